@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..disk.place import mode_of_old
+from ..disk.location import mode_of_existing
 from ..errors import OutputError
 
 
@@ -24,7 +24,7 @@ class RowJournal:
         # path -> offset of its line, and digest of its file
         self._known: dict[str, tuple[int, str | None]] = {}
         try:
-            mode_of_old(file)
+            mode_of_existing(file)
             self._file = file.open("a+b")
             self._read()
         except OSError as error:

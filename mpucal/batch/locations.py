@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
 from ..errors import OutputError, RecordingError, UsageError
 
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..data import STANDARD_GRAVITY_MPS2
-from ..disk.folder import Folder
+from ..disk.output_folder import OutputFolder
 from ..errors import SourceError, UsageError
 from .journal import RowJournal
 from .row import Settings, make_rows
@@ -81,7 +81,7 @@ def calibrate_many(
     names, settings = [str(path) for path in paths], Settings(model, gravity)
     with TemporaryDirectory() as temporary, local_client() if client is None else nullcontext(client) as workers:
         place = Path(folder or temporary)
-        with Folder(place), closing(RowJournal(place / JOURNAL, settings.key)) as journal:
+        with OutputFolder(place), closing(RowJournal(place / JOURNAL, settings.key)) as journal:
             for _ in run_batch(names, workers, journal, settings):
                 pass
             return make_table(journal.rows(names))

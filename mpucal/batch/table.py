@@ -12,7 +12,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..disk.whole import whole_file
+from ..disk.atomic import atomic_file
 from ..errors import plain
 from .row import COLUMNS, TEXTS, WHOLE
 
@@ -42,7 +42,7 @@ def write_tables(folder: Path, rows: Iterator[dict[str, Any]]) -> tuple[Path, Pa
     OutputError : they cannot be written.
     """
     parquet, text = folder / PARQUET, folder / CSV
-    with whole_file(parquet) as binary, whole_file(text) as plain, pq.ParquetWriter(binary, schema()) as writer:
+    with atomic_file(parquet) as binary, atomic_file(text) as plain, pq.ParquetWriter(binary, schema()) as writer:
         plain.write((",".join(COLUMNS) + "\n").encode())
         while group := list(islice(rows, GROUP)):
             writer.write_table(make_table(group))

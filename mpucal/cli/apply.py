@@ -13,7 +13,7 @@ import click
 import numpy as np
 
 from ..data import Samples
-from ..disk.whole import check_not_among
+from ..disk.atomic import check_not_input
 from ..errors import UsageError
 from ..files import open_rows, open_writer
 from ..files.csv import CsvText
@@ -45,7 +45,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     if as_json and target is None:
         raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
     if target is not None:
-        check_not_among(target, (calibration, file, *captures_in(file)))
+        check_not_input(target, (calibration, file, *captures_in(file)))
     rows = open_rows(file, make_hints(hints))
     say_interpretation(rows.taken)
     if rows.done:

@@ -14,8 +14,8 @@ from ..batch.journal import RowJournal
 from ..batch.locations import expand
 from ..batch.many import JOURNAL, Progress, local_client, remote_client, run_batch
 from ..batch.row import Settings
-from ..disk.folder import Folder
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
+from ..disk.output_folder import OutputFolder
 from ..errors import UsageError
 from .arguments import PATH, output_option
 from .options import fit_options
@@ -72,8 +72,8 @@ def command(
         () if by_pattern is None else read_hints_file(by_pattern),
     )
     with (
-        Folder(folder),
-        Folder(folder / REPORTS) if reports else nullcontext(),
+        OutputFolder(folder),
+        OutputFolder(folder / REPORTS) if reports else nullcontext(),
         closing(RowJournal(folder / JOURNAL, settings.key)) as journal,
     ):
         with remote_client(scheduler) if scheduler else local_client(workers, dashboard) as client:

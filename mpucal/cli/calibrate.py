@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..disk.folder import Folder
+from ..disk.output_folder import OutputFolder
 from ..errors import RefusedError
 from ..files import load
 from ..files.formats import readable_formats
@@ -61,7 +61,7 @@ def command(
     paths: tuple[Path, ...] = ()
     if folder is not None:
         check_owner(folder, calibration, recording, "calibrate", str(recording))
-        with Folder(folder) as into:
+        with OutputFolder(folder) as into:
             paths = save(into.path, dict(result_files(calibration, samples)))
     if as_json:
         click.echo(calibration.json(), nl=False)

@@ -13,8 +13,8 @@ from typing import Any
 import click
 
 from ..data import Recording
-from ..disk.folder import Folder
-from ..disk.whole import check_not_among
+from ..disk.atomic import check_not_input
+from ..disk.output_folder import OutputFolder
 from ..errors import UsageError
 from ..files import load
 from ..page.address import Address
@@ -92,13 +92,13 @@ def command(
     old = load_calibration(calibration) if folder is None else load_trusted(calibration, force)
     if folder is not None:
         for name in (BLOB.name, DOCUMENT.name):
-            check_not_among(folder / name, [calibration])
+            check_not_input(folder / name, [calibration])
     if file is not None:
         recording = load(file, given_hints(options))
         say_interpretation(recording.taken)
         if folder is not None:
             check_owner(folder, old, None, "check", str(calibration), str(file))
-        with nullcontext() if folder is None else Folder(folder) as place:
+        with nullcontext() if folder is None else OutputFolder(folder) as place:
             return _check(old, place, as_json, recording)[0].exit_code
     check_source(click.get_current_context())
     options = at_gravity_of(old, options)
@@ -122,7 +122,7 @@ def command(
 
 
 def _check(
-    old: Calibration, folder: Folder | None, as_json: bool, recording: Recording
+    old: Calibration, folder: OutputFolder | None, as_json: bool, recording: Recording
 ) -> tuple[CheckResult, list[Path]]:
     """Check, print the result, and write its files: check.json, and an updated calibration if only biases changed."""
     result = check(old, recording)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..disk.whole import check_not_among, write_atomically
+from ..disk.atomic import check_not_input, write_atomically
 from ..export.forms import FORMS, form
 from ..result.noise import Noise, with_noise
 from .arguments import calibration_argument, json_option, noise_option, output_option
@@ -36,7 +36,7 @@ Exit code 5: the calibration was refused; 6: the format cannot represent it.
 def command(calibration: Path, name: str, file: Path | None, noise: Path | None, as_json: bool) -> None:
     """Convert the calibration, and print or write the text."""
     if file is not None:
-        check_not_among(file, [calibration])
+        check_not_input(file, [calibration])
     chosen = form(name)
     read = load_calibration(calibration)
     text, notes = chosen.export(read if noise is None else with_noise(read, Noise.load(noise)))

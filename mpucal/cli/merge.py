@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from ..disk.folder import Folder
-from ..disk.whole import check_not_among
+from ..disk.atomic import check_not_input
+from ..disk.output_folder import OutputFolder
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import check_owner, save
@@ -31,11 +31,11 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as
     """
     if folder is not None:
         for file in (BLOB, DOCUMENT):
-            check_not_among(folder / file.name, calibrations)
+            check_not_input(folder / file.name, calibrations)
     made = merge([load_trusted(path, force) for path in calibrations])
     if folder is not None:
         check_owner(folder, made.calibration, None, "merge", *map(str, calibrations))
-        with Folder(folder) as into:
+        with OutputFolder(folder) as into:
             document, blob = made.calibration.json().encode(), made.calibration.blob().encode()
             save(into.path, {BLOB.name: blob, DOCUMENT.name: document})
     for sentence in (made.why, *made.remarks):

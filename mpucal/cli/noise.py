@@ -15,7 +15,7 @@ import click
 
 from ..allan import NoiseMeter
 from ..data import Samples, Sensor
-from ..disk.folder import Folder
+from ..disk.output_folder import OutputFolder
 from ..errors import EndOfCapture, UsageError
 from ..files import open_rows
 from ..files.rows import drop_incomplete
@@ -67,7 +67,7 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
         noise = _measure_source(options, None if hours is None else 3600.0 * hours)
     click.echo(noise.json() if as_json else summary(noise), nl=not as_json)
     if folder is not None:
-        with Folder(folder) as into:
+        with OutputFolder(folder) as into:
             save(into.path, {PAGE: render(noise).encode(), DOCUMENT: noise.json().encode()})
         click.echo(f"\nWritten to {folder}:\n  {DOCUMENT}, {PAGE}", err=as_json)
 

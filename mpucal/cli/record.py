@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..disk.place import check_free
+from ..disk.location import check_free
 from ..errors import OutputError
 from ..result.clock import stamp
 from ..sources.opening import open_source

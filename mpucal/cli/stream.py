@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from ..data import Samples
-from ..disk.place import check_free
+from ..disk.location import check_free
 from ..errors import EndOfCapture
 from ..files.csv import NS, CsvText
 from ..page.address import Address

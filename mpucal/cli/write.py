@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..disk.folder import Folder
+from ..disk.output_folder import OutputFolder
 from ..sinks.record import file_recorder, is_calibration
 from ..sinks.table import SINKS
 from ..sinks.write_back import put_back, write_objection, write_to
@@ -41,7 +41,7 @@ def command(
     check_sink(kind, check_source(click.get_current_context()), options)
     written = load_trusted(calibration, force) if is_calibration(calibration) else None
     with (
-        Folder(folder or calibration.parent) as into,
+        OutputFolder(folder or calibration.parent) as into,
         kind.open(make_device(at_gravity_of(written, options))) as sink,
     ):
         objection = write_objection(written, sink) if written is not None and written.quality else None

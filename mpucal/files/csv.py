@@ -17,7 +17,7 @@ from typing import IO
 import numpy as np
 
 from ..data import Samples, Vector
-from ..disk.whole import whole_file
+from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ._text import lines, numbers
 from .budget import LONGEST_LINE
@@ -207,5 +207,5 @@ class CsvText:
 @contextmanager
 def csv_file(path: Path, rows: Rows, _done: str) -> Iterator[Write]:
     """Open a table; it has no column for the flat part, gaps, clipping and the sensor. See open_writer."""
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         yield CsvText(file.write, rows.utc_ns).write

@@ -18,7 +18,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from numpy.typing import NDArray
 
 from ..data import Samples, Vector
-from ..disk.whole import whole_file
+from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from .chunks import ChunkWriter
 from .mcap import CALIBRATED
@@ -108,7 +108,7 @@ def imu_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
     Stamps are times of day if these are known, as on every robot, and else the recording's own times.
     """
     utc_ns = rows.utc_ns or 0
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         writer = ChunkWriter(
             file,
             MESSAGE,

@@ -28,8 +28,8 @@ from ..arguments import regular
 from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import Record, SessionEvent
-from ..disk.growing import Growing
-from ..disk.whole import whole_file
+from ..disk.atomic import atomic_file
+from ..disk.growing_file import GrowingFile
 from ..errors import CaptureError, OutputError
 from ..strict_json import parsed_own
 from .budget import LONGEST_CHUNK
@@ -68,7 +68,7 @@ class CaptureWriter:
 
     def __init__(self, path: str | Path) -> None:
         self._meta: Mapping[str, Any] = {}
-        self._file = Growing(Path(path))
+        self._file = GrowingFile(Path(path))
         # the index of chunks grows by 1 MB an hour, which is wasted if the file is not kept
         self._stream = _Stream(cast("IO[bytes]", self._file), CHUNK_NS, chunked=self._file.kept)
 
@@ -111,7 +111,7 @@ class CaptureWriter:
             self.close()
 
     def _with_longer_chunks(self, path: Path) -> None:
-        with whole_file(path) as file:
+        with atomic_file(path) as file:
             stream, written = _Stream(file, CLOSED_CHUNK_NS), CaptureReader(path)
             stream.start(self._meta)
             for block in written.blocks():

@@ -28,7 +28,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..data import Recording, Samples, Sensor
-from ..disk.whole import whole_file
+from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ..strict_json import parsed
 from .budget import check_size
@@ -202,7 +202,7 @@ def _runs(path: Path) -> Iterator[Samples]:
 @contextmanager
 def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
     """Open an uncompressed archive with all metadata; see open_writer."""
-    with ExitStack() as stack, whole_file(path) as file:
+    with ExitStack() as stack, atomic_file(path) as file:
         columns = {field.name: stack.enter_context(TemporaryFile(dir=path.parent)) for field in fields(Samples)}
         count = 0
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..chip.families import PARTS, Part
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
-from .elements import Element
+from .scan_elements import ScanElement
 
 AXES = "xyz"
 ACCEL, GYRO, TEMP, TIMESTAMP = "in_accel", "in_anglvel", "in_temp", "in_timestamp"
@@ -66,13 +66,13 @@ def full_scale(kind: str, scale: float, bits: int) -> float:
     return float(round(value)) if abs(value - round(value)) < ROUNDED * value else value
 
 
-def bits_of(kind: str, texts: Texts, elements: Mapping[str, Element]) -> int | None:
+def bits_of(kind: str, texts: Texts, elements: Mapping[str, ScanElement]) -> int | None:
     """Of a count; None where neither the buffer nor the part's name says it."""
     first = elements.get(f"{kind}_x")
     return first.bits if first is not None else USUAL_BITS if part_of(texts) is not None else None
 
 
-def group(kind: str, device: str, texts: Texts, elements: Mapping[str, Element]) -> Group:
+def group(kind: str, device: str, texts: Texts, elements: Mapping[str, ScanElement]) -> Group:
     """Of a device's attributes.
 
     Raises

@@ -12,9 +12,9 @@ from ..chip.access import Transaction
 from ..chip.families import MPU6050
 from ..data import Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
-from .aligned import Aligned, Times
 from .attributes import ACCEL, AXES, GYRO, TEMP, TIMESTAMP, Group, bits_of, chip, group, mount_matrix, part_of
-from .elements import Element, Layout
+from .scan_elements import FrameLayout, ScanElement
+from .stream_aligner import StreamAligner, Times
 
 NS = 1e-9
 # samples are missing where the next is so many intervals later
@@ -30,7 +30,7 @@ class _Device:
     """What is known of one: the texts of its attributes, and how its frames look."""
 
     texts: dict[str, str]
-    layout: Layout | None = None
+    layout: FrameLayout | None = None
     offset_ns: int | None = None
 
 
@@ -49,7 +49,7 @@ class IioDecoder:
         self._devices: dict[str, _Device] = {}
         self._groups: dict[str, tuple[str, Group]] = {}
         self._streams: dict[str, int] = {}
-        self._aligned: Aligned | None = None
+        self._aligned: StreamAligner | None = None
         self._turn: Vector | None = None
         self._temperature = np.nan
         self._last_ns: int | None = None
@@ -81,12 +81,12 @@ class IioDecoder:
         """The attributes of a device that were read or written, by name."""
         return self._devices.setdefault(device, _Device({})).texts
 
-    def elements(self, device: str) -> dict[str, Element]:
+    def elements(self, device: str) -> dict[str, ScanElement]:
         """The channels that a frame of it may hold, as far as they were read."""
         texts = self.texts(device)
         names = [name[len("scan_elements/") : -len("_type")] for name in texts if name.endswith("_type")]
         return {
-            name: Element.parse(name, texts[f"scan_elements/{name}_index"], texts[f"scan_elements/{name}_type"])
+            name: ScanElement.parse(name, texts[f"scan_elements/{name}_index"], texts[f"scan_elements/{name}_type"])
             for name in names
             if f"scan_elements/{name}_index" in texts
         }
@@ -158,10 +158,10 @@ class IioDecoder:
             accel_offsets=self._calibbias(texts),
         )
 
-    def _layout(self, held: _Device) -> Layout | None:
+    def _layout(self, held: _Device) -> FrameLayout | None:
         device = next(name for name, one in self._devices.items() if one is held)
         enabled = [e for e in self.elements(device).values() if held.texts.get(f"scan_elements/{e.name}_en") == "1"]
-        return Layout(enabled) if enabled else None
+        return FrameLayout(enabled) if enabled else None
 
     def _begin(self) -> None:
         """Streams of frames: one where a device has both sensors, else two."""
@@ -173,7 +173,7 @@ class IioDecoder:
         self._groups = {}
         self._settled = self._said()
         self._streams = {name: i for i, name in enumerate(widths)}
-        self._aligned = Aligned(list(widths.values()))
+        self._aligned = StreamAligner(list(widths.values()))
         accel, gyro = (mount_matrix(self.texts(self.group(kind)[0]), kind) for kind in (ACCEL, GYRO))
         self._turn = None if np.array_equal(accel, gyro) else np.asarray(np.linalg.solve(accel, gyro), np.float64)
         self._last_ns, self._broken = None, bool(self._given)

@@ -16,7 +16,7 @@ from ..errors import BusError, ChipError, EndOfCapture, NoAnswer
 from .attributes import ACCEL, AXES, GYRO, TEMP
 from .decode import IioDecoder
 from .devices import Devices
-from .setup import Attributes, set_up
+from .setup import DeviceAttributes, set_up
 
 # so long without a sample, and the driver gives up
 DEAD_NS = 2_000_000_000
@@ -53,7 +53,7 @@ class IioDriver:
     ) -> None:
         self._files, self._devices, self._config, self._say, self._trigger = files, devices, config, say, trigger
         self._decoder = IioDecoder(name)
-        self._each: list[Attributes] = []
+        self._each: list[DeviceAttributes] = []
         self._buffered = False
         self._now_ns = self._next_ns = self._fruitless_ns = self._warm_ns = 0
 
@@ -78,7 +78,7 @@ class IioDriver:
         BusError : no such device, or it cannot be written. ChipError : it has no such sensor, or no trigger.
         """
         self._now_ns = self.now_ns()
-        self._each = [Attributes(self._files, self._decoder, device) for device in self._devices.each]
+        self._each = [DeviceAttributes(self._files, self._decoder, device) for device in self._devices.each]
         for each in self._each:
             each.look(self._kinds(each.device))
         running = []
@@ -86,10 +86,10 @@ class IioDriver:
             for each in self._each:
                 running.append(set_up(each, self._kinds(each.device), self._config, self._decoder, self._trigger))
         except (BusError, ChipError):
-            self._put_back()
+            self._restore()
             raise
         if any(running) and not all(running):
-            self._put_back()
+            self._restore()
             raise ChipError("one of the two devices has no buffer", "give --trigger none, which polls both")
         self._buffered = all(running)
         if not self._buffered:
@@ -145,12 +145,12 @@ class IioDriver:
                 f"samples are missing in {self._decoder.gaps} places: the kernel's buffer overran, or the trigger fired"
                 " late; a lower --rate helps"
             )
-        self._put_back()
+        self._restore()
 
-    def _put_back(self) -> None:
+    def _restore(self) -> None:
         for each in self._each:
             with suppress(BusError, EndOfCapture):
-                each.put_back()
+                each.restore()
 
     def _kinds(self, device: str) -> tuple[str, ...]:
         return tuple(kind for kind, of in zip((ACCEL, GYRO), self._devices, strict=True) if of == device)

@@ -38,7 +38,7 @@ READ = (
 WITHIN = 1.01
 
 
-class Attributes:
+class DeviceAttributes:
     """The files of one device, each access followed by `decoder`.
 
     Attributes
@@ -104,7 +104,7 @@ class Attributes:
         self._old.append((name, held))
         return self.read(name)
 
-    def put_back(self) -> None:
+    def restore(self) -> None:
         """Write what was there before, the last one first; BusError where that fails."""
         while self._old:
             self._write(*self._old.pop())
@@ -123,7 +123,7 @@ class Attributes:
 
 
 def set_up(
-    attributes: Attributes, kinds: Sequence[str], config: Config, decoder: IioDecoder, trigger: str | None
+    attributes: DeviceAttributes, kinds: Sequence[str], config: Config, decoder: IioDecoder, trigger: str | None
 ) -> bool:
     """Rate, ranges, and a buffer that runs where it has one; whether it does.
 
@@ -162,7 +162,7 @@ def set_up(
     return True
 
 
-def _set_rate(attributes: Attributes, kinds: Sequence[str], config: Config) -> None:
+def _set_rate(attributes: DeviceAttributes, kinds: Sequence[str], config: Config) -> None:
     """The slowest that is as fast as wanted, else the fastest."""
     for name in (FREQUENCY, *(f"{kind}_{FREQUENCY}" for kind in kinds)):
         if name in attributes.names:
@@ -171,7 +171,7 @@ def _set_rate(attributes: Attributes, kinds: Sequence[str], config: Config) -> N
             attributes.set(name, f"{wanted:g}")
 
 
-def _set_scales(attributes: Attributes, kinds: Sequence[str], config: Config, decoder: IioDecoder) -> None:
+def _set_scales(attributes: DeviceAttributes, kinds: Sequence[str], config: Config, decoder: IioDecoder) -> None:
     """The smallest range that is as large as wanted, of a sensor that has several."""
     wanted = {ACCEL: config.accel_range_g, GYRO: config.gyro_range_dps}
     for kind in kinds:
@@ -185,7 +185,7 @@ def _set_scales(attributes: Attributes, kinds: Sequence[str], config: Config, de
             attributes.set(name, min(enough, key=enough.__getitem__) if enough else max(ranges, key=ranges.__getitem__))
 
 
-def _choose_trigger(attributes: Attributes, trigger: str | None) -> None:
+def _choose_trigger(attributes: DeviceAttributes, trigger: str | None) -> None:
     """The one that was named, or that is set, or the device's own."""
     held = attributes.read(TRIGGER)
     if trigger is None and held:
@@ -200,7 +200,7 @@ def _choose_trigger(attributes: Attributes, trigger: str | None) -> None:
     attributes.set(TRIGGER, wanted)
 
 
-def _enable_channels(attributes: Attributes, kinds: Sequence[str]) -> None:
+def _enable_channels(attributes: DeviceAttributes, kinds: Sequence[str]) -> None:
     """Those that are wanted, and no others.
 
     Raises

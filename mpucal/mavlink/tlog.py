@@ -10,7 +10,7 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from ..disk.growing import Growing
+from ..disk.growing_file import GrowingFile
 from ..errors import CaptureError, OutputError
 from .dialect import BEGINNING, HEADER, LONGEST, packet_length
 from .transport import US
@@ -38,7 +38,7 @@ class TlogWriter:
 
     def __init__(self, path: Path) -> None:
         self._flushed_ns = 0
-        self._file = Growing(path)
+        self._file = GrowingFile(path)
 
     def packet(self, t_ns: int, data: bytes) -> None:
         """Write a packet."""

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from .. import frames
 from ..arguments import a_path, content, shaped, vectors
 from ..data import GYRO_COUNTS, Recording, Sensor, Vector
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parsed
 from .blob import NO_RANGE, Blob, BlobError

@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..disk.whole import make_folders, sync_folder, write_atomically
+from ..disk.atomic import make_folders, sync_folder, write_atomically
 from ..errors import OutputError
 from ..strict_json import parsed
 from .clock import now

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import content
 from ..data import Sensor, Vector
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
 from ..errors import RecordingError
 from ..strict_json import MOST_BYTES, parsed
 from .calibration import Calibration

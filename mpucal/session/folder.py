@@ -6,15 +6,15 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..data import Sensor
-from ..disk.folder import Folder, free_name
+from ..disk.output_folder import OutputFolder, free_name
 from ..errors import OutputError, UsageError
 from ..files.folder import all_captures_in
 from ..result.clock import stamp
 from ..result.session_files import DOCUMENT
 
 
-class SessionFolder(Folder):
-    """Folder for one session, locked until it is closed; see Folder.
+class SessionFolder(OutputFolder):
+    """Folder for one session, locked until it is closed; see OutputFolder.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class SessionFolder(Folder):
             if not self._asked:
                 self.path.rmdir()
         elif sensor.chip and not self._asked:
-            self.call(f"{sensor.chip.lower()}-{self._stamp}")
+            self.rename(f"{sensor.chip.lower()}-{self._stamp}")
 
 
 def check_unfinished(folder: Path) -> None:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..data import Recording
-from ..disk.folder import free_name
-from ..disk.whole import take_away, write_atomically, write_together
+from ..disk.atomic import remove_file, write_atomically, write_together
+from ..disk.output_folder import free_name
 from ..errors import MpucalError, OutputError
 from ..files.folder import all_captures_in
 from ..report import render
@@ -85,7 +85,7 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
             write_atomically(folder / REPORT.name, files[REPORT.name])
         except OutputError as error:
             # An old report would be that of another calibration.
-            take_away(folder / REPORT.name)
+            remove_file(folder / REPORT.name)
             raise OutputError(
                 f"{error.what}; {' and '.join(first)} are kept in {folder}",
                 f"make the report with `mpucal calibrate {folder} -o ELSEWHERE`",

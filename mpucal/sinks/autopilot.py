@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4

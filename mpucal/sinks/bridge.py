@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from pkgutil import resolve_name
 
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
 from ..errors import BusError, WriteBackError
 from ..result.blob import Blob, BlobError
 from ..result.calibration import Calibration

@@ -21,13 +21,13 @@ from ..chip.access import Files
 from ..chip.config import Config
 from ..chip.offsets import Words, word_difference
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
 from ..errors import ChipError, OutputError
 from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
 from ..iio.attributes import ACCEL, AXES, mount_matrix
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
-from ..iio.setup import POLLED, Attributes
+from ..iio.setup import POLLED, DeviceAttributes
 from ..rests.stillness import let_go
 from ..result.calibration import Calibration
 from ..result.journal import Journal
@@ -68,7 +68,7 @@ class KernelSink:
         self._source, self._journal = source, journal or Journal()
         self._files: Files = source.bus  # type: ignore[assignment]
         self._decoder = IioDecoder("the kernel's driver")
-        self._attributes = Attributes(self._files, self._decoder, source.devices.accel)
+        self._attributes = DeviceAttributes(self._files, self._decoder, source.devices.accel)
         self._attributes.look([ACCEL])
         name = f"61-mpucal-{source.devices.accel.replace(':', '-')}.rules"
         self._rule = None if source.rules is None else source.rules / name

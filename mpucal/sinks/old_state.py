@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import content
-from ..disk.whole import write_atomically
+from ..disk.atomic import write_atomically
 from ..errors import RecordingError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
 from ..result.journal import Journal

@@ -23,7 +23,7 @@ from ...chip.probe import read_identity
 from ...chip.registers import ACCEL_LSB_PER_G, ACCEL_RANGES_G, GYRO_LSB_PER_DPS, GYRO_RANGES_DPS
 from ...data import STANDARD_GRAVITY_MPS2, Samples
 from ...iio.attributes import ACCEL, AXES, GYRO, TEMP, TIMESTAMP
-from ...iio.elements import Element, Layout
+from ...iio.scan_elements import FrameLayout, ScanElement
 from ...iio.setup import TRIGGERS
 from ...sources.iio_errors import attribute_error, buffer_error
 from ..chip import SimulatedBus
@@ -176,11 +176,11 @@ class _Device:
             self.texts |= {f"{TEMP}_raw": "", f"{TEMP}_scale": f"{self._temp_scale:.6f}"}
             self.texts |= {f"{TEMP}_offset": f"{self._temp_offset:.0f}"}
         self._elements = {
-            channel: Element(channel, i, ">", True, 16, 2, 0)
+            channel: ScanElement(channel, i, ">", True, 16, 2, 0)
             for i, channel in enumerate(
                 [*(c for c in CHANNELS if c.startswith(tuple(kinds))), *([TEMP] if ACCEL in kinds else [])]
             )
-        } | {TIMESTAMP: Element(TIMESTAMP, 9, "<", True, 64, 8, 0)}
+        } | {TIMESTAMP: ScanElement(TIMESTAMP, 9, "<", True, 64, 8, 0)}
         if buffered:
             for channel, element in self._elements.items():
                 stored = 8 * element.stored_bytes
@@ -204,7 +204,7 @@ class _Device:
     def begin(self) -> None:
         """Empty the buffer, which has just been enabled or disabled."""
         enabled = [e for e in self._elements.values() if self.texts.get(f"scan_elements/{e.name}_en") == "1"]
-        self.layout = Layout(enabled)
+        self.layout = FrameLayout(enabled)
         self.frames = b""
 
     def columns(self, samples: Samples) -> dict[str, np.ndarray]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import OutputError
 
 
-def place(handle: int, path: Path) -> Path | None:
+def current_path(handle: int, path: Path) -> Path | None:
     """Where the file or folder behind `handle` is now, `path` where it is still there; None where it has no name."""
     link = Path(f"/proc/self/fd/{handle}")
     # Linux tells where a file went
@@ -21,7 +21,7 @@ def place(handle: int, path: Path) -> Path | None:
     return None
 
 
-def mode_of_old(path: Path) -> int | None:
+def mode_of_existing(path: Path) -> int | None:
     """The rights of the file at `path`, which a new one may replace; None where there is none.
 
     Raises

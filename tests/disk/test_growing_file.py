@@ -6,8 +6,8 @@ import sys
 import pytest
 
 from mpucal.chip.access import Transaction
-from mpucal.disk.growing import Growing
-from mpucal.disk.place import check_free
+from mpucal.disk.growing_file import GrowingFile
+from mpucal.disk.location import check_free
 from mpucal.errors import OutputError
 from mpucal.files.mcap import CaptureWriter
 from mpucal.mavlink.tlog import TlogWriter
@@ -35,7 +35,7 @@ def test_what_is_there_already_stays(tmp_path, make):
     with pytest.raises(OutputError, match="is there already"):
         check_free(path)
     with pytest.raises(OutputError, match="File exists"):
-        Growing(path)
+        GrowingFile(path)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_what_is_there_already_stays(tmp_path, make):
     ids=["shortened", "removed", "replaced"],
 )
 def test_one_that_others_spoil_meanwhile_is_told(tmp_path, meddle, what):
-    file = Growing(tmp_path / "capture.mcap")
+    file = GrowingFile(tmp_path / "capture.mcap")
     file.write(b"bytes")
     file.flush()
     meddle(file.path)
@@ -60,7 +60,7 @@ def test_one_that_others_spoil_meanwhile_is_told(tmp_path, meddle, what):
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a file went")
 def test_one_in_a_folder_that_is_renamed_is_found(tmp_path):
     (tmp_path / "board").mkdir()
-    file = Growing(tmp_path / "board" / "capture.mcap")
+    file = GrowingFile(tmp_path / "board" / "capture.mcap")
     file.write(b"bytes")
     (tmp_path / "board").rename(tmp_path / "seven")
     assert file.close() == tmp_path / "seven" / "capture.mcap"

@@ -8,19 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.errors import ChipError
-from mpucal.iio.aligned import Aligned
-from mpucal.iio.elements import Element, Layout
+from mpucal.iio.scan_elements import FrameLayout, ScanElement
+from mpucal.iio.stream_aligner import StreamAligner
 
 
 def element(name, index, text):
-    return Element.parse(name, str(index), text)
+    return ScanElement.parse(name, str(index), text)
 
 
 def test_a_frame_of_an_mpu_has_padding_before_its_time():
     """inv_mpu6050 of Linux 6.1: six words, two bytes of temperature, then the time at a multiple of eight."""
     names = [*(f"in_accel_{axis}" for axis in "xyz"), "in_temp", *(f"in_anglvel_{axis}" for axis in "xyz")]
     words = [element(name, i, "be:s16/16>>0") for i, name in enumerate(names)]
-    layout = Layout([element("in_timestamp", 9, "le:s64/64>>0\n"), *words])
+    layout = FrameLayout([element("in_timestamp", 9, "le:s64/64>>0\n"), *words])
     data = struct.pack(">7h2x", 1, -2, 3, -32768, 5, 32767, -7) + struct.pack("<q", 1_700_000_000_123_456_789)
     columns = layout.columns(data * 3)
     assert layout.frame_bytes == 24
@@ -41,7 +41,7 @@ def test_a_frame_of_an_mpu_has_padding_before_its_time():
     ],
 )
 def test_each_way_to_store_a_count(text, stored, value):
-    layout = Layout([element("in_accel_x", 0, text)])
+    layout = FrameLayout([element("in_accel_x", 0, text)])
     assert layout.columns(stored)["in_accel_x"].tolist() == [value]
 
 
@@ -49,7 +49,7 @@ def test_what_is_no_type_and_what_is_no_frame_says_so():
     with pytest.raises(ChipError, match="of how in_accel_x is stored"):
         element("in_accel_x", 0, "s16/16>>0")
     with pytest.raises(ChipError, match="5 bytes, and a frame has 2"):
-        Layout([element("in_accel_x", 0, "le:s16/16>>0")]).columns(bytes(5))
+        FrameLayout([element("in_accel_x", 0, "le:s16/16>>0")]).columns(bytes(5))
 
 
 STEPS = st.lists(st.integers(1, 9), min_size=2, max_size=30)
@@ -60,7 +60,7 @@ CALLS = st.lists(st.tuples(st.integers(0, 1), st.integers(0, 5)), max_size=30)
 def test_alignment_is_numpys_interpolation_however_the_samples_come(one, other, calls):
     t, s = np.cumsum(one), np.cumsum(other)
     values, held = np.sin(t)[:, None], np.cos(s)[:, None] * [1.0, 2.0]
-    aligned, rows = Aligned([1, 2]), []
+    aligned, rows = StreamAligner([1, 2]), []
     at = [0, 0]
     for stream, count in [*calls, (0, len(t)), (1, len(s))]:
         times, columns = ((t, values), (s, held))[stream]
@@ -74,7 +74,7 @@ def test_alignment_is_numpys_interpolation_however_the_samples_come(one, other, 
 
 
 def test_a_sample_that_is_not_later_is_left_out():
-    aligned = Aligned([1])
+    aligned = StreamAligner([1])
     aligned.add(0, np.array([5, 5, 4, 6]), np.arange(4.0)[:, None])
     aligned.take()
     aligned.add(0, np.array([6, 7]), np.arange(2.0)[:, None])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.disk.whole import take_away, write_atomically, write_together
+from mpucal.disk.atomic import remove_file, write_atomically, write_together
 from mpucal.errors import OutputError
 
 
@@ -120,7 +120,7 @@ def test_what_is_no_file_is_never_replaced(tmp_path, make, what):
     for write in (lambda: write_atomically(path, b"new"), lambda: write_together({path: b"new"})):
         with pytest.raises(OutputError, match=what):
             write()
-    take_away(path)
+    remove_file(path)
     assert os.path.samestat(path.lstat(), was)
     assert (tmp_path / "other").read_bytes() == b"other"
     assert {each.name for each in tmp_path.iterdir()} == {"other", "a.json"}

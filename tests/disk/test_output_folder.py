@@ -5,24 +5,24 @@ import sys
 
 import pytest
 
-from mpucal.disk.folder import Folder, free_name
+from mpucal.disk.output_folder import OutputFolder, free_name
 from mpucal.errors import OutputError
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell who has a lock")
 def test_a_second_one_is_refused_and_told_who_has_it(tmp_path):
-    with Folder(tmp_path / "board"), pytest.raises(OutputError, match=rf"another mpucal \(process {os.getpid()}\)"):
-        Folder(tmp_path / "board")
-    with Folder(tmp_path / "board") as again:
+    with OutputFolder(tmp_path / "board"), pytest.raises(OutputError, match=rf"\(process {os.getpid()}\)"):
+        OutputFolder(tmp_path / "board")
+    with OutputFolder(tmp_path / "board") as again:
         assert again.path == tmp_path / "board"
 
 
 def test_new_ones_have_names_of_their_own(tmp_path):
-    folders = [Folder(tmp_path / "board", new=True) for _ in range(3)]
+    folders = [OutputFolder(tmp_path / "board", new=True) for _ in range(3)]
     assert [folder.path.name for folder in folders] == ["board", "board-2", "board-3"]
     for folder in folders:
         (folder.path / "capture").touch()
-        folder.call(str(tmp_path / "mpu6050"))
+        folder.rename(str(tmp_path / "mpu6050"))
         folder.close()
     assert {path.name for path in tmp_path.iterdir()} == {"mpu6050", "mpu6050-2", "mpu6050-3"}
     assert free_name(tmp_path / "mpu6050") == tmp_path / "mpu6050-4"
@@ -30,7 +30,7 @@ def test_new_ones_have_names_of_their_own(tmp_path):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a folder went")
 def test_one_that_is_renamed_is_followed_and_one_that_is_replaced_is_not_written_to(tmp_path):
-    with Folder(tmp_path / "board") as folder:
+    with OutputFolder(tmp_path / "board") as folder:
         (tmp_path / "board").rename(tmp_path / "seven")
         (tmp_path / "board").mkdir()
         assert folder.path == tmp_path / "seven"
@@ -42,4 +42,4 @@ def test_one_that_is_renamed_is_followed_and_one_that_is_replaced_is_not_written
 def test_a_file_in_its_place_is_an_output_error(tmp_path):
     (tmp_path / "board").touch()
     with pytest.raises(OutputError, match="cannot make the folder"):
-        Folder(tmp_path / "board")
+        OutputFolder(tmp_path / "board")

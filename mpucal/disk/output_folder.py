@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Self
 
 from ..errors import OutputError
-from .place import place
-from .whole import make_folders, sync_folder
+from .atomic import make_folders, sync_folder
+from .location import current_path
 
 
-class Folder:
+class OutputFolder:
     """A folder, made where it is missing, that no other process of mpucal writes to until it is closed.
 
     Where neither the system nor the disk knows locks, nobody is kept away.
@@ -44,7 +44,7 @@ class Folder:
         OutputError : it was removed, or another one is in its place.
         """
         if self._handle is not None:
-            found = place(self._handle, self._path)
+            found = current_path(self._handle, self._path)
             if found is None:
                 raise OutputError(
                     f"the folder {self._path} was removed or replaced by another program",
@@ -53,7 +53,7 @@ class Folder:
             self._path = found
         return self._path
 
-    def call(self, name: str) -> None:
+    def rename(self, name: str) -> None:
         """Rename it, to `name` or with the first number behind it that is free; where that fails, it stays."""
         with suppress(OSError, OutputError):
             free = _made(name)

@@ -12,7 +12,7 @@ from ..data import Vector
 Times = NDArray[np.int64]
 
 
-class Aligned:
+class StreamAligner:
     """Takes each stream's samples as they come, and gives the rows that are complete.
 
     What comes out depends on the samples alone, and not on how many came at once.

@@ -9,13 +9,13 @@ from threading import Event, Thread
 from typing import IO
 
 from ..errors import OutputError
-from .place import place
-from .whole import sync_folder
+from .atomic import sync_folder
+from .location import current_path
 
 EVERY_S = 1.0
 
 
-class Growing:
+class GrowingFile:
     """A file of bytes, made anew, synced once a second; the null device is there already, and keeps nothing.
 
     Attributes
@@ -37,7 +37,7 @@ class Growing:
         except OSError as error:
             raise self.failed(error) from error
         sync_folder(path.parent)
-        self._syncing = Syncing(self._file)
+        self._syncing = SyncThread(self._file)
 
     def write(self, data: bytes) -> int:
         """Add to its end; OSError where there is no room."""
@@ -63,7 +63,7 @@ class Growing:
             self.flush()
             if not self.kept:
                 return None
-            now = place(self._file.fileno(), self.path)
+            now = current_path(self._file.fileno(), self.path)
             if now is None or os.fstat(self._file.fileno()).st_size != self._written:
                 what = "was shortened or overwritten" if now else "was removed or replaced"
                 raise OutputError(
@@ -79,7 +79,7 @@ class Growing:
         )
 
 
-class Syncing:
+class SyncThread:
     """Syncs an open file once a second, in a thread of its own: a disk may take as long as it likes."""
 
     def __init__(self, file: IO[bytes]) -> None:

@@ -20,7 +20,7 @@ TYPE = re.compile(r"(be|le):([su])(\d+)/(8|16|32|64)(?:X(\d+))?>>(\d+)")
 
 
 @dataclass(frozen=True)
-class Element:
+class ScanElement:
     """One channel of a frame.
 
     Attributes
@@ -79,10 +79,10 @@ class Element:
         return np.asarray((held << up).view(np.int64) >> np.int64(up))
 
 
-class Layout:
+class FrameLayout:
     """Where the elements of a frame lie."""
 
-    def __init__(self, elements: Iterable[Element]) -> None:
+    def __init__(self, elements: Iterable[ScanElement]) -> None:
         self.elements = sorted(elements, key=lambda element: element.index)
         at, places = 0, []
         for element in self.elements:

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import IO
 
 from ..errors import OutputError, UsageError
-from .place import mode_of_old
+from .location import mode_of_existing
 
 
-def check_not_among(target: Path, inputs: Iterable[Path]) -> None:
+def check_not_input(target: Path, inputs: Iterable[Path]) -> None:
     """A result never takes the place of what it was made of; UsageError where `target` is one of `inputs`."""
     if target.exists() and any(read.exists() and target.samefile(read) for read in inputs):
         raise UsageError(f"{target} is what was given to be read", "choose another name with -o")
@@ -26,7 +26,7 @@ def write_atomically(path: Path, data: bytes) -> None:
     ------
     OutputError : the folder or file cannot be written.
     """
-    with whole_file(Path(path)) as file:
+    with atomic_file(Path(path)) as file:
         file.write(data)
 
 
@@ -44,7 +44,7 @@ def write_together(files: Mapping[Path, bytes]) -> None:
         with ExitStack() as stack:
             # what is entered last takes its place first
             for path in reversed(list(files)):
-                file = stack.enter_context(whole_file(path))
+                file = stack.enter_context(atomic_file(path))
                 file.write(files[path])
                 file.flush()
     except BaseException:
@@ -63,22 +63,22 @@ def _held(path: Path) -> bytes | None:
         ) from error
 
 
-def take_away(path: Path) -> None:
+def remove_file(path: Path) -> None:
     """Remove a file; what is none stays."""
     with suppress(OSError, OutputError):
-        if mode_of_old(path) is not None:
+        if mode_of_existing(path) is not None:
             path.unlink()
 
 
 def _put_back(path: Path, data: bytes | None) -> None:
     if data is None:
-        take_away(path)
+        remove_file(path)
     elif path.read_bytes() != data:
         write_atomically(path, data)
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[IO[bytes]]:
+def atomic_file(path: Path) -> Iterator[IO[bytes]]:
     """A file to be filled, which takes the place of `path` once it is; whatever fails meanwhile leaves the old one.
 
     Raises
@@ -86,7 +86,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
     OutputError : the folder or file cannot be written, or there is a link, device or pipe of that name.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-    rights = mode_of_old(path)
+    rights = mode_of_existing(path)
     made = False
     try:
         # the umask is the person's; what is there keeps its rights
@@ -97,7 +97,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        mode_of_old(path)
+        mode_of_existing(path)
         temporary.replace(path)
         sync_folder(path.parent)
     except BaseException as error:
