@@ -5,11 +5,12 @@ A transfer fails as on Linux: OSError with the errno of Documentation/i2c/fault-
 
 from __future__ import annotations
 
-import errno
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from errno import EREMOTEIO, ETIMEDOUT
+from functools import partial
 from typing import Self
 
 from ..chip.registers import FIFO_COUNT_H, FIFO_R_W
@@ -85,150 +86,75 @@ def _without_fifo(register: int, data: bytes) -> bytes:
     return bytes(len(data)) if FIFO_COUNT_H <= register <= FIFO_R_W else data
 
 
+BUS, CHIP, HAND, VEHICLE = Where.BUS, Where.CHIP, Where.HAND, Where.VEHICLE
+LINK, SERIAL, DEFECT = Where.LINK, Where.SERIAL, Where.DEFECT
+ALWAYS = partial(FaultKind, timed=False)
+
+# fmt: off
 _ROWS = (
-    FaultKind("nack", Where.BUS, "for 0.3 s the chip does not acknowledge", seconds=0.3, errno=errno.EREMOTEIO),
-    FaultKind(
-        "timeout",
-        Where.BUS,
-        "for 0.5 s each transfer takes 0.1 s and fails",
-        seconds=0.5,
-        errno=errno.ETIMEDOUT,
-        takes_s=0.1,
-    ),
-    FaultKind("overflow", Where.BUS, "the host sleeps for 2 s", pause_s=2.0),
-    FaultKind(
-        "brownout",
-        Where.CHIP,
-        "the chip resets, and is gone for 50 ms",
-        seconds=0.05,
-        errno=errno.EREMOTEIO,
-        strike=lambda chip, t_ns, _: chip.reset(t_ns),
-    ),
-    FaultKind(
-        "stuck",
-        Where.BUS,
-        "a wire stays low from then on",
-        seconds=math.inf,
-        errno=errno.ETIMEDOUT,
-        takes_s=0.1,
-    ),
-    FaultKind("unplugged", Where.BUS, "a wire is pulled, for good", seconds=math.inf, errno=errno.EREMOTEIO),
-    FaultKind(
-        "bitflips",
-        Where.BUS,
-        "for 0.5 s one byte in 200 arrives with a bit flipped, in either direction",
-        seconds=0.5,
-        flips=True,
-        share=1 / 200,
-    ),
-    FaultKind(
-        "clock",
-        Where.CHIP,
-        "the sample clock runs 1 % faster from then on",
-        strike=lambda chip, t_ns, _: chip.change_speed(1.01, t_ns),
-    ),
-    FaultKind(
-        "frozen",
-        Where.CHIP,
-        "for 1 s the sensor repeats itself",
-        seconds=1.0,
-        strike=lambda chip, _, end_ns: chip.freeze(end_ns),
-    ),
-    FaultKind("slip", Where.CHIP, "the FIFO loses a byte", strike=lambda chip, t_ns, _: chip.lose_fifo_byte(t_ns)),
-    FaultKind(
-        "low_byte",
-        Where.CHIP,
-        "the low byte of the accelerometer's x stays 0 from then on",
-        strike=lambda chip, *_: chip.clear_bits(0, 0xFF),
-    ),
-    FaultKind(
-        "high_bit",
-        Where.CHIP,
-        "bit 12 of the accelerometer's y stays 0 from then on",
-        strike=lambda chip, *_: chip.clear_bits(1, 1 << 12),
-    ),
-    FaultKind(
-        "bit_errors",
-        Where.BUS,
-        "from then on one byte in 2,000 arrives with a bit flipped, in either direction",
-        seconds=math.inf,
-        flips=True,
-        share=1 / 2000,
-    ),
-    FaultKind(
-        "nacks",
-        Where.DEFECT,
-        "one transfer in fifty is not acknowledged",
-        timed=False,
-        seconds=math.inf,
-        errno=errno.EREMOTEIO,
-        share=1 / 50,
-    ),
-    FaultKind(
-        "stuckbit",
-        Where.DEFECT,
-        "bit 4 of every byte that is read is 1",
-        timed=False,
-        alters=lambda _, data: bytes(byte | 0x10 for byte in data),
-    ),
-    FaultKind(
-        "ones",
-        Where.DEFECT,
-        "every byte that is read is 0xff: SDA is not connected",
-        timed=False,
-        alters=lambda _, data: b"\xff" * len(data),
-    ),
-    FaultKind(
-        "zeros",
-        Where.DEFECT,
-        "every byte that is read is 0",
-        timed=False,
-        alters=lambda _, data: bytes(len(data)),
-    ),
-    FaultKind("rtc", Where.DEFECT, "a DS3231 clock answers in its place", timed=False, alters=_of_a_clock),
-    FaultKind("no_fifo", Where.DEFECT, "the FIFO stays empty", timed=False, alters=_without_fifo),
-    FaultKind("low_x", Where.DEFECT, "accelerometer x stays at -32768", timed=False, pins=((0,), -32768)),
-    FaultKind("zero_z", Where.DEFECT, "accelerometer z stays at 0", timed=False, pins=((2,), 0)),
-    FaultKind("zero_acc", Where.DEFECT, "the accelerometer stays at 0", timed=False, pins=(ACC, 0)),
-    FaultKind("full_acc", Where.DEFECT, "the accelerometer stays at 32767", timed=False, pins=(ACC, 32767)),
-    FaultKind("zero_gyro", Where.DEFECT, "the gyroscope stays at 0", timed=False, pins=(GYR, 0)),
-    FaultKind("stuck_ax", Where.DEFECT, "accelerometer x stays at 1234", timed=False, pins=((0,), 1234)),
-    FaultKind("zero_gz", Where.DEFECT, "gyroscope z stays at 0", timed=False, pins=((6,), 0)),
-    FaultKind("stuck_gy", Where.DEFECT, "gyroscope y stays at -15", timed=False, pins=((5,), -15)),
-    FaultKind("stuck_temp", Where.DEFECT, "the thermometer stays at 0", timed=False, pins=(TEMPERATURE, 0)),
-    FaultKind("loose", Where.HAND, "the accelerometer turns by 8 deg on its mount", mishap=Slip),
-    FaultKind("knock", Where.HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=Knock),
-    FaultKind("zero_step", Where.HAND, "the accelerometer's bias steps by 10 mg on x", mishap=ZeroStep),
-    FaultKind("warming", Where.HAND, "the chip warms by 15 °C within 40 s, and its biases follow", mishap=Warmth),
-    FaultKind("arm", Where.VEHICLE, "it is armed", strike=lambda vehicle: vehicle.arm()),
-    FaultKind("reboot", Where.VEHICLE, "it boots anew, and is silent for 2 s", strike=lambda vehicle: vehicle.reboot()),
-    FaultKind(
-        "silence", Where.VEHICLE, "it sends and hears nothing any more", strike=lambda vehicle: vehicle.fall_silent()
-    ),
-    FaultKind(
-        "second_station",
-        Where.VEHICLE,
-        "another station asks for 4 Hz of everything, every 15 s, as a MAVProxy at its default does",
-        again_s=15.0,
-        strike=lambda vehicle: vehicle.obey_second_station(),
-    ),
-    FaultKind(
-        "autocal",
-        Where.VEHICLE,
-        "a PX4 with SENS_IMU_AUTOCAL commits the accelerometer offsets that it learnt",
-        strike=lambda vehicle: vehicle.learn_offsets(),
-    ),
-    FaultKind("phantom", Where.VEHICLE, "IMUs that an ArduPilot does not have are sent as zeros", timed=False),
-    FaultKind("no_storage", Where.VEHICLE, "it has no card", timed=False),
-    FaultKind("loss", Where.LINK, "one packet in five is lost", timed=False, share=0.2),
-    FaultKind("reorder", Where.LINK, "one packet in ten is overtaken by three others", timed=False, share=0.1),
-    FaultKind("duplicate", Where.LINK, "one packet in ten comes twice", timed=False, share=0.1),
-    FaultKind("lost", Where.SERIAL, "a byte is lost", spoils=lambda byte, _: b""),
-    FaultKind("twice", Where.SERIAL, "a byte comes twice", spoils=lambda byte, _: bytes([byte, byte])),
-    FaultKind("flipped", Where.SERIAL, "bits of a byte are flipped", spoils=lambda byte, v: bytes([byte ^ v])),
-    FaultKind("noise", Where.SERIAL, "up to 89 bytes of noise", spoils=lambda byte, v: bytes([byte]) + bytes(v % 90)),
-    FaultKind("late", Where.SERIAL, "what follows comes with what is sent next"),
+    FaultKind("nack", BUS, "for 0.3 s the chip does not acknowledge", seconds=0.3, errno=EREMOTEIO),
+    FaultKind("timeout", BUS, "for 0.5 s each transfer takes 0.1 s and fails",
+              seconds=0.5, errno=ETIMEDOUT, takes_s=0.1),
+    FaultKind("overflow", BUS, "the host sleeps for 2 s", pause_s=2.0),
+    FaultKind("brownout", CHIP, "the chip resets, and is gone for 50 ms", seconds=0.05, errno=EREMOTEIO,
+              strike=lambda chip, t_ns, _: chip.reset(t_ns)),
+    FaultKind("stuck", BUS, "a wire stays low from then on", seconds=math.inf, errno=ETIMEDOUT, takes_s=0.1),
+    FaultKind("unplugged", BUS, "a wire is pulled, for good", seconds=math.inf, errno=EREMOTEIO),
+    FaultKind("bitflips", BUS, "for 0.5 s one byte in 200 arrives with a bit flipped, in either direction",
+              seconds=0.5, flips=True, share=1 / 200),
+    FaultKind("clock", CHIP, "the sample clock runs 1 % faster from then on",
+              strike=lambda chip, t_ns, _: chip.change_speed(1.01, t_ns)),
+    FaultKind("frozen", CHIP, "for 1 s the sensor repeats itself", seconds=1.0,
+              strike=lambda chip, _, end_ns: chip.freeze(end_ns)),
+    FaultKind("slip", CHIP, "the FIFO loses a byte", strike=lambda chip, t_ns, _: chip.lose_fifo_byte(t_ns)),
+    FaultKind("low_byte", CHIP, "the low byte of the accelerometer's x stays 0 from then on",
+              strike=lambda chip, *_: chip.clear_bits(0, 0xFF)),
+    FaultKind("high_bit", CHIP, "bit 12 of the accelerometer's y stays 0 from then on",
+              strike=lambda chip, *_: chip.clear_bits(1, 1 << 12)),
+    FaultKind("bit_errors", BUS, "from then on one byte in 2,000 arrives with a bit flipped, in either direction",
+              seconds=math.inf, flips=True, share=1 / 2000),
+    ALWAYS("nacks", DEFECT, "one transfer in fifty is not acknowledged",
+           seconds=math.inf, errno=EREMOTEIO, share=1 / 50),
+    ALWAYS("stuckbit", DEFECT, "bit 4 of every byte that is read is 1",
+           alters=lambda _, data: bytes(byte | 0x10 for byte in data)),
+    ALWAYS("ones", DEFECT, "every byte that is read is 0xff: SDA is not connected",
+           alters=lambda _, data: b"\xff" * len(data)),
+    ALWAYS("zeros", DEFECT, "every byte that is read is 0", alters=lambda _, data: bytes(len(data))),
+    ALWAYS("rtc", DEFECT, "a DS3231 clock answers in its place", alters=_of_a_clock),
+    ALWAYS("no_fifo", DEFECT, "the FIFO stays empty", alters=_without_fifo),
+    ALWAYS("low_x", DEFECT, "accelerometer x stays at -32768", pins=((0,), -32768)),
+    ALWAYS("zero_z", DEFECT, "accelerometer z stays at 0", pins=((2,), 0)),
+    ALWAYS("zero_acc", DEFECT, "the accelerometer stays at 0", pins=(ACC, 0)),
+    ALWAYS("full_acc", DEFECT, "the accelerometer stays at 32767", pins=(ACC, 32767)),
+    ALWAYS("zero_gyro", DEFECT, "the gyroscope stays at 0", pins=(GYR, 0)),
+    ALWAYS("stuck_ax", DEFECT, "accelerometer x stays at 1234", pins=((0,), 1234)),
+    ALWAYS("zero_gz", DEFECT, "gyroscope z stays at 0", pins=((6,), 0)),
+    ALWAYS("stuck_gy", DEFECT, "gyroscope y stays at -15", pins=((5,), -15)),
+    ALWAYS("stuck_temp", DEFECT, "the thermometer stays at 0", pins=(TEMPERATURE, 0)),
+    FaultKind("loose", HAND, "the accelerometer turns by 8 deg on its mount", mishap=Slip),
+    FaultKind("knock", HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=Knock),
+    FaultKind("zero_step", HAND, "the accelerometer's bias steps by 10 mg on x", mishap=ZeroStep),
+    FaultKind("warming", HAND, "the chip warms by 15 °C within 40 s, and its biases follow", mishap=Warmth),
+    FaultKind("arm", VEHICLE, "it is armed", strike=lambda vehicle: vehicle.arm()),
+    FaultKind("reboot", VEHICLE, "it boots anew, and is silent for 2 s", strike=lambda vehicle: vehicle.reboot()),
+    FaultKind("silence", VEHICLE, "it sends and hears nothing any more", strike=lambda vehicle: vehicle.fall_silent()),
+    FaultKind("second_station", VEHICLE,
+              "another station asks for 4 Hz of everything, every 15 s, as a MAVProxy at its default does",
+              again_s=15.0, strike=lambda vehicle: vehicle.obey_second_station()),
+    FaultKind("autocal", VEHICLE, "a PX4 with SENS_IMU_AUTOCAL commits the accelerometer offsets that it learnt",
+              strike=lambda vehicle: vehicle.learn_offsets()),
+    ALWAYS("phantom", VEHICLE, "IMUs that an ArduPilot does not have are sent as zeros"),
+    ALWAYS("no_storage", VEHICLE, "it has no card"),
+    ALWAYS("loss", LINK, "one packet in five is lost", share=0.2),
+    ALWAYS("reorder", LINK, "one packet in ten is overtaken by three others", share=0.1),
+    ALWAYS("duplicate", LINK, "one packet in ten comes twice", share=0.1),
+    FaultKind("lost", SERIAL, "a byte is lost", spoils=lambda byte, _: b""),
+    FaultKind("twice", SERIAL, "a byte comes twice", spoils=lambda byte, _: bytes([byte, byte])),
+    FaultKind("flipped", SERIAL, "bits of a byte are flipped", spoils=lambda byte, v: bytes([byte ^ v])),
+    FaultKind("noise", SERIAL, "up to 89 bytes of noise", spoils=lambda byte, v: bytes([byte]) + bytes(v % 90)),
+    FaultKind("late", SERIAL, "what follows comes with what is sent next"),
 )
+# fmt: on
 FAULTS = {kind.name: kind for kind in _ROWS}
 
 
