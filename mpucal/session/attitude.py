@@ -52,14 +52,9 @@ class Attitude:
             self._step(seconds, force, rate, still)
 
     @property
-    def matrix(self) -> Vector:
-        """Attitude at the last sample (3, 3)."""
-        return np.array(matrix(self._q))
-
-    def quaternion(self) -> Quaternion:
-        """Return the attitude as a unit quaternion (w, x, y, z) with w >= 0."""
-        w, x, y, z = self._q
-        return (-w, -x, -y, -z) if w < 0.0 else self._q
+    def now(self) -> Quaternion:
+        """Attitude at the last sample."""
+        return self._q
 
     def _steps(self, samples: Samples) -> Iterator[tuple[float, Direction, Direction]]:
         """Yield the length [s], mean acceleration and mean rate of each step that `samples` complete."""
@@ -86,31 +81,31 @@ class Attitude:
             x, y, z = acc
             self._q = straight((x / force, y / force, z / force) if force >= FALLING_MPS2 else (0.0, 0.0, 1.0))
             return
-        q = _product(self._q, _turn(rate[0] * seconds, rate[1] * seconds, rate[2] * seconds))
+        q = compose(self._q, from_vector(rate[0] * seconds, rate[1] * seconds, rate[2] * seconds))
         # In free fall no direction is up, and the gyroscope alone carries the attitude.
         if force >= FALLING_MPS2:
-            x, y, z = _turned(q, acc)
+            x, y, z = rotate(q, acc)
             aside = math.hypot(x, y)
             missing = math.atan2(aside, z)
             share = 1.0 - math.exp(-seconds / (STILL_S if still else MOVING_S))
             turn = min(share * missing, CORRECT_RAD_S * seconds) / aside if aside else 0.0
-            q = _product(_turn(y * turn, -x * turn, 0.0), q)
+            q = compose(from_vector(y * turn, -x * turn, 0.0), q)
         if still and not self._levelled:
-            most, askew = STRAIGHTEN_RAD_S * seconds, _heading(_product(straight(matrix(q)[2]), _inverse(q)))
-            q = _product(_turn(0.0, 0.0, min(max(askew, -most), most)), q)
+            most, askew = STRAIGHTEN_RAD_S * seconds, yaw_between(straight(matrix(q)[2]), q)
+            q = compose(from_vector(0.0, 0.0, min(max(askew, -most), most)), q)
         size = math.hypot(*q)
         w, x, y, z = q
         self._q = (w / size, x / size, y / size, z / size)
 
 
-def _turn(x: float, y: float, z: float) -> Quaternion:
+def from_vector(x: float, y: float, z: float) -> Quaternion:
     """Return the quaternion of a rotation vector [rad]."""
     half = 0.5 * math.hypot(x, y, z)
     scale = 0.5 * (math.sin(half) / half if half else 1.0)
     return (math.cos(half), scale * x, scale * y, scale * z)
 
 
-def _product(p: Quaternion, q: Quaternion) -> Quaternion:
+def compose(p: Quaternion, q: Quaternion) -> Quaternion:
     """Return the turn q followed by the turn p."""
     a, b, c, d = p
     w, x, y, z = q
@@ -132,7 +127,7 @@ def matrix(attitude: Quaternion) -> Matrix:
     )
 
 
-def _turned(attitude: Quaternion, v: Direction) -> Direction:
+def rotate(attitude: Quaternion, v: Direction) -> Direction:
     """Return the vector `v` of the board's axes in the room's."""
     w, x, y, z = attitude
     a, b, c = v
@@ -145,45 +140,26 @@ def _turned(attitude: Quaternion, v: Direction) -> Direction:
     )
 
 
-def _inverse(attitude: Quaternion) -> Quaternion:
-    w, x, y, z = attitude
-    return (w, -x, -y, -z)
-
-
-def _heading(turn: Quaternion) -> float:
-    """Return the angle by which it turns about the vertical [rad]."""
-    w, _, _, z = turn
+def yaw_between(attitude: Quaternion, other: Quaternion) -> float:
+    """Return the turn about the vertical to one attitude from another [rad]."""
+    w, x, y, z = other
+    w, _, _, z = compose(attitude, (w, -x, -y, -z))
     return math.atan2(2.0 * w * z, w * w - z * z)
+
+
+def turned_up(attitude: Quaternion, up: Direction) -> Quaternion:
+    """Return an attitude after the shortest turn that points the unit vector `up` of the board's axes up."""
+    x, y, z = rotate(attitude, up)
+    size = math.hypot(1.0 + z, y, x)
+    return compose(((1.0 + z) / size, y / size, -x / size, 0.0), attitude)
 
 
 def straight(up: Direction) -> Quaternion:
     """Return the attitude nearest to a board laid straight in which the unit vector `up` of its axes points up."""
-    laid = _LAID if up[2] >= 0.0 else _TURNED_OVER
-    # The shortest turn to (0, 0, 1) of the direction that points up once the board is laid.
-    x, y, z = _turned(laid, up)
-    size = math.hypot(1.0 + z, y, x)
-    return _product(((1.0 + z) / size, y / size, -x / size, 0.0), laid)
+    return turned_up(_LAID if up[2] >= 0.0 else _TURNED_OVER, up)
 
 
-def quaternion(matrix: Vector) -> Quaternion:
-    """Return the quaternion (w, x, y, z), w >= 0, of a rotation (3, 3); the largest component first (Shepperd 1978)."""
-    m = matrix
-    squares = np.array(
-        [
-            1.0 + m[0, 0] + m[1, 1] + m[2, 2],
-            1.0 + m[0, 0] - m[1, 1] - m[2, 2],
-            1.0 - m[0, 0] + m[1, 1] - m[2, 2],
-            1.0 - m[0, 0] - m[1, 1] + m[2, 2],
-        ]
-    )
-    x, y, z = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
-    rows = (
-        (squares[0], x, y, z),
-        (x, squares[1], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]),
-        (y, m[0, 1] + m[1, 0], squares[2], m[1, 2] + m[2, 1]),
-        (z, m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[3]),
-    )
-    q = np.array(rows[int(squares.argmax())])
-    q /= math.copysign(float(np.linalg.norm(q)), q[0] if q[0] else 1.0)
-    a, b, c, d = q.tolist()
-    return (a, b, c, d)
+def canonical(q: Quaternion) -> Quaternion:
+    """Return the quaternion of the same rotation with w >= 0."""
+    w, x, y, z = q
+    return (-w, -x, -y, -z) if w < 0.0 else q

@@ -10,7 +10,7 @@ from ..data import Samples, Sensor
 from ..rests.limits import HAND
 from ..rests.stillness import Detector, Moved
 from ..rests.windows import Window, Windows
-from .attitude import Attitude, quaternion
+from .attitude import Attitude, canonical
 from .events import Caution, Direction, Meter, Output, down_of
 from .turn_guide import TurnGuide
 
@@ -57,7 +57,7 @@ class MotionWatch:
         sight = self._stillness.add(window)
         moving = isinstance(sight, Moved)
         self._still = not moving
-        turn = None if wanted is None else self._guide.turn_to(wanted, self._attitude.matrix)
+        turn = None if wanted is None else self._guide.turn_to(wanted, self._attitude.now)
         # The mean of the last stillness is the gyroscope's bias.
         turning = float(np.linalg.norm(window.gyr - self._stillness.rest_rad_s))
         return Meter(
@@ -69,10 +69,10 @@ class MotionWatch:
             math.degrees(turning),
             window.count / (window.end_s - window.start_s),
             self._temperature_c,
-            self._attitude.quaternion(),
+            canonical(self._attitude.now),
             turn.missing_deg if turn else None,
             turn.words if turn else "",
-            quaternion(turn.attitude) if turn else None,
+            canonical(turn.attitude) if turn else None,
         )
 
     def _cautions(self, samples: Samples, t_s: float) -> list[Caution]:

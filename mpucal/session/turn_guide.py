@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
+from .attitude import compose, from_vector, rotate, turned_up, yaw_between
+from .events import Direction, Quaternion
 
-from ..calibration.rotation import rotation, shortest_turn
-from ..data import Vector
-from .events import Direction
-
-UP = np.array([0.0, 0.0, 1.0])
 # The eight directions in which the board's top can be turned, anticlockwise from the right as seen from above.
 TURN_WORDS = (
     "roll it to the right",
@@ -33,11 +29,11 @@ SLEW_RAD = math.radians(15.0)
 
 
 class Turn(NamedTuple):
-    """Turn to a wanted orientation: its angle, its words, and the attitude (3, 3) that it leads to."""
+    """Turn to a wanted orientation: its angle, its words, and the attitude that it leads to."""
 
     missing_deg: float
     words: str
-    attitude: Vector
+    attitude: Quaternion
 
 
 class TurnGuide:
@@ -51,22 +47,22 @@ class TurnGuide:
         self._to: Direction | None = None
         self._heading = 0.0
         self._said = 0
-        self._wanted: Vector = np.eye(3)
+        self._wanted: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
-    def turn_to(self, down: Direction, attitude: Vector) -> Turn:
-        """Return the turn of a board with this attitude (3, 3) that points the unit vector `down` of its axes down."""
+    def turn_to(self, down: Direction, attitude: Quaternion) -> Turn:
+        """Return the turn of a board with this attitude that points the unit vector `down` of its axes down."""
         new = down != self._to
-        x, y, z = (attitude @ np.asarray(down)).tolist()
+        x, y, z = rotate(attitude, down)
         missing = math.atan2(math.hypot(x, y), -z)
         self._update_heading(math.atan2(y, x), missing, new)
         # The turn's axis is horizontal, and at right angles to the heading of the top.
         along_x, along_y = math.cos(self._heading), math.sin(self._heading)
         turn = math.atan2(x * along_x + y * along_y, -z)
-        turned = rotation(np.array([-turn * along_y, turn * along_x, 0.0])) @ attitude
-        wanted = rotation(shortest_turn(turned @ np.asarray(down), -UP)) @ turned
+        turned = compose(from_vector(-turn * along_y, turn * along_x, 0.0), attitude)
+        wanted = turned_up(turned, (-down[0], -down[1], -down[2]))
         if not new:
-            slew = min(max(_yaw_between(wanted, self._wanted), -SLEW_RAD), SLEW_RAD)
-            wanted = rotation(UP * slew) @ self._wanted
+            slew = min(max(yaw_between(wanted, self._wanted), -SLEW_RAD), SLEW_RAD)
+            wanted = compose(from_vector(0.0, 0.0, slew), self._wanted)
         self._to, self._wanted = down, wanted
         rounded = ROUND_DEG * round(math.degrees(missing) / ROUND_DEG)
         words = f"{rounded:.0f} deg more, {TURN_WORDS[self._said]}" if rounded else ""
@@ -86,12 +82,6 @@ class TurnGuide:
         self._heading = shortest + min(max(aside, -most), most)
         if new or abs(_wrapped(self._heading - _angle(self._said))) > SAID_RAD:
             self._said = _nearest(self._heading)
-
-
-def _yaw_between(attitude: Vector, other: Vector) -> float:
-    """Return the turn about the vertical to one attitude (3, 3) from another [rad]."""
-    turn = attitude @ other.T
-    return math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
 
 
 def _nearest(heading: float) -> int:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import STANDARD_GRAVITY_MPS2, Samples, Sensor
 from mpucal.session.aims import ALL_AROUND
-from mpucal.session.attitude import quaternion, straight
+from mpucal.session.attitude import straight
 from mpucal.session.events import Connected, FitKind, Knowledge, Learnt, Measured, Meter, Prompt, RequestFit, Target
 from mpucal.session.machine import Machine
 from mpucal.session.meter import MotionWatch
@@ -25,15 +25,6 @@ BEYOND_DEG = 20.0
 
 def matrix(q):
     return Rotation.from_quat(q, scalar_first=True)
-
-
-def test_a_quaternion_is_that_of_its_matrix():
-    for turn in Rotation.random(50, random_state=0):
-        assert np.allclose(quaternion(turn.as_matrix()), turn.as_quat(canonical=True, scalar_first=True))
-
-
-def test_a_half_turn_has_a_quaternion():
-    assert np.allclose(np.abs(quaternion(np.diag([1.0, -1.0, -1.0]))), [0, 1, 0, 0])
 
 
 def test_the_gyroscope_carries_the_heading(board):

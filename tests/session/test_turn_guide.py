@@ -7,6 +7,8 @@ from scipy.spatial.transform import Rotation
 from mpucal.session.aims import ALL_AROUND
 from mpucal.session.turn_guide import TurnGuide
 
+STRAIGHT = (1.0, 0.0, 0.0, 0.0)
+
 
 @pytest.mark.parametrize(
     ("axis", "words"),
@@ -21,19 +23,20 @@ from mpucal.session.turn_guide import TurnGuide
 def test_a_turn_in_words_says_where_the_top_goes(axis, words):
     phi = np.array(axis) / np.linalg.norm(axis) * math.radians(61.0)
     down = Rotation.from_rotvec(-phi).apply((0, 0, -1))
-    assert TurnGuide().turn_to(tuple(down), np.eye(3)).words == f"60 deg more, {words}"
+    assert TurnGuide().turn_to(tuple(down), STRAIGHT).words == f"60 deg more, {words}"
 
 
 def test_next_to_nothing_is_no_turn():
-    assert TurnGuide().turn_to((0.01, 0.0, -1.0), np.eye(3)).words == ""
+    assert TurnGuide().turn_to((0.01, 0.0, -1.0), STRAIGHT).words == ""
 
 
 @pytest.mark.parametrize("down", ALL_AROUND.tolist())
 def test_the_missing_turn_leads_to_the_wanted_orientation(down):
-    attitude = Rotation.random(random_state=3).as_matrix()
-    turn = TurnGuide().turn_to(down, attitude)
-    assert np.allclose(turn.attitude @ down, [0, 0, -1], atol=1e-9)
-    between = np.degrees(Rotation.from_matrix(turn.attitude @ attitude.T).magnitude())
+    attitude = Rotation.random(random_state=3)
+    turn = TurnGuide().turn_to(down, attitude.as_quat(scalar_first=True).tolist())
+    reached = Rotation.from_quat(turn.attitude, scalar_first=True)
+    assert np.allclose(reached.apply(down), [0, 0, -1], atol=1e-9)
+    between = np.degrees((reached * attitude.inv()).magnitude())
     # about one of eight axes where that leads near enough, and so hardly more than the shortest turn
     assert turn.missing_deg - 1e-6 <= between <= turn.missing_deg + 5.0
 
@@ -42,7 +45,7 @@ def test_the_missing_turn_leads_to_the_wanted_orientation(down):
 def test_the_way_of_a_board_that_is_upside_down_does_not_change_with_each_tremor(tremor_deg):
     way, rng = TurnGuide(), np.random.default_rng(5)
     shaken = [Rotation.from_rotvec(np.radians(tremor_deg) * rng.normal(size=3) * [1, 1, 0]) for _ in range(40)]
-    turns = [way.turn_to((0.0, 0.0, 1.0), each.as_matrix()) for each in shaken]
+    turns = [way.turn_to((0.0, 0.0, 1.0), each.as_quat(scalar_first=True).tolist()) for each in shaken]
     assert len({turn.words.partition(", ")[2] for turn in turns}) == 1
-    wanted = Rotation.from_matrix([turn.attitude for turn in turns])
+    wanted = Rotation.from_quat([turn.attitude for turn in turns], scalar_first=True)
     assert np.degrees((wanted[1:] * wanted[:-1].inv()).magnitude()).max() < 20.0
