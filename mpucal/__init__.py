@@ -4,7 +4,7 @@
     calibration = mpucal.calibrate(recording)
     a = calibration.apply(acc)
 
-The names load on first use, so that `import mpucal` costs nothing.
+The names are loaded on first use, so that `import mpucal` is fast.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _HOME = {
 }
 
 
-if not TYPE_CHECKING:  # to which any name would be there
+if not TYPE_CHECKING:  # a type checker would accept any name
 
     def __getattr__(name: str) -> Any:
         if name not in _HOME:

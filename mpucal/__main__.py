@@ -1,8 +1,8 @@
-"""`python -m mpucal` and the `mpucal` command: an exit code for each class of error, and one sentence."""
+"""`python -m mpucal` and the `mpucal` command: each error becomes one sentence and an exit code."""
 
 from __future__ import annotations
 
-# next to nothing here: what takes a while to load does so where Ctrl-C finds its sentence
+# few imports: slow ones happen inside run(), which handles Ctrl-C
 import errno
 import gc
 import io
@@ -12,40 +12,40 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from .errors import Abandoned, MpucalError, OutputError, SourceError, plain
+from .errors import Abandoned, MpucalError, OutputError, SourceError, escape_controls
 from .session.threads import ONE_THREAD
 
 BUG = 1
-# of a full disk or quota behind stdout
+# errors of a full disk or quota behind stdout
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# what the loader says of a library that memory does not hold
+# the loader's message about a library that does not fit into memory
 UNMAPPED = "failed to map segment"
-# what a computer may answer to whatever is asked of it
+# errors that any access to a file or device may cause
 DENIED = (*NO_ROOM, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-# the commands whose capture is written as it happens
+# commands that write a capture while they run
 RECORDING = ("session", "record")
-# errors are events then, too
+# with this option errors are JSON events
 EVENTS = "--json-events"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a command, and leave with its exit code."""
+    """Run a command, and exit with its exit code."""
     for variable, one in ONE_THREAD.items():
         os.environ.setdefault(variable, one)
     _keep_streams()
     code = run(arguments)
-    # Python looks through everything for cycles at its end, which takes longer than some commands
+    # without the last garbage collection, which takes longer than some commands
     gc.freeze()
     sys.exit(code)
 
 
 def _keep_streams() -> None:
-    """Streams that take every text; whatever becomes of stderr, what was measured is worth more than what is said."""
+    """Replace stdout and stderr by streams that accept every text; a failing stderr must not end a measurement."""
     for handle in (0, 1, 2):
         try:
             os.fstat(handle)
         except OSError:
-            # a file that is opened later would take its place, and receive what is said
+            # otherwise the next opened file would get this number, and receive the messages
             os.open(os.devnull, os.O_RDWR)
     if isinstance(sys.stdout, io.TextIOWrapper):
         encoding, to_a_person = sys.stdout.encoding, sys.stdout.line_buffering
@@ -56,14 +56,14 @@ def _keep_streams() -> None:
 
 
 class _Plain(io.TextIOWrapper):
-    """Text that a terminal only shows: what it would obey, as in the name of a file, is escaped."""
+    """Text stream that escapes control characters, such as those in a file's name."""
 
     def write(self, text: str) -> int:
-        return super().write(plain(text))
+        return super().write(escape_controls(text))
 
 
 class _Unfailing(io.FileIO):
-    """What cannot be written is left out."""
+    """Raw stream that ignores errors of writing."""
 
     def write(self, data: Any) -> int:
         try:
@@ -77,10 +77,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except KeyboardInterrupt:
-        # where it came while text was executed, as for a dataclass, CPython ends by SIGINT, unless text was since
+        # CPython would end by SIGINT if the interrupt came inside exec, as in a dataclass; another exec prevents that
         exec("")
         words = _words(arguments)
-        kept = "; what was recorded until then is kept" if words and words[0] in RECORDING else ""
+        kept = "; the recording until then is kept" if words and words[0] in RECORDING else ""
         if EVENTS in words:
             return _event(Abandoned.exit_code, f"interrupted{kept}", "")
         print(f"mpucal: interrupted{kept}.", file=sys.stderr)
@@ -89,9 +89,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if error.errno not in DENIED:
             return _bug(arguments)
         if error.errno in NO_ROOM and error.filename is None:
-            # Python would complain again while it flushes
+            # flushing at exit would fail again
             sys.stdout = None
-            print(f"mpucal: the output cannot be written ({error.strerror}): make room where it goes.", file=sys.stderr)
+            print(f"mpucal: the output cannot be written ({error.strerror}): free space there.", file=sys.stderr)
             return OutputError.exit_code
         what = error.filename or "a file or device"
         return _denied(arguments, f"cannot use {what} ({error.strerror})", "check its permissions, and the disk")
@@ -118,14 +118,14 @@ def _run(arguments: Sequence[str] | None) -> int:
             return _event(error.exit_code, error.what, error.remedy)
         click.echo(f"mpucal: {error}", err=True)
         if error.options:
-            # the whole of it, to be copied
+            # the whole command, to be copied
             click.echo(f"mpucal: try `mpucal {shlex.join(_words(arguments))} {error.options}`", err=True)
         return error.exit_code
     except SystemExit:
-        # click's own end where who read the results has left: that is no error
+        # click exits so if the reader of stdout has gone, which is not an error
         return 0
     except (OSError, MemoryError):
-        # as while modules are loaded
+        # also from the loading of modules
         raise
     except Exception as error:
         if isinstance(error, ImportError) and UNMAPPED in str(error):
@@ -138,7 +138,7 @@ def _words(arguments: Sequence[str] | None) -> Sequence[str]:
 
 
 def _denied(arguments: Sequence[str] | None, what: str, do: str) -> int:
-    """What the computer cannot give, in a sentence or event."""
+    """Report a missing resource of the computer as a sentence or event; return the exit code."""
     if EVENTS in _words(arguments):
         return _event(SourceError.exit_code, what, do)
     print(f"mpucal: {what}: {do}.", file=sys.stderr)
@@ -146,11 +146,11 @@ def _denied(arguments: Sequence[str] | None, what: str, do: str) -> int:
 
 
 def _event(exit_code: int, what: str, remedy: str) -> int:
-    """An error as one more event; its exit code."""
+    """Print an error as an event; return its exit code."""
     import json  # noqa: PLC0415
 
-    said = {"event": "error", "exit_code": exit_code, "what": what, "remedy": remedy}
-    print(json.dumps(said), file=sys.stderr)
+    event = {"event": "error", "exit_code": exit_code, "what": what, "remedy": remedy}
+    print(json.dumps(event), file=sys.stderr)
     return exit_code
 
 

@@ -1,4 +1,4 @@
-"""What a caller hands over, checked: arrays, times and paths, with a sentence for what is wrong with them."""
+"""Checks of callers' arguments: arrays, times, numbers and paths."""
 
 from __future__ import annotations
 
@@ -15,43 +15,43 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import ArraysError, RecordingError, WrongType, WrongValue
 
-# of the times of any sensor's samples: no product of them overflows
+# s: limits of times and their steps, within which no product overflows
 SHORTEST_S, LONGEST_S = 1e-12, 1e18
-# of m/s^2 and rad/s: farther than any sensor reads, and squares of it stay finite
+# m/s^2 and rad/s: beyond any sensor, and with finite squares
 LARGEST = 1e9
-# of a local gravity [m/s^2], from small moons to centrifuges
+# m/s^2: limits of a local gravity, from small moons to centrifuges
 LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2 = 1e-3, 1e4
-# likewise from the equator's mountains to the poles, in round numbers (GRS 80: 9.780 and 9.832 at sea level)
+# m/s^2: limits on Earth, from mountains on the equator to the poles (GRS 80: 9.780 and 9.832 at sea level)
 LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2 = 9.76, 9.84
 
 Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def numbers(values: ArrayLike, key: str, name: str) -> Vector:
-    """Float64 of anything that is numbers."""
+def check_numbers(values: ArrayLike, key: str, name: str) -> Vector:
+    """Return an array of numbers as float64."""
     return _as_float(_array(values, key, name), key, name)
 
 
-def column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
-    """(n,), one value a sample."""
-    array = numbers(values, key, name)
+def check_column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
+    """Return (n,), one value per sample."""
+    array = check_numbers(values, key, name)
     if array.shape != (n,):
-        raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n},)", "give one value a sample")
+        raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n},)", "give one value per sample")
     return array
 
 
-def mask(values: ArrayLike | None, key: str, n: int, name: str) -> Mask:
-    """(n,) bool, False where nothing is given."""
-    return np.zeros(n, bool) if values is None else column(values, key, n, name).astype(bool)
+def check_mask(values: ArrayLike | None, key: str, n: int, name: str) -> Mask:
+    """Return (n,) bool; False if nothing is given."""
+    return np.zeros(n, bool) if values is None else check_column(values, key, n, name).astype(bool)
 
 
-def rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
-    """(n, 3) finite numbers."""
-    array = numbers(values, key, name)
+def check_rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
+    """Return (n, 3) finite numbers."""
+    array = check_numbers(values, key, name)
     if array.shape != (n, 3):
-        raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z a sample")
-    bad = ~measured(array).all(axis=1)
+        raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z per sample")
+    bad = ~is_plausible(array).all(axis=1)
     if bad.any():
         raise ArraysError(
             f"{name}: {key} is not a finite number in {int(bad.sum())} of {n} samples,"
@@ -61,24 +61,24 @@ def rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
     return array
 
 
-def measured(values: ArrayLike) -> Mask:
-    """Which are numbers that a sensor may have read: neither infinite nor beyond LARGEST."""
+def is_plausible(values: ArrayLike) -> Mask:
+    """Return True for each number that a sensor may have read: neither infinite nor beyond LARGEST."""
     return np.asarray(np.abs(values) <= LARGEST)
 
 
-def seconds(t: ArrayLike, name: str) -> Vector:
-    """(n,) s, increasing: of numbers as they are, of dates since the first of them.
+def check_seconds(t: ArrayLike, name: str) -> Vector:
+    """Return increasing times (n,) s; dates become the time since the first one.
 
     Raises
     ------
-    ArraysError : they are no times, or do not increase.
+    ArraysError : they are not times, or do not increase.
     """
     given = _array(t, "t", name)
     if given.dtype.kind == "M" and given.size:
         given = given - given.flat[0]
     t = given / np.timedelta64(1, "s") if given.dtype.kind == "m" else _as_float(given, "t", name)
     if t.ndim != 1 or len(t) < 2:
-        raise ArraysError(f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds a sample")
+        raise ArraysError(f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds per sample")
     with np.errstate(over="ignore"):
         _check_time(t, name)
         least, most = np.diff(t).min(), t[-1] - t[0]
@@ -87,12 +87,12 @@ def seconds(t: ArrayLike, name: str) -> Vector:
     return t
 
 
-def stretch(flat: Any, n: int, name: str) -> tuple[int, int]:
-    """(first, last + 1), within n samples.
+def check_flat(flat: Any, n: int, name: str) -> tuple[int, int]:
+    """Return (first, last + 1) of a part of n samples.
 
     Raises
     ------
-    ArraysError : it is no such pair.
+    ArraysError : it is not such a pair.
     """
     remedy = "give (first, last + 1) of the samples that lie flat, or leave it out"
     try:
@@ -104,29 +104,29 @@ def stretch(flat: Any, n: int, name: str) -> tuple[int, int]:
     return first, last
 
 
-def vectors(values: ArrayLike, name: str, unit: str) -> Vector:
-    """(..., 3) numbers of x, y, z, for a calibration to be applied to.
+def check_vectors(values: ArrayLike, name: str, unit: str) -> Vector:
+    """Return (..., 3) numbers of x, y, z, to which a calibration is applied.
 
     Raises
     ------
-    WrongType : they are no numbers. WrongValue : the last axis is not x, y, z.
+    WrongType : they are not numbers. WrongValue : the last axis is not x, y, z.
     """
     try:
         array = _real(np.asarray(values))
     except (TypeError, ValueError) as error:
-        raise WrongType(f"{name} is no array of numbers ({error})", f"give (..., 3) {unit}") from error
+        raise WrongType(f"{name} is not an array of numbers ({error})", f"give (..., 3) {unit}") from error
     if array.ndim == 0 or array.shape[-1] != 3:
-        turned = f"{name}.T" if array.ndim == 2 and len(array) == 3 else "one row of x, y, z a sample"
+        turned = f"{name}.T" if array.ndim == 2 and len(array) == 3 else "one row of x, y, z per sample"
         raise WrongValue(f"{name} has shape {array.shape}, not (..., 3)", f"give {turned}, in {unit}")
     return array
 
 
-def a_path(path: Any, what: str) -> Path:
-    """The path of `what`.
+def check_path(path: Any, what: str) -> Path:
+    """Return the path of `what`.
 
     Raises
     ------
-    WrongType : it is none. WrongValue : no file can be called so.
+    WrongType : it is not a path. WrongValue : it cannot be the name of a file.
     """
     if not isinstance(path, str | PathLike):
         raise WrongType(f"{what} is given as {type(path).__name__}", "give the path of its file")
@@ -135,12 +135,12 @@ def a_path(path: Any, what: str) -> Path:
     return Path(path)
 
 
-def real(value: Any, what: str, wanted: str, least: float = -math.inf) -> float:
-    """A finite number, `least` or more.
+def check_number(value: Any, what: str, wanted: str, least: float = -math.inf) -> float:
+    """Return a finite number, `least` or more.
 
     Raises
     ------
-    WrongType : it is no number. WrongValue : it is smaller, or not finite.
+    WrongType : it is not a number. WrongValue : it is smaller, or not finite.
     """
     if not isinstance(value, Real) or isinstance(value, bool):
         raise WrongType(f"{what} is {value!r}", f"give {wanted}")
@@ -149,24 +149,24 @@ def real(value: Any, what: str, wanted: str, least: float = -math.inf) -> float:
     return float(value)
 
 
-def shaped(values: ArrayLike, name: str, *shapes: tuple[int, ...]) -> Vector:
-    """Numbers of one of the shapes, the first of which is wanted.
+def check_shape(values: ArrayLike, name: str, *shapes: tuple[int, ...]) -> Vector:
+    """Return numbers of one of the shapes; messages name the first shape.
 
     Raises
     ------
-    WrongType : they are no numbers. WrongValue : another shape.
+    WrongType : they are not numbers. WrongValue : another shape.
     """
     try:
         array = _real(np.asarray(values))
     except (TypeError, ValueError) as error:
-        raise WrongType(f"{name} is no array of numbers ({error})", f"give numbers of shape {shapes[0]}") from error
+        raise WrongType(f"{name} is not an array of numbers ({error})", f"give numbers of shape {shapes[0]}") from error
     if array.shape not in shapes:
         raise WrongValue(f"{name} has shape {array.shape}", f"give numbers of shape {shapes[0]}")
     return array
 
 
-def regular(path: Path) -> Path:
-    """`path`, which is a file, a folder, or not there.
+def check_regular(path: Path) -> Path:
+    """Return `path` if it is a file, a folder, or does not exist.
 
     Raises
     ------
@@ -177,19 +177,19 @@ def regular(path: Path) -> Path:
     except OSError:
         return path
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-        raise RecordingError(f"{path} is a pipe or device, and no file", "write what it gives to a file, and give that")
+        raise RecordingError(f"{path} is a pipe or device, not a file", "save its data to a file, and give that")
     return path
 
 
-def content(path: Path, most: int) -> bytes:
-    """The bytes of a file that is not longer than `most`.
+def read_limited(path: Path, most: int) -> bytes:
+    """Return the bytes of a file that is not longer than `most`.
 
     Raises
     ------
-    RecordingError : it cannot be read, is no file, or is longer.
+    RecordingError : it cannot be read, is not a file, or is longer.
     """
     try:
-        with regular(path).open("rb") as file:
+        with check_regular(path).open("rb") as file:
             data = file.read(most + 1)
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
@@ -209,7 +209,7 @@ def _array(values: ArrayLike, key: str, name: str) -> NDArray[Any]:
 
 
 def _as_float(array: NDArray[Any], key: str, name: str) -> Vector:
-    """A copy in float64."""
+    """Return a copy in float64."""
     try:
         return _real(array).copy()
     except (TypeError, ValueError) as error:
@@ -217,16 +217,16 @@ def _as_float(array: NDArray[Any], key: str, name: str) -> Vector:
 
 
 def _real(array: NDArray[Any]) -> Vector:
-    """In float64; neither times nor complex numbers are silently taken for numbers."""
+    """Return float64; times and complex numbers are refused."""
     if array.dtype.kind in "mMc":
         raise TypeError("they are complex" if array.dtype.kind == "c" else "they are times")
-    # what is too large for a float64 becomes infinite, and a signalling NaN a quiet one
+    # too large a number becomes infinite, and a signalling NaN a quiet one
     with np.errstate(over="ignore", invalid="ignore"):
         return array.astype(np.float64, copy=False)
 
 
 def _no_numbers(key: str, name: str, error: Exception) -> ArraysError:
-    return ArraysError(f"{name}: {key} holds values that are no numbers ({error})", "give numbers")
+    return ArraysError(f"{name}: {key} holds values that are not numbers ({error})", "give numbers")
 
 
 def _check_time(t: Vector, name: str) -> None:

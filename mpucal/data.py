@@ -15,24 +15,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import frames
-from .arguments import LARGEST, column, mask, measured, rows, seconds, stretch
+from .arguments import LARGEST, check_column, check_flat, check_mask, check_rows, check_seconds, is_plausible
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
-from .errors import WrongType, on_one_line
+from .errors import WrongType, escape_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 
-# Counts at full scale, of which all of mpucal, its exports and its firmware make SI units. PS-MPU-6000A r3.4, 6.1 and
+# Counts at full scale, with which mpucal, its exports and its firmware convert to SI units. PS-MPU-6000A r3.4, 6.1 and
 # 6.2, and PS-MPU-9250A r1.0, 3.1 and 3.2, "Sensitivity Scale Factor": 16384 LSB/g at +-2 g and 131 LSB/(deg/s) at +-250
 # deg/s, each half of it at the next range (32.75 and 16.375 are printed as 32.8 and 16.4).
 ACCEL_COUNTS = 32768.0
 GYRO_COUNTS = 32750.0
-# ranges of the sensors that recordings are of, [g] and [deg/s]; those of a chip are in its registers
+# full-scale ranges of sensors in recordings, [g] and [deg/s]; those of a chip are in its registers
 ACCEL_RANGES_G, GYRO_RANGES_DPS = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000)
-# names reach scripts and source code: these characters end no string and no comment there
+# names are exported to scripts and source code: these characters cannot end a string or comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
 BYTE = 0xFF
 MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")
@@ -40,17 +40,17 @@ MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")
 
 @dataclass(frozen=True)
 class Sensor:
-    """What is known of the sensor behind a recording; None where nobody said.
+    """Properties of the sensor of a recording; None if unknown.
 
     Attributes
     ----------
-    accel_offsets : the words that its accelerometer's offset registers x, y, z held meanwhile.
-    message : of an IMU of a vehicle, the MAVLink message that carried its samples, filtered and by radio.
-    steps : m/s^2, rad/s that its samples are whole multiples of, where its noise at rest may be less; else 0.
-    clock_ppm, clock_std : of a bus with a clock of its own: how fast that ran, which was corrected, and the relative
-        standard deviation that is left of all times' scale; None: the times are the host's.
-    least_noise : m/s^2, rad/s: standard deviations that a sample has at least, however still it reads.
-    accel_lag_s : by how much its filters make the accelerometer later than the gyroscope, by the data sheet.
+    accel_offsets : words of its accelerometer's offset registers x, y, z during the recording.
+    message : for an IMU of a vehicle, the MAVLink message of its samples, which are filtered and come by radio.
+    steps : m/s^2, rad/s: resolution of the samples if their noise at rest may be smaller; else 0.
+    clock_ppm, clock_std : for a bus with its own clock: its rate error, which was corrected, and the remaining relative
+        standard deviation of the scale of all times; None: times are the host's.
+    least_noise : m/s^2, rad/s: least standard deviations of a sample, even if the samples show less.
+    accel_lag_s : delay of the accelerometer after the gyroscope by the chip's filters, from the data sheet.
     """
 
     chip: str | None = None
@@ -69,18 +69,18 @@ class Sensor:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:
-        """Of a document's values, JSON's own types; what it holds besides is left out.
+        """Return the sensor of a document with values of JSON types; other keys are ignored.
 
         Raises
         ------
-        ValueError : a value is no name, or no finite number, where one belongs.
+        ValueError : a value is not a name or a finite number as required.
         """
         known = {f.name for f in fields(cls)}
         return cls(**{key: _checked(key, value) for key, value in document.items() if key in known})
 
 
 def _checked(key: str, value: Any) -> Any:
-    """A value of a Sensor's document, as the Sensor holds it."""
+    """Return a value of a Sensor's document as the Sensor holds it."""
     if value is None:
         return None
     if key in ("chip", "message"):
@@ -104,12 +104,12 @@ def _is(kind: Any, value: Any) -> bool:
 
 @dataclass(frozen=True)
 class Autopilot:
-    """What an autopilot says of an IMU whose stream it sends, corrected by its parameters.
+    """Autopilot that sends the stream of an IMU, corrected by its parameters.
 
     Attributes
     ----------
-    firmware : ArduPilot or PX4. imu : which of the vehicle's, from 1. message : the stream's MAVLink name.
-    parameters : by name, all that are known.
+    firmware : ArduPilot or PX4. imu : number of the IMU, from 1. message : MAVLink name of the stream.
+    parameters : all known ones, by name.
     """
 
     firmware: str
@@ -120,7 +120,7 @@ class Autopilot:
 
 @dataclass(frozen=True, eq=False)
 class Samples:  # noqa: PLW1641 - arrays have no hash either
-    """A run of samples, one row an instant; equal where every value is, unknown ones included.
+    """Run of samples, one row per instant; two are equal if all values are, including unknown ones.
 
     Attributes
     ----------
@@ -128,8 +128,8 @@ class Samples:  # noqa: PLW1641 - arrays have no hash either
     acc : (n, 3) m/s^2 at the chip's nominal scale, the paper's y_t.
     gyr : (n, 3) rad/s at the chip's nominal scale, the paper's omega-bar_t.
     temperature_c : (n,) degrees Celsius, NaN where unknown.
-    gap : (n,) True where samples are missing just before this one.
-    acc_clipped, gyr_clipped : (n,) True where an axis stood at the end of its range.
+    gap : (n,) True where samples just before are missing.
+    acc_clipped, gyr_clipped : (n,) True where an axis was at the end of its range.
     """
 
     t: Vector
@@ -150,7 +150,7 @@ class Samples:  # noqa: PLW1641 - arrays have no hash either
 
     @classmethod
     def joined(cls, parts: list[Samples]) -> Samples:
-        """All parts, one after the other; no parts give no samples, and one shares its arrays."""
+        """Return all parts in succession; a single part shares its arrays, and no parts give no samples."""
         if not parts:
             return Samples.empty()
         if len(parts) == 1:
@@ -159,29 +159,29 @@ class Samples:  # noqa: PLW1641 - arrays have no hash either
 
     @classmethod
     def empty(cls) -> Samples:
-        """No samples at all."""
+        """Return an empty run of samples."""
         none, three, no = np.zeros(0), np.zeros((0, 3)), np.zeros(0, bool)
         return Samples(none, three, three.copy(), none.copy(), no, no.copy(), no.copy())
 
 
-# by name, as a session asks for them some thousand times
+# an attrgetter, as a session calls it thousands of times
 _arrays = attrgetter(*(f.name for f in fields(Samples)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(Samples):
-    """Samples of one session with one sensor.
+    """Recording of one sensor: samples with metadata.
 
     Attributes
     ----------
     flat : (first, last + 1) samples known to lie flat and still; None: to be found.
-    sensor : what is known of the sensor.
-    name : what to call the recording in a message.
-    recovered : None, or the sentence that says how much of a damaged file this is.
-    utc_ns : the time of day when t was 0, ns since 1970; None: nobody noted it.
-    autopilot : of an IMU of a vehicle, what stands between the sensor and the samples.
+    sensor : properties of the sensor.
+    name : for messages.
+    recovered : None, or a sentence on the part of a damaged file that was read.
+    utc_ns : the time of day at t = 0, ns since 1970; None: unknown.
+    autopilot : for an IMU of a vehicle, the autopilot that corrected the samples.
     others : further IMUs of that vehicle, turned with it.
-    taken : None, or the sentence that says as what a file's columns and units were taken.
+    taken : None, or a sentence on how a file's columns and units were read.
     """
 
     flat: tuple[int, int] | None = None
@@ -195,7 +195,7 @@ class Recording(Samples):
 
     def __post_init__(self) -> None:
         # a file may be called anything
-        object.__setattr__(self, "name", on_one_line(self.name))
+        object.__setattr__(self, "name", escape_line(self.name))
 
     @classmethod
     def from_arrays(
@@ -213,29 +213,31 @@ class Recording(Samples):
         name: str = "recording",
         taken: str | None = None,
     ) -> Recording:
-        """A recording of plain arrays, checked.
+        """Return a recording of plain arrays, after checks.
 
         Parameters
         ----------
         t : (n,) s, strictly increasing, or datetime64, of which the first is 0 s.
         acc : (n, 3) m/s^2. gyr : (n, 3) rad/s.
         flat : (first, last + 1) samples that lie flat, if known.
-        temperature_c : (n,), whose mean is the sensor's where that has none. gap, acc_clipped, gyr_clipped : (n,) bool,
-            see Samples.
+        temperature_c : (n,); its mean becomes the sensor's temperature if that is not set.
+        gap, acc_clipped, gyr_clipped : (n,) bool, see Samples.
 
         Raises
         ------
-        ArraysError : wrong shapes, values that are no numbers, or time that does not increase. It is a RecordingError
-            and a ValueError. WrongType : `sensor` is none.
+        ArraysError : wrong shapes, values that are not numbers, or time that does not increase. It is a RecordingError
+            and a ValueError. WrongType : `sensor` is not a Sensor.
         """
         if not isinstance(sensor, Sensor | None):
-            raise WrongType(f"{name}: sensor is {sensor!r}", "give a Sensor, as of another recording, or leave it out")
-        t = seconds(t, name)
+            raise WrongType(
+                f"{name}: sensor is {sensor!r}", "give a Sensor, such as that of another recording, or leave it out"
+            )
+        t = check_seconds(t, name)
         n = len(t)
-        acc, gyr = rows(acc, "acc", n, name), rows(gyr, "gyr", n, name)
-        warm = np.full(n, np.nan) if temperature_c is None else column(temperature_c, "temperature_c", n, name)
+        acc, gyr = check_rows(acc, "acc", n, name), check_rows(gyr, "gyr", n, name)
+        warm = np.full(n, np.nan) if temperature_c is None else check_column(temperature_c, "temperature_c", n, name)
         sensor = sensor or Sensor()
-        known = warm[measured(warm)]
+        known = warm[is_plausible(warm)]
         if sensor.temperature_c is None and len(known):
             sensor = replace(sensor, temperature_c=float(known.mean()))
         return cls(
@@ -243,10 +245,10 @@ class Recording(Samples):
             acc,
             gyr,
             warm,
-            mask(gap, "gap", n, name),
-            mask(acc_clipped, "acc_clipped", n, name),
-            mask(gyr_clipped, "gyr_clipped", n, name),
-            flat=None if flat is None else stretch(flat, n, name),
+            check_mask(gap, "gap", n, name),
+            check_mask(acc_clipped, "acc_clipped", n, name),
+            check_mask(gyr_clipped, "gyr_clipped", n, name),
+            flat=None if flat is None else check_flat(flat, n, name),
             sensor=sensor,
             name=name,
             taken=taken,
@@ -256,27 +258,27 @@ class Recording(Samples):
     def from_dataframe(
         cls, frame: Any, flat: tuple[int, int] | None = None, *, sensor: Sensor | None = None, name: str = "recording"
     ) -> Recording:
-        """A recording of the columns t, ax, ay, az [m/s^2], gx, gy, gz [rad/s] of a data frame of pandas or polars.
+        """Return a recording from columns t, ax, ay, az [m/s^2], gx, gy, gz [rad/s] of a frame of pandas or polars.
 
-        The names may end with their units, as `to_dataframe` has them (t_s, ax_mps2, gx_rad_s). Without a column t the
-        index of pandas is the time. The columns temperature_c, gap, acc_clipped and gyr_clipped are taken too.
+        The names may end with their units, as those of `to_dataframe` (t_s, ax_mps2, gx_rad_s). Without a column t, the
+        index of pandas is the time. The columns temperature_c, gap, acc_clipped and gyr_clipped are read, too.
 
         Raises
         ------
-        WrongType : it is no data frame. WrongValue : a column is missing. ArraysError : see from_arrays.
+        WrongType : it is not a data frame. WrongValue : a column is missing. ArraysError : see from_arrays.
         """
-        given = frames.arrays(frame)
+        given = frames.recording_arrays(frame)
         t, acc, gyr = given.pop("t"), given.pop("acc"), given.pop("gyr")
         return cls.from_arrays(t, acc, gyr, flat, **given, sensor=sensor, name=name)
 
     def to_dataframe(self, library: Literal["pandas", "polars"] = "pandas") -> Any:
-        """A data frame with the columns t_s, ax_mps2 ... gz_rad_s, temperature_c, gap, acc_clipped and gyr_clipped.
+        """Return a data frame with columns t_s, ax_mps2 ... gz_rad_s, temperature_c, gap, acc_clipped and gyr_clipped.
 
         Raises
         ------
         WrongValue : another library. ImportError : the library is not installed.
         """
-        return frames.made(library, {f.name: getattr(self, f.name) for f in fields(Samples)})
+        return frames.make_frame(library, {f.name: getattr(self, f.name) for f in fields(Samples)})
 
     def __repr__(self) -> str:
         seconds = float(self.t[-1] - self.t[0]) if len(self) else 0.0
@@ -284,7 +286,7 @@ class Recording(Samples):
         return f"<Recording {self.name}: {len(self)} samples, {seconds:.1f} s{rate}>"
 
     def plot(self) -> Figure:
-        """A figure of accelerations and rates over time; needs mpucal[plot].
+        """Plot accelerations and rates over time; needs mpucal[plot].
 
         Raises
         ------
@@ -295,11 +297,11 @@ class Recording(Samples):
 
     @cached_property
     def rate_hz(self) -> float:
-        """Median sample rate [Hz]."""
+        """Return the median sample rate [Hz]."""
         return float(1.0 / np.median(np.diff(self.t)))
 
     def part(self, first: int, last: int) -> Self:
-        """Samples first..last-1; `flat` is cut with it, or forgotten where it lies outside."""
+        """Return samples first..last-1; `flat` is cut accordingly, or None if it lies outside."""
         flat = None
         if self.flat is not None:
             a, b = max(self.flat[0], first) - first, min(self.flat[1], last) - first
@@ -308,7 +310,7 @@ class Recording(Samples):
         return replace(self, flat=flat, **arrays)
 
     def without(self, first: int, last: int) -> Self:
-        """All samples but first..last-1, and a gap where they were; `flat` is kept where it lies before them."""
+        """Return all samples except first..last-1, with a gap in their place; `flat` is kept if it lies before them."""
         if first >= last:
             return self
         kept = np.r_[0:first, last : len(self)]

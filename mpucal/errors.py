@@ -1,27 +1,27 @@
-"""Everything mpucal raises on purpose, each with the exit code of the command line.
+"""The exceptions of mpucal, with their exit codes on the command line.
 
 MpucalError
 ├── UsageError            2  the call's words do not fit together
 │   ├── WrongType            an argument is of a type that cannot be used; a TypeError too
 │   └── WrongValue           an argument's value cannot be used; a ValueError too
 ├── SourceError           3  a device, bus or file cannot be read
-│   ├── RecordingError       a file or arrays that are no recording
-│   │   └── ArraysError      so are arrays; a ValueError too
-│   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
+│   ├── RecordingError       a file or arrays that are not a recording
+│   │   └── ArraysError      arrays that are not a recording; a ValueError too
+│   ├── CaptureError         a capture that is damaged, or lacks what was requested
 │   ├── BusError             a transfer failed
-│   │   ├── NoAnswer         nothing acknowledged the address, or sent a heartbeat
+│   │   ├── NoAnswer         no device acknowledged the address or sent a heartbeat
 │   │   ├── KeepsNothing     the bridge's firmware has no memory for a calibration
-│   │   ├── BusHeld          a wire is held low, so that every transfer takes its time-out
+│   │   ├── BusHeld          a wire is held low, so that every transfer times out
 │   │   └── LinkError        the link to a vehicle or board broke, or cannot be used
-│   └── ChipError            the chip answers, but not as its register map says
-│       ├── OddOffsets       so do its offset registers, wherever they were looked for
-│       └── ChipReset        it lost its settings while it was measured
-├── OutputError           3  a result cannot be written where it was asked to go
+│   └── ChipError            the chip answers, but not as in its register map
+│       ├── OddOffsets       the offset registers are not at a known place
+│       └── ChipReset        the chip lost its settings during the measurement
+├── OutputError           3  a result cannot be written to the requested place
 ├── Abandoned             4  the session ended before there was anything to calibrate
 ├── RefusedError          5  the calibration was refused, or failed its verification
 └── WriteBackError        6  the write-back was refused or failed; the old state holds
 
-EndOfCapture is no error: with it a source says that its recording has ended.
+EndOfCapture is not an error: a source raises it at the end of its recording.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-# by a terminal or a page, beside the ends of lines: controls, and what turns the direction of the text around
-OBEYED = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+# characters that control a terminal or page, except line ends: controls and changes of the text's direction
+CONTROLS = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
-def plain(text: str) -> str:
-    """A text that a terminal or a page only shows: what it would obey is escaped."""
-    return OBEYED.sub(lambda found: ascii(found[0])[1:-1], text)
+def escape_controls(text: str) -> str:
+    """Escape control characters, so that a terminal or page only shows the text."""
+    return CONTROLS.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
-def on_one_line(text: str) -> str:
-    """A text that names files and quotes what they hold, as a terminal only shows it: what else it obeys is escaped."""
+def escape_line(text: str) -> str:
+    """Escape control characters and line ends, so that quoted text cannot act on a terminal."""
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
@@ -50,7 +50,7 @@ class MpucalError(Exception):
     ----------
     what : one clause, no full stop: what happened, on what.
     remedy : one clause, no full stop: what the person can do next.
-    options : what the same command needs besides, where that is all.
+    options : command-line options that would make the same command work; empty if that is not enough.
     """
 
     exit_code = 1
@@ -58,8 +58,8 @@ class MpucalError(Exception):
     def __init__(self, what: str, remedy: str, options: str = "") -> None:
         super().__init__(what, remedy)
         self.options = options
-        self.what = on_one_line(what)
-        self.remedy = on_one_line(remedy)
+        self.what = escape_line(what)
+        self.remedy = escape_line(remedy)
 
     def __str__(self) -> str:
         return f"{self.what}: {self.remedy}{'' if self.remedy.endswith('?') else '.'}"
@@ -86,15 +86,15 @@ class SourceError(MpucalError):
 
 
 class RecordingError(SourceError):
-    """A file or arrays that are no recording."""
+    """A file or arrays that are not a recording."""
 
 
 class ArraysError(RecordingError, ValueError):
-    """Arrays that are no recording."""
+    """Arrays that are not a recording."""
 
 
 class CaptureError(SourceError):
-    """A capture that is damaged, or does not hold what was asked of it."""
+    """A capture that is damaged, or lacks what was requested."""
 
 
 class BusError(SourceError):
@@ -102,7 +102,7 @@ class BusError(SourceError):
 
 
 class NoAnswer(BusError):  # noqa: N818 - reads as the sentence it is
-    """Nothing acknowledged the address, or sent a heartbeat."""
+    """Missing reply: no device acknowledged the address or sent a heartbeat."""
 
 
 class LinkError(BusError):
@@ -114,29 +114,29 @@ class KeepsNothing(BusError):  # noqa: N818 - reads as the sentence it is
 
 
 class BusHeld(BusError):  # noqa: N818 - reads as the sentence it is
-    """A wire of the bus is held low, so that every transfer takes its time-out."""
+    """A wire of the bus is held low, so that every transfer times out."""
 
 
 class ChipError(SourceError):
-    """The chip answers, but not as its register map says."""
+    """The chip answers, but not as in its register map."""
 
 
 class OddOffsets(ChipError):  # noqa: N818 - reads as the sentence it is
-    """The accelerometer's offset registers answer in no known place, or as in no known one."""
+    """The accelerometer's offset registers are not at a known place."""
 
 
 class ChipReset(ChipError):  # noqa: N818 - reads as the sentence it is
-    """The chip lost its settings while it was measured, and what was read says nothing."""
+    """The chip lost its settings during the measurement, and its samples are invalid."""
 
     def __init__(self) -> None:
         super().__init__(
-            "the chip lost its settings while it was measured: it was reset",
-            "its supply breaks down: check the wires and connectors, and motors on the same supply, then start again",
+            "the chip lost its settings during the measurement: it was reset",
+            "its supply drops out: check wires, connectors, and motors on the same supply, then start again",
         )
 
 
 class OutputError(MpucalError):
-    """A result cannot be written where it was asked to go."""
+    """A result cannot be written to the requested place."""
 
     exit_code = 3
 
@@ -159,13 +159,13 @@ class WriteBackError(MpucalError):
     exit_code = 6
 
 
-class EndOfCapture(Exception):  # noqa: N818 - no error, and of no exit code: the recording behind a source has ended
-    """The source holds no more."""
+class EndOfCapture(Exception):  # noqa: N818 - not an error, and without an exit code
+    """The recording behind a source has ended."""
 
 
-def meant(word: str, names: Iterable[str]) -> str:
-    """What a message ends with where one of `names` is nearly `word`: "; did you mean session?", else nothing."""
-    from difflib import get_close_matches  # noqa: PLC0415 - only who mistypes waits for it
+def did_you_mean(word: str, names: Iterable[str]) -> str:
+    """Return the end of a message such as "; did you mean session?" if one of `names` is close to `word`, else ""."""
+    from difflib import get_close_matches  # noqa: PLC0415 - only needed after a typo
 
     near = get_close_matches(word, names, 1)
     return f"; did you mean {near[0]}?" if near and near[0] != word else ""

@@ -1,4 +1,4 @@
-"""Data frames of pandas or polars, by what both have; neither is imported here unless one is to be made."""
+"""Data frames of pandas or polars, through their common interface; neither is imported unless a frame is made."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ WITH_UNIT = {
 
 
 class Frame(Protocol):
-    """What a type checker knows a data frame by."""
+    """Interface of a data frame for type checkers."""
 
     @property
     def columns(self) -> Any:
-        """Its columns' names."""
+        """Names of the columns."""
 
 
 def is_frame(value: object) -> bool:
-    """Whether it is a data frame: has named columns, and gives copies of itself with some replaced."""
+    """Return True for a data frame: it has named columns and a method that returns a copy with some replaced."""
     return hasattr(value, "columns") and (hasattr(value, "assign") or hasattr(value, "with_columns"))
 
 
-def arrays(frame: Any) -> dict[str, Any]:
-    """The arguments of Recording.from_arrays that a frame holds.
+def recording_arrays(frame: Any) -> dict[str, Any]:
+    """Return the arguments of Recording.from_arrays in a frame.
 
     Raises
     ------
-    WrongType : it is no data frame. WrongValue : a column is missing.
+    WrongType : it is not a data frame. WrongValue : a column is missing.
     """
     if not is_frame(frame):
-        raise WrongType(f"{type(frame).__name__} is no data frame", "give one of pandas or polars")
-    if places(frame, TIME):
+        raise WrongType(f"{type(frame).__name__} is not a data frame", "give one of pandas or polars")
+    if column_names(frame, TIME):
         t = _columns(frame, TIME)[:, 0]
     elif getattr(getattr(frame, "index", None), "dtype", np.dtype(object)).kind in "mM":
         t = np.asarray(frame.index)
@@ -55,44 +55,44 @@ def arrays(frame: Any) -> dict[str, Any]:
 
 
 def columns(frame: Any, names: tuple[str, ...]) -> Array:
-    """(n, k) of the columns of these names, with or without their units.
+    """Return (n, k) of the columns of these names, with or without their units.
 
     Raises
     ------
     WrongValue : one is missing.
     """
-    if not places(frame, names):
+    if not column_names(frame, names):
         raise _missing(names)
     return _columns(frame, names)
 
 
-def places(frame: Any, names: tuple[str, ...]) -> tuple[str, ...]:
-    """The names that a frame has for these quantities; empty where it lacks one."""
+def column_names(frame: Any, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the frame's names of these quantities; empty if it lacks one."""
     found = [name for wanted in names for name in (wanted, WITH_UNIT[wanted]) if name in frame.columns]
     return tuple(found) if len(found) == len(names) else ()
 
 
-def replaced(frame: Any, new: Mapping[tuple[str, ...], Array]) -> Any:
-    """The frame with other numbers in some columns: {quantities: (n, k)}; index, order and other columns stay."""
+def replace_columns(frame: Any, new: Mapping[tuple[str, ...], Array]) -> Any:
+    """Return the frame with new numbers in some columns {quantities: (n, k)}; index, order and other columns stay."""
     values = {
         place: np.ascontiguousarray(array[:, k])
         for names, array in new.items()
-        for k, place in enumerate(places(frame, names))
+        for k, place in enumerate(column_names(frame, names))
     }
     if hasattr(frame, "assign"):
         return frame.assign(**values)
     return frame.with_columns([type(frame[name])(name, column) for name, column in values.items()])
 
 
-def made(library: str, samples: Mapping[str, Array]) -> Any:
-    """A frame of samples' arrays by name.
+def make_frame(library: str, samples: Mapping[str, Array]) -> Any:
+    """Return a frame of samples' arrays by name.
 
     Raises
     ------
     WrongValue : another library. ImportError : the library is not installed.
     """
     if library not in ("pandas", "polars"):
-        raise WrongValue(f"there are no data frames of {library!r} here", "choose pandas or polars")
+        raise WrongValue(f"data frames of {library!r} are not supported", "choose pandas or polars")
     split = {"t": samples["t"]}
     for names, key in ((ACC, "acc"), (GYR, "gyr")):
         split |= dict(zip(names, samples[key].T, strict=True))
@@ -101,7 +101,7 @@ def made(library: str, samples: Mapping[str, Array]) -> Any:
 
 
 def _columns(frame: Any, names: tuple[str, ...]) -> Array:
-    return np.column_stack([np.asarray(frame[place]) for place in places(frame, names)])
+    return np.column_stack([np.asarray(frame[place]) for place in column_names(frame, names)])
 
 
 def _missing(names: tuple[str, ...]) -> WrongValue:

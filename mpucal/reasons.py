@@ -1,4 +1,4 @@
-"""What can speak against a calibration: one row a reason code, with its sentences and their remedies.
+"""The reasons against a calibration: a row for each reason code, with its sentences and their remedies.
 
 A check (calibration/checks/, session/live/verification.py) decides whether a reason holds, and fills its numbers into
 one of the row's sentences: `reason("gyro_clipped", "samples", refuse=False, count=12, share=0.01)`. A new reason is a
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class ReasonFound(TypedDict):
-    """A reason as calibration.json has it in quality.reasons: its code, what was found, and what to do."""
+    """Entry of quality.reasons in calibration.json: code, finding and remedy."""
 
     code: ReadOnly[str]
     message: ReadOnly[str]
@@ -25,11 +25,11 @@ class ReasonFound(TypedDict):
 
 @dataclass(frozen=True)
 class Reason:
-    """One thing that speaks against a calibration.
+    """Reason against a calibration.
 
     Attributes
     ----------
-    code : of a row of KINDS. what, remedy : a clause each: what is wrong, what to do. refuse : nobody should use it.
+    code : key of KINDS. what, remedy : a clause each: what is wrong, what to do. refuse : the calibration is refused.
     """
 
     code: str
@@ -43,17 +43,17 @@ class Reason:
 
     @property
     def message(self) -> str:
-        """Both as one sentence, without its full stop."""
+        """Return both clauses as one sentence, without its full stop."""
         return f"{self.what}; {self.remedy}"
 
     def document(self) -> ReasonFound:
-        """As calibration.json has it in quality.reasons."""
+        """Return the entry of quality.reasons in calibration.json."""
         return {"code": self.code, "message": self.message, "remedy": self.remedy}
 
 
 @dataclass(frozen=True)
 class Sentence:
-    """One way in which a reason is said, with {places} for numbers; `refuse` None where the check decides."""
+    """Sentence of a reason, with {places} for numbers; `refuse` is None if the check decides."""
 
     what: str
     remedy: str
@@ -62,15 +62,15 @@ class Sentence:
 
 @dataclass(frozen=True)
 class Kind:
-    """A reason code.
+    """Kind of reasons, with one code.
 
     Attributes
     ----------
     meaning : what is wrong, for the documentation. sentences : by the name that a check gives.
-    reproduce : how to see it on the simulated chip: a `mpucal session`, or Python that calibrates a spoilt copy of r,
+    reproduce : a way to see it: a `mpucal session` on the simulated chip, or Python that calibrates a spoilt copy of r,
         the recording of a good session.
-    refused_when : it refuses, where that depends. turn_again : turning the board again from the start may help.
-    of_the_sensor : a contradiction in the data may come from it.
+    refused_when : condition of a refusal, if it depends. turn_again : turning the board again from the start may help.
+    of_the_sensor : it may be the cause of a contradiction in the data.
     """
 
     meaning: str
@@ -82,7 +82,7 @@ class Kind:
 
     @property
     def refuses(self) -> str:
-        """Always, never, or depends."""
+        """Return "always", "never" or "depends"."""
         refusals = {sentence.refuse for sentence in self.sentences.values()}
         if len(refusals) > 1 or None in refusals:
             return "depends"
@@ -90,15 +90,15 @@ class Kind:
 
 
 def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: object) -> Reason:
-    """A reason in words, with `numbers` in the places of its sentence.
+    """Return a reason, with `numbers` in the places of its sentence.
 
     Raises
     ------
-    KeyError : no such code, sentence or place. ValueError : `refuse` is given where the table decides, or is missing.
+    KeyError : unknown code, sentence or place. ValueError : `refuse` is given although the table decides, or missing.
     """
     row = KINDS[code].sentences[sentence]
     if (refuse is None) == (row.refuse is None):
-        raise ValueError(f"{code}, {sentence}: whether it refuses is said in the table or by the check, not by both")
+        raise ValueError(f"{code}, {sentence}: either the table or the check decides on a refusal, not both")
     decided = bool(refuse if row.refuse is None else row.refuse)
     return Reason(code, row.what.format(**numbers), row.remedy.format(**numbers), decided)
 

@@ -1,7 +1,7 @@
-"""JSON of unknown origin: RFC 8259 without its liberties, within limits that no file of mpucal comes near.
+"""JSON of unknown origin: a strict subset of RFC 8259, within limits far beyond any file of mpucal.
 
-Refused are numbers that are not finite or of more digits than a double or a 64-bit integer has, keys that occur twice,
-strings with control characters or halves of surrogate pairs, deep nesting, and long documents.
+Refused are numbers that are not finite or have more digits than a double or a 64-bit integer, duplicate keys, strings
+with control characters or lone surrogates, deep nesting, and long documents.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ DEEPEST = 32
 LONGEST_STRING = 1 << 16
 MOST_DIGITS = 40
 LARGEST_INTEGER = 1 << 64
-# squares of it stay finite
+# its square is finite
 LARGEST = 1e150
-# what a terminal obeys, and what no encoding writes
+# characters that control a terminal, and lone surrogates
 FORBIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
-def parsed(data: bytes | str) -> Any:
-    """The document.
+def parse_json(data: bytes | str) -> Any:
+    """Return the document.
 
     Raises
     ------
-    ValueError : it is none, or beyond a limit; says which.
+    ValueError : it is not JSON, or exceeds a limit; the message says which.
     """
     parse = partial(
         json.loads, parse_constant=_not_finite, parse_int=_integer, parse_float=_number, object_pairs_hook=_object
@@ -37,12 +37,12 @@ def parsed(data: bytes | str) -> Any:
     return _checked(data, parse, _check_string)
 
 
-def parsed_own(data: bytes | str) -> Any:
-    """A document within a capture: as Python's json writes it, not finite numbers and any string included.
+def parse_own_json(data: bytes | str) -> Any:
+    """Return a document in a capture, written by Python's json; it may hold infinities, NaN and any string.
 
     Raises
     ------
-    ValueError : it is none, too long or too deep.
+    ValueError : it is not JSON, too long or too deep.
     """
     return _checked(data, json.loads, lambda text: None)
 
@@ -55,7 +55,7 @@ def _checked(data: bytes | str, parse: Callable[[bytes | str], Any], check_strin
     except RecursionError:
         raise _too_deep() from None
     level = [document]
-    # a level at a time, without recursion
+    # level by level, without recursion
     for _ in range(DEEPEST):
         inner: list[Any] = []
         for value in level:
@@ -75,7 +75,7 @@ def _check_string(text: str) -> None:
     if len(text) > LONGEST_STRING:
         raise ValueError(f"a string of {len(text)} characters is longer than {LONGEST_STRING}")
     if (found := FORBIDDEN.search(text)) is not None:
-        raise ValueError(f"a string holds {found[0]!a}, which no text does")
+        raise ValueError(f"a string holds the character {found[0]!a}")
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def _number(digits: str) -> float:
 
 
 def _not_finite(name: str) -> float:
-    raise ValueError(f"{name} is no number")
+    raise ValueError(f"{name} is not a number")
 
 
 def _too_deep() -> ValueError:

@@ -1,4 +1,4 @@
-"""For pytest: a fixture that replays sessions and compares their calibrations with those that they once gave.
+"""Fixture for pytest that replays sessions and compares their calibrations with the stored ones.
 
 pytest_plugins = ["mpucal.testing"]  # in a conftest.py
 """
@@ -23,16 +23,16 @@ Replay = Callable[..., Calibration]
 
 @pytest.fixture
 def mpucal_replay(tmp_path: Path) -> Replay:
-    """A call that replays the session in a folder, and fails the test where its calibration is another one now.
+    """Return a function that replays the session in a folder, and fails the test if its calibration differs now.
 
     Parameters
     ----------
     folder : with the session's capture and calibration.json.
-    tolerance : of each element of D, and of b_a in m/s^2; 1e-9 also holds from one processor to another.
+    tolerance : of each element of D, and of b_a in m/s^2; 1e-9 also holds between processors.
 
     Returns
     -------
-    The Calibration of now.
+    The new Calibration.
     """
 
     def replay(folder: str | PathLike[str], tolerance: float = 1e-9) -> Calibration:
@@ -40,16 +40,16 @@ def mpucal_replay(tmp_path: Path) -> Replay:
         then = Calibration.load(folder / DOCUMENT.name)
         of_vehicle = folder / CAPTURE_OF_VEHICLE.name
         capture = of_vehicle if of_vehicle.exists() else folder / CAPTURE.name
-        said = io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+        messages = io.StringIO()
+        with contextlib.redirect_stderr(messages), contextlib.redirect_stdout(io.StringIO()):
             run(["session", "--replay", str(capture), "--yes", "--no-write", "-o", str(into)])
         if not (into / DOCUMENT.name).exists():
-            pytest.fail(f"{capture} does not replay: {said.getvalue().splitlines()[-1]}", pytrace=False)
+            pytest.fail(f"{capture} does not replay: {messages.getvalue().splitlines()[-1]}", pytrace=False)
         now = Calibration.load(into / DOCUMENT.name)
         for name in ("D", "b_a"):
-            told = f"{folder}: {name} is not what it was"
-            np.testing.assert_allclose(getattr(now, name), getattr(then, name), rtol=0, atol=tolerance, err_msg=told)
-        assert now.verdict == then.verdict, f"{folder}: the verdict is not what it was"
+            changed = f"{folder}: {name} has changed"
+            np.testing.assert_allclose(getattr(now, name), getattr(then, name), rtol=0, atol=tolerance, err_msg=changed)
+        assert now.verdict == then.verdict, f"{folder}: the verdict has changed"
         return now
 
     return replay

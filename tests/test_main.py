@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-KEPT = "; what was recorded until then is kept"
+KEPT = "; the recording until then is kept"
 
 PROGRAM = """
 import sys

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..disk.atomic import atomic_file
-from ..errors import plain
+from ..errors import escape_controls
 from .row import COLUMNS, TEXTS, WHOLE
 
 # rows in memory at once
@@ -58,4 +58,4 @@ def escape_cell(value: Any) -> Any:
     """Return a value that a spreadsheet only shows: not a formula, and without characters that change its direction."""
     if not isinstance(value, str):
         return value
-    return plain(f"'{value}" if value.startswith(FORMULA) else value)
+    return escape_controls(f"'{value}" if value.startswith(FORMULA) else value)

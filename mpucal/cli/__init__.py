@@ -7,7 +7,7 @@ from importlib import import_module
 import click
 
 from .. import __version__
-from ..errors import meant
+from ..errors import did_you_mean
 
 # Name: help text; the command is in the module of that name.
 COMMANDS = {
@@ -47,7 +47,7 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is called; fail with a suggestion if its name is misspelt."""
-        if nearly := meant(args[0], COMMANDS):
+        if nearly := did_you_mean(args[0], COMMANDS):
             ctx.fail(f"there is no command {args[0]}{nearly}")
         return super().resolve_command(ctx, args)
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ..arguments import content
+from ..arguments import read_limited
 from ..errors import UsageError
 from ..files.budget import MOST_MB, VARIABLE
 from ..files.hints import Hints, parse_columns, parse_span, parse_units
@@ -106,7 +106,7 @@ def read_hints_file(path: Path) -> tuple[tuple[str, Hints], ...]:
     UsageError : the file cannot be read, or a line cannot be parsed; the message has its number.
     """
     try:
-        lines = content(path, MOST_BYTES).decode().splitlines()
+        lines = read_limited(path, MOST_BYTES).decode().splitlines()
     except UnicodeDecodeError as error:
         raise UsageError(f"{path} is not a text file", "give a pattern and options on each line") from error
     found = []

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from pkgutil import resolve_name
 
-from ..arguments import regular
+from ..arguments import check_regular
 from ..data import Recording
 from ..errors import OutputError, RecordingError, UsageError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
@@ -159,7 +159,7 @@ def recognise(path: Path) -> Format | None:
     ------
     RecordingError : it is a pipe or device, whose bytes can be read once at best.
     """
-    regular(path)
+    check_regular(path)
     return next((row for row in FORMATS if row.is_read and row.matches(path)), None)
 
 

@@ -24,14 +24,14 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from zstandard import ZstdError, frame_content_size
 
-from ..arguments import regular
+from ..arguments import check_regular
 from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import Record, SessionEvent
 from ..disk.atomic import atomic_file
 from ..disk.growing_file import GrowingFile
 from ..errors import CaptureError, OutputError
-from ..strict_json import parsed_own
+from ..strict_json import parse_own_json
 from .budget import LONGEST_CHUNK
 from .messages import BUS, SESSION, accesses_schema, decode_message, encode_accesses, encode_event, event_schema
 
@@ -262,7 +262,7 @@ class CaptureReader:
     def blocks(self) -> Iterator[Accesses | Record]:
         """Yield the records, register accesses by the block as in the file."""
         try:
-            with regular(self._path).open("rb") as file:
+            with check_regular(self._path).open("rb") as file:
                 yield from self._blocks(file)
         except OSError as error:
             raise CaptureError(
@@ -376,7 +376,7 @@ class _SizeLimitedFile:
 
 def _meta(item: Metadata, path: Path) -> dict[str, Any]:
     try:
-        meta = {key: parsed_own(value) for key, value in item.metadata.items()}
+        meta = {key: parse_own_json(value) for key, value in item.metadata.items()}
         version = int(meta.pop(VERSION_KEY))
     except (ValueError, KeyError, TypeError) as error:
         raise CaptureError(f"the metadata of {path} are damaged ({error})", "record it again") from error

@@ -29,7 +29,7 @@ from mcap.well_known import MessageEncoding
 from ..chip.access import Failure, Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import SessionEvent
-from ..strict_json import parsed_own
+from ..strict_json import parse_own_json
 from . import protobuf
 
 BUS, SESSION = "/bus", "/session"
@@ -160,13 +160,13 @@ def decode_message(
     if topic == BUS:
         return decode_accesses(message) if encoding == MessageEncoding.Protobuf else _transaction(t_ns, message)
     if topic == SESSION:
-        content = parsed_own(message)
+        content = parse_own_json(message)
         return SessionEvent(content["name"], t_ns, content["data"])
     return None
 
 
 def _transaction(t_ns: int, message: bytes) -> Transaction:
-    content = parsed_own(message)
+    content = parse_own_json(message)
     error = content.get("error")
     return Transaction(
         content["op"],

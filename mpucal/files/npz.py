@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ..data import Recording, Samples, Sensor
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
-from ..strict_json import parsed
+from ..strict_json import parse_json
 from .budget import check_size
 from .reading import reading
 from .rows import ROWS, Rows, Write, check_runs, normalise
@@ -136,7 +136,7 @@ def _sensor(arrays: Mapping[str, Any], path: Path) -> Sensor:
     if "sensor" not in arrays:
         return Sensor()
     try:
-        return Sensor.of(parsed(str(arrays["sensor"])))
+        return Sensor.of(parse_json(str(arrays["sensor"])))
     except (ValueError, AttributeError) as error:
         raise RecordingError(
             f"{path}: sensor is not a JSON object ({error})", "leave sensor out, or write it with mpucal"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import measured
+from ..arguments import is_plausible
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from .tables.clock import FEWEST, fit_even_clock
@@ -118,8 +118,8 @@ def _add_gaps(gap: Any, more: Mask) -> Mask:
 
 def _is_complete(acc: Vector, gyr: Vector) -> Mask:
     """Return (n,) True where a sample has all its numbers; an accelerometer alone has no rates at all."""
-    rates = measured(gyr).all(axis=1)
-    return np.asarray(measured(acc).all(axis=1) & (rates | ~rates.any()))
+    rates = is_plausible(gyr).all(axis=1)
+    return np.asarray(is_plausible(acc).all(axis=1) & (rates | ~rates.any()))
 
 
 def drop_incomplete(samples: Samples) -> Samples:
@@ -148,7 +148,7 @@ def check_runs(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
                 "leave out that sample, and keep the times of the others",
             )
         for values in (samples.acc, samples.gyr):
-            values[~measured(values)] = np.nan
+            values[~is_plausible(values)] = np.nan
         any_complete |= bool(_is_complete(samples.acc, samples.gyr).any())
         with np.errstate(over="ignore"):
             back = np.diff(samples.t, prepend=last) < 0

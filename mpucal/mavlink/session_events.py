@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ..strict_json import parsed_own
+from ..strict_json import parse_own_json
 from .dialect import Message, dialect
 from .link import OWN_COMPONENT, OWN_SYSTEM
 
@@ -75,7 +75,7 @@ def _decode(text: bytes) -> Note | None:
     if not text.startswith(PREFIX):
         return None
     try:
-        content = parsed_own(text.removeprefix(PREFIX))
+        content = parse_own_json(text.removeprefix(PREFIX))
         return Note(str(content["name"]), dict(content["data"]))
     except (ValueError, KeyError, TypeError):
         return None

@@ -6,7 +6,7 @@ import hashlib
 import re
 from pathlib import Path
 
-from ..arguments import content
+from ..arguments import read_limited
 from ..errors import RecordingError, UsageError
 
 KEY_BYTES = 32
@@ -26,7 +26,7 @@ def read_key(path: Path) -> bytes:
     UsageError : the file cannot be read, is a pipe or device, longer than MOST_BYTES, or empty.
     """
     try:
-        held = content(path, MOST_BYTES)
+        held = read_limited(path, MOST_BYTES)
     except RecordingError as error:
         raise UsageError(f"the signing key cannot be read: {error.what}", "check --signing-key") from error
     if len(held) == KEY_BYTES and not _is_line(held):

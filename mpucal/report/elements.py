@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 from html import escape as without_marks
 from typing import Any
 
-from ..errors import plain
+from ..errors import escape_controls
 from .style import CSS
 
 
 def escape(text: str) -> str:
     """Return text as HTML that only shows it."""
-    return without_marks(plain(text))
+    return without_marks(escape_controls(text))
 
 
 def document(title: str, heading: str, *content: str) -> str:

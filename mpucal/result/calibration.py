@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import frames
-from ..arguments import a_path, content, shaped, vectors
+from ..arguments import check_path, check_shape, check_vectors, read_limited
 from ..data import GYRO_COUNTS, Recording, Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
-from ..strict_json import MOST_BYTES, parsed
+from ..strict_json import MOST_BYTES, parse_json
 from .blob import NO_RANGE, Blob, BlobError
 from .correlation import UNCORRELATED
 from .document import (
@@ -101,7 +101,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
 
     def __post_init__(self) -> None:
         for name, shape in SHAPES.items():
-            object.__setattr__(self, name, shaped(getattr(self, name), name, shape))
+            object.__setattr__(self, name, check_shape(getattr(self, name), name, shape))
         for name in ("fit", "quality", "extra"):
             object.__setattr__(self, name, FrozenDict(getattr(self, name)))
 
@@ -194,9 +194,9 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         """
         if frames.is_frame(acc):
             return self._applied_to_frame(acc)
-        y = vectors(acc, "acc", "m/s^2")
-        T = None if temperature_c is None else shaped(temperature_c, "temperature_c", y.shape[:-1], ())
-        omega = None if gyr is None else shaped(vectors(gyr, "gyr", "rad/s"), "gyr", y.shape)
+        y = check_vectors(acc, "acc", "m/s^2")
+        T = None if temperature_c is None else check_shape(temperature_c, "temperature_c", y.shape[:-1], ())
+        omega = None if gyr is None else check_shape(check_vectors(gyr, "gyr", "rad/s"), "gyr", y.shape)
         # the offset registers have subtracted their part from y already
         y = y - (self.b_a_at(T) - self.applied_in_hardware)
         a: Vector = y @ self.inverse.T
@@ -207,9 +207,9 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         new: dict[tuple[str, ...], Vector] = {
             frames.ACC: self.apply(frames.columns(frame, frames.ACC), temperature_c=T)
         }
-        if frames.places(frame, frames.GYR):
-            new[frames.GYR] = self._rates(vectors(frames.columns(frame, frames.GYR), "gyr", "rad/s"))
-        return frames.replaced(frame, new)
+        if frames.column_names(frame, frames.GYR):
+            new[frames.GYR] = self._rates(check_vectors(frames.columns(frame, frames.GYR), "gyr", "rad/s"))
+        return frames.replace_columns(frame, new)
 
     def _rates(self, omega: Vector) -> Vector:
         return np.asarray((omega - np.nan_to_num(self.b_omega)) @ self.K.T)
@@ -257,7 +257,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         OutputError : the file cannot be written.
         WrongValue : another suffix. ValueError : a blob of a calibration with unknown numbers.
         """
-        path = a_path(path, "the file of a calibration")
+        path = check_path(path, "the file of a calibration")
         if path.suffix == ".json":
             write_atomically(path, self.json().encode())
         elif path.suffix == ".bin":
@@ -273,15 +273,15 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         ------
         RecordingError : there is no such file, or no calibration in it.
         """
-        path = a_path(path, "a calibration")
-        data = content(path, MOST_BYTES)
+        path = check_path(path, "a calibration")
+        data = read_limited(path, MOST_BYTES)
         if path.suffix == ".bin":
             try:
                 return cls.from_blob(Blob.decode(data))
             except BlobError as error:
                 raise RecordingError(f"{path} is not a config blob: {error}", "give an undamaged blob") from error
         try:
-            document = check(parsed(data))
+            document = check(parse_json(data))
             return replace(cls(**from_document(document)), doubt=digest_warning(document))
         except ValueError as error:
             raise RecordingError(f"{path} holds no calibration ({error})", "give a calibration.json") from error

@@ -16,7 +16,7 @@ from typing import Any
 
 from ..disk.atomic import make_folders, sync_folder, write_atomically
 from ..errors import OutputError
-from ..strict_json import parsed
+from ..strict_json import parse_json
 from .clock import now
 
 AT = "at"
@@ -58,7 +58,7 @@ class Journal:
         if self._path is None:
             return None
         try:
-            content = parsed(self._path.read_bytes())
+            content = parse_json(self._path.read_bytes())
         except (OSError, ValueError):
             return None
         return content if isinstance(content, dict) and AT in content else None

@@ -11,11 +11,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..arguments import content
+from ..arguments import read_limited
 from ..data import Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError
-from ..strict_json import MOST_BYTES, parsed
+from ..strict_json import MOST_BYTES, parse_json
 from .calibration import Calibration
 
 FORMAT, VERSION = "mpucal.noise", 1
@@ -137,7 +137,7 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
         RecordingError : there is no such file, or no noise in it.
         """
         try:
-            return cls._of(parsed(content(Path(path), MOST_BYTES)))
+            return cls._of(parse_json(read_limited(Path(path), MOST_BYTES)))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             what = f"{path} holds no noise ({type(error).__name__}: {error})"
             raise RecordingError(what, "give a noise.json, as `mpucal noise -o DIR` writes it") from error

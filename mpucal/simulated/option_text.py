@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from ..errors import UsageError, meant
+from ..errors import UsageError, did_you_mean
 from .faults import Fault, Where, fault_kinds
 
 FAULT = "fault"
@@ -35,7 +35,7 @@ def parse_options(
         named = others is not None and key.isupper()
         if not equals or not (named or key in parsers):
             more = "" if others is None else ", or a parameter's name"
-            keys = f"its keys are {', '.join(parsers)}{more}{meant(key, parsers)}"
+            keys = f"its keys are {', '.join(parsers)}{more}{did_you_mean(key, parsers)}"
             raise UsageError(f"sim: does not know {word!r}", keys)
         made = _value(key, value, (number, "a number") if named else parsers[key])
         if named:
@@ -54,7 +54,7 @@ def _value(key: str, text: str, parser: Parser) -> Any:
     try:
         return parse(text)
     except (ValueError, KeyError):
-        nearly = meant(text.partition("@")[0], re.findall(r"[a-z]\w\w+", expected))
+        nearly = did_you_mean(text.partition("@")[0], re.findall(r"[a-z]\w\w+", expected))
         raise UsageError(f"sim: {key}={text} is not {expected}", f"correct it, or leave it out{nearly}") from None
 
 

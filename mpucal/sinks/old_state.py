@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import content
+from ..arguments import read_limited
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
 from ..result.journal import Journal
 from ..result.session_files import SessionFile
-from ..strict_json import MOST_BYTES, parsed
+from ..strict_json import MOST_BYTES, parse_json
 
 
 def save_state(file: SessionFile, folder: Path, form: str, where: str, state: Mapping[str, Any]) -> tuple[Path, ...]:
@@ -35,7 +35,7 @@ def load_state(file: SessionFile, path: Path, form: str, *keys: str) -> dict[str
     RecordingError : `path` cannot be read, or holds something else.
     """
     try:
-        document = parsed(content(path, MOST_BYTES))
+        document = parse_json(read_limited(path, MOST_BYTES))
     except ValueError as error:
         raise not_a_state(file, path, str(error)) from error
     if not isinstance(document, dict) or document.get("format") != form or not document.keys() >= set(keys):

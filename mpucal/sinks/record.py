@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..arguments import content
+from ..arguments import read_limited
 from ..data import Recording
 from ..errors import RecordingError
 from ..result.calibration import Calibration
 from ..result.document import FORMAT
 from ..result.session_files import DOCUMENT
 from ..session.results import result_files, save
-from ..strict_json import MOST_BYTES, parsed
+from ..strict_json import MOST_BYTES, parse_json
 from .kind import Effect, SinkKind
 
 # key in calibration.json: the writes, one entry each
@@ -59,6 +59,6 @@ def is_calibration(path: Path) -> bool:
     if path.suffix != ".json":
         return path.suffix == ".bin" or not path.exists()
     try:
-        return bool(parsed(content(path, MOST_BYTES)).get("format") == FORMAT)
+        return bool(parse_json(read_limited(path, MOST_BYTES)).get("format") == FORMAT)
     except (RecordingError, ValueError, AttributeError):
         return True

@@ -7,7 +7,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 from ..chip.config import Config, RateOnlyConfig
-from ..errors import CaptureError, UsageError, meant
+from ..errors import CaptureError, UsageError, did_you_mean
 from ..session.plan import Plan
 from .kind import Delivery, Option, Request, SourceKind
 from .opened_source import OpenedSource
@@ -39,7 +39,7 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
         remedy = "; ".join(filter(None, (one_of(kinds_for(command)), kind.instead)))
         raise UsageError(f"{kind.flag} was given, and `mpucal {command}` does not take it", remedy)
     word = str(values[kind.option.name]).partition(":")[0]
-    if nearly := meant(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
+    if nearly := did_you_mean(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
         raise UsageError(f"{kind.option.flag} {word} is not a known source", f"{kind.forms}{nearly}")
     if kind.delivers is not Delivery.CAPTURE:
         for option in _dependent_options(SOURCES):

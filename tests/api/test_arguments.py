@@ -1,4 +1,4 @@
-"""What the public functions say of arguments that they cannot use, and which they take beside the plain ones."""
+"""Arguments of the public functions: messages on wrong ones, and other types that are accepted."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ A_RECORDING = Recording.from_arrays(T, ACC, GYR)
 A_CALIBRATION = Calibration(np.eye(3), np.zeros(3))
 
 WRONG = {
-    "no recording": (lambda: mpucal.calibrate(ACC), TypeError, "ndarray is no recording: give a mpucal.Recording"),
+    "no recording": (lambda: mpucal.calibrate(ACC), TypeError, "ndarray is not a recording: give a mpucal.Recording"),
     "no such file": (lambda: mpucal.calibrate("no.csv"), MpucalError, "there is no file no.csv"),
     "no model": (lambda: mpucal.calibrate(A_RECORDING, "autoo"), ValueError, "there is no model 'autoo': choose one"),
     "no gravity": (lambda: mpucal.calibrate(A_RECORDING, gravity=-1), ValueError, "gravity is -1"),
@@ -29,36 +29,44 @@ WRONG = {
     "load no path": (lambda: mpucal.load(5), TypeError, "a recording is given as int: give the path of its file"),
     "columns": (lambda: A_CALIBRATION.apply(ACC.T), ValueError, r"acc has shape \(3, 40\), not .*: give acc.T, in m/s"),
     "one number": (lambda: A_CALIBRATION.apply(9.8), ValueError, r"acc has shape \(\), not .*: give one row"),
-    "words": (lambda: A_CALIBRATION.apply(["x", "y", "z"]), TypeError, "acc is no array of numbers"),
+    "words": (lambda: A_CALIBRATION.apply(["x", "y", "z"]), TypeError, "acc is not an array of numbers"),
     "rates' columns": (lambda: A_CALIBRATION.apply(ACC, GYR.T), ValueError, r"gyr has shape \(3, 40\)"),
     "rates of others": (lambda: A_CALIBRATION.apply(ACC, GYR[1:]), ValueError, r"gyr has shape \(39, 3\)"),
-    "temperature a word": (lambda: A_CALIBRATION.apply(ACC, temperature_c="warm"), TypeError, "temperature_c is no"),
+    "temperature a word": (lambda: A_CALIBRATION.apply(ACC, temperature_c="warm"), TypeError, "temperature_c is not"),
     "model a list": (lambda: mpucal.calibrate(A_RECORDING, ["hand"]), ValueError, r"there is no model \['hand'\]"),
     "D a number": (
         lambda: Calibration(1.0, np.zeros(3)),
         ValueError,
         r"D has shape \(\): give numbers of shape \(3, 3",
     ),
-    "D of words": (lambda: Calibration("D", np.zeros(3)), TypeError, "D is no array of numbers"),
+    "D of words": (lambda: Calibration("D", np.zeros(3)), TypeError, "D is not an array of numbers"),
     "days a word": (lambda: mpucal.check(A_CALIBRATION, A_RECORDING, "a week"), TypeError, "days is 'a week': give"),
     "days before": (lambda: mpucal.check(A_CALIBRATION, A_RECORDING, -7), ValueError, "days is -7: give"),
-    "plot of a number": (lambda: A_CALIBRATION.plot(5), TypeError, "int is no recording"),
+    "plot of a number": (lambda: A_CALIBRATION.plot(5), TypeError, "int is not a recording"),
     "plot of no file": (lambda: A_CALIBRATION.plot("no.csv"), MpucalError, "there is no file no.csv"),
-    "rate a word": (lambda: mpucal.load("no.csv", rate="200 Hz"), TypeError, "rate is '200 Hz': give samples a second"),
+    "rate a word": (
+        lambda: mpucal.load("no.csv", rate="200 Hz"),
+        TypeError,
+        "rate is '200 Hz': give the sample rate in Hz",
+    ),
     "no range": (
         lambda: mpucal.load("no.csv", accel_range=0),
         ValueError,
         "accel_range is 0: give the full scale in g",
     ),
-    "columns no text": (lambda: mpucal.load("no.csv", columns=["t"]), TypeError, "columns is .*: give it as text"),
+    "columns no text": (lambda: mpucal.load("no.csv", columns=["t"]), TypeError, "columns is .*: give text"),
     "sensor a word": (lambda: arrays(T, ACC, GYR, sensor="MPU-6050"), TypeError, "sensor is 'MPU-6050': give a Sensor"),
-    "save where": (lambda: A_CALIBRATION.save("c.txt"), ValueError, "not saved as c.txt: end its name with .json"),
+    "save where": (
+        lambda: A_CALIBRATION.save("c.txt"),
+        ValueError,
+        "cannot be saved as c.txt: end its name with .json",
+    ),
     "save no path": (lambda: A_CALIBRATION.save(None), TypeError, "the file of a calibration is given as NoneType"),
     "load nothing": (lambda: Calibration.load(None), TypeError, "a calibration is given as NoneType"),
     "ragged": (
         lambda: arrays([[1], [1, 2]], ACC, GYR),
         ValueError,
-        "t holds values that are no numbers",
+        "t holds values that are not numbers",
     ),
     "dates as acc": (
         lambda: arrays(T, np.tile(DATES, (3, 1)).T, GYR),
@@ -78,12 +86,12 @@ WRONG = {
         TypeError,
         "document of a calibration is given as str",
     ),
-    "document of nothing": (lambda: Calibration.from_document({}), ValueError, "no document of a calibration"),
+    "document of nothing": (lambda: Calibration.from_document({}), ValueError, "not a document of a calibration"),
     "no blob": (lambda: Calibration.from_blob(b""), TypeError, "a blob is given as bytes"),
     "flat a word": (lambda: arrays(T, ACC, GYR, "flat"), ValueError, "flat is 'flat', not two whole"),
     "flat of halves": (lambda: arrays(T, ACC, GYR, (0.5, 2)), ValueError, "not two whole numbers"),
-    "no data frame": (lambda: Recording.from_dataframe(ACC), TypeError, "ndarray is no data frame"),
-    "other frames": (lambda: A_RECORDING.to_dataframe("excel"), ValueError, "no data frames of 'excel'"),
+    "no data frame": (lambda: Recording.from_dataframe(ACC), TypeError, "ndarray is not a data frame"),
+    "other frames": (lambda: A_RECORDING.to_dataframe("excel"), ValueError, "data frames of 'excel' are not supported"),
 }
 
 

@@ -1,4 +1,4 @@
-"""What two type checkers, mypy and pyright in its build basedpyright, both strict, say of programs that use mpucal."""
+"""Programs that use mpucal, checked by mypy and basedpyright (pyright), both strict."""
 
 import json
 import re

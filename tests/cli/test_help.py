@@ -64,7 +64,7 @@ def test_a_full_disk_behind_stdout_is_3(mpucal, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "stdout", Full())
     result = mpucal("show", "c.json")
     assert result.code == 3
-    assert result.err == "mpucal: the output cannot be written (No space left on device): make room where it goes.\n"
+    assert result.err == "mpucal: the output cannot be written (No space left on device): free space there.\n"
 
 
 @pytest.mark.parametrize(

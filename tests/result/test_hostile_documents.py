@@ -13,7 +13,7 @@ from mpucal.data import Sensor
 from mpucal.errors import RecordingError, UsageError
 from mpucal.result.calibration import Calibration
 from mpucal.result.correction import make_correction
-from mpucal.strict_json import parsed
+from mpucal.strict_json import parse_json
 
 ONE = Calibration(
     np.eye(3) * 1.01,
@@ -126,7 +126,7 @@ def test_no_json_is_one_sentence(tmp_path, text):
 def test_keys_that_are_not_known_are_no_reason(tmp_path):
     document = json.loads(ONE.json())
     document["later"] = {"a": [1, "two", None, True]}
-    assert parsed(json.dumps(document)) == document
+    assert parse_json(json.dumps(document)) == document
     assert loaded(tmp_path, json.dumps(document)) == ONE
 
 
@@ -166,5 +166,5 @@ def test_a_pipe_or_device_is_no_file(tmp_path):
     for name in ("calibration.json", "capture.mcap", "calibration.bin"):
         (tmp_path / name).symlink_to("/dev/zero")
     for name in ("calibration.json", "calibration.bin"):
-        with pytest.raises(RecordingError, match="is a pipe or device, and no file"):
+        with pytest.raises(RecordingError, match="is a pipe or device, not a file"):
             Calibration.load(tmp_path / name)
