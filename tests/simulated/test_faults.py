@@ -1,4 +1,4 @@
-"""The table of faults: the pages hold it, the options take it, and what befalls the hand befalls chip and vehicle."""
+"""Table of faults: the pages hold it, the options accept it, and faults of the hand affect chip and vehicle."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,10 +22,9 @@ def table(page, number=1):
 
 
 def test_the_pages_hold_the_table():
-    assert table("chips.md") == [
-        f"| {kind.name} | {kind.what} |" for kind in fault_kinds(*OF_CHIP, Where.HAND).values()
-    ]
-    assert table("chips.md", 2) == [f"| {kind.name} | {kind.what} |" for kind in fault_kinds(Where.DEFECT).values()]
+    for page, number, where in (("chips.md", 1, (*OF_CHIP, Where.HAND)), ("chips.md", 2, (Where.DEFECT,))):
+        rows = [f"| {kind.name} | {kind.what} |" for kind in fault_kinds(*where).values()]
+        assert table(page, number) == rows
     vehicles = fault_kinds(*OF_VEHICLE).values()
     assert table("mavlink.md") == [f"| {kind.name}{'@' * kind.timed} | {kind.what} |" for kind in vehicles]
 
@@ -58,7 +57,7 @@ def test_a_schedule_gives_each_once_in_order_and_the_recurring_again():
 
 
 def measured(word):
-    """Specific force of a board that lies flat, 10 s after the start."""
+    """Return the specific force of a board that lies flat, 10 s after the start."""
     bus = open_simulated(f"sim:seed=6,hand=still{word}")
     driver = Driver(bus)
     driver.start()

@@ -1,10 +1,8 @@
-"""What befalls a simulated sensor, and hands that do as they like."""
+"""Mishaps of a simulated sensor."""
 
 import numpy as np
 import pytest
 
-from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.hands import HANDS
 from mpucal.simulated.mishaps import KNOCK_S, WARMER_C, WARMING_S, Knock, Mishap, Slip, Warmth
 
 FORCE, RATE = np.tile([0.0, 3.0, 9.0], (5, 1)), np.zeros((5, 3))
@@ -49,9 +47,3 @@ def test_warmth_moves_biases_by_as_much_as_the_chip_says():
     np.testing.assert_allclose(mishap.warmer_c(np.array([10.0, 10.0 + WARMING_S, 1e3])), [0.0, WARMER_C, WARMER_C])
     _, rate = mishap.apply(FORCE, RATE, T_S)
     assert np.degrees(rate[-1]).max() == pytest.approx(1.5)
-
-
-@pytest.mark.parametrize("kind", HANDS)
-def test_every_hand_can_be_asked_for(kind):
-    bus = open_simulated(f"sim:hand={kind}", seed=4)
-    assert bus.truth_document()["seed"] == 4

@@ -1,19 +1,15 @@
-"""Rotations of the simulated hand, against matrices."""
+"""Rotations of the simulated hand, compared with SciPy's matrices."""
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from mpucal.simulated import rotation
 
 
 def matrix(q):
-    """The rotation matrix of a quaternion, by Rodrigues' formula instead of the quaternion's."""
-    angle = 2 * np.arctan2(np.linalg.norm(q[1:]), q[0])
-    if angle == 0:
-        return np.eye(3)
-    x, y, z = q[1:] / np.linalg.norm(q[1:])
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    """Return SciPy's rotation matrix of a quaternion (w, x, y, z)."""
+    return Rotation.from_quat([*q[1:], q[0]]).as_matrix()
 
 
 def test_quaternions_against_matrices():

@@ -1,4 +1,4 @@
-"""The simulated sensor: its truth, and what it makes of a motion."""
+"""Simulated sensor: its truth, and its response to a motion."""
 
 import json
 
@@ -36,12 +36,8 @@ def test_a_drawn_sensor_lies_within_the_data_sheet(seed):
     assert abs(truth.rate_error_ppm) <= 10_000
 
 
-def test_a_seed_is_a_sensor():
-    assert SensorTruth.draw(7).document() == SensorTruth.draw(7).document()
-    assert SensorTruth.draw(7).document() != SensorTruth.draw(8).document()
-
-
-def test_the_document_is_plain_json():
+def test_a_seed_is_a_sensor_whose_document_is_plain_json():
+    assert SensorTruth.draw(7).document() == SensorTruth.draw(7).document() != SensorTruth.draw(8).document()
     truth = SensorTruth.draw(1, "mpu6500", 9.82)
     document = json.loads(json.dumps(truth.document()))
     assert document["D"] == truth.D.tolist()
@@ -55,7 +51,7 @@ def test_the_symmetric_frame_is_another_view_of_the_same_sensor():
     D2, K2, Q = to_symmetric_frame(D, K)
     np.testing.assert_allclose(K2, K2.T, atol=1e-12)
     assert np.all(np.linalg.eigvalsh(K2) > 0)
-    # what is seen by both of one turn and one force: K and D differ by one rotation
+    # Both views of one turn and one force: K and D differ by one rotation.
     np.testing.assert_allclose(Q, K2 @ np.linalg.inv(K), atol=1e-12)
     np.testing.assert_allclose(Q @ Q.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(Q) == pytest.approx(1.0)
@@ -97,12 +93,10 @@ def test_rates_and_forces_come_back_through_the_calibration():
     assert np.abs(rates).max() < 0.01
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-def test_it_saturates_at_the_ends_of_the_range(sign):
-    seen = counts(
-        SensorTruth.draw(5), setting(accel_range_g=2.0), sign * 100 * np.ones((9, 3)), sign * 50 * np.ones((9, 3))
-    )
-    end = 32767 if sign > 0 else -32768
+@pytest.mark.parametrize(("sign", "end"), [(1, 32767), (-1, -32768)])
+def test_it_saturates_at_the_ends_of_the_range(sign, end):
+    force, omega = sign * 100 * np.ones((9, 3)), sign * 50 * np.ones((9, 3))
+    seen = counts(SensorTruth.draw(5), setting(accel_range_g=2.0), force, omega)
     assert np.all(seen[:, [0, 1, 2, 4, 5, 6]] == end)
 
 

@@ -1,4 +1,4 @@
-"""The simulated bus: its time, and the driver on it."""
+"""Simulated bus: its time, and the driver on it."""
 
 from types import SimpleNamespace
 
@@ -18,18 +18,15 @@ def prompt(kind):
 
 
 def session(bus, seconds, rotate_s=None):
-    """A driver's recording of a hand that lays the board flat and, at `rotate_s`, turns it."""
+    """Return a driver's recording of a hand that lays the board flat and, at `rotate_s`, turns it."""
     driver = Driver(bus)
     driver.start()
     bus.hear(prompt("lay_flat"))
-    end = driver.now_ns() + int(seconds * 1e9)
-    said = rotate_s is None
-    rotate_ns = 0 if rotate_s is None else driver.now_ns() + int(rotate_s * 1e9)
-    while driver.now_ns() < end:
+    begin_ns = driver.now_ns()
+    while driver.now_ns() < begin_ns + seconds * 1e9:
         driver.poll()
-        if not said and driver.now_ns() >= rotate_ns:
+        if rotate_s is not None and driver.now_ns() >= begin_ns + rotate_s * 1e9:
             bus.hear(prompt("rotate"))
-            said = True
     return driver.recording()
 
 

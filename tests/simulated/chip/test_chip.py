@@ -1,4 +1,4 @@
-"""The simulated chip's registers, sample clock and FIFO, against the register map."""
+"""Registers, sample clock and FIFO of the simulated chip, compared with the register map."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ PIECE = FactoryTrim(TRIM, (13, 22, 31), (9, 1, 30), (0.4, 0.5, 0.6), (30.0, -40.
 
 
 class Counter:
-    """A feed whose samples are numbered: words 7 k, 7 k + 1, ... of sample k; remembers how it was asked."""
+    """Feed with the words 7 k, 7 k + 1, ... in sample k, which keeps the requested times and settings."""
 
     def __init__(self, end=None):
         self.next, self.end, self.settings, self.edges = 0, end, [], []
@@ -38,7 +38,7 @@ def chip(model="mpu6050", feed=None, ppm=0.0):
 
 
 def collecting(device, divider=4, sources=0xF8, config=1):
-    """The chip awake at 1 kHz / (1 + divider) from 0 on, its FIFO on."""
+    """Return the chip, awake at 1 kHz / (1 + divider) from 0 on, its FIFO on."""
     for register, value in (
         (reg.PWR_MGMT_1, 0x01),
         (reg.CONFIG, config),
@@ -48,6 +48,20 @@ def collecting(device, divider=4, sources=0xF8, config=1):
     ):
         device.write(register, bytes([value]), 0)
     return device
+
+
+def setting_after(*writes, model="mpu6050", **options):
+    """Return the setting under which a chip measures after writes of (register, bytes)."""
+    feed = Counter()
+    device = chip(model, feed)
+    for register, data in writes:
+        device.write(register, data, 0)
+    collecting(device, **options).read(reg.FIFO_R_W, 1, 10 * MS)
+    return feed.settings[-1]
+
+
+def word(value):
+    return value.to_bytes(2, "big", signed=True)
 
 
 def count(device, t_ns):
@@ -61,9 +75,6 @@ def words(data):
 @pytest.mark.parametrize(
     ("model", "register", "value"),
     [
-        pytest.param("mpu6050", reg.WHO_AM_I, 0x68, id="6050 identity"),
-        pytest.param("mpu6500", reg.WHO_AM_I, 0x70, id="6500 identity"),
-        pytest.param("clone98", reg.WHO_AM_I, 0x98, id="clone identity"),
         pytest.param("mpu6050", reg.PWR_MGMT_1, 0x40, id="6050 asleep"),
         pytest.param("mpu6500", reg.PWR_MGMT_1, 0x01, id="6500 awake"),
         pytest.param("mpu6050", reg.SMPLRT_DIV, 0, id="divider"),
@@ -131,7 +142,7 @@ def test_without_fifo_only_the_last_sample_is_measured():
     np.testing.assert_allclose(feed.edges[0], [0.499, 0.500])
 
 
-def test_reading_int_status_clears_it():
+def test_reading_int_status_clears_the_interrupt():
     device = collecting(chip())
     seen = [device.read(reg.INT_STATUS, 1, t * MS)[0] for t in (1, 6, 7, 11)]
     assert seen == [0, reg.INT_DATA_RDY, 0, reg.INT_DATA_RDY]
@@ -139,13 +150,8 @@ def test_reading_int_status_clears_it():
 
 @pytest.mark.parametrize(
     ("sources", "columns"),
-    [
-        pytest.param(0xF8, [0, 1, 2, 3, 4, 5, 6], id="all"),
-        pytest.param(0x08, [0, 1, 2], id="accelerometer"),
-        pytest.param(0x78, [0, 1, 2, 4, 5, 6], id="without temperature"),
-        pytest.param(0x80, [3], id="temperature"),
-        pytest.param(0x30, [5, 6], id="gyroscope y and z"),
-    ],
+    [(0xF8, [0, 1, 2, 3, 4, 5, 6]), (0x08, [0, 1, 2]), (0x78, [0, 1, 2, 4, 5, 6]), (0x80, [3]), (0x30, [5, 6])],
+    ids=["all", "accelerometer", "without temperature", "temperature", "gyroscope y and z"],
 )
 def test_a_frame_holds_the_enabled_sources_in_register_order(sources, columns):
     device = collecting(chip(), sources=sources)
@@ -176,12 +182,7 @@ def test_an_empty_fifo_returns_the_last_byte_again():
 
 @pytest.mark.parametrize(
     ("model", "accel_config2", "size"),
-    [
-        pytest.param("mpu6050", None, 1024, id="6050"),
-        pytest.param("mpu6500", None, 512, id="6500"),
-        pytest.param("clone98", None, 512, id="clone"),
-        pytest.param("clone98", 0xC0, 4096, id="clone, widened"),
-    ],
+    [("mpu6050", None, 1024), ("mpu6500", None, 512), ("clone98", None, 512), ("clone98", 0xC0, 4096)],
 )
 def test_overflow_drops_the_oldest_bytes_and_misaligns(model, accel_config2, size):
     device = chip(model)
@@ -214,13 +215,9 @@ def test_told_to_stop_when_full_it_keeps_the_oldest():
     assert words(device.read(reg.FIFO_R_W, 14, 100 * MS)) == list(range(7))
 
 
+# a 6050's FIFO is not reset while it is on
 @pytest.mark.parametrize(
-    ("model", "value", "left"),
-    [
-        pytest.param("mpu6050", 0x44, 28, id="6050, still on: not reset"),
-        pytest.param("mpu6050", 0x04, 0, id="6050, off"),
-        pytest.param("mpu6500", 0x44, 0, id="6500, still on"),
-    ],
+    ("model", "value", "left"), [("mpu6050", 0x44, 28), ("mpu6050", 0x04, 0), ("mpu6500", 0x44, 0)]
 )
 def test_fifo_reset(model, value, left):
     device = collecting(chip(model))
@@ -239,39 +236,25 @@ def test_it_fills_at_its_own_clock(ppm):
     assert feed.next == int(20 * 200 * (1 + ppm * 1e-6))
 
 
-@pytest.mark.parametrize(
-    ("config", "divider", "rate_hz"),
-    [
-        pytest.param(3, 4, 200.0, id="filtered"),
-        pytest.param(0, 7, 1000.0, id="filter 0 has a base of 8 kHz"),
-        pytest.param(7, 39, 200.0, id="filter 7 too"),
-    ],
-)
+# filters 0 and 7 have a base of 8 kHz
+@pytest.mark.parametrize(("config", "divider", "rate_hz"), [(3, 4, 200.0), (0, 7, 1000.0), (7, 39, 200.0)])
 def test_the_rate_follows_divider_and_filter(config, divider, rate_hz):
-    feed = Counter()
-    collecting(chip(feed=feed), divider=divider, config=config).read(reg.FIFO_R_W, 1, 10 * MS)
-    assert feed.settings[-1].rate_hz == rate_hz
+    assert setting_after(divider=divider, config=config).rate_hz == rate_hz
 
 
 @pytest.mark.parametrize("code", range(4))
 def test_the_ranges_follow_the_configuration(code):
-    feed = Counter()
-    device = chip(feed=feed)
-    device.write(reg.GYRO_CONFIG, bytes([code << 3, code << 3]), 0)
-    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
-    setting = feed.settings[-1]
+    setting = setting_after((reg.GYRO_CONFIG, bytes([code << 3, code << 3])))
     assert (setting.accel_range_g, setting.gyro_range_dps) == (2 << code, 250 << code)
 
 
-@pytest.mark.parametrize(
-    ("model", "address"), [pytest.param("mpu6050", 0x08, id="6050"), pytest.param("mpu6500", 0x7A, id="6500")]
-)
+@pytest.mark.parametrize(("model", "address"), [("mpu6050", 0x08), ("mpu6500", 0x7A)])
 def test_offset_registers_act_by_what_differs_from_the_factory_trim(model, address):
     feed = Counter()
     device = chip(model, feed)
     old = int.from_bytes(device.read(address, 2, 0), "big", signed=True)
-    device.write(address, (old + 256).to_bytes(2, "big", signed=True), 0)
-    device.write(reg.XG_OFFSET_H, (131).to_bytes(2, "big"), 0)
+    device.write(address, word(old + 256), 0)
+    device.write(reg.XG_OFFSET_H, word(131), 0)
     collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
     setting = feed.settings[-1]
     assert setting.accel_offset_g == (0.0, 0.125, 0.0)
@@ -281,11 +264,7 @@ def test_offset_registers_act_by_what_differs_from_the_factory_trim(model, addre
 
 
 def test_bit_0_of_an_offset_is_reserved():
-    feed = Counter()
-    device = chip(feed=feed)
-    device.write(0x08, (TRIM[1] ^ 1).to_bytes(2, "big", signed=True), 0)
-    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
-    assert feed.settings[-1].accel_offset_g == (0.0, 0.0, 0.0)
+    assert setting_after((0x08, word(TRIM[1] ^ 1))).accel_offset_g == (0.0, 0.0, 0.0)
 
 
 def test_a_feed_that_ends_is_served_to_its_last_sample():
@@ -307,18 +286,17 @@ def test_the_sensor_registers_end_with_the_feed():
 def test_another_identity_is_still_the_same_chip():
     device = Chip(replace(MODELS["mpu6500"], who_am_i=0x71), Counter(), 0.0, PIECE)
     assert device.read(reg.WHO_AM_I, 1, 0) == b"\x71"
-    assert device.read(0x77, 2, 0) == TRIM[0].to_bytes(2, "big", signed=True)
+    assert device.read(0x77, 2, 0) == word(TRIM[0])
 
 
 @pytest.mark.parametrize(
     ("model", "held"),
     [
         # x: 0b01101 and 9, y: 0b10110 and 1, z: 0b11111 and 30
-        pytest.param(
-            "mpu6050", {0x0D: 0b011_01001, 0x0E: 0b101_00001, 0x0F: 0b111_11110, 0x10: 0b01_10_11}, id="packed"
-        ),
-        pytest.param("mpu6500", {0x00: 9, 0x01: 1, 0x02: 30, 0x0D: 13, 0x0E: 22, 0x0F: 31}, id="a byte each"),
+        ("mpu6050", {0x0D: 0b011_01001, 0x0E: 0b101_00001, 0x0F: 0b111_11110, 0x10: 0b01_10_11}),
+        ("mpu6500", {0x00: 9, 0x01: 1, 0x02: 30, 0x0D: 13, 0x0E: 22, 0x0F: 31}),
     ],
+    ids=["packed", "a byte each"],
 )
 def test_the_factorys_self_test_codes(model, held):
     device = chip(model)
@@ -327,13 +305,10 @@ def test_the_factorys_self_test_codes(model, held):
 
 @pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
 def test_self_test_adds_what_the_piece_answers_on_the_axes_asked_for(model):
-    feed = Counter()
-    device = chip(model, feed)
-    device.write(reg.GYRO_CONFIG, b"\x80\x68", 0)
-    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
-    assert feed.settings[-1].gyro_offset_dps == (30.0, 0.0, 0.0)
-    assert feed.settings[-1].accel_offset_g == (0.0, 0.5, 0.6)
-    assert feed.settings[-1].accel_range_g == 4
+    setting = setting_after((reg.GYRO_CONFIG, b"\x80\x68"), model=model)
+    assert setting.gyro_offset_dps == (30.0, 0.0, 0.0)
+    assert setting.accel_offset_g == (0.0, 0.5, 0.6)
+    assert setting.accel_range_g == 4
 
 
 @pytest.mark.parametrize("model", ["mpu6050", "mpu6500"])
@@ -353,19 +328,13 @@ def test_a_drawn_piece_answers_its_self_test_as_its_codes_say(model):
 
 
 def test_revision_c_has_half_the_sensitivity():
-    feed = Counter()
-    device = collecting(chip("mpu6050c", feed))
-    device.write(reg.ACCEL_CONFIG, b"\x08", 0)
-    device.read(reg.FIFO_R_W, 1, 5 * MS)
-    assert feed.settings[-1].accel_range_g == 8
+    assert setting_after((reg.ACCEL_CONFIG, b"\x08"), model="mpu6050c").accel_range_g == 8
 
 
-@pytest.mark.parametrize(
-    ("offsets", "offset_g"), [("2048", 0.125), ("4096", 0.0625), ("readonly", 0.0)], ids=["2048", "4096", "readonly"]
-)
-def test_what_an_offset_does_can_be_chosen(offsets, offset_g):
+@pytest.mark.parametrize(("offsets", "offset_g"), [("2048", 0.125), ("4096", 0.0625), ("readonly", 0.0)])
+def test_the_effect_of_an_offset_can_be_chosen(offsets, offset_g):
     feed = Counter()
     device = Chip(replace(MODELS["mpu6050"], **OFFSETS[offsets]), feed, 0.0, PIECE)
-    device.write(0x06, (TRIM[0] + 256).to_bytes(2, "big", signed=True), 0)
+    device.write(0x06, word(TRIM[0] + 256), 0)
     collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
     assert feed.settings[-1].accel_offset_g == (offset_g, 0.0, 0.0)

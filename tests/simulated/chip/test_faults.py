@@ -1,4 +1,4 @@
-"""The simulated chip's faults, and what the driver makes of them: alone, in pairs, and of their captures."""
+"""Faults of the simulated chip and the driver's reaction: to one, to pairs, and to their captures."""
 
 import errno
 import json
@@ -30,7 +30,7 @@ TRUE = (-700, 1500, -1600, 1700)
 
 
 class NumberedFeed:
-    """Samples 0, 1, 2, ... in accelerometer x; every other word is the same in all but for the scale."""
+    """Feed of samples 0, 1, 2, ... in accelerometer x; every other word is constant, but for its scale."""
 
     def __init__(self):
         self.next = 0
@@ -142,7 +142,7 @@ def test_what_lasts_is_given_up_with_its_cause(name, says):
     assert len(recording) > 200
 
 
-# of which no driver can know that they are not what was measured
+# No driver can notice these.
 UNSEEN = {"low_byte", "high_bit"}
 places = st.builds(
     Fault, st.sampled_from(sorted({*fault_kinds(*OF_CHIP)} - UNSEEN)), st.floats(0, 4).map(lambda t: round(t, 3))
@@ -157,7 +157,7 @@ places = st.builds(
     seed=st.integers(0, 9),
 )
 def test_whatever_happens_what_is_delivered_is_true(faults, model, rate_hz, seed):
-    """But for a noisy bus, on which single values may be off; and it ends in samples or in a sentence."""
+    """On a noisy bus single values may be off; every run ends in samples or in a message."""
     recording, error = measured(suffering(*faults, model=model, seed=seed), 4.5, Config(rate_hz=rate_hz))
     assert error is None or error.remedy
     assert (np.diff(recording.t) > 0).all()

@@ -1,4 +1,4 @@
-"""A recording behind the simulated chip."""
+"""Recording behind the simulated chip."""
 
 from types import SimpleNamespace
 
@@ -41,10 +41,11 @@ def test_a_recordings_counts_come_out_as_they_are():
 @pytest.mark.parametrize(
     ("config", "says"),
     [
-        pytest.param(Config(4, 250, 100), "set to 4 g, the recording to 2 g", id="accelerometer"),
-        pytest.param(Config(2, 500, 100), "set to 500 deg/s, the recording to 250 deg/s", id="gyroscope"),
-        pytest.param(Config(2, 250, 200), "set to 200 Hz, the recording to 100 Hz", id="rate"),
+        (Config(4, 250, 100), "set to 4 g, the recording to 2 g"),
+        (Config(2, 500, 100), "set to 500 deg/s, the recording to 250 deg/s"),
+        (Config(2, 250, 200), "set to 200 Hz, the recording to 100 Hz"),
     ],
+    ids=["accelerometer", "gyroscope", "rate"],
 )
 def test_a_chip_set_otherwise_than_the_recording_is_an_error(config, says):
     with pytest.raises(UsageError, match=says):
@@ -54,14 +55,13 @@ def test_a_chip_set_otherwise_than_the_recording_is_an_error(config, says):
 @pytest.mark.parametrize(
     ("acc", "gyr"),
     [
-        pytest.param(np.zeros((5, 3)), np.zeros((4, 3)), id="not as many"),
-        pytest.param(np.zeros((5, 2)), np.zeros((5, 2)), id="two axes"),
-        pytest.param(np.full((5, 3), 0.5), np.zeros((5, 3)), id="fractions"),
-        pytest.param(np.full((5, 3), 32768), np.zeros((5, 3)), id="beyond 16 bits"),
-        pytest.param(np.full((5, 3), np.nan), np.zeros((5, 3)), id="no numbers"),
+        (np.zeros((5, 3)), np.zeros((4, 3))),
+        (np.zeros((5, 2)), np.zeros((5, 2))),
+        *((np.full((5, 3), value), np.zeros((5, 3))) for value in (0.5, 32768, np.nan)),
     ],
+    ids=["not as many", "two axes", "fractions", "beyond 16 bits", "no numbers"],
 )
-def test_what_is_no_recording_of_counts(acc, gyr):
+def test_counts_that_are_no_recording_are_refused(acc, gyr):
     with pytest.raises(RecordingError):
         open_recorded(acc, gyr, 100, 2, 250)
 

@@ -1,4 +1,4 @@
-"""The vehicle's low pass, compared with SciPy's."""
+"""Low pass of the vehicle, compared with SciPy's."""
 
 import numpy as np
 import pytest

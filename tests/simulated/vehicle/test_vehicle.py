@@ -1,4 +1,4 @@
-"""The simulated vehicle does what ArduPilot and PX4 do, quirks included."""
+"""Simulated vehicle: the behaviour of ArduPilot and PX4, quirks included."""
 
 import subprocess
 from collections import Counter
@@ -25,7 +25,7 @@ REAL32, INT32 = 9, 6
 
 
 class Station:
-    """Speaks with a vehicle, and reads what it sends."""
+    """Ground station of a simulated vehicle."""
 
     def __init__(self, words=""):
         self.vehicle = SimulatedVehicle(VehicleOptions.parse("sim" + (":" + words if words else "")))
@@ -55,7 +55,7 @@ class Station:
         return {name: count / seconds for name, count in counts.items()}
 
     def rest(self):
-        """Set it down."""
+        """Have the hand set the vehicle down."""
         self.vehicle.receive(bytes(encode_prompt(ReceivedPrompt("lay_flat", None)).pack(self.mav)))
         self.hear(5.0)
 
