@@ -1,1 +1,1 @@
-"""Files and folders on their way to the disk: written whole or as they grow, each by one process at a time."""
+"""Writing of files and folders: atomically or as they grow, each by one process at a time."""

@@ -1,4 +1,4 @@
-"""Atomic writing of files: after a crash the old file is there or the new one, never a part."""
+"""Atomic writing of files: a crash leaves the old file or the new one, never a part."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .location import mode_of_existing
 
 
 def check_not_input(target: Path, inputs: Iterable[Path]) -> None:
-    """A result never takes the place of what it was made of; UsageError where `target` is one of `inputs`."""
+    """Raise UsageError if `target` is one of `inputs`: a result must not replace what it is made of."""
     if target.exists() and any(read.exists() and target.samefile(read) for read in inputs):
-        raise UsageError(f"{target} is what was given to be read", "choose another name with -o")
+        raise UsageError(f"{target} is an input file", "choose another name with -o")
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write `data` to `path` so that a crash leaves the old file or the new one, never a part.
+    """Write `data` to `path`; see atomic_file.
 
     Raises
     ------
@@ -31,18 +31,18 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def write_together(files: Mapping[Path, bytes]) -> None:
-    """Write all files, or, where one cannot be written, none: the old ones are there again.
+    """Write all files; if one of them cannot be written, restore the old ones.
 
-    A crash between two of them leaves the old one of the second.
+    A crash between two files leaves the old file of the second.
 
     Raises
     ------
     OutputError : a folder or file cannot be written.
     """
-    old = {path: _held(path) for path in files}
+    old = {path: _read_old(path) for path in files}
     try:
         with ExitStack() as stack:
-            # what is entered last takes its place first
+            # The file that is entered last is replaced first.
             for path in reversed(list(files)):
                 file = stack.enter_context(atomic_file(path))
                 file.write(files[path])
@@ -50,27 +50,28 @@ def write_together(files: Mapping[Path, bytes]) -> None:
     except BaseException:
         for path, data in old.items():
             with suppress(OSError, OutputError):
-                _put_back(path, data)
+                _restore(path, data)
         raise
 
 
-def _held(path: Path) -> bytes | None:
+def _read_old(path: Path) -> bytes | None:
     try:
         return path.read_bytes() if path.is_file() else None
     except OSError as error:
         raise OutputError(
-            f"cannot write {path}, as what is there cannot be read ({error.strerror})", "choose another folder with -o"
+            f"cannot write {path}, since the old file cannot be read ({error.strerror})",
+            "choose another folder with -o",
         ) from error
 
 
 def remove_file(path: Path) -> None:
-    """Remove a file; what is none stays."""
+    """Remove a file, but not a link, a device or a pipe."""
     with suppress(OSError, OutputError):
         if mode_of_existing(path) is not None:
             path.unlink()
 
 
-def _put_back(path: Path, data: bytes | None) -> None:
+def _restore(path: Path, data: bytes | None) -> None:
     if data is None:
         remove_file(path)
     elif path.read_bytes() != data:
@@ -79,17 +80,17 @@ def _put_back(path: Path, data: bytes | None) -> None:
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[IO[bytes]]:
-    """A file to be filled, which takes the place of `path` once it is; whatever fails meanwhile leaves the old one.
+    """Open a temporary file that replaces `path` at the end of the `with` block; an error keeps the old one.
 
     Raises
     ------
-    OutputError : the folder or file cannot be written, or there is a link, device or pipe of that name.
+    OutputError : the folder or file cannot be written, or `path` is a link, device or pipe.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     rights = mode_of_existing(path)
     made = False
     try:
-        # the umask is the person's; what is there keeps its rights
+        # A new file gets the permissions of the umask; an old one keeps its own.
         with temporary.open("x+b") as file:
             made = True
             if rights is not None:
@@ -107,16 +108,16 @@ def atomic_file(path: Path) -> Iterator[IO[bytes]]:
             raise
         raise OutputError(
             f"cannot write {path} ({error.strerror or error})",
-            "choose a folder that you may write to with -o",
+            "choose a folder with permission to write with -o",
         ) from error
 
 
 def make_folders(folder: Path) -> None:
-    """Make `folder`, and those that it lies in, where they are missing, so that a power cut leaves them there.
+    """Create `folder` and its missing parents, and sync them.
 
     Raises
     ------
-    OSError : one cannot be made.
+    OSError : one cannot be created.
     """
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
@@ -125,7 +126,7 @@ def make_folders(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """See to it that a power cut leaves the names in `folder` as they are now; a disk that fails does not matter."""
+    """Sync the names in `folder`, so that a power cut keeps them; an error of the disk is ignored."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""A file that is written as what it holds happens: a power cut takes the last second or two."""
+"""File that is written while its content is recorded: a power cut loses the last second or two."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ EVERY_S = 1.0
 
 
 class GrowingFile:
-    """A file of bytes, made anew, synced once a second; the null device is there already, and keeps nothing.
+    """New file of bytes, synced once a second; the null device is accepted too, and keeps nothing.
 
     Attributes
     ----------
-    path : where it is to be. kept : whether it is kept anywhere.
+    path : of the file. kept : False for the null device.
 
     Raises
     ------
-    OutputError : it cannot be made, or is there already.
+    OutputError : the file cannot be created, or exists.
     """
 
     def __init__(self, path: Path) -> None:
         self.path, self.kept = path, path != Path(os.devnull)
         self._written = 0
         try:
-            # at its end: what another program cut off is not followed by a hole as long as that
+            # Appending leaves no hole if another program shortens the file.
             flags = os.O_CREAT | os.O_EXCL | os.O_APPEND if self.kept else 0
             self._file = os.fdopen(os.open(path, os.O_WRONLY | flags | getattr(os, "O_BINARY", 0), 0o666), "wb")
         except OSError as error:
@@ -40,24 +40,24 @@ class GrowingFile:
         self._syncing = SyncThread(self._file)
 
     def write(self, data: bytes) -> int:
-        """Add to its end; OSError where there is no room."""
+        """Append `data`; raise OSError if the disk is full."""
         self._written += len(data)
         return self._file.write(data)
 
     def tell(self) -> int:
-        """How many bytes were written."""
+        """Return the number of bytes written."""
         return self._written
 
     def flush(self) -> None:
-        """Give the system what was written."""
+        """Pass the written bytes to the system."""
         self._file.flush()
 
     def close(self) -> Path | None:
-        """Bring all to the disk and close it; where it then is, None where it is not kept.
+        """Sync and close the file, and return its present path; None for the null device.
 
         Raises
         ------
-        OutputError : it is another one than was written. OSError : there is no room.
+        OutputError : another program changed the file. OSError : the disk is full.
         """
         with self._file, closing(self._syncing):
             self.flush()
@@ -72,15 +72,15 @@ class GrowingFile:
             return now
 
     def failed(self, error: Exception) -> OutputError:
-        """The error of mpucal for an `error` of the operating system while the file grows."""
+        """Convert an `error` of the operating system while the file grows."""
         return OutputError(
             f"cannot write the capture {self.path} ({getattr(error, 'strerror', None) or error})",
-            "choose a place that you may write to, with room on it, with -o",
+            "choose another place with -o, with space and permission to write",
         )
 
 
 class SyncThread:
-    """Syncs an open file once a second, in a thread of its own: a disk may take as long as it likes."""
+    """Thread that syncs an open file once a second, so that a slow disk does not delay its writer."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._handle = file.fileno()
@@ -89,7 +89,7 @@ class SyncThread:
         self._thread.start()
 
     def close(self) -> None:
-        """Sync for the last time, what was flushed until now included."""
+        """Sync a last time, with everything flushed so far."""
         self._closing.set()
         self._thread.join()
         _sync(self._handle)
@@ -100,6 +100,6 @@ class SyncThread:
 
 
 def _sync(handle: int) -> None:
-    # a disk that fails shows in the next write
+    # An error of the disk shows in the next write.
     with suppress(OSError):
         getattr(os, "fdatasync", os.fsync)(handle)

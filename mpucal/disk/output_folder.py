@@ -1,4 +1,4 @@
-"""A folder for results, in which one process writes at a time."""
+"""Folder for results, in which only one process writes at a time."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from .location import current_path
 
 
 class OutputFolder:
-    """A folder, made where it is missing, that no other process of mpucal writes to until it is closed.
+    """Folder that is created if needed, and locked against other processes of mpucal until it is closed.
 
-    Where neither the system nor the disk knows locks, nobody is kept away.
+    There is no lock if the system or the disk does not support locks.
 
     Parameters
     ----------
-    path : of it. new : it is not there yet, and has the first number behind its name that is free.
+    path : of the folder. new : create a new folder, with the first free number behind its name.
 
     Raises
     ------
-    OutputError : it cannot be made, or another process writes to it.
+    OutputError : the folder cannot be created, or another process writes to it.
     """
 
     def __init__(self, path: Path, new: bool = False) -> None:
-        self._path = _made(str(path)) if new else path
+        self._path = _create(str(path)) if new else path
         try:
             make_folders(self._path)
         except OSError as error:
-            raise _not_made(path, error) from error
-        self._handle = _locked(self._path)
+            raise _creation_error(path, error) from error
+        self._handle = _lock(self._path)
 
     @property
     def path(self) -> Path:
-        """Where it is now.
+        """Present path of the folder.
 
         Raises
         ------
-        OutputError : it was removed, or another one is in its place.
+        OutputError : the folder was removed or replaced.
         """
         if self._handle is not None:
             found = current_path(self._handle, self._path)
@@ -54,9 +54,9 @@ class OutputFolder:
         return self._path
 
     def rename(self, name: str) -> None:
-        """Rename it, to `name` or with the first number behind it that is free; where that fails, it stays."""
+        """Rename the folder to `name`, with the first free number behind it; keep the old name if that fails."""
         with suppress(OSError, OutputError):
-            free = _made(name)
+            free = _create(name)
             try:
                 self._path = self.path.rename(free)
             except OSError:
@@ -64,7 +64,7 @@ class OutputFolder:
             sync_folder(free.parent)
 
     def close(self) -> None:
-        """Let others write to it."""
+        """Release the lock."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
@@ -77,7 +77,7 @@ class OutputFolder:
 
 
 def free_name(path: Path) -> Path:
-    """`path`, or with the first number behind it that nothing has."""
+    """Return `path`, or `path` with the first free number behind it."""
     return next(name for name in _numbered(str(path)) if not os.path.lexists(name))
 
 
@@ -85,25 +85,25 @@ def _numbered(name: str) -> map[Path]:
     return map(Path, (name if number == 1 else f"{name}-{number}" for number in count(1)))
 
 
-def _made(name: str) -> Path:
+def _create(name: str) -> Path:
     for path in _numbered(name):
         try:
             path.mkdir()
         except FileExistsError:
             continue
         except OSError as error:
-            raise _not_made(path, error) from error
+            raise _creation_error(path, error) from error
         sync_folder(path.parent)
         return path
     raise AssertionError(name)
 
 
-def _not_made(path: Path, error: OSError) -> OutputError:
+def _creation_error(path: Path, error: OSError) -> OutputError:
     return OutputError(f"cannot make the folder {path} ({error.strerror})", "choose another one with -o")
 
 
-def _locked(path: Path) -> int | None:
-    """A handle of the folder, with its lock as far as there are any."""
+def _lock(path: Path) -> int | None:
+    """Lock the folder, and return its handle; None if the system cannot open folders."""
     try:
         import fcntl  # noqa: PLC0415 - not on Windows, which opens no folders either
 
@@ -116,16 +116,16 @@ def _locked(path: Path) -> int | None:
         holder = _holder(handle)
         os.close(handle)
         raise OutputError(
-            f"another mpucal{holder} writes to {path}", "wait for it, or choose another folder with -o"
+            f"another mpucal{holder} writes to {path}", "wait until it ends, or choose another folder with -o"
         ) from error
     except OSError:
-        # a disk of another computer that knows none
+        # A network disk may not support locks.
         pass
     return handle
 
 
 def _holder(handle: int) -> str:
-    """The process that has the lock, by the kernel's list of them, as proc(5) has it; empty where that is not told."""
+    """Return the process that has the lock, from the kernel's list (proc(5)); empty if it is not in the list."""
     inode = str(os.fstat(handle).st_ino)
     with suppress(OSError, IndexError):
         for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():

@@ -1,4 +1,4 @@
-"""Sensors that a driver of the Linux kernel holds (IIO): their attributes and buffers, and samples from them."""
+"""Sensors with a Linux kernel (IIO) driver: their attributes, their buffers, and samples from them."""
 
-# of the driver: counts up with every change of its accesses
+# Version of the driver: it counts up with every change of its accesses.
 IIO_VERSION = "iio 1"

@@ -1,7 +1,7 @@
-"""The attributes of IIO devices as texts, and what they say of a sensor: units, ranges, mounting, name.
+"""Attributes of IIO devices as texts, and their meaning: units, ranges, mounting, name.
 
 Source: Linux Documentation/ABI/testing/sysfs-bus-iio: (raw + offset) * scale is m/s^2, rad/s or thousandths of a
-degree Celsius; a mount matrix turns what is measured into the frame of the device that it is built into.
+degree Celsius; a mount matrix rotates the samples into the frame of the product that contains the sensor.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from .scan_elements import ScanElement
 AXES = "xyz"
 ACCEL, GYRO, TEMP, TIMESTAMP = "in_accel", "in_anglvel", "in_temp", "in_timestamp"
 KINDS = {ACCEL: "accelerometer", GYRO: "gyroscope"}
-# counts of an MPU where no buffer says it
+# Bits of an MPU's count, if there is no buffer to describe them.
 USUAL_BITS = 16
-# what counts as full scale of such sensors: g, deg/s
+# Plausible full scales: g, deg/s.
 PLAUSIBLE = {ACCEL: (1.0, 1000.0), GYRO: (50.0, 20000.0)}
-# a driver rounds its scales to 0.1 %
+# Drivers round their scales to 0.1 %.
 ROUNDED = 0.005
 
 Texts = Mapping[str, str]
 
 
 @dataclass(frozen=True)
-class Group:
-    """The three axes of one sensor: `kind` is ACCEL or GYRO.
+class SensorScale:
+    """Scale of the three axes of a sensor: `kind` is ACCEL or GYRO.
 
     Attributes
     ----------
-    scale, offset : (3,) (raw + offset) * scale is in m/s^2 or rad/s. bits : of a count; None: nobody says.
+    scale, offset : (3,) (raw + offset) * scale is in m/s^2 or rad/s. bits : of a count; None: unknown.
     """
 
     kind: str
@@ -46,13 +46,13 @@ class Group:
 
     @property
     def full_scale(self) -> float | None:
-        """In g or deg/s, as a data sheet names it; None where the bits are not known."""
+        """Full scale in g or deg/s, as in a data sheet; None if the bits are unknown."""
         if self.bits is None:
             return None
         return full_scale(self.kind, float(self.scale.max()), self.bits)
 
     def clipped(self, counts: Vector) -> Vector:
-        """(n,) 1.0 where one of `counts` (n, 3) stands at the end of its range, else 0.0."""
+        """Return (n,) 1.0 if one of `counts` (n, 3) is at the end of its range, else 0.0."""
         if self.bits is None:
             return np.zeros(len(counts))
         most = 2.0 ** (self.bits - 1) - 1
@@ -60,41 +60,41 @@ class Group:
 
 
 def full_scale(kind: str, scale: float, bits: int) -> float:
-    """g or deg/s at the last count; a whole number where it is nearly one."""
+    """Return g or deg/s at the largest count, rounded to a whole number if it is nearly one."""
     value = scale * 2 ** (bits - 1)
     value = value / STANDARD_GRAVITY_MPS2 if kind == ACCEL else math.degrees(value)
     return float(round(value)) if abs(value - round(value)) < ROUNDED * value else value
 
 
 def bits_of(kind: str, texts: Texts, elements: Mapping[str, ScanElement]) -> int | None:
-    """Of a count; None where neither the buffer nor the part's name says it."""
+    """Return the bits of a count; None if neither the buffer nor the part's name tells them."""
     first = elements.get(f"{kind}_x")
     return first.bits if first is not None else USUAL_BITS if part_of(texts) is not None else None
 
 
-def group(kind: str, device: str, texts: Texts, elements: Mapping[str, ScanElement]) -> Group:
-    """Of a device's attributes.
+def read_scale(kind: str, device: str, texts: Texts, elements: Mapping[str, ScanElement]) -> SensorScale:
+    """Read the scale from a device's attributes.
 
     Raises
     ------
-    ChipError : a scale that is none, or of which no such sensor is.
+    ChipError : a scale that is not a number, or not plausible.
     """
-    scale = np.array([number(texts, kind, axis, "scale", 0.0) for axis in AXES])
-    offset = np.array([number(texts, kind, axis, "offset", 0.0) for axis in AXES])
+    scale = np.array([read_number(texts, kind, axis, "scale", 0.0) for axis in AXES])
+    offset = np.array([read_number(texts, kind, axis, "offset", 0.0) for axis in AXES])
     bits = bits_of(kind, texts, elements)
     low, high = PLAUSIBLE[kind]
     wrong = not (np.isfinite(scale) & (scale > 0)).all()
     if wrong or (bits is not None and not low <= full_scale(kind, float(scale.max()), bits) <= high):
         said = ", ".join(f"{value:g}" for value in scale)
         raise ChipError(
-            f"the scale of the {KINDS[kind]} of {device} is {said}, which no such sensor has",
-            f"look at {kind}_scale in /sys/bus/iio/devices/{device}, and write it anew",
+            f"the scale of the {KINDS[kind]} of {device} is {said}, which is not plausible",
+            f"correct {kind}_scale in /sys/bus/iio/devices/{device}",
         )
-    return Group(kind, scale, offset, bits)
+    return SensorScale(kind, scale, offset, bits)
 
 
-def number(texts: Texts, kind: str, axis: str, what: str, otherwise: float) -> float:
-    """Of an axis, or of all axes of a kind; NaN where it is no number."""
+def read_number(texts: Texts, kind: str, axis: str, what: str, otherwise: float) -> float:
+    """Read a number of an axis, or of all axes of a kind; NaN if the text is not a number."""
     for name in (f"{kind}_{axis}_{what}", f"{kind}_{what}"):
         if name in texts:
             try:
@@ -105,24 +105,24 @@ def number(texts: Texts, kind: str, axis: str, what: str, otherwise: float) -> f
 
 
 def part_of(texts: Texts) -> Part | None:
-    """The part of our table that a device is named after."""
+    """Return the known part with the device's name."""
     name = texts.get("name", "").lower()
     return next((part for part in PARTS.values() if part.chip.replace("-", "").lower() == name), None)
 
 
-def chip(texts: Texts) -> str:
-    """What to call it."""
+def chip_name(texts: Texts) -> str:
+    """Return the chip's name."""
     part = part_of(texts)
     name = "".join(c if c.isalnum() else "-" for c in texts.get("name", "")).strip("-").upper()
     return part.chip if part is not None else name[:60] or "IIO"
 
 
 def mount_matrix(texts: Texts, kind: str) -> Vector:
-    """(3, 3) of the sensor; the identity where none is said.
+    """Read the mount matrix (3, 3) of the sensor; the identity without one.
 
     Raises
     ------
-    ChipError : a text that is no matrix.
+    ChipError : a text that is not a matrix.
     """
     name = next((n for n in (f"{kind}_mount_matrix", "in_mount_matrix", "mount_matrix") if n in texts), None)
     if name is None:
@@ -130,11 +130,11 @@ def mount_matrix(texts: Texts, kind: str) -> Vector:
     try:
         return np.array([[float(v) for v in row.split(",")] for row in texts[name].split(";")]).reshape(3, 3)
     except ValueError as error:
-        raise ChipError(f"{name} is {texts[name]!r}, which is no matrix", "mend the device tree") from error
+        raise ChipError(f"{name} is {texts[name]!r}, which is not a matrix", "correct the device tree") from error
 
 
-def available(text: str) -> list[float]:
-    """The values that a text of an `_available` attribute lists; of [least step most] the ends."""
+def parse_available(text: str) -> list[float]:
+    """Parse the values of an `_available` attribute; for [least step most], the ends."""
     words = text.strip().strip("[]").split()
     try:
         values = [float(word) for word in words]

@@ -1,4 +1,4 @@
-"""What was read from and written to the files of IIO devices, to samples; as it happens or from a capture."""
+"""Decoder of accesses to the files of IIO devices to samples, as they happen or from a capture."""
 
 from __future__ import annotations
 
@@ -12,22 +12,34 @@ from ..chip.access import Transaction
 from ..chip.families import MPU6050
 from ..data import Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
-from .attributes import ACCEL, AXES, GYRO, TEMP, TIMESTAMP, Group, bits_of, chip, group, mount_matrix, part_of
+from .attributes import (
+    ACCEL,
+    AXES,
+    GYRO,
+    TEMP,
+    TIMESTAMP,
+    SensorScale,
+    bits_of,
+    chip_name,
+    mount_matrix,
+    part_of,
+    read_scale,
+)
 from .scan_elements import FrameLayout, ScanElement
 from .stream_aligner import StreamAligner, Times
 
 NS = 1e-9
-# samples are missing where the next is so many intervals later
+# Samples are missing if the next one is so many intervals later.
 GAP_INTERVALS = 1.5
-# a buffer whose clock is another than the host's monotonic one is off by more
+# A buffer with another clock than the host's monotonic one is off by more.
 OTHER_CLOCK_NS = 5_000_000_000
 LISTING = "/"
 ENABLE, FREQUENCY = "buffer/enable", "sampling_frequency"
 
 
 @dataclass
-class _Device:
-    """What is known of one: the texts of its attributes, and how its frames look."""
+class _DeviceState:
+    """State of a device: the texts of its attributes, and the layout of its frames."""
 
     texts: dict[str, str]
     layout: FrameLayout | None = None
@@ -35,19 +47,23 @@ class _Device:
 
 
 class IioDecoder:
-    """Follows every access that succeeded, and knows from those alone what the buffers' bytes mean.
+    """Decoder that knows the meaning of the buffers' bytes from the successful accesses alone.
 
-    The driver feeds it what it does and a capture what was done, so that both give the same samples.
+    The driver feeds it its own accesses, and a reader those of a capture, so that both get the same samples.
 
     Parameters
     ----------
-    name : what to call the recording.
+    name : of the recording.
+
+    Attributes
+    ----------
+    gaps : number of places at which samples are missing.
     """
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._devices: dict[str, _Device] = {}
-        self._groups: dict[str, tuple[str, Group]] = {}
+        self._devices: dict[str, _DeviceState] = {}
+        self._scales: dict[str, tuple[str, SensorScale]] = {}
         self._streams: dict[str, int] = {}
         self._aligned: StreamAligner | None = None
         self._turn: Vector | None = None
@@ -60,14 +76,14 @@ class IioDecoder:
         self.gaps = 0
 
     def feed(self, access: Transaction) -> None:
-        """An access was made, or failed."""
+        """Take one access, which may have failed."""
         if access.error is not None:
             return
         device, _, name = access.register.partition("/")
         if not name and not access.register.endswith(LISTING):
-            self._frames(device, access.data, access.t_ns)
+            self._add_frames(device, access.data, access.t_ns)
             return
-        held = self._devices.setdefault(device, _Device({}))
+        held = self._devices.setdefault(device, _DeviceState({}))
         text = access.data.decode(errors="replace").strip()
         held.texts[name] = text
         if name == ENABLE and access.op == "write":
@@ -75,14 +91,14 @@ class IioDecoder:
             if text == "1":
                 self._begin()
         elif access.op == "read" and name.endswith("_raw"):
-            self._polled(name.removesuffix("_raw"), text, access.t_ns)
+            self._add_count(name.removesuffix("_raw"), text, access.t_ns)
 
     def texts(self, device: str) -> dict[str, str]:
-        """The attributes of a device that were read or written, by name."""
-        return self._devices.setdefault(device, _Device({})).texts
+        """Return the attributes of a device that were read or written, by name."""
+        return self._devices.setdefault(device, _DeviceState({})).texts
 
     def elements(self, device: str) -> dict[str, ScanElement]:
-        """The channels that a frame of it may hold, as far as they were read."""
+        """Return the channels that a device's frames may have, as far as they were read."""
         texts = self.texts(device)
         names = [name[len("scan_elements/") : -len("_type")] for name in texts if name.endswith("_type")]
         return {
@@ -92,26 +108,26 @@ class IioDecoder:
         }
 
     def bits(self, device: str, kind: str) -> int | None:
-        """Of a count of a device; see attributes.bits_of."""
+        """Return the bits of a device's count; see attributes.bits_of."""
         return bits_of(kind, self.texts(device), self.elements(device))
 
-    def group(self, kind: str) -> tuple[str, Group]:
-        """The device and the scales of the accelerometer or the gyroscope.
+    def scale(self, kind: str) -> tuple[str, SensorScale]:
+        """Return the device and the scale of the accelerometer or the gyroscope.
 
         Raises
         ------
-        RecordingError : none was read. ChipError : see attributes.group.
+        RecordingError : no scale was read. ChipError : see attributes.read_scale.
         """
-        if kind not in self._groups:
+        if kind not in self._scales:
             device = next((d for d in self._devices if self._has(d, kind)), None)
             if device is None:
-                raise RecordingError(f"{self._name} does not say the scale of {kind}", "record again")
-            self._groups[kind] = (device, group(kind, device, self.texts(device), self.elements(device)))
-        return self._groups[kind]
+                raise RecordingError(f"{self._name} does not hold the scale of {kind}", "record again")
+            self._scales[kind] = (device, read_scale(kind, device, self.texts(device), self.elements(device)))
+        return self._scales[kind]
 
     @property
     def sensor(self) -> Sensor:
-        """What is known of the sensor so far."""
+        """Sensor as far as it is known."""
         t = self._given[-1].t[-1] - self._given[0].t[0] if self._given else 0.0
         count = sum(map(len, self._given))
         warm = [float(np.nanmean(s.temperature_c)) for s in self._given if np.isfinite(s.temperature_c).any()]
@@ -122,63 +138,63 @@ class IioDecoder:
         )
 
     def rate_hz(self, device: str) -> float | None:
-        """What a device is set to; None where it does not say."""
+        """Return the rate of a device; None if it has no such attribute."""
         texts = self.texts(device)
         named = next((n for n in (FREQUENCY, f"{ACCEL}_{FREQUENCY}", f"{GYRO}_{FREQUENCY}") if n in texts), None)
         return None if named is None else float(texts[named])
 
     def take(self) -> Samples:
-        """The samples since the last `take`."""
+        """Return the samples since the last `take`."""
         new, self._new = self._new, []
         return Samples.joined(new)
 
     def forget(self) -> None:
-        """Let go of all that was taken."""
+        """Forget all samples."""
         self._given = []
 
     def recording(self) -> Recording:
-        """All samples so far."""
+        """Return all samples."""
         samples = Samples.joined(self._given)
         return Recording(**vars(samples), sensor=self.sensor, name=self._name)
 
     def _has(self, device: str, kind: str) -> bool:
         return any(name.startswith(f"{kind}_") and name.endswith("scale") for name in self.texts(device))
 
-    def _said(self) -> Sensor:
-        """What the attributes say of the sensor now."""
-        device, accel = self.group(ACCEL)
+    def _describe_sensor(self) -> Sensor:
+        """Describe the sensor by its present attributes."""
+        device, accel = self.scale(ACCEL)
         texts = self.texts(device)
         part = part_of(texts)
         return Sensor(
-            chip=chip(texts),
+            chip=chip_name(texts),
             who_am_i=None if part is None else part.who_am_i,
             accel_range_g=accel.full_scale,
-            gyro_range_dps=self.group(GYRO)[1].full_scale,
+            gyro_range_dps=self.scale(GYRO)[1].full_scale,
             rate_hz=self.rate_hz(device),
             accel_offsets=self._calibbias(texts),
         )
 
-    def _layout(self, held: _Device) -> FrameLayout | None:
+    def _layout(self, held: _DeviceState) -> FrameLayout | None:
         device = next(name for name, one in self._devices.items() if one is held)
         enabled = [e for e in self.elements(device).values() if held.texts.get(f"scan_elements/{e.name}_en") == "1"]
         return FrameLayout(enabled) if enabled else None
 
     def _begin(self) -> None:
-        """Streams of frames: one where a device has both sensors, else two."""
-        devices = list(dict.fromkeys((self.group(ACCEL)[0], self.group(GYRO)[0])))
+        """Begin the streams of frames: one if a device has both sensors, else two."""
+        devices = list(dict.fromkeys((self.scale(ACCEL)[0], self.scale(GYRO)[0])))
         self._start({device: 4 * (2 if len(devices) == 1 else 1) for device in devices})
 
     def _start(self, widths: dict[str, int]) -> None:
-        # what holds from here on: afterwards the driver writes back what stood there before
-        self._groups = {}
-        self._settled = self._said()
+        # The attributes apply from here on; at the end the driver restores the old ones.
+        self._scales = {}
+        self._settled = self._describe_sensor()
         self._streams = {name: i for i, name in enumerate(widths)}
         self._aligned = StreamAligner(list(widths.values()))
-        accel, gyro = (mount_matrix(self.texts(self.group(kind)[0]), kind) for kind in (ACCEL, GYRO))
+        accel, gyro = (mount_matrix(self.texts(self.scale(kind)[0]), kind) for kind in (ACCEL, GYRO))
         self._turn = None if np.array_equal(accel, gyro) else np.asarray(np.linalg.solve(accel, gyro), np.float64)
         self._last_ns, self._broken = None, bool(self._given)
 
-    def _frames(self, device: str, data: bytes, t_ns: int) -> None:
+    def _add_frames(self, device: str, data: bytes, t_ns: int) -> None:
         held = self._devices.get(device)
         if held is None or held.layout is None or self._aligned is None or not data:
             return
@@ -189,45 +205,45 @@ class IioDecoder:
             held.offset_ns = off if abs(off) > OTHER_CLOCK_NS else 0
         parts = []
         for kind in (ACCEL, GYRO):
-            of, scales = self.group(kind)
+            of, scales = self.scale(kind)
             if of == device:
                 counts = np.stack([columns[f"{kind}_{axis}"] for axis in AXES], axis=1).astype(np.float64)
                 parts += [counts, scales.clipped(counts)[:, None]]
         if TEMP in columns:
-            self._warm(device, float(columns[TEMP][-1]))
+            self._set_temperature(device, float(columns[TEMP][-1]))
         self._aligned.add(self._streams[device], times + held.offset_ns, np.concatenate(parts, axis=1))
-        self._arrived()
+        self._deliver()
 
-    def _polled(self, channel: str, text: str, t_ns: int) -> None:
-        """A count of one channel, at a time of its own."""
+    def _add_count(self, channel: str, text: str, t_ns: int) -> None:
+        """Add a polled count of one channel, which has its own time."""
         if channel == TEMP:
             device = next(d for d in self._devices if f"{TEMP}_raw" in self.texts(d))
-            self._warm(device, float(text))
+            self._set_temperature(device, float(text))
             return
         names = [f"{kind}_{axis}" for kind in (ACCEL, GYRO) for axis in AXES]
         if self._aligned is None or channel not in self._streams:
             self._start(dict.fromkeys(names, 2))
         if self._aligned is not None and channel in self._streams:
-            scales = self.group(channel[:-2])[1]
+            scales = self.scale(channel[:-2])[1]
             count = np.array([[float(text)]])
             self._aligned.add(
                 self._streams[channel], np.array([t_ns]), np.hstack((count, scales.clipped(count)[:, None]))
             )
             if channel == names[-1]:
-                self._arrived()
+                self._deliver()
 
-    def _arrived(self) -> None:
+    def _deliver(self) -> None:
         if self._aligned is None:
             return
         t_ns, values = self._aligned.take()
         if len(t_ns) == 0:
             return
         if values.shape[1] == 12:
-            # a count and its mark of each channel, as they were polled
+            # Polled channels have a count and a mark each.
             counts, marks = values[:, ::2], values[:, 1::2]
             values = np.column_stack((counts[:, :3], marks[:, :3].max(1), counts[:, 3:], marks[:, 3:].max(1)))
-        accel, gyro = self.group(ACCEL)[1], self.group(GYRO)[1]
-        # whole counts again, also where they were interpolated: what looks at their bits finds them
+        accel, gyro = self.scale(ACCEL)[1], self.scale(GYRO)[1]
+        # Interpolated counts are rounded too, for the checks of single bits.
         counts = np.round(values)
         rates = (counts[:, 4:7] + gyro.offset) * gyro.scale
         samples = Samples(
@@ -245,7 +261,7 @@ class IioDecoder:
         self._new.append(samples)
 
     def _gaps(self, t_ns: Times) -> np.ndarray:
-        """(n,) True where the buffer left samples out; polling has no interval of its own."""
+        """Return (n,) True where the buffer dropped samples; polling has no fixed interval."""
         rate_hz = self._settled.rate_hz
         steps = np.diff(t_ns, prepend=t_ns[0] if self._last_ns is None else self._last_ns)
         longest_ns = math.inf if rate_hz is None or len(self._streams) > 2 else GAP_INTERVALS * 1e9 / rate_hz
@@ -254,7 +270,7 @@ class IioDecoder:
         self._broken = False
         return gaps
 
-    def _warm(self, device: str, count: float) -> None:
+    def _set_temperature(self, device: str, count: float) -> None:
         texts = self.texts(device)
         scale, offset = (float(texts.get(f"{TEMP}_{what}", usual)) for what, usual in (("scale", "1"), ("offset", "0")))
         self._temperature = (count + offset) * scale / 1000
@@ -262,7 +278,7 @@ class IioDecoder:
     def _calibbias(self, texts: dict[str, str]) -> tuple[int, int, int] | None:
         words = [texts.get(f"{ACCEL}_{axis}_calibbias", "") for axis in AXES]
         part = part_of(texts)
-        # of the others the driver reads y and z at other places than theirs
+        # For the other families the driver reads y and z at wrong addresses.
         if part is None or part.family is not MPU6050 or not all(word.lstrip("-").isdecimal() for word in words):
             return None
         x, y, z = map(int, words)
@@ -270,11 +286,11 @@ class IioDecoder:
 
 
 def decode(accesses: Iterable[Transaction], name: str = "recording") -> Recording:
-    """The samples that `accesses` carried; what was cut off at their end does no harm.
+    """Decode `accesses` to a recording; they may be cut off at the end.
 
     Raises
     ------
-    RecordingError : there are no two samples. ChipError : attributes that make no sense.
+    RecordingError : fewer than two samples. ChipError : attributes that are not plausible.
     """
     decoder = IioDecoder(name)
     for access in accesses:

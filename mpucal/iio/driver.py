@@ -1,6 +1,6 @@
-"""The samples of IIO devices as a session's source: from their buffers, or polled where there are none.
+"""Driver of IIO devices: samples come from their buffers, or by polling without buffers.
 
-What it accesses depends on nothing but the replies and their times, so that a replay asks for the same accesses.
+Its accesses depend on the replies and their times alone, so that a replay makes the same accesses.
 IIO_VERSION changes with every change of them.
 """
 
@@ -18,28 +18,28 @@ from .decode import IioDecoder
 from .devices import Devices
 from .setup import DeviceAttributes, set_up
 
-# so long without a sample, and the driver gives up
+# The driver gives up after so long without a sample.
 DEAD_NS = 2_000_000_000
-# what one read takes from a buffer at most
+# Most bytes of one read from a buffer.
 READ_BYTES = 65536
-# the die's temperature changes slowly
+# The die's temperature changes slowly.
 TEMPERATURE_NS = 1_000_000_000
 
 REGISTER_0 = (
-    "it waits for interrupts that do not come: check the chip's INT wire and its line in the device tree; of an"
-    " MPU-6050 the driver of Linux 6.1 takes register 0 for the interrupt's status, and gives no sample while its bit 0"
-    " is 0: give --trigger none, which polls, or unbind the driver and give --bus"
+    "it waits for interrupts that do not come: check the chip's INT wire and its line in the device tree. For an"
+    " MPU-6050 the driver of Linux 6.1 reads register 0 as the interrupt's status, and drops samples while its bit 0"
+    " is 0: use --trigger none, which polls, or unbind the driver and use --bus"
 )
 
 
 class IioDriver:
-    """The accelerometer and the gyroscope of one or two IIO devices.
+    """Driver of the accelerometer and the gyroscope of one or two IIO devices.
 
     Parameters
     ----------
-    files : of the kernel. devices : which ones. config : its rate and ranges are asked for.
-    name : what to call the recording. say : is told what a person should know; one sentence, no full stop.
-    trigger : of the buffers; None: their own. POLLED: none, the channels are polled.
+    files : of the kernel. devices : their names. config : requested rate and ranges. name : of the recording.
+    say : called with remarks for the user: one sentence each, without a full stop.
+    trigger : of the buffers; None: their own; POLLED: no buffers, the channels are polled.
     """
 
     def __init__(
@@ -58,29 +58,29 @@ class IioDriver:
         self._now_ns = self._next_ns = self._fruitless_ns = self._warm_ns = 0
 
     def now_ns(self) -> int:
-        """The host's monotonic clock as last seen."""
+        """Return the last time of the host's monotonic clock."""
         return max([self._now_ns, *(each.now_ns for each in self._each)])
 
     @property
     def buffered(self) -> bool:
-        """Whether samples come from buffers; once it was started."""
+        """True if samples come from buffers; valid after `start`."""
         return self._buffered
 
     def texts(self, device: str) -> dict[str, str]:
-        """The attributes of a device as they were read last."""
+        """Return the attributes of a device as they were last read."""
         return dict(self._decoder.texts(device))
 
     def start(self) -> Sensor:
-        """Look at the devices, set rate and ranges, and begin to measure.
+        """Read the devices' attributes, set rate and ranges, and start to measure.
 
         Raises
         ------
-        BusError : no such device, or it cannot be written. ChipError : it has no such sensor, or no trigger.
+        BusError : no such device, or it cannot be written. ChipError : no such sensor, or no trigger.
         """
         self._now_ns = self.now_ns()
         self._each = [DeviceAttributes(self._files, self._decoder, device) for device in self._devices.each]
         for each in self._each:
-            each.look(self._kinds(each.device))
+            each.read_all(self._kinds(each.device))
         running = []
         try:
             for each in self._each:
@@ -90,12 +90,12 @@ class IioDriver:
             raise
         if any(running) and not all(running):
             self._restore()
-            raise ChipError("one of the two devices has no buffer", "give --trigger none, which polls both")
+            raise ChipError("one of the two devices has no buffer", "use --trigger none, which polls both")
         self._buffered = all(running)
         if not self._buffered:
             self._say(
-                "the channels are polled one after the other, which is less exact than a buffer: a driver has one where"
-                " the INT wire is connected, or with a trigger"
+                "the channels are polled one by one, which is less accurate than a buffer: a driver has a buffer if the"
+                " INT wire is connected, or with a trigger"
             )
             self._read_channels()
         self._next_ns = self.now_ns()
@@ -103,11 +103,11 @@ class IioDriver:
         return self._decoder.sensor
 
     def poll(self) -> Samples:
-        """Wait for the next poll, and give the samples since the last.
+        """Wait for the next poll, and return the samples since the last one.
 
         Raises
         ------
-        BusError : a device is gone, or did not answer for two seconds. ChipError : its buffer stayed empty so long.
+        BusError : a device is gone, or did not answer for two seconds. ChipError : its buffer stayed empty for so long.
         """
         begun_ns = self.now_ns()
         period_ns = round((self._config.period_s if self._buffered else 1 / self._config.rate_hz) * 1e9)
@@ -117,7 +117,7 @@ class IioDriver:
         try:
             if self._buffered:
                 for each in self._each:
-                    each.frames(READ_BYTES)
+                    each.read_frames(READ_BYTES)
             else:
                 self._read_channels()
         except NoAnswer:
@@ -131,15 +131,15 @@ class IioDriver:
         return samples
 
     def recording(self) -> Recording:
-        """Everything so far."""
+        """Return all samples."""
         return self._decoder.recording()
 
     def forget(self) -> None:
-        """Let go of all samples so far."""
+        """Forget all samples."""
         self._decoder.forget()
 
     def stop(self) -> None:
-        """End the buffers, and write back what stood in the attributes before."""
+        """Stop the buffers, and restore the attributes."""
         if self._decoder.gaps:
             self._say(
                 f"samples are missing in {self._decoder.gaps} places: the kernel's buffer overran, or the trigger fired"

@@ -1,4 +1,4 @@
-"""Frames of an IIO buffer: which channels they hold, and how each is stored.
+"""Frames of an IIO buffer: their channels (scan elements) and the storage of each.
 
 Source: Linux Documentation/ABI/testing/sysfs-bus-iio (scan_elements: index, type); drivers/iio/industrialio-buffer.c,
 iio_compute_scan_bytes: each element is aligned to its own size, a frame to its largest.
@@ -21,13 +21,13 @@ TYPE = re.compile(r"(be|le):([su])(\d+)/(8|16|32|64)(?:X(\d+))?>>(\d+)")
 
 @dataclass(frozen=True)
 class ScanElement:
-    """One channel of a frame.
+    """Channel of a frame.
 
     Attributes
     ----------
-    name : in_accel_x. index : its place among the others. order : < or >, as NumPy has it.
-    signed, bits, shift : the value is `bits` wide, `shift` bits above the lowest of what is stored.
-    stored_bytes : of one value. repeat : how many values follow each other.
+    name : such as in_accel_x. index : its order among the channels. order : byte order < or >, as in NumPy.
+    signed, bits, shift : the value has `bits` bits, `shift` bits above the lowest stored one.
+    stored_bytes : of one value. repeat : number of consecutive values.
     """
 
     name: str
@@ -41,16 +41,17 @@ class ScanElement:
 
     @classmethod
     def parse(cls, name: str, index: str, text: str) -> Self:
-        """Of the texts of its attributes `index` and `type`, such as le:s16/16>>0.
+        """Parse the attributes `index` and `type`, such as le:s16/16>>0.
 
         Raises
         ------
-        ChipError : no such text.
+        ChipError : another form of text.
         """
         found = TYPE.fullmatch(text.strip())
         if found is None or not index.strip().isdecimal():
             raise ChipError(
-                f"the driver says {text.strip()!r} of how {name} is stored", "report it with the kernel's version"
+                f"the driver describes the storage of {name} as {text.strip()!r}, which is unknown",
+                "report it with the kernel's version",
             )
         order, sign, bits, stored, repeat, shift = found.groups()
         return cls(
@@ -66,11 +67,11 @@ class ScanElement:
 
     @property
     def bytes(self) -> int:
-        """How long it is; it lies at a multiple of this."""
+        """Size in the frame; its position is a multiple of this."""
         return self.stored_bytes * self.repeat
 
     def values(self, stored: NDArray[np.unsignedinteger]) -> NDArray[np.int64]:
-        """(n,) of what is stored; of several values that follow each other the first."""
+        """Decode the stored values (n,); the first of several consecutive ones."""
         one = stored.astype(np.uint64) if self.repeat == 1 else stored[:, 0].astype(np.uint64)
         held = (one >> np.uint64(self.shift)) & np.uint64((1 << self.bits) - 1)
         if not self.signed:
@@ -80,7 +81,7 @@ class ScanElement:
 
 
 class FrameLayout:
-    """Where the elements of a frame lie."""
+    """Positions of the elements in a frame."""
 
     def __init__(self, elements: Iterable[ScanElement]) -> None:
         self.elements = sorted(elements, key=lambda element: element.index)
@@ -103,22 +104,22 @@ class FrameLayout:
         )
 
     def columns(self, data: bytes) -> Mapping[str, NDArray[np.int64]]:
-        """(n,) counts of each channel, of n whole frames.
+        """Decode n frames to counts (n,) of each channel.
 
         Raises
         ------
-        ChipError : the bytes are no whole number of frames.
+        ChipError : the bytes are not a whole number of frames.
         """
         if len(data) % self.frame_bytes:
             raise ChipError(
-                f"the kernel's buffer gave {len(data)} bytes, and a frame has {self.frame_bytes}",
+                f"the kernel's buffer returned {len(data)} bytes, but a frame has {self.frame_bytes}",
                 "report it with the kernel's version",
             )
         frames = np.frombuffer(data, self._dtype)
         return {element.name: element.values(frames[element.name]) for element in self.elements}
 
     def packed(self, columns: Mapping[str, NDArray[np.int64]]) -> bytes:
-        """The frames of whole counts (n,) of each channel, of which none is shifted or repeated."""
+        """Encode whole counts (n,) of each channel to frames; channels must not be shifted or repeated."""
         frames = np.zeros(len(next(iter(columns.values()))), self._dtype)
         for element in self.elements:
             frames[element.name] = np.asarray(columns[element.name]).astype(np.int64).astype(f"u{element.stored_bytes}")

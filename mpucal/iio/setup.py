@@ -1,4 +1,4 @@
-"""An IIO device made to measure: what it has read, what is wanted written, and all put back afterwards."""
+"""Setup of an IIO device: its attributes are read, changed for the measurement, and restored afterwards."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import suppress
 from ..chip.access import Files, Transaction
 from ..chip.config import Config
 from ..errors import BusError, ChipError, NoAnswer
-from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, available, full_scale
+from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, full_scale, parse_available
 from .decode import ENABLE, FREQUENCY, IioDecoder
 
 TEXT_BYTES, LIST_BYTES, FIRST_BYTES = 4096, 65536, 65536
@@ -19,7 +19,7 @@ TRIGGER, CLOCK, LENGTH, WATERMARK = (
     "buffer/watermark",
 )
 TRIGGERS = "triggers"
-# of --trigger: no buffer at all
+# Value of --trigger: poll without a buffer.
 POLLED = "none"
 HELD_S = 2.0
 READ = (
@@ -39,11 +39,11 @@ WITHIN = 1.01
 
 
 class DeviceAttributes:
-    """The files of one device, each access followed by `decoder`.
+    """Attributes and buffer of a device; `decoder` follows each access.
 
     Attributes
     ----------
-    names : of all its attributes. now_ns : the clock as last seen.
+    names : of all its attributes. now_ns : last time of the clock.
     """
 
     def __init__(self, files: Files, decoder: IioDecoder, device: str) -> None:
@@ -52,12 +52,12 @@ class DeviceAttributes:
         self.names: frozenset[str] = frozenset()
         self.now_ns = 0
 
-    def look(self, kinds: Sequence[str]) -> None:
-        """Read what it has of `kinds`, ACCEL and GYRO.
+    def read_all(self, kinds: Sequence[str]) -> None:
+        """Read the attributes of `kinds`, ACCEL and GYRO.
 
         Raises
         ------
-        BusError : it is not there. ChipError : it has no such sensor.
+        BusError : no such device. ChipError : no such sensor.
         """
         self.names = frozenset(self.read("", LIST_BYTES).split("\n"))
         for kind in kinds:
@@ -70,10 +70,10 @@ class DeviceAttributes:
         foreign = tuple(f"{kind}_" for kind in (ACCEL, GYRO) if kind not in kinds)
         for name in sorted(self.names):
             if name.endswith(READ) and not name.startswith(foreign):
-                self._try(name)
+                self._try_to_read(name)
 
-    def _try(self, name: str) -> None:
-        """Read an attribute that a driver may show and not answer."""
+    def _try_to_read(self, name: str) -> None:
+        """Read an attribute that the driver may list and still not support."""
         try:
             self.read(name)
         except NoAnswer:
@@ -82,21 +82,21 @@ class DeviceAttributes:
             return
 
     def read(self, name: str, count: int = TEXT_BYTES) -> str:
-        """The text of an attribute; "": the list of their names."""
+        """Read the text of an attribute; "": the list of all names."""
         return self._bytes(f"{self.device}/{name}", count).decode(errors="replace").strip()
 
-    def frames(self, count: int) -> int:
-        """Read what the buffer holds, up to `count` bytes, and say how many that were."""
+    def read_frames(self, count: int) -> int:
+        """Read up to `count` bytes from the buffer, and return their number."""
         return len(self._bytes(self.device, count))
 
     def triggers(self) -> list[str]:
-        """The names of all there are."""
+        """Read the names of all triggers."""
         reply = self._files.read(TRIGGERS, LIST_BYTES)
         self.now_ns = max(self.now_ns, reply.t_ns)
         return reply.data.decode(errors="replace").split()
 
     def set(self, name: str, text: str) -> str:
-        """Write an attribute that holds something else, and give what it holds then."""
+        """Write an attribute if its value differs, and return its value afterwards."""
         held = self.read(name)
         if held == text or _equal(held, text):
             return held
@@ -105,7 +105,7 @@ class DeviceAttributes:
         return self.read(name)
 
     def restore(self) -> None:
-        """Write what was there before, the last one first; BusError where that fails."""
+        """Write the old values, the last one first; raise BusError if that fails."""
         while self._old:
             self._write(*self._old.pop())
 
@@ -125,22 +125,22 @@ class DeviceAttributes:
 def set_up(
     attributes: DeviceAttributes, kinds: Sequence[str], config: Config, decoder: IioDecoder, trigger: str | None
 ) -> bool:
-    """Rate, ranges, and a buffer that runs where it has one; whether it does.
+    """Set rate and ranges, and start the buffer if there is one; return True if a buffer runs.
 
     Raises
     ------
-    BusError : an attribute cannot be written, or somebody else reads the buffer. ChipError : no trigger.
+    BusError : an attribute cannot be written, or another program reads the buffer. ChipError : no trigger.
     """
     names = attributes.names
     buffered = ENABLE in names and trigger != POLLED
     if buffered and attributes.read(ENABLE) == "1":
         raise BusError(
             f"another program reads the buffer of {attributes.device}",
-            f"stop it (`sudo fuser -v /dev/{attributes.device}` names it), or if none is left:"
+            f"stop it (`sudo fuser -v /dev/{attributes.device}` names it), or if there is none:"
             f" echo 0 | sudo tee /sys/bus/iio/devices/{attributes.device}/{ENABLE}",
         )
     if not buffered:
-        # to poll needs no permission to write: then what was set before holds
+        # Polling works without permission to write, with the present settings.
         with suppress(BusError):
             _set_scales(attributes, kinds, config, decoder)
             _set_rate(attributes, kinds, config)
@@ -157,36 +157,38 @@ def set_up(
     if WATERMARK in names:
         attributes.set(WATERMARK, str(max(1, round(config.period_s * rate_hz))))
     attributes.set(ENABLE, "1")
-    # who else has it open is told of now
-    attributes.frames(FIRST_BYTES)
+    # A first read reports another program that has the buffer open.
+    attributes.read_frames(FIRST_BYTES)
     return True
 
 
 def _set_rate(attributes: DeviceAttributes, kinds: Sequence[str], config: Config) -> None:
-    """The slowest that is as fast as wanted, else the fastest."""
+    """Set the slowest rate that is as fast as requested, else the fastest."""
     for name in (FREQUENCY, *(f"{kind}_{FREQUENCY}" for kind in kinds)):
         if name in attributes.names:
-            offered = available(attributes.read(f"{name}_available")) if f"{name}_available" in attributes.names else []
+            offered = (
+                parse_available(attributes.read(f"{name}_available")) if f"{name}_available" in attributes.names else []
+            )
             wanted = min((hz for hz in offered if hz >= config.rate_hz), default=max(offered, default=config.rate_hz))
             attributes.set(name, f"{wanted:g}")
 
 
 def _set_scales(attributes: DeviceAttributes, kinds: Sequence[str], config: Config, decoder: IioDecoder) -> None:
-    """The smallest range that is as large as wanted, of a sensor that has several."""
+    """Set the smallest range that is as large as requested, if the sensor has several."""
     wanted = {ACCEL: config.accel_range_g, GYRO: config.gyro_range_dps}
     for kind in kinds:
         name, bits = f"{kind}_scale", decoder.bits(attributes.device, kind)
         if bits is None or not {name, f"{name}_available"} <= attributes.names:
             continue
         texts = attributes.read(f"{name}_available").split()
-        ranges = {text: full_scale(kind, scale, bits) for text in texts for scale in available(text)}
+        ranges = {text: full_scale(kind, scale, bits) for text in texts for scale in parse_available(text)}
         enough = {text: value for text, value in ranges.items() if value * WITHIN >= wanted[kind]}
         if ranges:
             attributes.set(name, min(enough, key=enough.__getitem__) if enough else max(ranges, key=ranges.__getitem__))
 
 
 def _choose_trigger(attributes: DeviceAttributes, trigger: str | None) -> None:
-    """The one that was named, or that is set, or the device's own."""
+    """Set the named trigger; without a name keep the present one, or set the device's own."""
     held = attributes.read(TRIGGER)
     if trigger is None and held:
         return
@@ -195,13 +197,15 @@ def _choose_trigger(attributes: DeviceAttributes, trigger: str | None) -> None:
     wanted = trigger or (own if own in there else "")
     if wanted not in there:
         named = f"no trigger {wanted}" if wanted else f"no trigger for the buffer of {attributes.device}"
-        listed = f"there are {', '.join(there)}" if there else "there is none: load iio-trig-hrtimer and make one"
-        raise ChipError(f"there is {named}", f"give --trigger NAME ({listed}), or --trigger {POLLED}, which polls")
+        listed = (
+            f"available: {', '.join(there)}" if there else "none is available: load iio-trig-hrtimer and create one"
+        )
+        raise ChipError(f"there is {named}", f"use --trigger NAME ({listed}), or --trigger {POLLED}, which polls")
     attributes.set(TRIGGER, wanted)
 
 
 def _enable_channels(attributes: DeviceAttributes, kinds: Sequence[str]) -> None:
-    """Those that are wanted, and no others.
+    """Enable the channels of the sensors, and no others.
 
     Raises
     ------
@@ -210,9 +214,7 @@ def _enable_channels(attributes: DeviceAttributes, kinds: Sequence[str]) -> None
     wanted = {f"scan_elements/{kind}_{axis}_en" for kind in kinds for axis in AXES}
     stamp = f"scan_elements/{TIMESTAMP}_en"
     if not wanted | {stamp} <= attributes.names:
-        raise ChipError(
-            f"the buffer of {attributes.device} has no time stamps", f"give --trigger {POLLED}, which polls"
-        )
+        raise ChipError(f"the buffer of {attributes.device} has no time stamps", f"use --trigger {POLLED}, which polls")
     wanted |= {stamp, f"scan_elements/{TEMP}_en"}
     for name in sorted(attributes.names):
         if name.startswith("scan_elements/") and name.endswith("_en"):

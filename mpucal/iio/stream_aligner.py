@@ -1,4 +1,4 @@
-"""Streams whose samples fall at times of their own, brought to the times of the first one by linear interpolation."""
+"""Linear interpolation of several streams at the sample times of the first one."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Times = NDArray[np.int64]
 
 
 class StreamAligner:
-    """Takes each stream's samples as they come, and gives the rows that are complete.
+    """Aligner that takes each stream's samples as they come, and returns the complete rows.
 
-    What comes out depends on the samples alone, and not on how many came at once.
+    The rows depend on the samples alone, not on how they were grouped.
 
     Parameters
     ----------
-    widths : how many columns each stream has.
+    widths : number of columns of each stream.
     """
 
     def __init__(self, widths: Sequence[int]) -> None:
@@ -28,7 +28,7 @@ class StreamAligner:
         self._last = [np.iinfo(np.int64).min] * len(widths)
 
     def add(self, stream: int, t_ns: Times, values: Vector) -> None:
-        """Samples (n, width) of a stream at `t_ns` (n,); one that is not later than those before it is left out."""
+        """Add samples (n, width) of a stream at `t_ns` (n,); one that is not later than the earlier ones is dropped."""
         latest = np.maximum.accumulate(np.concatenate(([self._last[stream]], t_ns)))
         later = t_ns > latest[:-1]
         self._last[stream] = int(latest[-1])
@@ -36,7 +36,7 @@ class StreamAligner:
         self._values[stream] = np.concatenate((self._values[stream], values[later]))
 
     def take(self) -> tuple[Times, Vector]:
-        """Times (n,) of the first stream and all streams' columns there, each once, where all streams have some."""
+        """Return the new complete rows: times (n,) of the first stream, and all streams' columns at these times."""
         t_ns, values = self._t[0], self._values[0]
         others = list(zip(self._t[1:], self._values[1:], strict=True))
         if not all(len(t) for t, _ in others):
@@ -46,17 +46,17 @@ class StreamAligner:
         asked = t_ns[first:due]
         parts = [values[first:due]]
         for i, (t, held) in enumerate(others, 1):
-            parts.append(_at(asked, t, held))
+            parts.append(_interpolate(asked, t, held))
             if due:
-                # the last one at or before what was asked brackets what comes next
+                # The last sample at or before the returned times is needed for the next ones.
                 kept = max(int(np.searchsorted(t, t_ns[due - 1], "right")) - 1, 0)
                 self._t[i], self._values[i] = t[kept:], held[kept:]
         self._t[0], self._values[0] = t_ns[max(due, first) :], values[max(due, first) :]
         return asked, np.concatenate(parts, axis=1)
 
 
-def _at(asked: Times, t: Times, values: Vector) -> Vector:
-    """(n, width) `values` (m, width) of the times `t` (m,), at `asked` (n,) between them."""
+def _interpolate(asked: Times, t: Times, values: Vector) -> Vector:
+    """Interpolate `values` (m, width) at the times `t` (m,) to the times `asked` (n,) between them."""
     if len(asked) == 0:
         return np.zeros((0, values.shape[1]))
     x, known = (asked - t[0]).astype(np.float64), (t - t[0]).astype(np.float64)

@@ -69,7 +69,7 @@ class KernelSink:
         self._files: Files = source.bus  # type: ignore[assignment]
         self._decoder = IioDecoder("the kernel's driver")
         self._attributes = DeviceAttributes(self._files, self._decoder, source.devices.accel)
-        self._attributes.look([ACCEL])
+        self._attributes.read_all([ACCEL])
         name = f"61-mpucal-{source.devices.accel.replace(':', '-')}.rules"
         self._rule = None if source.rules is None else source.rules / name
         self.where = f"{source.devices.accel} ({self._attributes.read('name')})"

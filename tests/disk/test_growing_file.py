@@ -32,7 +32,7 @@ def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch, kind)
 @pytest.mark.parametrize("make", [lambda path: path.write_bytes(b"other"), lambda path: path.symlink_to("nothing")])
 def test_what_is_there_already_stays(tmp_path, make):
     make(path := tmp_path / "capture.mcap")
-    with pytest.raises(OutputError, match="is there already"):
+    with pytest.raises(OutputError, match="exists already"):
         check_free(path)
     with pytest.raises(OutputError, match="File exists"):
         GrowingFile(path)

@@ -183,14 +183,14 @@ def change(files, name, text):
     ("spoil", "kind", "says"),
     [
         (lambda f: change(f, "in_accel_scale", "0"), {}, "the scale of the accelerometer of iio:device0 is 0, 0, 0"),
-        (lambda f: change(f, "in_accel_scale", "9.8"), {"trigger": "none"}, "which no such sensor has"),
+        (lambda f: change(f, "in_accel_scale", "9.8"), {"trigger": "none"}, "which is not plausible"),
         (lambda f: change(f, "buffer/enable", "1"), {}, "another program reads the buffer of iio:device0: stop it"),
         (
             lambda f: change(f, "trigger/current_trigger", ""),
             {},
-            "no trigger for the buffer of iio:device0: give --trigger",
+            "no trigger for the buffer of iio:device0: use --trigger",
         ),
-        (lambda f: None, {"trigger": "mine"}, r"no trigger mine: give --trigger NAME \(there are hrtimer-0\)"),
+        (lambda f: None, {"trigger": "mine"}, r"no trigger mine: use --trigger NAME \(available: hrtimer-0\)"),
         (lambda f: f._devices.clear(), {}, "iio:device0 is gone"),
     ],
 )
