@@ -21,7 +21,7 @@ from mpucal.simulated.chip.clock import RealClock
 
 DEVICE = struct.pack("<BBHBBBBHHHBBBB", 18, 1, 0x0110, 0xFF, 0, 0, 64, 0x0403, 0xC631, 0x0205, 0, 0, 0, 1)
 CONFIGURATION = struct.pack("<BBHBBBBB", 9, 2, 18, 1, 1, 0, 0x80, 50) + struct.pack("<9B", 9, 4, 0, 0, 0, 0xFF, 0, 0, 0)
-# plain I2C, and SMBus made of it
+# Plain I2C, and SMBus emulated with it
 ABILITIES = struct.pack("<I", 0x0EFF0001)
 SUBMIT, UNLINK, IN = 1, 2, 1
 GET_FUNC, GET_STATUS, BEGINS, IO = 1, 3, 1, 4
@@ -29,22 +29,22 @@ FULL_SPEED, ADDRESSES = 2, (0x68, 0x69)
 
 
 class Adapter:
-    """Answers the control requests of the kernel's driver.
+    """Responder to the control requests of the kernel's driver.
 
     Parameters
     ----------
-    buses : by their address, those to the chips.
+    buses : to the chips, by their address.
     """
 
     def __init__(self, buses: Mapping[int, SimulatedBus]) -> None:
         self._buses, self._register, self._status = buses, 0, 0
-        # what register 0 holds, which the kernel's driver takes for an MPU-6050's INT_STATUS: see docs/iio.md
+        # The kernel's driver takes register 0 for an MPU-6050's INT_STATUS: see docs/iio.md.
         self.register_0 = dict.fromkeys(buses, 1)
 
     def answer(self, setup: bytes, out: bytes) -> bytes:
         kind, request, value, index, length = struct.unpack("<BBHHH", setup)
         if kind & 0x60 == 0:
-            # standard requests: its descriptors, and a status of zeros
+            # Standard requests: descriptors, and a status of zeros.
             return {1: DEVICE, 2: CONFIGURATION}.get(value >> 8, b"")[:length] if request == 6 else bytes(length)
         if request == GET_FUNC:
             return ABILITIES[:length]
@@ -67,7 +67,7 @@ class Adapter:
 
 
 def serve(line: socket.socket, adapter: Adapter, at_once: Lock) -> None:
-    """USB/IP's commands, one after the other."""
+    """Execute the commands of USB/IP, one after the other."""
     while head := _exactly(line, 48):
         command, number, _, direction, _ = struct.unpack(">5I", head[:20])
         if command == UNLINK:
@@ -93,15 +93,15 @@ def _exactly(line: socket.socket, count: int) -> bytes:
 
 
 def obey(adapter: Adapter, buses: Mapping[int, SimulatedBus], at_once: Lock) -> None:
-    """Lines of JSON on stdin, until they end: what the hands hear, or what register 0 of a chip holds."""
+    """Obey lines of JSON on stdin until they end: prompts to the hands, or the content of a chip's register 0."""
     for line in sys.stdin:
-        told = json.loads(line)
+        command = json.loads(line)
         with at_once:
-            if "prompt" in told:
+            if "prompt" in command:
                 for bus in buses.values():
-                    bus.hear(SimpleNamespace(**told["prompt"]))
+                    bus.hear(SimpleNamespace(**command["prompt"]))
             else:
-                adapter.register_0[told["address"]] = told["register_0"]
+                adapter.register_0[command["address"]] = command["register_0"]
 
 
 def main(text: str) -> None:
@@ -109,7 +109,7 @@ def main(text: str) -> None:
     clock, at_once = RealClock(), Lock()
     buses = {address: open_simulated(text, clock=clock) for address in ADDRESSES}
     for bus in buses.values():
-        # the kernel waits two seconds for a transfer: what loads at the first ones is loaded before
+        # The kernel waits two seconds for a transfer: everything that the first ones import is imported here.
         driver = Driver(bus, Config(rate_hz=50))
         driver.start()
         driver.poll()

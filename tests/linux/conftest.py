@@ -1,7 +1,7 @@
 """A Debian kernel in QEMU: a program runs in it as root, over the host's files, which it cannot change.
 
-The guest's clock counts the instructions that it executes, a nanosecond each (-icount), so that what is measured there
-does not depend on how busy or slow the host is; limits are in the guest's time and in the host's processor time.
+The guest's clock counts the instructions that it executes, a nanosecond each (-icount), so that measurements there
+do not depend on the speed or load of the host; limits are in the guest's time and in the host's processor time.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from mpucal.result.calibration import Calibration
 
 HERE = Path(__file__).parent
 PACKAGES = HERE.parents[1] / "build" / "kernel"
-# in the guest's time, and of the host's processor
+# In the guest's time and in the host's processor time
 LONGEST_S, LONGEST_CPU_S = 900, 3600
 
-# in the order in which they need each other
+# In the order of their dependencies
 MODULES = (
     "virtio_ring",
     "virtio",
@@ -85,11 +85,11 @@ poweroff -f
 
 @dataclass(frozen=True)
 class Guest:
-    """What became of a program in that kernel.
+    """Result of a program in that kernel.
 
     Attributes
     ----------
-    said : by step, what it told. out : the folder of what it left.
+    said : lines of the guest, by step. out : folder with its files.
     """
 
     said: dict[str, dict]
@@ -98,7 +98,7 @@ class Guest:
 
 @pytest.fixture(scope="module")
 def guest(request, tmp_path_factory):
-    """guest.py's part that the test's module names, on a machine of its own."""
+    """Run the part of guest.py that the test module names, on a machine of its own."""
     folder = tmp_path_factory.mktemp("boot")
     (folder / "out").mkdir()
     packages = _packages()
@@ -109,7 +109,7 @@ def guest(request, tmp_path_factory):
 
 
 def _packages() -> list[Path]:
-    """Debian's kernel and its headers."""
+    """Return the packages of Debian's kernel and its headers."""
     lacking = [name for name in PROGRAMS if shutil.which(name) is None]
     named = Path(os.environ.get("MPUCAL_KERNEL", PACKAGES))
     images, found = sorted(named.glob("linux-image-*.deb")), sorted(named.glob("linux-*.deb"))
@@ -121,7 +121,7 @@ def _packages() -> list[Path]:
 
 
 def _boot(packages: list[Path], command: str, folder: Path) -> str:
-    """What the kernel and `command`, a shell's, print until it ends."""
+    """Return the output of the kernel and of the shell command `command` until it ends."""
     modules = _unpacked(packages, folder)
     root = folder / "initramfs"
     for name in ("bin", "lower", "upper", "root", "proc", "sys", "dev", "modules"):
@@ -145,7 +145,7 @@ def _boot(packages: list[Path], command: str, folder: Path) -> str:
 
 
 def _shared(name: str, path: Path | str, how: str) -> list[str]:
-    """A folder of the host, for the guest to mount by its name."""
+    """Return the options that share a folder of the host, which the guest mounts by `name`."""
     backend = f"local,id={name},path={path},security_model=none,{how}"
     return ["-fsdev", backend, "-device", f"virtio-9p-pci,fsdev={name},mount_tag={name}"]
 
@@ -155,7 +155,7 @@ def _limit() -> None:
 
 
 def _unpacked(packages: list[Path], folder: Path) -> dict[str, Path]:
-    """The kernel and its modules, by name; our own is compiled."""
+    """Unpack the kernel and its modules and compile our own; return the modules by name."""
     wanted = ["./boot/vmlinuz-*", *(f"*/{module}.ko" for module in MODULES)]
     for package in packages:
         chosen = wanted if package.name.startswith("linux-image-") else ["./usr"]
@@ -163,7 +163,7 @@ def _unpacked(packages: list[Path], folder: Path) -> dict[str, Path]:
             subprocess.run(["tar", "-x", "-C", folder, "--wildcards", *chosen], stdin=data.stdout, check=True)
     headers = next(folder.glob("usr/src/linux-headers-*/Module.symvers")).parent
     top = headers / "Makefile"
-    # it names its other half by where that would be installed
+    # The Makefile includes its other half from the place where that would be installed.
     top.write_text(top.read_text().replace("/usr/src", f"{folder}/usr/src"))
     own = folder / OWN
     own.mkdir()
@@ -175,9 +175,9 @@ def _unpacked(packages: list[Path], folder: Path) -> dict[str, Path]:
 
 @pytest.fixture(scope="session")
 def near():
-    """A session's calibration; asserts that D and b_a are the truth's within four standard deviations.
+    """near(guest) asserts that D and b_a of its session are the truth's within four standard deviations.
 
-    scale : of what the source delivers, relative to the chip's nominal.
+    It returns the calibration. scale : of the source's samples, relative to the chip's nominal scale.
     """
 
     def judge(guest, scale=1.0):

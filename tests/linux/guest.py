@@ -1,4 +1,4 @@
-"""Runs in the kernel that conftest.py boots: mpucal's commands; what they say in lines of JSON, their files in OUT."""
+"""Program in the kernel that conftest.py boots: mpucal's commands, reported in lines of JSON, with files in OUT."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ RATE = ("--rate", "50")
 
 
 def tell(step: str, **facts: Any) -> None:
-    """A line for the test, with the time since the kernel started."""
+    """Print a line for the test, with the time since the kernel's start."""
     up = float(Path("/proc/uptime").read_text().split()[0])
     print("SAID " + json.dumps({"step": step, "up": up, **facts}), flush=True)
 
 
 def run(step: str, *words: str, **facts: Any) -> str:
-    """One command of mpucal, in this process: each start of another takes seconds here."""
+    """Run one command of mpucal in this process: to start another takes seconds here."""
     ran = CliRunner().invoke(cli.commands, list(words), standalone_mode=False)
     error = ran.exception
     sentence = str(error) if isinstance(error, MpucalError) else repr(error) if error else ""
@@ -43,23 +43,23 @@ def run(step: str, *words: str, **facts: Any) -> str:
 
 
 def record(step: str, *words: str, seconds: float = 4) -> None:
-    """`mpucal record`, to a file in OUT that is named after the step."""
+    """Run `mpucal record` into a file in OUT that has the step's name."""
     run(step, "record", *words, *RATE, "--seconds", str(seconds), "-o", str(OUT / f"{step}.mcap"))
 
 
-def wait_for(there: Callable[[], Any], seconds: float = 60.0) -> Any:
-    """What it gives once it gives something; of the time that the guest sees."""
+def wait_for(find: Callable[[], Any], seconds: float = 60.0) -> Any:
+    """Return the first true result of `find` within `seconds` of the guest's time."""
     end = time.monotonic() + seconds
-    while not (found := there()) and time.monotonic() < end:
+    while not (found := find()) and time.monotonic() < end:
         time.sleep(0.1)
     if not found:
         raise TimeoutError(f"waited {seconds:g} s")
     return found
 
 
-def later(seconds: float, do: Callable[[], Any]) -> None:
-    """Do it while a command runs."""
-    Timer(seconds, do).start()
+def later(seconds: float, action: Callable[[], Any]) -> None:
+    """Call `action` after `seconds`, while a command runs."""
+    Timer(seconds, action).start()
 
 
 class Board:
@@ -67,7 +67,7 @@ class Board:
 
     Attributes
     ----------
-    bus : the adapter's number. rate_hz : what the chips make of 50 Hz.
+    bus : number of the adapter. rate_hz : the chips' own rate at a nominal 50 Hz.
     """
 
     def __init__(self, text: str) -> None:
@@ -79,18 +79,18 @@ class Board:
         names = wait_for(lambda: [p for p in I2C.glob("devices/i2c-*/name") if "i2c-tiny-usb" in p.read_text()])
         self.bus = names[0].parent.name.removeprefix("i2c-")
 
-    def hears(self, kind: str, down: Any = None) -> None:
-        """A prompt."""
-        self._told(prompt={"kind": kind, "down": down})
+    def prompt(self, kind: str, down: Any = None) -> None:
+        """Send a prompt to the hand."""
+        self._send(prompt={"kind": kind, "down": down})
 
     def register_0(self, address: int, value: int) -> None:
-        """What a chip holds there."""
-        self._told(address=address, register_0=value)
-        # nothing answers; it is done long before a command gets so far
+        """Set the content of a chip's register 0."""
+        self._send(address=address, register_0=value)
+        # There is no answer; it is done long before a command reads the register.
         time.sleep(0.1)
 
     def session(self, step: str, *words: str) -> None:
-        """A whole session, its prompts obeyed; its folder comes to OUT."""
+        """Run a whole session whose prompts the hand obeys; copy its folder to OUT."""
         folder = f"/run/{step.replace(' ', '-')}"
         command = [str(MPUCAL), "session", *words, *RATE, "--target", "quick", "--yes", "--json-events", "-o", folder]
         said = []
@@ -98,14 +98,14 @@ class Board:
             for line in process.stderr:
                 event = json.loads(line) if line.startswith("{") else {"event": "line", "what": line}
                 if event["event"] == "prompt":
-                    self.hears(event["kind"], event.get("down"))
+                    self.prompt(event["kind"], event.get("down"))
                 if event["event"] in ("line", "error", "note", "prompt"):
                     said.append(event)
         subprocess.run(["cp", "-r", folder, OUT], check=False)
         tell(step, code=process.wait(), said=said)
 
     def unplug(self) -> None:
-        """Take the adapter out of its socket."""
+        """Unplug the adapter."""
         DETACH.write_text("0")
 
     def close(self) -> None:
@@ -113,25 +113,25 @@ class Board:
         self._process.kill()
         self._process.wait()
 
-    def _told(self, **what: Any) -> None:
+    def _send(self, **what: Any) -> None:
         self._process.stdin.write(json.dumps(what) + "\n")
         self._process.stdin.flush()
 
 
 def over_bus(board: Board) -> None:
-    """The real /dev/i2c-N."""
+    """Use the real /dev/i2c-N."""
     bus = ("--bus", board.bus)
-    board.hears("lay_flat")
+    board.prompt("lay_flat")
     run("doctor", "doctor", *bus, "--seconds", "2", *RATE, "--json")
     record("recorded", *bus)
     board.session("session", *bus)
-    board.hears("lay_flat")
+    board.prompt("lay_flat")
     later(3, board.unplug)
     record("unplugged", *bus, seconds=20)
 
 
 def over_iio(board: Board) -> None:
-    """The kernel's own driver, with an interrupt."""
+    """Use the kernel's own driver, with an interrupt."""
     device, *_ = bound(board)
     iio, held, client = ("--iio", device), IIO / device, f"{board.bus}-{ADDRESSES[0]}"
     tell("bound", device=device)
@@ -146,23 +146,23 @@ def over_iio(board: Board) -> None:
     board.register_0(0x68, 0)
     record("empty", *iio)
     board.register_0(0x68, 1)
-    later(2, sleep_through)
+    later(2, stop_for_four_seconds)
     record("overrun", *iio, seconds=8)
     board.session("session", *iio)
-    written(board, iio)
+    write_and_restore(board, iio)
     later(2, lambda: (I2C / "drivers/inv-mpu6050-i2c/unbind").write_text(client))
     record("unbound", *iio, seconds=20)
 
 
 def over_two(board: Board) -> None:
-    """Accelerometer and gyroscope of two devices."""
+    """Use the accelerometer and the gyroscope of two devices."""
     accel, gyro = bound(board)
     board.session("session", "--iio", f"accel={accel},gyro={gyro}")
 
 
 def bound(board: Board) -> list[str]:
-    """The devices that the kernel's driver makes of the chips, as on a board with INT wires."""
-    board.hears("lay_flat")
+    """Bind the kernel's driver to the chips, as on a board with INT wires; return the devices."""
+    board.prompt("lay_flat")
     addresses = ",".join(f"0x{address}" for address in ADDRESSES)
     wires = [f"adapter={board.bus}", f"addresses={addresses}", f"period_us={round(1e6 / board.rate_hz)}"]
     subprocess.run(["/bin/busybox", "insmod", "/modules/interrupt.ko", *wires], check=True)
@@ -170,18 +170,18 @@ def bound(board: Board) -> list[str]:
     return [wait_for(lambda c=c: [path.name for path in c.glob("iio:device*")])[0] for c in clients]
 
 
-def sleep_through() -> None:
-    """This process stands still for four seconds; the kernel goes on, and its buffer holds two."""
+def stop_for_four_seconds() -> None:
+    """Stop this process for four seconds; the kernel goes on, and its buffer holds two."""
     subprocess.Popen(["/bin/sh", "-c", f"sleep 4; kill -CONT {os.getpid()}"])
     os.kill(os.getpid(), 19)
 
 
-def written(board: Board, iio: tuple[str, str]) -> None:
-    """What a session found, into calibbias and to udev, and out again."""
+def write_and_restore(board: Board, iio: tuple[str, str]) -> None:
+    """Write a session's calibration to calibbias and udev, and put the old state back."""
     with suppress(OSError):
         subprocess.run(["/lib/systemd/systemd-udevd", "--daemon"], check=False)
-    board.hears("lay_flat")
-    # until the hand has put it down
+    board.prompt("lay_flat")
+    # The hand needs so long to put it down.
     time.sleep(6)
     found = OUT / "session/calibration.json"
     record("as it was", *iio)

@@ -36,7 +36,7 @@ def test_a_session_ends_good_with_the_chips_own_truth(guest, near):
 
 
 def test_its_capture_replays_elsewhere(guest, tmp_path):
-    """On the host, another processor: the same samples, and the same numbers but for their last digits."""
+    """The host has another processor: the samples are equal, and the numbers but for their last digits."""
     words = ["session", "--replay", str(guest.out / "session"), "-o", str(tmp_path / "again"), "--yes", "--json"]
     assert run(words) == 0
     there, here = (mpucal.load(folder / "capture.mcap") for folder in (guest.out / "session", tmp_path / "again"))

@@ -11,9 +11,9 @@ from mpucal.data import STANDARD_GRAVITY_MPS2
 
 PART = "iio"
 pytestmark = pytest.mark.kernel
-# what inv_mpu6050 prints of 9.80665 / 8192
+# inv_mpu6050 prints 9.80665 / 8192 with these digits.
 PRINTED = 0.001196 * 8192 / STANDARD_GRAVITY_MPS2
-# as interrupt.c mounts them
+# interrupt.c mounts them so.
 MOUNTED = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
 
@@ -80,7 +80,7 @@ def test_a_calibration_goes_into_calibbias_and_to_udev_and_out_again(guest):
     [
         (
             "another reader",
-            "another program reads the buffer of iio:device0: stop it (`sudo fuser -v /dev/iio:device0`",
+            "another program reads the buffer of iio:device0: stop it (`sudo fuser -v /dev/iio",
         ),
         ("empty", "the buffer of iio:device0 stays empty: it waits for interrupts that do not come"),
         ("unbound", "iio:device0 is gone: its driver was unbound or its adapter unplugged"),

@@ -157,7 +157,7 @@ places = st.builds(
     seed=st.integers(0, 9),
 )
 def test_whatever_happens_what_is_delivered_is_true(faults, model, rate_hz, seed):
-    """On a noisy bus single values may be off; every run ends in samples or in a message."""
+    """Every run ends in samples or in a message; only a noisy bus may make single values wrong."""
     recording, error = measured(suffering(*faults, model=model, seed=seed), 4.5, Config(rate_hz=rate_hz))
     assert error is None or error.remedy
     assert (np.diff(recording.t) > 0).all()
