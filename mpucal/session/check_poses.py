@@ -7,44 +7,25 @@ import numpy as np
 from ..data import Samples
 from ..result.orientation import side_down
 from .aims import ALL_AROUND
-from .coverage import Coverage
-from .events import Caution, Direction, Finished, Output, Progress, Prompt, PromptKind, Rested, Use, triple
-from .pauses import Pause, PauseDetector, classify_use, countdown, held
+from .coverage import Directions
+from .events import Caution, Finished, Output, Progress, Prompt, PromptKind, Rested, Use, triple
+from .pauses import PATIENCE_S, Pause, PoseStep, classify_use, countdown, held
 
 ORIENTATIONS = 3
 # A check has few samples: a longer hold averages the hand's tremor.
 CHECK_HOLD_S = 2.0
-PATIENCE_S = 40.0
-SAY_AGAIN_S = 8.0
 # Weight that prefers, of both directions along an axis, the one that is farther from all others.
 OTHER_WAY = 0.1
 
 
-class CheckPoses:
-    """Step that asks for the orientations that would show most, and takes any new one.
-
-    Parameters
-    ----------
-    flat : the flat rest.
-
-    Attributes
-    ----------
-    prompt : the last one.
-    """
+class CheckPoses(PoseStep):
+    """Step that asks for the orientations that would show most, and takes any new one."""
 
     def __init__(self, flat: Rested) -> None:
-        self._coverage = Coverage()
-        self._coverage.pauses(np.array(flat.acc))
-        self._pauses = PauseDetector(flat, CHECK_HOLD_S)
-        self._begun_s: float | None = None
-        self._said_s = 0.0
-        self._number = 0
+        super().__init__(flat, CHECK_HOLD_S)
+        self._shown = Directions()
+        self._shown.add(np.array(flat.acc))
         self.prompt = self._next()
-
-    @property
-    def wanted(self) -> Direction | None:
-        """Unit vector that is to point down."""
-        return self.prompt.down
 
     def add(self, samples: Samples) -> list[Output | Finished]:
         """Return the outputs for `samples`; Finished comes last and ends the step."""
@@ -59,19 +40,10 @@ class CheckPoses:
             return [*outputs, Finished(f"{ORIENTATIONS} orientations: done")]
         if t_s - self._begun_s >= PATIENCE_S:
             return [*outputs, Finished(f"no new orientation for {PATIENCE_S:.0f} s")]
-        if t_s - self._said_s >= SAY_AGAIN_S:
-            self._said_s = t_s
-            outputs.append(Caution(t_s, "not_turned", "no new orientation for a while", self.prompt.text))
-        return outputs
-
-    def resumed(self) -> list[Output]:
-        """Start again after a gap, in which the board may have been moved."""
-        self._begun_s = None
-        self._pauses.forget()
-        return [self.prompt]
+        return [*outputs, *self._remind(t_s, self._said_s, "no new orientation for a while")]
 
     def _hold(self, pause: Pause) -> list[Output]:
-        new = self._coverage.is_new(pause.acc)
+        new = not self._shown.near(pause.acc)
         use = classify_use(pause.acc, self.prompt.down, new) if new else Use.SEEN
         outputs: list[Output] = [*countdown(pause, use)]
         if pause.seconds < CHECK_HOLD_S - 1e-6:
@@ -82,7 +54,7 @@ class CheckPoses:
         if not new:
             seen = Caution(pause.t_s, "seen_already", "this orientation was shown already", self.prompt.text)
             return [*outputs, seen]
-        self._coverage.pauses(pause.acc)
+        self._shown.add(pause.acc)
         self._number += 1
         self._begun_s = pause.t_s
         outputs.append(Progress(pause.t_s, self._number, ORIENTATIONS, f"held {self._number} of {ORIENTATIONS}"))
@@ -93,7 +65,7 @@ class CheckPoses:
 
     def _next(self) -> Prompt:
         """Return a prompt for the axis that differs most from all orientations shown: a bias shows along either way."""
-        along = -ALL_AROUND @ self._coverage.paused.units.T
+        along = -ALL_AROUND @ self._shown.units.T
         down = ALL_AROUND[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
         number = f"{self._number + 1} of {ORIENTATIONS}"
         text = f"Orientation {number}: {side_down(down)} down, or any other new one, then hold it still for 2 s."

@@ -26,7 +26,7 @@ _UNIFORM = 2.0 / 15.0
 
 
 class Directions:
-    """Unit vectors that differ from one another by at least `apart_rad`: `units`, (n, 3)."""
+    """Directions of accelerations, `apart_rad` or more from one another: unit vectors `units` (n, 3)."""
 
     def __init__(self, apart_rad: float = DISTINCT_RAD) -> None:
         self.units = np.zeros((0, 3))
@@ -35,16 +35,17 @@ class Directions:
     def __len__(self) -> int:
         return len(self.units)
 
-    def add(self, unit: Vector) -> bool:
-        """Keep a unit vector (3,) unless one near it is there already; return True if it was new."""
-        if self.near(unit, self._apart_rad):
+    def add(self, acc: Vector) -> bool:
+        """Keep the direction of a mean acceleration (3,), unless one near it is there; return True if it was new."""
+        if self.near(acc):
             return False
-        self.units = np.vstack([self.units, unit])
+        self.units = np.vstack([self.units, _unit(acc)])
         return True
 
-    def near(self, unit: Vector, apart_rad: float) -> bool:
-        """Return True if one of them is less than `apart_rad` from a unit vector (3,)."""
-        return bool(len(self)) and float((self.units @ unit).max()) > math.cos(apart_rad)
+    def near(self, acc: Vector, apart_rad: float | None = None) -> bool:
+        """Return True if one of them is less than `apart_rad` (None: that of `add`) from that of `acc` (3,)."""
+        apart_rad = self._apart_rad if apart_rad is None else apart_rad
+        return bool(len(self)) and float((self.units @ _unit(acc)).max()) > math.cos(apart_rad)
 
     def farthest_down(self, candidates: Vector) -> Vector:
         """Return that of the unit vectors (k, 3) which, pointing down, differs most from all directions here."""
@@ -67,29 +68,7 @@ class Coverage:
     """Orientations that the board has paused in, passed, and rested in, long or short."""
 
     def __init__(self) -> None:
-        self.paused = Directions()
-        self.passed = Directions()
-        self.rested = Directions(SAME_RAD)
-
-    def passes(self, acc: Vector) -> bool:
-        """Add the mean acceleration (3,) [m/s^2] of a short time; return True if its direction is new."""
-        return self.passed.add(_unit(acc))
-
-    def pauses(self, acc: Vector) -> bool:
-        """Add the mean acceleration (3,) [m/s^2] of a pause; return True if its direction is new."""
-        return self.paused.add(_unit(acc))
-
-    def rests(self, acc: Vector) -> None:
-        """Add the mean acceleration (3,) [m/s^2] of a rest."""
-        self.rested.add(_unit(acc))
-
-    def was_near(self, acc: Vector, apart_rad: float) -> bool:
-        """Return True if the board has rested less than `apart_rad` from the direction of `acc` (3,)."""
-        return self.rested.near(_unit(acc), apart_rad)
-
-    def is_new(self, acc: Vector) -> bool:
-        """Return True if a pause with the mean acceleration `acc` (3,) would be a new orientation."""
-        return not self.paused.near(_unit(acc), DISTINCT_RAD)
+        self.paused, self.passed, self.rested = Directions(), Directions(), Directions(SAME_RAD)
 
     @property
     def number(self) -> int:

@@ -11,11 +11,15 @@ from ..data import Samples, Vector
 from ..rests.limits import HAND
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
-from .events import Countdown, Direction, Held, Rested, Use, down_of
+from .events import Caution, Countdown, Direction, Held, Output, Prompt, Rested, Use, down_of
 
 WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
+# The prompt is repeated after this time without a new orientation.
+SAY_AGAIN_S = 8.0
+# A check and a verification end after this time without a new orientation.
+PATIENCE_S = 40.0
 # A board this near to the wanted orientation is in it.
 WANTED_RAD = math.radians(15.0)
 USE_TEXTS = {
@@ -66,6 +70,45 @@ def countdown(pause: Pause, use: Use) -> list[Countdown]:
     if pause.countdown is None or use is Use.SEEN:
         return []
     return [replace(pause.countdown, elsewhere=use is Use.USEFUL)]
+
+
+class PoseStep:
+    """Base of the steps that ask for one orientation after another.
+
+    Parameters
+    ----------
+    flat : the flat rest. hold_s : time for which each orientation is to be held.
+
+    Attributes
+    ----------
+    prompt : the last one.
+    """
+
+    prompt: Prompt
+
+    def __init__(self, flat: Rested, hold_s: float = HOLD_S) -> None:
+        self._pauses = PauseDetector(flat, hold_s)
+        self._begun_s: float | None = None
+        self._said_s = 0.0
+        self._number = 0
+
+    @property
+    def wanted(self) -> Direction | None:
+        """Unit vector that is to point down."""
+        return self.prompt.down
+
+    def resumed(self) -> list[Output]:
+        """Start again after a gap, in which the board may have been moved."""
+        self._begun_s = None
+        self._pauses.forget()
+        return [self.prompt]
+
+    def _remind(self, t_s: float, since_s: float, what: str) -> list[Output]:
+        """Return the prompt as a caution, if it is SAY_AGAIN_S since the last one and since `since_s`."""
+        if t_s - max(since_s, self._said_s) < SAY_AGAIN_S:
+            return []
+        self._said_s = t_s
+        return [Caution(t_s, "not_turned", what, self.prompt.text)]
 
 
 class PauseDetector:

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Samples, Vector
-from ..rests.windows import Window, Windows
+from ..rests.windows import Windows
 from ..result.orientation import side_down, tilt_down
 from .aims import Aim, directions
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
-    Caution,
     Direction,
     FitKind,
     Knowledge,
@@ -29,7 +28,7 @@ from .events import (
     down_of,
     triple,
 )
-from .pauses import HOLD_S, Pause, PauseDetector, classify_use, countdown, held
+from .pauses import HOLD_S, Pause, PoseStep, classify_use, countdown, held
 
 PASS_WINDOW_S = 0.1
 # Least length of a pause. A fit uses shorter rests, too.
@@ -38,8 +37,6 @@ REST_S = 0.5
 PATIENCE_S = 60.0
 # Nine tilts may be asked for; a sloppy hand makes this many different ones of them.
 TILTS = 6
-# The prompt is repeated after this time without a new orientation.
-SAY_AGAIN_S = 8.0
 # Beyond these the hand's own acceleration hides the direction of gravity [m/s^2].
 LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
@@ -52,7 +49,7 @@ SHOW_EVERY_S = 5.0
 WAIT_S = 0.5
 
 
-class Rotate:
+class Rotate(PoseStep):
     """Step that asks for one orientation after another until the target is reached.
 
     Parameters
@@ -62,21 +59,21 @@ class Rotate:
     """
 
     def __init__(self, flat: Rested, aim: Aim, until_end: bool = False, tilt_only: bool = False) -> None:
+        super().__init__(flat)
         self.flat, self._aim, self._until_end, self._tilt_only = flat, aim, until_end, tilt_only
         self._least = TILTS if tilt_only else aim.least
-        self._pauses, self._passes = PauseDetector(flat), Windows(PASS_WINDOW_S, spread=False)
+        self._passes = Windows(PASS_WINDOW_S, spread=False)
         self.coverage = Coverage()
         acc = np.array(flat.acc)
-        self.coverage.pauses(acc)
-        self.coverage.passes(acc)
-        self.coverage.rests(acc)
+        self.coverage.paused.add(acc)
+        self.coverage.passed.add(acc)
+        self.coverage.rested.add(acc)
         self.directions = directions(down_of(acc), tilt_only)
         self._knowledge: Knowledge | None = None
         self._asked = False
         self._advised_run = -1
         self._held: tuple[Pause, Use] | None = None
-        self._begun_s: float | None = None
-        self._t_s = self._new_s = self._known_s = self._told_s = self._said_s = 0.0
+        self._t_s = self._new_s = self._known_s = self._told_s = 0.0
         self.prompt = self._prompt_for(self.coverage.paused.farthest_down(self.directions))
 
     def add(self, samples: Samples) -> list[Output | Turned]:
@@ -84,7 +81,9 @@ class Rotate:
         if self._begun_s is None:
             self._begun_s = self._new_s = self._known_s = self._told_s = self._said_s = float(samples.t[0])
         for window in self._passes.add(samples):
-            self._pass(window)
+            steady = window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2
+            if steady and self.coverage.passed.add(window.acc):
+                self._new_s = window.end_s
         outputs: list[Output | Turned] = []
         for pause in self._pauses.add(samples):
             outputs += self._hold(pause)
@@ -127,24 +126,20 @@ class Rotate:
 
     def resumed(self) -> list[Output]:
         """Start again after a gap, in which the board may have been moved."""
-        self._asked, self._begun_s = False, None
-        self._pauses.forget()
-        return [] if self._until_end else [self.prompt]
-
-    def _pass(self, window: Window) -> None:
-        if window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2 and self.coverage.passes(window.acc):
-            self._new_s = window.end_s
+        self._asked = False
+        prompt = super().resumed()
+        return [] if self._until_end else prompt
 
     def _hold(self, pause: Pause) -> list[Output | Turned]:
         # A pause that the coverage has counted is not new any more: its use was decided before.
         if self._held is None or self._held[0].run != pause.run or pause.seconds < PAUSE_S - 1e-6:
-            self._held = pause, classify_use(pause.acc, self.prompt.down, self.coverage.is_new(pause.acc))
+            self._held = pause, classify_use(pause.acc, self.prompt.down, not self.coverage.paused.near(pause.acc))
         # The advice ends the countdown of its pause, also where a bump had delayed it.
         advised = pause.run <= self._advised_run
         outputs: list[Output | Turned] = [*countdown(pause, self._held[1])] if self._asked or not advised else []
         if pause.seconds >= REST_S - 1e-6:
-            self.coverage.rests(pause.acc)
-        if pause.seconds >= PAUSE_S - 1e-6 and self.coverage.pauses(pause.acc):
+            self.coverage.rested.add(pause.acc)
+        if pause.seconds >= PAUSE_S - 1e-6 and self.coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
             outputs.append(Seen(pause.t_s, len(self.coverage.paused), down_of(pause.acc), paused=True))
         if self._until_end or self._asked or advised:
@@ -168,10 +163,9 @@ class Rotate:
             more = number <= least
             text = f"orientation {number} of {least}" if more else f"{number} orientations, of at least {least}"
             outputs.append(Progress(t_s, min(number, least), least, text))
-        if not self._until_end and t_s - max(self._new_s, self._said_s) >= SAY_AGAIN_S:
-            self._said_s = t_s
-            outputs.append(Caution(t_s, "not_turned", "no new orientation for a while", self.prompt.text))
-        return outputs
+        return (
+            outputs if self._until_end else outputs + self._remind(t_s, self._new_s, "no new orientation for a while")
+        )
 
     def _is_enough(self) -> bool:
         if self.coverage.number < self._least or self._tilt_only:

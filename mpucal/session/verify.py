@@ -15,7 +15,6 @@ from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Caution,
     Checked,
-    Direction,
     Finished,
     FitKind,
     Output,
@@ -28,10 +27,8 @@ from .events import (
     Use,
     triple,
 )
-from .pauses import HOLD_S, Pause, PauseDetector, classify_use, countdown, held, is_wanted
+from .pauses import HOLD_S, PATIENCE_S, Pause, PoseStep, classify_use, countdown, held, is_wanted
 
-PATIENCE_S = 40.0
-SAY_AGAIN_S = 8.0
 # Bias and scale factor errors bend raw directions by up to a tenth: these must be farther apart by that.
 BENT = 1.1
 # A hand that is this near to the requested orientation meant to be there.
@@ -46,7 +43,7 @@ OFFERED_S = 60.0
 MOST_MORE = 2
 
 
-class Verify:
+class Verify(PoseStep):
     """Step that asks for `aim.verify` new orientations and compares the first calibration with them.
 
     Parameters
@@ -57,7 +54,7 @@ class Verify:
 
     Attributes
     ----------
-    prompt : the last one. checked : the result; None before it is known, or if the person skipped it.
+    checked : the result; None before it is known, or if the person skipped it.
     """
 
     def __init__(
@@ -69,21 +66,14 @@ class Verify:
         tilt_only: bool = False,
         attended: bool = False,
     ) -> None:
+        super().__init__(flat)
         self._aim, self._coverage, self._directions, self._tilt_only = aim, coverage, directions, tilt_only
         self._attended = attended
         self._refusal: Finished | None = None
-        self._pauses = PauseDetector(flat)
-        self._number = 0
         self._asked, self._more = False, MOST_MORE
-        self._begun_s: float | None = None
-        self._said_s = self._now_s = 0.0
+        self._now_s = 0.0
         self.checked: Checked | None = None
         self.prompt = self._next()
-
-    @property
-    def wanted(self) -> Direction | None:
-        """Unit vector that is to point down."""
-        return self.prompt.down
 
     def begin(self) -> list[Output]:
         """Return the first outputs."""
@@ -103,9 +93,7 @@ class Verify:
             outputs += self._hold(pause, use)
         if self._asked:
             return outputs
-        if t_s - self._said_s >= SAY_AGAIN_S:
-            self._said_s = t_s
-            outputs.append(Caution(t_s, "not_turned", "this orientation has not been held yet", self.prompt.text))
+        outputs += self._remind(t_s, self._said_s, "this orientation has not been held yet")
         if t_s - self._begun_s < PATIENCE_S:
             return outputs
         if self._number:
@@ -139,12 +127,6 @@ class Verify:
         """Return the end of the step, at the person's wish."""
         return self._refusal or Finished("you chose to go on: not verified")
 
-    def resumed(self) -> list[Output]:
-        """Start again after a gap, in which the board may have been moved."""
-        self._begun_s = None
-        self._pauses.forget()
-        return [self.prompt]
-
     def _refused(self, refusal: Finished, against: Reason) -> list[Output | Finished]:
         """Return the refusal, or offer to turn the board again, where that may help and somebody can answer."""
         if not self._attended or not KINDS[against.code].turn_again:
@@ -162,8 +144,8 @@ class Verify:
         self._said_s = pause.t_s
         if use is Use.SEEN:
             return [held(pause, use), *self._seen_already(pause)]
-        self._coverage.pauses(pause.acc)
-        self._coverage.rests(pause.acc)
+        self._coverage.paused.add(pause.acc)
+        self._coverage.rested.add(pause.acc)
         self._number += 1
         self._begun_s = pause.t_s
         useful = "" if use is Use.TAKEN else ": not the one asked for, but useful"
@@ -177,7 +159,7 @@ class Verify:
 
     def _classify_use(self, pause: Pause) -> Use:
         """Return SEEN if the fit already used this orientation, even when it was requested."""
-        if self._coverage.was_near(pause.acc, BENT * unseen_rad(self._tilt_only)):
+        if self._coverage.rested.near(pause.acc, BENT * unseen_rad(self._tilt_only)):
             return Use.SEEN
         return classify_use(pause.acc, self.prompt.down, new=True)
 

@@ -20,7 +20,7 @@ DEGENERATE = {
 def directions_of(units):
     directions = Directions()
     for unit in units:
-        directions.add(np.array(unit, float) / np.linalg.norm(unit))
+        directions.add(np.array(unit, float))
     return directions
 
 
@@ -33,20 +33,20 @@ def test_degenerate_directions_have_no_spread(units):
 def test_the_farthest_directions_mend_them(units):
     coverage = Coverage()
     for unit in units:
-        coverage.pauses(np.array(unit, float))
+        coverage.paused.add(np.array(unit, float))
     assert not coverage.varied
     for _ in range(8):
-        coverage.pauses(-coverage.paused.farthest_down(ALL_AROUND))
+        coverage.paused.add(-coverage.paused.farthest_down(ALL_AROUND))
     assert coverage.varied
     assert coverage.paused.spread() > SPREAD
 
 
 def test_four_passes_count_as_a_pause():
     coverage = Coverage()
-    coverage.pauses(np.array([0.0, 0.0, 9.8]))
+    coverage.paused.add(np.array([0.0, 0.0, 9.8]))
     assert coverage.number == 1
     for unit in ALL_AROUND[:12]:
-        coverage.passes(9.8 * unit)
+        coverage.passed.add(9.8 * unit)
     assert coverage.number == 3
 
 

@@ -342,7 +342,7 @@ def test_nor_does_the_same_one_twice(board, verifying):
 
 def test_who_is_where_asked_but_near_what_was_seen_is_asked_for_another(board, verifying):
     asked = verifying.of(Prompt)[-1]
-    verifying.machine._step._coverage.rests(-np.array(asked.down))
+    verifying.machine._step._coverage.rested.add(-np.array(asked.down))
     show(verifying, board, [[-v for v in asked.down]])
     assert verifying.of(Caution)[-1].code == "seen_already"
     another = verifying.of(Prompt)[-1]
