@@ -9,7 +9,7 @@ from mpucal.calibration.likelihood import evaluate, trace, value
 from mpucal.calibration.parameters import HAND
 from mpucal.calibration.problem import Problem, Series
 from mpucal.kernel import _kernel
-from tools.lab.hand_reference import evaluate_hand_reference, gains, innovations
+from tools.lab.reference import evaluate_hand_reference, gains, innovations
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What tools/attack/fuzz.py has peers say: bridges, vehicles, browsers; the bytes to be mutated are what they say.
+"""Peers for tools/attack/fuzz.py: bridges, vehicles, browsers; the bytes to be mutated are what they say.
 
 Check sums and sequence numbers, which would turn nearly all mutated bytes away, are made here: a peer's bytes are
 pieces, each a head that ends with a length, and so many bytes.
@@ -37,27 +37,14 @@ PIECE_OF_BRIDGE = struct.Struct("<BBB")
 PIECE_OF_VEHICLE = struct.Struct("<BBBHB")
 BEGUN_US = 1_000_000_000
 PACKETS = (
-    "heartbeat",
-    "raw_imu",
-    "scaled_imu",
-    "scaled_imu2",
-    "scaled_imu3",
-    "highres_imu",
-    "attitude",
-    "sys_status",
-    "statustext",
-    "command_ack",
-    "param_value",
-    "param_error",
-    "file_transfer_protocol",
-    "timesync",
-    "system_time",
+    *("heartbeat", "raw_imu", "scaled_imu", "scaled_imu2", "scaled_imu3", "highres_imu", "attitude", "sys_status"),
+    *("statustext", "command_ack", "param_value", "param_error", "file_transfer_protocol", "timesync", "system_time"),
     "autopilot_version",
 )
 
 
 def pieces(data: bytes, head: struct.Struct) -> Iterator[tuple[Any, ...]]:
-    """Each head's fields, with the bytes in place of their length."""
+    """Yield each head's fields, with the bytes in place of their length."""
     at = 0
     while at + head.size <= len(data):
         *fields, size = head.unpack_from(data, at)
@@ -66,12 +53,12 @@ def pieces(data: bytes, head: struct.Struct) -> Iterator[tuple[Any, ...]]:
 
 
 def joined(head: struct.Struct, rows: Sequence[Sequence[Any]]) -> bytes:
-    """The inverse of `pieces`."""
+    """Join pieces, the inverse of `pieces`."""
     return b"".join(head.pack(*fields, len(content)) + content for *fields, content in rows)
 
 
 def frames(data: bytes) -> None:
-    """What comes over a serial line."""
+    """Read what comes over a serial line."""
     for frame in Deframer().feed(data):
         if frame.type in wire.REQUESTS:
             wire.REQUESTS[frame.type].decode(frame.payload)
@@ -89,11 +76,11 @@ class HostileBridge:
         self._waiting, self._asked = list[Frame](), Frame(0, 0)
 
     def now_ns(self) -> int:
-        """Each look takes a millisecond."""
+        """Return the time; each look takes a millisecond."""
         return self._t_ns
 
     def read(self, until_ns: int) -> Chunk | None:
-        """The next piece, as an answer to the oldest request; see Port."""
+        """Return the next piece, as an answer to the oldest request; see Port."""
         kind, seq, payload = next(self._pieces, (None, 0, b""))
         if kind is None:
             self._t_ns = max(self._t_ns, until_ns)
@@ -105,20 +92,17 @@ class HostileBridge:
         return Chunk(frame.encode(), self._t_ns)
 
     def write(self, data: bytes) -> None:
-        """What is asked."""
+        """Note what is asked."""
         self._waiting += Deframer().feed(data)
 
-    def set_baud(self, baud: int) -> None:
-        """See Port."""
+    def close(self, *_: object) -> None:
+        """Do nothing; see Port."""
 
-    reopen = revive = set_baud
-
-    def close(self) -> None:
-        """See Port."""
+    set_baud = reopen = revive = close
 
 
 def bridge(data: bytes) -> None:
-    """What a bridge answers to who it is, what it keeps, what a chip holds, and what it pushes."""
+    """Ask a bridge who it is, what it keeps and what a chip holds, and take what it pushes."""
     bus = BridgeBus(HostileBridge(data))
     store = BlobStore(bus.link)
     store.who_am_i()
@@ -134,7 +118,7 @@ def bridge(data: bytes) -> None:
 
 
 def bridge_says() -> list[bytes]:
-    """What an honest one would say, in the order in which `bridge` asks."""
+    """Return what an honest one would say, in the order in which `bridge` asks."""
     ok = struct.pack("<BI", 0, 1000)
     hello = wire.HelloReply(0, 1000, wire.MAGIC, 1, 0, 0x68, 7, 3, 512, b"bridge").payload()
     blob = bytes(range(60))
@@ -146,14 +130,14 @@ def bridge_says() -> list[bytes]:
 
 
 def packets(data: bytes) -> None:
-    """What comes as a datagram, and what comes as a stream."""
+    """Read the packets as a datagram, and as a stream."""
     for packet in Parser(dialect().MAVLink(None)).datagram(data):
         packet.message.to_dict()
     list(Parser(dialect().MAVLink(None)).stream(data))
 
 
 def vehicles(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Times [us] and packets with sums that hold."""
+    """Yield times [us] and packets with sums that hold."""
     m, t_us = dialect(), BEGUN_US
     for number, (which, system, component, step_ms, payload) in enumerate(pieces(data, PIECE_OF_VEHICLE)):
         t_us += 1000 * step_ms
@@ -165,7 +149,7 @@ def vehicles(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def tlog(data: bytes) -> bytes:
-    """As a ground station records them."""
+    """Return the packets as a ground station records them."""
     return b"".join(struct.pack(">Q", t_us) + packet for t_us, packet in vehicles(data))
 
 
@@ -178,7 +162,7 @@ class HostileVehicle:
         self._packets, self._t_us = vehicles(data), BEGUN_US
 
     def now_ns(self) -> int:
-        """Of the last packet, or later."""
+        """Return the time of the last packet, or later."""
         return self._t_us * 1000
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
@@ -189,18 +173,14 @@ class HostileVehicle:
         self._t_us = max(self._t_us, t_us)
         return ReceivedBytes(packet, "192.0.2.1:1", self.now_ns())
 
-    def send(self, data: bytes, address: str | None) -> None:
-        """See Transport."""
+    def close(self, *_: object) -> None:
+        """Do nothing; see Transport."""
 
-    def restrict(self, address: str | None) -> None:
-        """See Transport."""
-
-    def close(self) -> None:
-        """See Transport."""
+    send = restrict = close
 
 
 def vehicle(data: bytes) -> None:
-    """What a vehicle answers: who it is, its parameters, a file."""
+    """Ask a vehicle who it is, and for its parameters and a file."""
     link = Link(HostileVehicle(data), lambda t_ns, packet: None)
     found = link.listen()
     link.lock(found[0])
@@ -210,7 +190,7 @@ def vehicle(data: bytes) -> None:
 
 
 def vehicle_says() -> list[bytes]:
-    """What a vehicle says in a second, and what `vehicle` asks for."""
+    """Return what a vehicle says in a second, and answers to `vehicle`."""
     m, link = dialect(), dialect().MAVLink(None, 1, 1)
 
     def piece(message: Any) -> tuple[int, int, int, int, bytes]:
@@ -219,9 +199,8 @@ def vehicle_says() -> list[bytes]:
 
     beat = m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3)
     imus = [m.MAVLink_raw_imu_message(20_000 * n, 9, 0, -1000, n, 2, 3, 0, 0, 0, 0, 2500) for n in range(40)]
-    more = [
-        m.MAVLink_highres_imu_message(20_000 * n, *(0.5, 0.0, -9.8, 0.1, 0.2, 0.3), *[0.0] * 7, 63) for n in range(40)
-    ]
+    values = (0.5, 0.0, -9.8, 0.1, 0.2, 0.3, *[0.0] * 7)
+    more = [m.MAVLink_highres_imu_message(20_000 * n, *values, 63) for n in range(40)]
     names = stream_parameter_names("ArduPilot")[:2]
     values = [m.MAVLink_param_value_message(name.encode(), 0.5, 9, 9, 1) for name in names * 3]
     answers = [Payload(2, 0, 128, b"", requested=4), Payload(3, 0, 128, b"data", requested=5)]
@@ -233,31 +212,26 @@ def vehicle_says() -> list[bytes]:
 
 
 def http(data: bytes) -> None:
-    """What a browser asks for."""
+    """Serve what a browser asks for."""
     page = SimpleNamespace(
         filter=RequestFilter("h:1", "t", True),
         results={"report.html": Path(__file__)},
         pressed=lambda key: None,
         seat=lambda: False,
     )
-    connection = SimpleNamespace(
-        recv=io.BytesIO(data).read,
-        sendall=lambda sent: None,
-        settimeout=lambda seconds: None,
-        setsockopt=lambda *option: None,
-        makefile=lambda *how: io.BytesIO(),
-    )
+    nothing = dict.fromkeys(("sendall", "settimeout", "setsockopt"), lambda *_: None)
+    connection = SimpleNamespace(recv=io.BytesIO(data).read, makefile=lambda *how: io.BytesIO(), **nothing)
     Handler(connection, ("192.0.2.1", 1), page)  # type: ignore[arg-type]
 
 
 def browser_says() -> list[bytes]:
-    """What browsers ask for."""
-    targets = (
+    """Return what browsers ask for."""
+    targets = [
         "GET /t/",
         "GET /t/page.js",
         "GET /t/events",
         "GET /t/results/report.html",
         "POST /t/keys/redo",
         "PUT /x",
-    )
+    ]
     return [f"{target} HTTP/1.1\r\nHost: h:1\r\nOrigin: http://h:1\r\n\r\n".encode() for target in targets]

@@ -1,4 +1,4 @@
-"""What tools/attack/fuzz.py runs: each reader and decoder by name, with the bytes that mutation begins with.
+"""Targets of tools/attack/fuzz.py: each reader and decoder by name, with the bytes that mutation begins with.
 
 Where check sums would turn nearly all mutated bytes away, the bytes are the content, and the sums are made here: of
 archives and captures, and in fuzz_peers.py of frames and packets.
@@ -47,19 +47,8 @@ from mpucal.sources.chained_bus import split_at_resumes
 from mpucal.sources.table import SOURCES
 
 from ..lab.dialects import dialects, walk
-from .fuzz_peers import (
-    bridge,
-    bridge_says,
-    browser_says,
-    frames,
-    http,
-    joined,
-    packets,
-    pieces,
-    tlog,
-    vehicle,
-    vehicle_says,
-)
+from . import fuzz_peers as peers
+from .fuzz_peers import joined, pieces, tlog
 
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "fixtures"
@@ -94,7 +83,7 @@ WORDS = (
 
 
 def command(*words: str) -> None:
-    """Run it; a trace is raised again."""
+    """Run a command; a trace is raised again."""
     with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as err:
         code = run(words)
     if code == 1:
@@ -102,7 +91,7 @@ def command(*words: str) -> None:
 
 
 def calibration(path: Path) -> None:
-    """What is done with one."""
+    """Read a calibration, and do with it what mpucal does."""
     command("show", str(path))
     command("diff", str(path), str(path))
     made = Calibration.load(path)
@@ -113,7 +102,7 @@ def calibration(path: Path) -> None:
 
 
 def archive(path: Path) -> None:
-    """Of the members' own bytes."""
+    """Load an archive of its members' bytes."""
     data = path.read_bytes()
     with zipfile.ZipFile(path, "w") as file:
         for name, member in zip(("t", "acc", "gyr", "sensor"), data.split(MEMBER)[1:], strict=False):
@@ -122,7 +111,7 @@ def archive(path: Path) -> None:
 
 
 def capture(path: Path) -> None:
-    """Of its messages' own bytes."""
+    """Load a capture of its messages' bytes."""
     t_ns, messages, meta = 0, [], {}
     for which, step_ns, message in pieces(path.read_bytes(), PIECE_OF_CAPTURE):
         t_ns = (t_ns + step_ns) % (1 << 64)
@@ -149,7 +138,7 @@ def capture(path: Path) -> None:
 
 
 def taken_apart(path: Path) -> bytes:
-    """A capture as `capture` takes it."""
+    """Return a capture as `capture` takes it."""
     with path.open("rb") as file:
         reader = make_reader(file)
         rows: list[tuple[int, int, bytes]] = []
@@ -163,7 +152,7 @@ def taken_apart(path: Path) -> bytes:
 
 
 def texts(data: bytes) -> None:
-    """What a person gives on the command line."""
+    """Parse what a person gives on the command line."""
     text = data.decode(errors="surrogateescape")
     for parse in TEXTS:
         with suppress(UsageError, ValueError):
@@ -171,7 +160,7 @@ def texts(data: bytes) -> None:
 
 
 def notes(path: Path) -> None:
-    """What is kept of a write, and of a session."""
+    """Read what is kept of a write, and of a session."""
     with suppress(MpucalError):
         saved_blocks(path)
     is_calibration(path)
@@ -179,7 +168,7 @@ def notes(path: Path) -> None:
 
 
 def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:
-    """By name: what is run, and its corpus."""
+    """Return by name what is run, and its corpus."""
     rows, npz, csv = table(), io.BytesIO(), io.BytesIO()
     np.savez(npz, t=rows[:, 0], acc=rows[:, 1:4], gyr=rows[:, 4:])
     np.savetxt(csv, rows, delimiter=",", header="t,ax,ay,az,gx,gy,gz", comments="")
@@ -199,39 +188,33 @@ def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:
         "signing key": (of_file(read_key, place, "key"), [b"00" * 32, b"a phrase"]),
         "texts": (texts, [text.encode() for text in WORDS]),
         "blob": (Blob.decode, blobs),
-        "frames": (frames, [b"".join(hello), *hello]),
-        "bridge": (bridge, bridge_says()),
-        "packets": (packets, [tlog(said) for said in vehicle_says()]),
-        "vehicle": (vehicle, vehicle_says()),
-        "http": (http, browser_says()),
+        "frames": (peers.frames, [b"".join(hello), *hello]),
+        "bridge": (peers.bridge, peers.bridge_says()),
+        "packets": (peers.packets, [tlog(said) for said in peers.vehicle_says()]),
+        "vehicle": (peers.vehicle, peers.vehicle_says()),
+        "http": (peers.http, peers.browser_says()),
         "csv": (of_file(load, place, "r.csv"), [csv.getvalue()]),
         "txt": (of_file(load, place, "r.txt"), [csv.getvalue(), b"a/g:\t1\t2\t3\t4\t5\t6\n" * 30]),
         "npz": (of_file(load, place, "r.npz"), [npz.getvalue()]),
         "npz's members": (of_file(archive, place, "r.npz"), [stored]),
         "mcap": (of_file(load, place, "r.mcap"), [path.read_bytes() for path in captures]),
         "mcap's messages": (of_file(capture, place, "r.mcap"), [taken_apart(path) for path in captures]),
-        "tlog": (of_file(load, place, "r.tlog"), [tlog(said) for said in vehicle_says()]),
-        "tlog's packets": (lambda data: load_tlog_of(place / "p.tlog", data), vehicle_says()),
+        "tlog": (of_file(load, place, "r.tlog"), [tlog(said) for said in peers.vehicle_says()]),
+        "tlog's packets": (lambda data: of_file(load, place, "p.tlog")(tlog(data)), peers.vehicle_says()),
         "dataflash": (of_file(load, place, "r.bin"), [b"\xa3\x95\x80" + bytes(range(86)) * 9, blobs[0]]),
         "dataflash of a flight": (of_file(load, place, "r.bin"), [flight()]),
         **{name: of_dialect(place, *written) for name, written in written_dialects(place).items()},
     }
 
 
-def load_tlog_of(path: Path, data: bytes) -> None:
-    """Of its packets' own bytes."""
-    path.write_bytes(tlog(data))
-    load(path)
-
-
 def table() -> np.ndarray:
-    """(n, 7) a short recording."""
+    """Return a short recording (n, 7)."""
     t = np.arange(300) * 0.01
     return np.column_stack((t, np.tile((0.1, -0.2, 9.8), (300, 1)), np.sin(t)[:, None] * (1.0, 0.5, -0.5)))
 
 
 def of_file(read: Callable[..., object], place: Path, name: str, *more: object) -> Run:
-    """Of bytes as a file of that name."""
+    """Return a reader of bytes as a file of that name."""
     path = place / name
 
     def run(data: bytes) -> object:
@@ -242,7 +225,7 @@ def of_file(read: Callable[..., object], place: Path, name: str, *more: object) 
 
 
 def flight() -> bytes:
-    """A dataflash log of two IMUs, by the writer of the tests."""
+    """Return a dataflash log of two IMUs, by the writer of the tests."""
     log = run_path(str(ROOT / "tests" / "files" / "test_dataflash.py"))["Dataflash"]()
     log.describe("FMT", 0x80, "BBnNZ", "Type,Length,Name,Format,Columns")
     log.describe("PARM", 0x81, "QNff", "TimeUS,Name,Value,Default")
@@ -256,7 +239,7 @@ def flight() -> bytes:
 
 
 def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
-    """Name -> a file of some 60 samples; of what is a folder, an archive, or the bag's file."""
+    """Return by name a file of some 60 samples; of what is a folder, an archive, or the bag's file."""
     found, short = {}, walk().part(2000, 2060)
     ns = np.rint(short.t * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
     for number, (name, (_, write, hints)) in enumerate(dialects().items()):
@@ -276,5 +259,5 @@ def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
 
 
 def of_dialect(place: Path, path: Path, hints: Hints = NO_HINTS) -> tuple[Run, list[bytes]]:
-    """Its reader, and its file as the corpus."""
+    """Return a dialect's reader, and its file as the corpus."""
     return of_file(load, place, f"r{path.suffix}", hints), [path.read_bytes()]

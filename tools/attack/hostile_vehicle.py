@@ -42,8 +42,7 @@ from tools.lab.campaign_judge import false, partial_files
 from tools.lab.judge import judged
 from tools.processes import CODES, Died, Ended, Tell, become, forked, ready
 
-from .hostile_link import ATTACKERS, FORGED, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
-from .hostile_packets import KINDS
+from .hostile_link import ATTACKERS, FORGED, KINDS, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
 
 KEY = bytes(range(32))
 FIRMWARES = ("ardupilot", "px4")

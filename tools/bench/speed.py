@@ -26,8 +26,7 @@ from mpucal.calibration.theta import Theta
 from mpucal.data import Recording
 from mpucal.kernel import _kernel
 from mpucal.rests.flat import flat_statistics
-from tools.lab.hand_reference import evaluate_hand_reference
-from tools.lab.reference import evaluate_reference
+from tools.lab.reference import evaluate_hand_reference, evaluate_reference
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
 from tools.lab.table import plain_table, show
 

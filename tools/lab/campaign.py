@@ -102,7 +102,7 @@ class Prefix:
     def __init__(self, number: int, cases: Sequence[Case], place: Path, keep: bool) -> None:
         self._number, self._place, self._keep = number, place, keep
         self._world = World(world_of(number))
-        self._child = False
+        self._child, self._left = False, not cases
         for case in cases:
             self._world.moments.add(case.blows[0].at_s, partial(self._leave, case))
 
@@ -117,6 +117,8 @@ class Prefix:
         with suppress(OSError):
             sys.stdout.flush()
         if not self._child:
+            if not self._left:
+                self._tell(Outcome(f"{self._number}.-1", self._world.kind, wrong=("no fault began",)))
             self._judge(Case(self._number, -1), here, Ended(code, (here / "err").read_text("utf-8", "replace")))
             code = 0
         os._exit(code)
@@ -124,6 +126,7 @@ class Prefix:
     def _leave(self, case: Case) -> None:
         if self._child:
             return
+        self._left = True
         place = self._place / str(case.k)
         pid = os.fork()
         if pid == 0:

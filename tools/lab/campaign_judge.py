@@ -59,7 +59,7 @@ class Outcome:
 
 def judged(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any) -> Outcome:
     """Judge a session that ran in `place` and left its files in `board`."""
-    names, folder = {blow.name for blow in blows}, place / FOLDER
+    names, folder = {str(blow).partition("@")[0] for blow in blows}, place / FOLDER
     # one that was killed, or whose stderr was full, says nothing
     killed = (-9,) if "killed" in names else ()
     silent = (*CODES, *killed) if "deaf" in names else (0, 5, *killed)

@@ -10,7 +10,6 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
-from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,16 +37,6 @@ ORDER = (*("mcap", "npz", "csv") * 3, "tlog")
 ODD = (np.nan, np.inf, 1e300, -1e300, 5e-324, 0.0, -32768.0, 1e19)
 Rng = np.random.Generator
 Table = list[np.ndarray]
-
-
-@dataclass(frozen=True)
-class Damage:
-    """A kind of damage, as a Blow of the campaign's table."""
-
-    name: str
-
-    def __str__(self) -> str:
-        return self.name
 
 
 def bits(data: bytearray, rng: Rng) -> None:
@@ -159,7 +148,7 @@ def _written(recording: Recording, path: Path) -> Path:
     return path
 
 
-def damaged(path: Path, number: int) -> tuple[list[Damage], bytes]:
+def damaged(path: Path, number: int) -> tuple[list[str], bytes]:
     """Return the kinds of damage by its number, and the damaged file."""
     rng = np.random.default_rng(number)
     kinds: list[Callable] = []
@@ -176,7 +165,7 @@ def damaged(path: Path, number: int) -> tuple[list[Damage], bytes]:
             if data:
                 kind(data, rng)
         kinds += more
-    return [Damage(kind.__name__) for kind in kinds], bytes(data)
+    return [kind.__name__ for kind in kinds], bytes(data)
 
 
 @cache

@@ -170,9 +170,15 @@ class HookedBus(SimulatedBus):
         self._world = world
         world.bus = self
 
-    def _begun(self) -> int:
+    def read(self, register: int, count: int) -> Any:
+        """See SimulatedBus."""
         self._world.moments.reach(self._clock.now() * 1e-9)
-        return super()._begun()
+        return super().read(register, count)
+
+    def write(self, register: int, data: bytes) -> int:
+        """See SimulatedBus."""
+        self._world.moments.reach(self._clock.now() * 1e-9)
+        return super().write(register, data)
 
     def suffer(self, faults: Sequence[Fault], seed: int) -> None:
         """Begin these now."""

@@ -31,8 +31,7 @@ from .halves import halves
 from .judge import rms
 from .runner import Asked, Program, names_of, option
 from .scenarios.course import direction
-from .scenarios.motions import CHECK_S, FLAT_S
-from .scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from .scenarios.recordings import CHECK_S, FLAT_S, GRAVITY_MPS2, hand_scenario
 from .scenarios.sensors import hand_sensor
 from .table import Column, grouped, over, show, table
 

@@ -30,7 +30,7 @@ from .judge import Judgement, followed, judged, sph_rms, tilts_deg
 from .runner import Asked, Program, names_of, option
 from .scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
 from .scenarios.sensors import hand_sensor, paper_sensor
-from .table import Column, cell, frequencies, grouped, known, over, show, table
+from .table import Column, cell, frequencies, grouped, known, over, plain_table, show, table
 
 # on data that conform to the model NIS is 3, and tens where the fit ended in a wrong optimum
 NIS_WRONG = 10.0
@@ -179,13 +179,6 @@ def tilt_table(runs: Sequence[Run]) -> Table:
     return lines
 
 
-class Efficiency(NamedTuple):
-    """Root mean square error of a parameter, and the square root of its Cramér-Rao bound."""
-
-    rmse: float
-    bound: float
-
-
 @dataclass(frozen=True)
 class Fitted:
     """A fit to one sensor: the covariance (12, 12) of D and b_a, and their errors (12,)."""
@@ -206,19 +199,13 @@ def fit_fixed(seed: int, model: str) -> Fitted | None:
     return Fitted(fit.covariance[:12, :12].tolist(), errors.tolist())
 
 
-def efficiency(fits: Sequence[Fitted]) -> dict[str, Efficiency]:
-    """Return RMSE against the Cramér-Rao bound of the mean Fisher information, of the 12 parameters by name."""
+def efficiency(fits: Sequence[Fitted]) -> list[dict[str, Any]]:
+    """Return a row a parameter of D and b_a: RMSE against the Cramér-Rao bound of the mean Fisher information."""
     fisher = np.mean([np.linalg.inv(fit.covariance) for fit in fits], axis=0)
     bound = np.sqrt(np.diag(np.linalg.inv(fisher)))
     rmse = np.sqrt(np.mean([np.square(fit.errors) for fit in fits], axis=0))
-    return dict(zip((*D_NAMES, *B_A_NAMES), map(Efficiency, rmse.tolist(), bound.tolist()), strict=True))
-
-
-EFFICIENCY_COLUMNS: dict[str, Column] = {
-    "RMSE": lambda of: of[0].rmse,
-    "√CRLB": lambda of: of[0].bound,
-    "RMSE / √CRLB": lambda of: of[0].rmse / of[0].bound,
-}
+    rows = zip((*D_NAMES, *B_A_NAMES), rmse.tolist(), bound.tolist(), (rmse / bound).tolist(), strict=True)
+    return [dict(zip(("", "RMSE", "√CRLB", "RMSE / √CRLB"), row, strict=True)) for row in rows]
 
 
 def tried(item: int | tuple[str, int], model: str) -> Fitted | Run | None:
@@ -243,8 +230,7 @@ def report(found: list[Any], asked: Asked) -> None:
     about = f"model {asked.model}, {len(asked.seeds)} seeds from {asked.seeds[0]}"
     if asked.crlb:
         failed = len(asked.seeds) - len(found)
-        lines = {name: [pair] for name, pair in efficiency(found).items()}
-        show(table(lines, EFFICIENCY_COLUMNS, f"section 4.4, {about}, of one sensor; {failed} failed"))
+        show(plain_table(efficiency(found), f"section 4.4, {about}, of one sensor; {failed} failed"))
         return
     show(table(grouped(found, "scene"), COLUMNS, about))
     show(table(grouped(successful(found), "model"), Z_COLUMNS, "claims by model"))

@@ -1,4 +1,7 @@
-"""Hooks of the documentation site: pages that lie beside docs/, links to files that are no pages, and the notebook."""
+"""The documentation site: pages that lie beside docs/, links to files that are no pages, the notebook, docstrings.
+
+The docstrings' `name : what it is` is made into the name and text that numpydoc has.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import griffe
 import nbformat
 from mkdocs.structure.files import File, Files
 from nbclient import NotebookClient
@@ -102,3 +106,23 @@ def on_post_page(output: str, page: Any, config: Any) -> str:
 def on_post_template(output_content: str, template_name: str, config: Any) -> str:
     """Have the page of what is not found do so, too."""
     return output_content.replace(SHIM, WORKER)
+
+
+SECTION = re.compile(r"^ *(Parameters|Attributes|Raises)\n *-+\n(.*?)(?=\n\n|\Z)", re.MULTILINE | re.DOTALL)
+# several may share a line: "acc : (n, 3) m/s^2. gyr : (n, 3) rad/s."
+ITEM = re.compile(r"(?:^ *|(?<=[.;] ))((?:\w+, )*\w+) : ", re.MULTILINE)
+
+
+class ProjectDocstrings(griffe.Extension):
+    """Gives each argument, attribute or error a line of its own, and its text the line below."""
+
+    def on_instance(self, *, obj: Any, **_: Any) -> None:
+        """Rewrite an object's docstring."""
+        if obj.docstring is not None:
+            obj.docstring.value = SECTION.sub(_items, obj.docstring.value)
+
+
+def _items(section: re.Match[str]) -> str:
+    _, *parts = ITEM.split(section[2])
+    items = [f"{name}\n    {' '.join(text.split())}" for name, text in zip(parts[::2], parts[1::2], strict=True)]
+    return f"{section[1]}\n{'-' * len(section[1])}\n" + "\n".join(items)

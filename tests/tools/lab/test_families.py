@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from tools.lab import families, runner
-from tools.lab.scenarios import around, body, course, delivery, family, faults, sampling, sensors, table
+from tools.lab.scenarios import around, body, course, family, faults, sensors, table
 
 STEP_S = 1.0 / 2000.0
 
@@ -87,7 +87,7 @@ def test_who_sits_in_a_swing_feels_gravity_along_the_rope_at_its_ends():
 def test_noise_has_the_density_that_was_asked_for():
     rng = np.random.default_rng(0)
     y = np.zeros((400_000, 3))
-    for one in (sampling.Sampling(), sampling.Sampling(lowpass_hz=40.0)):
+    for one in (sensors.Sampling(), sensors.Sampling(lowpass_hz=40.0)):
         frequency, psd = welch(one.gyroscope(y, 0.02, rng), 200.0, nperseg=1024, axis=0)
         passed = (frequency > 1.0) & (frequency < 15.0)
         assert np.sqrt(psd[passed].mean()) == pytest.approx(0.02, rel=0.05)
@@ -110,13 +110,13 @@ def test_an_accelerometer_that_is_late_is_so_by_that_much():
     t = np.arange(0.5, 40_000) * STEP_S
     y = np.tile(np.sin(2 * np.pi * t)[:, None], (1, 3))
     rng = np.random.default_rng(0)
-    late = sampling.Sampling(delay_ms=10.0).accelerometer(y, 0.0, rng)
-    now = sampling.Sampling().gyroscope(y, 0.0, rng)
+    late = sensors.Sampling(delay_ms=10.0).accelerometer(y, 0.0, rng)
+    now = sensors.Sampling().gyroscope(y, 0.0, rng)
     assert late[2:] == pytest.approx(now[:-2], abs=1e-12)
 
 
 def test_a_clock_that_is_fast_takes_more_samples_of_the_same_turn():
-    fast = readings(sampling=sampling.Sampling(clock_error=0.02)).recording
+    fast = readings(sampling=sensors.Sampling(clock_error=0.02)).recording
     right = readings().recording
     assert len(fast) == pytest.approx(1.02 * len(right), rel=1e-3)
     assert fast.rate_hz == pytest.approx(200.0)
@@ -134,20 +134,20 @@ def test_a_step_of_the_zero_is_told_in_the_truth_as_its_mean():
 def test_words_are_garbled_as_said():
     rng = np.random.default_rng(0)
     counts = rng.integers(-20_000, 20_000, (5000, 6)).astype(np.int32)
-    dead = delivery.low_byte_zero(counts.copy(), rng)
+    dead = faults.low_byte_zero(counts.copy(), rng)
     changed = (dead != counts).any(axis=0)
     assert changed.sum() == 1 and (dead[:, changed] & 0xFF == 0).all()
-    flipped = delivery.flipped(counts.copy(), rng, per_byte=0.01) ^ counts
+    flipped = faults.flipped(counts.copy(), rng, per_byte=0.01) ^ counts
     bits = np.array([bin(x & 0xFFFF).count("1") for x in flipped.ravel()])
     assert bits.max() <= 2 and np.mean(bits) == pytest.approx(0.02, rel=0.2)
-    signed = delivery.signed_low(counts.copy(), rng)
+    signed = faults.signed_low(counts.copy(), rng)
     assert (signed == (counts >> 8) * 256 + counts.astype(np.uint8).view(np.int8)).all()
 
 
 @pytest.mark.parametrize("name", ["jitter", "ticks", "bursts", "dropped", "each_twice", "polled"])
 def test_times_increase_and_stay_beside_their_samples(name):
     t = np.arange(4000) / 200.0
-    times, rows = getattr(delivery, name)(t, np.random.default_rng(0))
+    times, rows = getattr(faults, name)(t, np.random.default_rng(0))
     assert len(times) == len(rows)
     assert (np.diff(times) > 0).all() and (np.diff(rows) >= 0).all()
     assert np.abs(times - t[rows]).max() < 0.05

@@ -14,8 +14,8 @@ import numpy as np
 from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
 from mpucal.simulated.disturbance import JERK_MPS2, SWAY_HZ, TREMOR_HZ, HandDisturbance
 
+from .body import PIVOT_HZ
 from .course import FLAT_S, Course, Rng, Span, direction, within
-from .shaking import PIVOT_HZ
 
 Push = tuple[Vector | float, Vector | float]
 Around = Callable[[Course, Rng], Push]

@@ -15,10 +15,8 @@ from mpucal.simulated.sensor import SensorTruth
 from .around import Around, Hand
 from .body import attitudes, specific_force
 from .course import Course, Motion, Rng, poses
-from .delivery import Digits, Timing
-from .faults import Fault, Readings
-from .sampling import Sampling
-from .sensors import Chip
+from .faults import Digits, Fault, Readings, Timing
+from .sensors import Chip, Sampling
 
 GRAVITY_MPS2 = 9.81
 TEMPERATURE_C = 25.0

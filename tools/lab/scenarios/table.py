@@ -15,11 +15,10 @@ from typing import Any
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 
-from . import around, course, delivery, faults
+from . import around, course, faults
 from .around import Hand
 from .family import PLAIN, SHARP, Family
-from .sampling import Sampling
-from .sensors import Chip
+from .sensors import Chip, Sampling
 
 TREMBLING = Hand(tremor_mps2=0.1, tremor_rad_s=math.radians(0.6))
 # what turns about the sensor itself, and shakes nothing
@@ -72,7 +71,7 @@ _PLAIN = (
     but(CONTINUOUS, "continuous 3 ms late", sampling=Sampling(delay_ms=3.0)),
     but(CONTINUOUS, "continuous 10 ms late", sampling=Sampling(delay_ms=10.0)),
     but(POSES, "clock 2 % fast", sampling=Sampling(clock_error=0.02)),
-    but(POSES, "each sample twice", sampling=Sampling(100.0), timing=(delivery.each_twice,)),
+    but(POSES, "each sample twice", sampling=Sampling(100.0), timing=(faults.each_twice,)),
     Family("spins", motion=course.spins),
     BENCH,
 )
@@ -144,13 +143,13 @@ _SENSORS = (
 _WORDS = (
     but(POSES, "12 bits", chip=COARSE),
     but(CONTINUOUS, "12 bits continuous", chip=COARSE),
-    but(POSES, "low byte 0", digits=(delivery.low_byte_zero,)),
-    but(CONTINUOUS, "low byte 0 continuous", digits=(delivery.low_byte_zero,)),
-    but(POSES, "bits flip", digits=(delivery.flipped,)),
+    but(POSES, "low byte 0", digits=(faults.low_byte_zero,)),
+    but(CONTINUOUS, "low byte 0 continuous", digits=(faults.low_byte_zero,)),
+    but(POSES, "bits flip", digits=(faults.flipped,)),
     # github.com/hiwad-aziz/ros2_mpu6050_driver/issues/4, github.com/OSUrobotics/mpu_6050_driver/issues/2
-    but(POSES, "words torn", digits=(delivery.torn,)),
+    but(POSES, "words torn", digits=(faults.torn,)),
     # github.com/kriswiner/MPU6050/issues/6
-    but(POSES, "low byte signed", digits=(delivery.signed_low,)),
+    but(POSES, "low byte signed", digits=(faults.signed_low,)),
     # the examples of many libraries print two decimals
     but(POSES, "two decimals", chip=Chip(steps=(0.01, 0.01)), sampling=Sampling(100.0)),
     but(POSES, "sketch averages", faults=(partial(faults.hobby, smooth=0.2),)),
@@ -158,16 +157,16 @@ _WORDS = (
 )
 
 _TIMES = (
-    but(POSES, "jitter poses", timing=(delivery.jitter,)),
-    but(CONTINUOUS, "jitter continuous", timing=(delivery.jitter,)),
-    but(POSES, "ticks of 4 ms poses", timing=(delivery.ticks,)),
-    but(CONTINUOUS, "ticks of 4 ms continuous", timing=(delivery.ticks,)),
-    but(POSES, "dropped poses", timing=(partial(delivery.dropped, share=0.1),)),
-    but(CONTINUOUS, "dropped continuous", timing=(partial(delivery.dropped, share=0.1, stretch_s=0.5),)),
-    but(POSES, "bursts poses", timing=(delivery.bursts,)),
-    but(CONTINUOUS, "bursts continuous", timing=(delivery.bursts,)),
-    but(POSES, "polled poses", timing=(delivery.polled,)),
-    but(CONTINUOUS, "polled continuous", timing=(delivery.polled,)),
+    but(POSES, "jitter poses", timing=(faults.jitter,)),
+    but(CONTINUOUS, "jitter continuous", timing=(faults.jitter,)),
+    but(POSES, "ticks of 4 ms poses", timing=(faults.ticks,)),
+    but(CONTINUOUS, "ticks of 4 ms continuous", timing=(faults.ticks,)),
+    but(POSES, "dropped poses", timing=(partial(faults.dropped, share=0.1),)),
+    but(CONTINUOUS, "dropped continuous", timing=(partial(faults.dropped, share=0.1, stretch_s=0.5),)),
+    but(POSES, "bursts poses", timing=(faults.bursts,)),
+    but(CONTINUOUS, "bursts continuous", timing=(faults.bursts,)),
+    but(POSES, "polled poses", timing=(faults.polled,)),
+    but(CONTINUOUS, "polled continuous", timing=(faults.polled,)),
 )
 
 _TOLD = (

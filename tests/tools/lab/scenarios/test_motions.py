@@ -5,7 +5,7 @@ import pytest
 
 from mpucal.calibration.rotation import rotation
 from mpucal.simulated.legs import minimum_jerk_rate
-from tools.lab.scenarios.motions import (
+from tools.lab.scenarios.recordings import (
     FLAT_S,
     attitude,
     continuous,

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from mpucal.simulated.disturbance import HandDisturbance
-from tools.lab.scenarios import shaking
-from tools.lab.scenarios.motions import attitude
-from tools.lab.scenarios.shaking import band_noise, lever_acceleration
+from tools.lab.scenarios import body
+from tools.lab.scenarios.body import band_noise, lever_acceleration
+from tools.lab.scenarios.recordings import attitude
 
 STEP_S, N = 1 / 1000, 20000
 STILL, ALWAYS = np.zeros(N), np.ones(N)
@@ -12,7 +12,7 @@ OMEGA = np.tile([0.0, 0.0, 2.0], (N, 1))
 
 
 def acceleration(hand, omega=OMEGA, moving=ALWAYS, holding=STILL, seed=0):
-    return shaking.acceleration(hand, omega, moving, holding, STEP_S, np.random.default_rng(seed))
+    return body.acceleration(hand, omega, moving, holding, STEP_S, np.random.default_rng(seed))
 
 
 def test_band_noise_has_unit_rms_and_nothing_outside_its_band():
@@ -68,5 +68,5 @@ def test_sway_while_moving_tremor_while_holding(moving, holding, rms):
     hand = HandDisturbance(lever_m=(0, 0), jerks_per_s=0.0, tremor_mps2=0.1, tremor_rad_s=0.02)
     a = acceleration(hand, 0 * OMEGA, moving * ALWAYS, holding * ALWAYS)
     np.testing.assert_allclose(np.sqrt((a**2).mean(0)), rms, rtol=1e-9)
-    tremor = shaking.tremor(hand, holding * ALWAYS, STEP_S, np.random.default_rng(0))
+    tremor = body.tremor(hand, holding * ALWAYS, STEP_S, np.random.default_rng(0))
     np.testing.assert_allclose(np.sqrt((tremor**2).mean(0)), 0.02 * holding, rtol=1e-9)
