@@ -47,7 +47,7 @@ def test_buffer_and_channels_show_the_same(guest):
     np.testing.assert_allclose(buffered.gyr.mean(0), polled.gyr.mean(0), atol=0.01)
 
 
-def test_what_was_set_is_put_back(guest):
+def test_the_settings_are_restored(guest):
     assert guest.said["put back"] == guest.said["put back"] | {"enable": "0\n", "rate": "50\n"}
 
 

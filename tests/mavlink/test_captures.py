@@ -54,7 +54,7 @@ def test_the_replayed_capture_is_the_log_itself(captures, replayed):
     assert (folder / "capture.tlog").read_bytes() == (captures / "ardupilot_two_imus.tlog").read_bytes()
 
 
-def test_calibrate_gives_what_the_replay_gave(captures, replayed):
+def test_calibrate_and_replay_give_the_same(captures, replayed):
     _, folder = replayed(captures / "ardupilot_two_imus.tlog")
     result = CliRunner().invoke(commands, ["calibrate", str(captures / "ardupilot_two_imus.tlog"), "--json"])
     offline, live = json.loads(result.stdout), of_imu(folder, 1)
@@ -62,13 +62,13 @@ def test_calibrate_gives_what_the_replay_gave(captures, replayed):
     assert len(offline["others"]) == 1
 
 
-def test_a_stream_that_another_station_slowed_gives_way_to_one_it_did_not(captures):
+def test_a_stream_that_another_station_slowed_is_replaced_by_another(captures):
     recording = mpucal.load(captures / "mavproxy_streamrate4.tlog")
     assert recording.sensor.message == "HIGHRES_IMU"
     assert recording.rate_hz == pytest.approx(100, abs=1)
 
 
-def test_px4_is_calibrated_from_what_its_estimator_did_not_touch(captures):
+def test_px4_is_calibrated_from_a_stream_without_the_estimators_biases(captures):
     recording = mpucal.load(captures / "px4_sih_static.tlog")
     assert recording.sensor.message == "SCALED_IMU"
     assert recording.acc[:, 0].mean() == pytest.approx(-0.50, abs=0.02)

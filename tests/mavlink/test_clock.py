@@ -37,7 +37,7 @@ def test_a_counter_of_32_bits_is_unwrapped(steps, start, unit_us):
     ],
     ids=["reboot", "reboot after more than 2^32 us", "time of day set", "late packet", "in order"],
 )
-def test_jumps_are_told_apart(before_s, after_s, jump):
+def test_jumps_are_distinguished(before_s, after_s, jump):
     (_, first), (_, second) = run(1, [(round(before_s * 1e6), 100.0), (round(after_s * 1e6), 100.5)])
     assert first is Jump.NONE
     assert second is jump
@@ -50,7 +50,7 @@ def test_time_goes_on_over_a_reset_and_a_late_packet_keeps_its_time():
     assert [t_us for t_us, _ in late] == [1_000_000, 1_030_000, 1_010_000, 1_040_000]
 
 
-def test_what_was_read_late_in_a_burst_is_no_clock_that_was_set():
+def test_a_burst_that_is_read_late_is_not_a_clock_that_was_set():
     # read until 100.5, then not for 300 s: of what came meanwhile the first was kept, and the newest follow
     pairs = [(1_000_000, 100.5), (1_010_000, 400.5), (301_000_000, 400.51), (301_010_000, 400.52)]
     found = run(1, pairs)

@@ -10,7 +10,7 @@ from mpucal.mavlink.imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, Stream, decode_read
 
 
 @given(mg=st.floats(-16000, 16000), mrad_s=st.floats(-32000, 32000))
-def test_a_truncated_value_is_centred_in_what_truncates_to_it(station, decoded, mg, mrad_s):
+def test_a_truncated_value_is_centred(station, decoded, mg, mrad_s):
     content = decode_reading(decoded(station().raw(1, (int(mg), 0, -1000), (0, int(mrad_s), 0))))
     assert content.acc[0] == pytest.approx(mg * ACC_LSB_MPS2, abs=(0.5 if int(mg) else 1.0) * ACC_LSB_MPS2 + 1e-9)
     assert content.gyr[1] == pytest.approx(

@@ -183,7 +183,7 @@ def test_we_sign_no_earlier_than_the_vehicle(script, station, decoded):
     assert all(int.from_bytes(data[-12:-6], "little") >= ahead for _, _, data in transport.sent)
 
 
-def test_who_forges_signatures_meanwhile_does_not_silence_the_vehicle(script, station):
+def test_forged_signatures_do_not_silence_the_vehicle(script, station):
     vehicle, forger = station(key=KEY), station(key=b"x" * 32)
     forger.mav.signing.timestamp = 1 << 47
     both = in_order(heartbeats(vehicle, HOME), heartbeats(forger, STRANGER, 4))
@@ -196,7 +196,7 @@ def test_a_vehicle_that_signs_is_noticed_where_we_do_not(script, station):
     assert link.signed_only
 
 
-def test_who_leaves_early_loses_nothing(script, station):
+def test_a_loop_that_is_left_early_loses_no_message(script, station):
     vehicle = station()
     burst = b"".join(vehicle.raw(10_000 * k) for k in range(20))
     link, _ = locked(script([*heartbeats(vehicle, HOME, 2), (3.0, HOME, burst)], datagrams=False))

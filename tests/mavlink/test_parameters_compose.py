@@ -57,7 +57,7 @@ def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
 
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
-def test_the_offset_is_exact_and_the_residual_what_the_worst_attitude_shows(seed, number):
+def test_the_offset_is_exact_and_the_residual_that_of_the_worst_attitude(seed, number):
     C, bias, R, composed = composed_at_random(seed, number, cross=0.02)
     new = composed.correction
     np.testing.assert_allclose(new.offset, bias, atol=1e-12)
@@ -75,7 +75,7 @@ def test_an_autopilot_is_calibrated_to_standard_gravity_wherever_it_is():
     np.testing.assert_allclose(np.linalg.norm(a, axis=1), STANDARD_GRAVITY_MPS2, rtol=1e-12)
 
 
-def test_what_is_only_turned_is_said_and_not_written():
+def test_a_pure_rotation_is_reported_and_not_written():
     angle = np.radians(2.0)
     D = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
     composed = compose(D, np.zeros(3), Correction(np.zeros(3), np.ones(3)), np.eye(3), STANDARD_GRAVITY_MPS2)

@@ -31,13 +31,13 @@ def document_of(firmware, parameters, D=D):
     ],
     ids=["rotation", "values", "zero"],
 )
-def test_what_the_vehicle_did_not_tell_leaves_no_new_parameters(parameters, why):
+def test_missing_parameters_leave_no_new_ones(parameters, why):
     document = document_of("ArduPilot", parameters)
     assert document["params_new"] == {}
     assert why in document["why"]
 
 
-def test_px4_is_given_what_it_would_use():
+def test_px4_gets_the_values_that_it_would_use():
     # within 0.01 of 1: PX4 would go on with 1, and the residual says what that leaves
     document = document_of("PX4", PX4, D=np.diag([1.004, 1.0, 1.0]))
     assert [document["params_new"][f"CAL_ACC1_{axis}SCALE"] for axis in "XYZ"] == [1.0, 1.0, 1.0]

@@ -12,7 +12,7 @@ def test_px4_says_whether_it_would_arm_though_it_does_not_list_the_check(simulat
     assert check_prearm(px4.link).ready is not bool(words)
 
 
-def test_px4_that_tells_why_by_events_alone_is_said_to(simulated, monkeypatch):
+def test_px4_may_give_its_reasons_as_events_alone(simulated, monkeypatch):
     px4 = simulated("firmware=px4")
     monkeypatch.setattr(px4.vehicle.firmware, "complaints", lambda: ["in an event"])
     assert str(check_prearm(px4.link)) == "would not arm: its events say why, as QGroundControl shows them"

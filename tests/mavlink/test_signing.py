@@ -36,7 +36,7 @@ def test_an_empty_key_is_refused(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
-def test_what_has_no_end_is_no_key(tmp_path):
+def test_a_pipe_or_a_long_file_is_not_a_key(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "long").write_bytes(b"p" * 5000)
     for path, what in ((tmp_path / "pipe", "a pipe or device"), (tmp_path / "long", "longer than 4096 bytes")):

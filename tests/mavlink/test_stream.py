@@ -102,7 +102,7 @@ def test_a_denied_rate_is_followed_by_lower_ones(vehicle):
     assert [hz for message_id, hz in transport.asked if message_id == RAW] == [400, 200, 100]
 
 
-def test_the_person_is_told_once_which_rate_comes_instead(vehicle):
+def test_a_lower_rate_than_requested_is_reported_once(vehicle):
     said = []
     link, asked = streams(vehicle(fastest_hz=120), said, rate_hz=400.0)
     asked.start()
@@ -132,7 +132,7 @@ def watched(transport, lowered_hz, said, firmware=ARDUPILOT):
         (PX4, 60, "SCALED_IMU", "MAV_0_RATE"),
     ],
 )
-def test_a_lowered_rate_is_asked_for_again_and_told(vehicle, firmware, lowered_hz, name, remedy):
+def test_a_lowered_rate_is_requested_again_and_reported(vehicle, firmware, lowered_hz, name, remedy):
     said = []
     assert watched(vehicle(streams=(SCALED if firmware == PX4 else RAW,)), lowered_hz, said, firmware) > 140
     (told,) = said
@@ -140,7 +140,7 @@ def test_a_lowered_rate_is_asked_for_again_and_told(vehicle, firmware, lowered_h
     assert [word for word in ("--streamrate=-1", "MAV_0_RATE") if word in told] == [remedy]
 
 
-def test_a_slightly_lower_rate_is_let_be(vehicle):
+def test_a_slightly_lower_rate_is_accepted(vehicle):
     said = []
     assert watched(vehicle(), 160, said) < 170
     assert said == []

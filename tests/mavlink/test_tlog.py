@@ -45,7 +45,7 @@ def written(station, made):
     return made(packets), [Record(START_NS + round(t_s * 1e9), data) for t_s, data in packets]
 
 
-def test_what_is_written_is_read(written):
+def test_a_log_is_read_as_it_was_written(written):
     path, records = written
     tlog = read_tlog(path)
     assert tlog.records == tuple(records)
@@ -78,7 +78,7 @@ def test_mavlogdump_reads_it(written):
 
 @settings(max_examples=50)
 @given(cut=st.integers(1, 400), junk=st.binary(max_size=100))
-def test_a_damaged_log_gives_what_is_whole(written, cut, junk):
+def test_a_damaged_log_gives_its_whole_packets(written, cut, junk):
     path, records = written
     whole = b"".join((record.t_ns // 1000).to_bytes(8, "big") + record.data for record in records)
     path.write_bytes(whole[:-cut] + junk)
@@ -124,7 +124,7 @@ def test_a_parameter_that_changes_splits_a_log(station, made):
 
 
 @pytest.mark.parametrize(("name", "kept"), [("INS_POS1_X", True), ("a\x1b[2J", False), ("", False), ("Ä", False)])
-def test_what_no_firmware_calls_a_parameter_is_none(name, kept):
+def test_a_name_that_no_firmware_uses_is_ignored(name, kept):
     log = Log("ArduPilot")
     log.add_parameter(name, 1.0)
     assert (name in log.segments[-1].parameters) == kept

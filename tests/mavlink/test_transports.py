@@ -66,7 +66,7 @@ def soon(transport):
     return transport.receive(transport.now_ns() + SOON_NS)
 
 
-def test_udp_listens_and_answers_who_sent(other):
+def test_udp_listens_and_answers_the_sender(other):
     port = free_udp()
     with closing(open_transport(Url(Kind.UDP, HOST, port))) as transport:
         other.sendto(b"hello", (HOST, port))

@@ -33,6 +33,6 @@ def test_anything_else_is_refused_with_the_forms(text):
 
 
 @pytest.mark.parametrize(("text", "lacking"), [("tcp:127.0.0.1", "port"), ("udp:pi", "port"), ("tcp:5760", "host")])
-def test_what_is_lacking_is_named(text, lacking):
+def test_the_missing_part_is_named(text, lacking):
     with pytest.raises(UsageError, match=f"it names no {lacking}"):
         parse_url(text)

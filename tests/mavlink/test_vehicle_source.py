@@ -111,7 +111,7 @@ def test_the_filters_tell_by_how_much_both_sensors_are_apart(opened, words, cuto
 
 
 @pytest.mark.parametrize("words", ["type=plane", "type=rover", "firmware=px4,type=plane"])
-def test_planes_and_rovers_are_measured_and_said_to_be_armed_like_copters(opened, words):
+def test_planes_and_rovers_are_measured_like_copters(opened, words):
     to = opened(f"imus=1,hand=still,fault=arm@8,{words}")
     assert len(started(to, 5)) > 450
     assert [text for text in to.said if "was armed" in text]
@@ -160,7 +160,7 @@ def test_a_vehicle_that_falls_silent_is_waited_for_and_then_one_sentence(opened)
     assert [text for text in to.said if "has sent nothing for 4 s: wait until it is back" in text]
 
 
-def test_arming_is_said_at_once_and_does_not_end_it(opened):
+def test_arming_is_reported_at_once_and_does_not_end_the_session(opened):
     to = opened("imus=1,fault=arm@8")
     started(to, 8)
     assert [text for text in to.said if "was armed: keep clear of its propellers" in text] == to.said[1:]
@@ -216,7 +216,7 @@ def test_a_stream_of_zeros_is_no_imu(opened):
     assert [one.autopilot.imu for one in (recording, *recording.others)] == [1, 2]
 
 
-def test_a_px4_that_names_no_sensor_is_told_before_anything_is_turned(opened):
+def test_a_px4_without_sensor_ids_is_refused_before_it_is_turned(opened):
     fresh = "firmware=px4,imus=1,CAL_ACC0_ID=0"
     with pytest.raises(WriteBackError, match=r"all CAL_ACCn_ID are 0.*nothing was measured"):
         opened(fresh, writes=True).source.start()
@@ -242,7 +242,7 @@ def test_a_px4_that_was_prepared_names_its_sensors_and_holds_its_offsets(opened)
     assert repeated == t[: len(repeated)]
 
 
-def test_the_truth_after_a_preparation_is_that_of_what_was_measured(tmp_path):
+def test_the_truth_after_a_preparation_is_that_of_the_recording(tmp_path):
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,CAL_ACC0_ID=0"))
     opened = OpenedVehicle(SimulatedTransport(vehicle), Plan(), truth=vehicle.truth_document, prepare=True)
     fresh = opened.truth
@@ -283,14 +283,14 @@ def test_autocal_is_set_back_where_the_answer_to_holding_it_is_lost(opened, monk
     assert to.vehicle.firmware.store["SENS_IMU_AUTOCAL"] == 1
 
 
-def test_an_ardupilot_is_told_that_nothing_was_prepared(opened):
+def test_an_ardupilot_is_not_prepared(opened):
     to = opened("imus=1,hand=still", prepare=True)
     to.source.start()
     assert [text for text in to.said if "nothing was prepared" in text]
 
 
 @pytest.mark.parametrize(("asked_hz", "came_hz"), [(100, 100), (125, 125), (200, 250), (250, 250)])
-def test_px4_is_asked_so_that_most_arrives(opened, asked_hz, came_hz):
+def test_px4s_interval_is_requested_so_that_most_samples_arrive(opened, asked_hz, came_hz):
     to = opened("firmware=px4,imus=1,hand=still", rate_hz=asked_hz)
     assert len(started(to, 3)) / 3 == pytest.approx(came_hz, rel=0.05)
 
@@ -301,7 +301,7 @@ def test_an_ardupilot_that_hears_one_station_alone(opened):
         opened("imus=1,MAV_OPTIONS=1", own_system=254).source.start()
 
 
-def test_what_was_slow_from_the_beginning_is_asked_for_again(opened):
+def test_a_stream_that_is_slow_from_the_beginning_is_requested_again(opened):
     to = opened("imus=2,fault=second_station@0.5")
     started(to, 20)
     # the second station has it sent at 4 Hz

@@ -42,7 +42,7 @@ def test_each_world_takes_its_own_faults_and_names_them(options):
         assert set(own) <= set(str(caught.value).replace(",", " ").replace(";", " ").replace(":", " ").split())
 
 
-def test_a_time_goes_with_what_begins_at_one():
+def test_only_timed_faults_have_a_time():
     for word in ("arm", "loss@3", "nack@3"):
         with pytest.raises(UsageError):
             VehicleOptions.parse(f"sim:fault={word}")
@@ -69,7 +69,7 @@ def measured(word):
 
 
 @pytest.mark.parametrize(("name", "least"), [("loose", 1.0), ("knock", 0.3), ("warming", 0.01)])
-def test_what_befalls_the_hand_moves_the_sensor_of_chip_and_vehicle(name, least):
+def test_faults_of_the_hand_affect_chip_and_vehicle(name, least):
     assert np.linalg.norm(measured(f",fault={name}@0") - measured("")) > least
     plain, struck = (
         SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still" + word)) for word in ("", f",fault={name}@0")

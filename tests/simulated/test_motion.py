@@ -92,18 +92,18 @@ def test_it_reacts_no_sooner_than_a_person_and_no_later():
         assert not run.part(flat, 13.7, 14.5).any()
 
 
-def test_told_to_lay_flat_the_board_lies_flat_and_perfectly_still():
+def test_lay_flat_leaves_the_board_flat_and_perfectly_still():
     run = Run("guided", SESSION[:1], 12.0)
     np.testing.assert_allclose(run.part(run.force, 5.0, 12.0), [[0, 0, GRAVITY]] * 1405, atol=1e-9)
     assert np.abs(run.part(run.rate, 5.0, 12.0)).max() < 1e-12
 
 
-def test_told_to_be_still_while_laying_flat_it_goes_on_laying_flat():
+def test_hold_still_does_not_interrupt_laying_flat():
     run = Run("guided", ((0.0, prompt("lay_flat")), (0.1, prompt("hold_still"))), 8.0)
     np.testing.assert_allclose(run.force[-1], [0, 0, GRAVITY], atol=1e-9)
 
 
-def test_told_to_rest_it_puts_the_board_down():
+def test_rest_puts_the_board_down():
     run = Run("guided", (*SESSION, (25.0, prompt("rest"))), 35.0)
     assert np.abs(run.part(run.rate, 31.0, 35.0)).max() < 1e-12
 

@@ -100,7 +100,7 @@ def test_it_saturates_at_the_ends_of_the_range(sign, end):
     assert np.all(seen[:, [0, 1, 2, 4, 5, 6]] == end)
 
 
-def test_offsets_add_what_the_registers_say():
+def test_offset_registers_add_to_the_counts():
     truth = SensorTruth.draw(6)
     plain = counts(truth, setting()).astype(float).mean(axis=0)
     moved = counts(truth, setting(accel_offset_g=(0.125, 0, -0.5), gyro_offset_dps=(0, 4, 0)))

@@ -108,7 +108,7 @@ def test_values_after_reset(model, register, value):
         pytest.param("mpu6500", 0x7E, 0xFE, 0xFE, id="an offset of the 6500"),
     ],
 )
-def test_what_a_write_leaves(model, register, written, kept):
+def test_registers_after_a_write(model, register, written, kept):
     device = chip(model)
     device.write(register, bytes([written]), 0)
     assert device.read(register, 1, 0) == bytes([kept])
@@ -209,7 +209,7 @@ def test_after_an_overflow_frames_stay_misaligned_until_the_fifo_is_reset():
     assert words(aligned) == list(range(770, 777))
 
 
-def test_told_to_stop_when_full_it_keeps_the_oldest():
+def test_in_stop_mode_a_full_fifo_keeps_the_oldest():
     device = collecting(chip(), divider=0, config=1 | reg.CONFIG_FIFO_MODE_STOP)
     assert count(device, 100 * MS) == 1024
     assert words(device.read(reg.FIFO_R_W, 14, 100 * MS)) == list(range(7))
@@ -249,7 +249,7 @@ def test_the_ranges_follow_the_configuration(code):
 
 
 @pytest.mark.parametrize(("model", "address"), [("mpu6050", 0x08), ("mpu6500", 0x7A)])
-def test_offset_registers_act_by_what_differs_from_the_factory_trim(model, address):
+def test_offset_registers_act_by_their_difference_from_the_factory_trim(model, address):
     feed = Counter()
     device = chip(model, feed)
     old = int.from_bytes(device.read(address, 2, 0), "big", signed=True)
@@ -304,7 +304,7 @@ def test_the_factorys_self_test_codes(model, held):
 
 
 @pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
-def test_self_test_adds_what_the_piece_answers_on_the_axes_asked_for(model):
+def test_self_test_adds_the_response_of_the_selected_axes(model):
     setting = setting_after((reg.GYRO_CONFIG, b"\x80\x68"), model=model)
     assert setting.gyro_offset_dps == (30.0, 0.0, 0.0)
     assert setting.accel_offset_g == (0.0, 0.5, 0.6)

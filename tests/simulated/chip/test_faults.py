@@ -51,7 +51,7 @@ def suffering(*faults, model="mpu6050", seed=0):
 
 
 @pytest.mark.parametrize("text", ["melt@3", "nack", "nack@", "nack@-1", "nack@inf", "nack@1/", "@3"])
-def test_what_is_no_fault(text):
+def test_an_unknown_fault_is_refused(text):
     with pytest.raises(UsageError, match="NAME@SECONDS, or several with / between them, of nack, timeout"):
         open_simulated(f"sim:fault={text}")
 
@@ -114,7 +114,7 @@ def numbers(recording):
         ("clock", 0, 0.0),
     ],
 )
-def test_what_passes_by_is_a_gap_at_most(name, gaps, lost_s):
+def test_a_passing_fault_is_a_gap_at_most(name, gaps, lost_s):
     recording, error = measured(suffering(Fault(name, 2.5)), config=Config(rate_hz=100))
     assert error is None
     assert gaps <= recording.gap.sum() <= 2 * gaps
@@ -136,7 +136,7 @@ def test_one_transfer_in_fifty_that_is_not_acknowledged_loses_nothing():
     ("name", "says"),
     [("stuck", "a wire holds SDA or SCL low"), ("unplugged", "nothing answers at 0x68")],
 )
-def test_what_lasts_is_given_up_with_its_cause(name, says):
+def test_a_lasting_fault_ends_with_its_cause(name, says):
     recording, error = measured(suffering(Fault(name, 2.5)))
     assert says in str(error)
     assert len(recording) > 200
@@ -156,7 +156,7 @@ places = st.builds(
     rate_hz=st.sampled_from([50, 200, 1000]),
     seed=st.integers(0, 9),
 )
-def test_whatever_happens_what_is_delivered_is_true(faults, model, rate_hz, seed):
+def test_delivered_samples_are_true_under_all_faults(faults, model, rate_hz, seed):
     """Every run ends in samples or in a message; only a noisy bus may make single values wrong."""
     recording, error = measured(suffering(*faults, model=model, seed=seed), 4.5, Config(rate_hz=rate_hz))
     assert error is None or error.remedy

@@ -44,7 +44,7 @@ def test_a_seed_beside_the_text():
         open_simulated("sim:seed=4", seed=5)
 
 
-def test_what_is_asked_for_becomes_the_truth():
+def test_options_become_the_truth():
     text = "sim:chip=mpu6500,rate_error_ppm=4000,b_a=0.1/0.2/-0.3,b_omega=0/0/0.1,temperature_c=30,noise=0"
     truth = open_simulated(text, gravity=9.82).truth_document()
     assert truth["b_a"] == [0.1, 0.2, -0.3]

@@ -23,7 +23,7 @@ def test_each_row_is_filtered_by_its_own_cutoff():
     np.testing.assert_array_equal(found[:, 1], steps[:, 1])
 
 
-def test_what_comes_again_takes_the_place_of_what_came():
+def test_values_that_come_again_replace_the_earlier_ones():
     steps = np.random.default_rng(2).normal(size=(12, 1, 3))
     low = LowPass((20.0,), 200.0, 12)
     expected = low(steps)

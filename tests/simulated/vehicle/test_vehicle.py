@@ -156,7 +156,7 @@ def test_the_truth_it_tells_is_that_of_its_streams(words):
         np.testing.assert_allclose(mean, expected, atol=0.01)
 
 
-def test_px4s_highres_imu_hides_what_the_estimator_learns_unless_it_is_told_not_to():
+def test_px4s_highres_imu_lacks_the_biases_that_the_estimator_learns():
     shift, turn = {}, {}
     for control in (7, 6, 5, 4):
         station = Station(f"firmware=px4,imus=1,EKF2_IMU_CTRL={control}")
@@ -220,7 +220,7 @@ def test_px4_stores_and_ignores_a_small_change(value, used):
         station.vehicle.firmware.start()
 
 
-def test_it_arms_reboots_and_falls_silent_when_told_to():
+def test_it_arms_reboots_and_falls_silent_at_the_given_times():
     station = Station("fault=arm@2,fault=reboot@4,fault=silence@8")
     assert [m.base_mode & 128 for m in station.hear(3.9) if m.get_type() == "HEARTBEAT"] == [0, 128, 128]
     assert station.hear(2.0) == []
@@ -264,7 +264,7 @@ def test_the_tool_puts_it_on_a_real_port(program, port, firmware):
             running.terminate()
 
 
-def test_what_a_command_opens_again_holds_its_parameters():
+def test_a_vehicle_that_is_opened_again_keeps_its_parameters():
     values = {"mavlink": "sim:firmware=px4,imus=1,CAL_ACC0_ID=0", "kept": {}}
     with open_source(values).connected(lambda text: None) as link:
         send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 4)
