@@ -21,13 +21,13 @@ def walk():
 
 @pytest.fixture(scope="session")
 def walk_ns(walk):
-    """Its times, (n,) ns since 1970."""
+    """Times of the walk, (n,) ns since 1970."""
     return np.rint(walk.t * 1e9).astype(np.int64) + EPOCH_NS
 
 
 @pytest.fixture(scope="session")
 def assert_same():
-    """Whether samples are those of the walk, but for what the dialect rounds."""
+    """Return a check that samples are those of the walk, but for what the dialect rounds."""
 
     def check(read, walk, acc=1e-12, gyr=1e-12, t=1e-12):
         assert len(read) == len(walk)

@@ -83,7 +83,7 @@ if __name__ == "__main__":
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Where the made-up formats are, with a recording and its calibration."""
+    """Write the made-up formats to a folder, with a recording and its calibration."""
     folder = tmp_path_factory.mktemp("formats")
     (folder / "made_up.py").write_text(MADE_UP)
     (folder / "notes.odt").write_text("hello")

@@ -1,4 +1,4 @@
-"""What loggers, apps and sketches do besides naming columns: signs, dates, units below the header, lines of names."""
+"""Tests for habits of loggers, apps and sketches: signs, dates, units below the header, a name at each number."""
 
 import numpy as np
 import pandas as pd
@@ -121,7 +121,7 @@ def test_lines_that_name_each_number(ending, walk, assert_same, tmp_path):
 
 @pytest.mark.parametrize("timed", [True, False])
 def test_lines_that_lack_a_number_are_said(timed, walk, tmp_path):
-    """And are gaps where the samples have no times of their own."""
+    """Count the lines left out, which are gaps where the samples have no times of their own."""
     line = LINES[".txt"] if timed else LINES[".txt"].partition(",t:")[0]
     lines = [line.format(*a, *w, t) for a, w, t in zip(walk.acc, walk.gyr, walk.t, strict=True)]
     # below a line that measures nothing; one has not a number, one is torn
@@ -135,7 +135,7 @@ def test_lines_that_lack_a_number_are_said(timed, walk, tmp_path):
 
 @pytest.mark.parametrize("text", ["a" * 30_000, "a_" * 15_000, "ab " * 10_000, "ax:" * 10_000, "ax:1 " * 6_000])
 def test_a_long_line_of_letters_is_no_table(text, tmp_path):
-    """At once: the time that a pattern takes must not grow with the square of a line's length."""
+    """Refuse it at once: the time that a pattern takes must not grow with the square of a line's length."""
     (tmp_path / "walk.txt").write_text(text)
     with pytest.raises(RecordingError, match="names no columns of an accelerometer"):
         load(tmp_path / "walk.txt")
@@ -179,7 +179,7 @@ def test_times_that_are_not_known_as_such_are_named(walk, tmp_path):
 
 
 def sensor_loggers_one_table(walk, sign, in_g, uncalibrated=True):
-    """Its columns stand in the order z, y, x; `accelerometer` is without gravity."""
+    """Return Sensor Logger's table: columns in the order z, y, x, and `accelerometer` without gravity."""
     still = np.random.default_rng(0).normal(0.0, 0.05, (len(walk), 3))
     of = {"accelerometer": still, "totalAcceleration": sign * walk.acc, "gyroscope": walk.gyr}
     if uncalibrated:
@@ -261,7 +261,7 @@ def test_text_as_other_systems_write_it(encoding, end, walk, assert_same, tmp_pa
 
 
 def test_a_line_for_each_sensor(walk, tmp_path):
-    """As Adafruit's basic_readings prints."""
+    """Read what Adafruit's basic_readings prints."""
     lines = "Acceleration X: {:.4f}, Y: {:.4f}, Z: {:.4f} m/s^2\r\nRotation X: {:.5f}, Y: {:.5f}, Z: {:.5f} rad/s\r\n"
     text = "".join(
         lines.format(*a, *w) + "Temperature: 25.00 degC\r\n\r\n" for a, w in zip(walk.acc, walk.gyr, strict=True)

@@ -80,7 +80,7 @@ def test_a_log_with_sensor_combined_alone(walk, t_us, assert_same, tmp_path):
 
 
 def test_a_log_whose_raw_topics_are_slow(walk, t_us, assert_same, tmp_path):
-    """As PX4 logs by default: sensor_accel and sensor_gyro once a second."""
+    """Read PX4's default log, which has sensor_accel and sensor_gyro once a second."""
     path = ulog(
         tmp_path / "log.ulg",
         ("sensor_accel", 0, imu(t_us[::100], walk.acc[::100])),

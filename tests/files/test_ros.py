@@ -72,7 +72,7 @@ def test_bags_give_the_samples_that_were_written(kind, walk, walk_ns, assert_sam
 
 
 def test_a_bag_of_ros_1_that_was_made_an_mcap_file(walk, walk_ns, assert_same, tmp_path):
-    """As `mcap convert` does it."""
+    """Read what `mcap convert` makes of a bag."""
     path = tmp_path / "walk.mcap"
     with path.open("wb") as file:
         writer = McapWriter(file)

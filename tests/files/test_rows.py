@@ -350,7 +350,7 @@ def test_what_was_forgotten_is_left_out(tmp_path, forgotten):
 
 
 def test_the_frames_of_a_long_capture_wait_in_a_file(monkeypatch):
-    """Nothing of a sample stays in memory; each look at the FIFO leaves 16 bytes there, which are not these."""
+    """Keep no byte of a sample in memory; the 16 bytes for each read of the FIFO's count are not measured here."""
     monkeypatch.setattr(capture_module, "ROWS", 500)
     spool, frames = Spool(), np.arange(7000, dtype=np.int16).reshape(1000, 7)
     tracemalloc.start()

@@ -67,7 +67,7 @@ def zeros_and_a_second_header(walk):
 
 
 def without_a_sign(walk):
-    """As a program prints int16 as uint16, without names."""
+    """Return int16 counts printed as uint16, without names."""
     return text(np.column_stack([np.rint(walk.t * 1000), counts(walk) % 65536, counts(walk) % 7]).astype(int), "\t")
 
 

@@ -364,7 +364,7 @@ def test_one_table_of_two_asks_for_the_other(walk, walk_ns, tmp_path):
 
 
 def test_lines_that_hold_one_sensor_each(walk, assert_same, tmp_path):
-    """As loggers write that have one line for each event."""
+    """Read what a logger writes that has one line for each event."""
     nothing = np.full((len(walk), 3), np.nan)
     of_acc = timed("time", walk.t, "ax|ay|az|wx|wy|wz", walk.acc, nothing)
     of_gyr = timed("time", walk.t + 0.002, "ax|ay|az|wx|wy|wz", nothing, walk.gyr)
