@@ -1,4 +1,4 @@
-"""The kernel's side of an I2C adapter: the ioctls of the real smbus2, answered in this process."""
+"""Fixtures: the kernel's side of an I2C adapter, which answers the ioctls of the real smbus2."""
 
 import ctypes
 import errno
@@ -20,7 +20,7 @@ I2C_M_RD = 0x0001
 
 
 class StillFeed:
-    """A board at rest, flat, at 30.65 C; its gyroscope's z flickers from sample to sample."""
+    """Samples of a board that lies flat at 30.65 C; the gyroscope's z alternates."""
 
     def __init__(self):
         self.next = 0
@@ -35,7 +35,7 @@ class StillFeed:
 
 
 class Adapter:
-    """Passes what smbus2 asks the kernel for to `bus`, if it is for `address`.
+    """Adapter that passes the requests of smbus2 to `bus`, if they are for `address`.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ def _os_error(number):
 
 @pytest.fixture
 def still_chip():
-    """A simulated chip at rest, and its bus, with a clock that runs only while someone waits."""
+    """Makes the bus of a simulated chip at rest, and its clock, which runs only during waits."""
 
     def make(model="mpu6050", rate_error_ppm=2500.0):
         clock = FastClock()
@@ -137,7 +137,7 @@ def still_chip():
 
 @pytest.fixture
 def adapter(monkeypatch, tmp_path, still_chip):
-    """Puts a bus behind a path that smbus2 can open; its clock becomes the host's."""
+    """Makes an adapter at a path that smbus2 can open; its clock becomes the host's."""
 
     def make(model="mpu6050", address=0x68):
         bus, clock = still_chip(model)

@@ -1,4 +1,4 @@
-"""A session in parts: what was recorded, then the rest, on one clock."""
+"""Session in parts: recorded ones, then the rest, on one clock."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def key(name):
 
 
 class Young:
-    """A bus that was opened a moment ago."""
+    """Bus that was just opened."""
 
     def __init__(self):
         self.t_ns, self.slept_ns = 5, []
@@ -69,7 +69,7 @@ def test_only_what_was_recorded_is_replayed():
     assert young.closed
 
 
-def test_a_later_clock_goes_on_where_the_earlier_one_stopped():
+def test_a_clock_continues_the_earlier_one():
     young = Young()
     bus = ShiftedClockBus(young, 7 * S)
     bus.sleep_until(3 * S)

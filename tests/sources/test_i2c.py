@@ -1,4 +1,4 @@
-"""Linux I2C through the real smbus2, whose ioctls a simulated chip answers."""
+"""Linux I2C bus with the real smbus2, whose ioctls a simulated chip answers."""
 
 import errno
 import os
@@ -17,6 +17,16 @@ from mpucal.sources.device_lock import lock_device
 from mpucal.sources.i2c import I2cBus
 
 
+def measured(bus, config=None, seconds=3):
+    driver = Driver(bus, config)
+    driver.start()
+    while driver.now_ns() < seconds * 1e9:
+        driver.poll()
+    driver.stop()
+    bus.close()
+    return driver.recording()
+
+
 def test_registers_are_read_in_one_burst(adapter):
     kernel = adapter()
     bus = I2cBus(str(kernel.path))
@@ -28,22 +38,20 @@ def test_registers_are_read_in_one_burst(adapter):
 
 @pytest.mark.parametrize("address", [0x68, 0x69])
 def test_both_addresses_are_tried(adapter, address):
-    kernel = adapter(address=address)
-    bus = I2cBus(str(kernel.path))
+    bus = I2cBus(str(adapter(address=address).path))
     assert bus.address == address
     assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
 
 
-def test_a_given_address_is_the_only_one_tried(adapter):
-    kernel = adapter(address=0x69)
-    with pytest.raises(NoAnswer, match="nothing answers at 0x68 on"):
-        I2cBus(str(kernel.path), 0x68)
-
-
-def test_nobody_at_either_address(adapter):
-    kernel = adapter(address=0x50)
-    with pytest.raises(NoAnswer, match=r"nothing answers at 0x68 or 0x69 on .*i2c-1: .*i2cdetect -y 1"):
-        I2cBus(str(kernel.path))
+@pytest.mark.parametrize(
+    ("address", "asked", "message"),
+    [(0x69, 0x68, "nothing answers at 0x68 on"), (0x50, None, r"at 0x68 or 0x69 on .*i2c-1: .*i2cdetect -y 1")],
+    ids=["another address", "any address"],
+)
+def test_no_chip_at_the_tried_addresses(adapter, address, asked, message):
+    kernel = adapter(address=address)
+    with pytest.raises(NoAnswer, match=message):
+        I2cBus(str(kernel.path), asked)
 
 
 def test_a_kernel_driver_is_noticed_by_a_plain_read_first(adapter):
@@ -93,7 +101,7 @@ def test_an_adapter_that_was_unplugged_is_gone_whatever_the_number(adapter):
 
 
 def test_where_a_stub_has_no_chip_nothing_answers(adapter):
-    """i2c-stub says ENODEV of an empty address; of an adapter that was unplugged the file is gone besides."""
+    """An empty address gives ENODEV from i2c-stub, as an unplugged adapter does, whose file is gone too."""
     kernel = adapter()
     kernel.failures[smbus2.I2C_SMBUS] = errno.ENODEV
     with pytest.raises(NoAnswer, match="nothing answers at 0x68"):
@@ -102,7 +110,7 @@ def test_where_a_stub_has_no_chip_nothing_answers(adapter):
 
 def test_no_such_bus_names_those_there_are(tmp_path, monkeypatch):
     monkeypatch.setattr(mpucal.sources.i2c_errors, "DEVICES", tmp_path)
-    with pytest.raises(BusError, match=r"there is not an I2C bus .*i2c-7: enable I2C"):
+    with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: enable I2C"):
         I2cBus(str(tmp_path / "i2c-7"))
     (tmp_path / "i2c-1").touch()
     with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: use one of .*i2c-1"):
@@ -132,7 +140,7 @@ def test_a_number_is_a_bus_of_dev(monkeypatch):
     ],
     ids=["EACCES", "ENXIO", "EMFILE"],
 )
-def test_what_opening_can_say(monkeypatch, number, words):
+def test_errors_of_opening(monkeypatch, number, words):
     def refuse(path, flags):
         raise OSError(number, os.strerror(number))
 
@@ -142,7 +150,7 @@ def test_what_opening_can_say(monkeypatch, number, words):
 
 
 def test_another_file_is_no_bus_and_is_closed_again(tmp_path):
-    """The kernel's own ENOTTY."""
+    """The kernel reports ENOTTY."""
     other = tmp_path / "notes.txt"
     other.write_text("no bus")
     handles = len(os.listdir("/proc/self/fd"))  # noqa: PTH208
@@ -162,11 +170,7 @@ def test_an_adapter_of_single_bytes_is_refused(adapter):
 def test_an_smbus_adapter_moves_blocks_of_32_bytes(adapter):
     kernel = adapter()
     kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA | smbus2.I2cFunc.SMBUS_I2C_BLOCK)
-    driver = Driver(I2cBus(str(kernel.path)), Config(rate_hz=100))
-    driver.start()
-    while driver.now_ns() < 3e9:
-        driver.poll()
-    recording = driver.recording()
+    recording = measured(I2cBus(str(kernel.path)), Config(rate_hz=100))
     assert len(recording) > 200
     assert not recording.gap.any()
     assert smbus2.I2C_RDWR not in kernel.requests
@@ -198,27 +202,22 @@ def test_registers_in_blocks_are_those_in_one_burst(adapter):
 
 
 def test_the_longest_message_of_an_adapter_is_found(adapter):
-    """As i2c-core refuses what an adapter's quirks do not allow; no byte of the FIFO is lost by it."""
+    """The kernel refuses longer messages (i2c-core quirks), and no byte of the FIFO is lost."""
     kernel = adapter()
     kernel.longest = 70
-    driver = Driver(I2cBus(str(kernel.path)))
-    driver.start()
-    while driver.now_ns() < 3e9:
-        driver.poll()
-    assert not driver.recording().gap.any()
-    assert len(driver.recording()) > 400
+    recording = measured(I2cBus(str(kernel.path)))
+    assert not recording.gap.any()
+    assert len(recording) > 400
 
 
 def test_an_adapter_without_repeated_start_writes_and_reads_apart(adapter):
     kernel = adapter()
     kernel.repeats_start = False
-    driver = Driver(I2cBus(str(kernel.path)))
-    assert driver.start().who_am_i == 0x68
-    while driver.now_ns() < 3e9:
-        driver.poll()
-    assert not driver.recording().gap.any()
-    assert len(driver.recording()) > 400
-    # whole bursts still
+    recording = measured(I2cBus(str(kernel.path)))
+    assert recording.sensor.who_am_i == 0x68
+    assert not recording.gap.any()
+    assert len(recording) > 400
+    # still in whole bursts
     assert max(length for transfer in kernel.transfers for _, length in transfer) >= 4 * reg.FRAME_BYTES
 
 
@@ -264,15 +263,7 @@ def test_more_than_the_kernel_moves_at_once(adapter):
 @pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
 @pytest.mark.parametrize("rate_hz", [200, 1000])
 def test_the_driver_runs_through_it(adapter, model, rate_hz):
-    kernel = adapter(model)
-    bus = I2cBus(str(kernel.path))
-    driver = Driver(bus, Config(rate_hz=rate_hz))
-    driver.start()
-    while driver.now_ns() < 5e9:
-        driver.poll()
-    driver.stop()
-    bus.close()
-    recording = driver.recording()
+    recording = measured(I2cBus(str(adapter(model).path)), Config(rate_hz=rate_hz), 5)
     assert recording.sensor.rate_hz == pytest.approx(rate_hz * 1.0025, rel=200e-6)
     assert len(recording) > 4 * rate_hz
     assert not recording.gap.any()

@@ -1,4 +1,4 @@
-"""The files of IIO devices: a tree like sysfs beside a buffer, and what goes wrong with them."""
+"""Files of IIO devices: a tree like sysfs with a buffer, and its faults."""
 
 import errno
 import os
@@ -29,7 +29,7 @@ CHANNELS = [f"in_{kind}_{axis}" for kind in ("accel", "anglvel") for axis in "xy
 
 @pytest.fixture
 def tree(tmp_path, monkeypatch):
-    """A device as inv_mpu6050 shows it, its buffer a FIFO; IioFiles looks there."""
+    """Makes the attributes of a device as inv_mpu6050 has them, with a FIFO as its buffer."""
     device, dev = tmp_path / "sys" / "iio:device0", tmp_path / "dev"
     dev.mkdir()
     texts = {"name": "mpu6050", "sampling_frequency": "50", "sampling_frequency_available": "10 20 50 100 200 500"}
@@ -99,8 +99,8 @@ def test_a_buffer_that_stays_empty_names_the_interrupt(tree):
     os.close(fifo)
 
 
-def test_what_an_error_left_is_put_back_as_the_files_are_closed(tree):
-    """No kernel ends a buffer whose reader went away: the next one would be told that another program reads it."""
+def test_attributes_are_restored_as_the_files_are_closed(tree):
+    """The kernel keeps the buffer of a reader that went away, and would refuse the next reader."""
     calibbias = tree / "in_accel_x_calibbias"
     calibbias.write_text("5\n")
     before = {path: path.read_text().strip() for path in tree.rglob("*") if path.is_file()}
@@ -114,8 +114,8 @@ def test_what_an_error_left_is_put_back_as_the_files_are_closed(tree):
     assert {path: path.read_text().strip() for path in before} == before | {calibbias: "7"}
 
 
-def test_what_is_polled_is_interpolated_to_common_times(tree):
-    """Each channel grows with its own time: at common times all of one kind read alike."""
+def test_polled_channels_are_interpolated_to_common_times(tree):
+    """Each channel grows with its own time, so that all of one kind are equal at common times."""
     accesses = []
     for name in ("name", "in_accel_scale", "in_anglvel_scale"):
         accesses.append(Transaction("read", f"iio:device0/{name}", 4096, (tree / name).read_bytes(), 0))
@@ -194,10 +194,9 @@ def change(files, name, text):
         (lambda f: f._devices.clear(), {}, "iio:device0 is gone"),
     ],
 )
-def test_what_goes_wrong_before_is_one_sentence(spoil, kind, says):
+def test_errors_of_the_start_are_one_sentence(spoil, kind, says):
     files = simulated()
-    for name in ("in_accel_scale_available",):
-        files._devices["iio:device0"].texts.pop(name)
+    files._devices["iio:device0"].texts.pop("in_accel_scale_available")
     spoil(files)
     with pytest.raises((BusError, ChipError), match=says):
         run(files, BOTH, **kind)

@@ -1,4 +1,4 @@
-"""A read that a pause of the process held up is read again: its time would be early by the pause."""
+"""A read that was delayed by a pause of the process is repeated, since its time would be early by the pause."""
 
 from itertools import count
 
@@ -11,7 +11,7 @@ USUAL_NS = 400_000
 
 
 class Host:
-    """A clock, and transfers that take what they are told to, then the usual time."""
+    """Clock with transfers of given durations, and then of the usual one."""
 
     def __init__(self):
         self.now_ns, self.takes_ns, self.read = 0, [], count()

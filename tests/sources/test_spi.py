@@ -1,4 +1,4 @@
-"""A chip behind spidev's interface: mode, speeds and messages, and the driver over it."""
+"""Chip behind the interface of spidev: mode, speeds, messages, and the driver."""
 
 import builtins
 import errno
@@ -26,7 +26,7 @@ from mpucal.sources.spi import SpiBus
 
 
 class SpiDev:
-    """spidev 3.8 as far as it is used, with a simulated chip behind; a setting that the hardware refuses raises."""
+    """The used part of spidev 3.8, with a simulated chip behind it."""
 
     chip, opens, mode, bits_per_word, max_speed_hz = None, None, 0, 8, 500_000
 
@@ -58,7 +58,7 @@ class SpiDev:
 
 @pytest.fixture
 def opened(monkeypatch):
-    """A bus with a simulated chip behind it, and the device that it opened."""
+    """Makes a bus to a simulated chip, and returns it with the device that it opened."""
 
     def make(words="chip=mpu6500,hand=still"):
         clock = FastClock()
@@ -116,7 +116,7 @@ def test_a_long_read_of_the_fifo_is_cut_and_goes_on_at_the_same_register(opened)
 
 @pytest.mark.parametrize("chip", ["mpu6050", "mpu6500", "clone98", "icm20602"])
 def test_the_driver_measures_and_i2c_stays_off(opened, chip):
-    """In every write to USER_CTRL; what the driver reads back is what it wrote."""
+    """Every write to USER_CTRL turns I2C off; the driver reads back what it wrote."""
     bus, device = opened(f"chip={chip},hand=still,temperature_c=30")
     driver = Driver(bus, Config(rate_hz=1000))
     driver.start()

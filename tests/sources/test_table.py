@@ -1,4 +1,4 @@
-"""The table of sources, and what is made from it."""
+"""Table of sources, and its uses."""
 
 import subprocess
 import sys
@@ -23,7 +23,7 @@ def test_all_that_a_row_names_is_there(kind):
 
 
 @pytest.mark.parametrize("kind", SOURCES, ids=IDS)
-def test_a_row_is_found_by_what_a_person_writes(kind):
+def test_a_row_is_selected_by_its_option(kind):
     values = {kind.option.name: f"{kind.word}:a=b" if kind.word else "x"}
     assert matching_kinds(values) == [kind]
 
@@ -52,7 +52,7 @@ def test_none_and_several():
         ({"replay": "board/capture.mcap"}, "replay of board/capture.mcap"),
     ],
 )
-def test_a_person_names_it(values, title):
+def test_the_title_of_a_session(values, title):
     assert source_title(values) == title
 
 
@@ -67,7 +67,7 @@ def test_a_command_takes_what_its_help_names_and_refuses_the_rest(command):
                 check_source(values, {}, command)
 
 
-def test_each_option_is_refused_beside_the_sources_that_have_it_not():
+def test_each_option_is_refused_with_sources_that_do_not_have_it():
     every = {option for kind in SOURCES for option in (*kind.options, *kind.settings)}
     refused = 0
     for kind in SOURCES:
@@ -85,7 +85,7 @@ def test_a_capture_of_an_unknown_source_says_so():
         reopen_source({"usb": "/dev/usb0"}, Plan())
 
 
-def test_only_text_with_meaning_parses():
+def test_options_refuse_meaningless_text():
     options = {option.name: option for kind in SOURCES for option in (kind.option, *kind.options, *kind.settings)}
     assert options["bus"].parse("1") == "/dev/i2c-1"
     assert options["address"].parse("0x69") == 0x69
@@ -104,14 +104,14 @@ def test_no_library_of_a_source_is_loaded_before_it_is_opened():
 
 @pytest.fixture
 def added():
-    """Adds rows to the table for the length of a test."""
+    """Adds rows to the table during a test."""
     before = list(SOURCES)
     yield SOURCES.append
     SOURCES[:] = before
 
 
 def test_kinds_of_source_share_an_option(added):
-    """One is meant by a word of its value, another by an option beside it; whatever the order of the rows."""
+    """A word of the value selects one, another option selects the other; the order of rows has no effect."""
     beside = Option("pins")
     by_word = replace(SOURCES[0], what="an adapter", word="ch347", forms="ch347:... for an adapter")
     serial = next(kind for kind in SOURCES if kind.option.name == "serial")

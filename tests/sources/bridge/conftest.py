@@ -1,4 +1,4 @@
-"""A simulated chip behind an emulated bridge, on a line whose time runs only while the host waits."""
+"""Fixtures: a simulated chip behind an emulated bridge, on a line whose time runs only while the host waits."""
 
 import contextlib
 import os
@@ -11,6 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
@@ -24,7 +26,7 @@ MS = 1_000_000
 
 
 class NumberedFeed:
-    """Samples 0, 1, 2, ... in accelerometer x; every other word is the same in all."""
+    """Samples 0, 1, 2, ... in accelerometer x; the other words are constant."""
 
     def __init__(self):
         self.next = 0
@@ -38,24 +40,25 @@ class NumberedFeed:
 
 
 class Rig(SimpleNamespace):
-    """The parts by name: clock, chip, line, and `bus` on demand."""
+    """Parts by name: clock, chip, line, and `bus` on demand."""
 
     def new_chip(self):
-        """One that has just got its supply."""
+        """Replace the chip by one that was just switched on."""
         self.chip = SimulatedBus(Chip(MODELS[self.model], NumberedFeed(), 2500.0, FactoryTrim()), self.clock)
 
     def new_bridge(self, boot_ns=0, **how):
-        """One that has just got its supply, with the chip there is."""
+        """Make a bridge that was just switched on, with the present chip."""
         started_ns = self.clock.now()
         bridge = EmulatedBridge(self.chip, lambda: self.clock.now() - started_ns, **{**self.how, **how})
         return Booting(bridge, self.clock, started_ns + boot_ns)
 
     def bus(self, address=None):
-        return BridgeBus(self.line, address)
+        self.opened = BridgeBus(self.line, address)
+        return self.opened
 
 
 class Booting:
-    """A bridge whose boot loader eats what comes until `ready_ns`."""
+    """Bridge whose boot loader takes all bytes until `ready_ns`."""
 
     def __init__(self, bridge, clock, ready_ns):
         self.bridge, self.clock, self.ready_ns = bridge, clock, ready_ns
@@ -82,14 +85,27 @@ def rig():
 
 
 @pytest.fixture(scope="session")
+def started(rig):
+    """Makes a rig and starts a driver on its bus: (rig, driver)."""
+
+    def start(model="mpu6050", latency_ns=MS, rate_hz=200, say=lambda _sentence: None, **how):
+        made = rig(model, latency_ns, **how)
+        driver = Driver(made.bus(), Config(rate_hz=rate_hz), say=say)
+        driver.start()
+        return made, driver
+
+    return start
+
+
+@pytest.fixture(scope="session")
 def numbers():
-    """Which of the feed's samples a recording holds."""
+    """Returns the numbers of the feed's samples in a recording."""
     return lambda recording: np.rint(recording.acc[:, 0] / recording.acc[0, 2] * 8192).astype(int)
 
 
 @pytest.fixture(scope="session")
 def stream():
-    """Polls a started driver for so many seconds."""
+    """Polls a started driver for some seconds."""
 
     def run(driver, seconds):
         end_ns = driver.now_ns() + round(seconds * 1e9)
@@ -100,11 +116,11 @@ def stream():
 
 
 class Server:
-    """Serves an emulated bridge on a pty or a socket, from a thread of its own, in a time that runs as fast as it can.
+    """Thread that serves an emulated bridge on a pty or a socket, in a time that runs as fast as possible.
 
     Attributes
     ----------
-    name : what the host opens. device : may be replaced: that is a reset. clock : the bridge's.
+    name : port for the host. device : the bridge; replacing it is a reset. clock : of the bridge.
     """
 
     def __init__(self, device, clock, handle, name, step_ns):
@@ -152,7 +168,7 @@ class OnPty:
 
 
 class OnSocket:
-    """One host after the other."""
+    """Socket for one host after the other."""
 
     def __init__(self):
         self._listening = socket.create_server(("127.0.0.1", 0))
@@ -188,7 +204,7 @@ class OnSocket:
 
 @pytest.fixture
 def serve(monkeypatch):
-    """Serves a device on a "pty" or "socket"; whoever talks to it does not give it up on a busy machine."""
+    """Serves a device on a "pty" or "socket", with time-outs that a busy machine does not reach."""
     monkeypatch.setattr(link, "REPLY_NS", 20_000 * MS)
     monkeypatch.setattr(link, "HELLO_NS", 20_000 * MS)
     monkeypatch.setattr(bus, "GONE_NS", 20_000 * MS)

@@ -18,14 +18,12 @@ MS = 1_000_000
 @pytest.mark.parametrize("latency_ms", [1, 16])
 @pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
 @pytest.mark.parametrize("rate_hz", [50, 200, 1000])
-def test_the_driver_runs_through_it_and_nothing_is_lost(rig, numbers, stream, model, rate_hz, latency_ms):
-    """16 ms is what an FTDI adapter holds bytes back by default."""
-    bus = rig(model, latency_ms * MS).bus()
-    driver = Driver(bus, Config(rate_hz=rate_hz))
-    driver.start()
+def test_the_driver_loses_nothing(started, numbers, stream, model, rate_hz, latency_ms):
+    """An FTDI adapter holds bytes back for 16 ms by default."""
+    made, driver = started(model, latency_ms * MS, rate_hz=rate_hz)
     stream(driver, 4)
     driver.stop()
-    bus.close()
+    made.opened.close()
     recording = driver.recording()
     assert not recording.gap.any()
     assert set(np.diff(numbers(recording))) == {1}
@@ -34,10 +32,8 @@ def test_the_driver_runs_through_it_and_nothing_is_lost(rig, numbers, stream, mo
 
 
 @pytest.mark.parametrize("latency_ms", [1, 16])
-def test_without_streaming_200_hz_go_through_as_well(rig, numbers, stream, latency_ms):
-    bus = rig(latency_ns=latency_ms * MS, features=Feature(0)).bus()
-    driver = Driver(bus, Config(rate_hz=200))
-    driver.start()
+def test_without_streaming_200_hz_work_too(started, numbers, stream, latency_ms):
+    _, driver = started(latency_ns=latency_ms * MS, features=Feature(0))
     stream(driver, 4)
     recording = driver.recording()
     assert not recording.gap.any()
@@ -62,28 +58,18 @@ def test_a_long_burst_is_one_request(rig):
     assert made.line.now_ns() - before < 60 * MS
 
 
-def test_many_registers_at_once(rig):
+def test_many_registers_and_too_many_bytes(rig):
     bus = rig().bus()
     whole = bus.read(0, 114).data
     assert len(whole) == 114
     assert whole[reg.PWR_MGMT_1] == reg.PWR_MGMT_1_SLEEP
+    with pytest.raises(BusError, match="reads at most 4096 bytes at once, not 4097"):
+        bus.read(reg.FIFO_R_W, 4097)
+    with pytest.raises(BusError, match="writes at most 32 bytes at once, not 33"):
+        bus.write(0, bytes(33))
 
 
-@pytest.mark.parametrize(
-    ("access", "words"),
-    [
-        (lambda bus: bus.read(reg.FIFO_R_W, 4097), "reads at most 4096 bytes at once, not 4097"),
-        (lambda bus: bus.write(0, bytes(33)), "writes at most 32 bytes at once, not 33"),
-    ],
-    ids=["read", "write"],
-)
-def test_more_than_a_bridge_moves_at_once(rig, access, words):
-    with pytest.raises(BusError, match=words):
-        access(rig().bus())
-
-
-def test_who_lets_the_fifo_fill_sees_it_fill(rig):
-    """Nothing is read ahead of a FIFO that was started without a reset."""
+def test_a_fifo_started_without_a_reset_is_not_read_ahead(rig):
     bus = rig().bus()
     bus.write(reg.PWR_MGMT_1, bytes([reg.CLKSEL_PLL]))
     bus.write(reg.FIFO_EN, bytes([reg.FIFO_EN_FRAME]))
@@ -93,13 +79,11 @@ def test_who_lets_the_fifo_fill_sees_it_fill(rig):
     assert bus.read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW
 
 
-def test_a_host_that_was_away_catches_up_without_a_gap(rig, numbers, stream):
-    """The chip's FIFO holds 73 ms at 1 kHz; the bridge pushes on, and the host's memory is larger."""
-    made = rig()
-    driver = Driver(made.bus(), Config(rate_hz=1000))
-    driver.start()
+def test_a_host_that_was_away_catches_up_without_a_gap(started, numbers, stream):
+    """The chip's FIFO holds 73 ms at 1 kHz, but the host's buffer is larger."""
+    made, driver = started(rate_hz=1000)
     stream(driver, 0.5)
-    # the host computes; its port goes on to take what comes
+    # the host computes, and its port still receives
     for _ in range(4000):
         made.line._step()
     stream(driver, 3)
@@ -109,20 +93,29 @@ def test_a_host_that_was_away_catches_up_without_a_gap(rig, numbers, stream):
     assert len(recording) > 3300
 
 
-def test_time_never_goes_back_in_a_capture(rig, stream):
-    made, records = rig(latency_ns=16 * MS), Records()
-    driver = Driver(Tap(made.bus(), records), Config(rate_hz=1000))
-    driver.start()
+@pytest.fixture
+def recorded(rig):
+    """Records a driver's accesses: (rig, driver, records)."""
+
+    def start(rate_hz, **how):
+        made, records = rig(**how), Records()
+        driver = Driver(Tap(made.bus(), records), Config(rate_hz=rate_hz))
+        driver.start()
+        return made, driver, records
+
+    return start
+
+
+def test_time_never_goes_back_in_a_capture(recorded, stream):
+    _, driver, records = recorded(1000, latency_ns=16 * MS)
     stream(driver, 2)
     driver.stop()
     times = [t.t_ns for t in records]
     assert times == sorted(times)
 
 
-def test_a_capture_of_it_replays(rig, stream):
-    made, records = rig(), Records()
-    driver = Driver(Tap(made.bus(), records), Config(rate_hz=200))
-    driver.start()
+def test_a_capture_of_it_replays(recorded, stream):
+    made, driver, records = recorded(200)
     stream(driver, 1)
     made.line.device = made.new_bridge()
     stream(driver, 3)
@@ -137,7 +130,7 @@ def test_a_capture_of_it_replays(rig, stream):
     assert any(t.error for t in records)
 
 
-def test_no_chip_on_the_bridge(rig):
+def test_no_chip_or_one_at_the_other_address(rig):
     made = rig()
     made.chip = None
     made.line.device = made.new_bridge()
@@ -145,16 +138,11 @@ def test_no_chip_on_the_bridge(rig):
         made.bus()
     with pytest.raises(NoAnswer, match="at 0x69 on its"):
         rig().bus(address=0x69)
-
-
-def test_a_chip_at_the_other_address(rig):
     assert rig(address=0x69).bus().address == 0x69
 
 
-def test_a_chip_that_comes_off_while_it_streams(rig, stream):
-    made = rig()
-    driver = Driver(made.bus(), Config(rate_hz=200))
-    driver.start()
+def test_a_chip_that_is_disconnected_during_a_stream(started, stream):
+    made, driver = started()
     stream(driver, 0.5)
 
     def nothing(*_):
@@ -171,11 +159,9 @@ class Records(list):
         self.append(transaction)
 
 
-def test_nothing_but_a_register_is_asked_for_beside_the_stream(rig, stream):
-    """FRAMES tell what INT_STATUS holds, whose reading would take it away from the bridge."""
-    made = rig()
-    driver = Driver(made.bus(), Config(rate_hz=200))
-    driver.start()
+def test_during_a_stream_only_int_enable_is_requested(started, stream):
+    """FRAMES contain the overflow of INT_STATUS; a read of it would clear the flag for the bridge."""
+    made, driver = started()
     made.line.written.clear()
     stream(driver, 2)
     asked = {(frame.type, frame.payload) for frame in Deframer().feed(bytes(made.line.written))}
@@ -187,13 +173,13 @@ def test_nothing_but_a_register_is_asked_for_beside_the_stream(rig, stream):
     [({"burst_ns": 450 * MS}, 0.0), ({"latency_ns": 300 * MS}, 0.02), ({"latency_ns": 5 * MS}, 0.02)],
     ids=["bursts of 0.45 s", "300 ms, and 2 % of the packets sent again", "the same on a quick line"],
 )
-def test_a_line_that_holds_replies_back_makes_no_gap(rig, numbers, stream, how, lost):
-    made = rig(line=how)
+def test_a_line_that_delays_replies_makes_no_gap(rig, numbers, stream, how, lost):
+    made, remarks = rig(line=how), []
     rng, free_ns = np.random.default_rng(1), [0]
     step, coming = made.line._step, made.line._coming
 
     def sent_again():
-        """As TCP does: what follows waits for what is lost."""
+        """Delay the packets after a lost one, as TCP does."""
         before = len(coming)
         step()
         if len(coming) > before:
@@ -201,8 +187,7 @@ def test_a_line_that_holds_replies_back_makes_no_gap(rig, numbers, stream, how, 
             coming[-1] = coming[-1]._replace(t_ns=free_ns[0])
 
     made.line._step = sent_again
-    said = []
-    driver = Driver(made.bus(), Config(rate_hz=200), say=said.append)
+    driver = Driver(made.bus(), Config(rate_hz=200), say=remarks.append)
     driver.start()
     stream(driver, 10)
     recording = driver.recording()
@@ -210,16 +195,16 @@ def test_a_line_that_holds_replies_back_makes_no_gap(rig, numbers, stream, how, 
     assert set(np.diff(numbers(recording))) == {1}
     assert len(recording) > 1600
     driver.stop()
-    assert [sentence for sentence in said if "failed" in sentence] == []
+    assert not any("failed" in sentence for sentence in remarks)
 
 
-def test_closing_stops_what_the_bridge_pushes(rig, stream):
+def test_closing_stops_the_stream(rig, stream):
     made = rig()
     bus = made.bus()
     driver = Driver(bus, Config(rate_hz=200))
     driver.start()
     stream(driver, 0.3)
-    bus.close()
+    made.opened.close()
     sent = io.BytesIO()
     for _ in range(2000):
         made.clock.sleep_until(made.clock.now() + MS)

@@ -18,7 +18,7 @@ def shown(t_ns, start_us=0):
     latency_ms=st.lists(st.floats(1, 30), min_size=20, max_size=20),
 )
 def test_it_unwraps_whatever_the_pauses(start_us, pauses_s, fast_ppm, latency_ms):
-    """A wrap is 71 minutes; half an hour of silence and a resonator that is 0.5 % off are no difficulty."""
+    """Half an hour of silence and a resonator that is 0.5 % off are allowed; a wrap takes 71 minutes."""
     clock, true_ns, first = BridgeClock(), 0, None
     for pause_s, late_ms in zip(pauses_s, latency_ms, strict=False):
         true_ns += round(pause_s * S)
@@ -63,15 +63,8 @@ def test_it_shows_nothing_before_it_was_seen():
 
 
 def test_a_bridge_that_runs_at_half_speed_is_followed():
-    clock = BridgeClock()
-    for i in range(1000):
-        clock.bus_time(shown(i * 10 * MS), i * 20 * MS)
-        assert 0 <= clock.now(i * 20 * MS) - i * 10 * MS <= 250 * MS
-
-
-def test_a_clock_that_is_far_too_slow_is_followed_nevertheless():
-    """As an emulated board's is on a busy machine: whoever waits for its time would wait for ever otherwise."""
+    """An emulated board on a busy machine does so; a wait for its time must end."""
     clock = BridgeClock()
     for i in range(2000):
         clock.bus_time(shown(i * 10 * MS), i * 20 * MS)
-    assert clock.now(2000 * 20 * MS) - 2000 * 10 * MS < 300 * MS
+        assert 0 <= clock.now(i * 20 * MS) - i * 10 * MS <= 250 * MS

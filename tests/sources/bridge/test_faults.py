@@ -1,4 +1,4 @@
-"""What goes wrong on the wire: the session goes on with a marked gap, or ends with one true sentence."""
+"""Faults of the line: the session continues after a marked gap, or ends with a true sentence."""
 
 import re
 
@@ -30,10 +30,16 @@ faults = st.lists(
 )
 
 
-def consistent(recording, numbers):
-    """Whatever is missing is behind a marked gap, and nothing is there twice."""
+def is_consistent(recording, numbers):
+    """Return True if missing samples are at marked gaps, and none is there twice."""
     steps = np.diff(numbers(recording))
     return bool(((steps == 1) | (recording.gap[1:] & (steps > 1))).all())
+
+
+def spoil(line, to_host, to_device, shorter):
+    """Apply faults to the bytes in both directions, at positions divided by `shorter`."""
+    directions = zip((to_host, to_device), shorter, strict=True)
+    line.to_host, line.to_device = (LineFaults([(n // by, *rest) for n, *rest in of]) for of, by in directions)
 
 
 @settings(max_examples=8)
@@ -41,28 +47,23 @@ def consistent(recording, numbers):
 def test_spoiled_bytes(rig, numbers, stream, to_host, to_device, rate_hz):
     made = rig()
     driver = Driver(made.bus(), Config(rate_hz=rate_hz))
-    made.line.to_host, made.line.to_device = (
-        LineFaults(to_host),
-        LineFaults([(n // 16, *rest) for n, *rest in to_device]),
-    )
+    spoil(made.line, to_host, to_device, shorter=(1, 16))
     driver.start()
     while made.line.to_host.number < 4000:
         driver.poll()
     made.line.to_host = made.line.to_device = bytes
     stream(driver, 1.0)
     recording = driver.recording()
-    assert consistent(recording, numbers)
+    assert is_consistent(recording, numbers)
     assert recording.t[-1] > driver.now_ns() * 1e-9 - 0.2
     assert len(recording) > 0.5 * rate_hz
 
 
 @settings(max_examples=4)
 @given(after_ms=st.integers(0, 900), boot_ms=st.sampled_from([0, 300, 2000]), rate_hz=st.sampled_from([200, 1000]))
-def test_a_reset_of_the_bridge(rig, numbers, stream, after_ms, boot_ms, rate_hz):
-    """Its clock begins anew; the chip goes on."""
-    made = rig()
-    driver = Driver(made.bus(), Config(rate_hz=rate_hz))
-    driver.start()
+def test_a_reset_of_the_bridge(started, numbers, stream, after_ms, boot_ms, rate_hz):
+    """The bridge's clock begins anew; the chip continues."""
+    made, driver = started(rate_hz=rate_hz)
     stream(driver, 0.2 + after_ms * 1e-3)
     ahead_ns = driver.now_ns() - made.clock.now()
     made.line.device = made.new_bridge(boot_ms * MS)
@@ -77,10 +78,8 @@ def test_a_reset_of_the_bridge(rig, numbers, stream, after_ms, boot_ms, rate_hz)
 
 
 @pytest.mark.parametrize("chip_loses_its_supply", [False, True])
-def test_unplugged_and_plugged_in_again(rig, numbers, stream, chip_loses_its_supply):
-    made = rig()
-    driver = Driver(made.bus(), Config(rate_hz=200))
-    driver.start()
+def test_unplugged_and_plugged_in_again(started, numbers, stream, chip_loses_its_supply):
+    made, driver = started()
     stream(driver, 0.5)
     made.line.unplugged = True
     made.line.device = made.new_bridge()
@@ -113,19 +112,18 @@ def test_unplugged_and_plugged_in_again(rig, numbers, stream, chip_loses_its_sup
     ],
     ids=["link", "sensor"],
 )
-def test_what_failed_is_said_of_the_link_or_of_the_sensor(rig, stream, spoil, words):
-    made, said = rig(), []
-    driver = Driver(made.bus(), Config(rate_hz=200), say=said.append)
-    driver.start()
+def test_the_remark_names_the_link_or_the_sensor(started, stream, spoil, words):
+    remarks = []
+    made, driver = started(say=remarks.append)
     stream(driver, 0.5)
     spoil(made)
     stream(driver, 2)
     driver.stop()
-    assert re.search(words, said[-1])
+    assert re.search(words, remarks[-1])
 
 
 def failing(chip, clock):
-    """For a moment."""
+    """Make the chip fail for a moment."""
     read, ends_ns = chip.read, clock.now() + 300 * MS
 
     def refused(*words):
@@ -136,29 +134,25 @@ def failing(chip, clock):
     chip.read = refused
 
 
-def test_unplugged_for_good(rig, stream):
-    made = rig()
-    driver = Driver(made.bus(), Config(rate_hz=200))
-    driver.start()
+@pytest.mark.parametrize(
+    ("attribute", "value", "sentence"),
+    [
+        ("unplugged", True, "the emulated line is gone: check its cable, plug it in again"),
+        ("to_host", lambda data: b"", "the bridge on the emulated line no longer answers: check its cable"),
+    ],
+    ids=["unplugged", "silent"],
+)
+def test_a_bridge_that_is_gone_for_good(started, stream, attribute, value, sentence):
+    made, driver = started()
     stream(driver, 0.5)
-    made.line.unplugged = True
-    with pytest.raises(BusError, match=r"^the emulated line is gone: check its cable, plug it in again"):
+    setattr(made.line, attribute, value)
+    with pytest.raises(BusError, match=f"^{sentence}"):
         stream(driver, 5)
     assert len(driver.recording()) > 80
 
 
-def test_a_bridge_that_falls_silent_for_good(rig, stream):
-    made = rig()
-    driver = Driver(made.bus(), Config(rate_hz=200))
-    driver.start()
-    stream(driver, 0.5)
-    made.line.to_host = lambda data: b""
-    with pytest.raises(BusError, match=r"^the bridge on the emulated line no longer answers: check its cable"):
-        stream(driver, 5)
-
-
 class Chatty:
-    """Another device: it prints, and hears nothing."""
+    """Device that prints and does not listen."""
 
     def __init__(self, clock, text):
         self.clock, self.text, self.next_ns = clock, text, 0
@@ -198,7 +192,7 @@ def test_another_device(text, sentence):
 
 
 class Flooding:
-    """A line that sends zeros without end, as fast as they are read, from its `sound_reads`th read on."""
+    """Line that sends endless zeros after `sound_reads` reads."""
 
     def __init__(self, line, sound_reads):
         self.line, self.left, self.ahead_ns = line, sound_reads, 0
@@ -236,7 +230,7 @@ def test_noise_before_the_hello_does_no_harm(rig, noise):
 
 
 class Shaky(Memory):
-    """A memory whose supply fails after so many bytes."""
+    """Memory whose supply fails after some bytes."""
 
     def __init__(self, data, left):
         self.data, self.left = data, left
@@ -254,7 +248,7 @@ class PowerFailure(Exception):  # noqa: N818
 
 
 class Mortal:
-    """A bridge that is silent once its supply has failed."""
+    """Bridge that is silent after its supply has failed."""
 
     def __init__(self, bridge):
         self.bridge = bridge
@@ -276,8 +270,16 @@ def blob(x):
     return Blob(0x68, 4.0, 500.0, D, (x, 0.0, 0.0), 9.81, 25.0, "", (0.0,) * 3, D, (0.0,) * 3).encode()
 
 
+def succeeds(store, new):
+    try:
+        store.write(new)
+    except MpucalError:
+        return False
+    return True
+
+
 def store_on(line):
-    link = Link(line, lambda seq, frames, t_ns: None)
+    link = Link(line)
     link.greet()
     return BlobStore(link)
 
@@ -292,11 +294,7 @@ def test_power_that_fails_at_any_byte_leaves_the_old_blob_or_the_new_one(rig, wr
     old, new = (blob(float(writes - 1)) if writes else None), blob(100.0)
     made.line.device = Mortal(made.new_bridge(memory=Shaky(memory.data, bytes_left)))
     store = store_on(made.line)
-    try:
-        store.write(new)
-        done = True
-    except BusError:
-        done = False
+    done = succeeds(store, new)
     made.line.device = made.new_bridge(memory=memory)
     held = store_on(made.line).read()
     assert held == new if done else held in (old, new)
@@ -310,22 +308,15 @@ def test_spoiled_bytes_never_leave_a_part_of_a_blob(rig, to_host, to_device):
     old, new = blob(1.0), blob(2.0)
     store = store_on(made.line)
     store.write(old)
-    made.line.to_host, made.line.to_device = (
-        LineFaults([(n // 16, *rest) for n, *rest in to_host]),
-        LineFaults([(n // 10, *rest) for n, *rest in to_device]),
-    )
-    try:
-        store.write(new)
-        done = True
-    except MpucalError:
-        done = False
+    spoil(made.line, to_host, to_device, shorter=(16, 10))
+    done = succeeds(store, new)
     made.line.to_host = made.line.to_device = bytes
     store.greet()
     assert store.read() == new if done else store.read() in (old, new)
 
 
 class Reset(Mortal):
-    """A bridge that starts anew, with what its memory holds, where its supply failed."""
+    """Bridge that restarts with its memory after its supply has failed."""
 
     def __init__(self, bridge, anew):
         super().__init__(bridge)
@@ -339,8 +330,8 @@ class Reset(Mortal):
 
 @settings(max_examples=40)
 @given(held_before=st.booleans(), bytes_left=st.integers(0, 230), to_host=faults, to_device=faults)
-def test_the_sink_says_truly_which_calibration_is_there(rig, held_before, bytes_left, to_host, to_device):
-    """Whatever byte the supply fails at, and whatever becomes of those on the line."""
+def test_the_sink_reports_the_stored_calibration_truly(rig, held_before, bytes_left, to_host, to_device):
+    """The supply fails at any byte, and bytes on the line are spoiled."""
     made, memory = rig(), Memory()
     calibration = Calibration(np.diag([1.01, 0.98, 1.03]), np.array([0.2, 0.1, -0.3]), quality={"verdict": "good"})
     old, new = blob(1.0) if held_before else None, calibration.blob().encode()
@@ -350,10 +341,7 @@ def test_the_sink_says_truly_which_calibration_is_there(rig, held_before, bytes_
     shaky = made.new_bridge(memory=Shaky(memory.data, bytes_left))
     made.line.device = Reset(shaky, lambda: made.new_bridge(memory=memory))
     sink = BridgeSink(store_on(made.line))
-    made.line.to_host, made.line.to_device = (
-        LineFaults([(n // 16, *rest) for n, *rest in to_host]),
-        LineFaults([(n // 10, *rest) for n, *rest in to_device]),
-    )
+    spoil(made.line, to_host, to_device, shorter=(16, 10))
     try:
         sink.write(calibration)
     except WriteBackError as error:

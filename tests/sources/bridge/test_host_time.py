@@ -1,4 +1,4 @@
-"""A bridge whose clock is off: its times are corrected, in a capture too."""
+"""Correction of a bridge's clock that is off, live and in a capture."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ MS = 1_000_000
 
 
 class Counting:
-    """Samples that differ from each other, of a board that lies flat; nothing here looks at them."""
+    """Different samples of a board that lies flat; their values do not matter here."""
 
     def __init__(self):
         self._next = 0
@@ -39,7 +39,7 @@ class Counting:
 
 @pytest.fixture
 def recorded(tmp_path):
-    """The recording of so many seconds behind a bridge whose clock is off, and its capture."""
+    """Records behind a bridge whose clock is off: (recording, path of the capture)."""
 
     def run(seconds, ppm, drift_ppm_a_minute=0.0, burst_ms=1, rate_error_ppm=2500.0, reset_s=None):
         clock = FastClock()
@@ -92,7 +92,7 @@ def test_the_rate_is_known_and_corrected(recorded, ppm, drift, burst_ms):
 
 
 @pytest.mark.parametrize("rate_error_ppm", [-130, 30])
-def test_frames_in_step_with_an_adapters_bursts_mislead_nobody(recorded, rate_error_ppm):
+def test_frames_in_step_with_an_adapters_bursts_do_no_harm(recorded, rate_error_ppm):
     """Four looks of 20 ms take as long as five bursts of 16 ms: each is later by as much as the chip is slow."""
     recording, *_ = recorded(30, 0, burst_ms=16, rate_error_ppm=rate_error_ppm)
     sensor = recording.sensor

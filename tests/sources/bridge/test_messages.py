@@ -48,7 +48,7 @@ def upper(name):
 
 
 def values(kind, draw):
-    """Whatever the fields of a message hold."""
+    """Draw values for the fields of a message."""
     sizes = re.findall(r"(\d*)([A-Za-z])", kind.FORMAT.format)
     limits = {"B": 0xFF, "H": 0xFFFF, "I": 0xFFFFFFFF}
     made = []

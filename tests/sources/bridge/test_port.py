@@ -1,4 +1,4 @@
-"""The real pyserial, on a pseudo-terminal and a socket."""
+"""Port on the real pyserial, with a pseudo-terminal and a socket."""
 
 import contextlib
 import errno
@@ -52,7 +52,7 @@ def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream, 
 
 
 def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_path):
-    """As a cable does: the name is the same, what is behind it is new."""
+    """A cable is plugged in again: the name stays, and the device behind it is new."""
     made = rig()
     first, name = serve(made.line.device, made.clock, "pty"), tmp_path / "ttyUSB0"
     name.symlink_to(first.name)
@@ -167,7 +167,7 @@ def test_nothing_stays_open_where_nobody_answers(monkeypatch):
 
 
 def opened(name):
-    """How many handles of this process are on a terminal."""
+    """Count the handles of this process on a terminal."""
     found = 0
     for handle in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(FileNotFoundError):

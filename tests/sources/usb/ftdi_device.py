@@ -17,7 +17,7 @@ SINGLE = (0x84, 0x85, 0x87, 0x8A, 0x8B, 0x8C, 0x8D, 0x96, 0x97)
 
 
 class I2cSlave:
-    """A chip at 0x68 that hears bytes between start and stop: its register comes first."""
+    """Chip at 0x68 that takes bytes between start and stop, its register first."""
 
     def __init__(self, chip):
         self.chip, self.selected, self.heard, self.reading = chip, False, bytearray(), False
@@ -32,7 +32,7 @@ class I2cSlave:
         self.selected = False
 
     def byte(self, value):
-        """What the master writes; whether it is acknowledged."""
+        """Take a byte of the master; return True to acknowledge it."""
         if self.address_next:
             self.address_next = False
             self.selected, self.reading = value >> 1 == 0x68, bool(value & 1)
@@ -54,7 +54,7 @@ class I2cSlave:
 
 
 class Backend(IBackend):
-    """One FT232H; a new one for each that asks."""
+    """FT232H, a new one for each user."""
 
     def __init__(self, chip):
         self.slave, self.out, self.pins, self.acknowledged = I2cSlave(chip), bytearray(), SCL | SDA, True

@@ -1,4 +1,4 @@
-"""A chip on USB adapters: both libraries themselves, over USB layers of ours."""
+"""Chip on USB adapters: the two real libraries on simulated USB layers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SPELLED = {"ftdi": "ftdi://ftdi:232h/1", "mcp2221": "mcp2221"}
 
 
 class HostClock(FastClock):
-    """The host's, since the chip was made."""
+    """Clock of the host, since the chip was made."""
 
     def __init__(self):
         super().__init__()
@@ -37,7 +37,7 @@ class HostClock(FastClock):
         return time.monotonic_ns() - self._begun_ns
 
     def spend(self, ns):
-        """The adapter has spent it already."""
+        """Do nothing: the adapter has taken the time already."""
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def chip():
 
 @pytest.fixture
 def plugged(chip, monkeypatch):
-    """Both adapters are plugged in, with one chip between them."""
+    """Plugs in both adapters, with one chip behind them."""
     from pyftdi.usbtools import UsbTools
 
     ftdi = _beside("ftdi_device")

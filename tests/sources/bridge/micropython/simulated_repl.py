@@ -59,7 +59,7 @@ class SimulatedRepl:
                 self._say(b"MPY: soft reboot\r\n")
 
     def _prompt(self, raw):
-        """Until Ctrl-D on an empty line; whether that was in raw mode."""
+        """Read lines until Ctrl-D on an empty one; return True in raw mode."""
         self._say(RAW if raw else self._banner + b">>> ")
         line = b""
         while True:
