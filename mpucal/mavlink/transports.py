@@ -140,7 +140,6 @@ class Serial(OnePartner):
 
         super().__init__()
         self.name = str(url)
-        self._failure: Any = (OSError, serial.SerialException)
         try:
             self._port = serial.Serial(url.host, url.port, timeout=0, write_timeout=1.0, exclusive=True)
         except (OSError, ValueError) as error:
@@ -150,7 +149,7 @@ class Serial(OnePartner):
         """See Transport."""
         try:
             data = self._read(until_ns - self.now_ns())
-        except self._failure as error:
+        except OSError as error:
             raise _broken(self.name, error) from error
         return ReceivedBytes(data, self.name, self.now_ns()) if data else None
 
@@ -164,7 +163,7 @@ class Serial(OnePartner):
         """See Transport."""
         try:
             self._port.write(data)
-        except self._failure as error:
+        except OSError as error:
             raise _broken(self.name, error) from error
 
     def close(self) -> None:
