@@ -46,7 +46,7 @@ class Stance:
 
     step: int
     attitude: Vector
-    held: float
+    grip: float
 
 
 class Hand:
@@ -62,15 +62,15 @@ class Hand:
     """
 
     MISHAP: type[Mishap] = Mishap
-    HELD = IN_THE_HAND
-    HASTE = 1.0
+    GRIP = IN_THE_HAND
+    SPEED = 1.0
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng, self._reaction_rng = rng.spawn(2)
         self._prompts: deque[tuple[int, HandPrompt]] = deque()
         self._last: tuple[str, tuple[float, float, float] | None] | None = None
         self._leg: Leg = Hold(0, 0, IN_THE_HAND)
-        self._wish = "hold_still"
+        self._task = "hold_still"
         self._down: Vector | None = None
         self._moved = False
         self.mishap = self.MISHAP()
@@ -107,36 +107,36 @@ class Hand:
             prompt = self._prompts.popleft()[1]
             kind, down = str(prompt.kind), prompt.down
             # A board that is being laid flat is held still by laying it flat.
-            goes_on = kind == "hold_still" and down is None and self._wish in ("lay_flat", "rest")
+            goes_on = kind == "hold_still" and down is None and self._task in ("lay_flat", "rest")
             if kind in ("lay_flat", "hold_still", "rotate", "verify", "rest") and not goes_on:
-                self._wish, self._moved = kind, False
+                self._task, self._moved = kind, False
                 self._down = None if down is None else np.array(down)
 
     def _next(self, now: Stance) -> Leg:
-        if self._wish in ("lay_flat", "rest"):
+        if self._task in ("lay_flat", "rest"):
             return self.lay_flat(now)
-        return self.rotate(now) if self._wish in ("rotate", "verify") else self.hold_still(now)
+        return self.rotate(now) if self._task in ("rotate", "verify") else self.hold_still(now)
 
     def lay_flat(self, now: Stance) -> Leg:
-        """Set the board down, then leave it alone."""
-        if self._moved or (now.held == ON_THE_TABLE and self._wish == "rest"):
+        """Return a leg that sets the board down, then pauses."""
+        if self._moved or (now.grip == ON_THE_TABLE and self._task == "rest"):
             return self.pause(now, PAUSE_S)
         self._moved = True
         down = np.array(FLAT_DOWN) if self._down is None else self._down
         return self.move(now, self.turn_to(now, down), ON_THE_TABLE)
 
     def hold_still(self, now: Stance) -> Leg:
-        """Hold the board as it is, or in the orientation that the prompt asks for."""
+        """Return a leg to the requested orientation, if there is one, then pauses."""
         if self._moved or self._down is None:
             return self.pause(now, PAUSE_S)
         self._moved = True
         return self.move(now, self.turn_to(now, self.inaccurate(self._down)), IN_THE_HAND)
 
     def rotate(self, now: Stance) -> Leg:
-        """Move and pause alternately; `aim` gives each move."""
+        """Return moves and pauses alternately; `aim` gives each move."""
         self._moved = not self._moved
         if self._moved:
-            return self.move(now, self.aim(now), self.HELD)
+            return self.move(now, self.aim(now), self.GRIP)
         return self.pause(now, PAUSE_S)
 
     def aim(self, now: Stance) -> Vector:
@@ -145,13 +145,13 @@ class Hand:
 
     def pause(self, now: Stance, seconds: float) -> Leg:
         """Return a leg without motion, with the present grip."""
-        return Hold(now.step, now.step + steps(seconds), now.held)
+        return Hold(now.step, now.step + steps(seconds), now.grip)
 
-    def move(self, now: Stance, turn_rad: Vector, held: float) -> Leg:
+    def move(self, now: Stance, turn_rad: Vector, grip: float) -> Leg:
         """Return a leg that turns the board about a fixed axis; beyond 130 deg it takes longer."""
         longer = max(1.0, float(np.linalg.norm(turn_rad)) / TURN_RAD[1])
-        seconds = MOVE_S * longer / self.HASTE * self._rng.uniform(0.9, 1.1)
-        return Move(now.step, now.step + steps(seconds), turn_rad, (now.held, held))
+        seconds = MOVE_S * longer / self.SPEED * self._rng.uniform(0.9, 1.1)
+        return Move(now.step, now.step + steps(seconds), turn_rad, (now.grip, grip))
 
     def turn_to(self, now: Stance, down: Vector, twist_rad: float = 0.0) -> Vector:
         """Return the rotation vector (3,) [rad] that points `down` (3,) down, with a twist about the vertical."""

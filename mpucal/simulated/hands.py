@@ -26,7 +26,7 @@ class Guided(Hand):
         self._visited: list[Vector] = []
 
     def rotate(self, now: Stance) -> Leg:
-        """Turn to the requested orientation and wait, or alternate between own ones and pauses."""
+        """Return a move to the requested orientation, then pauses; without one, own moves and pauses alternately."""
         if self._down is None or not self._moved:
             return super().rotate(now)
         return self.pause(now, PAUSE_S)
@@ -59,7 +59,7 @@ class Guided(Hand):
 class Placing(Guided):
     """Hand that sets the board down in each orientation, and lets go of it."""
 
-    HELD = ON_THE_TABLE
+    GRIP = ON_THE_TABLE
 
 
 class Wandering(Guided):
@@ -71,7 +71,7 @@ class Wandering(Guided):
         return np.asarray(axis / np.linalg.norm(axis) * self._rng.uniform(*TURN_RAD))
 
     def rotate(self, now: Stance) -> Leg:
-        """Move and pause alternately."""
+        """Return moves and pauses alternately."""
         return Hand.rotate(self, now)
 
 
@@ -85,13 +85,13 @@ class Repeating(Guided):
         self._arrived = True
 
     def rotate(self, now: Stance) -> Leg:
-        """Follow the requests while rotating; while verifying go from one old pose to the next."""
+        """Return requested moves while rotating, and moves from one old pose to the next while verifying."""
         down = -rotation.up_in_board(now.attitude)
-        if self._wish == "verify":
+        if self._task == "verify":
             self._arrived = not self._arrived
             if self._arrived:
                 return self.pause(now, PAUSE_S)
-            return self.move(now, self.turn_to(now, self.inaccurate(next(self._again, down))), self.HELD)
+            return self.move(now, self.turn_to(now, self.inaccurate(next(self._again, down))), self.GRIP)
         leg = super().rotate(now)
         if not isinstance(leg, Move) and not any(np.array_equal(down, pose) for pose in self._shown):
             self._shown.append(down)
@@ -110,7 +110,7 @@ class OneAxis(Wandering):
 class Hasty(Guided):
     """Hand that follows the guidance four times as fast."""
 
-    HASTE = 4.0
+    SPEED = 4.0
 
 
 class Slipping(Guided):
@@ -138,8 +138,8 @@ class Random(Hand):
     RATE_RMS_RAD_S = math.radians(80.0)
 
     def rotate(self, now: Stance) -> Leg:
-        """Return six sines an axis at 0.08 to 0.7 Hz, 80 deg/s rms."""
-        if now.held == ON_THE_TABLE:
+        """Return a tumble of six sines an axis at 0.08 to 0.7 Hz, 80 deg/s rms."""
+        if now.grip == ON_THE_TABLE:
             return self.move(now, self._rng.uniform(-0.3, 0.3, 3), IN_THE_HAND)
         shape = (3, self.SINES)
         return Tumble(
@@ -155,7 +155,7 @@ class Motionless(Hand):
     """Hand that lays the board flat, and never moves it when told to rotate."""
 
     def rotate(self, now: Stance) -> Leg:
-        """Hold the board still."""
+        """Return a pause."""
         return self.pause(now, PAUSE_S)
 
 
@@ -167,7 +167,7 @@ class Restless(Guided):
     def pause(self, now: Stance, seconds: float) -> Leg:
         """Return a small turn, in the hand."""
         turn = self._rng.uniform(-self.FIDGET_RAD, self.FIDGET_RAD, 3)
-        return Move(now.step, now.step + steps(self._rng.uniform(0.3, 0.7)), turn, (now.held, IN_THE_HAND))
+        return Move(now.step, now.step + steps(self._rng.uniform(0.3, 0.7)), turn, (now.grip, IN_THE_HAND))
 
 
 HANDS: dict[str, type[Hand]] = {

@@ -51,13 +51,13 @@ class Leg:
 
 @dataclass(frozen=True)
 class Hold(Leg):
-    """Leg without motion; `held` is 1 in the hand, 0 on the table."""
+    """Leg without motion; `strength` is 1 in the hand, 0 on the table."""
 
-    held: float
+    strength: float
 
     def grip(self, nodes: Vector) -> Vector:
-        """Return `held`."""
-        return np.full(len(nodes), self.held)
+        """Return `strength`."""
+        return np.full(len(nodes), self.strength)
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Move(Leg):
     """Leg that turns by `turn_rad` (3,) with minimum jerk, from one grip to another; it cannot be cut."""
 
     turn_rad: Vector
-    held: tuple[float, float]
+    strengths: tuple[float, float]
 
     def turns(self, nodes: Vector) -> Vector:
         """Return shares of the turn."""
@@ -82,7 +82,7 @@ class Move(Leg):
 
     def grip(self, nodes: Vector) -> Vector:
         """Return the transition from the first grip to the second."""
-        before, after = self.held
+        before, after = self.strengths
         return before + (after - before) * self._share(nodes)
 
     def cut(self, step: int) -> Self:

@@ -59,7 +59,7 @@ class ByWords(Guided):
 
     def rotate(self, now: Stance) -> Leg:
         """Turn by what is said, a reaction time after it was said; hold still where nothing is."""
-        if self._room is None or now.held == ON_THE_TABLE:
+        if self._room is None or now.grip == ON_THE_TABLE:
             self._room = now.attitude
         way = self.HEADLINE.lower()
         t_s = now.step * STEP_S
@@ -76,7 +76,7 @@ class ByWords(Guided):
             axis = quaternions.product(quaternions.product(q, axis), quaternions.conjugate(q))
         miss = self._rng.normal(size=3)
         miss *= MISS_RAD * math.sqrt(self._rng.uniform()) / np.linalg.norm(miss)
-        return self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, self.HELD)
+        return self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, self.GRIP)
 
 
 HANDS[BY_WORDS] = ByWords
