@@ -28,7 +28,7 @@ def logging_after_hangup(log: Callable[[], Path], hung_up: Callable[[], None]) -
         yield
         return
 
-    # isatty is False after the terminal was closed, so it is asked now.
+    # After the terminal was closed, isatty would return False.
     on_terminal = [number for number in _DESCRIPTORS if os.isatty(number)]
 
     def handle(_number: int, _frame: FrameType | None) -> None:

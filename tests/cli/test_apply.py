@@ -50,7 +50,7 @@ def test_every_real_recording_comes_out_as_the_formula_says(mpucal, calibration,
     assert mpucal("apply", "c.json", path, "-o", "out.npz").code == 0
     recording, out = load(path), load("out.npz")
     acc, gyr = formula(recording)
-    # runs of rows are multiplied in another order than all at once
+    # Runs of rows are multiplied in another order than all rows at once.
     np.testing.assert_allclose(out.acc, acc, rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(out.gyr, gyr, rtol=1e-13, atol=1e-13)
     np.testing.assert_array_equal(out.t, recording.t)
@@ -165,7 +165,7 @@ def test_a_calibration_that_does_not_belong(mpucal, session, calibration, change
     assert done.code == code, done.err
     assert says in done.err
     if code == 0:
-        # what the registers subtract is not subtracted again, and after a reset all of it is
+        # The part of b_a that the registers subtract is not subtracted again; after a reset they subtract nothing.
         left = B_A - (B_A if registers_differ else 0.0)
         np.testing.assert_allclose(load("out.npz").acc, (recording.acc - left) @ np.linalg.inv(D).T, atol=1e-12)
 

@@ -187,7 +187,7 @@ def test_a_folder_is_one_recording_s(mpucal, session, tmp_path):
 
 
 def test_what_a_check_updates_goes_beside_no_capture(mpucal, session):
-    """This holds even for the capture that the calibration was made from."""
+    """The capture may even be that which the calibration was made from."""
     calibration = session.folder / "calibration.json"
     copy, words = Path("copy.json"), ("check", "copy.json", session.folder / "capture.mcap")
     copy.write_bytes(calibration.read_bytes())

@@ -38,7 +38,7 @@ def test_of_a_sensor_in_half_a_minute_with_its_biases_updated(mpucal, calibratio
     schema = json.loads((Path(result.__file__).parent / "calibration.schema.json").read_text())
     Draft202012Validator(schema).validate(document)
     assert document["updated_from"][0]["b_a"] == Calibration.load(calibration).b_a.tolist()
-    # its capture is a recording, and replays
+    # The capture is a recording, and can be replayed.
     for words in (("today/capture.mcap",), ("--replay", "today/capture.mcap")):
         assert mpucal("check", calibration, *words).out.splitlines()[0] == told.out.splitlines()[0]
 
@@ -57,7 +57,8 @@ def test_a_changed_one_is_updated_or_merged_only_by_force_and_what_is_made_of_it
     assert not (tmp_path / "today").exists()
     assert mpucal(*words, "--force").code == 0
     assert mpucal("merge", spoilt, spoilt).code == 6
-    assert mpucal("merge", spoilt, spoilt, "--force").code == 5  # the same data twice
+    # A merge of twice the same data is refused.
+    assert mpucal("merge", spoilt, spoilt, "--force").code == 5
     exported = mpucal("export", spoilt, "--to", "c-header")
     assert "its digest does not match" in exported.out
     Calibration.load(spoilt).save(tmp_path / "again.json")

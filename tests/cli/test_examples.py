@@ -58,7 +58,7 @@ def belongings(made, tmp_path):
 def test_an_example_runs(mpucal, belongings, tmp_path, example):
     words = [DEVICES.get(word, word) for word in shlex.split(example)]
     if words[0] in ("session", "record"):
-        # these begin with no such folder or file
+        # These commands create the folder and the file.
         shutil.rmtree(tmp_path / "board7")
         (tmp_path / "capture.mcap").unlink()
     result = mpucal(*words, *SHORTER.get(words[0], ()))

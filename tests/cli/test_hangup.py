@@ -14,7 +14,7 @@ from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 
 HELD = str(Path(__file__).with_name("held.py"))
-# how long a busy machine may take, for what takes it a second or two
+# Time that a busy machine may need for a step of a second or two.
 PATIENCE_S = 300.0
 
 
@@ -91,7 +91,8 @@ def test_a_session_that_keeps_going_gets_its_result(on_a_terminal, tmp_path):
     session = on_a_terminal("--keep-going", "--bus", "sim:seed=3", held=("rotate", 1))
     session.read_until_held()
     os.close(session.terminal)
-    os.kill(session.pid, signal.SIGHUP)  # the shell's, after the kernel's
+    # The shell sends SIGHUP as well, after the kernel.
+    os.kill(session.pid, signal.SIGHUP)
     session.let_go()
     assert session.exit_code() == 0
     assert Calibration.load(tmp_path / "board" / "calibration.json").verdict == "good"

@@ -63,7 +63,7 @@ def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
     assert settings.hints_of("line3/b.txt").rate_hz == 100
     assert settings.hints_of("b.csv") == Hints()
     assert settings.key != Settings("accel", 9.80665).key
-    # as dask sends it to a worker
+    # Dask sends settings to a worker by pickle.
     row = make_row(str(table), pickle.loads(pickle.dumps(settings)))
     assert row["samples"] == len(recording)
     assert "its columns are a, b, c, d, e, f, g" in make_row(str(table), Settings("accel", 9.80665))["error"]

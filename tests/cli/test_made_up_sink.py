@@ -74,7 +74,7 @@ def test_a_calibration_is_written_and_what_was_there_comes_back(call, board):
     back = call(board, "write", "logbook-old.txt", "logbook", "--bus", "sim")
     assert (back.code, back.out) == (0, "Done: the logbook of sim says again what logbook-old.txt says.\n")
     assert (board / "logbook.txt").read_text() == first
-    # what was there between is kept as well
+    # The state in between is saved as well.
     assert (board / "logbook-old-2.txt").read_text() == "b_a: [0.5, 0.0, 0.0]\n"
 
 

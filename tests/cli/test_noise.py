@@ -48,7 +48,7 @@ def test_of_a_sensor_for_some_hours(mpucal):
     assert "let go of it" in told.err
     document = json.loads(told.out)
     assert 36.0 <= document["seconds"] < 38.0
-    # the hand that trembles has put it down before that
+    # The trembling hand has put the board down before.
     assert document["suspicious"] == []
     assert (
         max(document["accelerometer"]["white_noise"]["value"])

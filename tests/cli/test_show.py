@@ -128,7 +128,6 @@ def test_a_chip_is_shown_as_it_is(mpucal, chip):
     assert shown["chip"].lower().replace("-", "") == chip
     assert shown["accel_range_g"] == 2
     place = {"mpu6050": "0x06", "mpu6500": "0x77"}[chip]
-    # the factory's trim
     assert any(shown["accel_offsets"][place])
     page = mpucal("show", "--bus", f"sim:seed=3,chip={chip}").out
     assert f"WHO_AM_I 0x{shown['who_am_i']:02x}" in page

@@ -33,14 +33,14 @@ def test_a_session_writes_to_the_chip_and_says_so(mpucal):
     assert result.out == made.json()
     (entry,) = made.extra["written"]
     assert (entry["to"], entry["where"]) == ("chip", "the chip on sim")
-    # one word is 0.5 mg, an even one 1 mg
+    # A word of the register is 0.5 mg, and only even words are written.
     np.testing.assert_allclose(made.applied_in_hardware, made.b_a, atol=0.0055)
     np.testing.assert_array_equal(
         Calibration.load("board/calibration.bin").applied_in_hardware, np.float32(made.applied_in_hardware)
     )
     assert "offset registers" in Path("board/report.html").read_text()
     assert "Results are written to files and the chip's offset registers" in result.err
-    # its own capture was measured before: all of b_a is subtracted of that
+    # The capture was recorded before the write, so all of b_a is subtracted from its samples.
     mpucal("apply", "board/calibration.json", "board", "-o", "out.npz")
     acc = (load("board").acc - made.b_a) @ np.linalg.inv(made.D).T
     np.testing.assert_allclose(load("out.npz").acc, acc, atol=1e-12)

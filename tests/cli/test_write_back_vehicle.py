@@ -58,7 +58,7 @@ def test_the_new_parameters_are_there_and_the_files_say_so(flown):
     assert entry["to"] == "autopilot"
     assert "read back and verified in its streams" in entry["what"]
     assert "Results are written to files and the autopilot" in flown.err
-    # of what was measured, as truth.json is; of the streams that come now, the other file
+    # This file is of the samples that were measured, as truth.json is; the other one is of the streams from now on.
     truth = json.loads((flown.folder / "truth.json").read_text())
     measured = Calibration.load(flown.folder / "calibration.json")
     now = Calibration.load(flown.folder / "calibration-on-autopilot.json")
@@ -81,5 +81,5 @@ def test_a_vehicle_that_refuses_keeps_what_it_held(flown, tmp_path):
     with pytest.raises(WriteBackError) as raised:
         list(write_to_all((SINKS["autopilot"],), measured, vehicle, tmp_path, record, lambda question: None))
     assert raised.value.exit_code == 6
-    # nothing says that anything was written
+    # No file claims that something was written.
     assert not (tmp_path / "calibration.json").exists()

@@ -38,7 +38,7 @@ def add():
 
 
 if __name__ == "__main__":
-    # what the row names is this module, and not another copy of it
+    # The row names this module, which must not be imported a second time.
     sys.modules["turntable"] = sys.modules["__main__"]
     add()
     sys.exit(run(sys.argv[1:]))

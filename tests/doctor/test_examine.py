@@ -98,7 +98,7 @@ def test_a_board_that_is_put_down_late_is_examined_as_any():
     bus = open_simulated("sim:hand=still", seed=51)
     told = {}
     for finding in examine(bus, Config(), 3.0):
-        # the first finding of the chip itself comes after the wait
+        # The finding of the chip comes after the wait.
         if finding.topic == "chip":
             bus.hear(Prompt(PromptKind.REST, ""))
         told[finding.topic] = finding

@@ -12,7 +12,7 @@ from mpucal.page.state import changes, state
 from mpucal.reasons import Reason
 from mpucal.terminal.view import View
 
-# what the page showed, each time that it changed
+# Records the page's texts at each change.
 WATCH = """() => {
   window.shown = [];
   const look = () => shown.push(Object.fromEntries(
@@ -84,7 +84,7 @@ def session(tmp_path):
         [sys.executable, "-m", "mpucal", *words], cwd=tmp_path, stdout=-1, stderr=-1, text=True
     ) as process:
         address = json.loads(process.stderr.readline())["address"]
-        # its page is there, in a process of its own
+        # The page is served by another process, which goes on.
         process.send_signal(signal.SIGSTOP)
         yield process, address, tmp_path / "board"
         process.kill()
@@ -107,11 +107,11 @@ def test_two_browsers_follow_a_session_to_its_results(chromium, tab, session):
     found = tab.inner_text("#prompt")
     assert found.startswith("Estimated error at rest: ")
     assert {one["prompt"] for one in shown} - {"", found} <= prompts
-    # the values of x, y and z, all within the width of a phone
+    # The values of x, y and z fit into the width of a phone.
     assert tab.locator("#values td:not(:empty)").count() == 12
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     assert {one["headline"] for one in shown} & turns
-    # the results outlive the session
+    # The results can be saved after the session.
     with other.expect_download() as download:
         other.click("text=calibration.json")
     assert download.value.path().read_bytes() == (folder / "calibration.json").read_bytes()

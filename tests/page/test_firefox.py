@@ -14,10 +14,11 @@ from mpucal.page.state import changes, state
 from mpucal.terminal.view import View
 
 BROWSER = shutil.which("firefox-esr") or shutil.which("firefox")
+# Any free port, and dark colours.
 PREFERENCES = {
-    "marionette.port": 0,  # any that is free
-    "layout.css.prefers-color-scheme.content-override": 0,  # dark
-    # it asks nobody for anything
+    "marionette.port": 0,
+    "layout.css.prefers-color-scheme.content-override": 0,
+    # The others keep it from using the network.
     "app.update.auto": False,
     "browser.shell.checkDefaultBrowser": False,
     "datareporting.policy.dataSubmissionEnabled": False,
@@ -27,7 +28,7 @@ PREFERENCES = {
     "services.settings.server": "data:,",
     "toolkit.telemetry.enabled": False,
 }
-# whether anything is drawn in a canvas
+# Returns true if anything is drawn in the canvas.
 DRAWN = """
 const canvas = document.getElementById('now');
 return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((v) => v > 0);

@@ -86,7 +86,7 @@ def make_board():
     return Board
 
 
-# deliberately varied: faces, edges and corners, 50 to 130 degrees apart one after the other
+# Varied orientations: faces, edges and corners, each 50 to 130 degrees from the one before.
 VARIED = (
     (1, 0, 0),
     (0, 1, 1),

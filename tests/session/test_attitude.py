@@ -16,10 +16,10 @@ from mpucal.simulated.motion import Motion
 from mpucal.simulated.sensor import SensorTruth, SiSetting
 
 STILL = np.zeros(3)
-# of the simulated hands, whose mishaps come within; a poll is 50 ms long
+# Length of a simulated session, within which the hands' mishaps happen; a poll is 50 ms long.
 SECONDS, RATE_HZ, POLL = 40.0, 100.0, 5
 GYRO_RANGE_DPS = 500.0
-# what the gyroscope may have turned besides between two meters: its noise and a drift
+# Allowance for the gyroscope's noise and drift between two meters.
 BEYOND_DEG = 20.0
 
 

@@ -282,7 +282,7 @@ def test_nobody_is_asked_twice_for_the_same_orientation(board, rotating, varied)
     rotating.overall = 0.1
     show(rotating, board, varied[:4])
     asked = [prompt.down for prompt in rotating.of(Prompt) if prompt.kind is PromptKind.ROTATE]
-    # the advice is the same each time
+    # The advice of these answers is always the same.
     assert asked.count(DOWN) >= 2
     assert all(one != other for one, other in pairwise(asked))
 

@@ -10,7 +10,7 @@ from mpucal.session.table import TRANSITIONS, IllegalEvent, State, next_state
 # The table looks at the class of an event alone.
 EVENTS = {kind.__name__: object.__new__(kind) for kind in get_args(Event)}
 
-# written out by hand: where each event leads, "" where it may not happen
+# Written by hand: the state to which each event leads, "" where it is illegal.
 EXPECTED = {
     #              connect     lay flat    rotate       verify       calibrate    write
     "Connected": ("lay flat", "", "", "", "", ""),

@@ -37,7 +37,7 @@ def test_the_missing_turn_leads_to_the_wanted_orientation(down):
     reached = Rotation.from_quat(turn.attitude, scalar_first=True)
     assert np.allclose(reached.apply(down), [0, 0, -1], atol=1e-9)
     between = np.degrees((reached * attitude.inv()).magnitude())
-    # about one of eight axes where that leads near enough, and so hardly more than the shortest turn
+    # The turn is about one of eight axes if that leads near enough, so it may exceed the shortest turn a little.
     assert turn.missing_deg - 1e-6 <= between <= turn.missing_deg + 5.0
 
 

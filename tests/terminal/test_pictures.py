@@ -87,7 +87,8 @@ def test_the_map_shows_a_direction_on_its_own_half():
     assert any("o" in row for row in upper)
     assert not any("X" in row for row in upper)
     (row,) = (row for row in lower if "X" in row)
-    assert row.index("X") > 13  # x is to the right
+    # x is to the right.
+    assert row.index("X") > 13
     assert not any("o" in row for row in lower)
 
 

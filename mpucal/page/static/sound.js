@@ -1,6 +1,6 @@
 // Speech, tones and vibration. They are off until a tap, as browsers require.
 
-// pitch [Hz], begin and length [s] of each note; vibration [ms]
+// Pitch [Hz], begin and length [s] of each note; vibration [ms].
 const TONES = {
   hold: { notes: [[660, 0, 0.09]], buzz: [40] },
   taken: { notes: [[660, 0, 0.1], [990, 0.11, 0.16]], buzz: [80] },
