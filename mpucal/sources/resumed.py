@@ -40,21 +40,9 @@ class ResumedChip:
     plan: Plan
     recovered: str | None
     capture_name: str
-
-    @property
-    def truth(self) -> Mapping[str, Any] | None:
-        """See OpenedSource."""
-        return self.live.truth
-
-    @property
-    def real_time(self) -> bool:
-        """See OpenedSource."""
-        return self.live.real_time
-
-    @property
-    def resumable(self) -> bool:
-        """See OpenedSource."""
-        return True
+    truth: Mapping[str, Any] | None
+    real_time: bool
+    resumable: bool = True
 
     @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]:
@@ -149,4 +137,6 @@ def open_resumed(folder: Path) -> ResumedChip:
         plan,
         recovered[-1] if recovered else None,
         CAPTURE.numbered(len(files) + 1),
+        live.truth,
+        live.real_time,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -40,75 +40,59 @@ SOURCE_VERSION = 4
 NOTE_IDS = 65535
 
 
+@dataclass
 class OpenedVehicle:
     """Vehicle behind a transport; see OpenedSource.
 
-    Parameters
-    ----------
-    transport : open. plan : of the session; only the rate of its `config` applies. system : number of the vehicle.
-    key : signing key, or None. listeners : receive the prompts besides the vehicle.
-    own_system : MAVLink id of mpucal. writes : True if the result will be written to the vehicle.
-    prepare : True to prepare a PX4; see Preparation.
-    truth : returns the true parameters of a simulated vehicle's streams. replay : the same transport if it is a replay.
-    real_time : see OpenedSource.
-
     Attributes
     ----------
-    link : to the vehicle, while it measures.
+    transport : open. plan : of the session; only the rate of its `config` applies. system : number of the vehicle.
+    key : signing key, or None. own_system : MAVLink id of mpucal.
+    listeners : receive the prompts; the vehicle itself is the first of them.
+    read_truth : returns the true parameters of a simulated vehicle's streams.
+    replay : the same transport if it is a replay. writes : True if the result will be written to the vehicle.
+    prepare : True to prepare a PX4; see Preparation. link : to the vehicle, while it measures.
     """
 
-    capture_name = CAPTURE_OF_VEHICLE.name
-    resumable = False
+    transport: Transport
+    plan: Plan
+    system: int | None = None
+    key: bytes | None = None
+    _: KW_ONLY
+    listeners: Sequence[Callable[[Prompt], None]] = ()
+    read_truth: Callable[[], Mapping[str, Any] | None] = lambda: None
+    replay: TlogReplay | None = None
+    recovered: str | None = None
+    real_time: bool = True
+    own_system: int = OWN_SYSTEM
+    writes: bool = False
+    prepare: bool = False
+    link: Link | None = None
+    capture_name: str = CAPTURE_OF_VEHICLE.name
+    resumable: bool = False
 
-    def __init__(
-        self,
-        transport: Transport,
-        plan: Plan,
-        system: int | None = None,
-        key: bytes | None = None,
-        *,
-        listeners: Sequence[Callable[[Prompt], None]] = (),
-        truth: Callable[[], Mapping[str, Any]] | None = None,
-        replay: TlogReplay | None = None,
-        recovered: str | None = None,
-        real_time: bool = True,
-        own_system: int = OWN_SYSTEM,
-        writes: bool = False,
-        prepare: bool = False,
-    ) -> None:
-        self.plan = plan
-        self.listeners = (self._prompt, *listeners)
-        self._truth = truth
-        self.recovered = recovered
-        self.real_time = real_time and replay is None
-        self.link: Link | None = None
-        self._transport = transport
-        self._system = system
-        self._key = key
-        self._replay = replay
-        self._own_system = own_system
-        self._writes = writes
-        self._prepare = prepare
+    def __post_init__(self) -> None:
+        self.listeners = (self._send_prompt, *self.listeners)
 
     @property
     def truth(self) -> Mapping[str, Any] | None:
         """True parameters of the streams, under the vehicle's present parameters."""
-        return None if self._truth is None else self._truth()
+        return self.read_truth()
 
     def talk(self, person: Operator) -> Operator:
         """See OpenedSource."""
-        return person if self._replay is None else ReplayedOperator(person, self._pending)
+        return person if self.replay is None else ReplayedOperator(person, self._pending)
 
     @contextmanager
     def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[ActiveSource]:
         """See OpenedSource."""
-        with closing(self._transport), TlogWriter(capture) as writer:
-            link = self.link = Link(self._transport, writer.packet, self._key, self._own_system)
+        with closing(self.transport), TlogWriter(capture) as writer:
+            link = self.link = Link(self.transport, writer.packet, self.key, self.own_system)
             notes = _NoteRecorder(link)
-            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system, PREPARE: self._prepare}
+            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self.system, PREPARE: self.prepare}
             notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
             rate_hz = self.plan.config.rate_hz
-            source = VehicleSource(link, rate_hz, self._system, say, capture.name, self._writes, self._prepare)
+            source = VehicleSource(link, rate_hz, self.system, say, capture.name, self.writes, self.prepare)
             try:
                 yield ActiveSource(source, notes.keep, late=self._was_late)
             finally:
@@ -125,11 +109,11 @@ class OpenedVehicle:
         ------
         UsageError : a .tlog, or several vehicles. NoAnswer, LinkError : see Link.
         """
-        if self._replay is not None:
+        if self.replay is not None:
             raise UsageError("a .tlog is not a vehicle that can be written to", "give the vehicle's --mavlink URL")
-        with closing(self._transport):
-            link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key, self._own_system)
-            lock_to_vehicle(link, self._system, say)
+        with closing(self.transport):
+            link = self.link = Link(self.transport, lambda _t_ns, _packet: None, self.key, self.own_system)
+            lock_to_vehicle(link, self.system, say)
             yield link
 
     def contents(self) -> dict[str, Any]:
@@ -142,7 +126,7 @@ class OpenedVehicle:
                 "parameters": dict(read_stream_parameters(link, firmware)),
             }
 
-    def _prompt(self, prompt: Prompt) -> None:
+    def _send_prompt(self, prompt: Prompt) -> None:
         """Send the prompt to the vehicle, so that its log contains it."""
         if self.link is not None:
             # The operator gets the prompt even if the vehicle is gone.
@@ -150,12 +134,12 @@ class OpenedVehicle:
                 self.link.send(encode_prompt(prompt))
 
     def _was_late(self, late: bool) -> bool:
-        return late if self._replay is None else bool(self._pending(LATE))
+        return late if self.replay is None else bool(self._pending(LATE))
 
     def _pending(self, name: str) -> Sequence[SessionEvent]:
-        if self._replay is None:
+        if self.replay is None:
             return []
-        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self._replay.pending(name)]
+        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self.replay.pending(name)]
 
 
 @dataclass(frozen=True)
@@ -268,8 +252,15 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | Op
     try:
         plan = dict(head.data[PLAN])
         made = Plan(**{**plan, "config": RateOnlyConfig(**plan["config"])})
-        prepare = bool(head.data.get(PREPARE))
-        return OpenedVehicle(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered, prepare=prepare)
+        return OpenedVehicle(
+            replay,
+            made,
+            head.data[SYSTEM],
+            replay=replay,
+            recovered=tlog.recovered,
+            real_time=False,
+            prepare=bool(head.data.get(PREPARE)),
+        )
     except (KeyError, TypeError, ValueError) as error:
         raise CaptureError(
             f"the head of {tlog.name} does not describe its session ({error})", "use `mpucal calibrate` on it"

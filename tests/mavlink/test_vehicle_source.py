@@ -244,7 +244,7 @@ def test_a_px4_that_was_prepared_names_its_sensors_and_holds_its_offsets(opened)
 
 def test_the_truth_after_a_preparation_is_that_of_the_recording(tmp_path):
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,CAL_ACC0_ID=0"))
-    opened = OpenedVehicle(SimulatedTransport(vehicle), Plan(), truth=vehicle.truth_document, prepare=True)
+    opened = OpenedVehicle(SimulatedTransport(vehicle), Plan(), read_truth=vehicle.truth_document, prepare=True)
     fresh = opened.truth
     with opened.measuring(tmp_path / "capture.tlog", lambda text: None, "") as measuring:
         measuring.source.start()

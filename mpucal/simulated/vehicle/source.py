@@ -23,7 +23,7 @@ def open_source(request: Request) -> OpenedVehicle:
         request.plan,
         system,
         key,
-        truth=vehicle.truth_document,
+        read_truth=vehicle.truth_document,
         real_time=transport.real_time,
         **link_identity(request),
     )

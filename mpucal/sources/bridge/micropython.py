@@ -9,7 +9,7 @@ from pathlib import Path
 from ...errors import BusError
 from .frame import DELIMITER, Frame
 from .messages import Hello, Leave
-from .port import Chunk, Port, SerialPort
+from .port import Port, SerialPort
 from .repl import RawRepl
 
 PROGRAM = Path(__file__).with_name("board.py")
@@ -34,27 +34,13 @@ class MicroPythonPort:
         self._port: Port = SerialPort(text, BAUDS) if isinstance(text, str) else text
         self.name, self.bauds = self._port.name, self._port.bauds[:1]
         self._pins = tuple(pins)
+        self.now_ns, self.read, self.write = self._port.now_ns, self._port.read, self._port.write
+        self.set_baud = self._port.set_baud
         try:
             self.revive(self.now_ns() + ENTER_NS)
         except BaseException:
             self._port.close()
             raise
-
-    def now_ns(self) -> int:
-        """See Port."""
-        return self._port.now_ns()
-
-    def read(self, until_ns: int) -> Chunk | None:
-        """See Port."""
-        return self._port.read(until_ns)
-
-    def write(self, data: bytes) -> None:
-        """See Port."""
-        self._port.write(data)
-
-    def set_baud(self, baud: int) -> None:
-        """See Port."""
-        self._port.set_baud(baud)
 
     def reopen(self, until_ns: int) -> None:
         """Open the port again and restart the bridge, which a board that was off has lost."""
