@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import calibrate, weigh
+from mpucal.calibration import calibrate, estimate
 from mpucal.calibration.evidence import Evidence
 from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
@@ -251,7 +251,7 @@ def test_six_faces_by_hand_are_usable(hand):
 
 
 def test_what_is_claimed_to_be_useless_is_refused_whatever_the_claim_rests_on(hand):
-    evidence, _ = weigh(hand(0, "pose6").recording, "auto", G)
+    evidence, _ = estimate(hand(0, "pose6").recording, "auto", G)
     wide = 1.0 / evidence.sure.rms_mps2
     claim = replace(evidence.claim, left_out=replace(evidence.claim.left_out, time=wide * evidence.claim.model))
     quality = judge(
@@ -558,7 +558,7 @@ def test_before_there_is_anything_to_judge_only_that_is_said(good):
     "spoilt", [{"D": np.diag([1.0, 1.0, 0.0])}, {"covariance": np.full((HAND, HAND), np.nan)}], ids=list
 )
 def test_an_estimate_of_which_nothing_is_sure_is_refused(in_hand, spoilt):
-    evidence, _ = weigh(in_hand.recording, "hand", G)
+    evidence, _ = estimate(in_hand.recording, "hand", G)
     quality = judge(replace(evidence, fit=replace(evidence.fit, **spoilt)))
     assert quality["verdict"] == "refused"
     assert "few_orientations" in [reason["code"] for reason in quality["reasons"]]
@@ -636,3 +636,24 @@ def test_a_bias_that_stepped_at_the_only_rest_is_refused(hand):
     stepped = judged(replace(lying, acc=lying.acc - np.outer(lying.t > 8.0, (0.0, 0.0, 2.0))))
     assert stepped.verdict == "refused"
     assert "bias moved by 19" in stepped.reasons["zero_moved"]
+
+
+def test_shaking_that_follows_and_clips_is_left_out(hand):
+    calm = hand(4, "pose12").recording
+    rng = np.random.default_rng(4)
+    n = 1000
+    shaking = np.cumsum(rng.normal(0.0, 1.0, (n, 3)), axis=0)
+    end = calm.t[-1] + 0.01 * (1 + np.arange(n))
+    limit = np.radians(500.0)
+    recording = Recording.from_arrays(
+        np.concatenate([calm.t, end]),
+        np.concatenate([calm.acc, calm.acc[-1] + 2.0 * shaking]),
+        np.concatenate([calm.gyr, np.clip(shaking, -limit, limit)]),
+    )
+    assert (np.abs(recording.gyr) >= limit).any()
+    clipped = replace(recording, gyr_clipped=(np.abs(recording.gyr) >= limit).any(1))
+    calibration = calibrate(clipped, "auto", G)
+    assert calibration.quality["verdict"] == "good"
+    assert "what follows" in calibration.fit["why"]
+    alone = calibrate(calm, "auto", G)
+    assert np.abs((calibration.D - alone.D) / alone.D_std).max() < 1.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import calibrate, weigh
+from mpucal.calibration import calibrate, estimate
 from mpucal.calibration.claim import claim_of
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.jackknife import _moved, jackknife
@@ -51,13 +51,13 @@ def test_the_parts_scores_sum_to_the_whole(hand, made, parameters, block):
 
 @pytest.mark.parametrize("motion", ["continuous", "pose12"])
 def test_where_the_model_holds_it_claims_no_more_than_the_model(hand, motion):
-    inflations = [weigh(hand(seed, motion).recording, "auto", G)[0].claim.inflation for seed in range(3)]
+    inflations = [estimate(hand(seed, motion).recording, "auto", G)[0].claim.inflation for seed in range(3)]
     assert np.median(inflations) < 1.3
 
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
 def test_a_side_that_no_other_makes_up_for_says_little(hand, seed):
-    claim = weigh(hand(seed, "pose7").recording, "auto", G)[0].claim
+    claim = estimate(hand(seed, "pose7").recording, "auto", G)[0].claim
     # leaving a side out moves the estimate by 15 times as much
     assert 0.0 < claim.left_out.claim() < 5.0 * claim.model
 
@@ -88,7 +88,7 @@ def test_a_nonlinear_sensor_is_claimed_by_its_sides(hand):
 
 
 def test_where_too_few_sides_were_down_to_be_compared_the_model_is_believed_half(hand):
-    fit = weigh(hand(1, "continuous").recording, "hand", G)[0].fit
+    fit = estimate(hand(1, "continuous").recording, "hand", G)[0].fit
     alike = np.zeros_like(fit.parts.side)
     sides = claim_of(fit, G, None, 0.0), claim_of(replace(fit, parts=replace(fit.parts, side=alike)), G, None, 0.0)
     assert sides[1].left_out.side == 0.0

@@ -179,6 +179,6 @@ def test_a_mask_saves_what_a_clipped_gyroscope_would_spoil(hand, monkeypatch):
     clipped = replace(recording, gyr=np.clip(recording.gyr, -limit, limit))
     assert 20 < (np.abs(clipped.gyr) == limit).any(1).sum() < 400
     saved = calibrate(clipped, "hand", truth.gravity)
-    monkeypatch.setattr("mpucal.calibration.with_masks", lambda recording: recording)
+    monkeypatch.setattr("mpucal.calibration.estimation.with_masks", lambda recording: recording)
     blind = calibrate(clipped, "hand", truth.gravity)
     assert sph_rms(truth, saved.D, saved.b_a) < 0.5 * sph_rms(truth, blind.D, blind.b_a)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import weigh
+from mpucal.calibration import estimate
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.rotation import rotation
 from mpucal.calibration.walks import STEPS, Walk, _walk, likeliest_walk
@@ -14,14 +14,14 @@ G = 9.82
 
 
 def walk_of(recording):
-    evidence, _ = weigh(recording, "auto", G)
+    evidence, _ = estimate(recording, "auto", G)
     return likeliest_walk(evidence.fit.parts, evidence.fit.D)
 
 
 @pytest.mark.parametrize("motion", ["continuous", "wobble30", "wobble100", "pose12", "calm jerks"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_sensor_that_stays_the_same_does_not_walk(hand, motion, seed):
-    evidence, _ = weigh(hand(seed, motion).recording, "auto", G)
+    evidence, _ = estimate(hand(seed, motion).recording, "auto", G)
     assert evidence.claim.change is None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...calibration import weigh
+from ...calibration import estimate
 from ...calibration.checks import found
 from ...calibration.evidence import Evidence
 from ...calibration.interim import InterimEstimate, interim_estimate
@@ -88,7 +88,7 @@ class Fits:
 
     def _try(self) -> Event:
         recording = self._store.recording()
-        evidence, _ = weigh(recording, self._plan.model, self._plan.gravity)
+        evidence, _ = estimate(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
         reasons = found(evidence)
         return Tried(verdict(reasons), _most_specific_reason(reasons, evidence.recording))

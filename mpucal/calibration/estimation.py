@@ -1,0 +1,128 @@
+"""The estimate of a recording: with the gyroscope, from the rests alone, or from the part before it was shaken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
+from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..errors import WrongValue
+from ..reasons import OF_RESTS, Reason
+from ..rests.flat import Flat, find_flat, flat_statistics, tells
+from ..rests.intervals import RestFinder
+from .checks import found, gyroscope_at_fault, unusable_for_a_fit
+from .checks.unusable import no_gyroscope
+from .claim import claim_of, claimed
+from .evidence import Evidence
+from .lone_jumps import without_lone_jumps
+from .masks import reset, with_masks
+from .model_selection import METHODS, Choice, choose
+from .static import fit_static
+from .walks import Walk, likeliest_walk, without_walk
+
+MODELS = ("auto", *METHODS)
+NOTHING = {"why": "nothing could be estimated"}
+# Each walk is what is left of a drift after the one before; it must make the recording as much likelier.
+MOST_WALKS, LEAST_GAIN = 3, 10.0
+
+
+def estimate(
+    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2, gravity_anyway: bool = False
+) -> tuple[Evidence, Mapping[str, str]]:
+    """Estimate as `calibrate` does; return the evidence, with the fit and its covariance, and the model and why.
+
+    Where the gyroscope is at fault and the rests suffice, the estimate is of the rests alone. Where a sensor was at the
+    end of its range and the part before is good by itself, the estimate is of that part.
+
+    Raises
+    ------
+    WrongValue : no such model, or a gravity that is none.
+    """
+    if model not in tuple(MODELS):  # which takes what has no hash
+        raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
+    if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
+        raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
+    before = Evidence(recording, gravity, None, None, model, gravity_anyway=gravity_anyway)
+    of_all = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
+    if model != "auto":
+        return of_all
+    at_fault = gyroscope_at_fault(of_all[0])
+    other = _before_it_clipped(of_all[0]) if at_fault is None else _of_rests(before, at_fault)
+    return other or of_all
+
+
+def _before_it_clipped(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
+    """Return the estimate up to the last rest before a sensor was at the end of its range; None if it is not good."""
+    recording, flat = evidence.recording, evidence.flat
+    clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
+    if flat is None or not len(clipped):
+        return None
+    ends = RestFinder(recording, flat).alike()[:, 1]
+    calm = recording.part(0, int(ends[ends <= clipped[0]].max(initial=0)))
+    if len(calm) <= flat.last:
+        return None
+    of_calm, chosen = _with_gyroscope(replace(evidence, recording=calm, flat=None, fit=None, model="auto", claim=None))
+    if of_calm.fit is None or found(of_calm):
+        return None
+    seconds = calm.t[-1] - calm.t[0]
+    left_out = f"; a sensor was at the end of its range later, and what follows {seconds:.1f} s is left out"
+    return of_calm, {**chosen, "why": chosen["why"] + left_out}
+
+
+def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str, str]] | None:
+    """The estimate from the rests alone; None where they do not suffice."""
+    recording = with_masks(before.recording)
+    segment = recording.flat or find_flat(recording)
+    if segment is None or not tells(recording, segment):
+        return None
+    flat = flat_statistics(recording, segment)
+    fit = fit_static(recording, flat, before.gravity)
+    usable = replace(at_fault, what=at_fault.what + OF_RESTS, refuse=False)
+    evidence = replace(before, recording=recording, flat=flat, fit=fit, model="static", gyroscope=usable)
+    if any(reason.refuse for reason in found(evidence)):
+        return None
+    return evidence, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
+
+
+def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
+    recording, gravity, model = before.recording, before.gravity, before.model
+    # an acceleration that jumps alone may be a knock, which the fit weighs itself
+    recording = replace(with_masks(recording), gyr=without_lone_jumps(recording).gyr)
+    segment = recording.flat or find_flat(recording)
+    flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
+    over = None if flat is None else reset(recording, flat)
+    if over is not None:
+        recording = recording.part(0, over)
+    before = replace(before, recording=recording, flat=flat)
+    if flat is None or unusable_for_a_fit(before):
+        return before, NOTHING | {"model": model}
+    choice, walk = _fit(recording, flat, gravity, model)
+    claim = claim_of(choice.fit, gravity, walk, choice.walked)
+    evidence = replace(before, fit=claimed(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
+    left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
+    return evidence, {"model": choice.model, "why": choice.why + (left_out if over is not None else "")}
+
+
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, Walk | None]:
+    """The fit, with a gyroscope's bias that walked while the board was turned taken away, and the walk that is left."""
+    choice, walk = _fit_once(recording, flat, gravity, model)
+    for _ in range(MOST_WALKS):
+        if walk is None or walk.what != "gyroscope" or not choice.fit.converged:
+            break
+        without, left = _fit_once(without_walk(choice.recording, flat, walk), flat, gravity, model)
+        if not without.fit.V < choice.fit.V - LEAST_GAIN:
+            break
+        choice, walk = without._replace(walked=without.walked + choice.walked + walk.q), left
+    return choice, walk
+
+
+def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, Walk | None]:
+    if model == "auto":
+        choice = choose(recording, flat, gravity)
+    else:
+        choice = Choice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
+    fit = choice.fit
+    return choice, None if fit.parts is None else likeliest_walk(fit.parts, fit.D)
