@@ -26,7 +26,7 @@ def calibration(tmp_path):
     made.save(tmp_path / "c.json")
 
 
-def test_it_is_recorded_and_shown(mpucal, capture):
+def test_a_recording_of_the_accelerometer_alone_is_shown(mpucal, capture):
     shown = json.loads(mpucal("show", capture, "--json").out)
     assert shown["samples"] == pytest.approx(2000, abs=40)
     assert shown["rate_hz"] == pytest.approx(4000, rel=0.01)
@@ -49,7 +49,7 @@ def test_a_calibration_is_applied_to_it(mpucal, capture, calibration, target):
     assert json.loads(result.out)["mean_after_mps2"] == pytest.approx(9.80665, abs=0.01)
 
 
-def test_it_is_streamed_without_rates(mpucal, calibration):
+def test_the_accelerometer_alone_is_streamed_without_rates(mpucal, calibration):
     words = ("stream", *FAST, "--apply", "c.json", "--seconds", "0.05")
     lines = mpucal(*words).out.splitlines()
     assert lines[0] == "t,ax,ay,az,utc_s"
@@ -58,7 +58,7 @@ def test_it_is_streamed_without_rates(mpucal, calibration):
     assert sample["w"] is sample["temperature_c"] is None
 
 
-def test_it_is_no_calibration(mpucal, capture):
+def test_the_accelerometer_alone_cannot_be_calibrated(mpucal, capture):
     result = mpucal("calibrate", capture, "--json")
     assert result.code == 5
     (reason,) = json.loads(result.out)["quality"]["reasons"]
@@ -67,7 +67,7 @@ def test_it_is_no_calibration(mpucal, capture):
 
 
 @pytest.mark.parametrize("command", ["session", "doctor"])
-def test_what_needs_the_gyroscope_says_so(mpucal, command):
+def test_commands_that_need_the_gyroscope_refuse(mpucal, command):
     result = mpucal(command, *FAST)
     assert result.code == 2
     assert result.err == (

@@ -138,7 +138,7 @@ def test_b_a_follows_the_temperature(mpucal, session, calibration):
 
 
 @pytest.mark.parametrize(("ending", "code"), [(".npz", 2), (".mcap", 3)])
-def test_what_is_calibrated_already_is_refused(mpucal, session, calibration, ending, code):
+def test_calibrated_recordings_are_refused(mpucal, session, calibration, ending, code):
     mpucal("apply", "c.json", session.folder, "-o", f"out{ending}")
     again = mpucal("apply", "c.json", f"out{ending}", "-o", "twice.npz")
     assert again.code == code
@@ -188,7 +188,7 @@ def test_nothing_is_written_over_the_capture_in_the_folder(mpucal, session, cali
     "words",
     [("export", "c.json", "--to", "c-header", "-o", "c.json"), ("merge", "calibration.json", "c.json", "-o", ".")],
 )
-def test_nothing_is_written_over_a_calibration_that_it_is_made_of(mpucal, calibration, words):
+def test_an_input_calibration_is_not_overwritten(mpucal, calibration, words):
     shutil.copy("c.json", "calibration.json")
     before = Path("c.json").read_bytes()
     result = mpucal(*words)
@@ -200,5 +200,5 @@ def test_nothing_is_written_over_a_calibration_that_it_is_made_of(mpucal, calibr
     "words",
     [("apply", "c.json", "walk.npz"), ("apply", "none.json", "walk.npz"), ("apply", "c.json", "x.txt", "-o", "y.csv")],
 )
-def test_what_is_not_there_is_3(mpucal, calibration, words):
+def test_missing_files_are_exit_code_3(mpucal, calibration, words):
     assert mpucal(*words).code == 3

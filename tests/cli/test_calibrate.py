@@ -60,7 +60,7 @@ def contents(folder):
 
 
 @pytest.mark.parametrize(("change", "sentence"), UNREADABLE.values(), ids=UNREADABLE.keys())
-def test_what_is_no_recording_is_3(mpucal, tmp_path, change, sentence):
+def test_files_without_a_recording_are_exit_code_3(mpucal, tmp_path, change, sentence):
     np.savez(tmp_path / "walk.npz", **change(turning()))
     result = mpucal("calibrate", "walk.npz")
     assert result.code == 3
@@ -79,7 +79,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("change", "code"), REFUSED.values(), ids=REFUSED.keys())
-def test_what_cannot_be_calibrated_is_refused_with_its_reason(mpucal, tmp_path, change, code):
+def test_a_refusal_has_its_reason(mpucal, tmp_path, change, code):
     np.savez(tmp_path / "walk.npz", **change(turning()))
     result = mpucal("calibrate", "walk.npz", "--json", "-o", "out")
     assert result.code == 5
@@ -100,7 +100,7 @@ def test_what_cannot_be_calibrated_is_refused_with_its_reason(mpucal, tmp_path, 
     ],
     ids=["g and deg/s", "NaN", "stamps of arrival"],
 )
-def test_what_a_recording_lacks_is_made_up_for_and_said(mpucal, tmp_path, change, says):
+def test_odd_units_gaps_and_time_stamps_are_corrected_with_a_message(mpucal, tmp_path, change, says):
     arrays = change(turning())
     np.savez(tmp_path / "walk.npz", **{**arrays, "t": np.maximum.accumulate(arrays["t"])})
     result = mpucal("calibrate", "walk.npz", "--json")
@@ -120,7 +120,7 @@ def test_what_a_recording_lacks_is_made_up_for_and_said(mpucal, tmp_path, change
     ],
 )
 @pytest.mark.parametrize("command", ["calibrate", "show"])
-def test_what_cannot_be_read_is_3(mpucal, tmp_path, command, file, sentence):
+def test_unreadable_files_are_exit_code_3(mpucal, tmp_path, command, file, sentence):
     for name in ("text.mcap", "text.npz", "text.docx"):
         (tmp_path / name).write_text("hello")
     result = mpucal(command, file)
@@ -129,7 +129,7 @@ def test_what_cannot_be_read_is_3(mpucal, tmp_path, command, file, sentence):
     assert "Traceback" not in result.err
 
 
-def test_writes_only_where_it_is_told_to(mpucal, tmp_path):
+def test_writes_only_into_the_given_folder(mpucal, tmp_path):
     np.savez(tmp_path / "walk.npz", **turning())
     result = mpucal("calibrate", "walk.npz", "-o", "out/deep")
     assert result.code == 0, result.out
@@ -153,7 +153,7 @@ def test_a_session_s_folder_is_its_capture(mpucal, session):
     assert offline["accelerometer"]["D"] == online["accelerometer"]["D"]
 
 
-def test_a_capture_cut_short_says_how_much_it_holds(mpucal, session, tmp_path):
+def test_a_truncated_capture_is_read_with_a_message(mpucal, session, tmp_path):
     data = (session.folder / "capture.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: int(0.8 * len(data))])
     result = mpucal("calibrate", "cut.mcap")
@@ -186,7 +186,7 @@ def test_a_folder_is_one_recording_s(mpucal, session, tmp_path):
         assert contents(folder) == before
 
 
-def test_what_a_check_updates_goes_beside_no_capture(mpucal, session):
+def test_an_updated_calibration_is_not_written_beside_a_capture(mpucal, session):
     """The capture may even be that which the calibration was made from."""
     calibration = session.folder / "calibration.json"
     copy, words = Path("copy.json"), ("check", "copy.json", session.folder / "capture.mcap")

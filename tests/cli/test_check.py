@@ -43,9 +43,7 @@ def test_of_a_sensor_in_half_a_minute_with_its_biases_updated(mpucal, calibratio
         assert mpucal("check", calibration, *words).out.splitlines()[0] == told.out.splitlines()[0]
 
 
-def test_a_changed_one_is_updated_or_merged_only_by_force_and_what_is_made_of_it_says_so(
-    mpucal, session, calibration, tmp_path
-):
+def test_a_changed_calibration_is_used_only_with_force_and_its_outputs_say_so(mpucal, session, calibration, tmp_path):
     spoilt = tmp_path / "spoilt.json"
     document = json.loads(calibration.read_text())
     document["accelerometer"]["b_a"][0] += 1e-9
@@ -72,7 +70,7 @@ def test_of_another_sensor(mpucal, calibration, tmp_path):
     assert not (tmp_path / "other" / "calibration.json").exists()
 
 
-def test_what_it_is_checked_by_is_one_thing(mpucal, calibration):
+def test_check_takes_exactly_one_recording_or_source(mpucal, calibration):
     assert mpucal("check", calibration).code == 2
     assert mpucal("check", calibration, "walk.npz", "--bus", "sim").code == 2
     assert mpucal("check", calibration, "walk.npz", "--to", "chip").code == 2

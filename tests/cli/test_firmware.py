@@ -50,7 +50,7 @@ def test_the_library_is_written_whole(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("board", "baud"), [("uno", "115200"), ("nano-old", "57600")])
-def test_avrdude_is_told_what_to_write(installed, programs, board, baud):
+def test_avrdude_gets_the_image_and_the_port(installed, programs, board, baud):
     program(programs, 0)
     assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 0
     said = (programs / "said").read_text().split()

@@ -75,7 +75,7 @@ def test_a_full_disk_behind_stdout_is_3(mpucal, tmp_path, monkeypatch):
         (OSError(errno.EMFILE, "Too many open files"), "cannot use a file or device (Too many open files)"),
     ],
 )
-def test_what_the_computer_refuses_is_3(mpucal, monkeypatch, error, said):
+def test_errors_of_the_computer_are_exit_code_3(mpucal, monkeypatch, error, said):
     def refused(*_words):
         raise error
 

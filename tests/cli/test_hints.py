@@ -40,7 +40,7 @@ def table(recording, tmp_path):
     [("show", "odd.csv", "--json"), ("apply", "c.json", "odd.csv", "-o", "out.npz", "--json")],
     ids=lambda w: w[0],
 )
-def test_every_command_is_told_the_columns_and_the_span(words, mpucal, table, recording):
+def test_every_command_takes_columns_and_span(words, mpucal, table, recording):
     assert mpucal(*words).code == 3
     done = mpucal(*words, *SAID)
     assert done.code == 0, done.err
@@ -55,7 +55,7 @@ def test_a_device_needs_no_columns(mpucal):
     assert "--columns and --rate say how a file is read, and a device was given" in done.err
 
 
-def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
+def test_a_batch_takes_hints_by_pattern(table, recording, tmp_path):
     (tmp_path / "hints").write_text(f"# those of the old logger\n\nodd*.csv {shlex.join(SAID)}\n*.txt --rate 100\n")
     by_pattern = read_hints_file(tmp_path / "hints")
     settings = Settings("accel", 9.80665, by_pattern=by_pattern)
@@ -70,7 +70,7 @@ def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
 
 
 @pytest.mark.parametrize("line", ["*.csv --units acc=feet", "*.csv --rate", "*.csv 'open", "*.csv more"])
-def test_a_line_that_is_no_hint_is_named(line, tmp_path):
+def test_a_bad_line_of_hints_is_named(line, tmp_path):
     (tmp_path / "hints").write_text(f"*.txt --rate 100\n{line}\n")
     with pytest.raises(UsageError, match="line 2 is not a pattern with options"):
         read_hints_file(tmp_path / "hints")

@@ -33,7 +33,7 @@ def board(measured, tmp_path):
     return tmp_path
 
 
-def test_a_session_writes_to_it_by_default_and_records_its_effect(measured):
+def test_a_session_writes_to_the_new_sink_by_default_and_records_its_effect(measured):
     folder, done = measured
     assert done.code == 0, done.err
     assert "Results are written to files and the logbook (change with --to or --no-write)." in done.err
@@ -48,21 +48,21 @@ def test_a_session_writes_to_it_by_default_and_records_its_effect(measured):
     assert "`mpucal write board/logbook-old.txt logbook ...` restores it" in done.err
 
 
-def test_a_session_leaves_it_alone_where_told_to(call, tmp_path):
+def test_no_write_leaves_the_sink_alone(call, tmp_path):
     done = call(tmp_path, "session", *SIM, "--tilt-only", "-o", "board", "--no-write")
     assert done.code == 0, done.err
     assert not (tmp_path / "logbook.txt").exists()
     assert not (tmp_path / "board" / "calibration-on-logbook.json").exists()
 
 
-def test_it_is_written_to_among_others_in_the_order_of_the_table(call, tmp_path):
+def test_several_sinks_are_written_in_the_order_of_the_table(call, tmp_path):
     done = call(tmp_path, "session", *SIM, "--tilt-only", "-o", "board", "--to", "logbook", "--to", "chip")
     assert done.code == 0, done.err
     written = Calibration.load(tmp_path / "board" / "calibration.json").extra["written"]
     assert [entry["to"] for entry in written] == ["chip", "logbook"]
 
 
-def test_a_calibration_is_written_and_what_was_there_comes_back(call, board):
+def test_a_calibration_is_written_and_the_previous_state_restored(call, board):
     first = (board / "logbook.txt").read_text()
     Calibration(np.eye(3), np.array([0.5, 0.0, 0.0])).save(board / "later.json")
     written = call(board, "write", "later.json", "logbook", "--bus", "sim", "--ink", "--json")
@@ -78,7 +78,7 @@ def test_a_calibration_is_written_and_what_was_there_comes_back(call, board):
     assert (board / "logbook-old-2.txt").read_text() == "b_a: [0.5, 0.0, 0.0]\n"
 
 
-def test_what_cannot_be_recorded_is_undone(call, board):
+def test_a_write_that_cannot_be_recorded_is_undone(call, board):
     before = (board / "logbook.txt").read_text()
     (board / "board" / "calibration-on-logbook.json").unlink()
     (board / "board" / "calibration-on-logbook.json").mkdir()
@@ -115,7 +115,7 @@ def test_the_help_names_it(call, tmp_path, command):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_wrong_usage_is_told_with_its_name(call, tmp_path, words, says):
+def test_usage_errors_name_the_new_sink(call, tmp_path, words, says):
     done = call(tmp_path, *words)
     assert done.code == 2
     assert says in " ".join(done.err.split())

@@ -30,7 +30,7 @@ def measured(tmp_path_factory, process):
     return folder
 
 
-def test_a_session_runs_on_it_and_its_capture_names_it(measured):
+def test_a_session_runs_on_the_new_source_and_its_capture_names_it(measured):
     assert Calibration.load(measured / "board" / "calibration.json").quality["verdict"] == "good"
     meta = read_capture(measured / "board" / "capture.mcap").meta
     assert meta["source"] == {"turntable": "round", "arm_length": 0.25}
@@ -53,13 +53,13 @@ def test_a_session_that_broke_off_goes_on_with_it(call, measured, write_capture,
     assert read_capture(tmp_path / "board" / "capture-2.mcap").meta["source"] == whole.meta["source"]
 
 
-def test_it_is_recorded(call, tmp_path):
+def test_the_new_source_is_recorded(call, tmp_path):
     done = call(tmp_path, "record", *TURNTABLE, "--seconds", "3", "-o", "walk.mcap")
     assert done.code == 0, done.err
     assert call(tmp_path, "show", "walk.mcap").out.startswith("walk.mcap: a recording.")
 
 
-def test_it_streams(call, measured, tmp_path):
+def test_the_new_source_is_streamed(call, measured, tmp_path):
     calibration = measured / "board" / "calibration.json"
     done = call(tmp_path, "stream", *TURNTABLE, "--apply", calibration, "--seconds", "2", "--json")
     assert done.code == 0, done.err
@@ -109,7 +109,7 @@ def test_the_help_names_it(call, tmp_path, command):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_what_is_wrong_is_told_with_its_name(call, tmp_path, words, code, says):
+def test_usage_errors_name_the_new_source(call, tmp_path, words, code, says):
     done = call(tmp_path, *words)
     assert done.code == code
     assert says in done.err

@@ -57,7 +57,7 @@ def test_of_a_sensor_for_some_hours(mpucal):
     assert document["accelerometer"]["data_sheet"]["white_noise"] == pytest.approx(2.77e-3, rel=0.01)
 
 
-def test_ctrl_c_keeps_what_there_is(mpucal, monkeypatch):
+def test_ctrl_c_keeps_the_result_so_far(mpucal, monkeypatch):
     from mpucal.allan import NoiseMeter
 
     add, calls = NoiseMeter.add, []
@@ -74,6 +74,6 @@ def test_ctrl_c_keeps_what_there_is(mpucal, monkeypatch):
     assert json.loads(told.out)["samples"] == sum(calls)
 
 
-def test_one_thing_is_measured(mpucal):
+def test_noise_takes_exactly_one_recording_or_source(mpucal):
     assert mpucal("noise").code == 2
     assert mpucal("noise", "lying.npz", "--bus", "sim").code == 2

@@ -36,7 +36,7 @@ def joined(write_capture, folder, names):
     return write_capture(folder.parent / "joined.mcap", captures[0].meta, records)
 
 
-def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at, write_capture, tmp_path):
+def test_a_resumed_session_has_the_bits_of_an_unbroken_one(mpucal, stopped_at, write_capture, tmp_path):
     """The session is killed while flat, and stopped with Ctrl-C while rotating."""
     folder = tmp_path / "board"
     words = ("--bus", "sim", "--rate", "25", "--target", "quick", "-o", "board", "--name", "Bench 7")
@@ -87,7 +87,7 @@ def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at,
     ],
     ids=["no session", "another source", "another folder"],
 )
-def test_what_cannot_be_resumed_says_so(mpucal, words, sentence):
+def test_errors_of_resume_name_the_problem(mpucal, words, sentence):
     result = mpucal("session", *words)
     assert result.code == 2
     assert sentence in result.err

@@ -27,7 +27,7 @@ def rewritten(write_capture):
     return call
 
 
-def test_a_session_leaves_its_files_and_says_what_it_found(session):
+def test_a_session_writes_its_files_and_prints_the_summary(session):
     assert session.result.code == 0, session.result.err
     names = {path.name for path in session.folder.iterdir()}
     assert names == {"capture.mcap", "calibration.json", "calibration.bin", "report.html", "truth.json"}
@@ -41,7 +41,7 @@ def test_a_session_leaves_its_files_and_says_what_it_found(session):
         assert heading not in out
 
 
-def test_the_truth_lies_within_what_the_result_claims(session):
+def test_the_estimated_bias_is_near_the_truth(session):
     truth = json.loads((session.folder / "truth.json").read_text())
     calibration = Calibration.load(session.folder / "calibration.json")
     true_b_a = np.array(truth.get("b_a") or truth["accelerometer"]["b_a"])
@@ -80,7 +80,7 @@ def test_a_replay_says_the_same_and_finds_the_same_bits(mpucal, session, tmp_pat
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_what_cannot_work_says_so(mpucal, tmp_path, words, code, sentence):
+def test_errors_name_the_problem(mpucal, tmp_path, words, code, sentence):
     (tmp_path / "text.mcap").write_text("not a capture")
     result = mpucal("session", *words)
     assert result.code == code, result.err
@@ -88,7 +88,7 @@ def test_what_cannot_work_says_so(mpucal, tmp_path, words, code, sentence):
     assert "Traceback" not in result.err
 
 
-def test_no_folder_is_left_where_nothing_answered(mpucal, tmp_path):
+def test_no_folder_is_left_if_nothing_answered(mpucal, tmp_path):
     mpucal("session", "--bus", "/dev/i2c-99")
     mpucal("session", "--bus", "sim:who_am_i=0xff")
     assert list(tmp_path.iterdir()) == []
@@ -176,7 +176,7 @@ def test_a_recording_is_calibrated_and_replayed_later_unless_accesses_are_left_u
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a folder went")
-def test_a_folder_that_is_renamed_and_a_capture_that_is_cut_meanwhile(mpucal, tmp_path, monkeypatch):
+def test_a_folder_renamed_and_a_capture_truncated_during_a_session(mpucal, tmp_path, monkeypatch):
     """The results follow the capture, and a capture that another program shortens is reported."""
     calibrate = Runner.calibrate
 

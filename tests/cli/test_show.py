@@ -51,7 +51,7 @@ def test_reservations_are_named(verdict):
     assert "  - 18 gyro samples stood at full scale" in text
 
 
-def test_nobody_judged_a_blob():
+def test_a_blob_has_no_verdict():
     text = summary(calibration(quality={}, fit={}))
     assert text.splitlines()[0].split() == ["value", "±", "1", "sigma", "x", "y", "z"]
     assert "calibration is" not in text
@@ -72,7 +72,7 @@ def test_the_formula_calibrates():
     assert np.array(matrix) @ shifted == pytest.approx(c.apply([1.0, 2.0, 3.0]), abs=1e-4)
 
 
-def test_what_is_next_depends_on_what_was_written(tmp_path):
+def test_the_next_steps_follow_from_the_files(tmp_path):
     good = files_written([tmp_path / "calibration.json", tmp_path / "calibration.bin", tmp_path / "report.html"])
     assert "firmware" in good
     refused = files_written([tmp_path / "calibration.json", tmp_path / "report.html"])
@@ -101,7 +101,7 @@ def test_shows_a_capture(mpucal, session):
     assert facts["flat_s"][1] - facts["flat_s"][0] > 5.0
 
 
-def test_shows_a_recording_of_which_little_is_known(mpucal, tmp_path):
+def test_shows_a_recording_with_few_properties(mpucal, tmp_path):
     rng = np.random.default_rng(0)
     np.savez(
         tmp_path / "walk.npz", t=np.arange(300) / 100.0, acc=rng.normal(size=(300, 3)), gyr=rng.normal(size=(300, 3))
@@ -123,7 +123,7 @@ def test_no_calibration_is_3(mpucal, tmp_path, name, content):
 
 
 @pytest.mark.parametrize("chip", ["mpu6050", "mpu6500"])
-def test_a_chip_is_shown_as_it_is(mpucal, chip):
+def test_a_chip_is_shown(mpucal, chip):
     shown = json.loads(mpucal("show", "--bus", f"sim:seed=3,chip={chip}", "--json").out)
     assert shown["chip"].lower().replace("-", "") == chip
     assert shown["accel_range_g"] == 2
@@ -142,11 +142,11 @@ def test_a_vehicles_parameters_are_shown(mpucal):
 
 
 @pytest.mark.parametrize("words", [(), ("x.json", "--bus", "sim"), ("--bus", "sim", "--mavlink", "sim")])
-def test_one_thing_is_shown(mpucal, words):
+def test_show_takes_exactly_one_file_or_device(mpucal, words):
     assert mpucal("show", *words).code == 2
 
 
-def test_what_is_applied_is_said_and_not_subtracted_again(mpucal, tmp_path):
+def test_hardware_offsets_are_shown_and_not_subtracted_again(mpucal, tmp_path):
     b_a = np.array([0.25, -0.5, 0.75])
     entry = {"to": "chip", "where": "the chip", "what": "the registers subtract it", "at": "2024-05-17T09:30:00+00:00"}
     made = Calibration(np.eye(3), b_a, applied_in_hardware=b_a, extra={"written": [entry]})

@@ -102,7 +102,7 @@ def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
     assert not said
 
 
-def test_rests_that_contradict_the_calibration_are_told_once(mpucal, session):
+def test_rests_that_contradict_the_calibration_are_reported_once(mpucal, session):
     right = session.folder / "calibration.json"
     calibration = Calibration.load(right)
     replace(calibration, b_a=calibration.b_a + np.array([0.0, 0.0, 0.3])).save("wrong.json")

@@ -39,7 +39,7 @@ def test_a_recording_of_a_vehicle_is_shown(recorded):
         (["--mavlink", "sim", "--signing-key", "/no/such/key"], "cannot be read"),
     ],
 )
-def test_what_does_not_fit_is_refused(words, what, tmp_path):
+def test_options_of_another_source_are_refused(words, what, tmp_path):
     result = run("session", *words, "-o", tmp_path / "out", "--yes")
     assert isinstance(result.exception, UsageError)
     assert what in str(result.exception)
@@ -52,7 +52,7 @@ def test_a_capture_of_mpucal_fixes_its_options(recorded, tmp_path):
     assert "which the capture fixes" in str(result.exception)
 
 
-def test_a_rate_is_asked_of_a_vehicle_whatever_a_chip_has(tmp_path):
+def test_a_vehicle_takes_rates_that_a_chip_does_not(tmp_path):
     path = tmp_path / "capture.tlog"
     result = run("record", "--mavlink", "sim:imus=1", "--rate", 300, "--seconds", 4, "-o", path)
     assert result.exception is None, result.output

@@ -12,7 +12,7 @@ from mpucal.result.calibration import Calibration
 
 
 @pytest.mark.parametrize("answer", ["y\n", "n\n", None], ids=["yes", "no", "no terminal"])
-def test_a_person_is_asked_and_nobody_else(monkeypatch, answer):
+def test_a_question_is_asked_on_a_terminal_only(monkeypatch, answer):
     monkeypatch.setattr("sys.stdin.isatty", lambda: answer is not None, raising=False)
     asked = []
     monkeypatch.setattr("click.confirm", lambda question, err: asked.append(question) or answer == "y\n")

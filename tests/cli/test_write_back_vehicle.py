@@ -67,14 +67,14 @@ def test_the_new_parameters_are_there_and_the_files_say_so(flown):
     assert now.extra["autopilot"]["params_old"].items() >= measured.extra["autopilot"]["params_new"].items()
 
 
-def test_its_own_recording_takes_the_calibration_of_what_was_measured(flown, mpucal):
+def test_a_recording_before_the_write_takes_the_calibration_before_it(flown, mpucal):
     assert mpucal("apply", flown.folder / "calibration.json", flown.folder, "-o", "a.npz").code == 0
     other = mpucal("apply", flown.folder / "calibration-on-autopilot.json", flown.folder, "-o", "b.npz")
     assert other.code == 2
     assert "while these samples were taken" in other.err
 
 
-def test_a_vehicle_that_refuses_keeps_what_it_held(flown, tmp_path):
+def test_a_vehicle_that_refuses_keeps_its_parameters(flown, tmp_path):
     measured = Calibration.load(flown.folder / "calibration.json")
     record = session_recorder(tmp_path, measured, None, None)
     vehicle = make_device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"})

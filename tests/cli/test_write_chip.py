@@ -10,7 +10,7 @@ def calibrated(session):
     return session.folder / "calibration.json"
 
 
-def test_what_is_written_says_what_the_chip_subtracts(mpucal, calibrated, tmp_path):
+def test_the_written_calibration_states_what_the_chip_subtracts(mpucal, calibrated, tmp_path):
     written = mpucal("write", calibrated, "chip", "--bus", "sim:seed=3", "-o", tmp_path, "--json")
     assert written.code == 0, written.err
     b_a = json.loads(calibrated.read_text())["accelerometer"]["b_a"]
@@ -34,7 +34,7 @@ def test_numbers_that_changed_since_are_written_only_by_force(mpucal, calibrated
     assert (shown.code, "its digest does not match" in shown.err) == (0, True)
 
 
-def test_it_is_said_that_it_does_not_last(mpucal, calibrated, tmp_path):
+def test_a_write_to_volatile_registers_is_announced(mpucal, calibrated, tmp_path):
     result = mpucal("write", calibrated, "chip", "--bus", "sim:seed=3", "-o", tmp_path)
     assert "volatile" in result.out
 

@@ -82,19 +82,19 @@ def test_the_true_rate_is_measured(topics):
         ("fault=stuck_temp", "dead axis", Mark.BAD),
     ],
 )
-def test_what_is_amiss_is_found(topics, keys, topic, mark):
+def test_each_fault_is_found(topics, keys, topic, mark):
     told = topics(keys)
     assert told[topic].mark is mark
     assert told[topic].remedy
 
 
-def test_a_board_that_is_never_put_down_is_waited_for_once(topics):
+def test_a_board_that_is_never_put_down_costs_one_wait(topics):
     told = topics("hand=restless")
     assert "the board moves" in told["offset registers"].what
     assert PATIENCE * READS < told["transfers"].data["transfers"] < 1.5 * PATIENCE * READS
 
 
-def test_a_board_that_is_put_down_late_is_examined_as_any():
+def test_a_board_that_is_put_down_late_is_examined():
     bus = open_simulated("sim:hand=still", seed=51)
     told = {}
     for finding in examine(bus, Config(), 3.0):
@@ -124,7 +124,7 @@ def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing(topics):
         ("stuckbit", "bits flip on the bus"),
     ],
 )
-def test_what_is_no_chip_or_no_wire_is_named(examined, fault, says):
+def test_a_bad_wire_or_another_device_is_named(examined, fault, says):
     last = examined(f"fault={fault}")[-1]
     assert last.mark is Mark.BAD
     assert says in last.what
@@ -157,14 +157,14 @@ def test_an_axis_that_dies_midway_is_named_and_one_that_rarely_changes_is_not():
     assert [mask.tolist() for mask in live_axes(recording)] == [[True, False, True], [True, True, True]]
 
 
-def test_a_stuck_bit_is_looked_for_where_a_revision_c_shows_half_of_g(topics):
+def test_stuck_bits_of_a_revision_c_are_found_at_half_the_scale(topics):
     told = topics("chip=mpu6050c,fault=high_bit@0")
     assert told["stuck bits"].what == "bit 12 of accelerometer y does not move"
     assert topics("chip=mpu6050c")["stuck bits"].mark is Mark.OK
 
 
 @pytest.mark.parametrize("at_s", [0, 1, 3, 5, 6, 8])
-def test_a_wire_pulled_meanwhile_ends_it_with_a_sentence(topics, at_s):
+def test_an_unplugged_chip_ends_the_examination_with_a_finding(topics, at_s):
     told = topics(f"fault=unplugged@{at_s}")
     assert list(told.values())[-1].mark is Mark.BAD
     assert "nothing answers" in list(told.values())[-1].what
@@ -189,7 +189,7 @@ def test_page_and_document_hold_every_finding():
 
 
 @pytest.mark.parametrize(("chip", "at_s"), [("mpu6050", 7.72), ("mpu6050", 11.16), ("mpu6500", 7.72)])
-def test_a_reset_while_it_is_measured_is_no_defect_of_the_chip(chip, at_s):
+def test_a_reset_during_the_examination_is_not_called_a_defect(chip, at_s):
     """Each reset falls into the self test, or into the measurement with shifted offset registers."""
     told = findings(open_simulated(f"sim:chip={chip},fault=brownout@{at_s}"))
     assert "lost its settings" in told["broken off"].what

@@ -49,7 +49,7 @@ def test_every_address_is_asked(told):
     assert sorted(set(adapter.asked)) == list(range(0x08, 0x78))
 
 
-def test_a_bus_that_is_held_is_not_asked_for_every_address(told):
+def test_a_held_bus_is_given_up_after_three_addresses(told):
     adapter = Adapter(lambda _address: errno.ETIMEDOUT)
     finding = told(adapter)
     assert finding.mark is Mark.BAD

@@ -34,7 +34,7 @@ def test_a_constant_adds_nothing():
 
 
 @pytest.mark.parametrize("tremor_mps2", [0.05, 0.1])
-def test_a_hand_is_told_from_noise(tremor_mps2):
+def test_a_hands_tremor_is_recognised(tremor_mps2):
     """A hand trembles by 0.05 to 0.1 m/s^2 at 2 to 10 Hz."""
     t = np.arange(4000) / RATE_HZ
     shaking = tremor_mps2 * np.sin(2 * np.pi * 6.0 * t)[:, None] * [1.0, 0.6, 0.8]

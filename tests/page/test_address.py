@@ -5,7 +5,7 @@ import pytest
 from mpucal.page.address import Address, lan_host, parse_address
 
 
-def test_it_is_this_computer_unless_the_network_is_asked_for():
+def test_the_address_is_local_unless_the_network_is_given():
     assert parse_address("127.0.0.1") == Address("127.0.0.1", 0, "127.0.0.1")
     assert parse_address("lan").host == lan_host()
     assert parse_address("192.168.1.20:8000") == Address("192.168.1.20", 8000, "192.168.1.20")

@@ -48,7 +48,7 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
     assert tab.get_attribute("body", "data-look") == "no"
 
 
-def test_a_lost_connection_is_said_and_mends_itself(tab, serve):
+def test_a_lost_connection_is_shown_and_reopened(tab, serve):
     server = serve()
     server.latest.update({"title": "a chip", "headline": "Before"})
     tab.goto(server.url)
@@ -63,7 +63,7 @@ def test_a_lost_connection_is_said_and_mends_itself(tab, serve):
     assert tab.is_hidden("#lost")
 
 
-def test_keys_are_shown_only_where_they_can_be_pressed(tab, serve):
+def test_keys_are_shown_only_if_allowed(tab, serve):
     pressed = threading.Event()
     server = serve(keys=True, pressed=lambda key: pressed.set() if key == "redo" else None)
     server.latest.update({"title": "a chip", "keys": False, "headline": "One"})

@@ -13,7 +13,7 @@ from mpucal.result.calibration import Calibration
 
 
 @pytest.mark.slow
-def test_the_page_asks_and_tells_the_verdict(tmp_path):
+def test_the_page_shows_the_prompts_and_the_verdict(tmp_path):
     Calibration(np.eye(3), np.zeros(3), quality={"verdict": "good", "reasons": []}).save(tmp_path / "c.json")
     words = ["check", "c.json", "--bus", "sim:pace=fast,seed=3", "--rate", "100", "--page", "-o", "checked"]
     with subprocess.Popen(

@@ -38,7 +38,7 @@ def followed(url, until):
     return shown
 
 
-def test_who_comes_late_is_told_everything(feed):
+def test_a_late_client_gets_all_values(feed):
     feed.hear(PROMPT)
     feed.say("  a line of talk")
     shown = followed(feed.url, lambda shown: shown.get("notes"))
@@ -62,7 +62,7 @@ def test_keys_and_results_go_through(feed, tmp_path):
     assert feed.pressed() == []
 
 
-def test_a_process_that_is_stopped_or_killed_holds_up_nobody(feed):
+def test_a_stopped_or_killed_process_does_not_block_the_session(feed):
     pid = feed._process.pid
     os.kill(pid, signal.SIGSTOP)
     for number in range(20000):
@@ -73,7 +73,7 @@ def test_a_process_that_is_stopped_or_killed_holds_up_nobody(feed):
     assert feed._process.poll() is not None
 
 
-def test_it_ends_with_a_session_that_is_killed():
+def test_the_process_ends_with_a_killed_session():
     program = (
         "import sys; from mpucal.page.feed import Feed; from mpucal.page.address import Address\n"
         "print(Feed(Address(), {}).url, flush=True); sys.stdin.read()"
@@ -89,7 +89,7 @@ def test_it_ends_with_a_session_that_is_killed():
             time.sleep(0.02)
 
 
-def test_a_place_that_is_taken_is_a_sentence(feed):
+def test_an_address_in_use_is_an_output_error(feed):
     port = int(feed.url.split(":")[2].split("/")[0])
     with pytest.raises(OutputError, match=f"no page can be served at 127.0.0.1:{port}"):
         Feed(Address(port=port), {})

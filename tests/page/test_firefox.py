@@ -139,7 +139,7 @@ def test_a_session_is_followed_to_its_end_in_the_dark(firefox, server, phases):
     assert luminance(firefox.run("return getComputedStyle(document.body).color")) > 0.9
 
 
-def test_a_lost_connection_is_said_and_mends_itself(firefox, serve):
+def test_a_lost_connection_is_shown_and_reopened(firefox, serve):
     server, board = serve(), {"t_s": 1.0, "rate_hz": 200.0, "temperature_c": None, "attitude": [1, 0, 0, 0]}
     server.latest.update({"title": "a chip", "board": "gy-521", "headline": "Before", "meter": board})
     firefox.call("WebDriver:Navigate", url=server.url)

@@ -26,7 +26,7 @@ ORIGINS = st.lists(st.sampled_from([f"http://{HOST}", "http://evil.example", "nu
 
 
 @given(METHODS, TARGETS, HOSTS, ORIGINS, st.booleans())
-def test_only_who_knows_all_of_it_is_let_in(method, target, hosts, origins, keys):
+def test_only_requests_with_host_and_token_are_allowed(method, target, hosts, origins, keys):
     request = RequestFilter(HOST, TOKEN, keys).check(method, target, hosts, origins, RESULTS)
     looks = method == "GET" and target in {f"/{TOKEN}/{name}" for name in LOOKS}
     presses = keys and method == "POST" and target in {f"/{TOKEN}/keys/{key}" for key in KEYS}

@@ -30,7 +30,7 @@ def test_the_page_loads_nothing_from_elsewhere(server, name):
 
 @settings(max_examples=150)
 @given(st.data())
-def test_nobody_else_is_let_in_and_nothing_breaks(server, data):
+def test_other_requests_are_refused_without_errors(server, data):
     token, host = server.filter.token.encode(), server.filter.host.encode()
     method = data.draw(st.sampled_from(METHODS)).encode("latin-1")
     near = st.sampled_from(
@@ -56,7 +56,7 @@ def test_results_are_fetched_by_their_names_alone(server, tmp_path):
         assert b" 404 " in server.answer(server.request(f"results/{name}"))[:20]
 
 
-def test_keys_are_pressed_only_where_that_was_allowed(server, serve):
+def test_keys_are_accepted_only_if_allowed(server, serve):
     pressed = []
     other = serve(keys=True, pressed=pressed.append)
     assert b" 405 " in server.answer(server.request("keys/redo", "POST"))[:20]

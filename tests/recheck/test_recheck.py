@@ -90,14 +90,14 @@ def test_a_change_of_temperature_explains_what_the_data_sheet_allows_and_no_more
     assert mpucal.check(CALIBRATION, shown(hot, temperature_c=30.0), days=1.0).temperature_explains is False
 
 
-def test_where_b_a_of_the_temperature_is_known_it_has_not_drifted():
+def test_a_known_b_a_of_t_is_not_called_a_drift():
     slope = 0.05 * TEN_MG
     known = replace(CALIBRATION, b_a_slope=slope, b_a_slope_std=np.zeros(3), temperature_range_c=np.array([0.0, 60.0]))
     warm = replace(TRUTH, b_a=TRUTH.b_a + 20.0 * slope)
     assert mpucal.check(known, shown(warm, temperature_c=45.0), days=1.0).verdict == "still good"
 
 
-def test_too_little_to_tell_says_what_was_missing():
+def test_too_few_orientations_cannot_be_told():
     recording = shown(TRUTH)
     still = recording.part(0, round(9.0 * recording.rate_hz))
     told = mpucal.check(CALIBRATION, still, days=1.0)
@@ -107,13 +107,13 @@ def test_too_little_to_tell_says_what_was_missing():
     assert mpucal.check(CALIBRATION, moving).verdict == "cannot be told"
 
 
-def test_a_flat_segment_that_is_too_short_to_tell_noise_is_none():
+def test_a_flat_segment_too_short_to_estimate_noise_is_ignored():
     recording = shown(TRUTH)
     assert observe(replace(recording, flat=(0, 2)), CALIBRATION) is None
     assert observe(replace(recording, flat=(0, 400)), CALIBRATION) is not None
 
 
-def test_another_chip_is_told_by_what_it_says_of_itself():
+def test_another_chip_is_recognised_by_who_am_i_and_factory_trim():
     known = replace(CALIBRATION, sensor=replace(CALIBRATION.sensor, who_am_i=0x68, accel_offsets=(2, 4, 6)))
     recording = shown(TRUTH)
     for sensor in (Sensor(who_am_i=0x70), Sensor(who_am_i=0x68, accel_offsets=(2, 4, 9000))):
@@ -133,7 +133,7 @@ def test_the_prior_is_the_covariance_of_the_fit():
     assert np.abs(stored.correlation - np.eye(21)).max() > 0.1
 
 
-def test_the_observations_are_linear_in_what_is_wrong():
+def test_the_observations_are_linear_in_theta():
     rng = np.random.default_rng(0)
     recording = shown(TRUTH)
     before = observe(recording, CALIBRATION)

@@ -125,7 +125,7 @@ def rotating(board, laid):
     return restored(board, laid)
 
 
-def test_tells_to_lay_flat_then_to_rotate_after_ten_seconds_of_stillness(board):
+def test_prompts_to_lay_flat_and_to_rotate_after_ten_seconds_of_stillness(board):
     session = Session()
     assert session.prompts() == [PromptKind.LAY_FLAT]
     assert session.feed(board.still(9.5)).state is State.LAY_FLAT
@@ -141,7 +141,7 @@ def test_tells_to_lay_flat_then_to_rotate_after_ten_seconds_of_stillness(board):
     ],
     ids=["tilted", "turned about the vertical"],
 )
-def test_a_board_that_was_moved_starts_the_count_again_and_says_what_moved(board, disturb, what):
+def test_a_moved_board_restarts_the_countdown_with_a_caution(board, disturb, what):
     session = Session().feed(board.still(8.0)).feed(disturb(board)).feed(board.still(8.0))
     assert session.state is State.LAY_FLAT
     assert what in session.words()
@@ -214,7 +214,7 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
     assert rotating.feed(board.still(3.0)).prompts().count(PromptKind.ROTATE) == 2
 
 
-def test_what_is_known_is_asked_every_second(board, rotating):
+def test_uncertainties_are_requested_every_second(board, rotating):
     rotating.overall = 0.1
     rotating.feed(board.turn((1, 0, 0), 3.0, 6.0))
     assert [ask.kind for ask in rotating.of(RequestFit)] in ([FitKind.KNOW] * 5, [FitKind.KNOW] * 6)
@@ -278,7 +278,7 @@ def test_no_new_orientation_for_a_minute_ends_the_turning(board, rotating):
     assert "no new orientation for 60 s, 2 seen" in rotating.words()
 
 
-def test_nobody_is_asked_twice_for_the_same_orientation(board, rotating, varied):
+def test_consecutive_prompts_differ(board, rotating, varied):
     rotating.overall = 0.1
     show(rotating, board, varied[:4])
     asked = [prompt.down for prompt in rotating.of(Prompt) if prompt.kind is PromptKind.ROTATE]
@@ -333,14 +333,14 @@ def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, v
     assert verifying.machine.checked.agrees is None
 
 
-def test_nor_does_the_same_one_twice(board, verifying):
+def test_an_orientation_counts_once(board, verifying):
     up = [-v for v in verifying.of(Prompt)[-1].down]
     show(verifying, board, [up, (0, 0, 1)] * 4)
     assert verifying.state is State.VERIFY
     assert verifying.count() == 1
 
 
-def test_who_is_where_asked_but_near_what_was_seen_is_asked_for_another(board, verifying):
+def test_a_requested_orientation_that_was_seen_is_replaced(board, verifying):
     asked = verifying.of(Prompt)[-1]
     verifying.machine._step._coverage.rested.add(-np.array(asked.down))
     show(verifying, board, [[-v for v in asked.down]])
@@ -357,7 +357,7 @@ def test_another_new_orientation_than_the_one_asked_for_is_useful(board, verifyi
     assert "2 of 3" in verifying.of(Prompt)[-1].text
 
 
-def test_another_is_asked_for_where_one_was_seen_after_all(board, verifying, varied):
+def test_an_orientation_that_the_fit_has_seen_is_replaced(board, verifying, varied):
     verifying.checked = Checked((), None, MOVED)
     show(verifying, board, varied[9:12])
     assert verifying.state is State.VERIFY
@@ -368,7 +368,7 @@ def test_another_is_asked_for_where_one_was_seen_after_all(board, verifying, var
     assert verifying.machine.checked.agrees
 
 
-def test_a_disagreement_is_told_and_kept(board, verifying, varied):
+def test_a_disagreement_ends_the_session_and_is_kept(board, verifying, varied):
     verifying.checked = Checked((), False, MOVED)
     show(verifying, board, varied[9:12])
     assert verifying.state is State.CALIBRATE
@@ -384,14 +384,14 @@ def test_a_refused_first_calibration_is_not_verified(board, rotating, varied):
     assert rotating.machine.checked.reason == FLIPPED
 
 
-def test_who_does_not_verify_is_not_waited_for_for_ever(board, verifying):
+def test_the_verification_times_out(board, verifying):
     verifying.feed(board.still(41.0))
     assert verifying.state is State.CALIBRATE
     assert "held still in none of the requested orientations" in verifying.words()
     assert verifying.machine.checked.agrees is None
 
 
-def test_what_was_shown_before_patience_ended_is_looked_at(board, verifying, varied):
+def test_a_partial_verification_is_checked_at_the_time_out(board, verifying, varied):
     show(verifying, board, varied[9:10])
     assert FitKind.CHECK not in [ask.kind for ask in verifying.of(RequestFit)]
     verifying.feed(board.still(41.0))
@@ -414,7 +414,7 @@ def offered(board, varied):
     return session
 
 
-def test_who_is_refused_may_turn_it_again(board, offered):
+def test_the_board_may_be_turned_again_after_a_refusal(board, offered):
     offered.feed(board.still(50.0)).give(Redo())
     assert offered.state is State.ROTATE
     assert offered.machine.checked is None
@@ -422,14 +422,14 @@ def test_who_is_refused_may_turn_it_again(board, offered):
 
 
 @pytest.mark.parametrize("end", [lambda s, _: s.give(Enough()), lambda s, board: s.feed(board.still(61.0))])
-def test_who_does_not_is_left_with_the_refusal(board, offered, end):
+def test_the_refusal_stays_without_another_turning(board, offered, end):
     end(offered, board)
     assert offered.state is State.CALIBRATE
     assert offered.machine.checked.reason == MOVED
     assert offered.words().count("the sensor moved on its mount") == 2
 
 
-def test_turning_again_is_not_offered_where_it_would_not_help(board, varied):
+def test_turning_again_is_offered_only_if_it_may_help(board, varied):
     session = Session(attended=True).feed(board.still(10.6))
     session.overall, session.tried = 1.0, Tried("refused", FLIPPED)
     show(session, board, varied[:9])
@@ -446,7 +446,7 @@ def test_redo_turns_again_without_laying_flat_again(board, verifying):
     assert verifying.prompts()[-1] is PromptKind.ROTATE
 
 
-def test_a_resumed_session_asks_again_for_what_it_wanted(board, rotating):
+def test_a_resumed_session_repeats_its_prompt(board, rotating):
     rotating.overall = 0.1
     rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(2.0))
     wanted = rotating.of(Prompt)[-1]
@@ -463,7 +463,7 @@ def test_a_resumed_rest_begins_anew(board):
     assert session.feed(board.still(5.0)).state is State.ROTATE
 
 
-def test_what_is_wrong_with_the_turning_is_said_once_in_a_while(board, rotating):
+def test_cautions_are_not_repeated_at_once(board, rotating):
     fast = board.turn((0, 0, 1), 14.0, 2.0)
     fast.gyr_clipped[40:60] = True
     rotating.feed(fast)
@@ -483,7 +483,7 @@ def test_the_meter_follows_the_board(board, rotating):
 
 
 @pytest.mark.parametrize(("seconds", "state"), [(6.0, State.ROTATE), (3.0, State.LAY_FLAT)])
-def test_until_end_takes_a_shorter_rest_as_it_ends(board, seconds, state):
+def test_until_end_accepts_a_shorter_rest(board, seconds, state):
     session = Session(until_end=True).feed(board.still(seconds))
     assert session.state is State.LAY_FLAT
     assert session.feed(board.turn((1, 0, 0), 1.0, 1.0)).state is state

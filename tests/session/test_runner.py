@@ -266,7 +266,7 @@ def test_ctrl_c_does_not_wait_for_a_late_answer():
     assert source.polls == 148
 
 
-def test_who_watches_a_replay_may_stop_it_but_not_steer_it():
+def test_a_viewer_may_abort_a_replay_but_not_press_other_keys():
     watcher = Person({3: [Key.ENOUGH], 5: [Key.ABORT]})
     replayed = ReplayedOperator(watcher, lambda _name: [])
     assert [list(replayed.pressed()) for _ in range(5)] == [[], [], [], [], [Key.ABORT]]

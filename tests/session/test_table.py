@@ -39,7 +39,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("state", "event", "following"), CASES)
-def test_leads_where_it_should(state, event, following):
+def test_each_event_leads_to_its_state(state, event, following):
     if following:
         assert next_state(state, event) == following
     else:
@@ -51,7 +51,7 @@ def test_every_event_is_in_a_row():
     assert {event.__name__ for row in TRANSITIONS.values() for event in row} == set(EVENTS) == set(EXPECTED)
 
 
-def test_an_illegal_event_leaves_the_machine_as_it_was():
+def test_an_illegal_event_changes_no_state():
     machine = Machine()
     with pytest.raises(IllegalEvent):
         machine.handle(Fitted("good"))

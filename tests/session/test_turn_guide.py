@@ -20,7 +20,7 @@ STRAIGHT = (1.0, 0.0, 0.0, 0.0)
         ((1, -1, 0), "tip it toward you and left"),
     ],
 )
-def test_a_turn_in_words_says_where_the_top_goes(axis, words):
+def test_the_words_name_the_direction_of_the_top(axis, words):
     phi = np.array(axis) / np.linalg.norm(axis) * math.radians(61.0)
     down = Rotation.from_rotvec(-phi).apply((0, 0, -1))
     assert TurnGuide().turn_to(tuple(down), STRAIGHT).words == f"60 deg more, {words}"
@@ -42,7 +42,7 @@ def test_the_missing_turn_leads_to_the_wanted_orientation(down):
 
 
 @pytest.mark.parametrize("tremor_deg", [1.0, 4.0])
-def test_the_way_of_a_board_that_is_upside_down_does_not_change_with_each_tremor(tremor_deg):
+def test_the_turn_of_a_board_upside_down_does_not_change_with_tremor(tremor_deg):
     way, rng = TurnGuide(), np.random.default_rng(5)
     shaken = [Rotation.from_rotvec(np.radians(tremor_deg) * rng.normal(size=3) * [1, 1, 0]) for _ in range(40)]
     turns = [way.turn_to((0.0, 0.0, 1.0), each.as_quat(scalar_first=True).tolist()) for each in shaken]

@@ -30,7 +30,7 @@ class Terminal(io.StringIO):
     ],
     ids=["terminal", "dumb", "no TERM", "terminal, json", "pipe", "pipe, json"],
 )
-def test_what_the_streams_allow(monkeypatch, err, term, as_json, kind):
+def test_the_console_follows_from_the_streams(monkeypatch, err, term, as_json, kind):
     monkeypatch.setattr(sys, "stderr", err())
     monkeypatch.setenv("TERM", term)
     assert type(console(quiet=False, as_json=as_json)) is kind

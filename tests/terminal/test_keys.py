@@ -62,7 +62,7 @@ def test_the_first_signal_is_a_key_and_the_second_interrupts(number):
 
 
 @pytest.mark.usefixtures("uncollected")
-def test_a_signal_that_nobody_takes_interrupts():
+def test_a_signal_that_is_not_taken_interrupts():
     keys = Keys()
     with keys.listening():
         signal.raise_signal(signal.SIGINT)

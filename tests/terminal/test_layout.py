@@ -69,7 +69,7 @@ def test_each_turn_is_shown_in_large_letters(views, words):
 
 
 @pytest.mark.parametrize("size", [(40, 15), (80, 24), (160, 50)], ids=str)
-def test_as_it_is_laid_flat_the_person_is_asked_what_they_see(views, size):
+def test_the_flat_orientation_is_to_be_confirmed(views, size):
     drawn = " ".join("".join(text_of(views["laid"], *size)).split())
     for word in ("Chip", "pins", "Then leave it."):
         assert word in drawn
@@ -92,7 +92,7 @@ def test_a_warning_grows_quiet(views):
     assert "reverse" not in str(quiet[0].spans)
 
 
-def test_results_of_the_check_stand_where_the_bars_were(views):
+def test_verifications_replace_the_bars(views):
     drawn = "\n".join(text_of(views["checked"]))
     assert "orientation 1 of 2 agrees" in drawn
     assert "wanted" not in drawn

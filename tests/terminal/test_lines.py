@@ -30,7 +30,7 @@ def test_a_prompt_that_goes_on_is_a_line(out):
     assert out.getvalue().count("ROTATE") == 1
 
 
-def test_the_bell_rings_where_it_is_wanted_and_something_else_is_to_be_done(out):
+def test_the_bell_rings_at_new_prompts_only(out):
     lines = Lines(out, Keys(), bell=True)
     for text in ("Now turn it.", "Now turn it.", "Now the other side."):
         lines.hear(Prompt(PromptKind.ROTATE, text))
@@ -83,7 +83,7 @@ def test_a_whole_session_is_told(out, session):
     assert "\x1b" not in said
 
 
-def test_keys_are_explained_once_where_there_is_a_keyboard(keyboard):
+def test_keys_are_explained_once_if_there_is_a_keyboard(keyboard):
     for lines_of, times in ((None, 0), (keyboard[1], 1)):
         out = io.StringIO()
         lines = Lines(out, Keys(lines_of))

@@ -58,7 +58,7 @@ def where(canvas, letter):
 
 @pytest.mark.parametrize(("axis", "letter"), [(0, "X"), (1, "Y"), (2, "Z")], ids="xyz")
 @pytest.mark.parametrize("size", [(22, 9), (44, 25)], ids=["small", "large"])
-def test_the_letter_of_the_axis_that_is_down_is_below_the_others(axis, letter, size):
+def test_the_letter_of_the_lowest_axis_is_below_the_others(axis, letter, size):
     for sign in (1.0, -1.0):
         down = tuple(sign if i == axis else 0.0 for i in range(3))
         canvas = board.picture("gy-521", held(down), *size)
@@ -92,7 +92,7 @@ def test_the_map_shows_a_direction_on_its_own_half():
     assert not any("o" in row for row in lower)
 
 
-def test_what_lies_outside_is_not_drawn():
+def test_points_outside_are_not_drawn():
     canvas = Canvas(4, 2)
     canvas.line((-100.0, 3.0), (100.0, 3.0))
     canvas.letter((50.0, 0.0), "X", "")

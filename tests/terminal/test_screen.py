@@ -57,7 +57,7 @@ def test_a_terminal_of_another_size_is_painted_anew(out):
     assert "one" in out.getvalue()
 
 
-def test_colours_unless_nobody_wants_them(out, monkeypatch):
+def test_colours_follow_no_color(out, monkeypatch):
     line = Text("green", style="bold green")
     Painter(out).paint([line], (80, 24))
     assert COLOUR.search(out.taken())
@@ -69,7 +69,7 @@ def test_colours_unless_nobody_wants_them(out, monkeypatch):
 
 
 @pytest.mark.parametrize("error", [None, KeyboardInterrupt, ZeroDivisionError], ids=["ends", "Ctrl-C", "fails"])
-def test_the_terminal_is_given_back_and_what_was_decided_is_told(out, error, session):
+def test_the_terminal_is_restored_and_the_decisions_are_printed(out, error, session):
     before = threading.active_count()
     screen = Screen(out, Keys(), UNICODE)
     try:

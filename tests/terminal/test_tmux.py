@@ -78,7 +78,7 @@ SESSION = [sys.executable, "-m", "mpucal", "session", "--bus", "sim:pace=real", 
 SHOWN = ("Lay the board flat", "Hz", "°C", "still", "now", "q or Ctrl-C: stop", "mpucal: simulated chip", "██")
 
 
-def test_a_session_is_shown_and_ctrl_c_leaves_the_terminal_as_it_was(terminal):
+def test_a_session_is_shown_and_ctrl_c_restores_the_terminal(terminal):
     tmux = terminal(80, 24)
     tmux.run(*SESSION)
     small = tmux.wait_for(*SHOWN)

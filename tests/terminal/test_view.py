@@ -11,7 +11,7 @@ def test_nothing_is_known_at_first():
     assert (view.headline, view.wanted, view.waiting, view.elapsed_s) == ("WAIT", None, None, 0.0)
 
 
-def test_the_headline_says_what_to_do(views):
+def test_the_headline_is_the_instruction(views):
     assert views["laid"].headline == "STILL 7"
     assert views["turned"].headline == "ROLL LEFT 60"
     assert views["checked"].headline == "+Y DOWN"
@@ -36,7 +36,7 @@ def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
     assert view.headline == headline
 
 
-def test_a_countdown_ends_where_the_board_moves_or_was_told_of(views):
+def test_a_countdown_ends_when_the_board_moves_or_the_orientation_is_decided(views):
     counting = replace(views["turned"], now_s=26.0, countdown=Countdown(26.0, 1.3, 2.0, False))
     moves = counting.after(replace(counting.meter, t_s=26.2, still=False))
     assert moves.headline == "ROLL LEFT 60"
@@ -69,19 +69,19 @@ def test_the_way_is_short_in_large_letters(views, words, headline):
         ("gy-521", (0.0, 0.7, -0.7), "The board is tilted"),
     ],
 )
-def test_a_person_confirms_what_they_see_by_leaving_it(views, board, down, words):
+def test_the_flat_orientation_is_described(views, board, down, words):
     view = replace(views["laid"], board=board)
     assert words in replace(view, meter=replace(view.meter, down=down)).confirming
     assert views["turned"].confirming == ""
 
 
-def test_what_would_help_most_is_wanted_where_the_prompt_names_nothing(views):
+def test_without_a_requested_orientation_the_most_helpful_one_is_wanted(views):
     view = views["turned"].after(Prompt(PromptKind.ROTATE, "Turn it."))
     assert view.wanted == view.knowledge.down
     assert view.after(Prompt(PromptKind.VERIFY, "Check it.")).wanted is None
 
 
-def test_what_was_verified_is_told_at_the_end(views):
+def test_verifications_are_among_the_final_messages(views):
     assert views["ended"].notes[-2:] == ("orientation 1 of 2 agrees", "the calibration is good")
 
 
@@ -120,7 +120,7 @@ def test_axes_that_carry_much_of_gravity_are_named(down, words):
 @pytest.mark.parametrize(
     ("use", "headline"), [(Use.TAKEN, "TAKEN"), (Use.USEFUL, "NOT THAT ONE, BUT USEFUL"), (Use.SEEN, "SEEN ALREADY")]
 )
-def test_what_became_of_an_orientation_is_said_for_a_moment(views, use, headline):
+def test_the_use_of_an_orientation_is_the_headline_for_a_moment(views, use, headline):
     held = Held(26.0, use, (1.0, 0.0, 0.0), "")
     view = views["turned"].after(held)
     assert view.headline == headline

@@ -77,7 +77,7 @@ def test_a_try_and_its_check_agree_on_good_data(fits, poses):
     assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.found)
 
 
-def test_what_the_fit_has_seen_verifies_nothing(fits, poses):
+def test_orientations_that_the_fit_has_seen_verify_nothing(fits, poses):
     fits.do(Task(part(poses, 0, 44), FitKind.TRY))
     checked = fits.do(Task(after(part(poses, 18, 44), 26.0 + 1 / 200), FitKind.CHECK))
     assert (checked.found, checked.agrees) == ((), None)
@@ -85,7 +85,7 @@ def test_what_the_fit_has_seen_verifies_nothing(fits, poses):
     assert not checked.reason.refuse
 
 
-def test_what_the_fit_has_seen_may_refute_it(fits, poses):
+def test_orientations_that_the_fit_has_seen_may_refute_it(fits, poses):
     fits.do(Task(part(poses, 0, 44), FitKind.TRY))
     again = after(part(poses, 18, 44), 26.0 + 1 / 200)
     checked = fits.do(Task(replace(again, acc=1.03 * again.acc), FitKind.CHECK))
@@ -98,7 +98,7 @@ def test_nothing_is_known_of_a_board_that_never_lay_still(fits, poses):
     assert fits.do(Task(replace(part(poses, 0, 10), gyr=rates), FitKind.KNOW)) is None
 
 
-def test_what_is_forgotten_is_not_computed(fits, poses):
+def test_forgotten_samples_are_not_fitted(fits, poses):
     fits.do(Task(part(poses, 0, 30), FitKind.KNOW))
     fits.do(Task(NONE, forget=2200))
     learnt = fits.do(Task(part(poses, 30, 34), FitKind.KNOW))
@@ -122,7 +122,7 @@ def test_faster_samples_are_averaged(rate_hz, size):
     assert np.flatnonzero(recording.gap).tolist() == [501 // size]
 
 
-def test_a_flip_that_is_set_right_too_late_is_taken_away_and_no_blow(poses):
+def test_a_late_bit_flip_is_removed_and_a_blow_is_kept(poses):
     """A flipped sign bit of the gyroscope would be a turn by some degrees; a blow moves more than one word."""
     at = len(poses) - 100
     flipped, blow = poses.gyr.copy(), poses.acc.copy()

@@ -72,7 +72,7 @@ def test_an_answer_is_brought_after_the_asked_number_of_samples_and_no_sooner(sc
     assert not scheduler.due
 
 
-def test_what_is_due_and_not_there_is_late(scheduler, slow):
+def test_an_answer_that_is_due_and_not_done_is_late(scheduler, slow):
     scheduler.request(RequestFit(FitKind.TRY, 3.0))
     assert not scheduler.late
     scheduler.add(nothing(600))
@@ -81,7 +81,7 @@ def test_what_is_due_and_not_there_is_late(scheduler, slow):
     assert not scheduler.late
 
 
-def test_each_sample_is_told_once(scheduler, slow):
+def test_each_sample_is_sent_once(scheduler, slow):
     for n in (3, 4, 5):
         scheduler.add(nothing(n))
     scheduler.request(RequestFit(FitKind.KNOW, 0.5))
@@ -90,7 +90,7 @@ def test_each_sample_is_told_once(scheduler, slow):
     assert [len(task.samples) for task in slow.tasks] == [12, 6]
 
 
-def test_what_is_forgotten_has_no_answer(scheduler, slow):
+def test_forgotten_requests_have_no_answer(scheduler, slow):
     scheduler.request(RequestFit(FitKind.KNOW, 0.0))
     scheduler.forget(7)
     assert not scheduler.due
@@ -116,7 +116,7 @@ def test_a_process_of_its_own_gives_the_same_bits(poses, apart):
     assert found[0].knowledge.down is not None
 
 
-def test_a_process_that_died_is_said_and_not_waited_for(poses, apart):
+def test_a_process_that_died_raises_abandoned(poses, apart):
     scheduler = FitScheduler(PLAN, SENSOR, lambda *_: apart)
     ask(scheduler, poses)
     os.kill(apart.pid, signal.SIGKILL)
@@ -124,7 +124,7 @@ def test_a_process_that_died_is_said_and_not_waited_for(poses, apart):
         ask(scheduler, poses)
 
 
-def test_what_a_fit_raises_is_raised_where_it_is_asked_for(poses, apart):
+def test_an_exception_of_a_fit_is_raised_with_its_answer(poses, apart):
     scheduler = FitScheduler(PLAN, SENSOR, lambda *_: apart)
     with pytest.raises(ValueError) as raised:
         ask(scheduler, replace(poses, acc=poses.acc[:5]))

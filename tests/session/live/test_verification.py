@@ -67,7 +67,7 @@ TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * tur
         "rests after a knock",
     ],
 )
-def test_says_what_is_wrong(rests, data, contradiction, code, words):
+def test_the_likeliest_reason_is_given(rests, data, contradiction, code, words):
     checked = judge_verification(rests, rests, 3, data, contradiction)
     assert checked.agrees == (code == "")
     if code:
@@ -111,7 +111,7 @@ def test_a_disagreement_refuses_and_comes_first():
 
 
 @pytest.mark.parametrize(("verdict", "then"), [("good", "usable"), ("usable", "usable"), ("refused", "refused")])
-def test_what_nothing_verified_is_usable_at_most(verdict, then):
+def test_an_unverified_calibration_is_usable_at_most(verdict, then):
     found = add_verification(calibration(verdict), Checked((), None, MOVED))
     assert found.verdict == then
     assert found.quality["reasons"][0]["message"] == "it moved; fasten it"
