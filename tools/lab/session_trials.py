@@ -2,14 +2,12 @@
 
     python -m tools.lab session_trials hands --seeds 50 --of guided placing random wandering
     python -m tools.lab session_trials damage --seeds 7000:7050
-    python -m tools.lab session_trials sabotage | parts | faults | recordings
+    python -m tools.lab session_trials parts
 
-hands: a hand that follows the guidance, beside hands that turn as they like. sabotage: sessions that must be refused,
-each for its own reason. parts: each part of mpucal/chip/families.py, simulated by what its row says. damage: what
-nobody announces begins while the board is turned or verified: a step of 3 to 30 mg of the bias (zero; both sides count
-as true), a low byte that is lost (byte), one byte in 2,000 with a flipped bit (bits), or nothing (none). faults: each
-of mpucal/simulated/faults.py at a random moment, and a pair of them. recordings: each and every pair, in a recording
-that is calibrated afterwards, which takes a tenth of the time.
+hands: a hand that follows the guidance, beside hands that turn as they like. parts: each part of
+mpucal/chip/families.py, simulated by what its row says. damage: what nobody announces begins while the board is turned
+or verified: a step of 3 to 30 mg of the bias (zero; both sides count as true), a low byte that is lost (byte), one byte
+in 2,000 with a flipped bit (bits), or nothing (none).
 
 An error is that of a calibrated reading, rms over all directions; claims are errors in units of what is claimed. Times
 are simulated seconds since the start. Exit code 1 where one ended as it should not.
@@ -20,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
-from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -29,44 +26,22 @@ from mpucal.chip.config import Config
 from mpucal.chip.families import PARTS
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
 from mpucal.result.error_model import MG_PER_MPS2
-from mpucal.session.events import Decision, Prompt, PromptKind, Verification
+from mpucal.session.events import Decision, PromptKind, Verification
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip.models import MODELS
-from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.simulated.hands import HANDS
 from mpucal.simulated.mishaps import ZeroStep
 
 from .judge import rms
 from .runner import Asked, Program, option, seed_range
-from .sessions import ABANDONED, NOTHING, Ear, Ended, by_command, ended_of, recorded, session
+from .sessions import ABANDONED, NOTHING, Ear, Ended, by_command, ended_of, session
 from .table import Column, count, frequencies, grouped, known, over, show, table
 
 RATE_HZ = 50.0
-# what changes while the board is turned is seen by what was turned, or by what verifies it
-CHANGED = "inconsistent", "verification_failed"
-# what comes after --bus, options of the chip, and which reason is to be given first
-SABOTAGE = {
-    "never still": ("sim:hand=restless", {}, ("never_still",)),
-    "one orientation": ("sim:hand=still", {}, ("few_orientations",)),
-    "one axis": ("sim:hand=one_axis", {}, ("few_orientations",)),
-    "flipped axis": ("sim:D=1/0/0/0/-1/0/0/0/1", {}, ("left_handed",)),
-    "swapped axes": ("sim:D=0/1/0/1/0/0/0/0/-1", {}, ("swapped_axes",)),
-    "wrong range": ("sim:D=2/0/0/0/2/0/0/0/2", {}, ("wrong_range",)),
-    "gyro clipping": ("sim:hand=hasty", {"gyro_range_dps": 250}, ("gyro_clipped",)),
-    "a knock": ("sim:hand=knocking", {}, CHANGED),
-    "a slip": ("sim:hand=slipping", {}, CHANGED),
-    "warming by 15 C": ("sim:hand=warming", {}, ("temperature_moved",)),
-}
 # of a part: its temperature, which is to be known so well, as each element of D is
 TEMPERATURE_C, NEAR_C, NEAR = 27.0, 0.3, 2e-3
 DAMAGES = {"zero": None, "byte": "low_byte", "bits": "bit_errors", "none": None}
 DAMAGED_S, STEP_MG = (12.0, 75.0), (3.0, 30.0)
-FAULTS = tuple(fault_kinds(*OF_CHIP))
-PAIR = "a pair"
-COMBINATIONS = [*FAULTS, *map("/".join, combinations_with_replacement(FAULTS, 2))]
-CHIPS = ("mpu6050", "mpu6500", "clone98")
-FAULTY_S, RECORDED_S, POLL_S = 75, 45, 0.2
-CODES, FARTHEST_Z = (0, 3, 4, 5), 6.0
 
 
 def parts() -> dict[str, tuple[str, str]]:
@@ -80,23 +55,9 @@ def parts() -> dict[str, tuple[str, str]]:
 
 
 def of_hand(name: str, seed: int) -> Ended:
-    """Run a session in that hand."""
-    return heard(name, f"sim:hand={name}", Plan(), seed)
-
-
-def of_sabotage(name: str, seed: int) -> Ended:
-    """Run a session that cannot end well."""
-    words, options, reasons = SABOTAGE[name]
-    ended = heard(name, words, Plan(Config(**options)), seed)
-    first = "never_still" if "not still" in ended.said else next(iter(ended.reasons), "")
-    right = ended.verdict in (REFUSED, ABANDONED) and first in reasons
-    return replace(ended, wrong="" if right else f"not refused as {' or '.join(reasons)}")
-
-
-def heard(name: str, words: str, plan: Plan, seed: int) -> Ended:
-    """Run a session, and note when what was said."""
+    """Run a session in that hand, and note when what was said."""
     ear = Ear()
-    done = session(words, plan, seed, ear)
+    done = session(f"sim:hand={name}", Plan(), seed, ear)
     rotated_s, finished_s = ear.when(PromptKind.VERIFY), ear.when(PromptKind.REST)
     return Ended(
         **asdict(done.judged()),
@@ -105,7 +66,6 @@ def heard(name: str, words: str, plan: Plan, seed: int) -> Ended:
         said=done.said or "; ".join(decision.why for decision in ear.of(Decision)),
         rotated_s=finished_s if math.isnan(rotated_s) else rotated_s,
         finished_s=finished_s,
-        prompts=sum(prompt.kind is PromptKind.ROTATE for prompt in ear.of(Prompt)),
         verified_z=tuple(
             z
             for v in ear.of(Verification)
@@ -142,44 +102,11 @@ def of_damage(name: str, seed: int) -> Ended:
     return ended_of(name, seed, done, "", *([step] if stepped else []))
 
 
-def of_faults(name: str, seed: int) -> Ended:
-    """Run a session by the command, on a chip that suffers this fault, or two that are drawn."""
-    rng = np.random.default_rng([seed, [*FAULTS, PAIR].index(name)])
-    return of_faulty(name, struck(rng, rng.choice(FAULTS, 2) if name == PAIR else [name], FAULTY_S), seed)
-
-
-def of_recording(name: str, seed: int) -> Ended:
-    """Record a chip that suffers these faults."""
-    faults = struck(np.random.default_rng([seed, COMBINATIONS.index(name)]), name.split("/"), RECORDED_S)
-    return of_faulty(name, faults, seed, record=True)
-
-
-def of_faulty(name: str, faults: Sequence[Fault], seed: int, model: str = "auto", record: bool = False) -> Ended:
-    """Run a session, or record, on a chip that suffers them."""
-    words = f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}"
-    if record:
-        done = recorded(words, Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True), RECORDED_S)
-    else:
-        done, _ = by_command("--bus", words, "--rate", f"{RATE_HZ:g}", "--model", model)
-    ended = ended_of(name, seed, done, "" if done.code in CODES else f"exit code {done.code}")
-    far = ended.verdict == GOOD and max(map(abs, ended.z)) > FARTHEST_Z
-    said = " ".join([*map(str, faults), done.said])
-    return replace(ended, said=said, wrong=ended.wrong or ("called good" if far else ""))
-
-
-def struck(rng: np.random.Generator, names: Sequence[str], end_s: float) -> list[Fault]:
-    """Draw a moment for each."""
-    return [Fault(str(name), round(float(rng.uniform(0.0, end_s)), 2)) for name in names]
-
-
 # by name: the things to try, the function that tries one, and the seeds unless told otherwise
 TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], Ended], str]] = {
     "hands": (tuple(HANDS), of_hand, "50"),
-    "sabotage": (tuple(SABOTAGE), of_sabotage, "1"),
     "parts": (tuple(parts()), of_part, "4:5"),
     "damage": (tuple(DAMAGES), of_damage, "40"),
-    "faults": ((*FAULTS, PAIR), of_faults, "3"),
-    "recordings": (COMBINATIONS, of_recording, "1"),
 }
 
 

@@ -19,7 +19,7 @@ from mpucal.__main__ import run
 from mpucal.calibration import calibrate
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording, Vector
-from mpucal.errors import Abandoned, SourceError
+from mpucal.errors import Abandoned
 from mpucal.result.calibration import GOOD, Calibration
 from mpucal.session.events import Key, Meter, Output, Prompt, PromptKind
 from mpucal.session.plan import Plan
@@ -93,7 +93,6 @@ class Ended(Judgement):
     wrong: str = ""
     rotated_s: float = math.nan
     finished_s: float = math.nan
-    prompts: int = 0
     verified_z: tuple[float, ...] = ()
 
 
@@ -117,20 +116,6 @@ def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequenc
         return Session(code=error.exit_code, said=str(error))
     found = runner.calibrate(recording, partial(calibrate, model=plan.model, gravity=plan.gravity))
     return Session(found, bus.truth_document() or {}, recording)
-
-
-def recorded(words: str, plan: Plan, seconds: float) -> Session:
-    """Record `--bus words` for so long, as far as it gives samples, and calibrate."""
-    bus, said = open_simulated(words), ""
-    driver = Driver(bus, plan.config)
-    try:
-        Runner(driver, Ear(), lambda *_: None, plan, (bus.hear,)).record(seconds)
-    except SourceError as error:
-        said = str(error)
-    recording = driver.recording()
-    if len(recording) < 2:
-        return Session(code=SourceError.exit_code, said=said)
-    return Session(calibrate(recording), bus.truth_document() or {}, recording, said=said)
 
 
 def by_command(*words: str) -> tuple[Session, dict[str, Any]]:

@@ -8,37 +8,71 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.chip.families import PARTS
+from mpucal.errors import SourceError
+from mpucal.result.calibration import GOOD
 from mpucal.session.events import Prompt, PromptKind
+from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from tools.lab import session_trials as trials
+from tools.lab.sessions import NOTHING, Ear, Session, by_command, ended_of
 
-LONGEST_S = 60
+FAULTS = tuple(fault_kinds(*OF_CHIP))
+CHIPS = ("mpu6050", "mpu6500", "clone98")
+LONGEST_S, RECORDED_S, RATE_HZ, POLL_S = 60, 45, 50.0, 0.2
+CODES, FARTHEST_Z = (0, 3, 4, 5), 6.0
 seeds = st.integers(0, 2**32 - 1)
+
+
+def struck(rng, names, end_s):
+    """Draw a moment for each fault."""
+    return [Fault(str(name), round(float(rng.uniform(0.0, end_s)), 2)) for name in names]
+
+
+def recorded(words):
+    """Record a chip for so long, as far as it gives samples, and calibrate."""
+    plan = Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True)
+    bus, said = open_simulated(words), ""
+    driver = Driver(bus, plan.config)
+    try:
+        Runner(driver, Ear(), lambda *_: None, plan, (bus.hear,)).record(RECORDED_S)
+    except SourceError as error:
+        said = str(error)
+    recording = driver.recording()
+    if len(recording) < 2:
+        return Session(code=SourceError.exit_code, said=said)
+    return Session(calibrate(recording), bus.truth_document(), recording, said=said)
+
+
+def judged(faults, seed, record=False):
+    """Run a session by the command, or record, on a chip that suffers the faults; the verdict is true, or none."""
+    words = f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}"
+    done = recorded(words) if record else by_command("--bus", words, "--rate", "50", "--model", "accel")[0]
+    ended = ended_of("", seed, done, "" if done.code in CODES else f"exit code {done.code}")
+    assert not ended.wrong, (faults, seed, ended)
+    assert ended.verdict != GOOD or max(map(abs, ended.z)) <= FARTHEST_Z, (faults, seed, ended)
+    assert ended.verdict != NOTHING or ended.said
 
 
 @settings(max_examples=1)
 @given(seeds)
 def test_no_session_calls_a_wrong_calibration_good(seed):
     rng = np.random.default_rng(seed)
-    faults = trials.struck(rng, rng.choice(trials.FAULTS, 2), LONGEST_S)
-    ended = trials.of_faulty("", faults, seed, model="accel")
-    assert not ended.wrong, ended
-    assert ended.verdict != trials.NOTHING or ended.said
+    judged(struck(rng, rng.choice(FAULTS, 2), LONGEST_S), seed)
 
 
-@pytest.mark.parametrize("number", range(len(trials.FAULTS)), ids=trials.FAULTS)
+@pytest.mark.parametrize("number", range(len(FAULTS)), ids=FAULTS)
 @settings(max_examples=1)
 @given(seed=seeds)
 def test_no_pair_of_faults_makes_a_wrong_calibration_good(number, seed):
     """Each fault and another in a recording calibrated afterwards: as a session, without the fits behind its advice."""
     rng = np.random.default_rng([seed, number])
-    faults = trials.struck(rng, [trials.FAULTS[number], rng.choice(trials.FAULTS)], trials.RECORDED_S)
-    ended = trials.of_faulty("", faults, seed, record=True)
-    assert not ended.wrong, (faults, seed, ended)
-    assert ended.verdict != trials.NOTHING or ended.said
+    judged(struck(rng, [FAULTS[number], rng.choice(FAULTS)], RECORDED_S), seed, record=True)
 
 
 def test_every_part_has_its_name_its_temperature_and_a_source():
