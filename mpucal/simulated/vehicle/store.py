@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from ...mavlink.parameters.encoding import REAL32, Number, Parameter, as_float32
 INT8, INT16 = 2, 4
 
 
-class ParameterStore:
-    """Names, values and types; floats are kept as float32.
+class ParameterStore(dict[str, Number]):
+    """Values by name, with types; floats are kept as float32.
 
     Attributes
     ----------
@@ -21,8 +21,8 @@ class ParameterStore:
     """
 
     def __init__(self) -> None:
+        super().__init__()
         self.version = 0
-        self._values: dict[str, Number] = {}
         self._types: dict[str, int] = {}
 
     def add(self, name: str, value: Number, kind: int = REAL32) -> None:
@@ -35,21 +35,9 @@ class ParameterStore:
         for name in names:
             self.add(name, value)
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._values
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __getitem__(self, name: str) -> Number:
-        return self._values[name]
-
     def __setitem__(self, name: str, value: Number) -> None:
         self.version += 1
-        self._values[name] = as_float32(value) if self._types[name] == REAL32 else round(value)
+        super().__setitem__(name, as_float32(value) if self._types[name] == REAL32 else round(value))
 
     def type(self, name: str) -> int:
         """Return the MAV_PARAM_TYPE."""
@@ -57,7 +45,7 @@ class ParameterStore:
 
     def vector(self, names: Sequence[str]) -> Vector:
         """Return the values of several parameters."""
-        return np.array([float(self._values[name]) for name in names])
+        return np.array([float(self[name]) for name in names])
 
     def set_vector(self, names: Sequence[str], values: Vector) -> None:
         """Set several parameters."""
@@ -66,4 +54,4 @@ class ParameterStore:
 
     def parameter(self, name: str) -> Parameter:
         """Return a parameter as it is sent."""
-        return Parameter(name, self._values[name], self._types[name], list(self._values).index(name), len(self))
+        return Parameter(name, self[name], self._types[name], list(self).index(name), len(self))
