@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import mpucal
+from mpucal.files import load
+from mpucal.files.hints import NO_HINTS
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 EPOCH_NS = 1_403_636_579_758_555_392
@@ -36,3 +38,14 @@ def assert_same():
         np.testing.assert_allclose(read.gyr, walk.gyr, rtol=0, atol=gyr)
 
     return check
+
+
+@pytest.fixture
+def load_table(tmp_path):
+    """Return a function that writes a table as walk.csv, with words for pandas, and loads it."""
+
+    def load_table(table, hints=NO_HINTS, **written):
+        table.to_csv(tmp_path / "walk.csv", index=False, **written)
+        return load(tmp_path / "walk.csv", hints)
+
+    return load_table

@@ -1,5 +1,7 @@
 """Tests for habits of loggers, apps and sketches: signs, dates, units below the header, a name at each number."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -65,22 +67,19 @@ def test_tables_that_are_called_by_a_word_of_their_names(walk, walk_ns, assert_s
     assert_same(load(tmp_path), walk, 1e-9, 1e-9, 1e-6)
 
 
-def test_a_date_of_no_zone_is_no_time_of_day(walk, walk_ns, assert_same, tmp_path):
-    made(walk, pd.to_datetime(walk_ns)).to_csv(tmp_path / "walk.csv", index=False)
-    read = load(tmp_path / "walk.csv")
+def test_a_date_of_no_zone_is_no_time_of_day(walk, walk_ns, assert_same, load_table):
+    read = load_table(made(walk, pd.to_datetime(walk_ns)))
     assert_same(read, walk, 1e-9, 1e-9, 1e-6)
     assert read.utc_ns is None
 
 
-def test_samples_that_are_written_again_are_left_out(walk, walk_ns, assert_same, tmp_path):
+def test_samples_that_are_written_again_are_left_out(walk, walk_ns, assert_same, load_table):
     table = made(walk, walk_ns)
-    table.loc[table.index.repeat(np.where(np.arange(len(table)) % 7, 1, 2))].to_csv(tmp_path / "walk.csv", index=False)
-    read = load(tmp_path / "walk.csv")
+    read = load_table(table.loc[table.index.repeat(np.where(np.arange(len(table)) % 7, 1, 2))])
     assert_same(read, walk)
     assert f"{-(-len(walk) // 7)} repeated samples were left out" in read.taken
     table.loc[10, "time"] = table.loc[9, "time"]
-    table.to_csv(tmp_path / "walk.csv", index=False)
-    again = load(tmp_path / "walk.csv")
+    again = load_table(table)
     assert_same(again, walk, t=1e-4)
     assert "arrival stamps" in again.taken
 
@@ -96,12 +95,11 @@ def test_units_in_the_line_below_the_header(walk, assert_same, tmp_path):
 
 
 @pytest.mark.parametrize("said", ["t=when,ax=AccX(g),ay=AccY(g),az=AccZ,gx=wx,gy=wy,gz=wz", "-,t,ax,ay,az,gx,gy,gz"])
-def test_named_columns_beside_columns_of_words(said, walk, assert_same, tmp_path):
+def test_named_columns_beside_columns_of_words(said, walk, assert_same, load_table):
     table = made(walk, walk.t, ["AccX(g)", "AccY(g)", "AccZ(g)", "wx", "wy", "wz"]).rename(columns={"time": "when"})
     table.iloc[:, 1:4] /= G
     table.insert(0, "device", "WT901")
-    table.to_csv(tmp_path / "walk.csv", index=False)
-    assert_same(load(tmp_path / "walk.csv", Hints(columns=parse_columns(said))), walk, 1e-9, 1e-9, 1e-9)
+    assert_same(load_table(table, Hints(columns=parse_columns(said))), walk, 1e-9, 1e-9, 1e-9)
 
 
 LINES = {
@@ -147,35 +145,27 @@ def test_the_serial_monitors_times_before_the_lines_of_a_table(walk, assert_same
     assert_same(load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
 
 
-def test_a_rate_that_does_not_fit_is_refused(walk, tmp_path):
-    path, rate = tmp_path / "walk.csv", 1 / np.median(np.diff(walk.t))
-    made(walk).to_csv(path, index=False)
-    assert len(load(path, Hints(rate_hz=rate))) == len(walk)
+def test_a_rate_that_does_not_fit_is_refused(walk, load_table):
+    rate = 1 / np.median(np.diff(walk.t))
+    assert len(load_table(made(walk), Hints(rate_hz=rate))) == len(walk)
     for units in ({}, parse_units("acc=m/s^2")):
         with pytest.raises(RecordingError, match=r"gravity turns 0\.\d+ times as fast .* for the times --rate HZ"):
-            load(path, Hints(rate_hz=rate / 4, units=units))
+            load_table(made(walk), Hints(rate_hz=rate / 4, units=units))
 
 
-def test_rates_of_the_other_sign_are_said(walk, tmp_path):
-    table = made(walk, walk.t)
-    table[["gx", "gy", "gz"]] *= -1
-    table.to_csv(tmp_path / "walk.csv", index=False)
-    assert "gravity turns the other way" in load(tmp_path / "walk.csv").taken
+def test_rates_of_the_other_sign_are_said(walk, load_table):
+    assert "gravity turns the other way" in load_table(made(replace(walk, gyr=-walk.gyr), walk.t)).taken
 
 
-def test_a_size_that_is_no_gravity_says_no_unit(walk, tmp_path):
-    table = made(walk, walk.t)
-    table[["ax", "ay", "az"]] *= 512 / G
-    table[["ax", "ay", "az"]] = table[["ax", "ay", "az"]].round()
-    table.to_csv(tmp_path / "walk.csv", index=False)
+def test_a_size_that_is_no_gravity_says_no_unit(walk, load_table):
+    table = made(replace(walk, acc=np.round(walk.acc * 512 / G)), walk.t)
     with pytest.raises(RecordingError, match="the unit of acc is not known"):
-        load(tmp_path / "walk.csv", Hints(units=parse_units("gyr=rad/s,t=s")))
+        load_table(table, Hints(units=parse_units("gyr=rad/s,t=s")))
 
 
-def test_times_that_are_not_known_as_such_are_named(walk, tmp_path):
-    made(walk, walk.t).rename(columns={"time": "Ticks"}).to_csv(tmp_path / "walk.csv", index=False)
+def test_times_that_are_not_known_as_such_are_named(walk, load_table):
     with pytest.raises(RecordingError, match="no times that are known as such; its columns are Ticks, ax"):
-        load(tmp_path / "walk.csv")
+        load_table(made(walk, walk.t).rename(columns={"time": "Ticks"}))
 
 
 def sensor_loggers_one_table(walk, sign, in_g, uncalibrated=True):
@@ -189,16 +179,15 @@ def sensor_loggers_one_table(walk, sign, in_g, uncalibrated=True):
 
 
 @pytest.mark.parametrize("ios", [False, True])
-def test_sensor_loggers_one_table(ios, walk, assert_same, tmp_path):
-    sensor_loggers_one_table(walk, -1 if ios else 1, ios).to_csv(tmp_path / "one.csv", index=False)
-    read = load(tmp_path / "one.csv")
+def test_sensor_loggers_one_table(ios, walk, assert_same, load_table):
+    read = load_table(sensor_loggers_one_table(walk, -1 if ios else 1, ios))
     assert_same(read, walk, 1e-9, 1e-9, 1e-9)
     assert ("the opposite sign, as on iOS" in read.taken) == ios
 
 
-def test_a_table_that_does_not_say_whose_sign_it_has_is_said(walk, assert_same, tmp_path):
-    sensor_loggers_one_table(walk, 1, False, uncalibrated=False).to_csv(tmp_path / "one.csv", index=False)
-    assert "if an iPhone recorded them, it is the opposite one" in load(tmp_path / "one.csv").taken
+def test_a_table_that_does_not_say_whose_sign_it_has_is_said(walk, load_table):
+    read = load_table(sensor_loggers_one_table(walk, 1, False, uncalibrated=False))
+    assert "if an iPhone recorded them, it is the opposite one" in read.taken
 
 
 def pair(folder, walk, times, order=(0, 1, 2, 3)):
@@ -225,11 +214,10 @@ def test_two_tables_without_names_whose_columns_are_said(said, walk, walk_ns, as
 
 
 @pytest.mark.parametrize("odd", ["", "nan", "inf"])
-def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, tmp_path):
+def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, load_table, tmp_path):
     rows = made(walk, walk.t).astype(str)
     rows.iloc[100, 2] = odd
-    rows.to_csv(tmp_path / "a.csv", index=False)
-    read = load(tmp_path / "a.csv")
+    read = load_table(rows)
     np.testing.assert_allclose(read.acc, np.delete(walk.acc, 100, axis=0), atol=1e-9)
     assert "1 samples whose accelerations lack a number were left out" in read.taken
     (tmp_path / "b.csv").write_text(rows.drop(columns="time").to_csv(index=False) + "1.0,2.0")
@@ -245,19 +233,17 @@ def test_a_line_that_was_torn_at_the_end_is_left_out_and_said(walk, assert_same,
     assert "1 lines that lack a number" in read.taken
 
 
-def test_seconds_and_nanoseconds_in_columns_of_their_own(walk, walk_ns, assert_same, tmp_path):
+def test_seconds_and_nanoseconds_in_columns_of_their_own(walk, walk_ns, assert_same, load_table):
     table = made(walk, walk_ns // 10**9).rename(columns={"time": "header.stamp.sec"})
     table.insert(1, "header.stamp.nanosec", walk_ns % 10**9)
-    table.to_csv(tmp_path / "a.csv", index=False)
-    read = load(tmp_path / "a.csv")
+    read = load_table(table)
     assert_same(read, walk, 1e-9, 1e-9, 1e-9)
     assert read.utc_ns == walk_ns[0]
 
 
 @pytest.mark.parametrize(("encoding", "end"), [("utf-16", "\n"), ("utf-8-sig", "\r\n"), ("utf-8", "\r")])
-def test_text_as_other_systems_write_it(encoding, end, walk, assert_same, tmp_path):
-    made(walk, walk.t).to_csv(tmp_path / "a.csv", index=False, encoding=encoding, lineterminator=end)
-    assert_same(load(tmp_path / "a.csv"), walk, 1e-9, 1e-9, 1e-9)
+def test_text_as_other_systems_write_it(encoding, end, walk, assert_same, load_table):
+    assert_same(load_table(made(walk, walk.t), encoding=encoding, lineterminator=end), walk, 1e-9, 1e-9, 1e-9)
 
 
 def test_a_line_for_each_sensor(walk, tmp_path):

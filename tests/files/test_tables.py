@@ -115,10 +115,8 @@ SEPARATED = [(d, s) for d in DIALECTS for s in SEPARATORS if s == "," or d in ("
 
 
 @pytest.mark.parametrize(("dialect", "separator"), SEPARATED)
-def test_dialects_give_the_samples_that_were_written(dialect, separator, walk, walk_ns, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    DIALECTS[dialect](walk, walk_ns).to_csv(path, sep=separator, index=False)
-    read = load(path)
+def test_dialects_give_the_samples_that_were_written(dialect, separator, walk, walk_ns, assert_same, load_table):
+    read = load_table(DIALECTS[dialect](walk, walk_ns), sep=separator)
     assert_same(read, walk, 1e-9, 1e-9, 1e-6 if dialect in ("ulog2csv", "WitMotion") else 1e-9)
     assert read.taken.startswith("walk.csv was read with times in ")
     assert SEPARATORS[separator] in read.taken
@@ -130,16 +128,9 @@ def test_other_endings(ending, walk, walk_ns, assert_same, tmp_path):
     assert_same(load(tmp_path / f"walk{ending}"), walk, 1e-9, 1e-9, 1e-9)
 
 
-def test_decimal_commas(walk, walk_ns, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    DIALECTS["AndroSensor"](walk, walk_ns).to_csv(path, sep=";", decimal=",", index=False)
-    assert_same(load(path), walk, 1e-9, 1e-9, 1e-9)
-
-
-def test_an_encoding_of_windows(walk, walk_ns, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    DIALECTS["AndroSensor"](walk, walk_ns).to_csv(path, index=False, encoding="cp1252")
-    assert_same(load(path), walk, 1e-9, 1e-9, 1e-9)
+@pytest.mark.parametrize("written", [{"sep": ";", "decimal": ","}, {"encoding": "cp1252"}])
+def test_decimal_commas_and_an_encoding_of_windows(written, walk, walk_ns, assert_same, load_table):
+    assert_same(load_table(DIALECTS["AndroSensor"](walk, walk_ns), **written), walk, 1e-9, 1e-9, 1e-9)
 
 
 def test_lines_before_the_header(walk, walk_ns, assert_same, tmp_path):
@@ -148,64 +139,55 @@ def test_lines_before_the_header(walk, walk_ns, assert_same, tmp_path):
     assert_same(load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
 
 
-def test_dates_are_times(walk, walk_ns, assert_same, tmp_path):
-    made = DIALECTS["axes first"](walk, walk_ns)
-    made["t"] = pd.to_datetime(walk_ns, utc=True)
-    made.to_csv(tmp_path / "walk.csv", index=False)
-    read = load(tmp_path / "walk.csv")
+def test_dates_are_times(walk, walk_ns, assert_same, load_table):
+    read = load_table(DIALECTS["axes first"](walk, walk_ns).assign(t=pd.to_datetime(walk_ns, utc=True)))
     assert_same(read, walk, 1e-9, 1e-9, 1e-6)
     assert abs(read.utc_ns - walk_ns[0]) < 1000
 
 
-def test_ios_counts_gravity_the_other_way(walk, walk_ns, tmp_path):
-    DIALECTS["SensorLog"](walk, walk_ns).to_csv(tmp_path / "walk.csv", index=False)
-    assert "the opposite sign, as on iOS" in load(tmp_path / "walk.csv").taken
+def test_ios_counts_gravity_the_other_way(walk, walk_ns, load_table):
+    assert "the opposite sign, as on iOS" in load_table(DIALECTS["SensorLog"](walk, walk_ns)).taken
 
 
-def test_doubtful_units_are_refused_and_can_be_said(walk, walk_ns, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    made = DIALECTS["EuRoC"](walk, walk_ns)
-    made.iloc[:, 4:] /= G
-    made.to_csv(path, index=False)
-    with pytest.raises(RecordingError, match=r"acc is said to be in m/s\^2, but .* suggests g"):
-        load(path)
-    assert_same(load(path, Hints(units=parse_units("acc=g"))), walk)
+@pytest.mark.parametrize(
+    ("names", "scale", "units", "says"),
+    [
+        (
+            "time [s]|ax [m s^-2]|ay [m s^-2]|az [m s^-2]|gx|gy|gz",
+            (1, 1 / G, 1),
+            "acc=g",
+            r"acc is said to be in m/s\^2, but .* suggests g",
+        ),
+        (
+            "time [s]|ax|ay|az|omega_x|omega_y|omega_z",
+            (1, 1, np.degrees(1)),
+            "gyr=deg/s",
+            "gyr is said to be in rad/s, but the turning of gravity suggests deg/s",
+        ),
+        ("time [s]|ax|ay|az|gx|gy|gz", (1000, 1, 1), "t=ms", r"t is said to be in s, but the step of .* suggests ms"),
+    ],
+)
+def test_doubtful_units_are_refused_and_can_be_said(names, scale, units, says, walk, assert_same, load_table):
+    table = frame(names, walk.t * scale[0], walk.acc * scale[1], walk.gyr * scale[2])
+    with pytest.raises(RecordingError, match=says):
+        load_table(table)
+    assert_same(load_table(table, Hints(units=parse_units(units))), walk, 1e-9, 1e-9, 1e-9)
 
 
-def test_degrees_that_are_called_radians_are_refused(walk, walk_ns, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    made = DIALECTS["Kalibr"](walk, walk_ns)
-    made.iloc[:, 1:4] = np.degrees(made.iloc[:, 1:4])
-    made.to_csv(path, index=False)
-    with pytest.raises(RecordingError, match="gyr is said to be in rad/s, but the turning of gravity suggests deg/s"):
-        load(path)
-    assert_same(load(path, Hints(units=parse_units("gyr=deg/s"))), walk)
-
-
-def test_milliseconds_that_are_called_seconds_are_refused(walk, walk_ns, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    timed("time [s]", walk.t * 1000, "ax|ay|az|gx|gy|gz", walk.acc, walk.gyr).to_csv(path, index=False)
-    with pytest.raises(RecordingError, match=r"t is said to be in s, but the step of .* suggests ms"):
-        load(path)
-
-
-def test_rates_of_a_sensor_at_rest_need_a_unit(tmp_path):
+def test_rates_of_a_sensor_at_rest_need_a_unit(load_table):
     rng = np.random.default_rng(3)
     acc, gyr = rng.normal([0, 0, G], 0.02, (500, 3)), rng.normal(0, 0.3, (500, 3))
-    timed("time", np.arange(500) * 5, "accX|accY|accZ|gyroX|gyroY|gyroZ", acc, gyr).to_csv(
-        tmp_path / "a.csv", index=False
-    )
+    table = timed("time", np.arange(500) * 5, "accX|accY|accZ|gyroX|gyroY|gyroZ", acc, gyr)
     with pytest.raises(RecordingError, match="the unit of gyr is not known"):
-        load(tmp_path / "a.csv")
-    assert len(load(tmp_path / "a.csv", Hints(units=parse_units("gyr=deg/s")))) == 500
+        load_table(table)
+    assert len(load_table(table, Hints(units=parse_units("gyr=deg/s")))) == 500
 
 
-def test_linear_acceleration_is_none_that_can_be_calibrated(walk, walk_ns, tmp_path):
+def test_linear_acceleration_is_none_that_can_be_calibrated(walk, walk_ns, load_table):
     made = DIALECTS["Kalibr"](walk, walk_ns)
     made.iloc[:, 4:] = np.random.default_rng(1).normal(0, 0.3, (len(walk), 3))
-    made.to_csv(tmp_path / "walk.csv", index=False)
     with pytest.raises(RecordingError, match="gravity is not in it"):
-        load(tmp_path / "walk.csv")
+        load_table(made)
 
 
 def counts(walk):
@@ -218,28 +200,28 @@ def even(walk):
     return type(walk).from_arrays(np.arange(len(walk)) / rate, walk.acc, walk.gyr), rate
 
 
-def test_counts_need_their_ranges_and_a_rate(walk, assert_same, tmp_path):
-    path, (steady, rate) = tmp_path / "walk.csv", even(walk)
-    pd.DataFrame(counts(walk), columns=["ax", "ay", "az", "gx", "gy", "gz"]).to_csv(path, index=False)
+def test_counts_need_their_ranges_and_a_rate(walk, assert_same, load_table):
+    table, (steady, rate) = frame("ax|ay|az|gx|gy|gz", counts(walk)), even(walk)
     with pytest.raises(RecordingError, match="give the rate of its samples with --rate HZ"):
-        load(path)
-    seen = load(path, Hints(rate_hz=rate))
+        load_table(table)
+    seen = load_table(table, Hints(rate_hz=rate))
     assert "counts of ±4 g (by |a|) and rates in counts of ±500 deg/s (by how gravity turns)" in seen.taken
     assert_same(seen, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
-    read = load(path, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=500))
+    read = load_table(table, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=500))
     assert_same(read, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
     assert (read.sensor.accel_range_g, read.sensor.gyro_range_dps) == (4, 500)
     with pytest.raises(RecordingError, match="which is not gravity"):
-        load(path, Hints(rate_hz=rate, accel_range_g=2, gyro_range_dps=500))
+        load_table(table, Hints(rate_hz=rate, accel_range_g=2, gyro_range_dps=500))
     with pytest.raises(RecordingError, match=r"gravity turns .* as fast"):
-        load(path, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=2000))
+        load_table(table, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=2000))
 
 
-def test_counts_at_the_end_of_the_range_are_clipped(walk, tmp_path):
-    path, made = tmp_path / "walk.csv", counts(walk)
+def test_counts_at_the_end_of_the_range_are_clipped(walk, load_table):
+    made = counts(walk)
     made[7, 1], made[9, 5] = 32767, -32768
-    pd.DataFrame(made, columns=["ax", "ay", "az", "gx", "gy", "gz"]).to_csv(path, index=False)
-    read = load(path, Hints(rate_hz=even(walk)[1], accel_range_g=4, gyro_range_dps=500))
+    read = load_table(
+        frame("ax|ay|az|gx|gy|gz", made), Hints(rate_hz=even(walk)[1], accel_range_g=4, gyro_range_dps=500)
+    )
     assert np.flatnonzero(read.acc_clipped).tolist() == [7]
     assert np.flatnonzero(read.gyr_clipped).tolist() == [9]
 
@@ -253,19 +235,19 @@ def test_counts_at_the_end_of_the_range_are_clipped(walk, tmp_path):
         ("", "t,ax,ay,az,gx,gy,gz"),
     ],
 )
-def test_columns_are_named(names, said, walk, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    frame(names or "0|1|2|3|4|5|6", walk.t * 1000, walk.acc, walk.gyr).to_csv(path, index=False, header=bool(names))
-    seen = load(path)
+def test_columns_are_named(names, said, walk, assert_same, load_table):
+    table = frame(names or "0|1|2|3|4|5|6", walk.t * 1000, walk.acc, walk.gyr)
+    seen = load_table(table, header=bool(names))
     assert "how gravity turns: --columns t,ax,ay,az,gx,gy,gz" in seen.taken
     assert_same(seen, walk, 1e-9, 1e-9, 1e-9)
-    assert_same(load(path, Hints(columns=parse_columns(said))), walk, 1e-9, 1e-9, 1e-9)
+    read = load_table(table, Hints(columns=parse_columns(said)), header=bool(names))
+    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
 
 
-def test_a_column_that_is_not_there(walk, tmp_path):
-    frame("a|b|c|d|e|f|g", walk.t, walk.acc, walk.gyr).to_csv(tmp_path / "walk.csv", index=False)
+def test_a_column_that_is_not_there(walk, load_table):
+    hints = Hints(columns=parse_columns("t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g"))
     with pytest.raises(RecordingError, match="there is no column h for t: name one of a, b, c, d, e, f, g"):
-        load(tmp_path / "walk.csv", Hints(columns=parse_columns("t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g")))
+        load_table(frame("a|b|c|d|e|f|g", walk.t, walk.acc, walk.gyr), hints)
 
 
 def test_the_public_name_takes_words(walk, assert_same, tmp_path):
@@ -363,13 +345,12 @@ def test_one_table_of_two_asks_for_the_other(walk, walk_ns, tmp_path):
         load(tmp_path / "Accelerometer.csv")
 
 
-def test_lines_that_hold_one_sensor_each(walk, assert_same, tmp_path):
+def test_lines_that_hold_one_sensor_each(walk, load_table):
     """Read what a logger writes that has one line for each event."""
     nothing = np.full((len(walk), 3), np.nan)
     of_acc = timed("time", walk.t, "ax|ay|az|wx|wy|wz", walk.acc, nothing)
     of_gyr = timed("time", walk.t + 0.002, "ax|ay|az|wx|wy|wz", nothing, walk.gyr)
-    pd.concat([of_acc, of_gyr]).sort_values("time").to_csv(tmp_path / "walk.csv", index=False)
-    read = load(tmp_path / "walk.csv")
+    read = load_table(pd.concat([of_acc, of_gyr]).sort_values("time"))
     np.testing.assert_allclose(read.acc, walk.acc[1:], atol=1e-9)
     assert "+2.00 ms after" in read.taken
 
