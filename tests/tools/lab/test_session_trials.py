@@ -52,7 +52,11 @@ def recorded(words):
 def judged(faults, seed, record=False):
     """Run a session by the command, or record, on a chip that suffers the faults; the verdict is true, or none."""
     words = f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}"
-    done = recorded(words) if record else by_command("--bus", words, "--rate", "50", "--model", "accel")[0]
+    done = (
+        recorded(words)
+        if record
+        else by_command("--bus", words, "--rate", "25", "--target", "quick", "--model", "accel")[0]
+    )
     ended = ended_of("", seed, done, "" if done.code in CODES else f"exit code {done.code}")
     assert not ended.wrong, (faults, seed, ended)
     assert ended.verdict != GOOD or max(map(abs, ended.z)) <= FARTHEST_Z, (faults, seed, ended)
