@@ -116,15 +116,13 @@ class ArduPilot(Firmware):
         interval_us = 1_000_000 // rate_hz if rate_hz else 0
         return [(message_id, interval_us) for message_id in (SYS_STATUS, RAW_IMU, *SCALED_IMUS[1 : self.options.imus])]
 
-    def set(self, wanted: Parameter) -> list[Parameter | int]:
+    def set(self, wanted: Parameter) -> list[str] | int:
         """Echo the parameter, and with one axis of a vector all three; ignore an unknown name or NaN."""
         if wanted.name not in self.store or not np.isfinite(wanted.value) or wanted.name == self.options.refuse:
             return []
         self.store[wanted.name] = wanted.value
-        echoed = [wanted.name]
-        if wanted.name[:-1].endswith("_") and self.store.type(wanted.name) == REAL32:
-            echoed = [wanted.name[:-1] + axis for axis in AXES]
-        return [self.store.parameter(name) for name in echoed]
+        is_vector = wanted.name[:-1].endswith("_") and self.store.type(wanted.name) == REAL32
+        return [wanted.name[:-1] + axis for axis in AXES] if is_vector else [wanted.name]
 
     def correction(self, imu: int) -> tuple[Vector, Vector]:
         """Return the stored correction, which is in use at once."""

@@ -96,8 +96,8 @@ class Firmware(ABC):
         """Return MAV_RESULT of a request for a message each `interval_us`, and the interval that it gets."""
 
     @abstractmethod
-    def set(self, wanted: Parameter) -> list[Parameter | int]:
-        """Set a parameter; return the echoes, or the MAV_PARAM_ERROR, or nothing if the firmware does not answer."""
+    def set(self, wanted: Parameter) -> list[str] | int:
+        """Set a parameter; return the names that the firmware echoes, none if it is silent, or MAV_PARAM_ERROR."""
 
     @abstractmethod
     def correction(self, imu: int) -> tuple[Vector, Vector]:

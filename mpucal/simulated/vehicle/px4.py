@@ -117,17 +117,17 @@ class Px4(Firmware):
         # A sample that comes before its interval is over is omitted: every one is sent, or every second.
         return m.MAV_RESULT_ACCEPTED, self.tick_us if interval_us <= self.tick_us else max(interval_us, SHORTEST_US)
 
-    def set(self, wanted: Parameter) -> list[Parameter | int]:
+    def set(self, wanted: Parameter) -> list[str] | int:
         """Echo the parameter; an unknown name or another type is an error."""
         if wanted.name not in self.store:
-            return [DOES_NOT_EXIST]
+            return DOES_NOT_EXIST
         if wanted.name == self.options.refuse:
-            return [PERMISSION_DENIED]
+            return PERMISSION_DENIED
         if wanted.type != self.store.type(wanted.name):
-            return [TYPE_MISMATCH]
+            return TYPE_MISMATCH
         self.store[wanted.name] = wanted.value
         self._take_over()
-        return [self.store.parameter(wanted.name)]
+        return [wanted.name]
 
     def learn_offsets(self) -> list[str]:
         """Add the estimator's biases of IMU 1 to its offsets (SENS_IMU_AUTOCAL), in a slot that names it."""

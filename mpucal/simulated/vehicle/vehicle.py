@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
 from ...mavlink.ftp import Payload
-from ...mavlink.parameters.encoding import Parameter, from_wire, name_bytes, to_wire
+from ...mavlink.parameters.encoding import from_wire, name_bytes, to_wire
 from ...mavlink.prearm import ARMED
 from ...mavlink.prompts import ReceivedPrompt, decode_prompt
 from ..faults import Schedule
@@ -125,11 +125,13 @@ class SimulatedVehicle:
     def _boot(self) -> None:
         self._booted_us = self._now_us
         self._streams = StreamTimes()
-        self._streams.set(HEARTBEAT, S_US, self._now_us)
-        for message_id, interval_us in self.firmware.streams:
-            self._streams.set(message_id, interval_us, self._now_us)
+        self._set_intervals(((HEARTBEAT, S_US), *self.firmware.streams))
         self._list: deque[str] = deque()
         self.firmware.start()
+
+    def _set_intervals(self, intervals: Iterable[tuple[int, int]]) -> None:
+        for message_id, interval_us in intervals:
+            self._streams.set(message_id, interval_us, self._now_us)
 
     def _take_sent(self) -> list[Sent]:
         sent = list(self._out)
@@ -156,7 +158,7 @@ class SimulatedVehicle:
             if message is not None:
                 self._send(message)
         if self._list:
-            self._send(self._value(self.firmware.store.parameter(self._list.popleft())))
+            self._send_value(self._list.popleft())
 
     def _message(self, message_id: int) -> Message | None:
         return self.firmware.message(message_id, self._now_us - self._booted_us)
@@ -173,11 +175,11 @@ class SimulatedVehicle:
         self._mav.seq = (self._mav.seq + 1) % SEQUENCE
         self._out.append(Sent(self._now_us, data))
 
-    def _value(self, parameter: Parameter) -> Message:
-        value = to_wire(parameter.value, parameter.type, self.firmware.bytewise)
-        return dialect().MAVLink_param_value_message(
-            name_bytes(parameter.name), value, parameter.type, parameter.count, parameter.index
-        )
+    def _send_value(self, name: str) -> None:
+        held = self.firmware.store.parameter(name)
+        value = to_wire(held.value, held.type, self.firmware.bytewise)
+        message = dialect().MAVLink_param_value_message(name_bytes(name), value, held.type, held.count, held.index)
+        self._send(message)
 
     def _param_request_read(self, message: Message) -> None:
         store = self.firmware.store
@@ -185,7 +187,7 @@ class SimulatedVehicle:
         if message.param_index >= 0:
             name = next(itertools.islice(store, message.param_index, None), "")
         if name in store:
-            self._send(self._value(store.parameter(name)))
+            self._send_value(name)
         elif self.firmware.bytewise:
             self._param_error(name, 1)
 
@@ -193,19 +195,19 @@ class SimulatedVehicle:
         self._list = deque(self.firmware.store)
 
     def _param_set(self, message: Message) -> None:
-        for echo in self.firmware.set(from_wire(message, self.firmware.bytewise)):
-            if isinstance(echo, Parameter):
-                self._send(self._value(echo))
-            else:
-                self._param_error(message.param_id, echo)
+        echoed = self.firmware.set(from_wire(message, self.firmware.bytewise))
+        if isinstance(echoed, int):
+            self._param_error(message.param_id, echoed)
+            return
+        for name in echoed:
+            self._send_value(name)
 
     def _param_error(self, name: str, error: int) -> None:
         self._send(dialect().MAVLink_param_error_message(self.options.system, COMPONENT, name_bytes(name), -1, error))
 
     def _request_data_stream(self, message: Message) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
-        for message_id, interval_us in self.firmware.group(rate_hz):
-            self._streams.set(message_id, interval_us, self._now_us)
+        self._set_intervals(self.firmware.group(rate_hz))
 
     def _command_long(self, message: Message) -> None:
         m = dialect()
@@ -223,7 +225,7 @@ class SimulatedVehicle:
         message_id = int(message.param1)
         result, interval_us = self.firmware.interval(message_id, int(message.param2))
         if result == dialect().MAV_RESULT_ACCEPTED:
-            self._streams.set(message_id, interval_us, self._now_us)
+            self._set_intervals([(message_id, interval_us)])
         return result
 
     def _request_message(self, message: Message) -> int:
@@ -267,7 +269,7 @@ class SimulatedVehicle:
     def learn_offsets(self) -> None:
         """Change the vehicle's own accelerometer offsets, and send them."""
         for name in self.firmware.learn_offsets():
-            self._send(self._value(self.firmware.store.parameter(name)))
+            self._send_value(name)
 
     def fall_silent(self) -> None:
         """Stop sending and receiving for good."""
@@ -275,8 +277,7 @@ class SimulatedVehicle:
 
     def obey_second_station(self) -> None:
         """Set the rates that another ground station requests by default."""
-        for message_id, interval_us in self.firmware.group(SECOND_STATION_HZ):
-            self._streams.set(message_id, interval_us, self._now_us)
+        self._set_intervals(self.firmware.group(SECOND_STATION_HZ))
 
     def _file_transfer_protocol(self, message: Message) -> None:
         reply = self.card.answer(Payload.decode(bytes(message.payload)))
