@@ -192,7 +192,7 @@ def test_an_input_calibration_is_not_overwritten(mpucal, calibration, words):
     shutil.copy("c.json", "calibration.json")
     before = Path("c.json").read_bytes()
     result = mpucal(*words)
-    assert result.code == 2 and "was given to be read" in result.err
+    assert result.code == 2 and "is an input file" in result.err
     assert Path("c.json").read_bytes() == Path("calibration.json").read_bytes() == before
 
 

@@ -197,7 +197,7 @@ def test_an_updated_calibration_is_not_written_beside_a_capture(mpucal, session)
     assert f"`mpucal {' '.join(map(str, words))} -o {session.folder}-2` puts" in result.err
     for name in ("calibration.json", "calibration.bin"):
         result = mpucal("check", session.folder / name, session.folder, "-o", session.folder)
-        assert (result.code, "was given to be read" in result.err) == (2, True)
+        assert (result.code, "is an input file" in result.err) == (2, True)
     assert contents(session.folder) == before
 
 
