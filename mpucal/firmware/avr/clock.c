@@ -29,7 +29,7 @@ uint32_t clock_now_us(void) {
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
         uint8_t ticks = TCNT0;
         us = steps_us + ticks / 2;
-        /* it has overflowed since interrupts are off, and before it was read */
+        /* It overflowed after interrupts were disabled and before it was read. */
         if (TIFR0 & _BV(TOV0) && ticks < 128) {
             us += CLOCK_STEP_US;
         }
@@ -44,6 +44,6 @@ uint8_t clock_steps(void) {
 void clock_nap(void) {
     sleep_enable();
     sei();
-    sleep_cpu(); /* the instruction behind sei() still runs before any interrupt */
+    sleep_cpu(); /* the instruction after sei() runs before any interrupt */
     sleep_disable();
 }

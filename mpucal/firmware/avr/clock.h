@@ -1,4 +1,4 @@
-/* Microseconds since the start, on timer 0. */
+/* Clock in microseconds since the start, on timer 0. */
 #ifndef CLOCK_H
 #define CLOCK_H
 
@@ -6,15 +6,15 @@
 
 void clock_begin(void);
 
-/* Wraps at 2^32; steps of 0.5 us, rounded down. */
+/* Returns microseconds modulo 2^32, rounded down from 0.5 us. */
 uint32_t clock_now_us(void);
 
-/* The same in steps of 128 us, modulo 256: for short waits, without arithmetic in 32 bits. */
+/* Returns steps of 128 us modulo 256, for short waits without 32-bit arithmetic. */
 uint8_t clock_steps(void);
 
 #define CLOCK_STEP_US 128
 
-/* Sleep until any interrupt, at most a step; interrupts are off when it is called, and on when it returns. */
+/* Sleeps until any interrupt, for a step at most; interrupts must be disabled before, and are enabled after. */
 void clock_nap(void);
 
 #endif

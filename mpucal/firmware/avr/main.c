@@ -1,4 +1,4 @@
-/* The bridge on an ATmega328P at 16 MHz: an Arduino Uno, Nano or Pro Mini. */
+/* Bridge on an ATmega328P at 16 MHz: an Arduino Uno, Nano or Pro Mini. */
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/wdt.h>

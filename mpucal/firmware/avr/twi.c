@@ -18,7 +18,7 @@
 
 #define GO (_BV(TWEN) | _BV(TWIE) | _BV(TWINT))
 
-/* The transfer that the interrupt carries out. */
+/* Transfer that the interrupt carries out. */
 static uint8_t address, first, reading, register_sent;
 static uint8_t *data;
 static uint8_t left;
@@ -29,7 +29,7 @@ static void finish(uint8_t with) {
     code = with;
 }
 
-/* What was sent last was acknowledged: the address, the register or a byte of data. */
+/* Continues after an acknowledge of the address, the register or a byte of data. */
 static void send_next(void) {
     if (!register_sent) {
         register_sent = 1;
@@ -90,7 +90,7 @@ void twi_begin(void) {
     TWCR = _BV(TWEN);
 }
 
-/* A chip that was cut off within a byte holds SDA low until it has clocked the rest of it out. */
+/* Frees the bus: a chip that was interrupted within a byte holds SDA low until the rest of it is clocked out. */
 static void free_bus(void) {
     TWCR = 0;
     for (uint8_t bit = 0; bit < 9; bit++) {
@@ -114,7 +114,7 @@ static uint8_t transfer(uint8_t count) {
     uint8_t began = clock_steps();
     left = count;
     register_sent = 0;
-    while (TWCR & _BV(TWSTO)) { /* the last transfer's */
+    while (TWCR & _BV(TWSTO)) { /* stop of the last transfer */
         if ((uint8_t)(clock_steps() - began) > TIMEOUT_STEPS) {
             return give_up();
         }
@@ -145,6 +145,6 @@ uint8_t twi_write(uint8_t at, uint8_t from, const uint8_t *bytes, uint8_t count)
     address = at;
     first = from;
     reading = 0;
-    data = (uint8_t *)bytes; /* which is only read from */
+    data = (uint8_t *)bytes; /* only read */
     return transfer(count);
 }

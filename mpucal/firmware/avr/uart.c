@@ -8,11 +8,11 @@
 #ifndef BAUD
 #define BAUD 115200UL
 #endif
-/* 115200 is 2.1 % off at 16 MHz, as with the Arduino core; receivers stand 4 % */
+/* 115200 is 2.1 % off at 16 MHz, as in the Arduino core; receivers tolerate 4 % */
 #define BAUD_TOL 4
 #include <util/setbaud.h>
 
-/* Positions are bytes, so that they wrap around by themselves. */
+/* Positions are bytes, which wrap around by themselves. */
 static volatile uint8_t received[UART_QUEUE_BYTES + 1], received_first, received_end;
 static volatile uint8_t to_send[UART_QUEUE_BYTES + 1], to_send_first, to_send_end;
 

@@ -8,12 +8,12 @@
 
 void uart_begin(void);
 
-/* Whether a byte has come; call it with interrupts off before a nap. */
+/* Returns true if a byte has come; call it with interrupts disabled before a sleep. */
 uint8_t uart_has_byte(void);
 
 uint8_t uart_take(void);
 
-/* Queue bytes to be sent; waits where there is no room. */
+/* Queues bytes to send; waits if the queue is full. */
 void uart_send(const uint8_t *bytes, uint8_t count);
 
 #endif

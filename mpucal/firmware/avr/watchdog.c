@@ -10,7 +10,8 @@ void watchdog_begin(void) {
     WDTCSR = _BV(WDIE) | _BV(WDP2) | _BV(WDP1) | _BV(WDP0); /* an interrupt after 2 s */
 }
 
-/* No reset by the watchdog itself: the boot loader of older boards leaves it on then, and is reset for ever. */
+/* The interrupt restarts the program. A reset by the watchdog would never end on older boards, whose boot loader leaves
+ * the watchdog running. */
 ISR(WDT_vect, ISR_NAKED) {
     __asm__ __volatile__("jmp 0");
 }

@@ -1,4 +1,4 @@
-/* Starts the program anew where nobody feeds it for two seconds: the host's next request is answered with NO_HELLO. */
+/* Watchdog: restarts the program if it is not fed for two seconds; the next request is then answered with NO_HELLO. */
 #ifndef MPUCAL_WATCHDOG_H
 #define MPUCAL_WATCHDOG_H
 

@@ -1,4 +1,4 @@
-/* How many cycles mpucal_apply takes on an ATmega328P: `make cycles` runs this in an emulator and prints what it says. */
+/* Counts the cycles of mpucal_apply on an ATmega328P: `make cycles` runs it in an emulator and prints its output. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
@@ -8,7 +8,7 @@
 #include "mpucal_apply.h"
 
 #define RUNS 200
-#define TIMER_CYCLES 64 /* timer 1 counts every 64th cycle, so that loading a blob fits */
+#define TIMER_CYCLES 64 /* timer 1 counts every 64th cycle, enough for loading a blob */
 
 static int put(char c, FILE *stream) {
     (void)stream;
@@ -19,7 +19,7 @@ static int put(char c, FILE *stream) {
 
 static FILE out = FDEV_SETUP_STREAM(put, NULL, _FDEV_SETUP_WRITE);
 
-/* Not inlined, as it would be called. */
+/* Not inlined, as in a real call. */
 static void __attribute__((noinline)) apply(const struct mpucal *sensor, const int16_t counts[3], float a_mps2[3]) {
     mpucal_apply(sensor, counts, a_mps2);
 }
@@ -37,7 +37,7 @@ static void __attribute__((noinline)) nothing(const struct mpucal *sensor, const
     __asm__ __volatile__("" : : "r"(sensor), "r"(counts), "r"(a_mps2) : "memory");
 }
 
-/* Cycles of RUNS calls with counts all over the range. */
+/* Returns the cycles of RUNS calls with counts over the whole range. */
 static uint32_t cycles_of(void (*call)(const struct mpucal *, const int16_t *, float *), const struct mpucal *sensor) {
     float a_mps2[3];
     uint16_t began = TCNT1;
@@ -48,7 +48,7 @@ static uint32_t cycles_of(void (*call)(const struct mpucal *, const int16_t *, f
     return (uint32_t)(uint16_t)(TCNT1 - began) * TIMER_CYCLES;
 }
 
-/* How far apart both are at most, in thousandths of a count; from one end of the range to the other. */
+/* Returns the largest difference of both over the whole range, in thousandths of a count. */
 static uint16_t apart(const struct mpucal *sensor, float mps2_per_count) {
     static const int16_t ENDS[] = {INT16_MIN, INT16_MIN + 1, -12345, -1, 0, 1, 12345, INT16_MAX};
     float worst = 0.0f;

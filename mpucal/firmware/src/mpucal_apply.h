@@ -1,7 +1,7 @@
-/* Apply a config blob to a sample: a = inv(D) (y - b_a + applied_b_a), from counts, in float.
+/* Applies a config blob to a sample: a = inv(D) (y - b_a + applied_b_a), from counts, in float.
  *
- * One header in C99 (or C++11) for any microcontroller: no heap, no tables, no library to link, 48 bytes of RAM a
- * sensor. The blob is the one of firmware_protocol.md.
+ * A single header in C99 (or C++11) for any microcontroller: no heap, no tables, no library to link, 48 bytes of RAM
+ * for each sensor. firmware_protocol.md describes the blob.
  *
  *     static struct mpucal sensor;
  *     if (mpucal_load(&sensor, blob, sizeof blob, 0x68, 4.0f) == MPUCAL_OK) {
@@ -43,57 +43,57 @@ extern "C" {
 #define MPUCAL_GYRO_COUNTS_AT 204
 #define MPUCAL_LENGTH_WITH_COUNTS 212
 
-/* firmware_protocol.md, "Counts": at full scale, by the data sheet's 16384 LSB/g and 131 LSB/(deg/s). Libraries that
- * divide by 32768 / range, such as FastIMU, differ from the latter by 0.055 %. */
+/* Counts at full scale (firmware_protocol.md, "Counts"), from the data sheet's 16384 LSB/g and 131 LSB/(deg/s).
+ * Libraries that divide by 32768 / range, such as FastIMU, differ from the latter by 0.055 %. */
 #define MPUCAL_ACCEL_COUNTS 32768.0f
 #define MPUCAL_GYRO_COUNTS 32750.0f
 #define MPUCAL_STANDARD_GRAVITY_MPS2 9.80665f
-#define MPUCAL_RAD 0.01745329252f /* a degree */
+#define MPUCAL_RAD 0.01745329252f /* one degree */
 
-/* Why a blob is not used; the first five in the order in which firmware_protocol.md, "Reading", has them checked. */
+/* Result of loading a blob; the first five errors are in the order of the checks in firmware_protocol.md, "Reading". */
 enum mpucal_status {
     MPUCAL_OK = 0,
-    MPUCAL_NO_BLOB,       /* too short, or another magic: nothing was stored */
-    MPUCAL_OTHER_MAJOR,   /* a layout that this code does not know */
-    MPUCAL_BAD_LENGTH,    /* its length is out of range, or more than there is */
+    MPUCAL_NO_BLOB,       /* too short, or another magic: no blob was stored */
+    MPUCAL_OTHER_MAJOR,   /* unknown layout */
+    MPUCAL_BAD_LENGTH,    /* length out of range, or larger than the data */
     MPUCAL_BAD_CRC,       /* damaged */
-    MPUCAL_NOT_FINITE,    /* D, b_a or applied_b_a holds infinity or NaN */
-    MPUCAL_NOT_INVERTIBLE, /* D is beyond any sensor's, or no more than rounding is left of its determinant */
-    MPUCAL_OTHER_CHIP,    /* it was measured on a chip of another WHO_AM_I */
-    MPUCAL_OTHER_RANGE,   /* it was measured at another full scale, at what is none, or nobody knows at which */
-    MPUCAL_NOT_FIXED      /* it has no room in struct mpucal_fixed */
+    MPUCAL_NOT_FINITE,    /* infinity or NaN in D, b_a or applied_b_a */
+    MPUCAL_NOT_INVERTIBLE, /* D is not plausible, or its determinant is within rounding errors of 0 */
+    MPUCAL_OTHER_CHIP,    /* measured on a chip with another WHO_AM_I */
+    MPUCAL_OTHER_RANGE,   /* measured at another, an impossible or an unknown full scale */
+    MPUCAL_NOT_FIXED      /* does not fit into struct mpucal_fixed */
 };
 
-/* A calibration, ready to be applied: a = gain * counts - bias, in m/s^2. */
+/* Calibration in the form that is applied: a = gain * counts - bias, in m/s^2. */
 struct mpucal {
     float gain[3][3]; /* inv(D) * 9.80665 * accel_range_g / MPUCAL_ACCEL_COUNTS */
     float bias[3];    /* inv(D) (b_a - applied_b_a) */
 };
 
-/* How that drifts with the chip's temperature: 24 bytes more, for firmware that reads it. */
+/* Drift of the bias with the chip's temperature: 24 bytes more, for firmware that reads the temperature. */
 struct mpucal_drift {
-    float slope[3]; /* inv(D) b_a_slope, m/s^2 per degree Celsius; zeros where the blob has no b_a(T) */
+    float slope[3]; /* inv(D) b_a_slope, m/s^2 per degree Celsius; zeros without b_a(T) in the blob */
     float at_c, from_c, to_c;
 };
 
-/* The gyroscope's part, 48 bytes more: w = gain * counts - bias, in rad/s. */
+/* Calibration of the gyroscope, 48 bytes more: w = gain * counts - bias, in rad/s. */
 struct mpucal_gyro {
     float gain[3][3]; /* K * (pi / 180) * gyro_range_dps / the blob's gyro_counts */
-    float bias[3];    /* K b_omega; zeros where the blob has none */
+    float bias[3];    /* K b_omega; zeros if it is unknown */
 };
 
-/* Either of both for a processor without floating point, 39 bytes: out = (gain * counts + offset) >> 14, in counts. */
+/* Calibration without floating point, 39 bytes: out = (gain * counts + offset) >> 14, in counts. */
 struct mpucal_fixed {
-    int16_t gain[3][3];    /* whole units of 2^-14 */
-    uint8_t fraction[3][3]; /* and what is left of them, of 2^-22 */
-    int32_t offset[3];     /* what is subtracted, of 2^-14 counts, and half a count to round */
+    int16_t gain[3][3];    /* in units of 2^-14 */
+    uint8_t fraction[3][3]; /* the rest, in units of 2^-22 */
+    int32_t offset[3];     /* in units of 2^-14 counts, including half a count to round */
 };
 
-/* Where a blob is read from, byte by byte: plain memory, or what has to be asked, such as an EEPROM. */
+/* Source of a blob's bytes: plain memory, or a device that is read byte by byte, such as an EEPROM. */
 struct mpucal_source {
     uint8_t (*read)(const void *where, uint16_t offset);
     const void *where;
-    size_t size; /* bytes that there are, at least the blob's */
+    size_t size; /* available bytes, at least the blob's */
 };
 
 static inline uint8_t mpucal_read_memory(const void *where, uint16_t offset) {
@@ -112,7 +112,7 @@ static inline uint32_t mpucal_u32(const struct mpucal_source *blob, uint16_t off
     return mpucal_u16(blob, offset) | (uint32_t)mpucal_u16(blob, (uint16_t)(offset + 2)) << 16;
 }
 
-/* From bits rather than by a cast: their order is the blob's, not the processor's. */
+/* Decodes bits instead of a cast, since the blob's byte order may not be the processor's. */
 static inline float mpucal_f32(const struct mpucal_source *blob, uint16_t offset) {
     uint32_t bits = mpucal_u32(blob, offset);
     float value;
@@ -120,7 +120,7 @@ static inline float mpucal_f32(const struct mpucal_source *blob, uint16_t offset
     return value;
 }
 
-/* Neither infinite nor NaN; by its bits, since -ffast-math would take a comparison for true. */
+/* True if neither infinite nor NaN. It tests bits, since -ffast-math assumes that a comparison is true. */
 static inline int mpucal_is_finite(float value) {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
@@ -136,7 +136,7 @@ static inline int mpucal_all_finite(const struct mpucal_source *blob, uint16_t o
     return 1;
 }
 
-/* CRC-32 of zlib, PNG and Ethernet of the first `count` bytes. By bits: it runs seldom, and a table takes 1 KiB. */
+/* CRC-32 of zlib, PNG and Ethernet of the first `count` bytes, bit by bit: it runs seldom, a table takes 1 KiB. */
 static inline uint32_t mpucal_crc32(const struct mpucal_source *blob, uint16_t count) {
     uint32_t crc = 0xFFFFFFFFu;
     for (uint16_t i = 0; i < count; i++) {
@@ -148,14 +148,14 @@ static inline uint32_t mpucal_crc32(const struct mpucal_source *blob, uint16_t c
     return ~crc;
 }
 
-/* Element (i, j) of the adjugate of D, row-major: of inv(D) but for 1 / det(D). */
+/* Element (i, j) of the adjugate of D, row-major: inv(D) without the factor 1 / det(D). */
 static inline float mpucal_adjugate(const float D[9], uint8_t i, uint8_t j) {
     uint8_t p = (uint8_t)((j + 1) % 3), q = (uint8_t)((j + 2) % 3);
     uint8_t r = (uint8_t)((i + 1) % 3), s = (uint8_t)((i + 2) % 3);
     return D[3 * p + r] * D[3 * q + s] - D[3 * p + s] * D[3 * q + r];
 }
 
-/* D of a blob; its determinant, 0 where it is beyond any sensor's, or no more than rounding is left. */
+/* Reads D and returns its determinant; 0 if D is not plausible, or the determinant is within rounding errors. */
 static inline float mpucal_read_D(const struct mpucal_source *blob, float D[9]) {
     float det = 0.0f, most = 0.0f;
     for (uint8_t i = 0; i < 9; i++) {
@@ -171,19 +171,19 @@ static inline float mpucal_read_D(const struct mpucal_source *blob, float D[9]) 
     return (det < 0.0f ? -det : det) > 1e-6f * most * most * most ? det : 0.0f;
 }
 
-/* A full scale, or 0 for unknown. */
+/* Returns a full scale; 0: unknown. */
 static inline int mpucal_is_range(const struct mpucal_source *blob, uint16_t offset) {
     float value = mpucal_f32(blob, offset);
     return mpucal_is_finite(value) && value >= 0.0f;
 }
 
-/* Counts of the gyroscope at its full scale; a blob of minor version 0 or 1 does not say them. */
+/* Returns the gyroscope's counts at full scale, which blobs of minor version 0 and 1 do not contain. */
 static inline float mpucal_gyro_counts(const struct mpucal_source *blob) {
     return mpucal_u16(blob, MPUCAL_LENGTH_AT) < MPUCAL_LENGTH_WITH_COUNTS ? MPUCAL_GYRO_COUNTS
                                                                          : mpucal_f32(blob, MPUCAL_GYRO_COUNTS_AT);
 }
 
-/* firmware_protocol.md, "Reading", of the blob at the beginning of a source. */
+/* Checks the blob at the beginning of a source: firmware_protocol.md, "Reading". */
 static inline enum mpucal_status mpucal_check(const struct mpucal_source *blob) {
     if (blob->size < MPUCAL_HEADER_LENGTH || mpucal_u32(blob, 0) != MPUCAL_MAGIC) {
         return MPUCAL_NO_BLOB;
@@ -214,7 +214,7 @@ static inline enum mpucal_status mpucal_check(const struct mpucal_source *blob) 
     return MPUCAL_OK;
 }
 
-/* What a blob that was checked makes of counts at +-range_g. */
+/* Prepares a checked blob for counts at +-range_g. */
 static inline enum mpucal_status mpucal_prepare(struct mpucal *sensor, const struct mpucal_source *blob,
                                                 float range_g) {
     float D[9], offset[3], det = mpucal_read_D(blob, D);
@@ -240,10 +240,10 @@ static inline enum mpucal_status mpucal_prepare(struct mpucal *sensor, const str
     return MPUCAL_OK;
 }
 
-/* Check a blob, and prepare to apply it; on any status but MPUCAL_OK, `sensor` is left as it was.
+/* Checks a blob and prepares it for use; on any status except MPUCAL_OK, `sensor` is not changed.
  *
- * who_am_i: the chip's register 0x75; 0: whichever it is.
- * accel_range_g: the full scale that the chip is set to, g; 0: the blob's.
+ * who_am_i: the chip's register 0x75; 0: any chip.
+ * accel_range_g: the chip's present full scale, g; 0: the blob's.
  */
 static inline enum mpucal_status mpucal_load_from(struct mpucal *sensor, const struct mpucal_source *blob,
                                                   uint8_t who_am_i, float accel_range_g) {
@@ -263,14 +263,14 @@ static inline enum mpucal_status mpucal_load_from(struct mpucal *sensor, const s
     return mpucal_prepare(sensor, blob, range_g);
 }
 
-/* The same, of a blob that begins at `memory`, where there are `size` bytes. */
+/* Loads a blob from `size` bytes of `memory`; see mpucal_load_from. */
 static inline enum mpucal_status mpucal_load(struct mpucal *sensor, const void *memory, size_t size, uint8_t who_am_i,
                                              float accel_range_g) {
     struct mpucal_source blob = {mpucal_read_memory, memory, size};
     return mpucal_load_from(sensor, &blob, who_am_i, accel_range_g);
 }
 
-/* The specific force a_mps2 (m/s^2; at rest, +gravity upward) of one sample's accelerometer `counts` (x, y, z). */
+/* Converts the accelerometer `counts` (x, y, z) of a sample to specific force (m/s^2; at rest, +gravity upward). */
 static inline void mpucal_apply(const struct mpucal *sensor, const int16_t counts[3], float a_mps2[3]) {
     float x = counts[0], y = counts[1], z = counts[2];
     for (uint8_t i = 0; i < 3; i++) {
@@ -279,9 +279,9 @@ static inline void mpucal_apply(const struct mpucal *sensor, const int16_t count
     }
 }
 
-/* The gyroscope's K and b_omega of a blob; on any status but MPUCAL_OK, `gyro` is left as it was.
+/* Loads the gyroscope's K and b_omega from a blob; on any status except MPUCAL_OK, `gyro` is not changed.
  *
- * gyro_range_dps: the full scale that the chip is set to, deg/s; 0: the blob's.
+ * gyro_range_dps: the chip's present full scale, deg/s; 0: the blob's.
  */
 static inline enum mpucal_status mpucal_load_gyro(struct mpucal_gyro *gyro, const struct mpucal_source *blob,
                                                   float gyro_range_dps) {
@@ -307,7 +307,7 @@ static inline enum mpucal_status mpucal_load_gyro(struct mpucal_gyro *gyro, cons
     return MPUCAL_OK;
 }
 
-/* The rate w_rad_s (rad/s) of one sample's gyroscope `counts` (x, y, z). */
+/* Converts the gyroscope `counts` (x, y, z) of a sample to a rate (rad/s). */
 static inline void mpucal_apply_gyro(const struct mpucal_gyro *gyro, const int16_t counts[3], float w_rad_s[3]) {
     float x = counts[0], y = counts[1], z = counts[2];
     for (uint8_t i = 0; i < 3; i++) {
@@ -316,7 +316,7 @@ static inline void mpucal_apply_gyro(const struct mpucal_gyro *gyro, const int16
     }
 }
 
-/* b_a(T) of a blob, beside what mpucal_load makes of it; on any status but MPUCAL_OK, `drift` is left as it was. */
+/* Loads b_a(T) from a blob, in addition to mpucal_load; on any status except MPUCAL_OK, `drift` is not changed. */
 static inline enum mpucal_status mpucal_load_drift(struct mpucal_drift *drift, const struct mpucal_source *blob) {
     enum mpucal_status status = mpucal_check(blob);
     if (status != MPUCAL_OK) {
@@ -345,14 +345,14 @@ static inline enum mpucal_status mpucal_load_drift(struct mpucal_drift *drift, c
     return MPUCAL_OK;
 }
 
-/* How far a temperature is from that of b_a, deg C; one that is not known, NaN, is that of b_a. */
+/* Returns the difference to the temperature of b_a, deg C; 0 for an unknown temperature, NaN. */
 static inline float mpucal_away_c(const struct mpucal_drift *drift, float temperature_c) {
     float known = mpucal_is_finite(temperature_c) ? temperature_c : drift->at_c;
     float within = known < drift->from_c ? drift->from_c : known;
     return (within > drift->to_c ? drift->to_c : within) - drift->at_c;
 }
 
-/* The specific force with b_a(T) at the chip's temperature_c; beyond the temperatures that were seen, as at their end. */
+/* Applies b_a(T) at the chip's temperature_c; beyond the measured temperatures it is constant. */
 static inline void mpucal_apply_at(const struct mpucal *sensor, const struct mpucal_drift *drift,
                                    const int16_t counts[3], float temperature_c, float a_mps2[3]) {
     float away_c = mpucal_away_c(drift, temperature_c);
@@ -362,7 +362,7 @@ static inline void mpucal_apply_at(const struct mpucal *sensor, const struct mpu
     }
 }
 
-/* A calibration at that temperature, to be applied many times until it has changed. */
+/* Prepares a calibration for a temperature, to be applied until the temperature changes. */
 static inline struct mpucal mpucal_at(const struct mpucal *sensor, const struct mpucal_drift *drift,
                                       float temperature_c) {
     struct mpucal at = *sensor;
@@ -374,9 +374,9 @@ static inline struct mpucal mpucal_at(const struct mpucal *sensor, const struct 
 }
 
 #define MPUCAL_FIXED_ONE 16384.0f /* 2^14 */
-#define MPUCAL_FIXED_LIMIT 131064.0f /* counts that 32 bits hold in these units, and 8 to round */
+#define MPUCAL_FIXED_LIMIT 131064.0f /* counts that fit into 32 bits, less 8 for rounding */
 
-/* gain * counts - bias as fixed point; `unit` is what a count is worth. On any status but MPUCAL_OK, `fixed` stays. */
+/* Converts gain * counts - bias to fixed point; `unit`: one count. On any status except MPUCAL_OK, `fixed` stays. */
 static inline enum mpucal_status mpucal_fix(struct mpucal_fixed *fixed, const float gain[3][3], const float bias[3],
                                             float unit) {
     struct mpucal_fixed made;
@@ -401,20 +401,20 @@ static inline enum mpucal_status mpucal_fix(struct mpucal_fixed *fixed, const fl
     return MPUCAL_OK;
 }
 
-/* A calibration at +-range_g, for mpucal_apply_fixed. */
+/* Converts a calibration at +-range_g for mpucal_apply_fixed. */
 static inline enum mpucal_status mpucal_fix_accel(struct mpucal_fixed *fixed, const struct mpucal *sensor,
                                                   float range_g) {
     return mpucal_fix(fixed, sensor->gain, sensor->bias, MPUCAL_STANDARD_GRAVITY_MPS2 * range_g / MPUCAL_ACCEL_COUNTS);
 }
 
-/* The gyroscope's at +-range_dps, in counts of MPUCAL_GYRO_COUNTS at full scale. */
+/* Converts the gyroscope's calibration at +-range_dps, in counts of MPUCAL_GYRO_COUNTS at full scale. */
 static inline enum mpucal_status mpucal_fix_gyro(struct mpucal_fixed *fixed, const struct mpucal_gyro *gyro,
                                                  float range_dps) {
     return mpucal_fix(fixed, gyro->gain, gyro->bias, MPUCAL_RAD * range_dps / MPUCAL_GYRO_COUNTS);
 }
 
 #ifdef __AVR_HAVE_MUL__
-/* Of what is below, avr-gcc makes three times as many cycles: sum + (256 gain + fraction) count / 256, byte by byte. */
+/* sum + (256 gain + fraction) count / 256, byte by byte: avr-gcc needs three times as many cycles for the C below. */
 static inline int32_t mpucal_plus(int32_t sum, int16_t gain, uint8_t fraction, int16_t count) {
     __asm__("mul %[f], %A[c]\n\tadd %A[s], r1\n\tadc %B[s], %[o]\n\tadc %C[s], %[o]\n\tadc %D[s], %[o]\n\t"
             "mulsu %B[c], %[f]\n\tsbc %C[s], %[o]\n\tsbc %D[s], %[o]\n\t" /* the carry is the product's sign */
@@ -428,7 +428,7 @@ static inline int32_t mpucal_plus(int32_t sum, int16_t gain, uint8_t fraction, i
     return sum;
 }
 
-/* sum / 2^14 by two bytes and two bits: an AVR shifts by one bit at a time. */
+/* sum / 2^14 by two bytes and two bits, since an AVR shifts by one bit at a time. */
 static inline int32_t mpucal_shifted(int32_t sum) {
     int32_t above = sum >> 8;
     __asm__("" : "+r"(above));
@@ -444,8 +444,8 @@ static inline int32_t mpucal_shifted(int32_t sum) {
 }
 #endif
 
-/* What mpucal_apply or mpucal_apply_gyro makes of one sample, in counts at the nominal scale, without floating point;
- * within 1 of it over the whole range of the counts. */
+/* Applies a calibration without floating point. The result is in counts at the nominal scale, within 1 count of
+ * mpucal_apply or mpucal_apply_gyro over the whole range. */
 static inline void mpucal_apply_fixed(const struct mpucal_fixed *fixed, const int16_t counts[3], int32_t corrected[3]) {
     int16_t x = counts[0], y = counts[1], z = counts[2];
     for (uint8_t i = 0; i < 3; i++) {

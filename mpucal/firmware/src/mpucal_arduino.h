@@ -1,9 +1,9 @@
-/* Where an Arduino board keeps its blob: in the EEPROM of an AVR from MPUCAL_EEPROM_AT on, of an ESP32, ESP8266 or RP2040
- * in a file of LittleFS; elsewhere, and in an EEPROM that is too small, nowhere, and a host that stores a blob is told so.
+/* Memory for the blob on an Arduino board: the EEPROM of an AVR from MPUCAL_EEPROM_AT on; a file of LittleFS on an
+ * ESP32, ESP8266 or RP2040. Other boards, and those with too small an EEPROM, have none; a host gets an error then.
  *
- * For sketches, once each. The flash behind other boards' EEPROM library is erased whole before it is written, which
- * would lose both slots; LittleFS renames a file at once or not at all. Each library is included by name for its cores:
- * the Arduino IDE and arduino-cli find a library by an include that fails, and never by __has_include.
+ * Include it once in a sketch. The EEPROM libraries of other boards erase the whole flash before a write, which would
+ * lose both slots; LittleFS renames a file atomically. Each library is included by name for its cores: the Arduino IDE
+ * and arduino-cli discover a library by an include that fails, and not by __has_include.
  */
 #ifndef MPUCAL_ARDUINO_H
 #define MPUCAL_ARDUINO_H
@@ -12,7 +12,7 @@
 
 #include "mpucal_slots.h"
 
-/* Where both slots begin, of MPUCAL_SLOTS_BYTES in all; what another sketch keeps there is overwritten. */
+/* Address of the two slots of MPUCAL_SLOTS_BYTES; data of other sketches there is overwritten. */
 #ifndef MPUCAL_EEPROM_AT
 #define MPUCAL_EEPROM_AT 0
 #endif
@@ -44,7 +44,7 @@ static const char *const MPUCAL_NEW_FILE = "/mpucal.new";
 static uint8_t mpucalImage[MPUCAL_SLOTS_BYTES];
 static bool mpucalMounted = false;
 
-/* A flash that holds no files is formatted only where a blob is stored: reading must not take what else may be there. */
+/* Only storing a blob formats a flash without a file system: reading must not destroy other data. */
 static void mpucalMount(bool format) {
 #if defined(ESP32)
     mpucalMounted = LittleFS.begin(format);
@@ -56,7 +56,7 @@ static void mpucalMount(bool format) {
 #endif
 }
 
-/* What the file holds; all zeros, which is no blob, where there is none. */
+/* Content of the file; zeros, which are not a blob, without a file. */
 static void mpucalReload() {
     memset(mpucalImage, 0, sizeof mpucalImage);
     if (!mpucalMounted) {
@@ -88,7 +88,7 @@ static void mpucalCommit() {
 
 static void mpucalSave() {
     mpucalCommit();
-    mpucalReload(); /* what is checked next is what was kept */
+    mpucalReload(); /* so that the next check reads the stored data */
 }
 
 static uint8_t mpucalRead(uint16_t address) { return mpucalImage[address]; }

@@ -80,7 +80,7 @@ static uint8_t on_data(struct mpucal_bridge *bridge, struct mpucal_request reque
     return MPUCAL_CODE_OK;
 }
 
-/* With nothing begun, the stored blob itself is what a repeated commit speaks of. */
+/* If no blob was begun, a repeated commit refers to the stored one. */
 static uint8_t repeated(const struct mpucal_bridge *bridge, uint16_t length, uint32_t crc, uint32_t *generation) {
     struct mpucal_stored stored = mpucal_slots_stored(bridge->port->memory);
     *generation = stored.generation;

@@ -16,7 +16,7 @@
 #define FEATURE_OCCUPIED 8
 #define MAX_I2C_ADDRESS 0x7F
 
-/* The asked address, or with 0 the first of the chip's two, that acknowledges; 0: none. */
+/* Returns the requested address, or for 0 the first of the chip's two, if it acknowledges; else 0. */
 static uint8_t find_chip(const struct mpucal_port *port, uint8_t asked) {
     uint8_t last = asked ? asked : 0x69;
     for (uint8_t address = asked ? asked : 0x68; address <= last; address++) {
@@ -74,7 +74,7 @@ static uint8_t on_read(struct mpucal_bridge *bridge, struct mpucal_request reque
     return bridge->port->read_registers(bridge->address, request.payload[0], bridge->out + BODY_AT, reply->body_size);
 }
 
-/* Sends every piece but the last itself. */
+/* Sends every part except the last one, which the caller sends. */
 static uint8_t on_burst(struct mpucal_bridge *bridge, struct mpucal_request request, struct mpucal_message *reply) {
     uint16_t count = request.size < 3 ? 0 : mpucal_get_u16(request.payload + 1), offset = 0;
     if (count < 1 || count > MPUCAL_MAX_BURST) {

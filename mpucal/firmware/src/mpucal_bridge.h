@@ -1,7 +1,7 @@
-/* The serial bridge of firmware_protocol.md: requests in, replies and pushed FIFO frames out.
+/* Serial bridge of firmware_protocol.md: requests in, replies and pushed FIFO frames out.
  *
- * It reaches the processor through the functions of a port, keeps one struct mpucal_bridge (172 bytes on an AVR), and
- * never allocates. The loop of a firmware gives it every byte that came in, and otherwise lets it look:
+ * It uses the processor through the functions of a port, needs one struct mpucal_bridge (172 bytes on an AVR), and
+ * never allocates. The firmware's loop passes every received byte to it, and otherwise lets it look at the FIFO:
  *
  *     mpucal_bridge_begin(&bridge, &port);
  *     for (;;) {
@@ -18,13 +18,13 @@
 extern "C" {
 #endif
 
-/* The state after start-up: every request but HELLO is refused. */
+/* Sets the state after start-up, in which every request except HELLO is refused. */
 void mpucal_bridge_begin(struct mpucal_bridge *bridge, const struct mpucal_port *port);
 
-/* A byte came from the host; where it ends a request, that is carried out and answered now. */
+/* Takes a byte from the host; if it ends a request, carries that out and answers it. */
 void mpucal_bridge_receive(struct mpucal_bridge *bridge, uint8_t byte);
 
-/* Nothing came from the host: push a message of the stream, if one is due. */
+/* Pushes a message of the stream if one is due; call it when no byte has come. */
 void mpucal_bridge_look(struct mpucal_bridge *bridge);
 
 #ifdef __cplusplus

@@ -3,7 +3,7 @@
 uint16_t mpucal_crc16(const uint8_t *bytes, uint8_t size) {
     uint16_t crc = 0xFFFF;
     while (size--) {
-        /* the eight steps of polynomial 0x1021 at once, without a table */
+        /* The eight steps of polynomial 0x1021 at once, without a table. */
         uint8_t x = (uint8_t)(crc >> 8 ^ *bytes++);
         x ^= x >> 4;
         crc = (uint16_t)(crc << 8 ^ (uint16_t)x << 12 ^ (uint16_t)x << 5 ^ x);

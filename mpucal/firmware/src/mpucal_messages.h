@@ -1,22 +1,22 @@
-/* What the parts of the bridge share: a request, the reply that is being made, and how it is sent. Private to them. */
+/* Request and reply as the parts of the bridge share them. Private. */
 #ifndef MPUCAL_MESSAGES_H
 #define MPUCAL_MESSAGES_H
 
 #include "mpucal_state.h"
 
-/* Offsets in a frame's buffer: COBS's byte, then type, seq, payload; a bridge's begins with status and t_us. */
+/* Offsets in a frame's buffer: byte of COBS, type, seq, payload; a bridge's payload begins with status and t_us. */
 #define TYPE_AT 1
 #define SEQ_AT 2
 #define PAYLOAD_AT 3
 #define BODY_AT (PAYLOAD_AT + 5)
 
-/* A bridge's message; its body, what follows status and t_us, lies in the bridge's `out`. */
+/* Message of the bridge; its body, after status and t_us, is in the bridge's `out`. */
 struct mpucal_message {
     uint8_t type, seq, code, body_size;
     uint32_t t_us;
 };
 
-/* A request's payload, as far as a handler may read. */
+/* Payload of a request. */
 struct mpucal_request {
     const uint8_t *payload;
     uint8_t size;
@@ -40,7 +40,7 @@ static inline uint32_t mpucal_get_u32(const uint8_t *bytes) {
     return mpucal_get_u16(bytes) | (uint32_t)mpucal_get_u16(bytes + 2) << 16;
 }
 
-/* Send a message whose body lies in bridge->out. */
+/* Sends a message whose body is in bridge->out. */
 void mpucal_send(struct mpucal_bridge *bridge, const struct mpucal_message *message);
 
 #endif

@@ -1,4 +1,4 @@
-/* The numbers of firmware_protocol.md: version, limits, messages, status codes. */
+/* Numbers of firmware_protocol.md: version, limits, messages, status codes. */
 #ifndef MPUCAL_PROTOCOL_H
 #define MPUCAL_PROTOCOL_H
 

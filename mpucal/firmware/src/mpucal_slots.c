@@ -1,6 +1,6 @@
 #include "mpucal_slots.h"
 
-/* Where a source reads: one slot's blob. */
+/* Position of a source: the blob of a slot. */
 struct place {
     const struct mpucal_memory *memory;
     uint16_t at;
@@ -46,12 +46,12 @@ static int is_sealed(const struct mpucal_memory *memory, uint16_t at) {
 }
 
 static void break_seal(const struct mpucal_memory *memory, uint16_t at) {
-    /* no number is its own complement */
+    /* No number is its own complement. */
     memory->write(complement_at(at), memory->read(generation_at(at)));
     commit(memory);
 }
 
-/* What one slot holds; generation 0: nothing valid. */
+/* Reads a slot; generation 0: it is not valid. */
 static struct mpucal_stored slot_stored(const struct mpucal_memory *memory, uint8_t slot) {
     struct mpucal_stored stored = {0, blob_at(slot), 0};
     struct place place = {memory, stored.at};
@@ -68,7 +68,7 @@ struct mpucal_stored mpucal_slots_stored(const struct mpucal_memory *memory) {
     if (!first.generation || !second.generation) {
         return first.generation ? first : second;
     }
-    /* generations wrap around: the later one is less than half of all numbers ahead */
+    /* Generations wrap around: the later one is ahead by less than half of all numbers. */
     return second.generation - first.generation < 0x80000000u ? second : first;
 }
 
@@ -120,7 +120,7 @@ int mpucal_slots_occupied(const struct mpucal_memory *memory) {
     return is_foreign(memory, 0) || is_foreign(memory, 1);
 }
 
-/* The stored blob as a source, which reads `place`; one of no bytes where none is stored. */
+/* Makes a source of the stored blob, which reads `place`; without a blob it has no bytes. */
 static struct mpucal_source stored_blob(const struct mpucal_memory *memory, struct place *place) {
     struct mpucal_stored stored = mpucal_slots_stored(memory);
     place->memory = memory;

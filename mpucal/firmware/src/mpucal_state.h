@@ -1,4 +1,4 @@
-/* What the bridge needs of a processor, and all that it keeps between two calls. */
+/* Interface to the processor, and state of the bridge between two calls. */
 #ifndef MPUCAL_STATE_H
 #define MPUCAL_STATE_H
 
@@ -10,20 +10,20 @@
 extern "C" {
 #endif
 
-/* What the bridge needs of a processor. Register transfers return OK, NO_ANSWER or BUS_FAILED, within I2C_MS. */
+/* Interface to the processor. Register transfers return OK, NO_ANSWER or BUS_FAILED within I2C_MS. */
 struct mpucal_port {
     uint8_t (*read_registers)(uint8_t address, uint8_t first, uint8_t *data, uint8_t count);
-    uint8_t (*write_registers)(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count); /* count 0: ask */
+    uint8_t (*write_registers)(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count); /* count 0: probe */
     uint32_t (*now_us)(void);
-    void (*send)(const uint8_t *bytes, uint8_t count); /* waits where there is no room */
+    void (*send)(const uint8_t *bytes, uint8_t count); /* waits if its buffer is full */
     const struct mpucal_memory *memory;
-    uint8_t window;      /* requests of MPUCAL_FRAME_BYTES that the receiver holds while the bridge is busy */
+    uint8_t window;      /* requests of MPUCAL_FRAME_BYTES that the receiver can hold while the bridge is busy */
     const char *name;    /* at most 16 characters, for people */
 };
 
 struct mpucal_stream {
     uint8_t frame_bytes, batch; /* frame_bytes 0: no stream runs */
-    uint8_t seq, code;          /* code: why it stands */
+    uint8_t seq, code;          /* code: why the stream stands still */
     uint8_t left;               /* frames of this look that are still in the FIFO */
     uint16_t index, drops;
     uint32_t look_us, sent_us;

@@ -2,7 +2,7 @@
 
 #include "mpucal_messages.h"
 
-/* The registers that a bridge reads by itself. */
+/* Registers that the bridge reads by itself. */
 #define INT_STATUS 0x3A
 #define INT_STATUS_FIFO_OFLOW 0x10
 #define FIFO_COUNT_H 0x72
@@ -53,7 +53,7 @@ static uint8_t read_registers(const struct mpucal_bridge *bridge, uint8_t first,
     return bridge->address ? bridge->port->read_registers(bridge->address, first, data, count) : MPUCAL_CODE_NO_ANSWER;
 }
 
-/* Rules 1 to 3 up to the frames: whether they are to be pushed now. */
+/* Rules 1 to 3 without the frames: returns true if a message is due now. */
 static int look(struct mpucal_bridge *bridge, uint32_t now_us) {
     struct mpucal_stream *stream = &bridge->stream;
     uint8_t count[2];
@@ -75,7 +75,7 @@ static int look(struct mpucal_bridge *bridge, uint32_t now_us) {
     return 1;
 }
 
-/* Rules 3 to 5: the next message of a look. */
+/* Rules 3 to 5: makes the next message of a look. */
 static void push_next(struct mpucal_bridge *bridge) {
     struct mpucal_stream *stream = &bridge->stream;
     uint8_t fit = (uint8_t)(MPUCAL_MAX_READ / stream->frame_bytes), status = 0;

@@ -1,13 +1,13 @@
-/* The stream: looks at the chip's FIFO and pushes what it collects; firmware_protocol.md, "FRAMES". Private. */
+/* Stream: reads the chip's FIFO and pushes its frames; firmware_protocol.md, "FRAMES". Private. */
 #ifndef MPUCAL_STREAM_H
 #define MPUCAL_STREAM_H
 
 #include "mpucal_messages.h"
 
-/* Carry out STREAM: begin, replace or end the stream; the reply's code. */
+/* Carries out STREAM, which begins, replaces or ends the stream; returns the reply's code. */
 uint8_t mpucal_on_stream(struct mpucal_bridge *bridge, struct mpucal_request request, struct mpucal_message *reply);
 
-/* Push a message of the stream, if one is due. */
+/* Pushes a message of the stream if one is due. */
 void mpucal_stream_look(struct mpucal_bridge *bridge);
 
 #endif

@@ -1,6 +1,6 @@
-// The serial bridge for boards with the Arduino core: `mpucal session --serial PORT` measures through it.
+// Serial bridge for boards with the Arduino core: `mpucal session --serial PORT` measures through it.
 //
-// SDA and SCL go to the sensor, which gets 3.3 V. An Uno, Nano or Pro Mini is better served by mpucal/firmware/avr.
+// Connect SDA and SCL to the sensor, and 3.3 V. For an Uno, Nano or Pro Mini, mpucal/firmware/avr is the better choice.
 #include <Wire.h>
 
 #include <mpucal_arduino.h>
@@ -10,24 +10,24 @@
 #include <avr/wdt.h>
 #endif
 
-// The buffer of 64 bytes that an Arduino core has holds one request while another is carried out, which at this rate is
-// done before it is full. With -DSERIAL_RX_BUFFER_SIZE=256 it may be 500000, and then 1000 samples a second fit.
+// An Arduino core's buffer of 64 bytes holds one request while another is carried out, without overflow at this rate.
+// With -DSERIAL_RX_BUFFER_SIZE=256 the rate may be 500000, which is enough for 1000 samples a second.
 #ifndef MPUCAL_BAUD
 #define MPUCAL_BAUD 115200
 #endif
 
-// Pins of the I2C bus, of a core that lets them be chosen (ESP32, ESP8266, RP2040); without these the board's own.
+// Pins of the I2C bus for cores with a choice (ESP32, ESP8266, RP2040); by default the board's own.
 // #define MPUCAL_SDA 4
 // #define MPUCAL_SCL 5
 
 const uint32_t BAUD_RATE = MPUCAL_BAUD;
 const uint32_t I2C_HZ = 400000;
 const uint32_t I2C_TIMEOUT_MS = 25;
-const uint8_t WIRE_BYTES = 32;  // what the smallest Wire library takes at once
+const uint8_t WIRE_BYTES = 32;  // buffer of the smallest Wire library
 const uint8_t WIRE_NO_ADDRESS = 2, WIRE_TIMED_OUT = 5;
 const uint8_t FIFO_R_W = 0x74, MEM_R_W = 0x6F;  // these do not auto-increment
 
-// How a core limits the time of a transfer: the first of these functions that its Wire has.
+// Limits the time of a transfer, by the first of these functions that the core's Wire has.
 template <typename W> static auto limitTime(W &wire, int) -> decltype(wire.setWireTimeout(1, true)) {
     return wire.setWireTimeout(I2C_TIMEOUT_MS * 1000, true);
 }
@@ -50,7 +50,7 @@ static void beginWire() {
     limitTime(Wire, 0);
 }
 
-// A chip that was cut off within a byte holds SDA low until it has clocked the rest of it out.
+// Frees the bus: a chip that was interrupted within a byte holds SDA low until the rest of it is clocked out.
 static void freeBus() {
 #if defined(PIN_WIRE_SCL) && defined(WIRE_HAS_END)
     Wire.end();
@@ -76,7 +76,7 @@ static uint8_t registerAfter(uint8_t first, uint8_t done) {
     return first == FIFO_R_W || first == MEM_R_W ? first : (uint8_t)(first + done);
 }
 
-// An AVR's Wire says that it took all of several bytes, and drops those for which it has no room: one byte at a time.
+// Writes byte by byte: an AVR's Wire reports success for several bytes, and drops those that do not fit.
 static uint8_t writePiece(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count) {
     Wire.beginTransmission(address);
     bool fits = Wire.write(first) == 1;
@@ -87,7 +87,7 @@ static uint8_t writePiece(uint8_t address, uint8_t first, const uint8_t *data, u
     return code == MPUCAL_CODE_OK && !fits ? (uint8_t)MPUCAL_CODE_BUS_FAILED : code;
 }
 
-// The register takes one of Wire's bytes.
+// The register takes one byte of Wire's buffer.
 static uint8_t writeRegisters(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count) {
     uint8_t done = 0, code;
     do {
@@ -98,7 +98,7 @@ static uint8_t writeRegisters(uint8_t address, uint8_t first, const uint8_t *dat
     return code;
 }
 
-// Some cores send the register only with the read behind it, and cannot say then that nobody answered.
+// Some cores send the register only together with the read, and then cannot report a missing acknowledge.
 static uint8_t whyNothing(uint8_t address) {
     Wire.beginTransmission(address);
     uint8_t code = codeOf(Wire.endTransmission());
@@ -121,7 +121,7 @@ static uint8_t readPiece(uint8_t address, uint8_t first, uint8_t *data, uint8_t 
     return MPUCAL_CODE_OK;
 }
 
-// More than one piece is one transfer only for the FIFO: a host reads no more than 14 other registers at once.
+// Several parts make one transfer only for the FIFO: a host reads at most 14 other registers at once.
 static uint8_t readRegisters(uint8_t address, uint8_t first, uint8_t *data, uint8_t count) {
     for (uint8_t done = 0; done < count; done = (uint8_t)(done + WIRE_BYTES)) {
         uint8_t left = (uint8_t)(count - done), piece = left < WIRE_BYTES ? left : WIRE_BYTES;
@@ -142,8 +142,8 @@ static const struct mpucal_port port = {readRegisters, writeRegisters, nowUs,   
 static struct mpucal_bridge bridge;
 
 #if defined(WDTCSR)
-// Nothing has fed it for two seconds: the program starts anew, and the host's next request is answered with NO_HELLO. No
-// reset by the watchdog itself: the boot loader of older boards leaves it on then, and is reset for ever.
+// Restarts the program if it was not fed for two seconds; the next request is then answered with NO_HELLO. A reset by
+// the watchdog itself would never end on older boards, whose boot loader leaves the watchdog running.
 ISR(WDT_vect, ISR_NAKED) { __asm__ __volatile__("jmp 0"); }
 
 static void watchdogBegin() {
@@ -156,7 +156,7 @@ static void watchdogBegin() {
 
 static void watchdogFeed() { wdt_reset(); }
 #elif defined(__AVR__)
-// A megaAVR's watchdog has no interrupt, and its boot loader no such fault.
+// A megaAVR's watchdog has no interrupt, and its boot loader does not have this fault.
 static void watchdogBegin() { _PROTECTED_WRITE(WDT.CTRLA, WDT_PERIOD_2KCLK_gc); }
 static void watchdogFeed() { wdt_reset(); }
 #else

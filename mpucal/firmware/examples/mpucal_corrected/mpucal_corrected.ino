@@ -1,9 +1,9 @@
-// What a board does once mpucal has stored its calibration: reads the chip, and prints accelerations and rates corrected.
+// Example of a board with a stored calibration: it reads the chip, and prints corrected accelerations and rates.
 #include <Wire.h>
 
 #include <mpucal_arduino.h>
 
-// 0x69 where AD0 is high.
+// 0x69 if AD0 is high.
 #ifndef MPUCAL_ADDRESS
 #define MPUCAL_ADDRESS 0x68
 #endif
@@ -12,7 +12,7 @@ const uint8_t ADDRESS = MPUCAL_ADDRESS;
 const uint8_t WHO_AM_I = 0x75, PWR_MGMT_1 = 0x6B, GYRO_CONFIG = 0x1B, ACCEL_CONFIG = 0x1C, ACCEL_XOUT_H = 0x3B;
 const uint8_t CLKSEL_PLL = 0x01, AFS_4G = 0x08, FS_500DPS = 0x08;
 const float RANGE_G = 4.0f, RANGE_DPS = 500.0f;
-const uint8_t MPU6050 = 0x68;  // whose temperature has another scale than that of later chips
+const uint8_t MPU6050 = 0x68;  // its temperature scale differs from that of later chips
 
 static struct mpucal sensor;
 static struct mpucal_drift drift;
