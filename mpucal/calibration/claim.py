@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 
 from ..data import Vector
+from .bias_walks import SIGNIFICANT, BiasWalk, walked_covariance
 from .fit import Fit
 from .jackknife import Jackknife, jackknife
 from .parameters import ACCELEROMETER
 from .uncertainty import uncertainty
-from .walks import SIGNIFICANT, Walk, walked_covariance
 
 SINGULAR, TINY_MPS2 = 1e-6, 1e-9
 FLOOR_MPS2 = 5e-5  # nothing is known better where a walk was taken away, drawn straight from part to part
@@ -37,7 +37,7 @@ class Claim:
     model: float
     floored: float
     left_out: Jackknife
-    change: Walk | None
+    change: BiasWalk | None
     of_change: float = 0.0
 
     @property
@@ -53,7 +53,7 @@ class Claim:
         return "change" if self.of_change > self.left_out.claim() else self.left_out.decides()
 
 
-def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Claim | None:
+def claim_of(fit: Fit, gravity: float, change: BiasWalk | None, walked: float) -> Claim | None:
     """Of a fit by the filter; None for one whose parts are not known, or that has no usable D or covariance.
 
     change : the likeliest walk that the fit's parts show. walked : (rad/s)^2 from part to part, of a walk of the

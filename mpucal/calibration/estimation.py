@@ -11,17 +11,17 @@ from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..errors import WrongValue
 from ..reasons import OF_RESTS, Reason
-from ..rests.flat import Flat, find_flat, flat_statistics, tells
+from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
-from .checks import found, gyroscope_at_fault, unusable_for_a_fit
+from .bias_walks import BiasWalk, find_walk, remove_walk
+from .checks import find_reasons, gyroscope_at_fault, unusable_for_a_fit
 from .checks.unusable import no_gyroscope
 from .claim import claim_of, claimed
 from .evidence import Evidence
-from .lone_jumps import without_lone_jumps
+from .lone_jumps import remove_spikes
 from .masks import reset, with_masks
 from .model_selection import METHODS, Choice, choose
 from .static import fit_static
-from .walks import Walk, likeliest_walk, without_walk
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
@@ -60,12 +60,12 @@ def _before_it_clipped(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]]
     clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
     if flat is None or not len(clipped):
         return None
-    ends = RestFinder(recording, flat).alike()[:, 1]
+    ends = RestFinder(recording, flat).typical()[:, 1]
     calm = recording.part(0, int(ends[ends <= clipped[0]].max(initial=0)))
     if len(calm) <= flat.last:
         return None
     of_calm, chosen = _with_gyroscope(replace(evidence, recording=calm, flat=None, fit=None, model="auto", claim=None))
-    if of_calm.fit is None or found(of_calm):
+    if of_calm.fit is None or find_reasons(of_calm):
         return None
     seconds = calm.t[-1] - calm.t[0]
     left_out = f"; a sensor was at the end of its range later, and what follows {seconds:.1f} s is left out"
@@ -76,13 +76,13 @@ def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str
     """The estimate from the rests alone; None where they do not suffice."""
     recording = with_masks(before.recording)
     segment = recording.flat or find_flat(recording)
-    if segment is None or not tells(recording, segment):
+    if segment is None or not is_long_enough(recording, segment):
         return None
     flat = flat_statistics(recording, segment)
     fit = fit_static(recording, flat, before.gravity)
     usable = replace(at_fault, what=at_fault.what + OF_RESTS, refuse=False)
     evidence = replace(before, recording=recording, flat=flat, fit=fit, model="static", gyroscope=usable)
-    if any(reason.refuse for reason in found(evidence)):
+    if any(reason.refuse for reason in find_reasons(evidence)):
         return None
     return evidence, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
 
@@ -90,9 +90,9 @@ def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str
 def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     recording, gravity, model = before.recording, before.gravity, before.model
     # an acceleration that jumps alone may be a knock, which the fit weighs itself
-    recording = replace(with_masks(recording), gyr=without_lone_jumps(recording).gyr)
+    recording = replace(with_masks(recording), gyr=remove_spikes(recording).gyr)
     segment = recording.flat or find_flat(recording)
-    flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
+    flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
     over = None if flat is None else reset(recording, flat)
     if over is not None:
         recording = recording.part(0, over)
@@ -106,23 +106,23 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     return evidence, {"model": choice.model, "why": choice.why + (left_out if over is not None else "")}
 
 
-def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, Walk | None]:
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, BiasWalk | None]:
     """The fit, with a gyroscope's bias that walked while the board was turned taken away, and the walk that is left."""
     choice, walk = _fit_once(recording, flat, gravity, model)
     for _ in range(MOST_WALKS):
         if walk is None or walk.what != "gyroscope" or not choice.fit.converged:
             break
-        without, left = _fit_once(without_walk(choice.recording, flat, walk), flat, gravity, model)
+        without, left = _fit_once(remove_walk(choice.recording, flat, walk), flat, gravity, model)
         if not without.fit.V < choice.fit.V - LEAST_GAIN:
             break
         choice, walk = without._replace(walked=without.walked + choice.walked + walk.q), left
     return choice, walk
 
 
-def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, Walk | None]:
+def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, BiasWalk | None]:
     if model == "auto":
         choice = choose(recording, flat, gravity)
     else:
         choice = Choice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
     fit = choice.fit
-    return choice, None if fit.parts is None else likeliest_walk(fit.parts, fit.D)
+    return choice, None if fit.parts is None else find_walk(fit.parts, fit.D)

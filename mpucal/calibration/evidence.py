@@ -132,7 +132,7 @@ class Evidence:
 
     def _rest_to_rest(self, flat: Flat, longest_s: float = LONGEST_MOVE_S) -> list[_Move]:
         """Return the moves from rest to rest that turn gravity far and take no longer than `longest_s`."""
-        r, runs = self.recording, RestFinder(self.recording, flat).alike()
+        r, runs = self.recording, RestFinder(self.recording, flat).typical()
         u, first, last = _units(statistics(r.acc, runs)[0]), runs[1:, 0], runs[:-1, 1]
         far = (_angles(u[1:], u[:-1]) > LEAST_TURN_RAD) & (r.t[first] - r.t[last - 1] < longest_s)
         return [self._move(flat, u[k], u[k + 1], last[k], first[k]) for k in np.flatnonzero(far).tolist()]
@@ -172,7 +172,7 @@ class Evidence:
         fit, flat, r = self.fit, self.flat, self.recording
         if fit is None or flat is None or self.calibrated is None:
             return None
-        runs = RestFinder(r, flat).alike()
+        runs = RestFinder(r, flat).typical()
         if len(runs) < FEWEST_RESTS:
             runs = in_pieces(runs, round(PIECE_S * r.rate_hz))
         if len(runs) < FEWEST_RESTS:

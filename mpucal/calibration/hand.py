@@ -15,7 +15,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
-from ..rests.local_noise import louder
+from ..rests.local_noise import noise_ratio
 from .downsampling import downsampled, means
 from .fit import Fit
 from .gyro_matrix import WALD_99, at_prior, wald
@@ -40,7 +40,7 @@ from .prior import Prior
 from .problem import Problem
 from .theta import Theta
 from .transitions import leverages, miss_variances, q_scale, transitions_of
-from .tremor import without_tremor
+from .tremor import remove_tremor
 
 SEARCH_HZ = 50.0
 ROUGHLY, MOST_ROUGHLY = 0.05, 20
@@ -60,13 +60,13 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
 
 
 def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, flat: Flat, gravity: float) -> Fit:
-    noise_factor = louder(recording, flat)
+    noise_factor = noise_ratio(recording, flat)
     fine = preprocess(recording, (flat.first, flat.last), gravity, noise_factor)
     rough = means(noise_factor, recording, flat, SEARCH_HZ)
     search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
     theta, noise = search.run(begin(search.prepared.problem, fine.flat.b_omega))
     if search.trembles:
-        fine = without_tremor(fine)
+        fine = remove_tremor(fine)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", likeliest(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)
@@ -156,7 +156,7 @@ class _Search:
         """A pivot's travel, and whether the tremor has a lever arm of its own (BIC of its three components)."""
         theta, noise = self._travel(theta)
         one, theta = self.prepared, self._roughly(noise.problem(self.prepared), theta)
-        two = without_tremor(one)
+        two = remove_tremor(one)
         there = self._roughly(noise.problem(two), theta)
         if _likeliest_cost(two, there) + 1.5 * math.log(len(two.problem.series)) > _likeliest_cost(one, theta):
             return theta, noise

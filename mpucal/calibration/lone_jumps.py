@@ -15,7 +15,7 @@ LEAST_JUMP, JUMPS, RETURNS = np.repeat((0.3, 0.15), 3), 8.0, 0.25
 BESIDE = 4
 
 
-def without_lone_jumps(recording: Recording) -> Recording:
+def remove_spikes(recording: Recording) -> Recording:
     """The recording with the mean of its neighbours for a word that jumps alone and is back with the next sample.
 
     Bits that a transfer flipped (chip/bit_flips.py sets the last frame of a poll right with the next poll only), and

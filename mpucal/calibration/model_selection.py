@@ -15,6 +15,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat, flat_statistics
+from .bias_walks import find_walk, remove_walk
 from .downsampling import downsampled
 from .fit import Fit
 from .gyro_matrix import WALD_99, at_prior, wald
@@ -33,7 +34,6 @@ from .rotation import lengths
 from .static import fit_static
 from .theta import Theta
 from .tilt import fit_tilt
-from .walks import likeliest_walk, without_walk
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
 EXPLAINED_NIS = 4.0
@@ -163,10 +163,10 @@ class _InPlace:
         for _ in range(MOST_WALKS):
             rough = steady._rough(IMU)
             parts = parts_of(steady._thin, rough, self._prior)
-            walk = None if parts is None else likeliest_walk(parts, rough.theta.D)
+            walk = None if parts is None else find_walk(parts, rough.theta.D)
             if walk is None or walk.what != "gyroscope":
                 break
-            recording, walked = without_walk(steady.recording, self._flat, walk), steady.walked + walk.q
+            recording, walked = remove_walk(steady.recording, self._flat, walk), steady.walked + walk.q
             steady = _InPlace(recording, self._flat, self._gravity, walked)
         return steady
 

@@ -1,7 +1,7 @@
 """A series cut into parts: what each of them says against the estimate, by its score.
 
 Where the model holds, the parts differ by chance. Where it does not (a sensor that drifts, a nonlinear one, vibration),
-the covariance of the estimate knows nothing of it, and only the parts show it: see jackknife.py and walks.py.
+the covariance of the estimate knows nothing of it, and only the parts show it: see jackknife.py and bias_walks.py.
 """
 
 from __future__ import annotations

@@ -11,10 +11,10 @@ import numpy as np
 from ..data import Recording, Vector
 from ..kernel import _kernel
 from ..rests.flat import Flat, flat_statistics, rounding_variance
-from ..rests.gyro_drift import without_drift
+from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder, statistics
-from ..rests.law import carried, rate_of_rests, tremor_variance
-from ..rests.local_noise import louder, noise_variance
+from ..rests.local_noise import noise_ratio, noise_variance
+from ..rests.tremor import carried, fit_lambda, tremor_variance
 from .masks import mask
 from .prior import Prior, prior_of
 from .problem import Problem, Series
@@ -93,10 +93,10 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     """
     flat = flat_statistics(recording, at)
     rests = RestFinder(recording, flat)
-    runs = rests.alike()
-    recording = without_drift(recording, flat, rests.telling_bias(runs))
+    runs = rests.typical()
+    recording = remove_drift(recording, flat, rests.bias_runs(runs))
     flat = flat_statistics(recording, at)
-    loud = (louder(recording, flat) if noise is None else noise)[flat.last :]
+    loud = (noise_ratio(recording, flat) if noise is None else noise)[flat.last :]
     series = mask(Series.after(recording, flat), recording, flat)
     series = replace(series, r_scale=loud if series.r_scale is None else np.maximum(series.r_scale, loud))
     after = np.maximum(runs[runs[:, 1] > flat.last] - flat.last, 0)
@@ -107,7 +107,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     rate, alpha = (np.where(rest[:, None], 0.0, values) for values in rates(recording, flat))
     speed2 = np.sum(rate * rate, axis=1)
     acc = carried(recording, flat, runs)
-    lam = rate_of_rests(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
+    lam = fit_lambda(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
     for (a, b), variance in zip(after.tolist(), statistics(acc[flat.last :], after)[1], strict=True):
         tremor = math.sqrt(tremor_variance(variance, float(loud[a:b].mean()) * flat.Sigma_a))

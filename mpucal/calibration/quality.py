@@ -8,7 +8,7 @@ from ..data import Vector
 from ..reasons import Reason
 from ..result.calibration import GOOD, REFUSED, USABLE
 from ..result.keys import ErrorStd, Magnitude, Quality, Verdict
-from .checks import found
+from .checks import find_reasons
 from .claim import Claim
 from .evidence import Evidence
 from .jackknife import OF_SIDE, OF_TIME
@@ -22,7 +22,7 @@ def judge(evidence: Evidence) -> Quality:
     `error_std` is what a calibrated measurement's error amounts to over all directions: rms and magnitude [m/s^2],
     direction [deg]; and what it rests on, see claim.py.
     """
-    reasons = found(evidence)
+    reasons = find_reasons(evidence)
     return {
         "verdict": verdict(reasons),
         "reasons": [reason.document() for reason in reasons],

@@ -13,7 +13,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..rests.intervals import RestFinder, statistics
-from ..rests.law import mean_variance, rate_of_rests, tremor_variance
+from ..rests.tremor import fit_lambda, mean_variance, tremor_variance
 from .fit import Fit
 from .gyro_matrix import KNOWN
 from .parameters import B_A_NAMES, D_NAMES, Form
@@ -76,9 +76,9 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
 
 def _rests(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
     """(k, 3) mean accelerations of the rests, and (k,) the variance of a mean beside its noise."""
-    runs = RestFinder(recording, flat).alike()
+    runs = RestFinder(recording, flat).typical()
     y, spread = statistics(recording.acc, runs)
-    lam = rate_of_rests(recording.acc, recording, flat, runs, TREMOR_PER_S)
+    lam = fit_lambda(recording.acc, recording, flat, runs, TREMOR_PER_S)
     seconds = (runs[:, 1] - runs[:, 0]) / recording.rate_hz
     tremor = np.array([tremor_variance(of_one, flat.Sigma_a) for of_one in spread])
     noise = flat.Sigma_a.mean() / (runs[:, 1] - runs[:, 0])

@@ -16,7 +16,7 @@ TURNS_S, TIMES = 0.04, 3
 REWEIGHTED = 4  # least squares, each weighed by what the one before left
 
 
-def without_tremor(prepared: Preprocessed) -> Preprocessed:
+def remove_tremor(prepared: Preprocessed) -> Preprocessed:
     """The recording less the acceleration of its tremor, with the angular acceleration of the turns alone.
 
     The tremor's own lever arm r_t is the least squares solution of y = alpha x r_t above the turns' frequencies, where

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
-from ..rests.gyro_drift import without_drift
+from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import RestFinder
 from .fit import Fit
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
@@ -71,8 +71,8 @@ class NewOrientation:
 def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[NewOrientation]:
     """What the still intervals that begin after sample `since` say of `fit`, one after the other."""
     rests = RestFinder(recording, flat)
-    runs = rests.held()
-    recording = without_drift(recording, flat, rests.telling_bias(runs))
+    runs = rests.any_hand()
+    recording = remove_drift(recording, flat, rests.bias_runs(runs))
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))
     return [

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import BusError, ChipError, ChipReset
-from ..rests.stillness import let_go
+from ..rests.stillness import is_untouched
 from . import registers as reg
 from .port import Port
 
@@ -78,7 +78,7 @@ class TemporaryMeasurement:
             # Revision C of the 6050 shows half of gravity. It is measured once, since offsets may shift the reading.
             sensitivity = self._sensitivity or (0.5 if np.linalg.norm(acc_g.mean(0)) < HALF_SENSITIVITY_G else 1.0)
             acc_g /= sensitivity
-            if let_go(acc_g * STANDARD_GRAVITY_MPS2):
+            if is_untouched(acc_g * STANDARD_GRAVITY_MPS2):
                 self._sensitivity = self._sensitivity or sensitivity
                 return np.asarray(acc_g.mean(0))
         moves_mg = 1000 * acc_g.std(0).max()

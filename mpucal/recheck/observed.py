@@ -23,8 +23,8 @@ from ..calibration.masks import with_masks
 from ..calibration.rotation import cross, turned
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
-from ..rests.flat import Flat, find_flat, flat_statistics, tells
-from ..rests.gyro_drift import without_drift
+from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
+from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration
 
@@ -89,17 +89,17 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
     gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
-    if segment is None or not tells(recording, segment):
+    if segment is None or not is_long_enough(recording, segment):
         return None
     flat = flat_statistics(recording, segment)
     found = RestFinder(recording, flat)
-    runs = found.alike()
+    runs = found.typical()
     runs = runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * recording.rate_hz]
     if not len(runs):
         return None
     T = recording.temperature_c
     known = bool(np.isfinite(T).any())
-    mended = without_drift(recording, flat, found.telling_bias(runs))
+    mended = remove_drift(recording, flat, found.bias_runs(runs))
     rests = _Rests(mended, runs, calibration, float(np.nanmean(T)) if known else None)
     parts = [_Residuals.magnitude(rests, k, gravity) for k in range(len(runs))]
     turns = (_Residuals.direction(rests, k, flat, calibration) for k in range(1, len(runs)))

@@ -56,7 +56,7 @@ class Track:
         """Return (k, 2): first and last + 1 of the samples of each rest."""
         if self.flat is None:
             return np.zeros((0, 2), np.intp)
-        return RestFinder(self.recording, flat_statistics(self.recording, self.flat)).alike()
+        return RestFinder(self.recording, flat_statistics(self.recording, self.flat)).typical()
 
     @cached_property
     def resting(self) -> Mask:

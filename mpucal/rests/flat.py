@@ -92,7 +92,7 @@ def samples_of_window(recording: Recording) -> int:
     return max(round(WINDOW_S * recording.rate_hz), FEWEST)
 
 
-def tells(recording: Recording, flat: tuple[int, int]) -> bool:
+def is_long_enough(recording: Recording, flat: tuple[int, int]) -> bool:
     """Whether a flat segment, given by a caller, is long enough to tell noise and bias."""
     return flat[1] - flat[0] >= max(round(SHORTEST_GIVEN_S * recording.rate_hz), 2)
 

@@ -19,7 +19,7 @@ RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second; the fi
 DRIFTS_99 = 11.3  # scipy.stats.chi2.ppf(0.99, 3): twice what the log likelihood gains by walks of chance, on three axes
 
 
-def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
+def remove_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
     """The recording with its gyroscope's drift removed: in every rest, the mean rate is the flat segment's.
 
     The bias is a random walk seen through the means of runs at rest, its density the likeliest; between them it is

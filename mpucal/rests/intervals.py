@@ -40,15 +40,15 @@ class RestFinder:
         self._n = samples_of_window(recording)
         self._windows = _windows(recording, self._n)
 
-    def alike(self) -> Intervals:
+    def typical(self) -> Intervals:
         """The rests like most of this recording's: in which the rate spreads as little as there."""
         return self.within(self._learned())
 
-    def held(self) -> Intervals:
+    def any_hand(self) -> Intervals:
         """The rests, and beside them whatever a hand of any tremor may have meant to hold."""
-        return _and_others(self.alike(), self.within(ANY_HAND))
+        return _and_others(self.typical(), self.within(ANY_HAND))
 
-    def telling_bias(self, rests: Intervals) -> Intervals:
+    def bias_runs(self, rests: Intervals) -> Intervals:
         """The runs that tell the gyroscope's bias: a rest's quiet part where that is long, or all of it."""
         quiet = self.within(QUIET)
         quiet = quiet[quiet[:, 1] - quiet[:, 0] >= TELLS_BIAS_S * self._recording.rate_hz]

@@ -49,7 +49,7 @@ class Limits:
 
 
 # Nobody touches the board: its mean acceleration is that of another look, to the last mg.
-LET_GO = Limits(gyro_sd=0.03, acc_sd=0.06, gyro_step=0.02, acc_step=0.03, vibration=2.0)
+UNTOUCHED = Limits(gyro_sd=0.03, acc_sd=0.06, gyro_step=0.02, acc_step=0.03, vibration=2.0)
 # A board on a table that hums, or in a hand whose elbow is braced.
 QUIET = Limits(gyro_sd=0.03, acc_sd=0.15, gyro_step=0.02, acc_step=0.08)
 # A hand trembles by 0.1 m/s^2 and 1 deg/s at 2 to 10 Hz.

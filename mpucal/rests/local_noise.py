@@ -30,7 +30,7 @@ def noise_variance(recording: Recording) -> Vector:
     return _kernel.moving_mean(squares, max(round(WINDOW_S * recording.rate_hz) // 2, 2))
 
 
-def louder(recording: Recording, flat: Flat) -> Vector:
+def noise_ratio(recording: Recording, flat: Flat) -> Vector:
     """(n,) the noise around each sample, as a factor of Sigma_a; 1 where it is as at rest."""
     ratio = noise_variance(recording) @ (1.0 / (3.0 * flat.Sigma_a))
     return np.asarray(np.where(ratio > LOUDER, ratio, 1.0))

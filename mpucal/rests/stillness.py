@@ -16,12 +16,12 @@ import numpy as np
 from ..data import Vector
 from .limits import (
     ANY_HAND,
-    LET_GO,
     MOST_BIAS_RAD_S,
     NOISIEST_ACC_MPS2,
     NOISIEST_GYRO_RAD_S,
     QUIET,
     TIMES_NOISE,
+    UNTOUCHED,
     Limits,
     learned,
 )
@@ -238,10 +238,10 @@ class Detector:
         return f"acceleration along {AXES[axis]} changed by {abs(acc_step[axis]):.2f} m/s²"
 
 
-def let_go(acc: Vector) -> bool:
+def is_untouched(acc: Vector) -> bool:
     """Whether an accelerometer's rows (n, 3) m/s^2 are of a board that nobody touches."""
     silent = np.zeros(3)
-    return bool(Detector(LET_GO, (silent, silent)).shares(of_rows(acc, np.zeros_like(acc))).level < 1.0)
+    return bool(Detector(UNTOUCHED, (silent, silent)).shares(of_rows(acc, np.zeros_like(acc))).level < 1.0)
 
 
 def _turned(gyr: Vector) -> str:

@@ -28,7 +28,7 @@ from ..iio.attributes import ACCEL, AXES, mount_matrix
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, DeviceAttributes
-from ..rests.stillness import let_go
+from ..rests.stillness import is_untouched
 from ..result.calibration import Calibration
 from ..result.journal import Journal
 from ..session.lay_flat import put_down
@@ -165,7 +165,7 @@ class KernelSink:
                 while driver.now_ns() < end_ns:
                     driver.poll()
                 acc = driver.recording().acc
-                if len(acc) > FEWEST and let_go(acc):
+                if len(acc) > FEWEST and is_untouched(acc):
                     return np.asarray(acc.mean(axis=0), np.float64)
         finally:
             driver.stop()

@@ -173,7 +173,7 @@ def test_jerks_do_little(hand):
 def test_one_lost_move_does_little(hand, pick, how, k):
     run = hand(1, "pose12")
     recording = run.recording
-    runs = RestFinder(recording, flat_statistics(recording, recording.flat)).alike()
+    runs = RestFinder(recording, flat_statistics(recording, recording.flat)).typical()
     first, last = runs[k][1], runs[k + 1][0]
     if how == "left out":
         kept = np.ones(len(recording), bool)
@@ -193,7 +193,7 @@ def test_a_move_that_slipped_unseen_never_passes_for_good_unless_it_did_no_harm(
     run = hand(1, "pose12")
     recording = run.recording
     flat = flat_statistics(recording, recording.flat)
-    runs = RestFinder(recording, flat).alike()
+    runs = RestFinder(recording, flat).typical()
     gyr, rng = recording.gyr.copy(), np.random.default_rng(0)
     slipped = slice(runs[k][1], runs[k + 1][0])
     gyr[slipped] = flat.b_omega + 0.002 * rng.standard_normal((slipped.stop - slipped.start, 3))

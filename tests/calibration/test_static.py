@@ -34,7 +34,7 @@ def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, seed):
 def test_it_is_an_ellipsoid_through_the_rests(hand):
     recording = hand(66, "pose12").recording
     calibration = calibrate(recording, "static", G)
-    runs = RestFinder(recording, flat_statistics(recording, find_flat(recording))).alike()
+    runs = RestFinder(recording, flat_statistics(recording, find_flat(recording))).typical()
     means = statistics(recording.acc, runs)[0]
 
     def residuals(x):

@@ -56,7 +56,7 @@ def test_what_was_told_to_be_held_is_found_by_the_verification(tremor_dps, hertz
         for pause in pauses.add(recording.part(first, first + 20)):
             if pause.seconds >= HOLD_S:
                 told[pause.run] = pause.t_s
-    runs = RestFinder(recording, flat_statistics(recording, recording.flat)).held()
+    runs = RestFinder(recording, flat_statistics(recording, recording.flat)).any_hand()
     long = recording.t[runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * RATE_HZ]]
     for t_s in told.values():
         assert any(first <= t_s <= last + HOLD_S for first, last in long), (told, long)

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
-from mpucal.rests.gyro_drift import without_drift
+from mpucal.rests.gyro_drift import remove_drift
 from mpucal.rests.intervals import RestFinder
 from mpucal.rests.limits import ANY_HAND
 
@@ -14,7 +14,7 @@ from mpucal.rests.limits import ANY_HAND
 def found(simulated):
     recording = simulated.recording
     flat = flat_statistics(recording, recording.flat)
-    return recording, flat, RestFinder(recording, flat).alike()
+    return recording, flat, RestFinder(recording, flat).typical()
 
 
 @pytest.mark.parametrize("motion", ["pose6", "pose9", "pose12"])
@@ -51,7 +51,7 @@ def test_a_turn_at_constant_rate_is_no_rest():
     gyr[1000:, 2] += 0.5
     acc = [0.0, 0.0, 9.8] + 0.01 * rng.standard_normal((2000, 3))
     recording = Recording.from_arrays(0.01 * np.arange(2000), acc, gyr)
-    runs = RestFinder(recording, flat_statistics(recording, (0, 900))).alike()
+    runs = RestFinder(recording, flat_statistics(recording, (0, 900))).typical()
     assert runs[:, 1].max() <= 1010
 
 
@@ -60,21 +60,21 @@ def test_a_gap_parts_a_rest(in_hand):
     gap = np.zeros(len(recording), bool)
     gap[500] = True
     flat = flat_statistics(recording, recording.flat)
-    runs = RestFinder(replace(recording, gap=gap), flat).alike()
+    runs = RestFinder(replace(recording, gap=gap), flat).typical()
     assert not any(a <= 500 < b for a, b in runs)
-    assert len(runs) == len(RestFinder(recording, flat).alike()) + 1
+    assert len(runs) == len(RestFinder(recording, flat).typical()) + 1
 
 
 def test_shorter_than_a_window_has_no_runs():
     recording = Recording.from_arrays(0.01 * np.arange(20), np.ones((20, 3)), np.zeros((20, 3)))
-    assert RestFinder(recording, flat_statistics(recording, (0, 20))).alike().shape == (0, 2)
+    assert RestFinder(recording, flat_statistics(recording, (0, 20))).typical().shape == (0, 2)
 
 
 def test_zeros_of_the_accelerometer_are_no_rest():
     gyr = 0.002 * np.random.default_rng(0).standard_normal((1500, 3))
     recording = Recording.from_arrays(0.01 * np.arange(1500), np.zeros((1500, 3)), gyr)
     with np.errstate(all="raise"):
-        assert len(RestFinder(recording, flat_statistics(recording, (0, 800))).alike()) == 0
+        assert len(RestFinder(recording, flat_statistics(recording, (0, 800))).typical()) == 0
 
 
 def drifting(in_hand, drift):
@@ -90,8 +90,8 @@ def drifting(in_hand, drift):
 def test_drift_is_removed(in_hand, drift):
     recording = drifting(in_hand, drift)
     flat = flat_statistics(recording, recording.flat)
-    runs = RestFinder(recording, flat).alike()
-    mended = without_drift(recording, flat, runs)
+    runs = RestFinder(recording, flat).typical()
+    mended = remove_drift(recording, flat, runs)
     for a, b in runs[1:]:
         np.testing.assert_allclose(mended.gyr[a:b].mean(0), flat.b_omega, atol=5e-4)
     bias = flat.b_omega - flat_statistics(in_hand.recording, recording.flat).b_omega
@@ -102,7 +102,7 @@ def test_drift_is_removed(in_hand, drift):
 def test_a_bias_that_stays_is_left_nearly_alone(in_hand):
     recording = in_hand.recording
     flat = flat_statistics(recording, recording.flat)
-    mended = without_drift(recording, flat, RestFinder(recording, flat).alike())
+    mended = remove_drift(recording, flat, RestFinder(recording, flat).typical())
     one_rest = np.sqrt(flat.Sigma_omega / 150).max()
     assert np.abs(mended.gyr - recording.gyr).max() < 2.0 * one_rest
 
@@ -117,15 +117,15 @@ def test_a_slow_turn_about_gravity_is_no_bias(in_hand):
     acc[at : at + 80] = flat.y + 0.01 * np.random.default_rng(0).standard_normal((80, 3))
     gyr[at : at + 80] = flat.b_omega + np.array([0.0, 0.0, np.radians(2.0)])
     turning = replace(recording, acc=acc, gyr=gyr)
-    runs = RestFinder(turning, flat).alike()
+    runs = RestFinder(turning, flat).typical()
     assert any(at < a < at + 80 for a, _ in runs)
-    assert without_drift(turning, flat, runs) is turning
+    assert remove_drift(turning, flat, runs) is turning
 
 
 def test_of_one_rest_no_drift_is_known(in_hand):
     recording = in_hand.recording
     flat = flat_statistics(recording, recording.flat)
-    assert without_drift(recording, flat, np.array([[0, 900]])) is recording
+    assert remove_drift(recording, flat, np.array([[0, 900]])) is recording
 
 
 def test_rests_between_which_it_turned_as_slowly_as_a_hand_trembles_are_two():

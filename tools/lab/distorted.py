@@ -134,7 +134,7 @@ def orientations(recording: Recording, D: Vector, b_a: Vector, K: Vector, gravit
     corrected = replace(recording, gyr=recording.gyr @ K.T)
     s = followed(recording, flat, D, b_a, gravity)
     s[:, 2:3] = followed(corrected, flat_statistics(corrected, segment), D[2:3], b_a[2:3], gravity)
-    return s, int(RestFinder(recording, flat).alike()[-1, 0]) - flat.last
+    return s, int(RestFinder(recording, flat).typical()[-1, 0]) - flat.last
 
 
 COLUMNS: dict[str, Column] = {

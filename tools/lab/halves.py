@@ -63,7 +63,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
     flat = recording.flat or find_flat(recording)
     if flat is None:
         raise RecordingError(f"{recording.name}: no rest to begin with", "give a recording that begins at rest")
-    runs = RestFinder(recording, flat_statistics(recording, flat)).alike()
+    runs = RestFinder(recording, flat_statistics(recording, flat)).typical()
     runs = runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * recording.rate_hz]
     n, middle = len(recording), (flat[1] + len(recording)) // 2
     inner = runs[(runs[:, 0] > flat[1]) & (np.abs(runs.mean(1) - middle) < 0.25 * n)]

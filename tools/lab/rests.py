@@ -76,7 +76,7 @@ def of_recording(recording: Recording, name: str, seed: int) -> Found:
     ends = np.cumsum(np.random.default_rng(seed).integers(1, LARGEST_PART, len(after)))
     parts = [after.part(first, last) for first, last in pairwise([0, *ends[ends < len(after)].tolist(), len(after)])]
     held = _held(flat, parts)
-    runs = RestFinder(recording, flat).held()
+    runs = RestFinder(recording, flat).any_hand()
     found: list[Span] = [(float(recording.t[a]), float(recording.t[b - 1])) for a, b in runs if a >= flat.last]
     rests = [rest for rest in found if rest[1] - rest[0] >= LONG_S]
     return Found(

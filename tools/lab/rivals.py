@@ -62,7 +62,7 @@ class Rests:
         if segment is None:
             raise Unfit("never still")
         flat = flat_statistics(recording, segment)
-        runs = RestFinder(recording, flat).alike()
+        runs = RestFinder(recording, flat).typical()
         return cls(recording, flat, runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * recording.rate_hz])
 
     @cached_property

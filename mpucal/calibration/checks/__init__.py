@@ -72,7 +72,7 @@ def gyroscope_at_fault(evidence: Evidence) -> Reason | None:
     return None
 
 
-def found(evidence: Evidence) -> list[Reason]:
+def find_reasons(evidence: Evidence) -> list[Reason]:
     """Return all that speaks against an estimate, what refuses it first."""
     if evidence.model == "static":
         # unusable accelerations are unusable without a gyroscope, too

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...reasons import Reason, reason
+from ..bias_walks import BiasWalk
 from ..claim import MOST_NIS
 from ..evidence import Evidence
 from ..tilt import CONE_RAD
-from ..walks import Walk
 
 # of a claim, 1 sigma: errors of 0.1 m/s^2 are then rare
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
@@ -112,7 +112,7 @@ def zero_moved(e: Evidence) -> Reason | None:
     return reason("zero_moved", "walk", _useless(e), size=size, begin=begin, end=end)
 
 
-def _change_of(e: Evidence, what: str) -> Walk | None:
+def _change_of(e: Evidence, what: str) -> BiasWalk | None:
     """That change, where it is more than is no news.
 
     Lost and clipped samples pull at an estimate too, and have reasons of their own.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ...calibration import estimate
-from ...calibration.checks import found
+from ...calibration.checks import find_reasons
 from ...calibration.evidence import Evidence
 from ...calibration.interim import InterimEstimate, interim_estimate
 from ...calibration.masks import with_masks
@@ -90,7 +90,7 @@ class Fits:
         recording = self._store.recording()
         evidence, _ = estimate(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
-        reasons = found(evidence)
+        reasons = find_reasons(evidence)
         return Tried(verdict(reasons), _most_specific_reason(reasons, evidence.recording))
 
     def _check(self) -> Event:
@@ -101,7 +101,7 @@ class Fits:
         recording = with_masks(self._store.recording())
         rests = new_orientations(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
         unseen = select_unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
-        contradiction = next((against for against in found(evidence) if against.code == CONTRADICTION), None)
+        contradiction = next((against for against in find_reasons(evidence) if against.code == CONTRADICTION), None)
         return judge_verification(rests, unseen[:of], of, recording, contradiction)
 
 

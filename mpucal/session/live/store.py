@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...calibration.lone_jumps import BESIDE, without_lone_jumps
+from ...calibration.lone_jumps import BESIDE, remove_spikes
 from ...data import Mask, Recording, Samples, Sensor, Vector
 
 # Faster samples are averaged to this rate: no motion of a hand is lost.
@@ -56,10 +56,10 @@ class SampleStore:
         return Recording(**vars(self._filtered()), sensor=self._sensor)
 
     def _filtered(self) -> Samples:
-        """Return all samples filtered by `without_lone_jumps`, which is applied to those since the last call alone."""
+        """Return all samples filtered by `remove_spikes`, which is applied to those since the last call alone."""
         begin = len(self._done) - self._lead
         self._open, self._parts = Samples.joined([self._open, *self._parts]), []
-        filtered = without_lone_jumps(Recording(**vars(self._open), sensor=self._sensor))
+        filtered = remove_spikes(Recording(**vars(self._open), sensor=self._sensor))
         whole = Samples.joined([self._done, _cut(filtered, self._lead, len(filtered))])
         settled = max(len(whole) - BESIDE, len(self._done))
         self._done, self._lead = _cut(whole, 0, settled), min(BESIDE, settled - begin)

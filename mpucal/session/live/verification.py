@@ -43,7 +43,7 @@ def _fitted_directions(evidence: Evidence) -> Vector:
     if fit is None or flat is None:
         return np.zeros((0, 3))
     shortest = SHORTEST_REST_S * r.rate_hz
-    means = [r.acc[a:b].mean(0) for a, b in RestFinder(r, flat).alike() if b - a >= shortest]
+    means = [r.acc[a:b].mean(0) for a, b in RestFinder(r, flat).typical() if b - a >= shortest]
     up = np.linalg.solve(fit.D, (np.reshape(means, (-1, 3)) - fit.b_a).T).T
     return np.asarray(-up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9))
 

@@ -46,7 +46,7 @@ SIGNIFICANT = 20.0
 MEDIAN_SQUARE, UNSEEN = 0.455, 1e-9
 
 
-class Walk(NamedTuple):
+class BiasWalk(NamedTuple):
     """The likeliest walk.
 
     Attributes
@@ -85,7 +85,7 @@ class Walk(NamedTuple):
         return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
 
 
-def likeliest_walk(parts: Parts, D: Vector) -> Walk | None:
+def find_walk(parts: Parts, D: Vector) -> BiasWalk | None:
     """Of what changed most likely; None where nothing did, beyond chance, or a fit that failed cannot say."""
     if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
         return None
@@ -99,7 +99,7 @@ def likeliest_walk(parts: Parts, D: Vector) -> Walk | None:
     return walk if walk.gain > SIGNIFICANT else None
 
 
-def without_walk(recording: Recording, flat: Flat, walk: Walk) -> Recording:
+def remove_walk(recording: Recording, flat: Flat, walk: BiasWalk) -> Recording:
     """With a walk of the gyroscope's bias taken from its rates."""
     return replace(recording, gyr=recording.gyr - walk.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0)))
 
@@ -138,7 +138,7 @@ def _sums(k: int) -> Vector:
     return np.asarray(np.kron(np.tri(k), np.eye(3)))
 
 
-def _walk(what: What, parts: Parts, D: Vector, gradient: Vector, fisher: Vector, t: Vector) -> Walk:
+def _walk(what: What, parts: Parts, D: Vector, gradient: Vector, fisher: Vector, t: Vector) -> BiasWalk:
     k, B = len(gradient), _directions(what, D, len(parts.H))
     to_theta = fisher @ B  # (k, p, 3)
     S = _block_diagonal(B.T @ to_theta)
@@ -159,4 +159,4 @@ def _walk(what: What, parts: Parts, D: Vector, gradient: Vector, fisher: Vector,
     )
     best = int(gain.argmax())
     delta = (sums @ (U @ (c / (eigenvalues + 1.0 / q[best])))).reshape(k, 3)
-    return Walk(what, float(gain[best]), float(alone.max()), float(q[best, 0]), delta, t)
+    return BiasWalk(what, float(gain[best]), float(alone.max()), float(q[best, 0]), delta, t)

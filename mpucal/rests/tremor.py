@@ -52,7 +52,7 @@ def carried(recording: Recording, flat: Flat, runs: Intervals) -> Vector:
     return acc
 
 
-def rate_of_rests(acc: Vector, recording: Recording, flat: Flat, runs: Intervals, otherwise: float) -> float:
+def fit_lambda(acc: Vector, recording: Recording, flat: Flat, runs: Intervals, otherwise: float) -> float:
     """Lambda [1/s], by what means over blocks keep of the acceleration's variance in the rests of a hand.
 
     acc : (n, 3) as `carried` gives it. otherwise : where too few rests tremble to tell.

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
-from mpucal.rests.law import carried, mean_variance, rate_of_rests
 from mpucal.rests.limits import ANY_HAND, QUIET, learned
+from mpucal.rests.tremor import carried, fit_lambda, mean_variance
 
 RATE_HZ, REST_S, NOISE_MPS2 = 100.0, 3.0, 0.02
 
@@ -53,7 +53,7 @@ def held(lam, sigma, seed, rests=14):
 @pytest.mark.parametrize("lam", [6.0, 12.0, 25.0])
 def test_lambda_is_found(lam):
     found = [
-        rate_of_rests(carried(recording, flat, runs), recording, flat, runs, 1.0)
+        fit_lambda(carried(recording, flat, runs), recording, flat, runs, 1.0)
         for recording, flat, runs in (held(lam, 0.1, seed) for seed in range(6))
     ]
     assert np.exp(np.mean(np.log(found))) == pytest.approx(lam, rel=0.25)
@@ -61,7 +61,7 @@ def test_lambda_is_found(lam):
 
 def test_a_board_that_lies_has_no_law():
     recording, flat, runs = held(10.0, 1e-6, 0)
-    assert rate_of_rests(carried(recording, flat, runs), recording, flat, runs, 17.0) == 17.0
+    assert fit_lambda(carried(recording, flat, runs), recording, flat, runs, 17.0) == 17.0
 
 
 def test_a_turn_that_the_gyroscope_sees_is_carried_away():
@@ -102,7 +102,7 @@ def test_a_hand_that_trembles_by_two_degrees_a_second_rests():
     acc = [0.0, 0.0, 9.81] + 0.05 * rng.standard_normal((4000, 3))
     recording = Recording.from_arrays(t, acc, gyr, flat=(0, 900))
     flat = flat_statistics(recording, (0, 900))
-    runs = RestFinder(recording, flat).alike()
+    runs = RestFinder(recording, flat).typical()
     assert np.sum(runs[:, 1] - runs[:, 0] > 3.0 * RATE_HZ) == 7
     assert len(RestFinder(recording, flat).within(QUIET)) == 1
 
@@ -118,4 +118,4 @@ def test_a_table_that_is_quieter_than_the_flat_segment_has_no_tremor(rate_hz, sh
         acc = [0.0, 0.0, 9.81] + 0.03 * rng.standard_normal((n, 3))
         recording = Recording.from_arrays(np.arange(n) / rate_hz, acc, gyr, flat=(0, n // 6))
         flat = flat_statistics(recording, recording.flat)
-        np.testing.assert_array_equal(RestFinder(recording, flat).alike(), RestFinder(recording, flat).within(QUIET))
+        np.testing.assert_array_equal(RestFinder(recording, flat).typical(), RestFinder(recording, flat).within(QUIET))

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import estimate
+from mpucal.calibration.bias_walks import STEPS, BiasWalk, _walk, find_walk
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.rotation import rotation
-from mpucal.calibration.walks import STEPS, Walk, _walk, likeliest_walk
 
 G = 9.82
 
 
 def walk_of(recording):
     evidence, _ = estimate(recording, "auto", G)
-    return likeliest_walk(evidence.fit.parts, evidence.fit.D)
+    return find_walk(evidence.fit.parts, evidence.fit.D)
 
 
 @pytest.mark.parametrize("motion", ["continuous", "wobble30", "wobble100", "pose12", "calm jerks"])
@@ -87,5 +87,5 @@ def test_the_likelihood_is_that_of_the_joint_gaussian():
 
 
 def test_a_walk_is_drawn_straight_from_where_the_turning_begins():
-    walk = Walk("gyroscope", 30.0, 30.0, 1e-8, np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.array([1.0, 3.0]))
+    walk = BiasWalk("gyroscope", 30.0, 30.0, 1e-8, np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.array([1.0, 3.0]))
     np.testing.assert_allclose(walk.at(np.array([0.0, 0.5, 1.0, 2.0, 9.0]))[:, 2], [0.0, 0.1, 0.2, 0.3, 0.4])
