@@ -1,4 +1,4 @@
-"""/dev/i2c-1 with a simulated chip behind it, for the installed command and for the tools of Linux."""
+"""Fixtures: /dev/i2c-1 with a simulated chip, for the installed command and for the tools of Linux."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Result:
 
 
 class Device:
-    """A simulated chip at /dev/i2c-1, for the programs that `run` starts.
+    """Simulated chip at /dev/i2c-1, for the programs that `run` starts.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Device:
 
     @contextmanager
     def but_for(self, adapter):
-        """Another adapter for as long as the context lasts; see harness/adapter.py."""
+        """Change the adapter during a `with` block; see harness/adapter.py."""
         self.tell(adapter=adapter)
         try:
             yield
@@ -91,7 +91,7 @@ class Device:
             self.tell(adapter={"address": 0x68, "bound": [], "fails": 0})
 
     def run(self, *command) -> Result:
-        """Any program."""
+        """Run a program."""
         words = [str(word) for word in command]
         done = subprocess.run(
             words, env=self.environment, cwd=self.folder, capture_output=True, text=True, check=False, timeout=120
@@ -99,11 +99,11 @@ class Device:
         return Result(done.returncode, done.stdout, done.stderr)
 
     def installed(self, *words) -> Result:
-        """The installed command."""
+        """Run the installed command."""
         return self.run(INSTALLED, *words)
 
     def mpucal(self, *words) -> Result:
-        """The same, in a process that need not load mpucal."""
+        """Run the command in a process that has loaded mpucal already."""
         with self.program(COMMAND, INSTALLED, *words) as (program, out, err), ThreadPoolExecutor(1) as reader:
             said = reader.submit(err.read)
             heard = out.read()
@@ -111,7 +111,7 @@ class Device:
 
     @contextmanager
     def program(self, code, *argv):
-        """Python's `code` as the main program, and its stdout and stderr."""
+        """Run Python's `code` as the main program; yield it, its stdout and its stderr."""
         with Path(os.devnull).open() as nothing:
             pipes = [os.pipe() for _ in range(2)]
             files = [nothing.fileno(), *(write for _, write in pipes)]
@@ -123,7 +123,7 @@ class Device:
 
     @contextmanager
     def recording(self, *words):
-        """The command `record` meanwhile, once it has the chip."""
+        """Run the command `record` during a `with` block, which begins once it has the chip."""
         capture = self.folder / "held.mcap"
         command = ("record", *words, "--seconds", "100000", "-o", capture)
         with self.program(COMMAND, INSTALLED, *command) as (program, _, err):
@@ -136,7 +136,7 @@ class Device:
                 program.wait()
 
     def session(self, *words) -> Result:
-        """The same, guiding the simulated hand through a session; it may fail before."""
+        """Run a session, and guide the simulated hand through it; the session may fail before."""
         self._share(0, told=0, worked=0, worker=0)
         command = ("session", "--bus", "/dev/i2c-1", "--json-events", *words)
         said = b""
@@ -152,20 +152,20 @@ class Device:
             return Result(program.wait(), heard.decode(), said.decode())
 
     def _share(self, heard: int, **worker: int) -> None:
-        """So many bytes of what the program says were heard; see harness/clock.c."""
+        """Share the number of the program's bytes that were read; see harness/clock.c."""
         words = struct.pack(f"<{1 + len(worker)}q", heard, *worker.values())
         with self._time.open("r+b") as file:
             file.seek(HEARD_AT)
             file.write(words)
 
     def forbid(self) -> None:
-        """Let the kernel refuse to open the device file, to root as well: a setting of /proc that is read only."""
+        """Make the kernel refuse to open the device file, even for root: it becomes a read-only setting of /proc."""
         node = self.root / "dev" / "i2c-1"
         node.unlink()
         node.symlink_to("/proc/sys/kernel/ostype")
 
     def configure(self, hz: int) -> None:
-        """The speed that the device tree asks of the adapter."""
+        """Set the adapter's speed in the device tree."""
         node = self.root / "sys" / "class" / "i2c-dev" / "i2c-1" / "device" / "of_node"
         node.mkdir(parents=True)
         (node / "clock-frequency").write_bytes(hz.to_bytes(4, "big"))
@@ -179,7 +179,7 @@ class Device:
 
 @pytest.fixture(scope="session")
 def clock(once):
-    """The library of harness/clock.c, built once."""
+    """Library of harness/clock.c, built once."""
     for library in ("libumockdev.so.0", "libumockdev-preload.so.0"):
         try:
             # the second one is for other programs: found is enough
@@ -227,13 +227,13 @@ def _devices(clock: Path, loaded):
 
 @pytest.fixture
 def device(clock, loaded):
-    """Makes a device; all are gone afterwards."""
+    """Makes a device, and removes it after the test."""
     with _devices(clock, loaded) as make:
         yield make
 
 
 @pytest.fixture(scope="module")
 def device_of_module(clock, loaded):
-    """The same for a device that several tests share."""
+    """Makes a device that the tests of a module share."""
     with _devices(clock, loaded) as make:
         yield make

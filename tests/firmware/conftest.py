@@ -32,20 +32,20 @@ def _need(*programs: str) -> None:
 
 @pytest.fixture(scope="session")
 def host():
-    """The module that compiles and runs the firmware's core on this machine."""
+    """Module that compiles and runs the firmware's core on this machine."""
     return _module(HERE / "host" / "core.py")
 
 
 @pytest.fixture(scope="session")
 def core(host, once):
-    """The firmware's core as a library of this machine."""
+    """Library of the firmware's core, compiled for this machine."""
     _need("gcc")
     return host.load_core(once("firmware-core", host.compile_core))
 
 
 @pytest.fixture(scope="session")
 def make(once):
-    """Makes a target of the firmware's Makefile in a folder of its own; gives that and what was said."""
+    """Makes a target of the firmware's Makefile: (folder, output)."""
     _need("avr-gcc", "make")
 
     def run(target, *settings):
@@ -64,13 +64,13 @@ def make(once):
 
 @pytest.fixture(scope="session")
 def avr_build(make):
-    """The folder with the firmware for the ATmega328P, and what its build said."""
+    """Builds the firmware for the ATmega328P: (folder, output)."""
     return make("all")
 
 
 @pytest.fixture(scope="session")
 def sketches(make):
-    """The folder with the Arduino sketches, built for an Uno."""
+    """Folder with the Arduino sketches, built for an Uno."""
     if not ARDUINO.exists():
         pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
     return make("sketches")[0]
@@ -78,13 +78,13 @@ def sketches(make):
 
 @pytest.fixture(scope="session")
 def fast_build(make):
-    """The folder with the firmware for the ATmega328P at 500000 baud."""
+    """Folder with the firmware for the ATmega328P at 500000 baud."""
     return make("all", "BAUD=500000")[0]
 
 
 @pytest.fixture(scope="session")
 def stock_sketches(make):
-    """Builds the sketches as a stock Arduino IDE does for a board; gives their folder, with what the compiler said."""
+    """Builds the sketches as a stock Arduino IDE does for a board; returns their folder with the compiler's output."""
     if not ARDUINO.exists():
         pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
     _need("arduino-builder", "arduino-ctags")
@@ -93,7 +93,7 @@ def stock_sketches(make):
 
 @pytest.fixture(scope="session")
 def emulator(once):
-    """The modules of the emulated board and of a line to it, and the board's library between them."""
+    """Modules of the emulated board, its library, and the line to it."""
     _need("gcc")
     if not SIMAVR.exists():
         pytest.skip("needs libsimavr-dev, of the packages in tools/ci_packages.txt")
@@ -104,7 +104,7 @@ def emulator(once):
 
 @pytest.fixture
 def switch_on(emulator, avr_build, tmp_path):
-    """Switches a board on, with an EEPROM that outlives it; gives the board and a port to it."""
+    """Switches a board on, with an EEPROM that is kept: (board, port)."""
     module, library, port = emulator
     boards = []
 

@@ -1,4 +1,4 @@
-"""The ioctls of a Linux I2C adapter, answered as the kernel answers them. Knows no chip: a bus is behind it.
+"""Ioctls of a Linux I2C adapter, answered as the kernel does. It knows no chip: a bus is behind it.
 
 Source: Linux include/uapi/linux/i2c-dev.h and i2c.h, drivers/i2c/i2c-dev.c; for a Raspberry Pi's limit
 drivers/i2c/busses/i2c-bcm2835.c.
@@ -31,11 +31,11 @@ NOBODY, BROKEN = errno.EREMOTEIO, errno.EIO
 
 @dataclass
 class Adapter:
-    """One adapter with one chip.
+    """Adapter with a chip.
 
     Attributes
     ----------
-    bus : the chip's. address : where it answers. functions : what the adapter says that it can.
+    bus : of the chip. address : of the chip. functions : that the adapter reports.
     bound : addresses that a driver of the kernel holds. pi : one read message at most, and that last.
     fails : errno of every transfer from now on, 0: none.
     """
@@ -49,7 +49,7 @@ class Adapter:
     _chosen: int = -1
 
     def answer(self, memory: Memory, request: int, value: int) -> int:
-        """0, or the errno of an ioctl."""
+        """Answer an ioctl: 0, or an errno."""
         if request == I2C_FUNCS:
             _there(memory, 8).write(self.functions.to_bytes(8, "little"))
             return 0
@@ -137,6 +137,6 @@ def _there(memory: Memory, size: int) -> Memory:
 
 
 def _errno(error: BusError, otherwise: int) -> int:
-    """The error number that the bus names as the cause, as the real one does."""
+    """Return the error number of the bus error's cause."""
     cause = error.__cause__
     return (cause.errno or otherwise) if isinstance(cause, OSError) else otherwise

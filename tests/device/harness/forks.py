@@ -1,4 +1,4 @@
-"""Programs that start at once: a process that has loaded what they import forks for each of them.
+"""Quick start of programs: a process that has loaded their imports forks for each of them.
 
     python forks.py SOCKET MODULE...
 
@@ -25,22 +25,22 @@ MESSAGE_BYTES = 1 << 18
 
 
 class Forked:
-    """A program that was started; its pipes are the caller's."""
+    """Started program; the caller has its pipes."""
 
     def __init__(self, forks: Forks, pid: int) -> None:
         self._forks, self.pid = forks, pid
 
     def wait(self) -> int:
-        """Its exit code; a negative signal where one ended it."""
+        """Return its exit code; a negative signal number if a signal ended it."""
         return self._forks.ask({"wait": self.pid})
 
 
 class Forks:
-    """The caller's side.
+    """Connection of the caller to the forking process.
 
     Parameters
     ----------
-    environment : of the process that forks. modules : what that loads.
+    environment : of the forking process. modules : loaded by it.
     """
 
     def __init__(self, environment: dict[str, str], *modules: str) -> None:
@@ -58,7 +58,7 @@ class Forks:
         return Forked(self, self.ask(words, files))
 
     def ask(self, words: dict[str, Any], files: list[int] | None = None) -> int:
-        """The answer to one message."""
+        """Send a message and return its answer."""
         socket.send_fds(self._socket, [json.dumps(words).encode()], files or [])
         answer = self._socket.recv(MESSAGE_BYTES)
         if not answer:
@@ -66,13 +66,13 @@ class Forks:
         return int(answer)
 
     def close(self) -> None:
-        """End it; what it has started ends by itself."""
+        """End the forking process; programs that it started end by themselves."""
         self._socket.close()
         self._process.wait()
 
 
 def load(name: str) -> None:
-    """Import a module and what is in it."""
+    """Import a module and its submodules."""
     module = importlib.import_module(name)
     for inner in pkgutil.walk_packages(getattr(module, "__path__", ()), f"{name}."):
         # some need an extra that is not there
@@ -81,7 +81,7 @@ def load(name: str) -> None:
 
 
 def serve(number: int) -> dict[str, Any] | None:
-    """Answer until the socket ends: None; or, in a process that was forked, what it is to run."""
+    """Answer messages until the socket ends, then return None; in a forked process return its program."""
     with socket.socket(fileno=number) as here:
         while True:
             message, files, _, _ = socket.recv_fds(here, MESSAGE_BYTES, 3)
@@ -104,7 +104,7 @@ def serve(number: int) -> dict[str, Any] | None:
 
 
 def begin(words: dict[str, Any]) -> None:
-    """Run the program that `words` say."""
+    """Run the program of a message."""
     os.chdir(words["folder"])
     os.environ.clear()
     os.environ.update(words["environment"])

@@ -1,4 +1,4 @@
-"""The ioctls of Linux's spidev, answered as the kernel answers them. Knows no chip: a bus is behind it.
+"""Ioctls of Linux's spidev, answered as the kernel does. It knows no chip: a bus is behind it.
 
 Source: Linux include/uapi/linux/spi/spidev.h and spi.h, drivers/spi/spidev.c.
 """
@@ -23,7 +23,7 @@ CHIP_MODES = (0, 3)
 
 @dataclass
 class SpiDevice:
-    """One chip select with one chip.
+    """Chip select with a chip.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class SpiDevice:
     seen: list[list[int]] = field(default_factory=list)
 
     def answer(self, memory: Memory, request: int, _value: int) -> int:
-        """0, or the errno of an ioctl."""
+        """Answer an ioctl: 0, or an errno."""
         number, size, direction = request & 0xFF, request >> 16 & 0x3FFF, request >> 30
         if request >> 8 & 0xFF != TYPE:
             return errno.ENOTTY

@@ -1,6 +1,6 @@
-"""What of libumockdev this harness needs, by ctypes: a test bed with a device node whose ioctls are answered here.
+"""Part of libumockdev by ctypes: a test bed with a device node whose ioctls are answered here.
 
-Knows no I2C. The structures that an ioctl's argument points to are read from and written to the calling process.
+It knows no I2C. The structures that an ioctl's argument points to are read from and written to the calling process.
 """
 
 from __future__ import annotations
@@ -49,22 +49,22 @@ def _load() -> tuple[ctypes.CDLL, ctypes.CDLL]:
 
 
 class Memory:
-    """A piece of the calling process's memory, as far as an ioctl's argument leads there."""
+    """Part of the calling process's memory that an ioctl's argument points to."""
 
     def __init__(self, library: ctypes.CDLL, glib: ctypes.CDLL, data: int) -> None:
         self._library, self._glib, self._data = library, glib, data
 
     def at(self, offset: int, size: int) -> Memory | None:
-        """The `size` bytes that the pointer at `offset` points to; None where it is null."""
+        """Return the `size` bytes to which the pointer at `offset` points; None if it is null."""
         data = self._library.umockdev_ioctl_data_resolve(self._data, offset, size, None)
         if not data:
             return None
-        # whoever holds the pointer keeps a reference to what it points to
+        # the owner of the pointer keeps a reference to the target
         self._glib.g_object_unref(data)
         return Memory(self._library, self._glib, data)
 
     def bytes(self) -> bytes:
-        """All of it."""
+        """Return the bytes."""
         data, size = _POINTER(), _INT()
         self._library.umockdev_ioctl_data_retrieve(self._data, ctypes.byref(data), ctypes.byref(size))
         try:
@@ -73,12 +73,12 @@ class Memory:
             self._glib.g_free(data)
 
     def write(self, data: bytes, offset: int = 0) -> None:
-        """`data` from `offset` on; the caller sees it when its ioctl returns."""
+        """Write `data` from `offset` on, for the caller when its ioctl returns."""
         self._library.umockdev_ioctl_data_update(self._data, offset, data, len(data))
 
 
 class Testbed:
-    """A folder that stands for /dev and /sys in whatever runs with libumockdev-preload.so.0 and UMOCKDEV_DIR."""
+    """Folder that replaces /dev and /sys for programs with libumockdev-preload.so.0 and UMOCKDEV_DIR."""
 
     def __init__(self) -> None:
         self._library, self._glib = _load()
@@ -87,18 +87,18 @@ class Testbed:
 
     @property
     def folder(self) -> str:
-        """What UMOCKDEV_DIR has to be."""
+        """Value of UMOCKDEV_DIR."""
         return self._library.umockdev_testbed_get_root_dir(self._testbed).decode()
 
     def add(self, description: str) -> None:
-        """Devices, as `umockdev-record` describes them."""
+        """Add devices in the format of `umockdev-record`."""
         if not self._library.umockdev_testbed_add_from_string(self._testbed, description.encode(), None):
             raise ValueError(f"libumockdev does not understand {description!r}")
 
     def attach(self, node: str, answer: Answer) -> None:
-        """Let `answer(memory, request, value)` answer the ioctls of `node`: 0, or an errno.
+        """Answer the ioctls of `node` by `answer(memory, request, value)`: 0, or an errno.
 
-        memory : leads to the argument where it is a pointer. value : the argument itself.
+        memory : target of the argument if it is a pointer. value : the argument itself.
         """
 
         def handle(_handler: int, client: int, _data: int) -> int:

@@ -1,4 +1,4 @@
-"""An emulated Arduino Uno with a chip on its I2C bus. Knows no firmware, no protocol and no real time."""
+"""Emulated Arduino Uno with a chip on its I2C bus. It knows no firmware, no protocol and no real time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CHIP_WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint8, ctypes.c_uint8, ctypes.c_uin
 
 
 class Fault(IntEnum):
-    """What may be the matter with a chip, as board.c has it."""
+    """Fault of the chip, as in board.c."""
 
     SOUND, NO_ADDRESS, NO_DATA, HOLDS_BUS = range(4)
 
@@ -34,7 +34,7 @@ def compile_library(folder: Path) -> None:
 
 
 def load_library(folder: Path) -> ctypes.CDLL:
-    """What was compiled into `folder`."""
+    """Load the library that was compiled into `folder`."""
     loaded = ctypes.CDLL(str(folder / LIBRARY))
     board, u8, u32, u64 = ctypes.c_void_p, ctypes.c_uint8, ctypes.c_uint32, ctypes.c_uint64
     prototypes = {
@@ -56,36 +56,36 @@ def load_library(folder: Path) -> ctypes.CDLL:
 
 
 class BoardClock:
-    """What the chip takes for the time: when the transfer that is going on began, on the board's clock."""
+    """Clock of the chip: the begin of the present transfer on the board's clock."""
 
     def __init__(self) -> None:
         self.cycle = 0
 
     def now(self) -> int:
-        """In ns since the board was switched on."""
+        """Return ns since the board was switched on."""
         return self.cycle * 1_000_000_000 // CPU_HZ
 
     def spend(self, ns: int) -> None:
-        """The board has spent it already."""
+        """Do nothing: the board has taken the time already."""
 
     def sleep_until(self, t_ns: int) -> None:
-        """Nobody sleeps on the chip's side."""
+        """Do nothing: the chip never sleeps."""
 
 
 class Board:
-    """A board that was just switched on; its time passes only while it runs.
+    """Board that was just switched on; its time passes only while it runs.
 
     Parameters
     ----------
-    library : from load_library. elf : the firmware. eeprom : its file, made where it is missing.
-    chip : what is on its TWI; its time is `clock`.
+    library : from load_library. elf : the firmware. eeprom : its file, created if it is missing.
+    chip : on its TWI, with the time of `clock`.
     """
 
     def __init__(self, library: ctypes.CDLL, elf: Path, eeprom: Path, chip: Bus, clock: BoardClock) -> None:
         if not eeprom.exists():
             eeprom.write_bytes(b"\xff" * EEPROM_BYTES)
         self._library, self._chip, self._clock = library, chip, clock
-        # kept, or the library would call what is no more
+        # references that the library needs
         self._callbacks = CHIP_READ(self._read), CHIP_WRITE(self._write)
         self._board = library.board_open(str(elf).encode(), str(eeprom).encode(), *self._callbacks)
         if not self._board:
@@ -100,17 +100,17 @@ class Board:
 
     @property
     def cycle(self) -> int:
-        """Of the processor, since it was switched on."""
+        """Cycles of the processor since it was switched on."""
         return self._library.board_cycle(self._board)
 
     @property
     def now_s(self) -> float:
-        """Since it was switched on."""
+        """Seconds since it was switched on."""
         return self.cycle / CPU_HZ
 
     @property
     def overruns(self) -> int:
-        """Bytes that were lost on the line because nobody took them in time."""
+        """Bytes lost on the line because they were not read in time."""
         return self._library.board_overruns(self._board)
 
     @property
@@ -119,38 +119,38 @@ class Board:
         return self._library.board_eeprom_writes(self._board)
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
+        """Run the board for some seconds."""
         self.run_cycles(round(seconds * CPU_HZ))
 
     def run_cycles(self, cycles: int) -> None:
-        """Let that many cycles pass."""
+        """Run the board for some cycles."""
         if not self._library.board_run(self._board, self.cycle + cycles):
             raise RuntimeError(f"the processor crashed at cycle {self.cycle}")
         self._clock.cycle = self.cycle
 
     def send(self, data: bytes) -> int:
-        """Put bytes on the line to the board; how many of them there was room for."""
+        """Send bytes to the board; return the number that fitted."""
         return self._library.board_send(self._board, data, len(data))
 
     def receive(self) -> bytes:
-        """What the board has sent since."""
+        """Return the bytes that the board has sent since the last call."""
         count = self._library.board_receive(self._board, self._buffer, BUFFER_BYTES)
         return self._buffer.raw[:count]
 
     def press_reset(self) -> None:
-        """As DTR does when the port is opened; there is no bootloader."""
+        """Reset the board, as DTR does when the port is opened; there is no bootloader."""
         self._library.board_reset(self._board)
 
     def fault(self, fault: Fault) -> None:
-        """What is the matter with the chip from now on."""
+        """Give the chip a fault from now on."""
         self._library.board_fault(self._board, fault)
 
     def poke(self, address: int, value: int) -> None:
-        """A register of the processor, as a fault of it may set it."""
+        """Write a register of the processor, as a fault may do."""
         self._library.board_poke(self._board, address, value)
 
     def cut_power(self, torn: int = 0xFF) -> None:
-        """Now; a byte that is just being written to the EEPROM is left as `torn`."""
+        """Switch the board off; a byte that is being written to the EEPROM becomes `torn`."""
         if self._board:
             self._library.board_close(self._board, torn)
             self._board = None

@@ -1,4 +1,4 @@
-"""The line to an emulated board in the board's own time: a Port that lets the board run while its host waits."""
+"""Line to an emulated board in the board's own time: the board runs while its host waits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ STEP_S = 0.000_25
 
 
 class Runs(Protocol):
-    """What it needs of a board."""
+    """Interface to a board."""
 
     now_s: float
 
@@ -21,7 +21,7 @@ class Runs(Protocol):
 
 
 class BoardPort:
-    """A Port whose clock is the board's: nothing depends on how fast this machine is."""
+    """Port with the board's clock, so that the speed of this machine has no effect."""
 
     name = "the emulated board"
     bauds = (500_000,)
@@ -30,11 +30,11 @@ class BoardPort:
         self._board = board
 
     def now_ns(self) -> int:
-        """The board's clock."""
+        """Return the board's time."""
         return round(self._board.now_s * 1e9)
 
     def read(self, until_ns: int) -> Chunk | None:
-        """Let the board run until it says something, or its clock shows `until_ns`."""
+        """Run the board until it sends bytes, or its clock shows `until_ns`."""
         while not (data := self._board.receive()):
             if self.now_ns() >= until_ns:
                 return None
@@ -46,11 +46,11 @@ class BoardPort:
         self._board.send(data)
 
     def set_baud(self, baud: int) -> None:
-        """There is one rate."""
+        """Do nothing: there is one rate."""
 
     def reopen(self) -> None:
-        """Which resets the board."""
+        """Reset the board."""
         self._board.press_reset()
 
     def close(self) -> None:
-        """The board runs on."""
+        """Do nothing: the board keeps running."""

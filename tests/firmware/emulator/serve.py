@@ -1,9 +1,9 @@
-"""The emulated Uno on a pseudo terminal, for whoever talks to a serial port: prints that one's name, and runs.
+"""Emulated Uno on a pseudo terminal: a program that prints the terminal's name and runs the board.
 
     python tests/firmware/emulator/serve.py mpucal/firmware/build/mpucal_bridge.elf eeprom.bin --chip sim:seed=1
 
-The board is switched off when stdin ends. Lines on stdin are what `mpucal session --json-events` says, for the hand
-that holds the simulated chip.
+The board is switched off when stdin ends. Lines on stdin are the output of `mpucal session --json-events`, for the
+simulated hand that holds the chip.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CHUNK_BYTES = 4096
 
 
 class Terminal:
-    """The board's end of a pseudo terminal; never waits."""
+    """Board's end of a pseudo terminal, which never blocks."""
 
     def __init__(self) -> None:
         self._end, others = os.openpty()
@@ -43,18 +43,18 @@ class Terminal:
 
     @property
     def is_open(self) -> bool:
-        """Whether somebody holds the other end."""
+        """True if a program has opened the other end."""
         return not any(events & select.POLLHUP for _, events in self._poll.poll(0))
 
     def read(self) -> bytes:
-        """What was written to the other end."""
+        """Return the bytes written to the other end."""
         try:
             return os.read(self._end, CHUNK_BYTES)
         except OSError:
             return b""
 
     def write(self, data: bytes) -> bytes:
-        """Pass `data` on, and return what there was no room for."""
+        """Write `data`, and return the part that did not fit."""
         try:
             return data[os.write(self._end, data) :] if data else b""
         except BlockingIOError:
@@ -62,11 +62,11 @@ class Terminal:
 
 
 class Served:
-    """A board and the terminal that is its USB port: opening it resets the board, as an Arduino's does.
+    """Board with a terminal as its USB port: opening it resets the board, as on an Arduino.
 
     Parameters
     ----------
-    bootloader_s : for how long a bootloader then takes every byte for itself.
+    bootloader_s : time in which a bootloader takes all bytes after a reset.
     """
 
     def __init__(self, board: Board, terminal: Terminal, bootloader_s: float) -> None:
@@ -76,7 +76,7 @@ class Served:
         self._unsent = b""
 
     def step(self) -> None:
-        """Let a little time pass; none where the computer does not take what was sent."""
+        """Run the board for a step, but not while the computer does not read its bytes."""
         is_open = self._terminal.is_open
         if is_open and not self._was_open:
             self._booted_s = self._board.now_s + self._bootloader_s
@@ -94,7 +94,7 @@ class Served:
 
 
 def listener(tell: Callable[[Prompt], None]) -> Callable[[], bool]:
-    """Passes on the prompts on stdin when called; False once stdin has ended."""
+    """Return a function that passes on the prompts from stdin; it returns False once stdin has ended."""
     os.set_blocking(sys.stdin.fileno(), False)
     rest = b""
 

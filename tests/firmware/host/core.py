@@ -1,4 +1,4 @@
-"""The firmware's core compiled for this machine, and a processor for it to run on. Knows no test."""
+"""Firmware's core compiled for this machine, with a simulated processor."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Stored(ctypes.Structure):
 
 
 def compile_core(folder: Path) -> None:
-    """Compile the core into `folder`, under the sanitizers where the environment says so."""
+    """Compile the core into `folder`, with the sanitizers if the environment asks for them."""
     flags = SANITIZERS if SANITIZE in os.environ else ["-O2"]
     sources = [*sorted(SOURCES.glob("*.c")), Path(__file__).with_name("host.c")]
     command = ["gcc", "-std=c99", *WARNINGS, *flags, f"-I{SOURCES}", "-fPIC", "-shared", "-o", str(folder / CORE)]
@@ -61,7 +61,7 @@ def compile_core(folder: Path) -> None:
 
 
 def load_core(folder: Path) -> ctypes.CDLL:
-    """What was compiled into `folder`."""
+    """Load the core that was compiled into `folder`."""
     core = ctypes.CDLL(str(folder / CORE))
     core.mpucal_slots_stored.restype = Stored
     core.mpucal_slots_open.restype = U16
@@ -73,7 +73,7 @@ def load_core(folder: Path) -> ctypes.CDLL:
 
 
 class Eeprom:
-    """A memory of 1 KiB whose power fails at the write number `cut_at`, which leaves `torn` in the byte."""
+    """Memory of 1 KiB whose power fails at write number `cut_at`, which leaves `torn` in the byte."""
 
     def __init__(self, content: bytes = b"\xff" * 1024, cut_at: int | None = None, torn: int = 0) -> None:
         self.content = bytearray(content)
@@ -87,7 +87,7 @@ class Eeprom:
         return self.content[address]
 
     def _write(self, address: int, value: int) -> None:
-        # C cannot be left by an exception: without power nothing is written any more
+        # An exception cannot pass through C: without power the memory ignores writes.
         if self.is_off or address in self.stuck:
             return
         if self.writes == self._cut_at:
@@ -98,7 +98,7 @@ class Eeprom:
 
 
 class HostBridge:
-    """The bridge's core on this machine.
+    """Bridge's core on this machine.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class HostBridge:
 
     Attributes
     ----------
-    now_us : its clock. sent : bytes that it sent since they were taken.
+    now_us : its clock. sent : bytes that it has sent and that were not taken yet.
     """
 
     def __init__(
@@ -133,13 +133,13 @@ class HostBridge:
         core.mpucal_bridge_begin(self._bridge, ctypes.byref(self._port))
 
     def receive(self, data: bytes) -> bytes:
-        """What it sends when `data` come in."""
+        """Pass `data` to the bridge, and return the bytes that it sends."""
         for byte in data:
             self._core.mpucal_bridge_receive(self._bridge, byte)
         return self._take()
 
     def look(self) -> bytes:
-        """What it sends when nothing comes in."""
+        """Let the bridge look at the FIFO, and return the bytes that it sends."""
         self._core.mpucal_bridge_look(self._bridge)
         return self._take()
 
