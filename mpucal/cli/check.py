@@ -31,15 +31,14 @@ from ..sinks.choose import choose_sinks
 from ..sinks.record import file_recorder
 from ..sinks.table import SINKS
 from ..sources.opened_source import OpenedSource
-from ..sources.opening import one_of, open_source
-from ..sources.table import kinds_for, matching_kinds, source_title
+from ..sources.opening import open_source
+from ..sources.table import source_title
 from ..terminal.console import Console, console
-from ..terminal.flat import BOARD, VEHICLE
 from .arguments import PATH, calibration_argument, json_option, output_option, yes_option
 from .destination import write_back
 from .loading import at_gravity_of, force_option, load_calibration, load_trusted
-from .options import check_gyroscope, check_source, given_options, source_options
-from .page import page_options, with_page
+from .options import check_gyroscope, check_input, check_source, given_options, source_options
+from .page import choose_board, page_options, with_page
 from .recording_options import given_hints, hint_options, say_interpretation
 from .running import open_runner
 
@@ -81,10 +80,7 @@ def command(
     good; 5: drifted, remounted or another sensor; 4: it cannot be told, and why; 6: with -o, CALIBRATION was damaged or
     changed after it was saved.
     """
-    kinds = matching_kinds(options)
-    if (file is None) == (not kinds):
-        what = "a file and a source were given together" if kinds else "neither a recording nor a source was given"
-        raise UsageError(what, f"give a recording, or {one_of(kinds_for('check'))}")
+    kinds = check_input(file, options, "check")
     if page is not None and file is not None:
         raise UsageError("--page was given with a recording", "leave it out: a recording needs no guidance")
     if sinks and (folder is None or file is not None):
@@ -104,8 +100,7 @@ def command(
     options = at_gravity_of(old, options)
     source = open_source(options, given_options())
     check_gyroscope(source.plan.config)
-    board = board or (VEHICLE if options.get("mavlink") else BOARD)
-    title = source_title(options)
+    board, title = choose_board(board, source), source_title(options)
     terminal = console(quiet=yes, title=title, board=board)
     attended = not yes and sys.stdin.isatty() and sys.stderr.isatty()
     with (

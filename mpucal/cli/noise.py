@@ -16,7 +16,7 @@ import click
 from ..allan import NoiseMeter
 from ..data import Samples, Sensor
 from ..disk.output_folder import OutputFolder
-from ..errors import EndOfCapture, UsageError
+from ..errors import EndOfCapture
 from ..files import open_rows
 from ..files.rows import drop_incomplete
 from ..report.noise import render, summary
@@ -25,10 +25,9 @@ from ..result.noise import Noise
 from ..session.lay_flat import put_down
 from ..session.ports import Source
 from ..session.results import save
-from ..sources.opening import one_of, open_source
-from ..sources.table import kinds_for, matching_kinds
+from ..sources.opening import open_source
 from .arguments import PATH, json_option, output_option
-from .options import ABOVE_ZERO, check_gyroscope, check_source, given_options, source_options
+from .options import ABOVE_ZERO, check_gyroscope, check_input, check_source, given_options, source_options
 from .person import say
 from .recording_options import given_hints, hint_options, say_interpretation
 
@@ -56,10 +55,7 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
     with the data sheet. Ctrl-C ends a measurement and keeps its result. `mpucal export --noise` and `mpucal calibrate
     --noise` take noise.json.
     """
-    kinds = matching_kinds(options)
-    if (file is None) == (not kinds):
-        what = "a file and a source were given together" if kinds else "neither a recording nor a source was given"
-        raise UsageError(what, f"give a recording, or {one_of(kinds_for('noise'))}")
+    check_input(file, options, "noise")
     if file is not None:
         noise = _measure_file(file, options)
     else:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -17,7 +18,7 @@ from ..errors import UsageError
 from ..session.aims import AIMS, NORMAL
 from ..sources import opening
 from ..sources.kind import Option, SourceKind
-from ..sources.table import SOURCES, kinds_for, unique
+from ..sources.table import SOURCES, kinds_for, matching_kinds, unique
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -188,6 +189,20 @@ def given_options() -> dict[str, str]:
         if isinstance(option, click.Option)
         and context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
     }
+
+
+def check_input(file: Path | None, options: Mapping[str, Any], name: str) -> list[SourceKind]:
+    """Return the kinds of sources that are given; UsageError unless it is either a recording or sources.
+
+    Parameters
+    ----------
+    name : of the command.
+    """
+    kinds = matching_kinds(options)
+    if (file is None) == (not kinds):
+        what = "a file and a source were given together" if kinds else "neither a recording nor a source was given"
+        raise UsageError(what, f"give a recording, or {opening.one_of(kinds_for(name))}")
+    return kinds
 
 
 def check_source(context: click.Context) -> SourceKind:

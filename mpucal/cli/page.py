@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..page.address import LOOPBACK, Address, parse_address
+from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
-from ..terminal.flat import BOARD, BOARDS
+from ..terminal.flat import BOARD, BOARDS, VEHICLE
 from .options import Parsed, decorated
 
 if TYPE_CHECKING:
@@ -35,6 +36,11 @@ def page_options(command: F) -> F:
         ),
         click.option("--board", type=click.Choice(BOARDS), help=f"Board to draw; default: {BOARD}."),
     )
+
+
+def choose_board(board: str | None, source: OpenedSource) -> str:
+    """Return the board to draw: the given one, or the default of the source."""
+    return board or (VEHICLE if source.capture_name == CAPTURE_OF_VEHICLE.name else BOARD)
 
 
 def with_page(

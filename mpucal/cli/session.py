@@ -15,7 +15,7 @@ from ..errors import MpucalError, RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
-from ..result.session_files import CAPTURE_OF_VEHICLE, DOCUMENT, LOG
+from ..result.session_files import DOCUMENT, LOG
 from ..session.folder import SessionFolder, check_unfinished
 from ..sinks.choose import announce_sinks, choose_sinks
 from ..sinks.kind import SinkKind
@@ -26,7 +26,6 @@ from ..sources.opening import check_resume_options, open_source
 from ..sources.resumed import open_resumed
 from ..sources.table import matching_kinds, source_title
 from ..terminal.console import Console, console
-from ..terminal.flat import BOARD, VEHICLE
 from ..terminal.hangup import logging_after_hangup
 from .arguments import PATH, json_option, output_option, yes_option
 from .destination import session_sink_options, write_back
@@ -39,7 +38,7 @@ from .options import (
     given_options,
     source_options,
 )
-from .page import page_options, with_page
+from .page import choose_board, page_options, with_page
 from .running import open_runner
 from .summary import files_written, page_result, summary
 
@@ -91,7 +90,7 @@ def command(
     name = name or options.get(NAME)
     check_gyroscope(source.plan.config)
     title = f"{name}, {source_title(options)}" if name else source_title(options)
-    board = board or (VEHICLE if source.capture_name == CAPTURE_OF_VEHICLE.name else BOARD)
+    board = choose_board(board, source)
     terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title, board=board)
     watched = attended and sys.stderr.isatty() and not json_events
     on_page = with_page(terminal, page, source, options, title, board, page_keys, json_events, watched)

@@ -28,13 +28,12 @@ from ..session.events import Caution
 from ..session.ports import Source
 from ..sources.opening import open_source
 from ..sources.table import source_title
-from ..terminal.flat import BOARD, VEHICLE
 from ..terminal.keys import Keys
 from ..terminal.lines import JsonLines
 from .arguments import PATH, json_option, output_option
 from .loading import at_gravity_of, load_calibration
 from .options import ABOVE_ZERO, check_gyroscope, check_source, source_options
-from .page import page_options
+from .page import choose_board, page_options
 from .person import say
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
@@ -73,7 +72,7 @@ def command(
     if page is not None:
         check_gyroscope(source.plan.config)
     text = CsvText(lambda text: sys.stdout.write(text.decode()))
-    on_page = live_page(page, source_title(options), board or (VEHICLE if options.get("mavlink") else BOARD))
+    on_page = live_page(page, source_title(options), choose_board(board, source))
     messages = _Messages(json_events)
     capture = source.measuring(file or Path(os.devnull), messages.say, now().isoformat())
     with capture as measuring, on_page as screen, suppress(KeyboardInterrupt):

@@ -1,11 +1,13 @@
 """The words of the command line that name vehicles, and what contradicts them."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
 from mpucal.cli import commands
+from mpucal.cli.page import choose_board
 from mpucal.errors import UsageError
 
 
@@ -59,3 +61,10 @@ def test_a_vehicle_takes_rates_that_a_chip_does_not(tmp_path):
     assert float(re.search(r"at ([\d.]+) Hz", run("show", path).output).group(1)) > 299
     result = run("record", "--mavlink", "sim:imus=1", "--rate", 5000, "--seconds", 4, "-o", tmp_path / "x.tlog")
     assert isinstance(result.exception, UsageError)
+
+
+@pytest.mark.parametrize(("capture", "drawn"), [("capture.tlog", "vehicle"), ("capture.mcap", "gy-521")])
+def test_the_board_that_is_drawn_follows_from_the_source(capture, drawn):
+    source = SimpleNamespace(capture_name=capture)
+    assert choose_board(None, source) == drawn
+    assert choose_board("plain", source) == "plain"
