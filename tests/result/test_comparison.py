@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import mpucal
 from mpucal.data import Sensor
 from mpucal.result.calibration import Calibration
-from mpucal.result.comparison import CONFIDENCE, compare
+from mpucal.result.comparison import CONFIDENCE, compare, is_better, worst_magnitude_error
 from tools.lab.halves import halves
 
 ROOT = Path(__file__).parents[2]
@@ -132,3 +134,24 @@ def test_two_real_sensors_differ():
         pytest.skip("the real recordings are not beside the project")
     a, b = (mpucal.calibrate(mpucal.load(path), gravity=9.81) for path in paths)
     assert compare(a, b).same is False
+
+
+@settings(max_examples=100)
+@given(scale=st.floats(-0.05, 0.05), bias=st.floats(-0.5, 0.5), axis=st.integers(0, 2))
+def test_the_worst_magnitude_error_is_that_over_attitudes(scale, bias, axis):
+    D, b_a = np.eye(3), np.zeros(3)
+    D[axis, axis] += scale
+    b_a[axis] = bias
+    true = replace(TRUTH, D=D, b_a=b_a, fit={"gravity": 9.8})
+    points = np.vstack([np.eye(3), -np.eye(3), np.random.default_rng(0).normal(size=(4000, 3))])
+    f = 9.8 * points / np.linalg.norm(points, axis=1, keepdims=True)
+    worst = np.abs(np.linalg.norm(f @ D.T + b_a, axis=1) - 9.8).max()
+    assert worst <= worst_magnitude_error(true, np.eye(3), np.zeros(3)) + 1e-9
+    # along the axis of both errors the bound is met
+    assert worst == pytest.approx(9.8 * abs(scale) + abs(bias), abs=0.02)
+
+
+def test_an_equal_one_is_not_better_and_neither_is_chance():
+    assert is_better(0.01, 0.05, 0.01)
+    assert not is_better(0.05, 0.05, 0.0)
+    assert not is_better(0.0, 0.014, 0.01)

@@ -179,6 +179,10 @@ def test_another_file_is_not_put_back(tmp_path):
         AutopilotSink(link).put_back(tmp_path / "x.param")
 
 
+def unchanged(calibration):
+    return calibration
+
+
 def refused(calibration):
     return replace(calibration, quality=MappingProxyType(REFUSED))
 
@@ -199,44 +203,29 @@ def of_another_sensor(calibration):
     return calibration
 
 
+def of_px4(calibration):
+    return calibration_of(vehicle_of("px4", ",imus=1")[0])
+
+
 @pytest.mark.parametrize(
-    ("change", "why"),
+    ("firmware", "words", "change", "why"),
     [
-        (refused, "refused"),
-        (of_a_chip, "of no vehicle"),
-        (beyond_limits, "beyond"),
-        (of_another_sensor, "of sensor"),
+        *((firmware, ",imus=1", refused, "refused") for firmware in FIRMWARES),
+        *((firmware, ",imus=1", of_a_chip, "of no vehicle") for firmware in FIRMWARES),
+        *((firmware, ",imus=1", beyond_limits, "beyond") for firmware in FIRMWARES),
+        *((firmware, ",imus=1", of_another_sensor, "of sensor") for firmware in FIRMWARES),
+        ("ardupilot", ",imus=1", of_px4, "PX4"),
+        ("ardupilot", ",fault=arm@3", unchanged, "armed"),
+        ("ardupilot", ",imus=1,hand=restless", unchanged, "still"),
+        ("ardupilot", ",fault=no_storage", unchanged, "card"),
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )
-@pytest.mark.parametrize("firmware", FIRMWARES)
 @pytest.mark.usefixtures("brief")
-def test_nothing_is_written_that_does_not_belong_there(firmware, change, why):
-    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+def test_nothing_is_written_that_does_not_belong_there(firmware, words, change, why):
+    vehicle, transport, link = vehicle_of(firmware, words)
     with pytest.raises(WriteBackError, match=rf"nothing was written.*{why}"):
-        AutopilotSink(link).write(change(calibration_of(vehicle)))
-    assert transport.sets == 0
-
-
-def test_a_calibration_of_the_other_firmware_is_refused():
-    px4, *_ = vehicle_of("px4", ",imus=1")
-    _, transport, link = vehicle_of("ardupilot", ",imus=1")
-    with pytest.raises(WriteBackError, match=r"nothing was written.*PX4"):
-        AutopilotSink(link).write(calibration_of(px4))
-    assert transport.sets == 0
-
-
-def test_an_armed_vehicle_is_left_alone():
-    vehicle, transport, link = vehicle_of("ardupilot", ",fault=arm@3")
-    with pytest.raises(WriteBackError, match=r"nothing was written.*armed"):
-        AutopilotSink(link).write(calibration_of(vehicle))
-    assert transport.sets == 0
-
-
-def test_a_vehicle_in_a_restless_hand_is_left_alone():
-    vehicle, transport, link = vehicle_of("ardupilot", ",imus=1,hand=restless")
-    with pytest.raises(WriteBackError, match=r"nothing was written.*still"):
-        AutopilotSink(link).write(calibration_of(vehicle))
+        AutopilotSink(link, store="storage" in words).write(change(calibration_of(vehicle)))
     assert transport.sets == 0
 
 
@@ -290,19 +279,25 @@ def test_px4_is_not_asked_to_hold_what_it_ignores_after_a_start():
     )
 
 
+def strike(transport, number, fault):
+    """Call `fault` with the nth PARAM_SET, before the vehicle has it."""
+
+    def befall(count, message):
+        if count == number:
+            fault(message)
+        return True
+
+    transport.befall = befall
+
+
 def lose(transport, number):
-    """The nth PARAM_SET and five more are lost."""
+    """Lose the nth PARAM_SET and five more."""
     transport.befall = lambda count, message: not number <= count < number + 6
 
 
 def arm(transport, number):
     """Arm the vehicle at the nth PARAM_SET."""
-
-    def befall(count, message):
-        transport.vehicle.firmware.armed |= count >= number
-        return True
-
-    transport.befall = befall
+    strike(transport, number, lambda message: setattr(transport.vehicle.firmware, "armed", True))
 
 
 def refuse(transport, number):
@@ -319,27 +314,19 @@ def refuse(transport, number):
 
 
 def spoil(transport, number):
-    """Somebody else writes another value just before the nth PARAM_SET."""
+    """Write another value from elsewhere just before the nth PARAM_SET."""
 
-    def befall(count, message):
-        if count == number:
-            store = transport.vehicle.firmware.store
-            other = next(name for name in stored(transport.vehicle) if name[:8] == message.param_id[:8])
-            store[other] = float(store[other]) + 0.3
-        return True
+    def change_other(message):
+        store = transport.vehicle.firmware.store
+        other = next(name for name in stored(transport.vehicle) if name[:8] == message.param_id[:8])
+        store[other] = float(store[other]) + 0.3
 
-    transport.befall = befall
+    strike(transport, number, change_other)
 
 
 def reboot(transport, number):
     """Reboot the vehicle at the nth PARAM_SET."""
-
-    def befall(count, message):
-        if count == number:
-            transport.vehicle.reboot()
-        return True
-
-    transport.befall = befall
+    strike(transport, number, lambda message: transport.vehicle.reboot())
 
 
 @pytest.mark.usefixtures("brief")
@@ -371,13 +358,7 @@ def test_whatever_happens_at_whichever_step_it_holds_the_old_or_the_new(firmware
 def test_a_vehicle_that_is_gone_cannot_be_put_back_and_that_is_said(firmware):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     calibration = calibration_of(vehicle)
-
-    def befall(count, message):
-        if count == 4:
-            vehicle.fall_silent()
-        return True
-
-    transport.befall = befall
+    strike(transport, 4, lambda message: vehicle.fall_silent())
     with pytest.raises(WriteBackError, match="could not be put back"):
         AutopilotSink(link).write(calibration)
 
@@ -394,14 +375,6 @@ def test_the_whole_d_is_kept_in_the_vehicles_storage(firmware, words):
     for path, expected in zip(paths, (truth, truth["others"][0]), strict=True):
         blob = Blob.decode(vehicle.card.files[path])
         np.testing.assert_allclose(np.array(blob.D).reshape(3, 3), expected["D"], atol=1e-5)
-
-
-@pytest.mark.usefixtures("brief")
-def test_nothing_is_written_where_there_is_no_card():
-    vehicle, transport, link = vehicle_of("ardupilot", ",fault=no_storage")
-    with pytest.raises(WriteBackError, match=r"nothing was written.*card"):
-        AutopilotSink(link, store=True).write(calibration_of(vehicle))
-    assert transport.sets == 0
 
 
 @pytest.mark.usefixtures("brief")
@@ -463,6 +436,10 @@ class Killed(BaseException):
     """End of the program as by kill -9."""
 
 
+def kill(message):
+    raise Killed
+
+
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
 @pytest.mark.parametrize("firmware", FIRMWARES)
 @pytest.mark.usefixtures("brief", "uncollected")
@@ -497,13 +474,7 @@ def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, journal = stored(vehicle), Journal(tmp_path / "note.json")
     calibration = calibration_of(vehicle)
-
-    def befall(count, message):
-        if count == number:
-            raise Killed
-        return True
-
-    transport.befall = befall
+    strike(transport, number, kill)
     with pytest.raises(Killed):
         AutopilotSink(link, journal=journal).write(calibration)
     assert journal.interrupted() is not None
@@ -520,13 +491,7 @@ def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_
 def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_off(tmp_path):
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     journal = Journal(tmp_path / "note.json")
-
-    def befall(count, message):
-        if count == 3:
-            raise Killed
-        return True
-
-    transport.befall = befall
+    strike(transport, 3, kill)
     with pytest.raises(Killed):
         AutopilotSink(link, journal=journal).write(calibration_of(vehicle))
     other, sets, link = vehicle_of("ardupilot", ",imus=1,seed=9,INS_ACCOFFS_X=0.7")

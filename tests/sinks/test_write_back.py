@@ -11,11 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mpucal.cli.person import ask_in_doubt
 from mpucal.errors import BusError, KeepsNothing, OutputError, WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.sinks.kind import Device, SinkKind
+from mpucal.sinks.record import session_recorder
 from mpucal.sinks.sink import Applied
-from mpucal.sinks.write_back import put_back, write_to, write_to_all
+from mpucal.sinks.table import SINKS
+from mpucal.sinks.write_back import put_back, write_objection, write_to, write_to_all
 
 BIAS = np.array([0.3, -0.2, 1.0])
 GOOD = {"verdict": "good", "reasons": []}
@@ -58,7 +61,7 @@ class Registers:
 KIND = SinkKind("made", behind=lambda source: True, where="the made-up sink", holds="all", opener="made_up_sink:opened")
 
 
-def write_all(monkeypatch, sink, calibration, folder, record, asked=(), said=print):
+def write_all(monkeypatch, sink, calibration, folder, record, asked=(), said=print, in_doubt=None):
     """Write to a made-up sink, or what is raised where it is opened."""
 
     @contextmanager
@@ -69,7 +72,7 @@ def write_all(monkeypatch, sink, calibration, folder, record, asked=(), said=pri
 
     monkeypatch.setitem(sys.modules, "made_up_sink", SimpleNamespace(opened=opened))
     device = Device(None, "/dev/made-up", lambda: None, said)
-    return list(write_to_all((KIND,), calibration, device, folder, record, lambda question: None, asked))
+    return list(write_to_all((KIND,), calibration, device, folder, record, lambda question: None, asked, in_doubt))
 
 
 def unsaved(kind, now):
@@ -156,3 +159,59 @@ def test_a_device_that_keeps_nothing_is_a_failure_where_it_was_asked_for(tmp_pat
     else:
         assert write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, said=said.append) == []
         assert "only in files" in said[0]
+
+
+class ComparableRegisters(Registers):
+    """A place that finds what it holds as good, or not."""
+
+    def __init__(self, reason):
+        super().__init__(set())
+        self.reason = reason
+
+    def reason_to_keep(self, calibration):
+        return self.reason
+
+
+@pytest.mark.parametrize(
+    ("verification", "reason", "objection"),
+    [
+        ({"verification": {"agrees": True, "orientations": []}}, None, None),
+        ({"verification": {"agrees": True, "orientations": []}}, "what it holds is as good", "as good"),
+        ({}, None, "not verified"),
+        ({"verification": {"agrees": None, "orientations": []}}, None, "not verified"),
+    ],
+    ids=["verified", "as good", "no verification", "a verification that nobody finished"],
+)
+def test_without_a_person_only_what_is_verified_and_better_is_written(
+    monkeypatch, tmp_path, verification, reason, objection
+):
+    sink, calibration = ComparableRegisters(reason), Calibration(np.eye(3), BIAS, quality={**GOOD, **verification})
+
+    def write():
+        return write_all(
+            monkeypatch,
+            sink,
+            calibration,
+            tmp_path,
+            as_it_is,
+            in_doubt=lambda question: ask_in_doubt(question, yes=True),
+        )
+
+    if objection is None:
+        write()
+    else:
+        assert objection in write_objection(calibration, sink)
+        with pytest.raises(WriteBackError, match=f"nothing was changed: .*{objection}") as raised:
+            write()
+        assert raised.value.exit_code == 6
+    assert bool(sink.held.any()) is (objection is None)
+
+
+def test_what_was_measured_stays_where_another_stream_comes_now(tmp_path):
+    measured = Calibration(np.eye(3), BIAS, quality=GOOD)
+    now = replace(measured, D=2 * np.eye(3), extra={"written": [{"to": "autopilot"}]})
+    held = session_recorder(tmp_path, measured, None, None)(SINKS["autopilot"], now)
+    assert np.array_equal(held.D, measured.D)
+    assert held.extra["written"] == [{"to": "autopilot"}]
+    assert np.array_equal(Calibration.load(tmp_path / "calibration.json").D, measured.D)
+    assert np.array_equal(Calibration.load(tmp_path / "calibration-on-autopilot.json").D, now.D)
