@@ -87,7 +87,7 @@ class Child:
             os.read(hold, 1)
             code = 1
             try:
-                resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
+                limit_cpu(cpu_s)
                 become(folder, said)
                 code = call()
                 sys.stdout.flush()
@@ -106,6 +106,11 @@ class Child:
     def wait(self, wall_s: float = WALL_S) -> Ended:
         """Wait for its end, for so long at most, and return it."""
         return ended(self._pid, self._said, wall_s)
+
+
+def limit_cpu(cpu_s: int = CPU_S) -> None:
+    """Have the kernel end this process as soon as it has used so much processor time [s]: `ended` calls that a hang."""
+    resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
 
 
 def become(folder: Path, said: Path) -> None:

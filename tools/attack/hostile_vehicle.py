@@ -40,7 +40,7 @@ from mpucal.mavlink.tlog import read_tlog
 from mpucal.result.calibration import Calibration
 from tools.lab.campaign_judge import false, partial_files
 from tools.lab.judge import judged
-from tools.processes import CODES, Died, Ended, Tell, become, forked, ready
+from tools.processes import CODES, Died, Ended, Tell, become, forked, limit_cpu, ready
 
 from .hostile_link import ATTACKERS, FORGED, KINDS, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
 
@@ -138,7 +138,7 @@ def outcomes(attacks: Sequence[tuple[Attack, Path | None, Path]], jobs: int) -> 
 
 def alone(attack: Attack, clean: Path | None, place: Path, tell: Tell) -> None:
     """Suffer it, and tell what became of it; a hang is ended by the kernel."""
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+    limit_cpu(CPU_S)
     signal.alarm(WALL_S)
     tell({**suffer(attack, clean, place), "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024})
     # what the session has open need not be closed in order

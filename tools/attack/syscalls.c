@@ -51,7 +51,6 @@ void allocations_arm(size_t size, int n, int since)
     none_at = n, none_since = since, allocated = 0, least = size;
 }
 
-int syscalls_count(void) { return count; }
 int allocations_count(void) { return allocated; }
 
 static const char *path_of(int fd)

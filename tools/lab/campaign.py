@@ -31,7 +31,7 @@ import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.session import results
-from tools.processes import Child, Died, Ended, Task, Tell, become, ended, forked, quick, ready
+from tools.processes import Child, Died, Ended, Task, Tell, become, ended, forked, limit_cpu, quick, ready
 
 from .campaign_judge import FOLDER, Outcome, judged, show_outcomes
 from .campaign_recordings import struck_recordings
@@ -131,6 +131,7 @@ class Prefix:
         pid = os.fork()
         if pid == 0:
             self._child = True
+            limit_cpu()
             if case.k % REPORTS:
                 results.report = lambda _: None
             self._move(place)
