@@ -157,7 +157,7 @@ class Trial:
         yield from (f"{name} is neither old nor new" for name in spoilt(now, self.whole))
         if done.code == 0:
             yield from (f"exit 0 without {name}" for name in self.new.keys() - now.keys())
-        told = noted(now) or "put back what was there" in done.last
+        told = noted(now) or "restore the old state" in done.last
         if told != (done.changed and done.code != 0):
             yield f"exit {done.code}, device {'changed' if done.changed else 'as before'}, told: {told}"
         for name in (name for name in self.new.keys() - self.old.keys() if name.endswith(CAPTURES)):
