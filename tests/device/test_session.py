@@ -1,4 +1,4 @@
-"""The installed command on /dev/i2c-1: a session from start to blob, its write-back, each fault in one sentence."""
+"""Installed command on /dev/i2c-1: a session from start to blob, its write-back, and one sentence for each fault."""
 
 import errno
 import json
@@ -14,7 +14,7 @@ NODE, UPTIME_S = "/dev/i2c-1", 900
 
 @pytest.fixture(scope="module")
 def guided(device_of_module):
-    """One whole session, and the device on which it ran."""
+    """Runs a whole session: (device, result)."""
     mocked = device_of_module("sim:chip=mpu6500,who_am_i=0x68,seed=7")
     return mocked, mocked.session("--rate", "25", "--target", "quick", "--yes", "-o", "board")
 

@@ -1,4 +1,4 @@
-"""The installed command with the real spidev on a character device: mode, speeds and messages as it sees them."""
+"""Installed command with the real spidev on a character device: mode, speeds and messages."""
 
 import json
 
@@ -13,7 +13,7 @@ pytest.importorskip("spidev", reason="spidev is missing: pip install mpucal[spi]
 
 
 def asked_for(mocked, data_hz):
-    """What the kernel was asked for: one mode, and a speed that is higher for samples alone."""
+    """Check the requests to the kernel: one mode, and a higher speed for samples alone."""
     mocked.tell(seen=str(mocked.folder / "seen"))
     seen = json.loads((mocked.folder / "seen").read_text())
     assert {(mode, bits) for mode, bits, *_ in seen} == {(3, 8)}

@@ -8,7 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
 from mpucal.simulated.chip import open_simulated
+from mpucal.sources.bridge.bus import BridgeBus
+from mpucal.sources.bridge.link import Link
 
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "mpucal" / "firmware"
@@ -119,3 +123,32 @@ def switch_on(emulator, avr_build, tmp_path):
     yield power
     for board in boards:
         board.cut_power()
+
+
+@pytest.fixture(scope="session")
+def greeted():
+    """Greets the bridge on a port, and returns the link."""
+
+    def greet(port):
+        link = Link(port)
+        link.greet()
+        return link
+
+    return greet
+
+
+@pytest.fixture(scope="session")
+def started():
+    """Starts a driver on the bridge behind a port; `until(seconds)` polls it by the board's time."""
+
+    class Started(Driver):
+        def __init__(self, board, port, rate_hz):
+            super().__init__(BridgeBus(port), Config(rate_hz=rate_hz))
+            self.board, self.known = board, self.start()
+
+        def until(self, seconds):
+            while self.board.now_s < seconds:
+                self.poll()
+            return self.recording()
+
+    return Started

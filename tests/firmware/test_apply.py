@@ -1,4 +1,4 @@
-"""mpucal_apply.h against the Python codec and NumPy: golden vectors, random blobs, float32 rounding."""
+"""Header mpucal_apply.h against the Python codec and NumPy: golden vectors, random blobs, float32 rounding."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def test_reads_random_blobs_as_python_does(core):
 
 
 def check_computed(usable, fields, counts, a):
-    """How many were applied, each to float32 rounding."""
+    """Check the applied ones to float32 rounding, and return their number."""
     D, b, applied, range_g = np.split(fields.astype(float), [9, 12, 15], axis=1)
     well = usable & (np.abs(D).max(axis=1) < 1e3) & (np.abs(np.linalg.det(D.reshape(-1, 3, 3))) > 1e-3)
     D, b, applied, range_g = D[well].reshape(-1, 3, 3), b[well], applied[well], range_g[well]

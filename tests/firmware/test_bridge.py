@@ -1,4 +1,4 @@
-"""The core's replies to every request, as firmware_protocol.md has them, and its header's tables."""
+"""Core's replies to every request, and the tables of its headers, against firmware_protocol.md."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CRC = int.from_bytes(BLOB[-4:], "little")
 
 @dataclass
 class Chip:
-    """Registers at one address; every read counts up what it gives."""
+    """Registers at one address; reads return increasing bytes."""
 
     address: int = 0x68
     failure: int = 0
@@ -46,7 +46,7 @@ class Chip:
 
 
 class Asking:
-    """A bridge, asked as a host asks it."""
+    """Bridge with the requests of a host."""
 
     def __init__(self, host, core, chip, eeprom):
         self.chip, self.eeprom = chip, eeprom

@@ -1,16 +1,14 @@
-"""A chip that answers nothing, or holds the bus, and a processor that hangs: what firmware and sketch do then."""
+"""Faults of a chip that does not answer or holds the bus, and of a processor that hangs, on firmware and sketch."""
 
 from __future__ import annotations
 
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.chip.config import Config
-from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.bus import BridgeBus
-from mpucal.sources.bridge.link import Link, LinkLost
+from mpucal.sources.bridge.link import LinkLost
 from mpucal.sources.bridge.messages import Status
 
 I2C_MS, REPLY_MS = 25, 100
@@ -25,20 +23,13 @@ def fault(emulator):
 
 @pytest.fixture(params=["firmware", "sketch"])
 def bridge(request, switch_on):
-    """A board with the firmware or the sketch; gives it and a port to it."""
+    """Makes a board with the firmware or the sketch: (board, port)."""
     if request.param == "firmware":
         return switch_on()
     return switch_on(elf=request.getfixturevalue("sketches") / "mpucal_bridge_sketch.elf")
 
 
-def test_says_that_no_chip_answers(bridge, fault):
-    board, port = bridge
-    board.fault(fault.NO_ADDRESS)
-    with pytest.raises(NoAnswer):
-        BridgeBus(port)
-
-
-def test_a_chip_unplugged_under_way_is_told(bridge, fault):
+def test_a_chip_that_is_disconnected_is_reported(bridge, fault):
     board, port = bridge
     bus = BridgeBus(port)
     board.fault(fault.NO_ADDRESS)
@@ -46,12 +37,14 @@ def test_a_chip_unplugged_under_way_is_told(bridge, fault):
         bus.read(reg.WHO_AM_I, 1)
     board.fault(fault.SOUND)
     assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+    board.fault(fault.NO_ADDRESS)
+    with pytest.raises(NoAnswer):
+        BridgeBus(port)
 
 
-def test_data_that_are_not_acknowledged_are_no_missing_chip(bridge, fault):
+def test_data_without_acknowledge_do_not_mean_a_missing_chip(bridge, fault, greeted):
     board, port = bridge
-    link = Link(port, lambda *_: None)
-    link.greet()
+    link = greeted(port)
     board.fault(fault.NO_DATA)
     answers = link.ask(wire.Write(reg.SMPLRT_DIV, b"\x07"), wire.Read(reg.WHO_AM_I, 1))
     assert [answer.reply.status for (answer,) in answers] == [Status.BUS_FAILED] * 2
@@ -59,10 +52,9 @@ def test_data_that_are_not_acknowledged_are_no_missing_chip(bridge, fault):
     assert link.ask(wire.Read(reg.WHO_AM_I, 1))[0][0].reply.data == b"\x68"
 
 
-def test_a_bus_that_a_chip_holds_is_given_up_in_time_and_freed(bridge, fault):
+def test_a_bus_that_a_chip_holds_is_freed_in_time(bridge, fault, greeted):
     board, port = bridge
-    link = Link(port, lambda *_: None)
-    link.greet()
+    link = greeted(port)
     board.fault(fault.HOLDS_BUS)
     began_s = board.now_s
     answers = link.ask(wire.Read(reg.WHO_AM_I, 1))
@@ -72,26 +64,21 @@ def test_a_bus_that_a_chip_holds_is_given_up_in_time_and_freed(bridge, fault):
     assert link.ask(wire.Read(reg.WHO_AM_I, 1))[0][0].reply.data == b"\x68"
 
 
-def test_a_session_goes_on_after_the_bus_was_held(bridge, fault):
+def test_a_session_continues_after_the_bus_was_held(bridge, fault, started):
     board, port = bridge
-    driver = Driver(BridgeBus(port), Config(rate_hz=200))
-    driver.start()
-    while board.now_s < 1:
-        driver.poll()
+    driver = started(board, port, 200)
+    driver.until(1)
     board.fault(fault.HOLDS_BUS)
-    while board.now_s < 2.5:
-        driver.poll()
-    recording = driver.recording()
+    recording = driver.until(2.5)
     assert recording.gap.any()
     assert recording.t[-1] - recording.t[0] > 1.8
     assert len(recording) > 300
 
 
-def test_a_program_that_hangs_is_started_anew(bridge, fault):
-    """Its clock has stopped, and so has what would give a transfer up."""
+def test_a_program_that_hangs_is_restarted(bridge, fault, greeted):
+    """The clock has stopped, and with it the time-out of a transfer."""
     board, port = bridge
-    link = Link(port, lambda *_: None)
-    link.greet()
+    link = greeted(port)
     board.poke(TCCR0B, 0)
     board.fault(fault.HOLDS_BUS)
     with pytest.raises(BusError):

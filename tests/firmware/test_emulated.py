@@ -1,4 +1,4 @@
-"""The real firmware on an emulated ATmega328P, in that one's own time: registers, streams, blobs, power."""
+"""Real firmware on an emulated ATmega328P, in its own time: registers, streams, blobs, power."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.chip.config import Config
-from mpucal.chip.driver import Driver
 from mpucal.errors import BusError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
@@ -22,7 +20,6 @@ from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge.bus import BridgeBus
-from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.store import BlobStore
 
 ROOT = Path(__file__).parents[2]
@@ -35,7 +32,7 @@ RATE_HZ = 1000
 
 
 class Numbers:
-    """A feed whose samples are numbered: accelerometer x and y hold the number, at a constant temperature."""
+    """Feed of numbered samples: accelerometer x and y hold the number, at a constant temperature."""
 
     def __init__(self):
         self._next = 0
@@ -52,10 +49,9 @@ def _numbering(clock):
     return SimulatedBus(Chip(MODELS["mpu6050"], Numbers(), 0.0, FactoryTrim()), clock)
 
 
-def open_store(port):
-    link = Link(port, lambda *_: None)
-    link.greet()
-    return BlobStore(link)
+@pytest.fixture(scope="module")
+def open_store(greeted):
+    return lambda port: BlobStore(greeted(port))
 
 
 def test_flash_and_ram_leave_room(avr_build):
@@ -87,13 +83,11 @@ def test_the_readme_gives_the_cycles_that_are_counted(make):
     assert 0.4 < float(re.search(r"at most (\S+) counts off", said)[1]) < 0.6
 
 
-def test_the_sketch_is_the_same_bridge(switch_on, sketches):
+def test_the_sketch_is_the_same_bridge(switch_on, sketches, open_store, started):
     board, port = switch_on(elf=sketches / "mpucal_bridge_sketch.elf")
-    driver = Driver(BridgeBus(port), Config(rate_hz=200))
-    assert driver.start().who_am_i == 0x68
-    while board.now_s < 2:
-        driver.poll()
-    recording = driver.recording()
+    driver = started(board, port, 200)
+    assert driver.known.who_am_i == 0x68
+    recording = driver.until(2)
     assert (recording.gap.sum(), len(recording) > 150) == (0, True)
     driver.stop()
     store = open_store(port)
@@ -102,7 +96,7 @@ def test_the_sketch_is_the_same_bridge(switch_on, sketches):
 
 
 def test_the_sketch_writes_as_many_bytes_as_the_protocol_allows(switch_on, sketches):
-    """Wire's buffer holds 32, and the register takes one of them."""
+    """Wire's buffer holds 32 bytes, one of which is the register."""
     _, port = switch_on(elf=sketches / "mpucal_bridge_sketch.elf")
     bus = BridgeBus(port)
     for count in (31, 32):
@@ -112,7 +106,7 @@ def test_the_sketch_writes_as_many_bytes_as_the_protocol_allows(switch_on, sketc
 
 
 class Still:
-    """A feed that does not change: accelerometer, temperature, gyroscope."""
+    """Feed of one constant sample: accelerometer, temperature, gyroscope."""
 
     WORDS = (1000, -2000, 8000, -700, 300, -200, 30000)
 
@@ -124,7 +118,7 @@ def _still(clock):
     return SimulatedBus(Chip(MODELS["mpu6050"], Still(), 0.0, FactoryTrim()), clock)
 
 
-def test_the_corrected_sketch_prints_what_is_stored(switch_on, sketches):
+def test_the_corrected_sketch_prints_what_is_stored(switch_on, sketches, open_store):
     sloped = (ROOT / "fixtures" / "vectors" / "blob_sloped.bin").read_bytes()
     _, port = switch_on()
     open_store(port).write(sloped)
@@ -148,24 +142,16 @@ def test_reads_and_writes_registers_in_the_bridges_time(switch_on):
     assert board.overruns == 0
 
 
-def test_half_a_kilohertz_fits_115200_baud(switch_on):
+def test_half_a_kilohertz_fits_115200_baud(switch_on, started):
     board, port = switch_on(_numbering)
-    driver = Driver(BridgeBus(port), Config(rate_hz=500))
-    driver.start()
-    while board.now_s < 3:
-        driver.poll()
-    recording = driver.recording()
+    recording = started(board, port, 500).until(3)
     assert (recording.gap.sum(), board.overruns, len(recording) > 1000) == (0, 0, True)
 
 
 @pytest.mark.parametrize("seconds", [4, pytest.param(60, marks=pytest.mark.slow)])
-def test_1_khz_at_500_kbaud_loses_nothing(switch_on, fast_build, seconds):
+def test_1_khz_at_500_kbaud_loses_nothing(switch_on, fast_build, seconds, started):
     board, port = switch_on(_numbering, fast_build / "mpucal_bridge.elf")
-    driver = Driver(BridgeBus(port), Config(rate_hz=RATE_HZ))
-    driver.start()
-    while board.now_s < seconds + 1:
-        driver.poll()
-    recording = driver.recording()
+    recording = started(board, port, RATE_HZ).until(seconds + 1)
     words = np.rint(recording.acc * 8192 / 9.80665).astype(int)
     numbers = words[:, 0] * 1000 + words[:, 1]
     assert len(numbers) >= seconds * RATE_HZ
@@ -175,7 +161,7 @@ def test_1_khz_at_500_kbaud_loses_nothing(switch_on, fast_build, seconds):
     assert np.diff(recording.t) == pytest.approx(1 / RATE_HZ, rel=1e-3)
 
 
-def test_a_blob_outlives_the_power(switch_on):
+def test_a_blob_outlives_the_power(switch_on, open_store):
     board, port = switch_on()
     open_store(port).write(OLD)
     board.cut_power()
@@ -184,8 +170,12 @@ def test_a_blob_outlives_the_power(switch_on):
     assert (store.read(), store.state().generation) == (OLD, 1)
 
 
+class Gone(Exception):  # noqa: N818 - stands for a plug that was pulled
+    """Failure of the power."""
+
+
 @pytest.mark.parametrize("torn", [0x00, 0xFF, 0xA5], ids=hex)
-def test_power_loss_at_any_cycle_of_a_blob_write_leaves_the_old_blob_or_the_new(torn, switch_on, tmp_path):
+def test_power_loss_at_any_cycle_of_a_blob_write_leaves_the_old_blob_or_the_new(torn, switch_on, open_store, tmp_path):
     eeprom = tmp_path / "eeprom.bin"
     board, port = switch_on()
     open_store(port).write(OLD)
@@ -193,34 +183,28 @@ def test_power_loss_at_any_cycle_of_a_blob_write_leaves_the_old_blob_or_the_new(
     open_store(port).write(NEW)
     cycles = board.cycle - began
     board.cut_power()
+
+    def held_after(cycles):
+        """Cut the power `cycles` after the host began to write NEW; return the blob at the next start."""
+        eeprom.write_bytes(holds_old)
+        board, port = switch_on()
+        store, run_cycles = open_store(port), board.run_cycles
+        end = board.cycle + int(cycles)
+
+        def run_until_power_fails(count):
+            run_cycles(min(count, end - board.cycle))
+            if board.cycle >= end:
+                raise Gone
+
+        board.run_cycles = run_until_power_fails
+        with suppress(Gone, BusError):
+            store.write(NEW)
+        board.cut_power(torn)
+        return open_store(switch_on()[1]).read()
+
     rng = np.random.default_rng(torn)
-    found = [held_after(cut, torn, holds_old, switch_on, eeprom) for cut in rng.integers(0, cycles, 4)]
+    found = [held_after(cut) for cut in rng.integers(0, cycles, 4)]
     assert set(found) <= {OLD, NEW}
     # the last bytes that are written make the difference
-    assert held_after(2 * cycles, torn, holds_old, switch_on, eeprom) == NEW
-    assert held_after(cycles // 2, torn, holds_old, switch_on, eeprom) == OLD
-
-
-class Gone(Exception):  # noqa: N818 - stands for a plug that was pulled
-    """The power failed."""
-
-
-def held_after(cycles, torn, before, switch_on, eeprom):
-    """What the next start finds where the power fails `cycles` after the host began to write NEW."""
-    eeprom.write_bytes(before)
-    board, port = switch_on()
-    store = open_store(port)
-    end = board.cycle + int(cycles)
-    run_cycles = board.run_cycles
-
-    def run_until_power_fails(count):
-        run_cycles(min(count, end - board.cycle))
-        if board.cycle >= end:
-            raise Gone
-
-    board.run_cycles = run_until_power_fails
-    with suppress(Gone, BusError):
-        store.write(NEW)
-    board.cut_power(torn)
-    _, port = switch_on()
-    return open_store(port).read()
+    assert held_after(2 * cycles) == NEW
+    assert held_after(cycles // 2) == OLD

@@ -1,4 +1,4 @@
-"""Where boards other than an AVR keep a blob: a file of LittleFS, which loses power at every step."""
+"""Storage of a blob in a file of LittleFS, which loses power at every step."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OLD = Path(__file__).parents[2] / "fixtures" / "vectors" / "blob_measured.bin"
 
 @pytest.mark.parametrize("core", ["ESP32", pytest.param("ESP8266", marks=pytest.mark.slow)])
 def test_a_loss_of_power_leaves_the_old_blob_or_the_new_one(core, tmp_path):
-    """And what is no file system is formatted by no reader, but by who stores."""
+    """Storing a blob, and nothing else, formats a flash without a file system."""
     if shutil.which("g++") is None or shutil.which("gcc") is None:
         pytest.skip("needs gcc and g++")
     (tmp_path / "new.bin").write_bytes(replace(Blob.decode(OLD.read_bytes()), b_a=(1.0, 2.0, 3.0)).encode())

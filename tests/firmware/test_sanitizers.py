@@ -1,4 +1,4 @@
-"""The tests of the core once more, with AddressSanitizer and UBSan compiled into it."""
+"""Tests of the core with AddressSanitizer and UBSan compiled into it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TESTS = ["test_frame.py", "test_slots.py", "test_bridge.py", "test_apply.py"]
 
 @pytest.fixture(scope="module")
 def sanitized(core):
-    """An environment in which what gcc sanitizes runs within Python, each block of memory by itself."""
+    """Makes an environment in which code sanitized by gcc runs within Python."""
     found = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
     library = Path(found.stdout.strip())
     if not library.is_absolute():

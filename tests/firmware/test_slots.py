@@ -1,4 +1,4 @@
-"""The two blob slots: one of them is whole at any moment, whatever the power does."""
+"""Blob slots: one of the two is valid at any moment, even if the power fails."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def slots(core):
 
 
 class Slots:
-    """The calls of a blob write, as the bridge's messages make them."""
+    """Calls of a blob write, as the bridge's messages make them."""
 
     def __init__(self, core):
         self._core = core

@@ -1,4 +1,4 @@
-"""What the core pushes: the rules under FRAMES in firmware_protocol.md, one by one."""
+"""Stream of the core: the rules under FRAMES in firmware_protocol.md, one by one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FIFO_OFLOW = 0x10
 
 
 class Streaming:
-    """A bridge that streams from a FIFO that the test fills; frames are numbered, each in all its bytes."""
+    """Bridge that streams from a FIFO which the test fills; all bytes of a frame are its number."""
 
     def __init__(self, host, core, batch=4, frame_bytes=BYTES):
         self.fifo, self.status, self.failures = bytearray(), 0, {}
@@ -40,18 +40,18 @@ class Streaming:
         return _messages(self.bridge.receive(Frame(request.TYPE, seq, request.payload()).encode()))
 
     def make(self, frames):
-        """The chip takes samples."""
+        """Fill the FIFO with frames."""
         for _ in range(frames):
             self.fifo += bytes([self.made % 256]) * self.frame_bytes
             self.made += 1
 
     def look(self, after_us=1000):
-        """What the bridge pushes `after_us` later."""
+        """Return the messages that the bridge pushes `after_us` later."""
         self.bridge.now_us += after_us
         return _messages(self.bridge.look())
 
     def pushed(self, after_us=1000):
-        """All messages of the look that is due."""
+        """Return all messages of the look that is due."""
         messages = self.look(after_us)
         while messages and messages[-1].left:
             messages += self.look(10)

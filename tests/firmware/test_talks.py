@@ -1,4 +1,4 @@
-"""What a host asks and what a bridge answers, of three bridges: the golden talks of firmware_protocol.md."""
+"""Golden talks of firmware_protocol.md, held with three bridges."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from mpucal.sources.bridge import board
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.conformance import find_difference, talks
 from mpucal.sources.bridge.frame import Deframer, Frame
-from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.messages import Status
 from mpucal.sources.bridge.store import BlobStore
 
@@ -26,7 +25,7 @@ FIFO = {(0x72, 2): b"\x01\xf8"}
 
 
 class Chip:
-    """A chip with 504 bytes in its FIFO; on the buses of two bridges."""
+    """Chip with 504 bytes in its FIFO, for the buses of two bridges."""
 
     def read(self, register, count):
         return Reply(FIFO.get((register, count), bytes(count)), 0)
@@ -95,15 +94,13 @@ EXCHANGE = json.loads((VECTORS / "talk_fifo_count.json").read_text())["talk"][0]
         ([Frame(0x82, 2, bytes(5) + b"\1\xf8")] * 2, "2 replies to"),
     ],
 )
-def test_another_answer_is_told(said, words):
+def test_another_answer_is_described(said, words):
     assert re.search(words, find_difference(EXCHANGE, said))
 
 
-def test_the_build_for_an_uno_has_all_talks(switch_on):
-    """By `mpucal doctor --conformance`, on whatever chip there is; what it stores is erased."""
-    _, port = switch_on()
-    link = Link(port, lambda *_: None)
-    link.greet()
+def test_the_build_for_an_uno_has_all_talks(switch_on, greeted):
+    """The examination of `mpucal doctor --conformance` works with any chip, and erases what it stores."""
+    link = greeted(switch_on()[1])
     found = list(examine_conformance(link))
     assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
     assert {finding.topic for finding in found} == talks().keys()
@@ -115,7 +112,7 @@ def test_the_build_for_an_uno_has_all_talks(switch_on):
 
 
 def test_a_narrow_clock_is_extended(tmp_path):
-    """MicroPython's; others have no narrower one."""
+    """MicroPython has such a clock; the other bridges do not."""
     vector = json.loads((VECTORS / "clock_30_bits.json").read_text())
     assert vector["bits"] == board.TICKS.bit_length()
     shown = iter(vector["shows"])

@@ -55,15 +55,15 @@ class SharedClock:
         self._opened = self._shown()
 
     def now(self) -> int:
-        """Time since the device was there."""
+        """Return the time since the device was opened."""
         return self._shown() - self._opened
 
     def spend(self, ns: int) -> None:
-        """A transfer takes `ns`, for whoever asked for it as well."""
+        """Advance the time by a transfer of `ns`, for the program under test too."""
         self._page[:] = (self._shown() + ns).to_bytes(8, "little")
 
     def sleep_until(self, t_ns: int) -> None:
-        """Nobody sleeps here: only the program under test does."""
+        """Raise RuntimeError: only the program under test sleeps."""
         raise RuntimeError("the device does not wait")
 
     def _shown(self) -> int:
@@ -71,17 +71,17 @@ class SharedClock:
 
 
 class ClockChip:
-    """A DS3231 at the MPU's address, 23:59:45 on the 31st of December; it remembers what was written to it."""
+    """DS3231 at the MPU's address, at 23:59:45 on December 31st; its registers keep what is written."""
 
     def __init__(self) -> None:
         self._registers = bytearray.fromhex("45592307311299") + bytes(12)
 
     def read(self, register: int, count: int) -> Reply:
-        """Its nineteen registers, again and again."""
+        """Read the nineteen registers, which repeat."""
         return Reply(bytes(self._registers[(register + i) % len(self._registers)] for i in range(count)), 0)
 
     def write(self, register: int, data: bytes) -> int:
-        """Any of them."""
+        """Write registers."""
         for at, value in enumerate(data, register):
             self._registers[at % len(self._registers)] = value
         return 0

@@ -139,7 +139,7 @@ class HostBridge:
         return self._take()
 
     def look(self) -> bytes:
-        """Let the bridge look at the FIFO, and return the bytes that it sends."""
+        """Call the bridge's look at the FIFO, and return the bytes that it sends."""
         self._core.mpucal_bridge_look(self._bridge)
         return self._take()
 
