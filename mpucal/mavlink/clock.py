@@ -23,7 +23,7 @@ class Jump(Enum):
 
 
 class VehicleClock:
-    """Times of one message stream on a line that grows except for late packets.
+    """Unwrapped times of one message stream, which grow except for late packets.
 
     Parameters
     ----------

@@ -128,7 +128,10 @@ class Writer:
 
 
 def is_partial_write(held: Mapping[str, float], old: Mapping[str, float], new: Mapping[str, float]) -> bool:
-    """Return True if an interrupted write from `old` to `new` can have left `held`: each is one of both, or off it."""
+    """Return True if an interrupted write from `old` to `new` can have left `held`.
+
+    Each value is then within DETOUR of its old or its new one.
+    """
     reach = DETOUR * 1.01
     return all(min(abs(held[name] - old[name]), abs(held[name] - new.get(name, old[name]))) <= reach for name in old)
 

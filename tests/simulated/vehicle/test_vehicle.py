@@ -8,6 +8,7 @@ import pytest
 
 from mpucal.errors import UsageError
 from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.imu import MESSAGE_ID
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.encoding import from_wire, name_bytes, to_wire
 from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
@@ -60,35 +61,26 @@ class Station:
         self.hear(5.0)
 
 
+# ArduPilot cuts intervals to whole ms, and keeps the last one when it denies; PX4 omits samples that come too early
 @pytest.mark.parametrize(
-    ("asked_hz", "result", "got_hz"),
-    [(10, ACCEPTED, 10), (100, ACCEPTED, 100), (250, ACCEPTED, 250), (300, ACCEPTED, 333), (400, DENIED, 50)],
-)
-def test_ardupilot_cuts_intervals_to_whole_ms_and_keeps_the_last_where_it_denies(asked_hz, result, got_hz):
-    station = Station("imus=1")
-    station.interval(HIGHRES, 50)
-    assert station.interval(HIGHRES, asked_hz) == result
-    assert station.rates()["HIGHRES_IMU"] == pytest.approx(got_hz, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("words", "message_id", "result"),
+    ("words", "name", "asked_hz", "result", "got_hz"),
     [
-        ("firmware=px4", RAW, FAILED),
-        ("firmware=px4", HIGHRES, ACCEPTED),
-        ("highres=no", HIGHRES, DENIED),
-        ("highres=no", RAW, ACCEPTED),
+        ("imus=1", "HIGHRES_IMU", 10, ACCEPTED, 10),
+        ("imus=1", "HIGHRES_IMU", 100, ACCEPTED, 100),
+        ("imus=1", "HIGHRES_IMU", 300, ACCEPTED, 333),
+        ("imus=1", "HIGHRES_IMU", 400, DENIED, 50),
+        ("highres=no", "HIGHRES_IMU", 100, DENIED, 0),
+        ("highres=no", "RAW_IMU", 100, ACCEPTED, 100),
+        ("firmware=px4", "RAW_IMU", 100, FAILED, 0),
+        ("firmware=px4", "HIGHRES_IMU", 125, ACCEPTED, 125),
+        ("firmware=px4", "SCALED_IMU", 200, ACCEPTED, 125),
     ],
-    ids=["px4 raw", "px4 highres", "old ardupilot highres", "old ardupilot raw"],
 )
-def test_each_firmware_has_its_messages(words, message_id, result):
-    assert Station(words).interval(message_id, 100) == result
-
-
-def test_px4_acknowledges_two_hundred_and_sends_less():
-    station = Station("firmware=px4")
-    assert station.interval(SCALED, 200) == ACCEPTED
-    assert station.rates()["SCALED_IMU"] == pytest.approx(125, rel=0.02)
+def test_each_firmware_has_its_messages_and_rates(words, name, asked_hz, result, got_hz):
+    station = Station(words)
+    station.interval(MESSAGE_ID[name], 50)
+    assert station.interval(MESSAGE_ID[name], asked_hz) == result
+    assert station.rates().get(name, 0) == pytest.approx(got_hz, rel=0.02)
 
 
 def test_a_second_station_slows_raw_imu_and_not_highres_imu():
