@@ -127,5 +127,5 @@ def _wait(what_for: str, enough: Callable[[], bool]) -> None:
     """Wait until Enter is pressed, or `enough` returns True."""
     print(f"  {what_for}", file=sys.stderr, flush=True)
     keys = Keys(sys.stdin)
-    while keys.asked and not enough() and not keys.pressed():
+    while keys.has_keyboard and not enough() and not keys.pressed():
         time.sleep(ASK_EVERY_S)

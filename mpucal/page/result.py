@@ -12,12 +12,12 @@ class Result:
 
     Attributes
     ----------
-    verdict : one word or two. said : the estimated error, in a sentence. reasons : as calibration.json has them.
+    verdict : one word or two. estimated_error : a sentence. reasons : as calibration.json has them.
     values : name of each row of the table, and its cells for x, y and z. summary : further text.
     """
 
     verdict: str
-    said: str = ""
+    estimated_error: str = ""
     reasons: Sequence[Mapping[str, object]] = ()
     values: Sequence[tuple[str, Sequence[str]]] = ()
     summary: str = ""

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
-from ..session.events import Knowledge, Use
+from ..session.events import Knowledge
 from ..terminal.lines import plain
-from ..terminal.view import HEADLINES, Moment, View
+from ..terminal.view import HEADLINES, USE_HEADLINES, Moment, View
 from ..terminal.words import groups
 
 CONNECTING = "Connecting"
 HOLD = "Hold still"
-TOLD = {Use.TAKEN: "Taken", Use.USEFUL: "Not that one, but useful", Use.SEEN: "Seen already"}
 # Number of messages that are kept.
 NOTES = 30
 
@@ -47,7 +46,7 @@ def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
             "target": f"{group.target:g} {group.unit}",
             "worst": group.worst,
             "axes": [
-                {"times": std / group.target, "said": group.text(axis), "reached": progress >= 1.0}
+                {"times": std / group.target, "text": group.text(axis), "reached": progress >= 1.0}
                 for axis, (std, progress) in enumerate(zip(group.std, group.progress, strict=True))
             ],
         }
@@ -62,8 +61,8 @@ def headline(view: View) -> str:
             return f"New: {HOLD.lower()}"
         case Moment.COUNTING | Moment.NEAR:
             return HOLD
-        case Moment.TOLD if view.held is not None:
-            return TOLD[view.held.use]
+        case Moment.DECIDED if view.held is not None:
+            return USE_HEADLINES[view.held.use].capitalize()
         case Moment.TURN if view.meter is not None:
             words = view.meter.turn.rpartition(", ")[2]
             return words[:1].upper() + words[1:]

@@ -91,8 +91,8 @@ class Attitude:
             turn = min(share * missing, CORRECT_RAD_S * seconds) / aside if aside else 0.0
             q = compose(from_vector(y * turn, -x * turn, 0.0), q)
         if still and not self._levelled:
-            most, askew = STRAIGHTEN_RAD_S * seconds, yaw_between(straight(matrix(q)[2]), q)
-            q = compose(from_vector(0.0, 0.0, min(max(askew, -most), most)), q)
+            most, yaw = STRAIGHTEN_RAD_S * seconds, yaw_between(straight(matrix(q)[2]), q)
+            q = compose(from_vector(0.0, 0.0, min(max(yaw, -most), most)), q)
         size = math.hypot(*q)
         w, x, y, z = q
         self._q = (w / size, x / size, y / size, z / size)

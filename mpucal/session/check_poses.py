@@ -31,7 +31,7 @@ class CheckPoses(PoseStep):
         """Return the outputs for `samples`; Finished comes last and ends the step."""
         t_s = float(samples.t[-1])
         if self._begun_s is None:
-            self._begun_s = self._said_s = t_s
+            self._begun_s = self._prompted_s = t_s
         outputs: list[Output | Finished] = []
         for pause in self._pauses.add(samples):
             if self._number < ORIENTATIONS:
@@ -40,7 +40,7 @@ class CheckPoses(PoseStep):
             return [*outputs, Finished(f"{ORIENTATIONS} orientations: done")]
         if t_s - self._begun_s >= PATIENCE_S:
             return [*outputs, Finished(f"no new orientation for {PATIENCE_S:.0f} s")]
-        return [*outputs, *self._remind(t_s, self._said_s, "no new orientation for a while")]
+        return [*outputs, *self._remind(t_s, self._prompted_s, "no new orientation for a while")]
 
     def _hold(self, pause: Pause) -> list[Output]:
         new = not self._shown.near(pause.acc)
@@ -49,7 +49,7 @@ class CheckPoses(PoseStep):
         if pause.seconds < CHECK_HOLD_S - 1e-6:
             return outputs
         self._pauses.leave(pause.run)
-        self._said_s = pause.t_s
+        self._prompted_s = pause.t_s
         outputs.append(held(pause, use))
         if not new:
             seen = Caution(pause.t_s, "seen_already", "this orientation was shown already", self.prompt.text)

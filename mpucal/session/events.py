@@ -108,11 +108,11 @@ class Checked:
 
     Attributes
     ----------
-    found : one for each orientation. agrees : None where too little was shown to tell.
+    verifications : one for each orientation. agrees : None where too little was shown to tell.
     reason : the likeliest cause, where they do not agree.
     """
 
-    found: tuple[Verification, ...]
+    verifications: tuple[Verification, ...]
     agrees: bool | None
     reason: Reason | None = None
 

@@ -1,4 +1,4 @@
-"""Folder of a session: the one that was asked for, or a new one named by chip and time."""
+"""Folder of a session: the given one, or a new one named by chip and time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class SessionFolder(OutputFolder):
 
     Parameters
     ----------
-    asked : its path; None: a new name in the working directory. capture_name : name of the capture to come.
+    given : its path; None: a new name in the working directory. capture_name : name of the capture to come.
     again : the folder holds earlier captures of the same session.
 
     Raises
@@ -26,16 +26,16 @@ class SessionFolder(OutputFolder):
     OutputError : it cannot be made, another process has it, or it holds a capture or results already.
     """
 
-    def __init__(self, asked: Path | None, capture_name: str, again: bool = False) -> None:
+    def __init__(self, given: Path | None, capture_name: str, again: bool = False) -> None:
         self._stamp = stamp()
-        self._asked = asked is not None
+        self._given = given is not None
         self._capture_name = capture_name
-        super().__init__(asked or Path(f"session-{self._stamp}"), new=asked is None)
+        super().__init__(given or Path(f"session-{self._stamp}"), new=given is None)
         held = [self.capture, self.path / DOCUMENT.name, *([] if again else all_captures_in(self.path))]
         if there := next((file.name for file in held if file.exists()), None):
             self.close()
             raise OutputError(
-                f"{asked} holds {there} already, which is not overwritten", "choose another folder with -o"
+                f"{given} holds {there} already, which is not overwritten", "choose another folder with -o"
             )
 
     @property
@@ -54,9 +54,9 @@ class SessionFolder(OutputFolder):
         """Rename a folder without a given name after its chip; delete the capture, and it, if no chip answered."""
         if sensor is None:
             self.capture.unlink(missing_ok=True)
-            if not self._asked:
+            if not self._given:
                 self.path.rmdir()
-        elif sensor.chip and not self._asked:
+        elif sensor.chip and not self._given:
             self.rename(f"{sensor.chip.lower()}-{self._stamp}")
 
 

@@ -55,15 +55,15 @@ class LayFlat:
         self._stillness = Detector(QUIET)
         self._still: Still | None = None
         self._begun_s: float | None = None
-        self._spoke_s = 0.0
-        self._shaken = ""
+        self._cautioned_s = 0.0
+        self._motion = ""
 
     def add(self, samples: Samples) -> list[Output | Rested | Stopped]:
         """Return the outputs for `samples`; Rested or Stopped comes last and ends the step."""
         outputs: list[Output | Rested | Stopped] = []
         for window in self._windows.add(samples):
             if self._begun_s is None:
-                self._begun_s = self._spoke_s = window.start_s
+                self._begun_s = self._cautioned_s = window.start_s
             t_s, sight = window.end_s, self._stillness.add(window)
             if isinstance(sight, Moved):
                 if self._patient and self._still is not None and self._still.seconds >= RECORDED_S:
@@ -98,16 +98,16 @@ class LayFlat:
         outputs: list[Output] = []
         before, self._still = self._still, still
         if before is not None and still.run != before.run and before.seconds >= WORTH_SAYING_S:
-            self._spoke_s = t_s
-            what, remedy = f"the board was moved: {self._shaken}", "let go of it; the countdown starts again"
+            self._cautioned_s = t_s
+            what, remedy = f"the board was moved: {self._motion}", "let go of it; the countdown starts again"
             outputs.append(Caution(t_s, "moved", what, remedy))
         return outputs + self._countdown(t_s, f"still for {still.seconds:.0f} of {FLAT_S:.0f} s", paused=False)
 
     def _moved(self, moved: Moved, t_s: float) -> list[Output]:
-        self._shaken = moved.what
+        self._motion = moved.what
         outputs = self._countdown(t_s, "waiting for the board to be still", paused=True)
-        if moved.after_s >= WORTH_SAYING_S or t_s - self._spoke_s >= SAY_AGAIN_S:
-            self._spoke_s = t_s
+        if moved.after_s >= WORTH_SAYING_S or t_s - self._cautioned_s >= SAY_AGAIN_S:
+            self._cautioned_s = t_s
             remedy = LOST if moved.lost else "put it on a firm surface and let go of it"
             outputs.append(Caution(t_s, "trembling", f"not still: {moved.what}", remedy))
         return outputs

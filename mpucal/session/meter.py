@@ -34,7 +34,7 @@ class MotionWatch:
         self._stillness = Detector(HAND)
         self._attitude, self._guide = Attitude(), TurnGuide()
         self._still = False
-        self._said_s: dict[str, float] = {}
+        self._last_s: dict[str, float] = {}
         self._temperature_c: float | None = None
 
     def flat(self) -> None:
@@ -93,8 +93,8 @@ class MotionWatch:
         return cautions
 
     def _is_due(self, caution: Caution) -> bool:
-        last = self._said_s.get(caution.code)
+        last = self._last_s.get(caution.code)
         if last is not None and caution.t_s - last < SAY_AGAIN_S:
             return False
-        self._said_s[caution.code] = caution.t_s
+        self._last_s[caution.code] = caution.t_s
         return True

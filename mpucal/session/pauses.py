@@ -89,7 +89,7 @@ class PoseStep:
     def __init__(self, flat: Rested, hold_s: float = HOLD_S) -> None:
         self._pauses = PauseDetector(flat, hold_s)
         self._begun_s: float | None = None
-        self._said_s = 0.0
+        self._prompted_s = 0.0
         self._number = 0
 
     @property
@@ -105,9 +105,9 @@ class PoseStep:
 
     def _remind(self, t_s: float, since_s: float, what: str) -> list[Output]:
         """Return the prompt as a caution, if it is SAY_AGAIN_S since the last one and since `since_s`."""
-        if t_s - max(since_s, self._said_s) < SAY_AGAIN_S:
+        if t_s - max(since_s, self._prompted_s) < SAY_AGAIN_S:
             return []
-        self._said_s = t_s
+        self._prompted_s = t_s
         return [Caution(t_s, "not_turned", what, self.prompt.text)]
 
 

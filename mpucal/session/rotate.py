@@ -41,7 +41,7 @@ TILTS = 6
 LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
 # Interval of the fits and of the progress. Fits become rarer as the turning gets long: every 1/40 of its time.
-KNOW_EVERY_S = TELL_EVERY_S = 1.0
+KNOW_EVERY_S = REPORT_EVERY_S = 1.0
 SELDOM = 40.0
 # Interval of the fits where nothing is asked for, and their numbers are only shown.
 SHOW_EVERY_S = 5.0
@@ -70,16 +70,16 @@ class Rotate(PoseStep):
         self.coverage.rested.add(acc)
         self.directions = directions(down_of(acc), tilt_only)
         self._knowledge: Knowledge | None = None
-        self._asked = False
+        self._requested = False
         self._advised_run = -1
         self._held: tuple[Pause, Use] | None = None
-        self._t_s = self._new_s = self._known_s = self._told_s = 0.0
+        self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
         self.prompt = self._prompt_for(self.coverage.paused.farthest_down(self.directions))
 
     def add(self, samples: Samples) -> list[Output | Turned]:
         """Return the outputs for `samples`; Turned comes last and ends the step."""
         if self._begun_s is None:
-            self._begun_s = self._new_s = self._known_s = self._told_s = self._said_s = float(samples.t[0])
+            self._begun_s = self._new_s = self._known_s = self._reported_s = self._prompted_s = float(samples.t[0])
         for window in self._passes.add(samples):
             steady = window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2
             if steady and self.coverage.passed.add(window.acc):
@@ -94,7 +94,7 @@ class Rotate(PoseStep):
 
     def learn(self, knowledge: Knowledge, advice: bool) -> list[Output | Turned]:
         """Return the outputs for new uncertainties; Turned comes last and ends the step."""
-        self._knowledge, self._asked = knowledge, False
+        self._knowledge, self._requested = knowledge, False
         outputs: list[Output | Turned] = [knowledge]
         if self._until_end:
             return outputs
@@ -106,7 +106,7 @@ class Rotate(PoseStep):
             what = "enough tilts seen" if self._tilt_only else "target reached"
             return [*outputs, Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
-            self._said_s = knowledge.t_s
+            self._prompted_s = knowledge.t_s
             # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
             # even if the estimate takes up for down, as for a sensor whose axes are mirrored.
             down = np.array(knowledge.down)
@@ -126,7 +126,7 @@ class Rotate(PoseStep):
 
     def resumed(self) -> list[Output]:
         """Start again after a gap, in which the board may have been moved."""
-        self._asked = False
+        self._requested = False
         prompt = super().resumed()
         return [] if self._until_end else prompt
 
@@ -136,16 +136,16 @@ class Rotate(PoseStep):
             self._held = pause, classify_use(pause.acc, self.prompt.down, not self.coverage.paused.near(pause.acc))
         # The advice ends the countdown of its pause, also where a bump had delayed it.
         advised = pause.run <= self._advised_run
-        outputs: list[Output | Turned] = [*countdown(pause, self._held[1])] if self._asked or not advised else []
+        outputs: list[Output | Turned] = [*countdown(pause, self._held[1])] if self._requested or not advised else []
         if pause.seconds >= REST_S - 1e-6:
             self.coverage.rested.add(pause.acc)
         if pause.seconds >= PAUSE_S - 1e-6 and self.coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
             outputs.append(Seen(pause.t_s, len(self.coverage.paused), down_of(pause.acc), paused=True))
-        if self._until_end or self._asked or advised:
+        if self._until_end or self._requested or advised:
             return outputs
         if pause.seconds >= HOLD_S - WAIT_S - 1e-6:
-            self._asked, self._advised_run, self._known_s = True, pause.run, pause.t_s
+            self._requested, self._advised_run, self._known_s = True, pause.run, pause.t_s
             outputs.append(RequestFit(FitKind.ADVISE, WAIT_S))
         return outputs
 
@@ -154,11 +154,11 @@ class Rotate(PoseStep):
         outputs: list[Output] = []
         turning_s = t_s - (self._begun_s or t_s)
         every_s = SHOW_EVERY_S if self._until_end else max(KNOW_EVERY_S, turning_s / SELDOM)
-        if not self._asked and t_s - self._known_s >= every_s:
-            self._asked, self._known_s = True, t_s
+        if not self._requested and t_s - self._known_s >= every_s:
+            self._requested, self._known_s = True, t_s
             outputs.append(RequestFit(FitKind.KNOW, WAIT_S))
-        if t_s - self._told_s >= TELL_EVERY_S:
-            self._told_s = t_s
+        if t_s - self._reported_s >= REPORT_EVERY_S:
+            self._reported_s = t_s
             number, least = self.coverage.number, self._least
             more = number <= least
             text = f"orientation {number} of {least}" if more else f"{number} orientations, of at least {least}"

@@ -55,7 +55,7 @@ class Runner:
     ) -> None:
         self._source, self._operator, self._note = source, operator, note
         self._plan = plan = plan or Plan()
-        self._go_on, self._hire, self._checking = go_on, start_worker, checking
+        self._go_on, self._start_worker, self._checking = go_on, start_worker, checking
         self._machine = Machine(plan.until_end, plan.target, plan.tilt_only, plan.attended, checking)
         self._dialogue = Dialogue(self._machine, operator, listeners, note, source.now_ns, late)
         self._ended = False
@@ -73,7 +73,7 @@ class Runner:
             self._dialogue.take_keys()
             self._connect()
             if self.sensor is not None and not self._checking:
-                self._dialogue.scheduler = FitScheduler(self._plan, self.sensor, self._hire)
+                self._dialogue.scheduler = FitScheduler(self._plan, self.sensor, self._start_worker)
             while self._dialogue.measuring:
                 self._step()
         except Abandoned:

@@ -23,7 +23,7 @@ ROUND_DEG = 5.0
 # A heading is kept as long as it leads this near to the wanted orientation.
 KEPT_RAD = math.radians(10.0)
 # The words are kept as long as the heading differs from theirs by no more than this.
-SAID_RAD = math.radians(30.0)
+WORDS_KEPT_RAD = math.radians(30.0)
 # From one call to the next the wanted attitude turns about the vertical by no more than this.
 SLEW_RAD = math.radians(15.0)
 
@@ -46,7 +46,7 @@ class TurnGuide:
     def __init__(self) -> None:
         self._to: Direction | None = None
         self._heading = 0.0
-        self._said = 0
+        self._word_index = 0
         self._wanted: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
     def turn_to(self, down: Direction, attitude: Quaternion) -> Turn:
@@ -65,7 +65,7 @@ class TurnGuide:
             wanted = compose(from_vector(0.0, 0.0, slew), self._wanted)
         self._to, self._wanted = down, wanted
         rounded = ROUND_DEG * round(math.degrees(missing) / ROUND_DEG)
-        words = f"{rounded:.0f} deg more, {TURN_WORDS[self._said]}" if rounded else ""
+        words = f"{rounded:.0f} deg more, {TURN_WORDS[self._word_index]}" if rounded else ""
         return Turn(math.degrees(missing), words, wanted)
 
     def _update_heading(self, shortest: float, missing: float, new: bool) -> None:
@@ -80,8 +80,8 @@ class TurnGuide:
         reach = math.sin(KEPT_RAD) / max(math.sin(missing), 1e-9)
         most = math.asin(reach) if reach < 1.0 else math.pi
         self._heading = shortest + min(max(aside, -most), most)
-        if new or abs(_wrapped(self._heading - _angle(self._said))) > SAID_RAD:
-            self._said = _nearest(self._heading)
+        if new or abs(_wrapped(self._heading - _angle(self._word_index))) > WORDS_KEPT_RAD:
+            self._word_index = _nearest(self._heading)
 
 
 def _nearest(heading: float) -> int:

@@ -70,7 +70,7 @@ class Verify(PoseStep):
         self._aim, self._coverage, self._directions, self._tilt_only = aim, coverage, directions, tilt_only
         self._attended = attended
         self._refusal: Finished | None = None
-        self._asked, self._more = False, MOST_MORE
+        self._requested, self._more = False, MOST_MORE
         self._now_s = 0.0
         self.checked: Checked | None = None
         self.prompt = self._next()
@@ -83,21 +83,21 @@ class Verify(PoseStep):
         """Return the outputs for `samples`; Finished comes last and ends the step."""
         t_s = self._now_s = float(samples.t[-1])
         if self._begun_s is None:
-            self._begun_s = self._said_s = t_s
+            self._begun_s = self._prompted_s = t_s
         if self._refusal is not None:
             return [self._refusal] if t_s - self._begun_s >= OFFERED_S else []
         outputs: list[Output | Finished] = []
         for pause in self._pauses.add(samples):
             use = self._classify_use(pause)
-            outputs += [] if self._asked else countdown(pause, use)
+            outputs += [] if self._requested else countdown(pause, use)
             outputs += self._hold(pause, use)
-        if self._asked:
+        if self._requested:
             return outputs
-        outputs += self._remind(t_s, self._said_s, "this orientation has not been held yet")
+        outputs += self._remind(t_s, self._prompted_s, "this orientation has not been held yet")
         if t_s - self._begun_s < PATIENCE_S:
             return outputs
         if self._number:
-            self._asked = True
+            self._requested = True
             return [*outputs, RequestFit(FitKind.CHECK, CHECK_WAIT_S)]
         not_shown = reason("verification_failed", "not_shown")
         self.checked = Checked((), None, not_shown)
@@ -114,14 +114,15 @@ class Verify(PoseStep):
         """Take the comparison with the new orientations."""
         if checked.agrees is None and self._number >= self._aim.verify and self._more:
             # The fit has seen one of these orientations after all: another one replaces it.
-            self._more, self._asked, self._begun_s = self._more - 1, False, None
+            self._more, self._requested, self._begun_s = self._more - 1, False, None
             self._number = self._aim.verify - 1
             self.prompt = self._next(self.prompt)
             return [self.prompt]
         self.checked = checked
         if checked.reason is None:
-            return [*checked.found, Finished("verified: the new orientations agree with the predicted uncertainty")]
-        return [*checked.found, *self._refused(Finished(checked.reason.what), checked.reason)]
+            agreement = Finished("verified: the new orientations agree with the predicted uncertainty")
+            return [*checked.verifications, agreement]
+        return [*checked.verifications, *self._refused(Finished(checked.reason.what), checked.reason)]
 
     def enough(self) -> Finished:
         """Return the end of the step, at the person's wish."""
@@ -138,10 +139,10 @@ class Verify(PoseStep):
         return [self.prompt, Caution(self._now_s, "refused", against.what, against.remedy)]
 
     def _hold(self, pause: Pause, use: Use) -> list[Output | Finished]:
-        if self._asked or pause.seconds < HOLD_S - 1e-6:
+        if self._requested or pause.seconds < HOLD_S - 1e-6:
             return []
         self._pauses.leave(pause.run)
-        self._said_s = pause.t_s
+        self._prompted_s = pause.t_s
         if use is Use.SEEN:
             return [held(pause, use), *self._seen_already(pause)]
         self._coverage.paused.add(pause.acc)
@@ -152,7 +153,7 @@ class Verify(PoseStep):
         text = f"held {self._number} of {self._aim.verify}{useful}"
         progress = Progress(pause.t_s, self._number, self._aim.verify, text)
         if self._number == self._aim.verify:
-            self._asked = True
+            self._requested = True
             return [held(pause, use), progress, RequestFit(FitKind.CHECK, CHECK_WAIT_S)]
         self.prompt = self._next(self.prompt)
         return [held(pause, use), progress, self.prompt]
@@ -174,10 +175,10 @@ class Verify(PoseStep):
 
     def _next(self, last: Prompt | None = None) -> Prompt:
         """Return a prompt for the direction farthest from all rests, at least DISTINCT_RAD from the `last` one."""
-        asked = self._directions
+        candidates = self._directions
         if last is not None:
-            asked = asked[asked @ np.array(last.down) < math.cos(DISTINCT_RAD)]
-        down = self._coverage.rested.farthest_down(asked)
+            candidates = candidates[candidates @ np.array(last.down) < math.cos(DISTINCT_RAD)]
+        down = self._coverage.rested.farthest_down(candidates)
         side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
         number = f"{self._number + 1} of {self._aim.verify}"
         return Prompt(PromptKind.VERIFY, f"Verification {number}: {side}, then hold it still.", triple(down))

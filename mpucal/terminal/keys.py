@@ -40,7 +40,7 @@ class Keys:
         self._interrupted = False
 
     @property
-    def asked(self) -> bool:
+    def has_keyboard(self) -> bool:
         """True if there is a keyboard."""
         return self._keyboard is not None
 

@@ -85,26 +85,24 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     """Return the pictures of the board as it is and as it is wanted, and the map of its orientations."""
     height = rows - 1
     quarter = (columns - 4) // 4
-    wide, round_ = min(quarter + 2, 4 * height), min(quarter - 2, 2 * height)
+    board_columns, map_columns = min(quarter + 2, 4 * height), min(quarter - 2, 2 * height)
     parts: list[tuple[str, list[Text], int]] = []
     attitudes = (view.meter.attitude, view.meter.wanted) if view.meter is not None else ()
     for name, style, attitude in zip(("now", "turn it like this"), ("", "yellow"), attitudes, strict=False):
         if attitude is not None:
-            canvas = board.picture(view.board, attitude, wide, height)
-            parts.append((name, canvas.lines(style, glyphs.unicode), wide))
+            canvas = board.picture(view.board, attitude, board_columns, height)
+            parts.append((name, canvas.lines(style, glyphs.unicode), board_columns))
     if view.confirming and height > 2:
-        beside = columns - wide - 3
-        asked = ["", *textwrap.wrap(view.confirming, beside), *[""] * height][:height]
-        parts.append(("", [Text(line, style="bold") for line in asked], beside))
+        text_columns = columns - board_columns - 3
+        question = ["", *textwrap.wrap(view.confirming, text_columns), *[""] * height][:height]
+        parts.append(("", [Text(line, style="bold") for line in question], text_columns))
     marks = _marks(view)
     if marks:
         for upper, name in ((False, "+Z up"), (True, "-Z up")):
-            canvas = orientation_map.draw_half(upper, marks, round_, height, glyphs.unicode)
-            parts.append((name, canvas.lines("", glyphs.unicode), round_))
-    rows_ = [Text(" ").join(Text(name[:wide].center(wide), style="dim") for name, _, wide in parts)]
-    for k in range(height):
-        rows_.append(Text(" ").join(_filled(drawn[k], wide) for _, drawn, wide in parts))
-    return rows_
+            canvas = orientation_map.draw_half(upper, marks, map_columns, height, glyphs.unicode)
+            parts.append((name, canvas.lines("", glyphs.unicode), map_columns))
+    names = Text(" ").join(Text(name[:width].center(width), style="dim") for name, _, width in parts)
+    return [names, *(Text(" ").join(_filled(rows[k], width) for _, rows, width in parts) for k in range(height))]
 
 
 def _marks(view: View) -> list[tuple[str, tuple[float, float, float]]]:

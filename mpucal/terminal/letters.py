@@ -64,8 +64,7 @@ def large(text: str, block: str, scale: int = 1) -> list[str]:
     rows = []
     for k in range(ROWS):
         row = (" " * GAP).join(letter[k] for letter in letters)
-        wide = "".join((block if dot == "#" else " ") * scale for dot in row)
-        rows += [wide] * scale
+        rows += ["".join((block if dot == "#" else " ") * scale for dot in row)] * scale
     return rows
 
 

@@ -38,7 +38,7 @@ class Lines:
 
     def __init__(self, out: TextIO, keys: Keys, bell: bool = False) -> None:
         self._out, self._keys, self._bell = out, keys, bell
-        self._explained = not keys.asked
+        self._explained = not keys.has_keyboard
         self._open = True
         self._prompt: Prompt | None = None
         self._last = ""

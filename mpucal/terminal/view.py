@@ -25,8 +25,8 @@ from ..session.events import (
 from .flat import BOARD, flat_description
 
 # Time for which the headline shows the use of the last orientation.
-TOLD_S = 1.2
-TOLD = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
+USE_SHOWN_S = 1.2
+USE_HEADLINES = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
 # Angle from the wanted orientation below which the headline asks to hold still.
 NEAR_DEG = 15.0
 # A countdown that is not renewed for this time has ended.
@@ -50,7 +50,7 @@ class Moment(StrEnum):
 
     CONNECTING = "connecting"
     COUNTING = "counting"
-    TOLD = "told"
+    DECIDED = "decided"
     STEP = "step"
     POINT = "point"
     TURN = "turn"
@@ -169,8 +169,8 @@ class View:
             word = "NEW: HOLD" if waiting.elsewhere else "HOLD"
             word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else word
             return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s) or ''}".rstrip()
-        if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < TOLD_S:
-            return Moment.TOLD, TOLD[self.held.use]
+        if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < USE_SHOWN_S:
+            return Moment.DECIDED, USE_HEADLINES[self.held.use]
         if self.wanted is None:
             return Moment.STEP, HEADLINES[self.prompt.kind]
         if self.meter is None or self.meter.missing_deg is None:

@@ -113,7 +113,7 @@ class Watcher:
             case Held(use=use):
                 self.told = True
                 self.wrong["wrong before taken"] += use is Use.TAKEN and self._since_counted != Moment.COUNTING
-                self.wrong["not told"] += shown["moment"] != Moment.TOLD
+                self.wrong["not told"] += shown["moment"] != Moment.DECIDED
             case Countdown():
                 self.holds += state(before)["moment"] != "counting" == shown["moment"]
             case Progress(done=done, of=of, text=text):

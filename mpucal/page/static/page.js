@@ -103,7 +103,7 @@ function task() {
   const { look, share, number } = done ? { look: FINE.includes(done) ? "yes" : "no", share: 1 } : dial();
   document.body.dataset.look = look;
   put("headline", VERDICTS[done] ?? (done ? "Stopped" : state.headline ?? "Connecting"));
-  put("prompt", done ? state.stopped ?? state.said ?? "" : promptWords());
+  put("prompt", done ? state.stopped ?? state.estimated_error ?? "" : promptWords());
   put("step", done ? "" : state.confirming || (state.progress?.text ?? ""));
   put("number", number ?? "");
   $("arc").setAttribute("stroke-dasharray", `${Math.max(0, Math.min(100, 100 * share))} 100`);
@@ -116,7 +116,7 @@ function dial() {
   switch (moment) {
     case "counting":
       return { look: "hold", share: countdown.remaining_s / countdown.of_s, number: String(Math.ceil(countdown.remaining_s) || "") };
-    case "told":
+    case "decided":
       return held.use === "seen" ? { look: "again", share: 1 } : { look: "yes", share: 1 };
     case "turn":
       return { look: "turn", share: meter.missing_deg / 180, number: `${5 * Math.round(meter.missing_deg / 5)}°` };
@@ -162,13 +162,13 @@ function known() {
   $("known").hidden = !state.known;
   $("known").replaceChildren(...(state.known ?? []).map((group) => {
     const made = element("div", "", "group"), name = element("div", "", "group-name");
-    name.append(element("span", group.name), element("b", group.axes[group.worst].said));
+    name.append(element("span", group.name), element("b", group.axes[group.worst].text));
     made.append(name);
-    group.axes.forEach(({ times, said, reached }, i) => {
+    group.axes.forEach(({ times, text, reached }, i) => {
       const row = element("div", "", reached ? "axis reached" : "axis"), bar = element("div", "", "bar"), full = element("span");
       full.style.width = `${100 * Math.max(0.02, Math.min(1, 1 - Math.log10(times) / 3))}%`;
       bar.setAttribute("role", "img");
-      bar.setAttribute("aria-label", `${group.name} ${"xyz"[i]} ${said}, target ${group.target}`);
+      bar.setAttribute("aria-label", `${group.name} ${"xyz"[i]} ${text}, target ${group.target}`);
       bar.append(full);
       row.append(element("i", "xyz"[i]), bar, element("u", reached ? "✓" : ""));
       made.append(row);

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ SHORTEST_REST_S = 0.5
 LEAST_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
 MUCH_CLIPPED = 0.002
-_IN_DOCUMENT = "agrees", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "down"
+_IN_DOCUMENT = "down", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "agrees"
 
 
 def select_unseen(rests: Sequence[NewOrientation], evidence: Evidence, apart_rad: float) -> list[NewOrientation]:
@@ -170,7 +170,7 @@ def add_verification(calibration: Calibration, checked: Checked | None) -> Calib
     """
     if checked is None:
         return calibration
-    orientations = [{key: value for key, value in asdict(v).items() if key in _IN_DOCUMENT} for v in checked.found]
+    orientations = [{key: getattr(verification, key) for key in _IN_DOCUMENT} for verification in checked.verifications]
     quality: Quality = {
         **calibration.quality,
         "verification": {"agrees": checked.agrees, "orientations": orientations},

@@ -74,13 +74,13 @@ def test_a_try_and_its_check_agree_on_good_data(fits, poses):
     checked = fits.do(Task(part(poses, 32), FitKind.CHECK))
     assert isinstance(checked, Checked)
     assert checked.agrees, checked
-    assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.found)
+    assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.verifications)
 
 
 def test_orientations_that_the_fit_has_seen_verify_nothing(fits, poses):
     fits.do(Task(part(poses, 0, 44), FitKind.TRY))
     checked = fits.do(Task(after(part(poses, 18, 44), 26.0 + 1 / 200), FitKind.CHECK))
-    assert (checked.found, checked.agrees) == ((), None)
+    assert (checked.verifications, checked.agrees) == ((), None)
     assert checked.reason.what.startswith("the board was held still in 0 of 3 orientations that the calibration has")
     assert not checked.reason.refuse
 

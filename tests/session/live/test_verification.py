@@ -76,12 +76,12 @@ def test_the_likeliest_reason_is_given(rests, data, contradiction, code, words):
         assert checked.reason.remedy
     else:
         assert checked.reason is None
-    assert len(checked.found) == len(rests)
+    assert len(checked.verifications) == len(rests)
 
 
 def test_a_direction_that_nothing_shows_is_called_not_judged():
     lost, whole = (rest(direction=0.02, clipped=clipped) for clipped in (True, False))
-    shown = judge_verification([lost, whole], [lost, whole], 2, recording(), None).found
+    shown = judge_verification([lost, whole], [lost, whole], 2, recording(), None).verifications
     assert ["(not judged: on the way samples were lost" in one.text for one in shown] == [True, False]
     assert "direction error 1.15 deg (1 sigma 0.10)" in shown[1].text
 
