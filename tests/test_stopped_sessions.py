@@ -23,7 +23,7 @@ DAY_NS = 86_400 * 10**9
 def pass_by(world, seconds):
     """The computer does nothing meanwhile; what a vehicle sends is lost."""
     transport = world.transport
-    transport._vehicle.go_on(transport._vehicle.now_us + round(seconds * 1e6))
+    transport._vehicle.run_until(transport._vehicle.now_us + round(seconds * 1e6))
 
 
 def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
