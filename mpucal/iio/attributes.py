@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,9 +24,9 @@ KINDS = {ACCEL: "accelerometer", GYRO: "gyroscope"}
 # Bits of an MPU's count, if there is no buffer to describe them.
 USUAL_BITS = 16
 # Plausible full scales: g, deg/s.
-PLAUSIBLE = {ACCEL: (1.0, 1000.0), GYRO: (50.0, 20000.0)}
+PLAUSIBLE_RANGES = {ACCEL: (1.0, 1000.0), GYRO: (50.0, 20000.0)}
 # Drivers round their scales to 0.1 %.
-ROUNDED = 0.005
+SCALE_TOLERANCE = 0.005
 
 Texts = Mapping[str, str]
 
@@ -63,7 +64,7 @@ def full_scale(kind: str, scale: float, bits: int) -> float:
     """Return g or deg/s at the largest count, rounded to a whole number if it is nearly one."""
     value = scale * 2 ** (bits - 1)
     value = value / STANDARD_GRAVITY_MPS2 if kind == ACCEL else math.degrees(value)
-    return float(round(value)) if abs(value - round(value)) < ROUNDED * value else value
+    return float(round(value)) if abs(value - round(value)) < SCALE_TOLERANCE * value else value
 
 
 def bits_of(kind: str, texts: Texts, elements: Mapping[str, ScanElement]) -> int | None:
@@ -79,29 +80,38 @@ def read_scale(kind: str, device: str, texts: Texts, elements: Mapping[str, Scan
     ------
     ChipError : a scale that is not a number, or not plausible.
     """
-    scale = np.array([read_number(texts, kind, axis, "scale", 0.0) for axis in AXES])
-    offset = np.array([read_number(texts, kind, axis, "offset", 0.0) for axis in AXES])
+    scale, offset = (
+        np.array([read_number(texts, f"{kind}_{axis}_{what}", f"{kind}_{what}", default=0.0) for axis in AXES])
+        for what in ("scale", "offset")
+    )
     bits = bits_of(kind, texts, elements)
-    low, high = PLAUSIBLE[kind]
-    wrong = not (np.isfinite(scale) & (scale > 0)).all()
-    if wrong or (bits is not None and not low <= full_scale(kind, float(scale.max()), bits) <= high):
-        said = ", ".join(f"{value:g}" for value in scale)
+    low, high = PLAUSIBLE_RANGES[kind]
+    if not (scale > 0).all() or (bits is not None and not low <= full_scale(kind, float(scale.max()), bits) <= high):
+        scales = ", ".join(f"{value:g}" for value in scale)
         raise ChipError(
-            f"the scale of the {KINDS[kind]} of {device} is {said}, which is not plausible",
+            f"the scale of the {KINDS[kind]} of {device} is {scales}, which is not plausible",
             f"correct {kind}_scale in /sys/bus/iio/devices/{device}",
         )
     return SensorScale(kind, scale, offset, bits)
 
 
-def read_number(texts: Texts, kind: str, axis: str, what: str, otherwise: float) -> float:
-    """Read a number of an axis, or of all axes of a kind; NaN if the text is not a number."""
-    for name in (f"{kind}_{axis}_{what}", f"{kind}_{what}"):
-        if name in texts:
-            try:
-                return float(texts[name])
-            except ValueError:
-                return math.nan
-    return otherwise
+def read_number(texts: Texts, *names: str, default: float) -> float:
+    """Read the number of the first of `names` that the device has; `default` without one.
+
+    Raises
+    ------
+    ChipError : a text that is not a finite number.
+    """
+    name = next((name for name in names if name in texts), None)
+    return default if name is None else parse_number(name, texts[name])
+
+
+def parse_number(name: str, text: str) -> float:
+    """Parse the `text` of the attribute `name`; see read_number."""
+    with suppress(ValueError):
+        if math.isfinite(value := float(text)):
+            return value
+    raise ChipError(f"{name} is {text!r}, which is not a number", "report it with the kernel's version")
 
 
 def part_of(texts: Texts) -> Part | None:
@@ -122,15 +132,17 @@ def mount_matrix(texts: Texts, kind: str) -> Vector:
 
     Raises
     ------
-    ChipError : a text that is not a matrix.
+    ChipError : a text that is not an invertible matrix.
     """
     name = next((n for n in (f"{kind}_mount_matrix", "in_mount_matrix", "mount_matrix") if n in texts), None)
     if name is None:
         return np.eye(3)
-    try:
-        return np.array([[float(v) for v in row.split(",")] for row in texts[name].split(";")]).reshape(3, 3)
-    except ValueError as error:
-        raise ChipError(f"{name} is {texts[name]!r}, which is not a matrix", "correct the device tree") from error
+    with suppress(ValueError):
+        matrix = np.array([[float(v) for v in row.split(",")] for row in texts[name].split(";")]).reshape(3, 3)
+        # Its determinant is that of a rotation or of a mirror, but for a calibration that it contains.
+        if 0.1 < abs(np.linalg.det(matrix)) < 10:
+            return matrix
+    raise ChipError(f"{name} is {texts[name]!r}, which is not a mount matrix", "correct the device tree")
 
 
 def parse_available(text: str) -> list[float]:

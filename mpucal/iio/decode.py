@@ -11,7 +11,7 @@ import numpy as np
 from ..chip.access import Transaction
 from ..chip.families import MPU6050
 from ..data import Recording, Samples, Sensor, Vector
-from ..errors import RecordingError
+from ..errors import ChipError, RecordingError
 from .attributes import (
     ACCEL,
     AXES,
@@ -22,7 +22,9 @@ from .attributes import (
     bits_of,
     chip_name,
     mount_matrix,
+    parse_number,
     part_of,
+    read_number,
     read_scale,
 )
 from .scan_elements import FrameLayout, ScanElement
@@ -66,12 +68,12 @@ class IioDecoder:
         self._scales: dict[str, tuple[str, SensorScale]] = {}
         self._streams: dict[str, int] = {}
         self._aligned: StreamAligner | None = None
-        self._turn: Vector | None = None
+        self._gyro_to_accel: Vector | None = None
         self._temperature = np.nan
         self._last_ns: int | None = None
-        self._broken = False
-        self._settled = Sensor()
-        self._given: list[Samples] = []
+        self._gap_next = False
+        self._sensor = Sensor()
+        self._samples: list[Samples] = []
         self._new: list[Samples] = []
         self.gaps = 0
 
@@ -87,9 +89,7 @@ class IioDecoder:
         text = access.data.decode(errors="replace").strip()
         held.texts[name] = text
         if name == ENABLE and access.op == "write":
-            held.layout = self._layout(held) if text == "1" else None
-            if text == "1":
-                self._begin()
+            held.layout = self._start_buffer(device) if text == "1" else None
         elif access.op == "read" and name.endswith("_raw"):
             self._add_count(name.removesuffix("_raw"), text, access.t_ns)
 
@@ -128,20 +128,20 @@ class IioDecoder:
     @property
     def sensor(self) -> Sensor:
         """Sensor as far as it is known."""
-        t = self._given[-1].t[-1] - self._given[0].t[0] if self._given else 0.0
-        count = sum(map(len, self._given))
-        warm = [float(np.nanmean(s.temperature_c)) for s in self._given if np.isfinite(s.temperature_c).any()]
+        t = self._samples[-1].t[-1] - self._samples[0].t[0] if self._samples else 0.0
+        count = sum(map(len, self._samples))
+        warm = [float(np.nanmean(s.temperature_c)) for s in self._samples if np.isfinite(s.temperature_c).any()]
         return replace(
-            self._settled,
-            rate_hz=(count - 1) / t if t > 0 else self._settled.rate_hz,
+            self._sensor,
+            rate_hz=(count - 1) / t if t > 0 else self._sensor.rate_hz,
             temperature_c=float(np.mean(warm)) if warm else None,
         )
 
     def rate_hz(self, device: str) -> float | None:
         """Return the rate of a device; None if it has no such attribute."""
-        texts = self.texts(device)
-        named = next((n for n in (FREQUENCY, f"{ACCEL}_{FREQUENCY}", f"{GYRO}_{FREQUENCY}") if n in texts), None)
-        return None if named is None else float(texts[named])
+        names = (FREQUENCY, f"{ACCEL}_{FREQUENCY}", f"{GYRO}_{FREQUENCY}")
+        rate_hz = read_number(self.texts(device), *names, default=0.0)
+        return rate_hz if rate_hz > 0 else None
 
     def take(self) -> Samples:
         """Return the samples since the last `take`."""
@@ -150,11 +150,11 @@ class IioDecoder:
 
     def forget(self) -> None:
         """Forget all samples."""
-        self._given = []
+        self._samples = []
 
     def recording(self) -> Recording:
         """Return all samples."""
-        samples = Samples.joined(self._given)
+        samples = Samples.joined(self._samples)
         return Recording(**vars(samples), sensor=self.sensor, name=self._name)
 
     def _has(self, device: str, kind: str) -> bool:
@@ -174,25 +174,31 @@ class IioDecoder:
             accel_offsets=self._calibbias(texts),
         )
 
-    def _layout(self, held: _DeviceState) -> FrameLayout | None:
-        device = next(name for name, one in self._devices.items() if one is held)
-        enabled = [e for e in self.elements(device).values() if held.texts.get(f"scan_elements/{e.name}_en") == "1"]
-        return FrameLayout(enabled) if enabled else None
-
-    def _begin(self) -> None:
-        """Begin the streams of frames: one if a device has both sensors, else two."""
-        devices = list(dict.fromkeys((self.scale(ACCEL)[0], self.scale(GYRO)[0])))
-        self._start({device: 4 * (2 if len(devices) == 1 else 1) for device in devices})
+    def _start_buffer(self, device: str) -> FrameLayout:
+        """Start the streams of frames, one if a device has both sensors, else two, and return the device's layout."""
+        devices = {kind: self.scale(kind)[0] for kind in (ACCEL, GYRO)}
+        texts, channels = self.texts(device), self.elements(device)
+        enabled = {name: each for name, each in channels.items() if texts.get(f"scan_elements/{name}_en") == "1"}
+        needed = [f"{kind}_{axis}" for kind, of in devices.items() if of == device for axis in AXES]
+        missing = {*needed, TIMESTAMP} - set(enabled)
+        if missing:
+            raise ChipError(
+                f"the buffer of {device} has no {min(missing)}", "use --trigger none, which polls, and record again"
+            )
+        self._start({of: 8 // len(set(devices.values())) for of in devices.values()})
+        return FrameLayout(enabled.values())
 
     def _start(self, widths: dict[str, int]) -> None:
         # The attributes apply from here on; at the end the driver restores the old ones.
         self._scales = {}
-        self._settled = self._describe_sensor()
+        self._sensor = self._describe_sensor()
         self._streams = {name: i for i, name in enumerate(widths)}
         self._aligned = StreamAligner(list(widths.values()))
         accel, gyro = (mount_matrix(self.texts(self.scale(kind)[0]), kind) for kind in (ACCEL, GYRO))
-        self._turn = None if np.array_equal(accel, gyro) else np.asarray(np.linalg.solve(accel, gyro), np.float64)
-        self._last_ns, self._broken = None, bool(self._given)
+        self._gyro_to_accel = (
+            None if np.array_equal(accel, gyro) else np.asarray(np.linalg.solve(accel, gyro), np.float64)
+        )
+        self._last_ns, self._gap_next = None, bool(self._samples)
 
     def _add_frames(self, device: str, data: bytes, t_ns: int) -> None:
         held = self._devices.get(device)
@@ -218,14 +224,14 @@ class IioDecoder:
         """Add a polled count of one channel, which has its own time."""
         if channel == TEMP:
             device = next(d for d in self._devices if f"{TEMP}_raw" in self.texts(d))
-            self._set_temperature(device, float(text))
+            self._set_temperature(device, parse_number(channel, text))
             return
         names = [f"{kind}_{axis}" for kind in (ACCEL, GYRO) for axis in AXES]
         if self._aligned is None or channel not in self._streams:
             self._start(dict.fromkeys(names, 2))
         if self._aligned is not None and channel in self._streams:
             scales = self.scale(channel[:-2])[1]
-            count = np.array([[float(text)]])
+            count = np.array([[parse_number(channel, text)]])
             self._aligned.add(
                 self._streams[channel], np.array([t_ns]), np.hstack((count, scales.clipped(count)[:, None]))
             )
@@ -249,7 +255,7 @@ class IioDecoder:
         samples = Samples(
             np.asarray(t_ns * NS, np.float64),
             (counts[:, :3] + accel.offset) * accel.scale,
-            rates if self._turn is None else rates @ self._turn.T,
+            rates if self._gyro_to_accel is None else rates @ self._gyro_to_accel.T,
             np.full(len(t_ns), self._temperature),
             self._gaps(t_ns),
             values[:, 3] > 0,
@@ -257,23 +263,23 @@ class IioDecoder:
         )
         self._last_ns = int(t_ns[-1])
         self.gaps += int(samples.gap.sum())
-        self._given.append(samples)
+        self._samples.append(samples)
         self._new.append(samples)
 
     def _gaps(self, t_ns: Times) -> np.ndarray:
         """Return (n,) True where the buffer dropped samples; polling has no fixed interval."""
-        rate_hz = self._settled.rate_hz
+        rate_hz = self._sensor.rate_hz
         steps = np.diff(t_ns, prepend=t_ns[0] if self._last_ns is None else self._last_ns)
         longest_ns = math.inf if rate_hz is None or len(self._streams) > 2 else GAP_INTERVALS * 1e9 / rate_hz
         gaps = np.asarray(steps > longest_ns)
-        gaps[0] |= self._broken
-        self._broken = False
+        gaps[0] |= self._gap_next
+        self._gap_next = False
         return gaps
 
     def _set_temperature(self, device: str, count: float) -> None:
         texts = self.texts(device)
-        scale, offset = (float(texts.get(f"{TEMP}_{what}", usual)) for what, usual in (("scale", "1"), ("offset", "0")))
-        self._temperature = (count + offset) * scale / 1000
+        scale = read_number(texts, f"{TEMP}_scale", default=1.0)
+        self._temperature = (count + read_number(texts, f"{TEMP}_offset", default=0.0)) * scale / 1000
 
     def _calibbias(self, texts: dict[str, str]) -> tuple[int, int, int] | None:
         words = [texts.get(f"{ACCEL}_{axis}_calibbias", "") for axis in AXES]

@@ -20,12 +20,10 @@ from .setup import DeviceAttributes, set_up
 
 # The driver gives up after so long without a sample.
 DEAD_NS = 2_000_000_000
-# Most bytes of one read from a buffer.
-READ_BYTES = 65536
 # The die's temperature changes slowly.
 TEMPERATURE_NS = 1_000_000_000
 
-REGISTER_0 = (
+NO_INTERRUPT_HINT = (
     "it waits for interrupts that do not come: check the chip's INT wire and its line in the device tree. For an"
     " MPU-6050 the driver of Linux 6.1 reads register 0 as the interrupt's status, and drops samples while its bit 0"
     " is 0: use --trigger none, which polls, or unbind the driver and use --bus"
@@ -117,7 +115,7 @@ class IioDriver:
         try:
             if self._buffered:
                 for each in self._each:
-                    each.read_frames(READ_BYTES)
+                    each.read_frames()
             else:
                 self._read_channels()
         except NoAnswer:
@@ -127,7 +125,9 @@ class IioDriver:
         samples = self._decoder.take()
         self._fruitless_ns = 0 if len(samples) else self._fruitless_ns + self.now_ns() - begun_ns
         if self._fruitless_ns > DEAD_NS:
-            raise trouble or ChipError(f"the buffer of {' and '.join(self._devices.each)} stays empty", REGISTER_0)
+            raise trouble or ChipError(
+                f"the buffer of {' and '.join(self._devices.each)} stays empty", NO_INTERRUPT_HINT
+            )
         return samples
 
     def recording(self) -> Recording:

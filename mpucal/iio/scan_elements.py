@@ -48,21 +48,16 @@ class ScanElement:
         ChipError : another form of text.
         """
         found = TYPE.fullmatch(text.strip())
-        if found is None or not index.strip().isdecimal():
-            raise ChipError(
-                f"the driver describes the storage of {name} as {text.strip()!r}, which is unknown",
-                "report it with the kernel's version",
-            )
-        order, sign, bits, stored, repeat, shift = found.groups()
-        return cls(
-            name,
-            int(index),
-            "<" if order == "le" else ">",
-            sign == "s",
-            int(bits),
-            int(stored) // 8,
-            int(shift),
-            int(repeat or 1),
+        if found is not None and index.strip().isdecimal():
+            order, sign = found.group(1, 2)
+            bits, stored, repeat, shift = (int(digits or 1) for digits in found.group(3, 4, 5, 6))
+            if 0 < bits <= stored - shift and repeat > 0:
+                return cls(
+                    name, int(index), "<" if order == "le" else ">", sign == "s", bits, stored // 8, shift, repeat
+                )
+        raise ChipError(
+            f"the driver describes the storage of {name} as {text.strip()!r}, which is unknown",
+            "report it with the kernel's version",
         )
 
     @property

@@ -11,7 +11,10 @@ from ..errors import BusError, ChipError, NoAnswer
 from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, full_scale, parse_available
 from .decode import ENABLE, FREQUENCY, IioDecoder
 
-TEXT_BYTES, LIST_BYTES, FIRST_BYTES = 4096, 65536, 65536
+# Most bytes of one attribute, and of a list of names.
+TEXT_BYTES, LIST_BYTES = 4096, 65536
+# Most bytes of one read from a buffer.
+FRAMES_BYTES = 65536
 TRIGGER, CLOCK, LENGTH, WATERMARK = (
     "trigger/current_trigger",
     "current_timestamp_clock",
@@ -21,8 +24,10 @@ TRIGGER, CLOCK, LENGTH, WATERMARK = (
 TRIGGERS = "triggers"
 # Value of --trigger: poll without a buffer.
 POLLED = "none"
-HELD_S = 2.0
-READ = (
+# Time that the kernel's buffer holds.
+BUFFER_S = 2.0
+# Ends of the names of the attributes that the driver reads.
+READ_SUFFIXES = (
     "name",
     "mount_matrix",
     "_matrix",
@@ -35,7 +40,8 @@ READ = (
     "_index",
     "_en",
 )
-WITHIN = 1.01
+# Drivers round their scales.
+RANGE_TOLERANCE = 1.01
 
 
 class DeviceAttributes:
@@ -69,7 +75,7 @@ class DeviceAttributes:
                 )
         foreign = tuple(f"{kind}_" for kind in (ACCEL, GYRO) if kind not in kinds)
         for name in sorted(self.names):
-            if name.endswith(READ) and not name.startswith(foreign):
+            if name.endswith(READ_SUFFIXES) and not name.startswith(foreign):
                 self._try_to_read(name)
 
     def _try_to_read(self, name: str) -> None:
@@ -85,9 +91,9 @@ class DeviceAttributes:
         """Read the text of an attribute; "": the list of all names."""
         return self._bytes(f"{self.device}/{name}", count).decode(errors="replace").strip()
 
-    def read_frames(self, count: int) -> int:
-        """Read up to `count` bytes from the buffer, and return their number."""
-        return len(self._bytes(self.device, count))
+    def read_frames(self) -> None:
+        """Read what the buffer holds, up to FRAMES_BYTES."""
+        self._bytes(self.device, FRAMES_BYTES)
 
     def triggers(self) -> list[str]:
         """Read the names of all triggers."""
@@ -153,12 +159,12 @@ def set_up(
         attributes.set(CLOCK, "monotonic")
     _enable_channels(attributes, kinds)
     rate_hz = decoder.rate_hz(attributes.device) or config.rate_hz
-    attributes.set(LENGTH, str(round(HELD_S * rate_hz)))
+    attributes.set(LENGTH, str(round(BUFFER_S * rate_hz)))
     if WATERMARK in names:
         attributes.set(WATERMARK, str(max(1, round(config.period_s * rate_hz))))
     attributes.set(ENABLE, "1")
     # A first read reports another program that has the buffer open.
-    attributes.read_frames(FIRST_BYTES)
+    attributes.read_frames()
     return True
 
 
@@ -182,7 +188,7 @@ def _set_scales(attributes: DeviceAttributes, kinds: Sequence[str], config: Conf
             continue
         texts = attributes.read(f"{name}_available").split()
         ranges = {text: full_scale(kind, scale, bits) for text in texts for scale in parse_available(text)}
-        enough = {text: value for text, value in ranges.items() if value * WITHIN >= wanted[kind]}
+        enough = {text: value for text, value in ranges.items() if value * RANGE_TOLERANCE >= wanted[kind]}
         if ranges:
             attributes.set(name, min(enough, key=enough.__getitem__) if enough else max(ranges, key=ranges.__getitem__))
 

@@ -46,8 +46,9 @@ def test_each_way_to_store_a_count(text, stored, value):
 
 
 def test_what_is_no_type_and_what_is_no_frame_says_so():
-    with pytest.raises(ChipError, match="storage of in_accel_x as"):
-        element("in_accel_x", 0, "s16/16>>0")
+    for text in ("s16/16>>0", "le:s0/16>>0", "le:s16/16>>4", "le:s16/16X0>>0"):
+        with pytest.raises(ChipError, match="storage of in_accel_x as"):
+            element("in_accel_x", 0, text)
     with pytest.raises(ChipError, match="5 bytes, but a frame has 2"):
         FrameLayout([element("in_accel_x", 0, "le:s16/16>>0")]).columns(bytes(5))
 

@@ -4,14 +4,19 @@ import errno
 import os
 import struct
 import time
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mpucal.chip.access import Transaction
 from mpucal.chip.config import Config
-from mpucal.errors import BusError, ChipError, NoAnswer, UsageError
+from mpucal.errors import BusError, ChipError, MpucalError, NoAnswer, UsageError
 from mpucal.iio import decode
+from mpucal.iio.decode import IioDecoder
 from mpucal.iio.devices import Devices
 from mpucal.iio.driver import IioDriver
 from mpucal.session.events import Prompt, PromptKind
@@ -200,6 +205,50 @@ def test_errors_of_the_start_are_one_sentence(spoil, kind, says):
     spoil(files)
     with pytest.raises((BusError, ChipError), match=says):
         run(files, BOTH, **kind)
+
+
+@pytest.fixture(scope="module", params=[None, "none"])
+def accesses(request):
+    """Records the accesses of a driver with a buffer, and of one that polls."""
+    found, feed = [], IioDecoder.feed
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(IioDecoder, "feed", lambda self, access: (found.append(access), feed(self, access))[1])
+        run(simulated(), BOTH, 0.3, trigger=request.param)
+    return found
+
+
+ODD_TEXTS = [b"", b"abc", b"nan", b"-1", b"0", b"1e400", b"0,0,0;0,0,0;0,0,0", b"le:s0/16>>0", b"be:s16/16>>0", b"\xff"]
+
+
+@given(data=st.data())
+def test_damaged_accesses_are_decoded_or_reported(accesses, data):
+    damaged = list(accesses)
+    for _ in range(data.draw(st.integers(1, 2))):
+        i = data.draw(st.sampled_from([i for i, access in enumerate(damaged) if "/" in access.register]))
+        text = data.draw(st.sampled_from([*ODD_TEXTS, None]))
+        damaged[i : i + 1] = [] if text is None else [replace(damaged[i], data=text)]
+    with suppress(MpucalError):
+        decode.decode(damaged)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("sampling_frequency", "fast", "sampling_frequency is 'fast', which is not a number"),
+        ("in_mount_matrix", "0,0,0;0,0,0;0,0,0", "which is not a mount matrix"),
+        ("scan_elements/in_accel_y_en", "0", "the buffer of iio:device0 has no in_accel_y"),
+    ],
+)
+def test_accesses_that_mean_no_samples_are_reported(name, text, says):
+    feed = IioDecoder("recording").feed
+    buffer = {f"scan_elements/{c}_type": "be:s16/16>>0" for c in [*CHANNELS, "in_timestamp"]}
+    buffer |= {f"scan_elements/{c}_index": str(i) for i, c in enumerate([*CHANNELS, "in_timestamp"])}
+    buffer |= {f"scan_elements/{c}_en": "1" for c in [*CHANNELS, "in_timestamp"]}
+    texts = {"name": "mpu6050", "in_accel_scale": "0.000598", "in_anglvel_scale": "0.000266181", **buffer, name: text}
+    for each, value in texts.items():
+        feed(Transaction("read", f"iio:device0/{each}", 4096, value.encode(), 0))
+    with pytest.raises(ChipError, match=says):
+        feed(Transaction("write", "iio:device0/buffer/enable", 1, b"1", 0))
 
 
 def test_an_attribute_that_a_driver_does_not_answer_is_left_out(monkeypatch):
