@@ -97,10 +97,13 @@ def _losses(recording: Recording, asked_s: float) -> Finding:
     gaps, seconds = int(recording.gap.sum()), float(recording.t[-1] - recording.t[0])
     data = {"samples": len(recording), "seconds": seconds, "gaps": gaps}
     samples = f"{len(recording)} samples in {seconds:.1f} s"
-    complete = not gaps and seconds > asked_s - ENDS_S
-    gapped = f"{gaps} gap{'' if gaps == 1 else 's'} in {samples}; {asked_s:g} s were expected"
-    remedy = "shorten the wires, check connectors and supply, or slow the bus down"
-    return Finding.check("losses", complete, f"none of {samples}" if complete else gapped, remedy, data, Mark.BAD)
+    if gaps:
+        remedy = "shorten the wires, check connectors and supply, or slow the bus down"
+        return Finding("losses", Mark.BAD, f"{gaps} gap{'' if gaps == 1 else 's'} in {samples}", remedy, data)
+    complete = seconds > asked_s - ENDS_S
+    late = "" if complete else f", though {asked_s:g} s were asked for"
+    remedy = "the samples began late: close other programs on this computer, and measure again"
+    return Finding.check("losses", complete, f"none of {samples}{late}", remedy, data)
 
 
 def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str) -> Finding:

@@ -12,7 +12,7 @@ from ..result.calibration import Calibration
 from ..result.correction import make_correction
 from . import drift
 from .hypotheses import NOTHING, Comparison, compare_hypotheses, estimate, p_value
-from .observed import Observations, apply_errors, observe
+from .observed import NOISE, Observations, apply_errors, observe
 from .outcome import (
     ANOTHER_SENSOR,
     CANNOT_BE_TOLD,
@@ -46,8 +46,8 @@ def check(calibration: Calibration, recording: Recording, days: float | None = N
 
     The prior is the calibration's own uncertainty and the ageing of unchanged sensors. The rests of the recording, and
     the turns between them, are the evidence for a change of the bias, of the scale factors, of the mount, of the
-    gyroscope or of the temperature, or for another sensor. A sensor that did not change is called changed in 1 of 100
-    checks.
+    gyroscope, of the noise or of the temperature, or for another sensor. A sensor that did not change is called changed
+    in 1 of 100 checks.
 
     Parameters
     ----------
@@ -159,6 +159,11 @@ def _describe_change(result: CheckResult) -> CheckResult:
         case "mount":
             message = f"the accelerometer has turned against the gyroscope by {changes['mount'].text()} deg{also}"
             remedy = ANEW
+        case "noise":
+            accelerometer, gyroscope = np.exp(np.zeros(2) if result.theta is None else result.theta[NOISE])
+            times = f"{accelerometer:.2g} times on the accelerometer, {gyroscope:.2g} times on the gyroscope"
+            message = f"the noise at rest is not the calibration's: {times}{also}"
+            remedy = f"check supply, wiring and filter bandwidth; if the table shook, {AGAIN}"
         case what:
             change = changes[what]
             message = f"{what} {change.text()} {change.unit}{also}{by_T}"

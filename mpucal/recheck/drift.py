@@ -1,6 +1,6 @@
 """Prior covariances of a calibration's errors theta: its own uncertainty, ageing, and each hypothesis of a change.
 
-All are covariances (21, 21) of theta (see `observed`), from standard deviations of independent parts. Sources: zero-g
+All are covariances (23, 23) of theta (see `observed`), from standard deviations of independent parts. Sources: zero-g
 level, sensitivity and zero-rate output over temperature and at 25 degrees Celsius of PS-MPU-6000A r3.4 and PS-MPU-6500A
 r1.0, section 3.1 and 3.2. No data sheet of these chips states ageing. Its figures here were measured on one phone's
 sensor from session to session, 1.3 to 2.2 mg with its temperature unknown, and on this program's simulated sensors.
@@ -18,7 +18,7 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
 from ..result.correlation import standard_deviations
-from .observed import BETA, DELTA, PARAMETERS, UPPER, E, G
+from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, UPPER, E, G
 
 MG = 1e-3 * STANDARD_GRAVITY_MPS2
 DEG = math.pi / 180.0
@@ -29,7 +29,7 @@ class Spread:
     """Standard deviations of the parts of theta.
 
     bias : m/s^2. scale, skew : of E, on and off the diagonal, symmetric. turn : rad, of the accelerometer's mount.
-    gyro_bias : rad/s. gyro_scale, gyro_skew : of G.
+    gyro_bias : rad/s. gyro_scale, gyro_skew : of G. noise : of the logarithms of noise.
     """
 
     bias: float = 0.0
@@ -39,9 +39,10 @@ class Spread:
     gyro_bias: float = 0.0
     gyro_scale: float = 0.0
     gyro_skew: float = 0.0
+    noise: float = 0.0
 
     def covariance(self) -> Vector:
-        """Return the covariance (21, 21) of theta."""
+        """Return the covariance (23, 23) of theta."""
         P = np.zeros((PARAMETERS, PARAMETERS))
         P[:9, :9] = np.diag(np.eye(3).ravel()) * self.scale**2
         for i, j in ((0, 1), (0, 2), (1, 2)):
@@ -52,11 +53,12 @@ class Spread:
         P[BETA, BETA] = np.eye(3) * self.bias**2
         P[G, G] = np.diag(np.where(UPPER[0] == UPPER[1], self.gyro_scale, self.gyro_skew) ** 2)
         P[DELTA, DELTA] = np.eye(3) * self.gyro_bias**2
+        P[NOISE, NOISE] = np.eye(2) * self.noise**2
         return P
 
 
 # Repeatability over a power cycle and the first hours.
-REPEATED = Spread(0.7 * MG, 3e-4, 2e-4, 0.02 * DEG, 0.3 * DEG, 5e-4, 3e-4)
+REPEATED = Spread(0.7 * MG, 3e-4, 2e-4, 0.02 * DEG, 0.3 * DEG, 5e-4, 3e-4, noise=0.15)
 # Random walk of the bias: m/s^2 in the root of a day, and its limit.
 WALK_MPS2, WALK_MOST_MPS2 = 0.1 * MG, 2.0 * MG
 # Standard deviation of a change of temperature that is not known.
@@ -84,6 +86,7 @@ HYPOTHESES: Mapping[str, tuple[float, Spread]] = MappingProxyType(
         "gyroscope's bias": (0.1, Spread(gyro_bias=5.0 * DEG)),
         "gyroscope's scale": (0.05, Spread(gyro_scale=0.02, gyro_skew=0.01)),
         "another sensor": (0.2, Spread(100.0 * MG, 0.02, 0.01, 1.5 * DEG, 10.0 * DEG, 0.015, 0.012)),
+        "noise": (0.1, Spread(noise=1.0)),
     }
 )
 TEMPERATURE, TEMPERATURE_PRIOR = "temperature", 0.5
@@ -96,9 +99,11 @@ def own_uncertainty(calibration: Calibration) -> Vector:
     spread[E] = np.where(np.eye(3, dtype=bool), TOLERANCE.scale, TOLERANCE.skew).ravel()
     if calibration.fit.get("model") in ("accel", "paper"):
         spread[G] = PERFECT_GYRO
-    std = standard_deviations(vars(calibration))
+    std, correlation = np.full(PARAMETERS, np.nan), np.eye(PARAMETERS)
+    std[:CALIBRATED] = standard_deviations(vars(calibration))
+    correlation[:CALIBRATED, :CALIBRATED] = calibration.correlation
     known = np.isfinite(std)
-    rho = np.where(np.outer(known, known), calibration.correlation, np.eye(PARAMETERS))
+    rho = np.where(np.outer(known, known), correlation, np.eye(PARAMETERS))
     # Rounded correlations may have negative eigenvalues, which no covariance has.
     values, vectors = np.linalg.eigh(rho)
     root = to_theta(calibration) @ (np.where(known, std, spread)[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
@@ -106,7 +111,7 @@ def own_uncertainty(calibration: Calibration) -> Vector:
 
 
 def to_theta(calibration: Calibration) -> Vector:
-    """Return the matrix (21, 21) from errors of D, b_a, K, b_omega, as in `mpucal.result.correlation`, to theta."""
+    """Return the matrix (23, 23) from errors of D, b_a, K, b_omega, as in `mpucal.result.correlation`, to theta."""
     A, M = calibration.inverse, np.eye(PARAMETERS)
     M[E, E], M[BETA, BETA] = np.kron(A, np.eye(3)), A
     return M
@@ -135,7 +140,7 @@ def temperature_covariance(calibration: Calibration, change_c: float) -> Vector:
 
 
 def hypotheses(calibration: Calibration, change_c: float | None) -> dict[str, tuple[float, Vector]]:
-    """Return the prior probability of each hypothesis and the covariance (21, 21) that it adds to theta."""
+    """Return the prior probability of each hypothesis and the covariance (23, 23) that it adds to theta."""
     all_ = {name: (prior, spread.covariance()) for name, (prior, spread) in HYPOTHESES.items()}
     if change_c is not None and abs(change_c) >= LEAST_C:
         all_[TEMPERATURE] = TEMPERATURE_PRIOR, temperature_covariance(calibration, change_c)

@@ -44,7 +44,7 @@ def compare_hypotheses(
 
     Parameters
     ----------
-    nothing : (21, 21) covariance of theta of an unchanged sensor.
+    nothing : (23, 23) covariance of theta of an unchanged sensor.
     hypotheses : the prior probability of each, and the covariance that it adds.
     """
     J, R, r = observed.J, observed.R, observed.r
@@ -61,7 +61,7 @@ def compare_hypotheses(
 
 
 def estimate(observed: Observations, P: Vector) -> tuple[Vector, Vector]:
-    """Return mean (21,) and covariance (21, 21) of theta given the observations and its prior covariance P."""
+    """Return mean (23,) and covariance (23, 23) of theta given the observations and its prior covariance P."""
     J = observed.J
     gain = np.linalg.solve(J @ P @ J.T + observed.R, J @ P).T
     return gain @ observed.r, P - gain @ J @ P
@@ -80,6 +80,8 @@ def _log_odds(rows: Vector, W: Vector, prior: float, added: Vector) -> Vector:
     values, vectors = np.linalg.eigh(added)
     used = values > 1e-15 * values.max()
     V = W @ (vectors[:, used] * np.sqrt(values[used]))
+    if not V.any():  # the observations say nothing of it
+        return np.full(len(rows), -math.inf)
     # S_h = I + V V^T
     inner = np.eye(V.shape[1]) + V.T @ V
     projected = rows @ V

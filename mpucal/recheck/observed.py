@@ -1,15 +1,16 @@
 """Residuals of a calibration in a recording of rests and turns, and their Jacobian: r = J theta + noise.
 
-The errors of a calibration are theta, 21 numbers in the body frame:
+The errors of a calibration are theta, 23 numbers, those of D, b_a, K and b_omega in the body frame:
 
     E (9)       the accelerometer's matrix is D (I + E), row-major
     beta (3)    its bias is b_a + D beta [m/s^2]
     G (6)       the gyroscope's matrix is (I + G) K, symmetric: xx, xy, xz, yy, yz, zz
     delta (3)   its bias is b_omega + delta [rad/s]
+    nu (2)      noise of the accelerometer and of the gyroscope, times e^nu
 
 A rest's calibrated mean is then a = s + E s + beta + noise, with s gravity's reaction. The residuals r are: |a| - g of
-each rest; the angle between a and gravity as carried by the gyroscope from the rest before; and the mean rate of the
-first rest.
+each rest; the angle between a and gravity as carried by the gyroscope from the rest before; the mean rate of the first
+rest; and the logarithm of its noise, relative to the calibration's, unless a hand or a table shook it.
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration
 
-PARAMETERS = 21
-E, BETA, G, DELTA = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21)
+E, BETA, G, DELTA, NOISE = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21), slice(21, 23)
+# A calibration states a covariance of the first 21.
+CALIBRATED, PARAMETERS = DELTA.stop, NOISE.stop
 UPPER = np.triu_indices(3)
 # Standard deviation of a turn, relative to its angle, by the gyroscope's nonlinearity (PS-MPU-6000A r3.4, section 6.1:
 # 0.2 % of full scale).
@@ -38,6 +40,10 @@ NONLINEAR = 0.001
 BLOCKS = 4
 # A rest has few blocks: the mean variance of the others counts as so many degrees of freedom more.
 POOLED = 6.0
+# Noise averages out in a mean over so long; means of a board that is shaken vary more, by this factor.
+SHAKEN_S, SHAKEN = 0.1, 4.0
+# Samples of a filtered stream are worth at least this share of independent ones.
+INDEPENDENT = 0.2
 # Orientations nearer to one another count as one.
 APART_RAD = math.radians(20.0)
 
@@ -48,7 +54,7 @@ class Observations:
 
     Attributes
     ----------
-    r : (m,) m/s^2 of magnitudes, rad of angles, rad/s of the rate. J : (m, 21). R : (m, m).
+    r : (m,) m/s^2 of magnitudes, rad of angles, rad/s of the rate, logarithms of noise. J : (m, 23). R : (m, m).
     down : (k, 3) unit vectors, calibrated: the direction that pointed down in each rest.
     temperature_c : mean of the chip's; None where it is not known. seconds : length of the recording.
     """
@@ -71,16 +77,19 @@ class Observations:
 
 
 def apply_errors(calibration: Calibration, theta: Vector) -> Calibration:
-    """Return the calibration of a sensor whose errors are theta (21,)."""
+    """Return the calibration of a sensor whose errors are theta (23,)."""
     twist = np.zeros((3, 3))
     twist[UPPER] = theta[G]
     twist += np.triu(twist, 1).T
+    noise = np.exp(theta[NOISE])
     return replace(
         calibration,
         D=calibration.D @ (np.eye(3) + theta[E].reshape(3, 3)),
         b_a=calibration.b_a + calibration.D @ theta[BETA],
         K=(np.eye(3) + twist) @ calibration.K,
         b_omega=calibration.b_omega + theta[DELTA],
+        noise_std=noise[0] * calibration.noise_std,
+        gyro_noise_std=noise[1] * calibration.gyro_noise_std,
     )
 
 
@@ -105,6 +114,7 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
     turns = (_Residuals.direction(rests, k, flat, calibration) for k in range(1, len(runs)))
     parts += [turn for turn in turns if turn is not None]
     parts.append(_Residuals.rate(recording, runs[0].tolist(), flat, calibration, len(runs)))
+    parts.append(_Residuals.noise(recording, flat, calibration, len(runs)))
     J_rests = np.vstack([part.J_rests for part in parts])
     J = np.vstack([part.J_theta for part in parts])
     J[:, : BETA.stop] += J_rests @ np.vstack([accelerometer_jacobian(a) for a in rests.a])
@@ -192,6 +202,30 @@ class _Residuals:
         r = gyr.mean(0) - calibration.b_omega
         known = np.isfinite(r)
         return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), J_theta[known], variance[known])
+
+    @classmethod
+    def noise(cls, recording: Recording, flat: Flat, calibration: Calibration, rests: int) -> _Residuals:
+        """Return the logarithms of both sensors' noise, relative to the calibration's, as far as they are known."""
+        J_theta = np.zeros((2, PARAMETERS))
+        J_theta[:, NOISE] = np.eye(2)
+        r = np.full(2, np.nan)
+        pairs = (recording.acc, calibration.noise_std), (recording.gyr, calibration.gyro_noise_std)
+        # Another rate has another bandwidth, and thereby other noise.
+        same_rate = calibration.sensor.rate_hz == recording.sensor.rate_hz is not None
+        for k, (values, then) in enumerate(pairs):
+            now = values[flat.first : flat.last]
+            if same_rate and not _is_shaken(now, recording.rate_hz):
+                r[k] = float(np.log(now.std(0) / then).mean())
+        known = np.isfinite(r)
+        variance = np.full(2, 1.0 / (6.0 * INDEPENDENT * flat.n))
+        return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), J_theta[known], variance[known])
+
+
+def _is_shaken(values: Vector, rate_hz: float) -> bool:
+    """Return True if means over 0.1 s of values (n, 3) vary by more than noise does."""
+    n = max(round(SHAKEN_S * rate_hz), 1)
+    blocks = values[: len(values) // n * n].reshape(-1, n, 3).mean(1)
+    return bool((n * blocks.var(0) > SHAKEN * values.var(0)).any())
 
 
 def accelerometer_jacobian(a: Vector) -> Vector:

@@ -52,7 +52,7 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
     Attributes
     ----------
     verdict : still good, drifted, remounted, another sensor, or cannot be told.
-    what : nothing, bias, scale, mount, gyroscope's bias, gyroscope's scale, temperature or another sensor.
+    what : nothing, bias, scale, mount, gyroscope's bias, gyroscope's scale, temperature, noise or another sensor.
     message : the verdict in a sentence. remedy : what to do next; empty if nothing is to be done.
     changes : by name (bias, scale, mount, gyroscope's bias, gyroscope's scale), estimated for this hypothesis.
     or_also : hypotheses that explain the observations nearly as well.
@@ -61,7 +61,7 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
     temperature_change_c : since the calibration; None: not known. temperature_explains : True if that explains the
         observations, by b_a(T) or the data sheet; None where it is not known or nothing changed.
     orientations : number of orientations seen, 20 deg apart. seconds : length of the recording.
-    theta : (21,), covariance : (21, 21), the estimate, see `mpucal.recheck.observed`; None: there is none.
+    theta : (23,), covariance : (23, 23), the estimate, see `mpucal.recheck.observed`; None: there is none.
     """
 
     verdict: Verdict
@@ -114,7 +114,7 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
 
 
 def changes_of(calibration: Calibration, theta: Vector, covariance: Vector) -> dict[str, Change]:
-    """Return the changes by theta (21,) and its covariance: bias [mg], scale factors [%], mount [deg], ..."""
+    """Return the changes by theta (23,) and its covariance: bias [mg], scale factors [%], mount [deg], ..."""
     D, degrees = calibration.D, float(np.degrees(1.0))
     to_turn = np.zeros((3, 9))
     for axis, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):

@@ -13,7 +13,7 @@ from ..result.calibration import Calibration
 from ..result.correction import make_correction
 from ..result.correlation import NAMES, correlation_of, standard_deviations
 from .drift import to_theta
-from .observed import BETA, DELTA, apply_errors
+from .observed import BETA, CALIBRATED, DELTA, apply_errors
 from .outcome import CheckResult
 
 HISTORY = "updated_from"
@@ -42,7 +42,7 @@ def update_biases(calibration: Calibration, result: CheckResult, recording: Reco
     T_0, change_c = ready.sensor.temperature_c, result.temperature_change_c
     T = T_0 if T_0 is None or change_c is None or ready.follows_temperature else T_0 + change_c
     errors = np.linalg.inv(to_theta(ready))
-    covariance = errors @ result.covariance @ errors.T
+    covariance = (errors @ result.covariance @ errors.T)[:CALIBRATED, :CALIBRATED]
     new = replace(
         ready,
         b_a=after.b_a,

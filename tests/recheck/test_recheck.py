@@ -12,7 +12,7 @@ from mpucal.data import Sensor
 from mpucal.errors import RefusedError
 from mpucal.recheck import drift
 from mpucal.recheck.hypotheses import NOTHING, compare_hypotheses
-from mpucal.recheck.observed import apply_errors, observe
+from mpucal.recheck.observed import CALIBRATED, PARAMETERS, apply_errors, observe
 from mpucal.recheck.update import update_biases
 from mpucal.recheck.watch import LEAST_RESTS, RESTS, DriftMonitor
 from mpucal.result.correlation import NAMES
@@ -41,6 +41,14 @@ def shown(truth, seed=7, temperature_c=25.0):
     return replace(recording, flat=None, temperature_c=np.full(len(recording), temperature_c))
 
 
+def noisier(factor, sensor="acc", seed=7):
+    """Return a recording of the unchanged sensor with so many times its noise."""
+    recording = shown(TRUTH, seed)
+    std = getattr(recording, sensor)[:500].std(0)
+    extra = np.random.default_rng(seed).normal(0.0, np.sqrt(factor**2 - 1.0) * std, (len(recording), 3))
+    return replace(recording, **{sensor: getattr(recording, sensor) + extra})
+
+
 HAPPENED = {
     "nothing": (TRUTH, "still good", "nothing"),
     "bias": (replace(TRUTH, b_a=TRUTH.b_a + TEN_MG), "drifted", "bias"),
@@ -57,6 +65,31 @@ def test_a_check_names_the_change(name):
     result = mpucal.check(CALIBRATION, shown(truth), days=1.0)
     assert (result.verdict, result.what) == (verdict, what)
     assert verdict in result.page().lower()
+
+
+@pytest.mark.parametrize(("sensor", "words"), [("acc", "3 times on the accelerometer"), ("gyr", "3.1 times on the gyro")])
+def test_noise_that_grew_is_named(sensor, words):
+    quiet = shown(TRUTH, seed=6)
+    known = replace(
+        CALIBRATION,
+        noise_std=quiet.acc[:500].std(0),
+        gyro_noise_std=quiet.gyr[:500].std(0),
+        sensor=replace(CALIBRATION.sensor, rate_hz=quiet.sensor.rate_hz),
+    )
+    assert mpucal.check(known, shown(TRUTH), days=1.0).what == "nothing"
+    assert mpucal.check(known, noisier(1.2, sensor), days=1.0).what == "nothing"
+    told = mpucal.check(known, noisier(3.0, sensor), days=1.0)
+    assert (told.verdict, told.what) == ("drifted", "noise")
+    assert words in told.message
+    assert not told.only_biases
+
+
+def test_a_hand_that_trembles_on_the_first_rest_is_no_noise():
+    recording = shown(TRUTH)
+    sensor = replace(CALIBRATION.sensor, rate_hz=recording.sensor.rate_hz)
+    known = replace(CALIBRATION, noise_std=np.full(3, 0.02), gyro_noise_std=np.full(3, 1e-3), sensor=sensor)
+    tremble = 0.1 * np.sin(2.0 * np.pi * 4.0 * recording.t)[:, None]
+    assert mpucal.check(known, replace(recording, acc=recording.acc + tremble), days=1.0).what != "noise"
 
 
 def test_a_new_bias_is_estimated_and_its_history_kept():
@@ -122,12 +155,12 @@ def test_another_chip_is_recognised_by_who_am_i_and_factory_trim():
 
 def test_the_prior_is_the_covariance_of_the_fit():
     recording = replace(hand_scenario(4, "pose9", rate_hz=50.0, truth_hz=400).recording, flat=None)
-    fit = mpucal.calibration.weigh(recording, "hand", GRAVITY_MPS2)[0].fit
+    fit = mpucal.calibration.estimate(recording, "hand", GRAVITY_MPS2)[0].fit
     calibration = mpucal.calibrate(recording, "hand", GRAVITY_MPS2)
     stored = mpucal.Calibration.from_document(calibration.document())
     names = [fit.names.index(name) for name in NAMES]
     covariance, to_errors = fit.covariance[np.ix_(names, names)], np.linalg.inv(drift.to_theta(stored))
-    prior = to_errors @ drift.own_uncertainty(stored) @ to_errors.T
+    prior = (to_errors @ drift.own_uncertainty(stored) @ to_errors.T)[:CALIBRATED, :CALIBRATED]
     std = np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(prior / np.outer(std, std), covariance / np.outer(std, std), atol=1e-4)
     assert np.abs(stored.correlation - np.eye(21)).max() > 0.1
@@ -137,8 +170,8 @@ def test_the_observations_are_linear_in_theta():
     rng = np.random.default_rng(0)
     recording = shown(TRUTH)
     before = observe(recording, CALIBRATION)
-    for i in range(21):
-        theta = np.zeros(21)
+    for i in range(CALIBRATED):
+        theta = np.zeros(PARAMETERS)
         theta[i] = 1e-4 * rng.choice([-1.0, 1.0])
         # A calibration that is wrong by theta sees a right sensor as wrong by -theta.
         after = observe(recording, apply_errors(CALIBRATION, -theta))
