@@ -1,4 +1,4 @@
-"""What tests of several rooms write."""
+"""Fixtures and settings of all tests."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """One more than there are processors: tests of bridges and browsers wait for most of their time."""
+    """Return one more than there are processors: tests of bridges and browsers wait for most of their time."""
     return (os.cpu_count() or 1) + 1
 
 

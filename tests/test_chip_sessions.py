@@ -72,7 +72,7 @@ def test_a_session_without_a_fifo_is_replayed_to_the_bit(tmp_path, capsys):
 
 
 def test_the_filters_of_a_6500_are_found_and_told():
-    """Its gyroscope is a millisecond later than its accelerometer, and the estimate is drawn towards that."""
+    """The gyroscope is a millisecond later than its accelerometer, and the estimate is drawn towards that."""
 
     def fitted(recording, **told):
         recording = replace(recording, sensor=replace(recording.sensor, **told))

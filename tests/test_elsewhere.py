@@ -1,4 +1,4 @@
-"""What differs on a machine that is no Linux: modules that are missing there, and a console with keys of its own."""
+"""Machines without Linux: modules that are missing there, and a console with keys of its own."""
 
 import io
 import subprocess

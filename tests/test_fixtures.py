@@ -1,4 +1,4 @@
-"""What lies in fixtures/: complete, small, and what the tool makes."""
+"""Files of fixtures/: complete, small, and equal to what the tool makes."""
 
 import json
 import sys

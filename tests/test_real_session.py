@@ -100,7 +100,7 @@ def session(capture):
 
 @pytest.fixture(scope="module")
 def by_accel(capture):
-    """The same by the model that knows no hand and trusts the gyroscope."""
+    """Result by the model that knows no hand and trusts the gyroscope."""
     return outcome(capture.parent / "accel", "calibrate", capture, "--model", "accel")
 
 
@@ -132,7 +132,7 @@ def test_the_gyroscope_carries_gravity_to_where_the_accelerometer_finds_it(sessi
 
 
 def test_what_no_pose_shows_is_not_claimed(session):
-    """None of its poses tilts x and y together: |a| alone knows nothing of how these two lean to each other."""
+    """No pose of it tilts x and y together, so |a| alone does not determine their cross-axis terms."""
     D_std = np.array(session.document["accelerometer"]["D_std"])
     assert D_std[0, 1] > 10 * D_std[0, 0]
     assert D_std[1, 0] > 10 * D_std[1, 1]
@@ -140,7 +140,7 @@ def test_what_no_pose_shows_is_not_claimed(session):
 
 
 def session_of(folder, recording, poll_s=SELDOM_S):
-    """The same way for another recording."""
+    """Run a session on a recording made a capture."""
     make_capture(recording, folder / "capture.mcap", 9.81, poll_s)
     return outcome(folder / "board", "session", "--replay", folder / "capture.mcap")
 
@@ -149,7 +149,7 @@ def session_of(folder, recording, poll_s=SELDOM_S):
     ("name", "most_deg"), [("mpu9150_a", 0.1), pytest.param("imucal_session", 0.15, marks=pytest.mark.slow)]
 )
 def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
-    """They lay flat for less than ten seconds; the MPU-9150s' show spikes to 74 m/s^2 where they were put down."""
+    """Recordings that lie flat for less than ten seconds; the MPU-9150s' show spikes to 74 m/s^2 where they were put down."""
     recording = RECORDINGS / f"{name}.npz"
     found = session_of(tmp_path, recording)
     assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")

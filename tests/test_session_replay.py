@@ -14,7 +14,7 @@ NAMES = sorted(path.stem for path in SESSIONS.glob("*.mcap"))
 
 
 class Outcome:
-    """What a session said, found and recorded."""
+    """Output, result and capture of a session."""
 
     def __init__(self, folder, out, err):
         events = [json.loads(line) for line in err.splitlines()]
@@ -46,7 +46,7 @@ def session(capsys, tmp_path, monkeypatch):
 
 
 def without_writing(said):
-    """All but the last decision, which names the files: a simulated session leaves its truth besides."""
+    """Return the events without the last decision, which names the files that a session leaves."""
     assert said[-1]["why"].startswith("wrote ")
     return said[:-1]
 
@@ -70,7 +70,7 @@ def test_a_stored_session_replays(session, name):
     ids=["mpu6500-hand", "clone98-accel"],
 )
 def test_a_replay_equals_its_session_to_the_last_bit(session, chip, model, name):
-    """That of an MPU-6050 is in tests/cli/test_session.py."""
+    """Replay two chips' sessions; that of an MPU-6050 is in tests/cli/test_session.py."""
     bus = f"sim:chip={chip},temperature_c=27"
     live = session("live", "--bus", bus, "--seed", 5, "--rate", 25, "--target", "quick", "--model", model)
     assert live.sensor["chip"] == name

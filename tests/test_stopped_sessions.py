@@ -21,13 +21,13 @@ DAY_NS = 86_400 * 10**9
 
 
 def pass_by(world, seconds):
-    """The computer does nothing meanwhile; what a vehicle sends is lost."""
+    """Let time pass while the computer does nothing; what a vehicle sends is lost."""
     transport = world.transport
     transport._vehicle.run_until(transport._vehicle.now_us + round(seconds * 1e6))
 
 
 def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
-    """While flat, and while rotating."""
+    """Stop the session while flat, and while rotating."""
     stops_s = {10.0: 70.0, 100.0: 90.0}
     world = worlds.World(worlds.VEHICLE)
     for at_s, stopped_s in stops_s.items():

@@ -1,4 +1,4 @@
-"""What a user reads keeps to the field's terms (docs/glossary.md): words that were given up do not come back."""
+"""Terms that a user reads are those of docs/glossary.md: words that were given up do not come back."""
 
 import ast
 import re
