@@ -132,7 +132,7 @@ def test_the_gyroscope_carries_gravity_to_where_the_accelerometer_finds_it(sessi
 
 
 def test_what_no_pose_shows_is_not_claimed(session):
-    """No pose of it tilts x and y together, so |a| alone does not determine their cross-axis terms."""
+    """Poses that never tilt x and y together do not determine their cross-axis terms by |a|."""
     D_std = np.array(session.document["accelerometer"]["D_std"])
     assert D_std[0, 1] > 10 * D_std[0, 0]
     assert D_std[1, 0] > 10 * D_std[1, 1]
@@ -149,7 +149,7 @@ def session_of(folder, recording, poll_s=SELDOM_S):
     ("name", "most_deg"), [("mpu9150_a", 0.1), pytest.param("imucal_session", 0.15, marks=pytest.mark.slow)]
 )
 def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
-    """Recordings that lie flat for less than ten seconds; the MPU-9150s' show spikes to 74 m/s^2 where they were put down."""
+    """Use recordings that lie flat for less than ten seconds; those of the MPU-9150s begin with spikes to 74 m/s^2."""
     recording = RECORDINGS / f"{name}.npz"
     found = session_of(tmp_path, recording)
     assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")

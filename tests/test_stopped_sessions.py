@@ -21,7 +21,7 @@ DAY_NS = 86_400 * 10**9
 
 
 def pass_by(world, seconds):
-    """Let time pass while the computer does nothing; what a vehicle sends is lost."""
+    """Pass the time while the computer does nothing; what a vehicle sends is lost."""
     transport = world.transport
     transport._vehicle.run_until(transport._vehicle.now_us + round(seconds * 1e6))
 

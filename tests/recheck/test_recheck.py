@@ -67,7 +67,7 @@ def test_a_check_names_the_change(name):
     assert verdict in result.page().lower()
 
 
-@pytest.mark.parametrize(("sensor", "words"), [("acc", "3 times on the accelerometer"), ("gyr", "3.1 times on the gyro")])
+@pytest.mark.parametrize(("sensor", "words"), [("acc", "3 times on the accel"), ("gyr", "3.1 times on the gyro")])
 def test_noise_that_grew_is_named(sensor, words):
     quiet = shown(TRUTH, seed=6)
     known = replace(
