@@ -85,6 +85,16 @@ def session(once, process):
     return Session(folder / "board", Result(**json.loads((folder / "result.json").read_text())))
 
 
+@pytest.fixture
+def spoilt(session, tmp_path):
+    """Write the session's calibration with a number changed, whose digest does not match; return its path."""
+    document = json.loads((session.folder / "calibration.json").read_text())
+    document["accelerometer"]["b_a"][0] += 1e-9
+    path = tmp_path / "spoilt.json"
+    path.write_text(json.dumps(document))
+    return path
+
+
 class Served:
     """Process of a program of this folder that adds to mpucal's tables; it runs one command line after another."""
 

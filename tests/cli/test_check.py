@@ -43,11 +43,7 @@ def test_of_a_sensor_in_half_a_minute_with_its_biases_updated(mpucal, calibratio
         assert mpucal("check", calibration, *words).out.splitlines()[0] == told.out.splitlines()[0]
 
 
-def test_a_changed_calibration_is_used_only_with_force_and_its_outputs_say_so(mpucal, session, calibration, tmp_path):
-    spoilt = tmp_path / "spoilt.json"
-    document = json.loads(calibration.read_text())
-    document["accelerometer"]["b_a"][0] += 1e-9
-    spoilt.write_text(json.dumps(document))
+def test_a_changed_calibration_is_used_only_with_force_and_its_outputs_say_so(mpucal, session, spoilt, tmp_path):
     assert mpucal("check", spoilt, session.folder).code == 0
     words = ("check", spoilt, session.folder, "-o", "today")
     refused = mpucal(*words)
