@@ -1,7 +1,8 @@
-"""From a recording to a Calibration: the one function that everything else calls."""
+"""Calibration of a recording: `calibrate`, the one function that everything else calls."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -18,10 +19,13 @@ from .evidence import Evidence
 from .fit import Fit
 from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
-from .recording_digest import recording_digest
 from .theta import from_elements
 
-__all__ = ["MODELS", "calibrate", "estimate"]
+__all__ = ["MODELS", "calibrate", "estimate", "recording_digest"]
+
+# Step of a digest [m/s^2, rad/s], far below a count of any sensor and far above what a text file rounds away, and the
+# largest value that it distinguishes, which no sensor measures.
+DIGEST_STEP, DIGEST_MOST = 1e-6, 1e12
 
 
 def calibrate(
@@ -35,19 +39,32 @@ def calibrate(
     ----------
     recording : what was measured, first lying flat, then turned.
     model : one of MODELS. gravity : m/s^2, the local ||g||.
-    gravity_anyway : a gravity that no place on Earth has is meant, and no reason against the calibration.
+    gravity_anyway : confirm a gravity outside the range found on Earth, which is else a reason against the calibration.
 
     Raises
     ------
-    WrongValue : no such model, or a gravity that is none.
+    WrongValue : the model does not exist, or the gravity is impossible.
     """
     return _calibration(*estimate(recording, model, gravity, gravity_anyway))
+
+
+def recording_digest(recording: Recording) -> str:
+    """Return the SHA-256 of acc and gyr, 64 hexadecimal digits, by which a recording is known from any file format.
+
+    Times are left out, since another reading of a clock changes them.
+    """
+    digest = hashlib.sha256()
+    for values in (recording.acc, recording.gyr):
+        # A gyroscope that was not measured is NaN.
+        measured = np.clip(np.where(np.isnan(values), 0.0, values), -DIGEST_MOST, DIGEST_MOST)
+        digest.update(np.rint(measured / DIGEST_STEP).astype("<i8").tobytes())
+    return digest.hexdigest()
 
 
 def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     recording, flat, fit = evidence.recording, evidence.flat, evidence.fit
     common: dict[str, Any] = {
-        "fit": _about(evidence, chosen),
+        "fit": _fit_document(evidence, chosen),
         "quality": judge(evidence),
         "sensor": recording.sensor,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -59,12 +76,12 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     calibration = Calibration(
         D=fit.D,
         b_a=fit.b_a,
-        D_std=_claimed(fit, D_NAMES).reshape(3, 3),
-        b_a_std=_claimed(fit, B_A_NAMES),
+        D_std=_stds(fit, D_NAMES).reshape(3, 3),
+        b_a_std=_stds(fit, B_A_NAMES),
         K=fit.K,
         K_std=np.hypot(
-            from_elements(BY_NAME["K"].form, _claimed(fit, BY_NAME["K"].names)),
-            # a clock that runs fast makes every rate smaller
+            from_elements(BY_NAME["K"].form, _stds(fit, BY_NAME["K"].names)),
+            # A clock that runs fast makes every rate smaller.
             (recording.sensor.clock_std or 0.0) * np.abs(fit.K),
         ),
         b_omega=fit.b_omega,
@@ -75,7 +92,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     return replace(calibration, correlation=correlation_of(fit.names, fit.covariance, std))
 
 
-def _about(evidence: Evidence, chosen: Mapping[str, str]) -> keys.Fit:
+def _fit_document(evidence: Evidence, chosen: Mapping[str, str]) -> keys.Fit:
     recording, fit = evidence.recording, evidence.fit
     about: keys.Fit = {
         "model": chosen["model"],
@@ -94,6 +111,6 @@ def _about(evidence: Evidence, chosen: Mapping[str, str]) -> keys.Fit:
     return {**about, "gravity_anyway": True} if evidence.gravity_anyway else about
 
 
-def _claimed(fit: Fit, names: Sequence[str]) -> Vector:
-    """Standard deviations; unknown of what the data say little."""
+def _stds(fit: Fit, names: Sequence[str]) -> Vector:
+    """Return standard deviations, NaN for parameters that the data hardly determine."""
     return np.where([name in fit.at_prior for name in names], np.nan, fit.std(*names))

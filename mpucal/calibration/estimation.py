@@ -14,14 +14,13 @@ from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
 from .bias_walks import BiasWalk, find_walk, remove_walk
-from .checks import find_reasons, gyroscope_at_fault, unusable_for_a_fit
+from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.unusable import no_gyroscope
-from .claim import claim_of, claimed
 from .evidence import Evidence
-from .lone_jumps import remove_spikes
-from .masks import reset, with_masks
-from .model_selection import METHODS, Choice, choose
+from .masks import find_reset, remove_spikes, with_masks
+from .model_selection import METHODS, ModelChoice, choose
 from .static import fit_static
+from .uncertainty import claim_uncertainty, inflate
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
@@ -49,7 +48,7 @@ def estimate(
     of_all = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
     if model != "auto":
         return of_all
-    at_fault = gyroscope_at_fault(of_all[0])
+    at_fault = find_gyroscope_fault(of_all[0])
     other = _before_it_clipped(of_all[0]) if at_fault is None else _of_rests(before, at_fault)
     return other or of_all
 
@@ -93,20 +92,20 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     recording = replace(with_masks(recording), gyr=remove_spikes(recording).gyr)
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
-    over = None if flat is None else reset(recording, flat)
+    over = None if flat is None else find_reset(recording, flat)
     if over is not None:
         recording = recording.part(0, over)
     before = replace(before, recording=recording, flat=flat)
-    if flat is None or unusable_for_a_fit(before):
+    if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
     choice, walk = _fit(recording, flat, gravity, model)
-    claim = claim_of(choice.fit, gravity, walk, choice.walked)
-    evidence = replace(before, fit=claimed(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
+    claim = claim_uncertainty(choice.fit, gravity, walk, choice.walked)
+    evidence = replace(before, fit=inflate(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if over is not None else "")}
 
 
-def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, BiasWalk | None]:
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, BiasWalk | None]:
     """The fit, with a gyroscope's bias that walked while the board was turned taken away, and the walk that is left."""
     choice, walk = _fit_once(recording, flat, gravity, model)
     for _ in range(MOST_WALKS):
@@ -119,10 +118,10 @@ def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[
     return choice, walk
 
 
-def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, BiasWalk | None]:
+def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, BiasWalk | None]:
     if model == "auto":
         choice = choose(recording, flat, gravity)
     else:
-        choice = Choice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
+        choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
     fit = choice.fit
     return choice, None if fit.parts is None else find_walk(fit.parts, fit.D)

@@ -18,7 +18,6 @@ from ..rests.flat import Flat
 from ..rests.local_noise import noise_ratio
 from .downsampling import downsampled, means
 from .fit import Fit
-from .gyro_matrix import WALD_99, at_prior, wald
 from .hand_noise import (
     CALM_MPS2,
     FIRST_MPS2,
@@ -27,20 +26,20 @@ from .hand_noise import (
     SLOWLY_PER_S,
     WHITE_MPS2,
     Noise,
-    farther,
-    likeliest,
+    most_likely_sigma,
+    pivot_sigma,
+    remove_tremor,
 )
+from .hypothesis_tests import WALD_99, undetermined, wald
 from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import Minimum, information, minimise
 from .likelihood import value
 from .parameters import HAND
 from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, preprocess
-from .prior import Prior
 from .problem import Problem
-from .theta import Theta
+from .theta import Prior, Theta
 from .transitions import leverages, miss_variances, q_scale, transitions_of
-from .tremor import remove_tremor
 
 SEARCH_HZ = 50.0
 ROUGHLY, MOST_ROUGHLY = 0.05, 20
@@ -68,18 +67,18 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
     if search.trembles:
         fine = remove_tremor(fine)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
-        noise = Noise("white", likeliest(fine.white, CALM_MPS2, theta, noise.sigma))
+        noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)
     prior = fine.prior()
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
     iterations = search.iterations + minimum.iterations
-    if wald(minimum) < WALD_99 and not at_prior(minimum.covariance()):
+    if wald(minimum) < WALD_99 and not undetermined(minimum.covariance()):
         trusted = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
     parts = parts_of(problem, minimum, prior)
     minimum = _doubted(minimum, noise, search.prepared, fine)
-    known = at_prior(minimum.covariance()) if minimum.free.all() else ()
+    known = undetermined(minimum.covariance()) if minimum.free.all() else ()
     return replace(minimum, iterations=iterations).as_fit(known, parts)
 
 
@@ -139,7 +138,7 @@ class _Search:
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
         sigma, sigmas = HAND_MPS2[0], HAND_MPS2 if prepared.rests_often else WHITE_MPS2
         for _ in range(2):
-            sigma = likeliest(prepared.white, sigmas, theta, sigma)
+            sigma = most_likely_sigma(prepared.white, sigmas, theta, sigma)
             theta = self._roughly(prepared.white(sigma), theta)
         if sigma == 0.0:
             return theta, Noise("none", 0.0)
@@ -166,9 +165,9 @@ class _Search:
     def _travel(self, theta: Theta) -> tuple[Theta, Noise]:
         """The likeliest size of a pivot's travel, with theta for it."""
         pivot = self.prepared.pivot
-        sigma = likeliest(pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
+        sigma = most_likely_sigma(pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
         theta = self._roughly(pivot(sigma), theta)
-        return theta, Noise("pivot", farther(likeliest(pivot, PIVOT_MPS2, theta, sigma)))
+        return theta, Noise("pivot", pivot_sigma(most_likely_sigma(pivot, PIVOT_MPS2, theta, sigma)))
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
         minimum = _roughly(problem, theta, self.prior)
@@ -182,4 +181,4 @@ def _roughly(problem: Problem, theta: Theta, prior: Prior, fixed: tuple[str, ...
 
 def _likeliest_cost(prepared: Preprocessed, theta: Theta) -> float:
     """V at theta with the likeliest size of a pivot's travel."""
-    return value(prepared.pivot(likeliest(prepared.pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])), theta)
+    return value(prepared.pivot(most_likely_sigma(prepared.pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])), theta)

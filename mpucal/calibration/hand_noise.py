@@ -1,34 +1,43 @@
-"""The hand's acceleration as noise: its kinds, the grids of sigma, and the likeliest of them."""
+"""The hand's acceleration: kinds of noise, their most likely size, and the tremor with a lever arm of its own."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
+from ..data import Vector
+from ..kernel import _kernel
 from .likelihood import value
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed
 from .problem import Problem
+from .rotation import lengths
 from .theta import Theta
 
-FIRST_MPS2 = 0.3  # by which a search begins
+FIRST_MPS2 = 0.3  # sigma at which a search begins
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 SOME_MPS2 = WHITE_MPS2[1:]
-HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
-CALM_MPS2 = WHITE_MPS2[3:]  # and, over all samples, a calm one at least: what looks calmer is taken for jerks
+HAND_MPS2 = WHITE_MPS2[4:]  # a board that goes from rest to rest is in a hand
+CALM_MPS2 = WHITE_MPS2[3:]  # the same over all samples: less noise than a calm hand's is taken for jerks
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
-# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma). Its
-# covariance admits that it comes back more slowly, 1/s: what sways as slowly as gravity turns is not told from it.
+# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma). The
+# covariance admits that it comes back more slowly [1/s], since a sway as slow as the turns looks like gravity.
 FARTHER, FARTHER_STILL, SLOWLY_PER_S = 1.5, 0.5, 2.0
+
+# Moving means over 2 TURNS_S, applied TIMES times, keep turns below 2 Hz and nothing of a tremor of 8 to 12 Hz.
+TURNS_S, TIMES = 0.04, 3
+REWEIGHTED = 4  # iterations of the reweighted least squares
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The hand's acceleration while it moves: none, white (correlated), or a pivot's, of sigma m/s^2.
+    """Noise of the hand's acceleration while it moves: none, white (correlated), or a pivot's, of sigma m/s^2.
 
-    lam : 1/s, how fast a pivot comes back, where it is not as the estimate has it.
+    lam : 1/s, how fast a pivot comes back, where it differs from the estimate's.
     """
 
     kind: Literal["none", "white", "pivot"]
@@ -36,21 +45,23 @@ class Noise:
     lam: float | None = None
 
     def problem(self, prepared: Preprocessed) -> Problem:
-        """What the filter runs over with this noise."""
+        """Return the problem with this noise."""
         if self.kind == "pivot":
             return prepared.pivot(self.sigma, FLOOR_MPS2, self.lam)
         return prepared.white(self.sigma, CORRELATION_S if self.kind == "white" else 0.0)
 
 
-def likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta, begin: float) -> float:
-    """The sigma of least V at theta: along the grid from `begin` as far as V falls, which has one minimum."""
+def most_likely_sigma(
+    problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta, begin: float
+) -> float:
+    """Return the sigma of least V at theta: V has one minimum, and the grid is followed from `begin` while V falls."""
 
     def cost(at: int) -> float:
         return value(problem_of(sigmas[at]), theta) if 0 <= at < len(sigmas) else math.inf
 
     at = first = sigmas.index(begin)
     least = cost(at)
-    for step in (-1, 1):  # all samples show less of it than means do
+    for step in (-1, 1):  # downwards first, since all samples show less noise than block means do
         while (there := cost(at + step)) < least:
             at, least = at + step, there
         if at != first:
@@ -58,6 +69,37 @@ def likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...],
     return sigmas[at]
 
 
-def farther(sigma: float) -> float:
-    """The sigma of a pivot, whose likeliest bounded position has this one."""
+def pivot_sigma(sigma: float) -> float:
+    """Return the sigma of a pivot whose most likely bounded position has this one."""
     return (FARTHER + FARTHER_STILL * sigma) * sigma
+
+
+def remove_tremor(prepared: Preprocessed) -> Preprocessed:
+    """Remove the acceleration of the tremor, and keep the angular acceleration of the turns alone.
+
+    A hand trembles about another joint than the one about which it turns the board. The tremor's own lever arm r_t is
+    the least squares solution of y = alpha x r_t above the turns' frequencies, where alpha is known: in motion.
+    """
+    series, rate_hz = prepared.problem.series, prepared.recording.rate_hz
+    if series.alpha is None or not series.alpha.any():
+        return prepared
+    turns = _low_pass(series.alpha, rate_hz)
+    alpha, y = series.alpha - turns, series.y - _low_pass(series.y, rate_hz)
+    moving = np.any(series.alpha != 0.0, axis=1) / (1.0 if series.r_scale is None else series.r_scale)
+    weight = moving
+    for _ in range(REWEIGHTED):
+        weighted = weight[:, None] * alpha
+        N = np.eye(3) * np.sum(weighted * alpha) - alpha.T @ weighted
+        r_t = np.linalg.pinv(N) @ np.sum(np.cross(y, weighted), axis=0)
+        away = lengths(y - np.cross(alpha, r_t))
+        # Cauchy's weights leave out jerks, which are no tremor.
+        weight = moving / (1.0 + (away / (2.0 * np.median(away[moving > 0.0]) + 1e-9)) ** 2)
+    series = replace(series, y=series.y - np.cross(alpha, r_t), alpha=turns)
+    return replace(prepared, problem=replace(prepared.problem, series=series))
+
+
+def _low_pass(values: Vector, rate_hz: float) -> Vector:
+    """Return the part of values (n, 3) below the frequencies of a tremor."""
+    for _ in range(TIMES):
+        values = _kernel.moving_mean(values, int(TURNS_S * rate_hz))
+    return values

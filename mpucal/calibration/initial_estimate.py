@@ -11,7 +11,7 @@ from ..kernel import _kernel
 from .likelihood import evaluate
 from .masks import GAP_ANGLE_VARIANCE, LOST_RAD
 from .problem import Problem, Series
-from .sphere import fibonacci_sphere, tangents
+from .rotation import fibonacci_sphere, tangents
 from .theta import Theta
 
 POINTS = 300

@@ -14,15 +14,14 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .downsampling import downsampled
-from .hand_noise import FARTHER, FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, likeliest
+from .hand_noise import FARTHER, FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, most_likely_sigma
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, information, minimise
 from .likelihood import value
 from .parameters import ACCELEROMETER, HAND, PLACES
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
-from .prior import Prior
 from .problem import Problem
-from .theta import Theta
+from .theta import Prior, Theta
 
 # Fast enough for a hand's moves, few enough samples for a fit within a poll or two.
 FIT_HZ = 50.0
@@ -87,19 +86,19 @@ def interim_estimate(
     if before is not None and before.converged and theta is before.theta:
         sigma = before.sigma
     else:
-        theta = _right_handed(_minimum(rough, theta, prior).theta)
-        sigma = likeliest(prepared.white, WHITE_MPS2, theta, HAND_MPS2[0])
+        theta = _minimum(rough, theta, prior).theta.right_handed()
+        sigma = most_likely_sigma(prepared.white, WHITE_MPS2, theta, HAND_MPS2[0])
     problem = prepared.white(sigma, CORRELATION_S)
     minimum = _minimum(problem, theta, prior)
     H = minimum.H
     if not prepared.rests_often:
         # who does not pause leans on a hand's travel, of which little is known: admit more of it
         pivots = partial(prepared.pivot, floor=FLOOR_MPS2)
-        pivot = likeliest(pivots, PIVOT_MPS2, minimum.theta, PIVOT_MPS2[0])
+        pivot = most_likely_sigma(pivots, PIVOT_MPS2, minimum.theta, PIVOT_MPS2[0])
         doubt = prepared.pivot(DOUBT * FARTHER * pivot, FLOOR_MPS2)
         H = information(doubt, minimum.theta, prior)
     covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
-    sigma = likeliest(prepared.white, SOME_MPS2, minimum.theta, max(sigma, SOME_MPS2[0]))
+    sigma = most_likely_sigma(prepared.white, SOME_MPS2, minimum.theta, max(sigma, SOME_MPS2[0]))
     return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged, compared)
 
 
@@ -109,11 +108,6 @@ def _starts(prepared: Preprocessed) -> tuple[Theta, ...]:
     u = flat.y / np.linalg.norm(flat.y)
     perfect = Theta.start(np.eye(3), flat.y - prepared.problem.gravity * u, flat.b_omega, u)
     return perfect, initialise(prepared.problem, flat.b_omega)
-
-
-def _right_handed(theta: Theta) -> Theta:
-    """Of (D, u) and (-D, -u), which fit equally well, the one with det D > 0."""
-    return theta if np.linalg.det(theta.D) > 0.0 else replace(theta, D=-theta.D, u=-theta.u)
 
 
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:

@@ -47,7 +47,7 @@ class Jackknife:
         """m/s^2 that is claimed at least."""
         return max(OF_TIME * self.time, OF_SIDE * self.side)
 
-    def decides(self) -> Literal["time", "side"]:
+    def decided_by(self) -> Literal["time", "side"]:
         """Which of the two is larger."""
         return "time" if OF_TIME * self.time >= OF_SIDE * self.side else "side"
 

@@ -15,9 +15,8 @@ from ..data import Vector
 from .fit import Fit
 from .likelihood import Evaluation, evaluate
 from .parameters import HAND, NAMES, PLACES
-from .prior import Prior
 from .problem import Problem
-from .theta import Theta, values
+from .theta import Prior, Theta
 
 if TYPE_CHECKING:
     from .parts import Parts
@@ -145,7 +144,7 @@ class _At:
     ) -> None:
         self.theta = theta
         self.data: Evaluation = evaluate(problem, theta, parameters, ends)
-        away = (values(theta) - prior.mean)[:parameters]
+        away = (theta.values() - prior.mean)[:parameters]
         precision = prior.precision[:parameters]
         self.V = self.data.V + 0.5 * float(precision @ (away * away))
         if not np.isfinite(self.V):

@@ -1,4 +1,4 @@
-"""Samples that must not be believed as they stand: clipped ones, and steps across a gap, drawn through or not."""
+"""Samples that must not be believed as they are: spikes, clipped ones, and steps across a gap, interpolated or not."""
 
 from __future__ import annotations
 
@@ -16,33 +16,60 @@ RANGE_TOLERANCE = 2e-3
 FEWEST_AT_A_RANGE, FEWEST_ANYWHERE = 2, 8
 
 CLIPPED_R_SCALE = 1e4
-GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: nothing is known of how the board turned
-CLIPPED_RATE_SD = 0.0015  # of |omega|, in a run of one: a longer one hides more of what lies beyond the range
+GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: the turn across a gap is unknown
+CLIPPED_RATE_SD = 0.0015  # of |omega|, in a run of one: a longer run hides more of what lies beyond the range
 
-# After a gap that long a correction, linear in the turn, falls short of it: the samples that follow correct it again.
+# After a long gap a linear correction falls short of the turn: the samples that follow correct it again.
 LOST_RAD, SETTLING = 0.2, 5
 
 LINE_TOLERANCE, SHORTEST_LINE = 1e-6, 8
 
-# Of a rate that repeats while the board turns by so much [rad/s]: as long as chance makes at rest so rarely.
+# A rate may repeat as often as chance makes it with this probability, while the board turns by so much [rad/s].
 SHORTEST_REPEAT, BY_CHANCE, TURNING = 8, 1e-6, 0.3
 
 GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
 
-# Of a board that is back at once: how far gravity turns within a step beyond what the gyroscope tells, how much of that
-# the steps before and after it may miss, and how near it is then to where it lay.
-JUMP_RAD, BESIDE, NEIGHBOURS, BACK = np.deg2rad(5.0), 0.2, 4, 0.02
+# A board is reset if gravity turns within a step by so much more than the gyroscope says, the neighbouring steps miss
+# by less than this share of it, and gravity is then this near to the flat segment's.
+RESET_RAD, OF_NEIGHBOURS, NEIGHBOURS, BACK = np.deg2rad(5.0), 0.2, 4, 0.02
 AROUND = np.array([step for step in range(-NEIGHBOURS, NEIGHBOURS + 1) if step])
+
+# A spike exceeds so much [m/s^2, rad/s], and so many times the departures of its neighbours from theirs; its
+# neighbours differ by less than this share of it.
+LEAST_SPIKE, SPIKES, RETURNS = np.repeat((0.3, 0.15), 3), 8.0, 0.25
+SPIKE_MARGIN = 4  # samples on either side of a word that decide whether it is a spike
+
+
+def remove_spikes(recording: Recording) -> Recording:
+    """Replace each spike, a single word that jumps and is back with the next sample, by the mean of its neighbours.
+
+    Spikes come from bits that a transfer flipped (chip/bit_flips.py repairs the last frame of a poll only with the next
+    poll), and from whatever else spoils a word in a file. No board moves like that.
+    """
+    words = np.hstack((recording.acc, recording.gyr))
+    before, after = words[:-2], words[2:]
+    mean = 0.5 * (before + after)
+    off = np.pad(np.abs(words[1:-1] - mean), ((3, 3), (0, 0)))
+    # The departures of the samples beside it hold half of the spike: those beyond them do not.
+    usual = np.max([off[k : len(off) - 6 + k] for k in (0, 1, 5, 6)], axis=0)
+    off = off[3:-3]
+    jumps = off > np.maximum(LEAST_SPIKE, SPIKES * usual)
+    alone = jumps & (np.abs(after - before) < RETURNS * off) & (jumps.sum(axis=1, keepdims=True) == 1)
+    if not alone.any():
+        return recording
+    words[1:-1][alone] = mean[alone]
+    acc, gyr = np.hsplit(words, 2)
+    return replace(recording, acc=acc, gyr=gyr)
 
 
 def with_masks(recording: Recording) -> Recording:
-    """The recording with its gaps and clipped samples marked, where its source did not already."""
+    """Return the recording with its gaps and clipped samples marked, where its source did not already."""
     dt = np.diff(recording.t, prepend=recording.t[0])
-    # An autopilot's stream comes by radio: its source says which pauses are more than packets lost here and there.
-    # It is rounded as well, of a range that no hand reaches: values repeat without a rail.
+    # An autopilot's stream comes by radio, and its source says which pauses are more than single lost packets. It is
+    # rounded, too, and of a range that no hand reaches: values repeat without being clipped.
     of_a_chip = recording.sensor.message is None
     paused = of_a_chip & (dt > GAP_INTERVALS * np.median(dt[1:]))
-    # a chip whose range is known does not clip at another one
+    # A chip whose range is known does not clip at another one.
     acc_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
     acc_ranges = ACC_RANGES if acc_g is None else np.array([acc_g]) * STANDARD_GRAVITY_MPS2
     gyro_ranges = GYRO_RANGES if gyro_dps is None else np.deg2rad([gyro_dps])
@@ -56,18 +83,18 @@ def with_masks(recording: Recording) -> Recording:
     )
 
 
-def reset(recording: Recording, flat: Flat) -> int | None:
-    """The first sample after a simulator was reset; None where it was not.
+def find_reset(recording: Recording, flat: Flat) -> int | None:
+    """Return the first sample after a simulator was reset, None where it was not.
 
-    The board lies flat again at once, and no rate tells of the way.
+    The board lies flat again within one step, and no rate shows the way.
     """
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
     dt = np.diff(recording.t[flat.last :])[:, None]
     with np.errstate(all="ignore"):
         missed = lengths(np.diff(acc, axis=0) + np.cross(rate[1:], acc[:-1]) * dt) / np.linalg.norm(flat.y)
-        at = np.flatnonzero((missed > JUMP_RAD) & ~recording.gap[flat.last + 1 :])
+        at = np.flatnonzero((missed > RESET_RAD) & ~recording.gap[flat.last + 1 :])
         at = at[(at >= NEIGHBOURS) & (at < len(missed) - NEIGHBOURS)]
-        for i in at[(missed[at[:, None] + AROUND] < BESIDE * missed[at, None]).all(1)]:
+        for i in at[(missed[at[:, None] + AROUND] < OF_NEIGHBOURS * missed[at, None]).all(1)]:
             after = acc[i + 1 : i + 1 + NEIGHBOURS].mean(0)
             if np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y):
                 return flat.last + int(i) + 1
@@ -75,7 +102,7 @@ def reset(recording: Recording, flat: Flat) -> int | None:
 
 
 def mask(series: Series, recording: Recording, flat: Flat) -> Series:
-    """The series with what its masks demand: R of clipped accelerations, extra Q of gaps and clipped rates."""
+    """Return the series with the noise of its masks: R of clipped accelerations, extra Q of gaps and clipped rates."""
     last = flat.last
     gap, acc, gyr = recording.gap[last:], recording.acc_clipped[last:], recording.gyr_clipped[last - 1 :]
     if not (gap.any() or acc.any() or gyr.any()):
@@ -86,41 +113,45 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     for i in np.flatnonzero(q_extra > LOST_RAD**2):
         q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
     q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
-    # the measured rates on both sides of a gap say nothing of what lies between
+    # The measured rates on both sides of a gap do not tell the rate within it.
     omega = np.where(gap[:, None], flat.b_omega, series.omega)
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
 
 
 def _run_lengths(mask: Mask) -> Vector:
-    """(n,) how many neighbours in a row share each sample's value, itself among them."""
+    """Return for each sample (n,) the length of the run of equal values that it is in."""
     edges = np.flatnonzero(np.concatenate([[True], mask[1:] != mask[:-1], [True]]))
     return np.repeat(np.diff(edges), np.diff(edges)).astype(np.float64)
 
 
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return first and last + 1 of the runs of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return [(first, last) for first, last in edges.reshape(-1, 2).tolist()]
+
+
 def _on_a_line(values: Vector, t: Vector) -> Mask:
-    """(n,) True within straight lines that all axes follow exactly, and not at rest: somebody drew them."""
+    """Return (n,) True within straight lines that all axes follow exactly, and not at rest: those are interpolated."""
     dt, straight = np.diff(t), np.ones(max(len(t) - 2, 0), bool)
     turns = ~straight
     for column in values.T:
         slope = np.diff(column) / dt
         steep = np.abs(slope[1:])
         straight &= np.abs(np.diff(slope)) <= LINE_TOLERANCE * steep
-        if not straight.any():  # nearly every recording: the other axes need not be asked
+        if not straight.any():  # nearly every recording ends here, and the other axes need no look
             return np.zeros(len(values), bool)
         turns |= steep > 0
-    if 2 * np.count_nonzero(straight) > len(straight):  # computed data: nothing in them has noise
+    if 2 * np.count_nonzero(straight) > len(straight):  # the data are computed, and have no noise anywhere
         return np.zeros(len(values), bool)
-    straight &= turns
-    edges = np.diff(np.concatenate([[False], straight, [False]]).astype(np.int8))
     drawn = np.zeros(len(values), bool)
-    for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+    for first, last in _runs(straight & turns):
         if last - first >= SHORTEST_LINE:
             drawn[first + 1 : last + 2] = True
     return drawn
 
 
 def _stuck(values: Vector, clipped: Mask) -> Mask:
-    """(n,) True where a rate within its range repeats while the board turns, longer than its noise at first lets it."""
+    """Return (n,) True where a rate within its range repeats while the board turns, longer than its noise lets it."""
     stuck = np.zeros(len(values), bool)
     for column in values.T:
         same = np.diff(column) == 0.0
@@ -129,9 +160,8 @@ def _stuck(values: Vector, clipped: Mask) -> Mask:
         longest = max(np.log(BY_CHANCE / len(values)) / np.log(by_chance), SHORTEST_REPEAT)
         if not same.any() or _run_lengths(same)[same].max() < longest:
             continue
-        edges = np.diff(np.concatenate([[False], same, [False]]).astype(np.int8))
-        for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-            # a rate that is far from rest, or others that change
+        for first, last in _runs(same):
+            # The board turns where this rate is far from rest, or where others change.
             most = np.ptp(values[first : last + 1], axis=0).max()
             if last - first >= longest and not clipped[first] and max(most, abs(column[first] - column[0])) > TURNING:
                 stuck[first + 1 : last + 2] = True
@@ -139,7 +169,7 @@ def _stuck(values: Vector, clipped: Mask) -> Mask:
 
 
 def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
-    """(n,) True where an axis repeats its largest magnitude exactly: few times at a chip's range, often elsewhere."""
+    """Return (n,) True where an axis repeats its largest magnitude: few times at a chip's range, often elsewhere."""
     clipped = np.zeros(len(values), bool)
     for column in values.T:
         for rail in (column.max(), column.min()):
@@ -148,12 +178,12 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
                 continue
             known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
             runs = int(np.count_nonzero(at[1:] & at[:-1]))
-            if known or (runs >= FEWEST_ANYWHERE and _beyond(column, rail)):
+            if known or (runs >= FEWEST_ANYWHERE and _is_motion(column, rail)):
                 clipped |= at
     return clipped
 
 
-def _beyond(column: Vector, rail: float) -> bool:
-    """Whether a value stands so far from the middle of its column that only motion can have brought it there."""
-    middle = np.median(column)
-    return bool(abs(rail - middle) > 20.0 * np.median(np.abs(column - middle)) + 1e-9)
+def _is_motion(column: Vector, value: float) -> bool:
+    """Return True if a value is so far from the median of its column that only motion can explain it."""
+    median = np.median(column)
+    return bool(abs(value - median) > 20.0 * np.median(np.abs(column - median)) + 1e-9)

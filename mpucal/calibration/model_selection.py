@@ -18,21 +18,19 @@ from ..rests.flat import Flat, flat_statistics
 from .bias_walks import find_walk, remove_walk
 from .downsampling import downsampled
 from .fit import Fit
-from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
+from .hypothesis_tests import WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, Minimum, minimise
-from .lever import lever_arm
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
 from .parameters import ACCEL, IMU
 from .parts import ends_of, parts_of
-from .prior import prior_of
 from .problem import Problem, Series
 from .rotation import lengths
 from .static import fit_static
-from .theta import Theta
+from .theta import Prior, Theta
 from .tilt import fit_tilt
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
@@ -62,7 +60,7 @@ MOST_WALKS = 2
 PROMISING = WALD_99 / 3.0  # of the decrement, of which twice is as much of the statistic
 
 
-class Choice(NamedTuple):
+class ModelChoice(NamedTuple):
     """A fit, the model that made it, and why it was chosen.
 
     recording : what it was fitted to, without a walk of its gyroscope's bias of `walked` [(rad/s)^2] from part to part.
@@ -95,7 +93,7 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 }
 
 
-def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
+def choose(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
     """The simplest model that explains the data.
 
     White noise and a trusted gyroscope first, then its matrix K; the same with a steadied gyroscope, and with small
@@ -122,19 +120,19 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
     )
 
 
-def _in_a_hand(recording: Recording, flat: Flat, gravity: float, why: str) -> Choice:
+def _in_a_hand(recording: Recording, flat: Flat, gravity: float, why: str) -> ModelChoice:
     hand = fit_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
-    return Choice(hand, "hand", f"{why}: a hand's model, with {kept}", recording)
+    return ModelChoice(hand, "hand", f"{why}: a hand's model, with {kept}", recording)
 
 
-def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> Choice:
+def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> ModelChoice:
     perfect = len(minimum.free) == ACCEL
     noise = "white noise" if errors == NO_ERRORS else "white noise with small errors of the sensors"
     gyroscope = "a perfect gyroscope explain" if perfect else "a gyroscope that is not perfect explain"
     why = f"{noise} and {gyroscope} the data (innovations {minimum.nis:.1f}, expected 3)"
     model = "accel" if perfect else "imu"
-    return Choice(in_place.as_fit(minimum, errors), model, why, in_place.recording, in_place.walked)
+    return ModelChoice(in_place.as_fit(minimum, errors), model, why, in_place.recording, in_place.walked)
 
 
 class _InPlace:
@@ -142,7 +140,7 @@ class _InPlace:
 
     def __init__(self, recording: Recording, flat: Flat, gravity: float, walked: float = 0.0) -> None:
         self.recording, self._flat, self._gravity, self.walked = recording, flat, gravity, walked
-        self._prior = prior_of(flat, recording.sensor)
+        self._prior = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
     def attempts(self) -> Iterator[tuple[_InPlace, bool]]:
@@ -207,11 +205,11 @@ class _InPlace:
 
     def lever_arm(self, minimum: Minimum, errors: Errors) -> Vector | None:
         """The lever arm r (3,) [m] of a sensor that does not turn in place."""
-        return lever_arm(_erring(self._thin, errors), *self._means(SEARCH_HZ), minimum, self._prior)
+        return find_lever_arm(_erring(self._thin, errors), *self._means(SEARCH_HZ), minimum, self._prior)
 
     def as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
         """With what the parts of the recording say."""
-        known = at_prior(minimum.covariance()) if len(minimum.free) > ACCEL else ()
+        known = undetermined(minimum.covariance()) if len(minimum.free) > ACCEL else ()
         return minimum.as_fit(known, parts_of(_erring(self._problem, errors), minimum, self._prior))
 
     def _rough(self, parameters: int) -> Minimum:

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from ..data import Vector
 from .levenberg_marquardt import Minimum, inverse
 from .likelihood import evaluate, part_scores
-from .prior import Prior
 from .problem import Problem
-from .theta import values
+from .theta import Prior
 
 MOST_PARTS, FEWEST_SAMPLES = 96, 16
 
@@ -85,7 +84,7 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
     mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]
     s = (mean - theta.b_a) @ np.linalg.pinv(theta.D).T
     axis = np.abs(s).argmax(1)
-    away, precision = values(theta)[: len(free)] - prior.mean[: len(free)], prior.precision[: len(free)]
+    away, precision = theta.values()[: len(free)] - prior.mean[: len(free)], prior.precision[: len(free)]
     left = scores.gradient.sum(0) + scores.flat.gradient + precision * away
     H = scores.fisher.sum(0) + scores.flat.fisher + np.diag(precision)
     return Parts(

@@ -16,9 +16,9 @@ from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.local_noise import noise_ratio, noise_variance
 from ..rests.tremor import carried, fit_lambda, tremor_variance
 from .masks import mask
-from .prior import Prior, prior_of
 from .problem import Problem, Series
 from .rotation import lengths
+from .theta import Prior
 
 HUBER = 2.0
 MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it grows to
@@ -59,7 +59,7 @@ class Preprocessed:
 
     def prior(self, **more: tuple[Vector | float, Vector | float]) -> Prior:
         """What is known of the parameters beforehand; `more` as in prior_of."""
-        return prior_of(self.flat, self.recording.sensor, **more)
+        return Prior.of_sensor(self.flat, self.recording.sensor, **more)
 
     def white(self, sigma: float, correlation_s: float = 0.0) -> Problem:
         """White acceleration of sigma m/s^2 while moving; a correlation time tau makes it (1 + 2 tau / dt) of that."""
@@ -104,7 +104,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     for a, b in after:
         rest[a:b] = True
     # at rest they are noise alone, and noise in a regressor pulls the lever arm to zero
-    rate, alpha = (np.where(rest[:, None], 0.0, values) for values in rates(recording, flat))
+    rate, alpha = (np.where(rest[:, None], 0.0, values) for values in smoothed_rates(recording, flat))
     speed2 = np.sum(rate * rate, axis=1)
     acc = carried(recording, flat, runs)
     lam = fit_lambda(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
@@ -133,7 +133,7 @@ def jerk_density(sigma: float, lam: float) -> float:
     return 16.0 * lam / 3.0 * sigma**2
 
 
-def rates(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
+def smoothed_rates(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
     """Rate and angular acceleration (n, 3) after the flat segment, by which a lever arm accelerates the sensor."""
     k = int(SMOOTH_S * recording.rate_hz)
     rate = _kernel.moving_mean(recording.gyr - flat.b_omega, k)

@@ -1,4 +1,4 @@
-"""The verdict on an estimate: good, usable or refused, with its reasons."""
+"""Quality of an estimate: the verdict good, usable or refused, its reasons, and the uncertainty."""
 
 from __future__ import annotations
 
@@ -9,18 +9,16 @@ from ..reasons import Reason
 from ..result.calibration import GOOD, REFUSED, USABLE
 from ..result.keys import ErrorStd, Magnitude, Quality, Verdict
 from .checks import find_reasons
-from .claim import Claim
 from .evidence import Evidence
 from .jackknife import OF_SIDE, OF_TIME
 from .rotation import lengths
-from .uncertainty import Uncertainty
 
 
 def judge(evidence: Evidence) -> Quality:
-    """The `quality` of calibration.json: verdict, reasons, the magnitude before and after, and how sure.
+    """Return the `quality` of calibration.json: verdict, reasons, the magnitude before and after, and `error_std`.
 
-    `error_std` is what a calibrated measurement's error amounts to over all directions: rms and magnitude [m/s^2],
-    direction [deg]; and what it rests on, see claim.py.
+    `error_std` is the error of a calibrated measurement over all directions, rms and magnitude [m/s^2] and direction
+    [deg], with the estimates that it is the largest of (uncertainty.py).
     """
     reasons = find_reasons(evidence)
     return {
@@ -28,25 +26,25 @@ def judge(evidence: Evidence) -> Quality:
         "reasons": [reason.document() for reason in reasons],
         "magnitude_before": _magnitude(evidence.recording.acc),
         "magnitude_after": _magnitude(evidence.calibrated),
-        "error_std": _error_std(evidence.sure, evidence.claim),
+        "error_std": _error_std(evidence),
     }
 
 
-def _error_std(sure: Uncertainty | None, claim: Claim | None) -> ErrorStd:
-    left_out = None if claim is None else claim.left_out
+def _error_std(evidence: Evidence) -> ErrorStd:
+    known, claim = evidence.uncertainty, evidence.claim
     return {
-        "rms": np.nan if sure is None else sure.rms_mps2,
-        "magnitude": np.nan if sure is None else sure.magnitude_mps2,
-        "direction_deg": np.nan if sure is None else float(np.rad2deg(sure.direction_rad)),
+        "rms": np.nan if known is None else known.rms_mps2,
+        "magnitude": np.nan if known is None else known.magnitude_mps2,
+        "direction_deg": np.nan if known is None else float(np.rad2deg(known.direction_rad)),
         "model": np.nan if claim is None else claim.floored,
-        "without_a_time": np.nan if left_out is None else OF_TIME * left_out.time,
-        "without_a_side": np.nan if left_out is None else OF_SIDE * left_out.side,
-        "decided_by": None if claim is None else claim.by,
+        "without_a_time": np.nan if claim is None else OF_TIME * claim.left_out.time,
+        "without_a_side": np.nan if claim is None else OF_SIDE * claim.left_out.side,
+        "decided_by": None if claim is None else claim.decided_by,
     }
 
 
 def verdict(reasons: list[Reason]) -> Verdict:
-    """What they amount to."""
+    """Combine the reasons into one verdict."""
     return REFUSED if any(reason.refuse for reason in reasons) else USABLE if reasons else GOOD
 
 

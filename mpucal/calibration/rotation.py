@@ -1,4 +1,4 @@
-"""Rotations: exp of a rotation vector as a matrix, its left Jacobian, one turn after the other, and the shortest turn.
+"""Rotations and directions: rotation vectors as matrices, turns in succession, unit vectors over the sphere.
 
 Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), appendix B.
 """
@@ -6,6 +6,7 @@ Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in rob
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,25 +18,25 @@ _EYE = np.eye(3)
 
 
 def lengths(v: Vector) -> NDArray[np.float64]:
-    """(n,) of the vectors (n, 3)."""
+    """Return the lengths (n,) of vectors (n, 3)."""
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", v, v)))
 
 
 def cross(v: Vector) -> NDArray[np.float64]:
-    """[v]x, the matrix of the cross product: (..., 3) -> (..., 3, 3)."""
+    """Return [v]x, the matrix of the cross product: (..., 3) -> (..., 3, 3)."""
     matrix = np.zeros((*v.shape[:-1], 3, 3))
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     return matrix - np.swapaxes(matrix, -1, -2)
 
 
 def rotation(phi: Vector) -> NDArray[np.float64]:
-    """exp([phi]x), the rotation by the vector phi [rad]: (..., 3) -> (..., 3, 3)."""
+    """Return exp([phi]x), the rotation by the vector phi [rad]: (..., 3) -> (..., 3, 3)."""
     if phi.ndim == 1:
         return _rotation(phi)
     angle2 = np.sum(phi * phi, axis=-1)[..., None, None]
     angle = np.sqrt(angle2)
     X = cross(phi)
-    # sinc and its companion, finite at zero
+    # Both coefficients are finite at zero.
     a = np.sinc(angle / np.pi)
     b = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
     turn: NDArray[np.float64] = np.eye(3) + a * X + b * (X @ X)
@@ -43,7 +44,7 @@ def rotation(phi: Vector) -> NDArray[np.float64]:
 
 
 def _rotation(phi: Vector) -> NDArray[np.float64]:
-    """The same of one vector (3,), to the last bit; a session asks for thousands of them."""
+    """Return the rotation by one vector (3,), equal to the last bit; a session asks for thousands of them."""
     x, y, z = phi.tolist()
     angle = math.sqrt(x * x + y * y + z * z)
     X = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
@@ -53,18 +54,18 @@ def _rotation(phi: Vector) -> NDArray[np.float64]:
 
 
 def _sinc(angle: float) -> float:
-    # np.sinc's own steps and its sine
+    # These are the steps of np.sinc, with its sine, so that the bits are equal.
     argument = math.pi * (angle / math.pi)
     return float(np.sin(argument)) / argument if argument else 1.0
 
 
 def turned(phi: Vector) -> Vector:
-    """(3, 3) exp([phi_n]x) ... exp([phi_1]x) of rotation vectors phi (n, 3) [rad]; the identity of none."""
+    """Return exp([phi_n]x) ... exp([phi_1]x), (3, 3), of rotation vectors phi (n, 3) [rad]; the identity of none."""
     return _kernel.turn(np.ascontiguousarray(phi))[0]
 
 
 def left_jacobian(phi: Vector) -> Vector:
-    """J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x)."""
+    """Return J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x)."""
     angle = float(np.linalg.norm(phi))
     X = cross(phi)
     if angle < 1e-3:
@@ -72,19 +73,39 @@ def left_jacobian(phi: Vector) -> Vector:
     return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))
 
 
-def _across(a: Vector, b: Vector) -> Vector:
-    """a x b of two vectors (3,); np.cross, which is made for many, takes ten times as long."""
-    (a_x, a_y, a_z), (b_x, b_y, b_z) = a.tolist(), b.tolist()
-    return np.array([a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x])
-
-
 def shortest_turn(a: Vector, b: Vector) -> Vector:
-    """(3,) rad, the rotation vector that takes unit vector a to b."""
-    axis = _across(a, b)
+    """Return the rotation vector (3,) [rad] that takes the unit vector a to b."""
+    axis = _cross_product(a, b)
     sine = float(np.linalg.norm(axis))
     if sine < 1e-6:
         if a @ b > 0.0:
             return np.zeros(3)
-        axis = _across(a, np.eye(3)[int(np.argmin(np.abs(a)))])
+        axis = _cross_product(a, np.eye(3)[int(np.argmin(np.abs(a)))])
         return np.asarray(math.pi * axis / np.linalg.norm(axis))
     return np.asarray(axis / sine * math.atan2(sine, float(a @ b)))
+
+
+def _cross_product(a: Vector, b: Vector) -> Vector:
+    """Return a x b of two vectors (3,); np.cross, which is made for many, takes ten times as long."""
+    (a_x, a_y, a_z), (b_x, b_y, b_z) = a.tolist(), b.tolist()
+    return np.array([a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x])
+
+
+@cache
+def fibonacci_sphere(n: int) -> Vector:
+    """Return (n, 3) unit vectors spread evenly over the sphere."""
+    k = np.arange(n) + 0.5
+    z, turn = 1.0 - 2.0 * k / n, np.pi * (1.0 + np.sqrt(5.0)) * k
+    radius = np.sqrt(1.0 - z * z)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
+
+
+def tangents(u: Vector) -> tuple[Vector, Vector]:
+    """Return two unit vectors (3,) that span the plane perpendicular to the unit vector u."""
+    x, y, z = u.tolist()
+    # The first is perpendicular to the axis farthest from u. Plain floats are fast, and each minimiser step runs this.
+    least = min(abs(x), abs(y), abs(z))
+    first = (0.0, z, -y) if abs(x) == least else (-z, 0.0, x) if abs(y) == least else (y, -x, 0.0)
+    size = math.hypot(*first)
+    a, b, c = (value / size for value in first)
+    return np.array([a, b, c]), np.array([y * c - z * b, z * a - x * c, x * b - y * a])

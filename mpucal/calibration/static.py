@@ -15,7 +15,7 @@ from ..rests.flat import Flat
 from ..rests.intervals import RestFinder, statistics
 from ..rests.tremor import fit_lambda, mean_variance, tremor_variance
 from .fit import Fit
-from .gyro_matrix import KNOWN
+from .hypothesis_tests import KNOWN
 from .parameters import B_A_NAMES, D_NAMES, Form
 from .preprocessing import POSE_MPS2, TREMOR_PER_S
 from .theta import UPPER, from_elements

@@ -1,4 +1,4 @@
-"""A point in the space of all parameters: a step from it, its numbers one by one, and its layout for the kernel."""
+"""Points in the space of all parameters, the steps between them, and prior densities over them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Vector
-from .parameters import NAMES, PLACES, TABLE, Form, Parameter
-from .sphere import tangents
+from ..data import Sensor, Vector
+from ..rests.flat import Flat
+from .parameters import BY_NAME, NAMES, PLACES, TABLE, Form, Parameter
+from .rotation import tangents
 
 UPPER = np.triu_indices(3)
 
 
 @dataclass(frozen=True)
 class Theta:
-    """All parameters of the model, as the table's rows describe them; those not estimated keep their start.
+    """Values of all parameters of the model, one field for each row of the table; those not estimated keep their start.
 
     Attributes
     ----------
@@ -36,29 +37,32 @@ class Theta:
 
     @classmethod
     def start(cls, D: Vector, b_a: Vector, b_omega: Vector, u: Vector) -> Theta:
-        """What is given, and the table's starting values: a perfect gyro and no hand."""
+        """Return theta with the given values, and the table's starting values: a perfect gyroscope and no hand."""
         values = {row.field: from_elements(row.form, np.array(row.mean)) for row in TABLE if row.field != "u"}
         return cls(**{**values, "D": D, "b_a": b_a, "b_omega": b_omega, "u": u})
 
     def moved(self, delta: Vector) -> Theta:
-        """theta + delta, delta (p,) in the order of NAMES; the tilts turn u and keep it a unit vector."""
+        """Return theta + delta, delta (p,) in the order of NAMES; the tilts turn u and keep it a unit vector."""
         d = np.zeros(len(NAMES))
         d[: len(delta)] = delta
         moved = {row.field: _moved(row.form, getattr(self, row.field), d[PLACES[row.name]]) for row in TABLE}
         return replace(self, **moved)
 
+    def right_handed(self) -> Theta:
+        """Return the one with det D > 0 of (D, u) and (-D, -u), which fit equally well."""
+        return self if np.linalg.det(self.D) > 0.0 else replace(self, D=-self.D, u=-self.u)
+
     def packed(self, rows: Sequence[Parameter]) -> Vector:
-        """The kernel's structure of these rows: matrices whole, u with its derivatives by the tilts."""
+        """Return the kernel's structure of these rows: matrices whole, u with its derivatives by the tilts."""
         return np.concatenate([_packed(row.form, getattr(self, row.field)) for row in rows])
 
-
-def values(theta: Theta) -> Vector:
-    """(p,) in the order of NAMES; the tilts are zero by definition."""
-    return np.concatenate([_elements(row.form, getattr(theta, row.field)) for row in TABLE])
+    def values(self) -> Vector:
+        """Return the parameters (p,) in the order of NAMES; the tilts are zero by definition."""
+        return np.concatenate([_elements(row.form, getattr(self, row.field)) for row in TABLE])
 
 
 def from_elements(form: Form, elements: Vector) -> Any:
-    """The matrix, vector or number whose parameters these are."""
+    """Return the matrix, vector or number that has these parameters."""
     if form is Form.MATRIX:
         return elements.reshape(3, 3)
     if form is Form.SYMMETRIC:
@@ -83,3 +87,39 @@ def _moved(form: Form, value: Any, d: Vector) -> Any:
 
 def _packed(form: Form, value: Any) -> Vector:
     return np.concatenate([value, *tangents(value)]) if form is Form.DIRECTION else np.ravel(value)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Normal density of the parameters before anything is fitted, with independent components.
+
+    Attributes
+    ----------
+    mean : (p,) in the order of NAMES. precision : (p,) 1 / variance; 0 where nothing is known.
+    """
+
+    mean: Vector
+    precision: Vector
+
+    @classmethod
+    def of(cls, **known: tuple[Vector | float, Vector | float]) -> Prior:
+        """Build a prior from (mean, standard deviation) by keys of PLACES (D row-major, K as its six)."""
+        mean, precision = np.zeros(len(NAMES)), np.zeros(len(NAMES))
+        for name, (centre, sd) in known.items():
+            mean[PLACES[name]], precision[PLACES[name]] = centre, 1.0 / np.square(sd)
+        return cls(mean, precision)
+
+    @classmethod
+    def of_sensor(cls, flat: Flat, sensor: Sensor, **more: tuple[Vector | float, Vector | float]) -> Prior:
+        """Build the table's priors, with b_omega by the flat segment and tau by the sensor's filters.
+
+        more : further rows, as for Prior.of.
+        """
+        known = {row.name: (np.array(row.mean), np.array(row.sd)) for row in TABLE if row.sd}
+        known["tau"] = (np.array(sensor.accel_lag_s), np.array(BY_NAME["tau"].sd))
+        return cls.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)), **known, **more)
+
+    def cost(self, theta: Theta) -> float:
+        """Return the sum of precision (x - mean)^2 / 2 at theta, which adds to V."""
+        away = theta.values() - self.mean
+        return 0.5 * float(self.precision @ (away * away))

@@ -14,9 +14,9 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .fit import Fit
-from .gyro_matrix import KNOWN, at_prior
 from .hand import ROUGHLY
-from .hand_noise import HAND_MPS2, WHITE_MPS2, likeliest
+from .hand_noise import HAND_MPS2, WHITE_MPS2, most_likely_sigma
+from .hypothesis_tests import KNOWN, undetermined
 from .levenberg_marquardt import Minimum, minimise
 from .parameters import B_A_NAMES, D_NAMES, NAMES
 from .preprocessing import CORRELATION_S, Preprocessed, preprocess
@@ -41,7 +41,7 @@ def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
     theta = Theta.start(np.eye(3), np.zeros(3), prepared.flat.b_omega, u)
     minimum = minimise(_white(prepared, 0.0), theta, len(NAMES), prior, frozen=True)
     for _ in range(ROUNDS):
-        sigma = likeliest(prepared.white, WHITE_MPS2, minimum.theta, HAND_MPS2[0])
+        sigma = most_likely_sigma(prepared.white, WHITE_MPS2, minimum.theta, HAND_MPS2[0])
         minimum = minimise(_white(prepared, sigma), minimum.theta, len(NAMES), prior, until=ROUGHLY, frozen=True)
     return _as_fit(minimum)
 
@@ -60,4 +60,4 @@ def _as_fit(minimum: Minimum) -> Fit:
     covariance = HONEST**2 * minimum.covariance()
     sd = np.sqrt(np.maximum(np.diag(covariance)[:12], 0.0))
     left = sd > KNOWN * np.append(D_SD, np.full(3, BIAS_SD_MPS2))
-    return minimum.as_fit((*compress(D_NAMES + B_A_NAMES, left), *at_prior(covariance)), spread=HONEST)
+    return minimum.as_fit((*compress(D_NAMES + B_A_NAMES, left), *undetermined(covariance)), spread=HONEST)

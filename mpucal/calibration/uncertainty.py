@@ -1,20 +1,37 @@
-"""The uncertainty of a calibrated measurement over all directions of gravity, by the covariance of D and b_a."""
+"""Uncertainty of a calibrated measurement: predicted by a covariance, and claimed where parts of a recording disagree.
+
+The claim is the largest of three errors: the model's own, the jackknife's, and that of a sensor that changed midway.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
 
 import numpy as np
 
 from ..data import Vector
-from .sphere import fibonacci_sphere
+from .bias_walks import SIGNIFICANT, BiasWalk, walked_covariance
+from .fit import Fit
+from .jackknife import TINY_MPS2, Jackknife, jackknife
+from .parameters import ACCELEROMETER
+from .rotation import fibonacci_sphere
 
 DIRECTIONS = 400
+LEAST_DETERMINANT = 1e-6  # a D of less is singular
+# Nothing is known better than this where a walk was removed, since it is interpolated linearly from part to part.
+FLOOR_MPS2 = 5e-5
+MOST_NIS = 5.0  # NIS of a model that explains the data; 3 is expected
+# The model's uncertainty is multiplied by this where too few sides were down for a comparison of them.
+UNCOMPARED = 2.0
+# A change of more than so many times the jackknife's error is none: changes reach 10, turns with a pull 35 to 750.
+MOST_UNFELT = 20.0
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard deviations of a calibrated measurement, over all directions of gravity.
+    """Standard deviations of a calibrated measurement over all directions of gravity.
 
     Attributes
     ----------
@@ -29,13 +46,13 @@ class Uncertainty:
     worst: Vector
 
 
-def uncertainty(D: Vector, covariance: Vector, gravity: float, unit: Vector | None = None) -> Uncertainty:
-    """What the (12, 12) covariance of (D row-major, b_a) means for inv(D) (y - b_a) with |s| = gravity.
+def propagate(D: Vector, covariance: Vector, gravity: float, unit: Vector | None = None) -> Uncertainty:
+    """Propagate the (12, 12) covariance of (D row-major, b_a) to s = inv(D) (y - b_a) with |s| = gravity.
 
     unit : (n, 3) directions of s; None: all over the sphere.
     """
     unit = fibonacci_sphere(DIRECTIONS) if unit is None else unit
-    # the error is -inv(D) (dD s + db): linear in the twelve parameters, and in (s, 1)
+    # The error is -inv(D) (dD s + db): linear in the twelve parameters, and in (s, 1).
     s = np.column_stack([gravity * unit, np.ones(len(unit))])
     J = np.zeros((4, 3, 12))
     for i in range(3):
@@ -53,3 +70,76 @@ def uncertainty(D: Vector, covariance: Vector, gravity: float, unit: Vector | No
         worst_mps2=float(np.sqrt(total[worst])),
         worst=unit[worst],
     )
+
+
+@dataclass(frozen=True)
+class UncertaintyClaim:
+    """Claimed error of a calibration, rms over all directions, and the estimates that it is the largest of.
+
+    Attributes
+    ----------
+    model : m/s^2, by the covariance of the model.
+    floored : m/s^2, `model` enlarged by what is left of a walk of the gyroscope's bias that was removed, and where too
+        few sides were down for a comparison of them.
+    left_out : errors by leaving parts out.
+    change : change of the sensor while the board was turned; None where it stayed the same. change_error : m/s^2.
+    """
+
+    model: float
+    floored: float
+    left_out: Jackknife
+    change: BiasWalk | None
+    change_error: float = 0.0
+
+    @property
+    def inflation(self) -> float:
+        """Factor of the model's standard deviations that gives the claimed ones, 1 or more."""
+        return max(self.floored, self.left_out.claim(), self.change_error) / self.model
+
+    @property
+    def decided_by(self) -> Literal["model", "time", "side", "change"]:
+        """Estimate that set the claimed uncertainty."""
+        if max(self.left_out.claim(), self.change_error) <= self.floored:
+            return "model"
+        return "change" if self.change_error > self.left_out.claim() else self.left_out.decided_by()
+
+
+def claim_uncertainty(fit: Fit, gravity: float, change: BiasWalk | None, walked: float) -> UncertaintyClaim | None:
+    """Return the claimed uncertainty of a fit; None where its parts are not known, or D or the covariance is unusable.
+
+    change : the most likely walk that the fit's parts show. walked : (rad/s)^2 from part to part, of a walk of the
+        gyroscope's bias that was removed.
+    """
+    if fit.parts is None or not is_usable(fit):
+        return None
+    rms = partial(_rms, fit.D, gravity=gravity)
+    model = floored = rms(fit.covariance)
+    if walked:
+        wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(fit.parts.covariance))
+        floored = float(np.hypot(wider * model, FLOOR_MPS2))
+    left_out = jackknife(fit.parts, fit.D, gravity)
+    if not left_out.side:
+        floored *= UNCOMPARED
+    # A model that does not explain its innovations leaves the hand's motion in every part, which looks like a walk.
+    if change is None or not fit.converged or (change.alone if fit.nis <= MOST_NIS else change.gain) < SIGNIFICANT:
+        return UncertaintyClaim(model, floored, left_out, None)
+    # A sensor that changed moves the estimate when parts are left out; a steady pull on a moving hand does not.
+    if change.error(gravity) > MOST_UNFELT * max(left_out.claim(), model):
+        return UncertaintyClaim(model, floored, left_out, None)
+    return UncertaintyClaim(model, floored, left_out, change, change.error(gravity))
+
+
+def is_usable(fit: Fit) -> bool:
+    """Return True if D is finite and regular, and the covariance finite."""
+    if not (np.isfinite(fit.covariance).all() and np.isfinite(fit.D).all()):
+        return False
+    return not abs(np.linalg.det(fit.D)) < LEAST_DETERMINANT
+
+
+def inflate(fit: Fit, claim: UncertaintyClaim | None) -> Fit:
+    """Return the fit with the claimed covariance."""
+    return fit if claim is None else replace(fit, covariance=claim.inflation**2 * fit.covariance)
+
+
+def _rms(D: Vector, covariance: Vector, gravity: float) -> float:
+    return max(propagate(D, covariance[ACCELEROMETER, ACCELEROMETER], gravity).rms_mps2, TINY_MPS2)

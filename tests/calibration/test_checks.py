@@ -252,7 +252,7 @@ def test_six_faces_by_hand_are_usable(hand):
 
 def test_what_is_claimed_to_be_useless_is_refused_whatever_the_claim_rests_on(hand):
     evidence, _ = estimate(hand(0, "pose6").recording, "auto", G)
-    wide = 1.0 / evidence.sure.rms_mps2
+    wide = 1.0 / evidence.uncertainty.rms_mps2
     claim = replace(evidence.claim, left_out=replace(evidence.claim.left_out, time=wide * evidence.claim.model))
     quality = judge(
         replace(evidence, claim=claim, fit=replace(evidence.fit, covariance=wide**2 * evidence.fit.covariance))

@@ -85,7 +85,7 @@ def test_an_only_rest_is_compared_with_gravity_piece_by_piece(hand):
 def test_a_fit_without_a_usable_matrix_is_sure_of_nothing(in_hand, broken):
     fit = replace(exact_fit(in_hand.truth), **broken)
     seen = evidence(in_hand.recording, fit)
-    assert seen.sure is None
+    assert seen.uncertainty is None
     assert seen.calibrated is None
     assert seen.agreement is None
 
@@ -106,8 +106,8 @@ def test_how_far_gravity_moved(ideal):
 def test_rates_in_degrees_are_told_from_rates_in_radians(ideal, hand, motion, flat):
     recording = ideal(0).recording if motion == "paper" else hand(0, motion).recording
     in_degrees = replace(recording, gyr=np.rad2deg(recording.gyr))
-    assert not evidence(recording, flat=flat).turned_in_degrees
-    assert evidence(in_degrees, flat=flat).turned_in_degrees
+    assert not evidence(recording, flat=flat).rates_in_degrees
+    assert evidence(in_degrees, flat=flat).rates_in_degrees
 
 
 def test_turns_about_the_vertical_and_noise_are_no_degrees(in_hand):
@@ -115,6 +115,6 @@ def test_turns_about_the_vertical_and_noise_are_no_degrees(in_hand):
     rng = np.random.default_rng(0)
     upright = np.tile(recording.acc[:1000], (5, 1))
     spinning = np.where(np.arange(5000)[:, None] < 1000, 0.0, [0.0, 0.0, 5.0])
-    assert not evidence(replace(recording, acc=upright, gyr=recording.gyr * 0 + spinning)).turned_in_degrees
+    assert not evidence(replace(recording, acc=upright, gyr=recording.gyr * 0 + spinning)).rates_in_degrees
     noisy = recording.gyr + 2.0 * rng.standard_normal(recording.gyr.shape)
-    assert not evidence(replace(recording, gyr=noisy)).turned_in_degrees
+    assert not evidence(replace(recording, gyr=noisy)).rates_in_degrees

@@ -8,8 +8,7 @@ from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.masks import mask, with_masks
 from mpucal.calibration.model_selection import fit_accel
 from mpucal.calibration.problem import Problem, Series
-from mpucal.calibration.rotation import rotation
-from mpucal.calibration.sphere import fibonacci_sphere
+from mpucal.calibration.rotation import fibonacci_sphere, rotation
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from tools.lab.judge import sph_rms

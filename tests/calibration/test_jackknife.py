@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate, estimate
-from mpucal.calibration.claim import claim_of
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.jackknife import _moved, jackknife
 from mpucal.calibration.likelihood import evaluate, part_scores
@@ -14,6 +13,7 @@ from mpucal.calibration.parameters import ACCEL, HAND
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.preprocessing import preprocess
 from mpucal.calibration.problem import Problem, Series
+from mpucal.calibration.uncertainty import claim_uncertainty
 from mpucal.rests.flat import find_flat, flat_statistics
 from tools.lab.judge import sph_rms
 from tools.lab.scenarios.recordings import paper_scenario
@@ -90,7 +90,8 @@ def test_a_nonlinear_sensor_is_claimed_by_its_sides(hand):
 def test_where_too_few_sides_were_down_to_be_compared_the_model_is_believed_half(hand):
     fit = estimate(hand(1, "continuous").recording, "hand", G)[0].fit
     alike = np.zeros_like(fit.parts.side)
-    sides = claim_of(fit, G, None, 0.0), claim_of(replace(fit, parts=replace(fit.parts, side=alike)), G, None, 0.0)
+    one_side = replace(fit, parts=replace(fit.parts, side=alike))
+    sides = [claim_uncertainty(of, G, None, 0.0) for of in (fit, one_side)]
     assert sides[1].left_out.side == 0.0
     assert sides[1].floored == 2.0 * sides[0].floored
 

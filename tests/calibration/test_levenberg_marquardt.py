@@ -9,8 +9,8 @@ from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import DECREMENT, MOST_ITERATIONS, _nearer, minimise
 from mpucal.calibration.likelihood import evaluate
 from mpucal.calibration.parameters import ACCEL, PLACES
-from mpucal.calibration.prior import Prior, prior_of
 from mpucal.calibration.problem import Problem, Series
+from mpucal.calibration.theta import Prior
 from mpucal.rests.flat import flat_statistics
 from tools.lab.scenarios.recordings import paper_scenario
 
@@ -143,6 +143,6 @@ def test_a_valley_without_an_end_is_left_soon():
     recording = paper_scenario(0, rate_hz=20, turn_s=330.0).recording
     flat = flat_statistics(recording, recording.flat)
     slow = Problem(Series.after(recording, flat), flat, 9.82)
-    minimum = minimise(slow, initialise(slow, flat.b_omega), ACCEL, prior_of(flat, recording.sensor), most=1000)
+    minimum = minimise(slow, initialise(slow, flat.b_omega), ACCEL, Prior.of_sensor(flat, recording.sensor), most=1000)
     assert not minimum.converged
     assert minimum.iterations < MOST_ITERATIONS

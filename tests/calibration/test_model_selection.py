@@ -6,14 +6,14 @@ from scipy.special import chdtri
 
 from mpucal.calibration import model_selection
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
-from mpucal.calibration.gyro_matrix import WALD_99
+from mpucal.calibration.hypothesis_tests import WALD_99
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import minimise
 from mpucal.calibration.model_selection import METHODS, choose, fit_accel, fit_imu
 from mpucal.calibration.paper import expand
 from mpucal.calibration.parameters import ACCEL, B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
-from mpucal.calibration.prior import Prior
 from mpucal.calibration.problem import Problem, Series
+from mpucal.calibration.theta import Prior
 from mpucal.rests.flat import flat_statistics
 from tools.lab.judge import sph_rms
 from tools.lab.scenarios.recordings import paper_scenario

@@ -7,7 +7,7 @@ import pytest
 
 from mpucal.calibration import parameters
 from mpucal.calibration.parameters import LANES, MODELS, NAMES, PLACES, TABLE, estimated, lanes_used
-from mpucal.calibration.theta import Theta, values
+from mpucal.calibration.theta import Theta
 
 
 def test_what_a_model_estimates_comes_first():
@@ -43,13 +43,13 @@ def test_a_step_changes_its_own_parameter_alone(row):
     assert changed == [row.field]
     # the tilts are measured from the direction itself
     expected = step if row.name != "tilt" else 0.0 * step
-    np.testing.assert_allclose(values(moved) - values(theta), expected, atol=1e-15)
+    np.testing.assert_allclose(moved.values() - theta.values(), expected, atol=1e-15)
 
 
 def test_the_start_is_a_perfect_sensor_at_rest():
     u = np.array([0.0, 0.6, 0.8])
     theta = Theta.start(np.eye(3), np.zeros(3), np.zeros(3), u)
-    assert values(theta).tolist() == [mean for row in TABLE for mean in row.mean]
+    assert theta.values().tolist() == [mean for row in TABLE for mean in row.mean]
     np.testing.assert_array_equal(theta.K, np.eye(3))
 
 

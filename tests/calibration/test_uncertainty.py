@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.uncertainty import uncertainty
+from mpucal.calibration.uncertainty import propagate
 
 G = 9.82
 D = np.array([[1.1, 0.05, -0.1], [0.2, 0.8, 0.0], [-0.05, 0.1, 0.9]])
@@ -21,36 +21,36 @@ def test_it_is_the_spread_of_calibrated_measurements():
     y = s @ D.T
     calibrated = np.linalg.solve(drawn[:, :9].reshape(-1, 3, 3), (y - drawn[:, 9:])[..., None])[..., 0]
     error = calibrated - s
-    sure = uncertainty(D, C, G)
-    assert sure.rms_mps2 == pytest.approx(np.sqrt((error**2).sum(1).mean()), rel=0.03)
+    known = propagate(D, C, G)
+    assert known.rms_mps2 == pytest.approx(np.sqrt((error**2).sum(1).mean()), rel=0.03)
     along = np.linalg.norm(calibrated, axis=1) - G
-    assert sure.magnitude_mps2 == pytest.approx(np.sqrt((along**2).mean()), rel=0.03)
+    assert known.magnitude_mps2 == pytest.approx(np.sqrt((along**2).mean()), rel=0.03)
     cosine = (calibrated * s).sum(1) / np.linalg.norm(calibrated, axis=1) / G
-    assert sure.direction_rad == pytest.approx(np.sqrt((np.arccos(cosine) ** 2).mean()), rel=0.03)
+    assert known.direction_rad == pytest.approx(np.sqrt((np.arccos(cosine) ** 2).mean()), rel=0.03)
 
 
 def test_a_bias_alone_is_equally_bad_everywhere():
     C = np.zeros((12, 12))
     C[9:, 9:] = 0.04 * np.eye(3)
-    sure = uncertainty(np.eye(3), C, G)
-    assert sure.rms_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
-    assert sure.worst_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
-    assert sure.magnitude_mps2 == pytest.approx(0.2)
-    assert sure.direction_rad == pytest.approx(0.2 * np.sqrt(2.0) / G)
+    known = propagate(np.eye(3), C, G)
+    assert known.rms_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
+    assert known.worst_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
+    assert known.magnitude_mps2 == pytest.approx(0.2)
+    assert known.direction_rad == pytest.approx(0.2 * np.sqrt(2.0) / G)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
 def test_a_gain_that_is_not_known_is_worst_along_its_axis(axis):
     C = 1e-8 * np.eye(12)
     C[4 * axis, 4 * axis] = 0.01**2
-    sure = uncertainty(np.eye(3), C, G)
-    assert abs(sure.worst[axis]) > 0.95
-    assert sure.worst_mps2 == pytest.approx(0.01 * G, rel=0.05)
-    assert np.linalg.norm(sure.worst) == pytest.approx(1.0)
+    known = propagate(np.eye(3), C, G)
+    assert abs(known.worst[axis]) > 0.95
+    assert known.worst_mps2 == pytest.approx(0.01 * G, rel=0.05)
+    assert np.linalg.norm(known.worst) == pytest.approx(1.0)
 
 
 def test_twice_the_standard_deviation_is_twice_the_error():
-    one, two = uncertainty(D, covariance(), G), uncertainty(D, 4.0 * covariance(), G)
+    one, two = propagate(D, covariance(), G), propagate(D, 4.0 * covariance(), G)
     for name in ("rms_mps2", "magnitude_mps2", "direction_rad", "worst_mps2"):
         assert getattr(two, name) == pytest.approx(2.0 * getattr(one, name))
 
@@ -60,7 +60,7 @@ def test_a_rotation_of_the_sensor_is_an_error_of_direction_alone():
     d_D = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]).ravel()
     C = np.zeros((12, 12))
     C[:9, :9] = 1e-4 * np.outer(d_D, d_D)
-    sure = uncertainty(np.eye(3), C, G)
-    assert sure.magnitude_mps2 < 1e-9
-    assert sure.direction_rad == pytest.approx(0.01 * np.sqrt(2.0 / 3.0), rel=0.01)
-    assert abs(sure.worst[2]) < 0.1
+    known = propagate(np.eye(3), C, G)
+    assert known.magnitude_mps2 < 1e-9
+    assert known.direction_rad == pytest.approx(0.01 * np.sqrt(2.0 / 3.0), rel=0.01)
+    assert abs(known.worst[2]) < 0.1

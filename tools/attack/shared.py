@@ -30,7 +30,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from mpucal.__main__ import run
-from mpucal.calibration.recording_digest import recording_digest
+from mpucal.calibration import recording_digest
 from mpucal.errors import MpucalError
 from mpucal.files import load
 from mpucal.result.calibration import Calibration

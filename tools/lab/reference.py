@@ -14,8 +14,7 @@ from scipy.linalg import expm
 from mpucal.calibration.likelihood import Evaluation
 from mpucal.calibration.parameters import ACCEL, HAND, PLACES
 from mpucal.calibration.problem import Problem
-from mpucal.calibration.rotation import cross, left_jacobian, rotation
-from mpucal.calibration.sphere import tangents
+from mpucal.calibration.rotation import cross, left_jacobian, rotation, tangents
 from mpucal.calibration.theta import Theta
 from mpucal.data import Vector
 

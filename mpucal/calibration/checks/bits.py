@@ -1,8 +1,8 @@
-"""Check of the bits of which readings are made: an axis whose low or high bits never move.
+"""Check of the bits of the readings: an axis whose low or high bits never change.
 
-Counts are known again where the range is known, or where all values are whole counts of one of the chip's (16 bits, as
-the MPU-6050 and its successors have). Where they are not, the steps of an axis are compared with those of the others.
-A sensor that is coarse on all axes is no fault.
+The counts are recovered where the range is known, or where all values are whole counts of one of the chip's ranges (16
+bits, as the MPU-6050 and its successors have). Where that fails, the steps of an axis are compared with those of the
+others. A sensor that is coarse on all axes is no fault.
 """
 
 from __future__ import annotations
@@ -13,34 +13,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
+from ...data import ACCEL_COUNTS, ACCEL_RANGES_G, GYRO_COUNTS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Vector
 from ...reasons import Reason, reason
 from ..evidence import Evidence
 from .unusable import dead_accelerometer, dead_gyroscope
 
-# PS-MPU-6000A r3.4, section 6: sensitivities at 16 bits
-FULL_SCALE = 32768
-ACCEL_RANGES_G, GYRO_RANGES_DPS = (16.0, 8.0, 4.0, 2.0), (2000.0, 1000.0, 500.0, 250.0)
-# So many low bits more than those that no axis moves are dead; so many on all axes are no coarse sensor's any more.
+# Low bits are dead if so many more never change on an axis than on all axes; if so many never change on all axes, it is
+# no coarse sensor.
 DEAD_BITS, DEAD_BITS_OF_ALL = 3, 7
-# They are looked for in pieces, as they may die midway; of the changes in a piece some may be errors of a bus.
+# Dead bits are looked for in pieces, as they may die midway; some of the changes in a piece may be errors of a bus.
 MOST_PIECES, SHORTEST_PIECE_S, FEWEST_CHANGES, SHARE_OF_ERRORS = 64, 2.0, 12, 0.1
-# A stuck bit takes values out of the middle of those that are passed; a low one does so in many places.
-LOW_BITS, HIGH_BITS, SIGN, OF_ALL_VALUES, FEWEST_PLACES = range(1, 8), range(8, 16), 15, 0.9, 16
-# Where a bit died midway, and a bus errs: errors among the samples, leaps over the bit, and samples on either side.
+# A stuck bit removes values from the middle of the range that is passed; a low one does so in many places.
+SIGN, OF_ALL_VALUES, FEWEST_PLACES = 15, 0.9, 16
+LOW_BITS, HIGH_BITS = range(1, 8), range(8, SIGN + 1)
+# A bit that died midway on a bus with errors: share of errors, leaps over the bit, share of samples on either side.
 MOST_ERRORS, FEWEST_LEAPS, STAYS = 0.005, 3, 0.05
 # Where the range is not known: how many steps of another axis make a step that is odd, and how exactly.
 ODD_STEPS, EXACTLY, FEWEST_VALUES, MOST_SAMPLES = 8.0, 0.02, 6, 20_000
-# Below this a step [m/s^2, rad/s] may be that of a float32, which is coarser the larger a value is.
+# A smaller step [m/s^2, rad/s] may be that of a float32, which is coarser the larger a value is.
 LEAST_ODD_STEP = 1e-3
-# beyond these an axis' rounding is no calibration's noise any more
+# The rounding of an axis refuses a calibration beyond so many claimed uncertainties, or these limits.
 HONEST_STD, MOST_MPS2, USABLE_RAD_S = 2.0, 0.1, np.deg2rad(0.5)
 
 Counts = NDArray[np.int64]
 
 
 class Low(NamedTuple):
-    """Low bits that never move: of which axis, how many, from which sample on, and the step that they leave."""
+    """Low bits of an axis that never change: their number, the sample from which on, and the step that they leave."""
 
     axis: int
     bits: int
@@ -49,20 +48,20 @@ class Low(NamedTuple):
 
 
 def bits_stuck(e: Evidence) -> Reason | None:
-    """An axis of either sensor whose low or high bits never move."""
+    """Find an axis of either sensor whose low or high bits never change."""
     if dead_accelerometer(e) is not None or dead_gyroscope(e) is not None:
         return None
     acc_range, gyro_range = e.recording.sensor.accel_range_g, e.recording.sensor.gyro_range_dps
-    acc_lsbs = [g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS for g in ([acc_range] if acc_range else ACCEL_RANGES_G)]
-    gyr_lsbs = [np.deg2rad(w / GYRO_COUNTS) for w in ([gyro_range] if gyro_range else GYRO_RANGES_DPS)]
-    most = MOST_MPS2 if e.sure is None else min(MOST_MPS2, HONEST_STD * e.sure.rms_mps2)
+    acc_lsbs = [g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS for g in ([acc_range] if acc_range else ACCEL_RANGES_G[::-1])]
+    gyr_lsbs = [np.deg2rad(w / GYRO_COUNTS) for w in ([gyro_range] if gyro_range else GYRO_RANGES_DPS[-2:0:-1])]
+    most = MOST_MPS2 if e.uncertainty is None else min(MOST_MPS2, HONEST_STD * e.uncertainty.rms_mps2)
     return _stuck(e, e.recording.acc, acc_lsbs, "accelerometer", "m/s^2", most) or _stuck(
         e, e.recording.gyr, gyr_lsbs, "gyroscope", "rad/s", USABLE_RAD_S
     )
 
 
 def _stuck(e: Evidence, values: Vector, lsbs: Iterable[float], sensor: str, unit: str, most: float) -> Reason | None:
-    lsb, counts = next(((lsb, found) for lsb in lsbs if (found := _counts(values, lsb)) is not None), (0.0, None))
+    lsb, counts = next(((lsb, whole) for lsb in lsbs if (whole := _counts(values, lsb)) is not None), (0.0, None))
     if counts is None:
         low = _odd_steps(values)
     else:
@@ -88,19 +87,19 @@ def _stuck(e: Evidence, values: Vector, lsbs: Iterable[float], sensor: str, unit
 
 
 def _counts(values: Vector, lsb: float) -> Counts | None:
-    """(n, 3) the counts of which `values` were made; None where they are no whole numbers of 16 bits."""
+    """Return `values` (n, 3) as counts of `lsb`; None where those are not integers of 16 bits."""
     scaled = values / lsb
     counts = np.rint(scaled)
-    # rates that were not measured are NaN
-    if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= FULL_SCALE):
+    # Rates that were not measured are NaN, and fail the comparison.
+    if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= ACCEL_COUNTS):
         return None
     return counts.astype(np.int64)
 
 
 def _stuck_low(counts: Counts, lsb: float, rate_hz: float) -> Low | None:
-    """The axis with the most low bits that never move."""
+    """Return the axis with the most low bits that never change."""
     changed = counts[1:] ^ counts[:-1]
-    # the lowest bit that a change moves; of no change a bit that there is not
+    # The lowest bit that changes; 63, which is none of a word, where nothing changes.
     lowest = np.where(changed == 0, 63, np.log2(np.maximum(changed & -changed, 1))).astype(int)
     size = max(round(SHORTEST_PIECE_S * rate_hz), len(lowest) // MOST_PIECES, 1)
     pieces = [lowest[first : first + size] for first in range(0, len(lowest), size)]
@@ -110,24 +109,24 @@ def _stuck_low(counts: Counts, lsb: float, rate_hz: float) -> Low | None:
         return None
     common = int(dead[known].min())
     least = 0 if common >= DEAD_BITS_OF_ALL else common
-    found = known & (dead >= least + DEAD_BITS)
-    if not found.any():
+    stuck = known & (dead >= least + DEAD_BITS)
+    if not stuck.any():
         return None
-    axis = int(np.where(found, dead, -1).max(0).argmax())
-    first, bits = int(found[:, axis].argmax()), int(dead[found[:, axis], axis].min())
-    # before the first piece that shows it there may be others that do not say
+    axis = int(np.where(stuck, dead, -1).max(0).argmax())
+    first, bits = int(stuck[:, axis].argmax()), int(dead[stuck[:, axis], axis].min())
+    # The pieces before the first one with dead bits may have too few changes to tell.
     first = 0 if not known[:first, axis].any() else first
     return Low(axis, bits, first * size, lsb * 2.0**bits)
 
 
 def _dead_bits(lowest: NDArray[np.int_]) -> int:
-    """How many low bits the changes of a piece never move, but for errors; -1 where there are too few changes."""
+    """Return the number of low bits that never change in a piece, but for errors; -1 of too few changes."""
     moved = np.sort(lowest[lowest < 63])
     return int(moved[int(SHARE_OF_ERRORS * len(moved))]) if len(moved) >= FEWEST_CHANGES else -1
 
 
 def _stuck_bit(counts: Counts, gap: NDArray[np.bool_], bits: range) -> tuple[int, int] | None:
-    """(axis, bit) that is the same throughout, though lower ones move, and values on both sides of it are passed."""
+    """Return (axis, bit) of a bit that is constant though lower ones change and values on both sides are passed."""
     halves = [part for part in (counts[: len(counts) // 2], counts[len(counts) // 2 :]) if not gap.any() and len(part)]
     for part in (counts, *halves):
         moved = np.bitwise_or.reduce(part ^ part[0], axis=0)
@@ -141,14 +140,14 @@ def _stuck_bit(counts: Counts, gap: NDArray[np.bool_], bits: range) -> tuple[int
                 if bit in HIGH_BITS or len(np.unique(part[:, axis] >> (bit + 1))) >= FEWEST_PLACES:
                     return axis, bit
     last = len(counts) // 2
-    found = ((axis, bit) for axis in range(3) for bit in bits if bit in HIGH_BITS and bit < SIGN)
-    return next((at for at in found if _leaps(counts[last:, at[0]], gap[last:], at[1])), None)
+    places = ((axis, bit) for axis in range(3) for bit in bits if bit in HIGH_BITS and bit < SIGN)
+    return next((at for at in places if _leaps(counts[last:, at[0]], gap[last:], at[1])), None)
 
 
 def _leaps(counts: Counts, gap: NDArray[np.bool_], bit: int) -> bool:
-    """Whether values (n,) leap over those with another value of a bit, again and again, and stay on both sides.
+    """Return True if values (n,) leap again and again over those with another value of a bit, and stay on both sides.
 
-    Gaps and errors of a bus may lie between: leaps across a gap count for nothing, and a few samples may be errors.
+    Leaps across a gap do not count, and a few samples may be errors of a bus.
     """
     with_it = int(np.count_nonzero(counts >> bit & 1))
     errors = min(with_it, len(counts) - with_it)
@@ -161,10 +160,10 @@ def _leaps(counts: Counts, gap: NDArray[np.bool_], bit: int) -> bool:
 
 
 def _odd_steps(values: Vector) -> Low | None:
-    """The axis whose every value is a multiple of a step that is many times the step of another axis."""
+    """Return the axis whose every value is a multiple of a step that is many times the step of another axis."""
     part = values[:: max(len(values) // MOST_SAMPLES, 1)]
     if all(_is_fine(column) for column in part.T):
-        return None  # without a value sorted: this is nearly every recording
+        return None  # nearly every recording ends here, without sorting its values
     unique = [np.unique(column) for column in part.T]
     if min(map(len, unique)) < FEWEST_VALUES:
         return None
@@ -174,12 +173,12 @@ def _odd_steps(values: Vector) -> Low | None:
     places = (unique[axis] - unique[axis][0]) / steps[axis]
     if steps[axis] < max(ODD_STEPS * finest, LEAST_ODD_STEP) or np.abs(places - np.rint(places)).max() > EXACTLY:
         return None
-    # of a word of 16 bits; what other axes hold beside it may be as fine as a number can be
+    # Other axes may be as fine as a float, but a word has 16 bits.
     bits = min(round(float(np.log2(steps[axis]) - np.log2(finest))), SIGN)
     return Low(axis, bits, 0, steps[axis])
 
 
 def _is_fine(column: Vector) -> bool:
-    """Whether some value follows another by less than a step that is odd."""
+    """Return True if some value differs from the one before it by less than an odd step."""
     change = np.abs(np.diff(column))
     return bool(np.any((change > 0.0) & (change < LEAST_ODD_STEP)))

@@ -1,9 +1,10 @@
-"""Checks of the recording alone: the board moved, samples are clipped or lost, the temperature changed."""
+"""Checks of the recording alone: the board moved, samples are clipped or lost, the temperature changed, gravity."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
 from ...data import Mask
 from ...reasons import Reason, reason
 from ...rests.local_noise import noise_variance
@@ -11,15 +12,16 @@ from ..evidence import Evidence
 
 WARMER_C = 5.0
 MOST_CLIPPED = 0.2
-# a longer gap is an interruption, whose length says nothing about the link
+# A longer gap is an interruption of the session, which says nothing about the link.
 INTERRUPTED_S = 10.0
-# of the accelerometer's noise: more than at rest for a share of the time, or at rest more than any sensor has
+# The accelerometer's noise is vibration where it exceeds this and that of the flat segment for a share of the time, or
+# where it is at rest more than that of any sensor.
 VIBRATING_MPS2, LOUDER_THAN_FLAT, VIBRATING_SHARE = 0.2, 2.5, 0.2
 SHAKING_MPS2 = 0.5
 
 
 def moved_while_still(e: Evidence) -> Reason | None:
-    """A flat segment, given by its caller, in which the board moved."""
+    """Find a board that moved in the flat segment that the caller named."""
     if e.flat is None or e.flat.n < 4:
         return None
     half = e.flat.n // 2
@@ -32,12 +34,12 @@ def moved_while_still(e: Evidence) -> Reason | None:
 
 
 def gyro_clipped(e: Evidence) -> Reason | None:
-    """Samples at the end of the gyroscope's range."""
+    """Find samples at the end of the gyroscope's range."""
     return _clipped("gyro_clipped", e.recording.gyr_clipped)
 
 
 def accel_clipped(e: Evidence) -> Reason | None:
-    """Samples at the end of the accelerometer's range."""
+    """Find samples at the end of the accelerometer's range."""
     return _clipped("accel_clipped", e.recording.acc_clipped)
 
 
@@ -47,14 +49,13 @@ def _clipped(code: str, mask: Mask) -> Reason | None:
 
 
 def data_lost(e: Evidence) -> Reason | None:
-    """Gaps."""
+    """Find gaps; more than half of the time lost refuses, interruptions of the session not counted."""
     gaps, t = e.recording.gap, e.recording.t
     if not gaps.any():
         return None
     places = int(np.count_nonzero(gaps & ~np.append(False, gaps[:-1])))
     missing = np.diff(t, prepend=t[0])[gaps]
     lost = float(missing.sum())
-    # a session that was interrupted has a gap that no bus is to blame for
     interrupted = float(missing[missing > INTERRUPTED_S].sum())
     return reason(
         "data_lost",
@@ -66,7 +67,7 @@ def data_lost(e: Evidence) -> Reason | None:
 
 
 def vibrating(e: Evidence) -> Reason | None:
-    """A motor that runs, from the start or from later on."""
+    """Find vibration, as of a motor that runs from the start or from later on."""
     if e.flat is None or e.fit is None:
         return None
     std = np.sqrt(noise_variance(e.recording) @ np.full(3, 1.0 / 3.0))
@@ -80,13 +81,19 @@ def vibrating(e: Evidence) -> Reason | None:
 
 
 def temperature_moved(e: Evidence) -> Reason | None:
-    """A sensor that warmed or cooled while it was measured."""
+    """Find a sensor that warmed or cooled while it was measured."""
     known = e.recording.temperature_c[np.isfinite(e.recording.temperature_c)]
     if len(known) < 10:
         return None
     low, high = np.quantile(known, [0.02, 0.98])
     if high - low <= WARMER_C:
         return None
-    if e.recording.sensor.message:
-        return reason("temperature_moved", "of_vehicle", low=low, high=high)
-    return reason("temperature_moved", "range", low=low, high=high)
+    return reason("temperature_moved", "of_vehicle" if e.recording.sensor.message else "range", low=low, high=high)
+
+
+def gravity_unlikely(e: Evidence) -> Reason | None:
+    """Find a gravity outside the range found on Earth that the caller did not confirm."""
+    least, most = LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
+    if e.gravity_anyway or least <= e.gravity <= most:
+        return None
+    return reason("gravity_unlikely", "beyond_earth", gravity=e.gravity, least=least, most=most)

@@ -1,4 +1,4 @@
-"""Checks of what a fit says of the sensor: its range, units and axes, and the gyroscope's scale factors."""
+"""Checks of the sensor by a trustworthy fit: its range, units and axes, the gyroscope, and the clock."""
 
 from __future__ import annotations
 
@@ -10,29 +10,34 @@ from ...data import Mask, Vector
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
 from ..evidence import MOST_MISS_RAD, Evidence
+from ..parameters import BY_NAME
 from .estimate import USABLE_RMS_MPS2, inconsistent
 
 WORST_AXES_RAD = np.deg2rad(60.0)
 GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
-# one way or the other; the paper simulates sensors of 0.5 to 1.5
-MOST_SCALE = 2.5
-# of all three alike: data sheets say 3 %, and chips that were soldered by hand are within 5 %
-SCALE_OFF = 0.1
-# so well three scale factors agree on one
-ALIKE = 0.05
+# Of all three scale factors alike: data sheets say 3 %, and chips that were soldered by hand are within 5 %; beyond
+# MOST_SCALE, or its inverse, the unit is wrong: the paper simulates sensors of 0.5 to 1.5.
+SCALE_OFF, MOST_SCALE = 0.1, 2.5
+ALIKE = 0.05  # largest difference of three scale factors that agree on one
+# A quartz crystal is within 100 ppm; a scale factor error of so much is a tenth of the accuracy wanted.
+OFF_PPM = 500.0
+# These models estimate no scale factor of the gyroscope.
+TRUSTING = ("accel", "paper", "tilt")
+# Filters of one clock leave 10 ms at most; those of an autopilot are set by its owner, and differ.
+LAG_S, LEAST_STDS = 0.02, 5.0
 
 
-def trustworthy(e: Evidence) -> bool:
-    """Whether D and K are known well enough to conclude from them what is wrong with the sensor."""
-    if e.fit is None or e.sure is None or not e.fit.converged or e.sure.rms_mps2 > USABLE_RMS_MPS2:
+def is_trustworthy(e: Evidence) -> bool:
+    """Return True if D and K are known well enough to conclude from them what is wrong with the sensor."""
+    if e.fit is None or e.uncertainty is None or not e.fit.converged or e.uncertainty.rms_mps2 > USABLE_RMS_MPS2:
         return False
     contradiction = inconsistent(e)
     return contradiction is None or not contradiction.refuse
 
 
 def wrong_range(e: Evidence) -> Reason | None:
-    """All three scale factors near one power of two."""
-    if e.fit is None or not trustworthy(e):
+    """Find three scale factors near the same power of two."""
+    if e.fit is None or not is_trustworthy(e):
         return None
     scale = _scale_factors(e.fit.D)
     power = np.round(np.log2(scale)).astype(int)
@@ -42,8 +47,8 @@ def wrong_range(e: Evidence) -> Reason | None:
 
 
 def accelerometer_factor(e: Evidence) -> Reason | None:
-    """All three scale factors off by one factor that is no range's, and beyond what a sensor is off by."""
-    if e.fit is None or not trustworthy(e) or wrong_range(e) is not None:
+    """Find three scale factors that are wrong by one factor, which is no range's and larger than a sensor's error."""
+    if e.fit is None or not is_trustworthy(e) or wrong_range(e) is not None:
         return None
     scale = _scale_factors(e.fit.D)
     factor = float(scale.mean())
@@ -54,19 +59,19 @@ def accelerometer_factor(e: Evidence) -> Reason | None:
 
 
 def _scale_factors(D: Vector) -> Vector:
-    """(3,) along the accelerometer's own axes, which may be swapped or turned."""
+    """Return (3,) along the accelerometer's own axes, which may be swapped or turned."""
     return np.diag(sensor_axes(D))
 
 
 def axes(e: Evidence) -> Reason | None:
-    """Axes that are mirrored or swapped against the gyroscope's."""
-    if e.fit is None or not trustworthy(e):
+    """Find axes that are mirrored or swapped relative to the gyroscope's."""
+    if e.fit is None or not is_trustworthy(e):
         return None
     U, _, Vt = np.linalg.svd(e.fit.D)
     Q = U @ Vt
     if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
         return None
-    # (D, u) and (-D, -u) fit equally: which of them it is, what the board reads as it lies face up decides
+    # (D, u) and (-D, -u) fit equally: the reading of the board that lies face up decides between them.
     M = max(_SIGNED_PERMUTATIONS, key=lambda M: float(abs(np.sum(M * Q)) + 0.01 * np.trace(M)))
     if not _reads_up(e, M):
         M = -M
@@ -77,9 +82,9 @@ def axes(e: Evidence) -> Reason | None:
 
 
 def _reads_up(e: Evidence, M: Vector) -> bool:
-    """True where the board, lying face up, reads +g on z once the axes M (3, 3) are undone.
+    """Return True if the board, lying face up, reads +g on z once the axes M (3, 3) are undone.
 
-    Where it lay on another side, M is preferred that changes fewer signs.
+    Where it lay on another side, return True for the M that changes fewer signs.
     """
     flat = np.zeros(3) if e.flat is None else M.T @ e.flat.y
     return bool(flat[2] > 0.0) if np.abs(flat).argmax() == 2 else bool(np.trace(M) > 0.0)
@@ -98,8 +103,8 @@ _SIGNED_PERMUTATIONS = [
 
 
 def gyro_range(e: Evidence) -> Reason | None:
-    """Rates that are all a power of two too small or too large for how gravity turned from rest to rest."""
-    if e.fit is None or trustworthy(e) or e.gyro_factor == 1.0:
+    """Find rates that are all a power of two too small or too large for how gravity turned from rest to rest."""
+    if e.fit is None or is_trustworthy(e) or e.gyro_factor == 1.0:
         return None
     assumed = e.recording.sensor.gyro_range_dps
     ranges = "" if assumed is None else f": ±{e.gyro_factor * assumed:g} deg/s, read as ±{assumed:g}"
@@ -107,15 +112,15 @@ def gyro_range(e: Evidence) -> Reason | None:
 
 
 def gyro_contradicts(e: Evidence) -> Reason | None:
-    """Rates that lead gravity far away from where it is at the next rest."""
-    if e.fit is None or trustworthy(e) or not e.gyro_miss > MOST_MISS_RAD:
+    """Find rates that carry gravity far away from where it is at the next rest."""
+    if e.fit is None or is_trustworthy(e) or not e.gyro_miss > MOST_MISS_RAD:
         return None
     return reason("gyro_off", "contradicts", degrees=np.rad2deg(e.gyro_miss))
 
 
 def gyro_off(e: Evidence) -> Reason | None:
-    """A gyroscope beyond what its data sheet allows."""
-    if e.fit is None or not trustworthy(e):
+    """Find a gyroscope outside the tolerances of its data sheet."""
+    if e.fit is None or not is_trustworthy(e):
         return None
     off = e.fit.K - np.eye(3)
     scale, cross = np.abs(np.diag(off)), np.abs(off - np.diag(np.diag(off)))
@@ -123,3 +128,29 @@ def gyro_off(e: Evidence) -> Reason | None:
         return None
     axis = int(np.argmax(scale))
     return reason("gyro_off", "scale", axis="xyz"[axis], scale=scale[axis], cross=cross.max())
+
+
+def clock_off(e: Evidence) -> Reason | None:
+    """Find a clock whose rate was corrected by much, or is hardly known: the gyroscope's K has the same error."""
+    ppm, std = e.recording.sensor.clock_ppm, e.recording.sensor.clock_std
+    if ppm is None or std is None:
+        return None
+    if std > 1e-6 * OFF_PPM:
+        if e.model in TRUSTING:
+            return reason("clock_off", "trusted", std=std * 1e6, model=e.model)
+        return reason("clock_off", "unknown", std=std * 1e6)
+    return reason("clock_off", "corrected", ppm=ppm, std=std * 1e6) if abs(ppm) > OFF_PPM else None
+
+
+def sensors_lag(e: Evidence) -> Reason | None:
+    """Find an accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters explain."""
+    if e.fit is None or e.claim is None or e.recording.autopilot is not None:
+        return None
+    (of_prior,) = BY_NAME["tau"].sd
+    std = float(e.fit.std("tau")[0]) / e.claim.inflation
+    # The prior draws the estimate towards the filters' delay: remove it, to have what the data alone say.
+    data, filters_s = 1.0 - (std / of_prior) ** 2, e.recording.sensor.accel_lag_s
+    lag_s = filters_s + (e.fit.delay_s - filters_s) / data if data > 0.0 else 0.0
+    if not data > 0.0 or abs(lag_s) < max(LAG_S, LEAST_STDS * std / data**0.5):
+        return None
+    return reason("clock_off", "apart", lag=1e3 * abs(lag_s), how="lags behind" if lag_s > 0 else "runs ahead of")

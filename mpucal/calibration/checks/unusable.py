@@ -13,27 +13,25 @@ from ..rotation import lengths
 FEWEST_SAMPLES = 50
 SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
-# Times in milliseconds of any sensor lie further apart; a logger's may lie so far.
+# Times of a slow logger may be so many seconds apart; those of any sensor in milliseconds are farther apart.
 LONGEST_STEP_S = 2.0
-# from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
+# Times that are farther apart than this are rather in microseconds, or in nanoseconds.
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
-LEAST_G = 0.5  # of a magnitude in g, below which it holds no gravity
-# Gains, biases, noise and a hand's acceleration make a magnitude vary by more; so little is left of two decimals.
+LEAST_G = 0.5  # magnitude in g below which a recording holds no gravity
+# Gains, biases, noise and a hand's acceleration make a magnitude vary by more; rounding to two decimals leaves as much.
 LEAST_SPREAD = 4e-4
-# So long no sensor repeats a value to the last bit while it is turned: its noise alone is more.
+# No sensor repeats a value for so long while it is turned: its noise alone prevents that.
 STUCK_S = 2.0
 FASTEST_GYRO_DPS, SELDOM = 4100.0, 0.01
 
 
 def no_gyroscope(e: Evidence) -> Reason | None:
-    """A recording of the accelerometer alone; nothing else can be said of it."""
-    if np.isfinite(e.recording.gyr).all():
-        return None
-    return reason("gyro_off", "missing")
+    """Find a recording of the accelerometer alone; no other check of it means anything."""
+    return None if np.isfinite(e.recording.gyr).all() else reason("gyro_off", "missing")
 
 
 def time_unit(e: Evidence) -> Reason | None:
-    """Times that are no seconds."""
+    """Find times that are not in seconds, or samples that are too far apart."""
     step = 1.0 / e.recording.rate_hz
     if step < 1.0 / SLOWEST_HZ:
         return None
@@ -44,7 +42,7 @@ def time_unit(e: Evidence) -> Reason | None:
 
 
 def accelerometer_unit(e: Evidence) -> Reason | None:
-    """Accelerations in g or counts."""
+    """Find accelerations in g or counts."""
     acc = _magnitude(e)
     if 0.2 * e.gravity < acc < 5.0 * e.gravity:
         return None
@@ -59,7 +57,7 @@ def _magnitude(e: Evidence) -> float:
 
 
 def same_magnitude(e: Evidence) -> Reason | None:
-    """Accelerations whose magnitude is the same however the board lies."""
+    """Find accelerations whose magnitude is the same in every orientation: somebody has normalised them."""
     size = lengths(e.recording.acc)
     if e.gravity_moved < LEAST_TURN_RAD or np.std(size) > LEAST_SPREAD * np.mean(size):
         return None
@@ -68,12 +66,12 @@ def same_magnitude(e: Evidence) -> Reason | None:
 
 
 def gyroscope_unit(e: Evidence) -> Reason | None:
-    """Rates in deg/s or counts."""
-    # by wrong times, or where there is no gravity, no rate fits how gravity turned
+    """Find rates in deg/s or counts."""
+    # With wrong times, or without gravity, no rate explains how gravity turned.
     if time_unit(e) is not None or _magnitude(e) < LEAST_G:
         return None
     rates = np.abs(e.recording.gyr)
-    if np.mean(rates > np.deg2rad(FASTEST_GYRO_DPS)) <= SELDOM and not e.turned_in_degrees:
+    if np.mean(rates > np.deg2rad(FASTEST_GYRO_DPS)) <= SELDOM and not e.rates_in_degrees:
         return None
     rate = float(np.quantile(rates, 1.0 - SELDOM))
     guess = "deg/s" if rate <= FASTEST_GYRO_DPS else "raw counts"
@@ -81,19 +79,17 @@ def gyroscope_unit(e: Evidence) -> Reason | None:
 
 
 def never_still(e: Evidence) -> Reason | None:
-    """No flat segment, or none before the board was turned."""
-    if e.flat is None and e.recording.flat is not None:
+    """Find a recording without a flat segment, or with none before the board was turned."""
+    if e.flat is not None:
+        return reason("never_still", "late", seconds=_seconds_before(e)) if _rested_late(e) else None
+    if e.recording.flat is not None:
         first, last = e.recording.flat
         return reason("never_still", "short", first=first, last=last - 1)
-    if e.flat is None and e.turned_in_degrees:
-        return None
-    if e.flat is None:
-        return reason("never_still", "at_all")
-    return reason("never_still", "late", seconds=_seconds_before(e)) if _rested_late(e) else None
+    return None if e.rates_in_degrees else reason("never_still", "at_all")
 
 
 def hardly_turned(e: Evidence) -> Reason | None:
-    """A board that was not rotated after it lay flat."""
+    """Find a board that was not turned after it lay flat."""
     if e.flat is None or _rested_late(e):
         return None
     after = len(e.recording) - e.flat.last
@@ -103,25 +99,25 @@ def hardly_turned(e: Evidence) -> Reason | None:
 
 
 def _seconds_before(e: Evidence) -> float:
-    """s that passed before the flat segment."""
+    """Return the time [s] before the flat segment."""
     return 0.0 if e.flat is None else float(e.recording.t[e.flat.first] - e.recording.t[0])
 
 
 def _rested_late(e: Evidence) -> bool:
-    """Whether the turns came before the rest; a board that is laid down at the start moves gravity too, but soon."""
+    """Return True if the turns came before the rest; a board that is laid down moves gravity too, but soon."""
     turned_before = e.gravity_moved_before >= LEAST_TURN_RAD > e.gravity_moved
     return turned_before and _seconds_before(e) >= LONGEST_TO_LAY_DOWN_S
 
 
 def dead_accelerometer(e: Evidence) -> Reason | None:
-    """An axis of the accelerometer that reads the same throughout, or for seconds while the others show a turn."""
+    """Find an axis of the accelerometer that is constant, throughout or for seconds while the others show a turn."""
     if e.flat is None:
         return None
-    axes = _constant(e, e.recording.acc, e.flat.Sigma_a, QUIETEST_ACC_MPS2)
+    axes = _constant_axes(e, e.recording.acc, e.flat.Sigma_a, QUIETEST_ACC_MPS2)
     if axes:
         return reason("bits_stuck", "constant", axes=axes, when="in every sample")
     if np.sqrt(e.flat.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.message is not None:
-        return None  # computed, or rounded on its way
+        return None  # data that are computed, or rounded on their way, repeat
     least, t = max(round(STUCK_S * e.recording.rate_hz), FEWEST_SAMPLES), e.recording.t - e.recording.t[0]
     for axis, column in zip("xyz", e.recording.acc.T, strict=True):
         for first, last in _repeats(column, least):
@@ -132,26 +128,26 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
 
 
 def _repeats(column: Vector, least: int) -> list[tuple[int, int]]:
-    """First and last + 1 of the runs of at least so many samples in which a column (n,) repeats its value."""
+    """Return first and last + 1 of the runs of at least `least` samples in which a column (n,) repeats its value."""
     same = np.concatenate([[False], np.diff(column) == 0.0, [False]])
     edges = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2)
     return [(first, last + 1) for first, last in edges.tolist() if last + 1 - first >= least]
 
 
 def dead_gyroscope(e: Evidence) -> Reason | None:
-    """An axis of the gyroscope that reads the same throughout."""
+    """Find an axis of the gyroscope that is constant throughout."""
     if e.flat is None:
         return None
-    axes = _constant(e, e.recording.gyr, e.flat.Sigma_omega, QUIETEST_GYRO_RAD_S)
+    axes = _constant_axes(e, e.recording.gyr, e.flat.Sigma_omega, QUIETEST_GYRO_RAD_S)
     return reason("gyro_off", "constant", axes=axes) if axes else None
 
 
-def _constant(e: Evidence, values: Vector, variance: Vector, quietest: float) -> str:
-    """The axes of `values` (n, 3) that read the same throughout, though the board was turned; empty where none does."""
+def _constant_axes(e: Evidence, values: Vector, variance: Vector, quietest: float) -> str:
+    """Return the axes of `values` (n, 3) that are constant though the board was turned; empty where none is."""
     if e.gravity_moved < LEAST_TURN_RAD or (np.ptp(values[:100], axis=0) >= quietest).all():
         return ""
     constant = np.ptp(values, axis=0) < quietest
-    # without noise on the other axes the data are computed, and this axis was not turned
+    # Data without noise on the other axes are computed, and this axis was not turned.
     if not constant.all() and np.sqrt(variance).max() <= quietest:
         return ""
     return " and ".join(axis for axis, is_constant in zip("xyz", constant, strict=True) if is_constant)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...calibration.lone_jumps import BESIDE, remove_spikes
+from ...calibration.masks import SPIKE_MARGIN, remove_spikes
 from ...data import Mask, Recording, Samples, Sensor, Vector
 
 # Faster samples are averaged to this rate: no motion of a hand is lost.
@@ -61,8 +61,8 @@ class SampleStore:
         self._open, self._parts = Samples.joined([self._open, *self._parts]), []
         filtered = remove_spikes(Recording(**vars(self._open), sensor=self._sensor))
         whole = Samples.joined([self._done, _cut(filtered, self._lead, len(filtered))])
-        settled = max(len(whole) - BESIDE, len(self._done))
-        self._done, self._lead = _cut(whole, 0, settled), min(BESIDE, settled - begin)
+        settled = max(len(whole) - SPIKE_MARGIN, len(self._done))
+        self._done, self._lead = _cut(whole, 0, settled), min(SPIKE_MARGIN, settled - begin)
         self._open = _cut(self._open, settled - self._lead - begin, len(self._open))
         return whole
 

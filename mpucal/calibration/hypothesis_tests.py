@@ -1,0 +1,62 @@
+"""Statistical tests that extend a model: Wald's of the gyroscope's matrix K, Rao's score test of a lever arm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import Recording, Vector
+from ..rests.flat import Flat
+from .levenberg_marquardt import Minimum
+from .likelihood import evaluate
+from .parameters import BY_NAME, HAND, PLACES
+from .preprocessing import smoothed_rates
+from .problem import Problem
+from .theta import UPPER, Prior
+
+K = BY_NAME["K"]
+WALD_99 = 16.8  # scipy.stats.chi2.ppf(0.99, 6): below it, K is not significantly different from the identity
+KNOWN = 0.5  # the data determine a parameter whose standard deviation they reduce to this share of the prior's
+SCORE = 30.7  # chi^2 of three degrees of freedom, which chance exceeds once in a million
+LEAST_LEVER_M = 1e-3  # the axes of one chip are as far from each other
+
+
+def wald(minimum: Minimum) -> float:
+    """Return k' C_k^-1 k of k = K - I: chi^2 of six degrees of freedom where the gyroscope is perfect."""
+    place = PLACES[K.name]
+    k = minimum.theta.K[UPPER] - K.mean
+    return float(k @ np.linalg.solve(minimum.covariance()[place, place], k))
+
+
+def undetermined(covariance: Vector) -> tuple[str, ...]:
+    """Return the names of K's elements that the data hardly determine, by the (p, p) covariance of a model with K."""
+    variance = np.diag(covariance)[PLACES[K.name]]
+    # A singular covariance may hold a negative variance.
+    known = (variance > 0.0) & (variance <= (KNOWN * np.array(K.sd)) ** 2)
+    return tuple(name for name, is_known in zip(K.names, known, strict=True) if not is_known)
+
+
+def find_lever_arm(problem: Problem, recording: Recording, flat: Flat, minimum: Minimum, prior: Prior) -> Vector | None:
+    """Return the lever arm r (3,) [m] that the data show beyond chance; None where the sensor turns in place.
+
+    The statistic is g' S^-1 g: g is the gradient by r at r = 0 and S its information, both less what the parameters of
+    the estimate take of them. S^-1 g is the first step to r.
+
+    Parameters
+    ----------
+    problem : of the recording, whose flat segment is `flat`. minimum : of a model without a lever arm.
+    """
+    n = len(problem.series)
+    rate, alpha = smoothed_rates(recording, flat)
+    of_a_hand = replace(
+        problem.series, rate=rate, alpha=alpha, reset=np.full(n, -1.0), jerk=np.zeros(n), r_extra=np.zeros(n)
+    )
+    at = evaluate(replace(problem, series=of_a_hand), minimum.theta, HAND)
+    r, others = np.arange(HAND)[PLACES["r"]], np.flatnonzero(minimum.free)
+    H = at.fisher[np.ix_(others, others)] + np.diag(prior.precision[others])
+    taken = np.linalg.solve(H, at.fisher[np.ix_(others, r)])
+    S = at.fisher[np.ix_(r, r)] - at.fisher[np.ix_(r, others)] @ taken
+    g = at.gradient[r] - taken.T @ at.gradient[others]
+    step = np.linalg.lstsq(S, g, rcond=None)[0]
+    return np.asarray(-step) if g @ step > SCORE and np.linalg.norm(step) > LEAST_LEVER_M else None
