@@ -82,8 +82,10 @@ def _find_reason(
     """Return the reason that explains most of the disagreement; None where there is none."""
     warmer = _temperature_change_c(recording)
     if abs(warmer) > WARMER_C:
-        variant = "of_vehicle_since_flat" if recording.sensor.message else "since_flat"
-        return reason("temperature_moved", variant, how="rose" if warmer > 0 else "fell", change=abs(warmer))
+        how = "rose" if warmer > 0 else "fell"
+        if recording.sensor.message:
+            return reason("temperature_moved", "of_vehicle_since_flat", how=how, change=abs(warmer))
+        return reason("temperature_moved", "since_flat", how=how, change=abs(warmer))
     if rests and all(rest.clipped for rest in rests) and recording.gyr_clipped.any():
         return reason("gyro_clipped", "every_turn")
     agree = all(rest.agrees for rest in shown)
