@@ -15,7 +15,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
-from ..rests.local_noise import noise_ratio
+from ..rests.windows import noise_ratio
 from .downsampling import downsampled, means
 from .fit import Fit
 from .hand_noise import (
@@ -59,7 +59,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
 
 
 def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, flat: Flat, gravity: float) -> Fit:
-    noise_factor = noise_ratio(recording, flat)
+    noise_factor = noise_ratio(recording, flat.Sigma_a)
     fine = preprocess(recording, (flat.first, flat.last), gravity, noise_factor)
     rough = means(noise_factor, recording, flat, SEARCH_HZ)
     search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))

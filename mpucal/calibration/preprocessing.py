@@ -13,8 +13,8 @@ from ..kernel import _kernel
 from ..rests.flat import Flat, flat_statistics, rounding_variance
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder, statistics
-from ..rests.local_noise import noise_ratio, noise_variance
-from ..rests.tremor import carried, fit_lambda, tremor_variance
+from ..rests.tremor import fit_lambda, level_rests, tremor_variance
+from ..rests.windows import noise_ratio, noise_variance
 from .masks import mask
 from .problem import Problem, Series
 from .rotation import lengths
@@ -96,7 +96,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     runs = rests.typical()
     recording = remove_drift(recording, flat, rests.bias_runs(runs))
     flat = flat_statistics(recording, at)
-    loud = (noise_ratio(recording, flat) if noise is None else noise)[flat.last :]
+    loud = (noise_ratio(recording, flat.Sigma_a) if noise is None else noise)[flat.last :]
     series = mask(Series.after(recording, flat), recording, flat)
     series = replace(series, r_scale=loud if series.r_scale is None else np.maximum(series.r_scale, loud))
     after = np.maximum(runs[runs[:, 1] > flat.last] - flat.last, 0)
@@ -106,7 +106,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     # at rest they are noise alone, and noise in a regressor pulls the lever arm to zero
     rate, alpha = (np.where(rest[:, None], 0.0, values) for values in smoothed_rates(recording, flat))
     speed2 = np.sum(rate * rate, axis=1)
-    acc = carried(recording, flat, runs)
+    acc = level_rests(recording, flat, runs)
     lam = fit_lambda(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
     for (a, b), variance in zip(after.tolist(), statistics(acc[flat.last :], after)[1], strict=True):

@@ -1,4 +1,4 @@
-"""The segment in which the board lies flat: where it is, and its means and variances (line 1 of Algorithm 1)."""
+"""Flat segment, in which the board lies still: its place, means and variances (line 1 of Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from .limits import QUIET
 from .stillness import Detector, still_windows
 from .windows import cut
 
-WINDOW_S, FEWEST = 0.5, 4  # of its samples, which take longer below 8 Hz
+WINDOW_S, FEWEST = 0.5, 4  # below 8 Hz, a window of the fewest samples is longer
 SHORTEST_FLAT_S = 1.0
-SHORTEST_GIVEN_S = 0.25  # of a shorter one the block means that a fit starts from have no variance
+SHORTEST_GIVEN_S = 0.25  # the block means that a fit starts from have no variance in a shorter one
 ENOUGH_FLAT_S = 5.0
 
-# In steps^2: at rest, less variance than that leaves the readings on one step or two, which no mean makes finer.
-UNVARIED, UNIFORM = 0.3, 1.0 / 12.0
+# With less variance at rest than this [steps^2], the readings stay on one step or two, and no mean makes them finer.
+UNVARIED = 0.3
+UNIFORM = 1.0 / 12.0  # variance of rounding [steps^2]
 
-# No sensor of this kind is quieter; data without noise are simulated, or stuck.
+# No sensor of this kind has less noise; data without noise are simulated, or stuck.
 QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S = 1e-4, 1e-5
 
 
 @dataclass(frozen=True)
 class Flat:
-    """Line 1 of Algorithm 1: what the flat segment says.
+    """Statistics of the flat segment, line 1 of Algorithm 1.
 
     Attributes
     ----------
     first, last : samples first..last-1 are the segment.
     y : (3,) m/s^2, mean of the accelerometer. b_omega : (3,) rad/s, mean of the gyroscope.
     Sigma_a : (3,) (m/s^2)^2 and Sigma_omega : (3,) (rad/s)^2, the diagonals of the covariances.
-    rounded : (m/s^2)^2 of y by coarse steps of the stream, which no number of samples makes less.
+    rounded : (m/s^2)^2, variance of y by coarse steps of the stream, which no number of samples reduces.
     """
 
     first: int
@@ -51,15 +52,15 @@ class Flat:
 
     @property
     def worth(self) -> float:
-        """How many samples of independent noise y is worth."""
+        """Number of samples of independent noise that give y the same variance."""
         return min(self.n, float(self.Sigma_a.min()) / self.rounded) if self.rounded else self.n
 
 
 def find_flat(recording: Recording) -> tuple[int, int] | None:
-    """(first, last + 1) of the segment that lies flat, or None where the board never lies still.
+    """Return (first, last + 1) of the flat segment, or None where the board never lies still.
 
-    It is the earliest still run of five seconds, or else of half the length of the longest: still is what the session
-    calls still on a table, but that a bias of the gyroscope may have any size and that a bump ends a run.
+    It is the earliest still run of five seconds, or else of half the length of the longest. Stillness is that of a
+    session on a table, except that the gyroscope's bias may have any size and that a bump ends a run.
     """
     n = samples_of_window(recording)
     windows = cut(with_rates(recording), n)
@@ -76,32 +77,32 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
         return None
     enough = max(min(max(lengths) / 2, ENOUGH_FLAT_S * recording.rate_hz), SHORTEST_FLAT_S * recording.rate_hz)
     _, first, last = next(run for run, length in zip(runs, lengths, strict=True) if length >= enough)
-    # the outermost windows may hold the first and last of a movement
+    # The outermost windows may hold the end of one movement and the beginning of the next.
     trim = n if last - first >= 6 * n else 0
     return first + trim, last - trim
 
 
 def with_rates(recording: Recording) -> Recording:
-    """Return the recording with rates of zero where it has none: the accelerometer alone then says what rests."""
+    """Return the recording with rates of zero where it has none, so that the accelerometer alone detects rests."""
     known = np.isfinite(recording.gyr)
     return recording if known.all() else replace(recording, gyr=np.where(known, recording.gyr, 0.0))
 
 
 def samples_of_window(recording: Recording) -> int:
-    """The samples of a window in which it is told whether the board is still."""
+    """Return the number of samples of a window for the detection of stillness."""
     return max(round(WINDOW_S * recording.rate_hz), FEWEST)
 
 
 def is_long_enough(recording: Recording, flat: tuple[int, int]) -> bool:
-    """Whether a flat segment, given by a caller, is long enough to tell noise and bias."""
+    """Return True if a flat segment, given by a caller, is long enough for noise and bias."""
     return flat[1] - flat[0] >= max(round(SHORTEST_GIVEN_S * recording.rate_hz), 2)
 
 
 def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
-    """Sigma_a, Sigma_omega, b_omega and the mean acceleration of samples flat[0]..flat[1]-1 (Algorithm 1, line 1).
+    """Compute the statistics of samples flat[0]..flat[1]-1 (Algorithm 1, line 1).
 
-    A variance is never zero: a stream of coarse steps may read exactly constant, but its noise is then somewhere
-    below a step, not absent. Nor is it below what the recording's source knows to be least.
+    A variance is never zero: a stream of coarse steps may be constant, but its noise is then somewhere below a step,
+    not absent. Nor is it below the least noise that the recording's source knows.
     """
     first, last = flat
     recording = with_rates(recording)
@@ -119,7 +120,7 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
 
 
 def rounding_variance(sensor: Sensor, variance: Vector) -> float:
-    """(m/s^2)^2 of a mean acceleration at rest, however long: of readings in coarse steps, whose variance is (3,)."""
+    """Return the variance [(m/s^2)^2] that coarse steps leave in any mean at rest of readings with `variance` (3,)."""
     step = sensor.steps[0]
     return UNIFORM * step**2 if (variance < UNVARIED * step**2).any() else 0.0
 
@@ -132,9 +133,9 @@ def _variance(part: Vector, whole: Vector, quietest: float) -> Vector:
 
 
 def _step(column: Vector) -> float:
-    """The stream's resolution: its smallest difference between two values, 0 where it is as fine as noise.
+    """Return the stream's resolution, its smallest difference between two values; 0 where it is as fine as noise.
 
-    A thousand samples tell: where nearly all values differ there are no steps to see.
+    A thousand samples are enough: where nearly all values differ there are no visible steps.
     """
     values = np.unique(column[:: max(len(column) // 1000, 1)])
     if len(values) < 2:

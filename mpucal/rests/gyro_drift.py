@@ -1,4 +1,4 @@
-"""The gyroscope's bias as a random walk, seen at the rests: smoothed and removed.
+"""Drift of the gyroscope's bias: a random walk, measured at the rests, smoothed and removed.
 
 Source of the smoother: Rauch, Tung, Striebel (1965).
 """
@@ -11,21 +11,22 @@ import numpy as np
 
 from ..data import Recording, Vector
 from .flat import Flat
-from .intervals import TELLS_BIAS_S, Intervals, gravity_turns, statistics
+from .intervals import BIAS_RUN_S, Intervals, gravity_turns, statistics
 
-TURNING_RAD_S = 0.005  # slower, gravity wanders by a hand that settles and by noise
+TURNING_RAD_S = 0.005  # gravity that turns more slowly is moved by a hand that settles, and by noise
 TREMOR_S = 0.05  # correlation time of a hand's tremor
-RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second; the first is none
-DRIFTS_99 = 11.3  # scipy.stats.chi2.ppf(0.99, 3): twice what the log likelihood gains by walks of chance, on three axes
+RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # densities, (rad/s)^2 a second; the first is none
+# scipy.stats.chi2.ppf(0.99, 3): twice the gain of the log likelihood by walks of chance, on three axes.
+DRIFTS_99 = 11.3
 
 
 def remove_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
-    """The recording with its gyroscope's drift removed: in every rest, the mean rate is the flat segment's.
+    """Remove the gyroscope's drift, so that the mean rate of every rest is the flat segment's.
 
-    The bias is a random walk seen through the means of runs at rest, its density the likeliest; between them it is
-    drawn straight.
+    The bias is a random walk of the most likely density, measured by the means of runs at rest, and interpolated
+    linearly between them.
     """
-    runs = runs[runs[:, 1] - runs[:, 0] >= TELLS_BIAS_S * recording.rate_hz]
+    runs = runs[runs[:, 1] - runs[:, 0] >= BIAS_RUN_S * recording.rate_hz]
     if len(runs) < 2:
         return recording
     first, last = runs.T
@@ -33,7 +34,7 @@ def remove_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording
     mean, spread = statistics(recording.gyr, runs)
     tremor = np.maximum(spread - 1.2 * flat.Sigma_omega, 0.0)
     variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
-    # so far a run's mean rate may be a turn and no bias
+    # As far as gravity turns in a run, its mean rate may be a turn and no bias.
     variance = variance + np.maximum(gravity_turns(recording, runs) - TURNING_RAD_S, 0.0)[:, None] ** 2
     walk = _smoothed(t, mean, variance)
     bias = np.stack([np.interp(recording.t, t, column) for column in walk.T], axis=1)
@@ -41,9 +42,9 @@ def remove_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording
 
 
 def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
-    """(k, 3) the random walks behind the rows of measurements (k, 3) of given variance, each of the likeliest density.
+    """Smooth random walks (k, 3), measured with a variance (k, 3), each with its most likely density.
 
-    All densities go side by side; (k, 3, q) in between.
+    The filter runs for all q densities at once, on arrays (k, 3, q).
     """
     k, q = len(t), RANDOM_WALKS
     m, P, m_before, P_before = (np.empty((k, 3, len(q))) for _ in range(4))

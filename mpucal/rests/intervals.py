@@ -1,7 +1,7 @@
-"""Intervals of samples in which the board rests: both sensors spread as little as in this recording's rests.
+"""Rests of a recording: the intervals of samples in which both sensors spread as little as in its other rests.
 
-A moving-window static detector, as in Tedaldi, Pretto, Menegatti (ICRA 2014), with the gyroscope beside the
-accelerometer, and with limits that the recording itself gives: hands tremble by 0.5 to 7 deg/s as they rest.
+A moving-window static detector, as in Tedaldi, Pretto, Menegatti (ICRA 2014), which uses both sensors, and learns its
+limits from the recording, since hands tremble by 0.5 to 7 deg/s as they rest.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ from ..data import Mask, Recording, Vector
 from ..kernel import _kernel
 from .flat import Flat, samples_of_window, with_rates
 from .limits import ANY_HAND, QUIET, TURNS_RAD_S, Limits, learned
-from .local_noise import noise_variance
 from .stillness import Detector
-from .windows import Spreads
+from .windows import Spreads, noise_variance
 
 SHORTEST_S = 0.3
-TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a hand settles, and leaves early
+# A share of a rest, within limits, is cut off at either end, since a hand settles, and leaves early.
+TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25
 FEW = 0.25  # of the windows that hold a sample
 FEWEST_S = 0.5  # of windows that may be rests, to learn from
-# So long a rest, or its quiet part, tells the gyroscope's bias: in less, a slow turn about gravity passes for it.
-TELLS_BIAS_S = 1.0
+# The mean rate of a shorter rest, or of its quiet part, may be a slow turn about gravity instead of the bias.
+BIAS_RUN_S = 1.0
 
 Intervals = NDArray[np.intp]
 
 
 class RestFinder:
-    """The runs of samples in which the board rests, (k, 2) first and last + 1, the flat segment's among them.
+    """Finder of the runs of samples in which the board rests, (k, 2) first and last + 1, with the flat segment's.
 
-    A sample is still where a still window covers it; runs are trimmed at both ends. The windows are those of half a
-    second that begin at each sample, judged by the detector of the session with the flat segment's noise and bias.
+    A sample is still where a still window covers it; runs are trimmed at both ends. A window of half a second begins at
+    each sample, and the session's detector judges it with the flat segment's noise and bias.
     """
 
     def __init__(self, recording: Recording, flat: Flat) -> None:
@@ -41,21 +41,21 @@ class RestFinder:
         self._windows = _windows(recording, self._n)
 
     def typical(self) -> Intervals:
-        """The rests like most of this recording's: in which the rate spreads as little as there."""
+        """Return the rests in which the rate spreads as little as in most of this recording's."""
         return self.within(self._learned())
 
     def any_hand(self) -> Intervals:
-        """The rests, and beside them whatever a hand of any tremor may have meant to hold."""
+        """Return the typical rests, and beside them those of a hand with any tremor."""
         return _and_others(self.typical(), self.within(ANY_HAND))
 
     def bias_runs(self, rests: Intervals) -> Intervals:
-        """The runs that tell the gyroscope's bias: a rest's quiet part where that is long, or all of it."""
+        """Return the runs whose mean rate is the gyroscope's bias: the quiet part of a rest if it is long, or all."""
         quiet = self.within(QUIET)
-        quiet = quiet[quiet[:, 1] - quiet[:, 0] >= TELLS_BIAS_S * self._recording.rate_hz]
+        quiet = quiet[quiet[:, 1] - quiet[:, 0] >= BIAS_RUN_S * self._recording.rate_hz]
         return _and_others(quiet[~_apart(quiet, rests)], rests)
 
     def within(self, limits: Limits) -> Intervals:
-        """The rests within these limits."""
+        """Return the rests within these limits."""
         recording, flat = self._recording, self._flat
         if self._windows is None:
             return np.zeros((0, 2), np.intp)
@@ -66,19 +66,19 @@ class RestFinder:
         changes[at + self._n] -= 1
         covered = np.cumsum(changes)[:-1]
         still = (covered > 0) & ~recording.gap
-        # where readings step from one rest to another, few still windows hold samples of both
+        # Where readings step from one rest to another, few still windows hold samples of both.
         few = (covered < FEW * self._n) & still
         for first, last in _runs(few).tolist():
             if few[first - 1] < still[first - 1] and few[last % len(few)] < still[last % len(few)]:
                 still[first:last] = False
         rests = self._trimmed(_runs(still))
-        # of a run in which gravity turns, what is left without the samples in which the gyroscope says so
+        # Of a run in which gravity turns, keep the samples in which the gyroscope hardly turns.
         slow = np.asarray(np.all(np.abs(self._windows.gyr - flat.b_omega) < TURNS_RAD_S, axis=1))
         still[self._n // 2 : self._n // 2 + len(slow)] &= slow
         return _and_others(rests, self._trimmed(_runs(still)))
 
     def _trimmed(self, runs: Intervals) -> Intervals:
-        """The runs without their ends, where they are long enough and gravity stands still in them."""
+        """Return the runs without their ends, if they are long enough and gravity does not turn in them."""
         rate = self._recording.rate_hz
         trim = np.clip(TRIM * (runs[:, 1] - runs[:, 0]), LEAST_TRIM_S * rate, MOST_TRIM_S * rate).astype(np.intp)
         runs = runs + np.stack([trim, -trim], axis=1)
@@ -96,38 +96,41 @@ class RestFinder:
 
 
 def _and_others(runs: Intervals, others: Intervals) -> Intervals:
-    """The runs, and those of the others that overlap none of them."""
+    """Return the runs, and those of the others that overlap none of them."""
     both = np.concatenate([runs, others[_apart(others, runs)]])
     return np.asarray(both[np.argsort(both[:, 0])])
 
 
 def _apart(runs: Intervals, others: Intervals) -> Mask:
-    """(k,) the runs that overlap none of the others: as many of these end before one begins as begin before it ends."""
+    """Return (k,) True for runs that overlap none of the others.
+
+    As many of the others end before such a run begins as begin before it ends.
+    """
     ended = np.searchsorted(others[:, 1], runs[:, 0], side="right")
     begun = np.searchsorted(others[:, 0], runs[:, 1], side="left")
     return np.asarray(ended == begun)
 
 
 def gravity_turns(recording: Recording, runs: Intervals) -> Vector:
-    """(k,) rad/s by which gravity turns in runs of samples, as far as it is beyond noise: from first third to last."""
+    """Return (k,) how fast gravity turns in runs of samples [rad/s], from first third to last, beyond noise."""
     first, last = runs.T
     n = np.maximum((last - first) // 3, 1)
     one, of_one = statistics(recording.acc, np.stack([first, first + n], axis=1))
     other, of_other = statistics(recording.acc, np.stack([last - n, last], axis=1))
     away2 = np.sum((other - one) ** 2 - 3.0 * (of_one + of_other) / n[:, None], axis=1)
     size2 = np.sum(one**2, axis=1)
-    # an accelerometer that reads nothing but zeros shows no gravity that could stand still
+    # An accelerometer that reads only zeros shows no gravity, and so no rest.
     angle2 = np.divide(away2, size2, out=np.full(len(size2), np.inf), where=size2 > 0.0)
     return np.asarray(np.sqrt(np.maximum(angle2, 0.0)) / (recording.t[last - n] - recording.t[first]))
 
 
 def statistics(values: Vector, runs: Intervals) -> tuple[Vector, Vector]:
-    """Means and variances (k, 3) of values (n, 3) over runs of samples."""
+    """Return means and variances (k, 3) of values (n, 3) over runs of samples."""
     return _kernel.statistics(np.ascontiguousarray(values), np.ascontiguousarray(runs, np.int64))
 
 
-def in_pieces(runs: Intervals, n: int) -> Intervals:
-    """(m, 2) the runs cut into pieces of n samples; what is left of each is left out."""
+def cut_runs(runs: Intervals, n: int) -> Intervals:
+    """Cut the runs into pieces (m, 2) of n samples each, without an incomplete last one."""
     pieces = [(at, at + n) for first, last in runs.tolist() for at in range(first, last - n + 1, n)]
     return np.array(pieces, np.intp).reshape(-1, 2)
 
@@ -142,6 +145,6 @@ def _windows(recording: Recording, n: int) -> Spreads | None:
 
 
 def _runs(mask: Mask) -> Intervals:
-    """(k, 2) first and last + 1 of the runs of True."""
+    """Return (k, 2) first and last + 1 of the runs of True."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
     return np.asarray(np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)], axis=1))

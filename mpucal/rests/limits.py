@@ -1,8 +1,7 @@
-"""Limits of stillness, the only ones: what a short window of samples may show of a board that rests.
+"""Limits of stillness, the only ones: the spread and the mean rate of a short window at rest.
 
-The fit, the check of a later recording and the report ask for what a recording's own rests are like: a spread between
-those of QUIET and ANY_HAND. The session calls still what is within HAND's, or is like the rests that it has seen, and
-the verification finds that again.
+The fit, the check of a later recording and the report use limits between QUIET and ANY_HAND that the recording's own
+rests give. The session uses HAND's limits, or those of the rests so far, and the verification finds the same rests.
 """
 
 from __future__ import annotations
@@ -14,26 +13,26 @@ import numpy as np
 
 from ..data import Vector
 
-# A noisier sensor may exceed the limits of spread by so many times its own noise, up to these.
+# A noisy sensor may exceed the limits of spread, up to so many times its own noise and up to these.
 TIMES_NOISE = 2.5
 NOISIEST_GYRO_RAD_S, NOISIEST_ACC_MPS2 = 0.15, 0.5
-# The MPU-6050's gyro may be off by 20 deg/s at rest; where its bias is not known, what turns faster than this turns.
+# The MPU-6050's bias may be 20 deg/s; where the bias is not known, a larger mean rate than this is a turn.
 MOST_BIAS_RAD_S = math.radians(30.0)
-# Faster, the accelerometer says, it turns: neither a rest nor a bias of the gyroscope.
+# A window in which gravity turns faster is neither a rest nor a measurement of the gyroscope's bias.
 TURNS_RAD_S = 0.02
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a window at rest.
+    """Limits for a window at rest.
 
     Attributes
     ----------
     gyro_sd, acc_sd : standard deviations within it [rad/s], [m/s^2].
-    gyro_step, acc_step : its means may be this far, beyond its spread, from those of the rest before it.
-    gyro_mean : mean rate beside the gyroscope's bias, where that is known [rad/s]: a turn at a constant rate has no
+    gyro_step, acc_step : distance of its means from those of the rest before it, beyond its spread.
+    gyro_mean : mean rate less the gyroscope's bias, where that is known [rad/s]: a turn at a constant rate has no
         spread, only a mean.
-    vibration : where a window's variance is less than so many times that of its noise, the board is not moved.
+    vibration : a window whose variance is less than so many times that of its noise vibrates, and is not moved.
     """
 
     gyro_sd: float
@@ -44,35 +43,35 @@ class Limits:
     vibration: float = 5.0
 
     def wider(self, gyro_sd: float) -> Limits:
-        """Limits for a hand whose rate spreads up to `gyro_sd` [rad/s] at rest; acc_sd grows in proportion."""
+        """Return limits for a hand whose rate spreads up to `gyro_sd` [rad/s]; acc_sd grows in proportion."""
         return replace(self, gyro_sd=gyro_sd, acc_sd=self.acc_sd * gyro_sd / self.gyro_sd)
 
 
-# Nobody touches the board: its mean acceleration is that of another look, to the last mg.
+# For a board that nobody touches: its mean acceleration repeats to the last mg.
 UNTOUCHED = Limits(gyro_sd=0.03, acc_sd=0.06, gyro_step=0.02, acc_step=0.03, vibration=2.0)
-# A board on a table that hums, or in a hand whose elbow is braced.
+# For a board on a table that hums, or in a hand with a braced elbow.
 QUIET = Limits(gyro_sd=0.03, acc_sd=0.15, gyro_step=0.02, acc_step=0.08)
-# A hand trembles by 0.1 m/s^2 and 1 deg/s at 2 to 10 Hz.
+# For a hand, which trembles by 0.1 m/s^2 and 1 deg/s at 2 to 10 Hz.
 HAND = Limits(gyro_sd=0.06, acc_sd=0.3, gyro_step=0.06, acc_step=0.3, gyro_mean=0.12)
-# The most that any hand trembles (7 deg/s) in an orientation that it means to keep.
+# For the strongest tremor (7 deg/s) of a hand that holds an orientation.
 ANY_HAND = Limits(gyro_sd=0.12, acc_sd=0.6, gyro_step=0.06, acc_step=0.3, gyro_mean=0.12)
 
-# So many standard deviations may the logarithm of a window's spread be above the median of windows that may be rests.
+# A rest's logarithm of spread lies at most so many standard deviations above the median of possible rests.
 LIKE_THE_OTHERS = 2.0
-LEAST_DEVIATION = 0.15  # of the logarithm, by chance: a window holds few periods of a tremor
-OF_NORMAL = 1.4826  # a standard deviation beside the median of distances
+LEAST_DEVIATION = 0.15  # of the logarithm, by chance: a window holds only few periods of a tremor
+OF_NORMAL = 1.4826  # ratio of a normal standard deviation to the median absolute deviation
 LEAST_OF_QUIET, LEAST_OF_NOISE = 0.1, 0.5  # a smaller spread than these shares is chance
 
 
 def learned(spread: Vector, speed: Vector, noise: float, fewest: float, limits: Limits = QUIET) -> Limits:
-    """The limits of rests like those of these windows: no narrower than `limits`, no wider than ANY_HAND's.
+    """Learn the limits of rests from windows: no narrower than `limits`, no wider than ANY_HAND's.
 
-    The windows that may be rests have a spread within ANY_HAND's and a mean rate within QUIET's. The logarithms of
-    their spreads have a median and a standard deviation; the limit lies LIKE_THE_OTHERS of these above it.
+    Possible rests have a spread within ANY_HAND's and a mean rate within QUIET's. The limit lies LIKE_THE_OTHERS
+    standard deviations of the logarithm of their spreads above its median.
 
     spread : (m,) rad/s, the largest standard deviation of the rate's axes beyond noise, which is `noise` [rad/s].
-    speed : (m,) rad/s, the largest mean rate beside the bias. fewest : of so few windows that may be rests nothing is
-    learned.
+    speed : (m,) rad/s, the largest mean rate of the axes, less the bias.
+    fewest : number of possible rests from which nothing is learned; there must be more.
     """
     may_rest = (spread < ANY_HAND.gyro_sd) & (speed < QUIET.gyro_mean)
     if np.count_nonzero(may_rest) <= fewest:

@@ -1,6 +1,6 @@
-"""Stillness detection: whether the board is still, for how long, and what moved it, from windows of samples.
+"""Stillness detection from windows of samples: whether the board is still, for how long, and how it moved.
 
-One detector answers for all: of one window after the other as they come, or of the windows of a whole recording.
+One detector judges windows one after the other as they come, and all windows of a recording at once.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from .limits import (
 )
 from .windows import Spreads, Window, of_rows
 
-# A bump is over after so long, and has not turned the board by more than this.
+# A bump ends within this time, and turns the board by no more than this angle.
 BUMP_S = 2.0
 BUMP_RAD = math.radians(3.0)
 
 # A hand's limits are learned from the newest windows that may be rests: from more than the fewest.
 FEWEST_WINDOWS, NEWEST_WINDOWS = 2, 12
 
-# So many standard deviations may two means of noise be apart.
+# Two means of noise differ by at most so many standard deviations.
 CHANCE = 4.5
 
 AXES = "xyz"
@@ -42,9 +42,9 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Still:
-    """It has been still for `seconds`; `acc` [m/s^2] and `gyr` [rad/s] are the means over that time, (3,).
+    """Stillness for `seconds`; `acc` [m/s^2] and `gyr` [rad/s] are the means over that time, (3,).
 
-    `run` numbers the stillnesses: it counts up where the board was moved, and not where it was only bumped.
+    run : number of the still run, which counts up where the board was moved, and not where it was only bumped.
     """
 
     seconds: float
@@ -55,9 +55,9 @@ class Still:
 
 @dataclass(frozen=True)
 class Moved:
-    """It moves, after `after_s` of stillness; `what`: which sensor saw it, how much and about which axis.
+    """Motion after `after_s` of stillness.
 
-    `lost` : samples are missing, so that nobody knows whether it moved.
+    what : which sensor measured it, how much and about which axis. lost : samples are missing, and motion is possible.
     """
 
     after_s: float
@@ -66,7 +66,7 @@ class Moved:
 
 
 class Shares(NamedTuple):
-    """How much of the limits windows (..., 3) use; above 1 they are not still."""
+    """Shares of the limits that windows (..., 3) use; above 1 they are not still."""
 
     acc: Vector
     gyr: Vector
@@ -74,26 +74,26 @@ class Shares(NamedTuple):
 
     @property
     def level(self) -> Vector:
-        """(...) the largest of each window."""
+        """Largest share of each window (...)."""
         return np.asarray(np.maximum(np.maximum(self.acc, self.gyr), self.turning).max(-1))
 
 
 class Detector:
-    """Follows one still run after another, a window at a time; `shares` judges windows by themselves.
+    """Detector of still runs, fed a window at a time; `shares` judges windows without regard to those before.
 
-    A bump that leaves the board where it was pauses the run; any other movement ends it.
+    A bump that leaves the board where it was pauses the run; any other motion ends it.
 
     Parameters
     ----------
     limits : of a window at rest. noise : (3,) standard deviations of the accelerometer [m/s^2] and the gyroscope
         [rad/s] at rest; None: those of the quietest window so far.
-    bias : (3,) rad/s of the gyroscope; where it is not known, how large it may be.
-    learns : the limits grow to those of a hand that trembles as this one does.
+    bias : (3,) rad/s of the gyroscope; a number where it is not known, the largest bias possible.
+    learns : widen the limits to those of a hand that trembles as this one does.
 
     Attributes
     ----------
-    level : how near the last window came to what counts as moving; 1 is there.
-    rest_rad_s : (3,) what the gyroscope read at the last stillness: its bias.
+    level : largest share of the limits that the last window used; above 1 it moves.
+    rest_rad_s : (3,) mean rate of the last still run, the gyroscope's bias.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class Detector:
         self._acc_noise, self._gyr_noise = noise if noise is not None else (unknown, unknown)
         self._bias, self._turns = (np.zeros(3), bias) if isinstance(bias, float) else (bias, limits.gyro_mean)
         self._spreads: deque[tuple[float, float]] = deque(maxlen=NEWEST_WINDOWS)
-        # the windows of this run, added up one after the other
+        # These are sums over the windows of this run.
         self._count = 0
         self._seconds: float = 0
         self._acc, self._gyr = np.zeros(3), np.zeros(3)
@@ -120,7 +120,7 @@ class Detector:
         self.rest_rad_s = self._bias
 
     def shares(self, windows: Spreads) -> Shares:
-        """What windows use of the limits, each by itself."""
+        """Return the shares of the limits that windows use, each by itself."""
         acc_limit, gyr_limit = self._most
         vibration = math.sqrt(self._limits.vibration) * windows.acc_noise
         return Shares(
@@ -131,7 +131,7 @@ class Detector:
 
     @property
     def _most(self) -> tuple[Vector, Vector]:
-        """(3,) the limits of the standard deviations for this sensor."""
+        """Limits (3,) of the standard deviations for this sensor."""
         return (
             np.maximum(self._limits.acc_sd, np.minimum(TIMES_NOISE * self._acc_noise, NOISIEST_ACC_MPS2)),
             np.maximum(self._limits.gyro_sd, np.minimum(TIMES_NOISE * self._gyr_noise, NOISIEST_GYRO_RAD_S)),
@@ -139,15 +139,15 @@ class Detector:
 
     @property
     def seconds(self) -> float:
-        """How long it has been still, a bump not counted [s]."""
+        """Duration of the stillness, without bumps [s]."""
         return self._seconds
 
     def forget(self) -> None:
-        """What comes next has nothing to do with what was."""
+        """Begin a new run: the next window has nothing to do with those before."""
         self._begin()
 
     def add(self, window: Window) -> Still | Moved:
-        """What `window` shows."""
+        """Take the next window, and return whether the board is still."""
         if self._quietest:
             self._acc_noise = np.minimum(self._acc_noise, window.acc_sd)
             self._gyr_noise = np.minimum(self._gyr_noise, window.gyr_sd)
@@ -156,7 +156,7 @@ class Detector:
         shaken = self._shaken(window)
         if shaken:
             return self._bumped(window, shaken)
-        # a window that is quiet in itself, only elsewhere, is where the next stillness begins
+        # A window that is quiet in itself, but in another orientation, begins the next run.
         stepped = self._stepped(window)
         if stepped:
             moved = Moved(self.seconds, stepped)
@@ -169,7 +169,7 @@ class Detector:
         return Still(self.seconds, acc, self.rest_rad_s, self._number)
 
     def _learn(self, window: Window) -> None:
-        """Widen the limits to what a hand does that trembles as this one."""
+        """Widen the limits to those of a hand that trembles as in this window and those before."""
         beyond = math.sqrt(max(float((window.gyr_sd**2 - self._gyr_noise**2).max()), 0.0))
         turning = float(np.abs(window.gyr - self.rest_rad_s).max())
         if not (beyond < ANY_HAND.gyro_sd and turning < QUIET.gyro_mean):
@@ -195,7 +195,7 @@ class Detector:
         self._bump_s, self._bump_rad = 0.0, np.zeros(3)
 
     def _go_on(self, window: Window) -> None:
-        """It is still in this window, too."""
+        """Add a still window to the run."""
         self._acc, self._gyr = (
             (self._acc + window.acc, self._gyr + window.gyr) if self._count else (window.acc, window.gyr)
         )
@@ -206,7 +206,7 @@ class Detector:
         return self._acc / self._count, self._gyr / self._count
 
     def _shaken(self, window: Window) -> str:
-        """What within the window says that it is not still, or nothing."""
+        """Return how the window itself shows motion; empty if it shows none."""
         shares = acc, gyr, turning = self.shares(window)
         self.level = float(shares.level)
         if not window.whole:
@@ -218,14 +218,14 @@ class Detector:
         return _shook(window.acc_sd, acc) if acc.max() > 1.0 else ""
 
     def _stepped(self, window: Window) -> str:
-        """What between the window and the stillness before it says that it moved, or nothing."""
+        """Return how the window shows motion since the run before it; empty if it shows none."""
         if not self._count:
             return ""
         acc, gyr = self._means()
         acc_step, gyr_step = window.acc - acc, window.gyr - gyr
-        # a mean over a window with slow tremor in it is off by a part of that tremor, and of few samples by their noise
+        # A mean over a window is off by part of a slow tremor in it, and with few samples by their noise.
         share = max(1.0, CHANCE * math.sqrt((1.0 + 1.0 / self._count) / window.count))
-        # a spike, or vibration, spreads a window further
+        # A spike, or vibration, spreads a window further, but its mean hardly.
         acc_sd = np.minimum(window.acc_sd, self._most[0])
         acc_ratio = np.abs(acc_step) / (self._limits.acc_step + share * acc_sd)
         gyr_ratio = np.abs(gyr_step) / (self._limits.gyro_step + share * window.gyr_sd)
@@ -239,7 +239,7 @@ class Detector:
 
 
 def is_untouched(acc: Vector) -> bool:
-    """Whether an accelerometer's rows (n, 3) m/s^2 are of a board that nobody touches."""
+    """Return True if an accelerometer's rows (n, 3) [m/s^2] are of a board that nobody touches."""
     silent = np.zeros(3)
     return bool(Detector(UNTOUCHED, (silent, silent)).shares(of_rows(acc, np.zeros_like(acc))).level < 1.0)
 
@@ -255,10 +255,10 @@ def _shook(acc_sd: Vector, ratio: Vector) -> str:
 
 
 def still_windows(detector: Detector, windows: Iterable[Window]) -> Iterator[tuple[int, int, int]]:
-    """Of each still window the number of its stillness, and the first and last + 1 of its samples."""
+    """Yield the number of its run, and the first and last + 1 of its samples, for each still window."""
     last = 0
     for window in windows:
         first, last = last, last + window.count
-        sight = detector.add(window)
-        if isinstance(sight, Still):
-            yield sight.run, first, last
+        state = detector.add(window)
+        if isinstance(state, Still):
+            yield state.run, first, last

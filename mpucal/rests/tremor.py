@@ -1,8 +1,8 @@
-"""The law of a hand's rest: how an acceleration that trembles and sways is spread over time.
+"""Tremor of a hand at rest: its variance, and its spectrum by one parameter lambda.
 
 A hand that holds still trembles at 4 to 12 Hz and sways below 1 Hz. Its acceleration is that of a position that three
-poles at lambda keep bounded (docs/method.md, equation 13). Its size is a rest's own; lambda is the recording's, and
-says how much of the acceleration a mean over a rest still holds.
+poles at lambda keep bounded (docs/method.md, equation 13). Each rest has a size of its own; lambda belongs to the
+recording, and gives the share of the acceleration's variance that a mean over a rest keeps.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ BLOCK_S = 0.4
 FEWEST_RESTS = 3
 QUICKEST_PER_S, SLOWEST_PER_S = 44.0, 3.0  # a tremor of 10 Hz alone; a sway of 0.7 Hz
 LAMBDAS = np.geomspace(QUICKEST_PER_S, SLOWEST_PER_S, 28)
-TREMBLES = 0.04  # a variance below this share of the sensor's noise is none
+TREMBLES = 0.04  # a tremor's variance below this share of the sensor's noise counts as zero
 
 
 def tremor_variance(variance: Vector, noise: Vector) -> float:
-    """(m/s^2)^2 by which a rest of that variance (3,) trembles beyond noise (3,); 0 of a board that lies."""
+    """Return the tremor's variance [(m/s^2)^2] in a rest of `variance` (3,), beyond noise (3,); 0 of a still board."""
     tremor = float(np.mean(variance - 1.05 * noise))
     return tremor if tremor > TREMBLES * float(noise.mean()) else 0.0
 
 
 def mean_variance(x: Vector) -> Vector:
-    """The variance of a mean over T, as a share of the acceleration's; x = lambda T.
+    """Return the variance of a mean over T as a share of the acceleration's; x = lambda T.
 
     The acceleration's autocovariance at a lag of t is exp(-u) (1 - 5 u / 3 + u^2 / 3) of its variance, u = lambda t.
     """
     return np.asarray(2.0 / (3.0 * x * x) * (1.0 - (1.0 + x - x * x) * np.exp(-x)))
 
 
-def carried(recording: Recording, flat: Flat, runs: Intervals) -> Vector:
-    """(n, 3) m/s^2 the acceleration, in each run carried by the gyroscope into the axes of the run's middle.
+def level_rests(recording: Recording, flat: Flat, runs: Intervals) -> Vector:
+    """Return the acceleration (n, 3) [m/s^2], in each run rotated by the gyroscope into the axes of the run's middle.
 
-    A slow turn of the hand moves gravity through the sensor's axes, and is no acceleration of the hand.
+    Otherwise a slow turn of the hand, which moves gravity through the axes, would pass for an acceleration of the hand.
     """
     acc = recording.acc.copy()
     steps = np.diff(recording.t, prepend=recording.t[0])[:, None] * (recording.gyr - flat.b_omega)
     path = np.cumsum(steps, axis=0)
-    # all runs at once, of which there are many
+    # All runs are rotated at once, since there are many.
     lengths = runs[:, 1] - runs[:, 0]
     begins = np.cumsum(lengths) - lengths
     at = np.arange(lengths.sum()) + np.repeat(runs[:, 0] - begins, lengths)
@@ -53,9 +53,9 @@ def carried(recording: Recording, flat: Flat, runs: Intervals) -> Vector:
 
 
 def fit_lambda(acc: Vector, recording: Recording, flat: Flat, runs: Intervals, otherwise: float) -> float:
-    """Lambda [1/s], by what means over blocks keep of the acceleration's variance in the rests of a hand.
+    """Return lambda [1/s] by the share of the acceleration's variance that means over blocks keep in a hand's rests.
 
-    acc : (n, 3) as `carried` gives it. otherwise : where too few rests tremble to tell.
+    acc : (n, 3) as `level_rests` returns it. otherwise : returned where too few rests tremble.
     """
     n = max(round(BLOCK_S * recording.rate_hz), 2)
     kept, seconds = [], []

@@ -1,27 +1,33 @@
-"""Windows of fixed length over a stream of samples: mean and standard deviation of each."""
+"""Windows of fixed length over a stream of samples: the mean, standard deviation and noise of each."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from ..data import Recording, Samples, Vector
+from ..kernel import _kernel
 from .limits import OF_NORMAL
-from .local_noise import ORDER, SQUARES
 
 UNKNOWN = np.full(3, np.nan)
+# Fourth differences leave noise and vibration, and next to nothing of a hand's motion below 10 Hz at 100 samples/s or
+# more. SQUARES is the sum of the squares of their coefficients 1, -4, 6, -4, 1.
+ORDER, SQUARES = 4, 70.0
+NOISE_WINDOW_S = 0.5
+# Ratio of variances up to which a window may be as noisy as the flat segment, but for chance and a hand.
+LOUDER = 2.0
 
 
 @dataclass(frozen=True)
 class Spreads:
-    """Says of one window (3,), or of many (m, 3), what tells whether it is still.
+    """Statistics of one window (3,), or of many (m, 3), that decide whether it is still.
 
     Attributes
     ----------
     gyr : mean rates [rad/s]. acc_sd, gyr_sd : standard deviations [m/s^2], [rad/s].
-    acc_noise : the accelerometer's noise and vibration, without the hand (local_noise.py).
+    acc_noise : the accelerometer's noise and vibration, without the hand's motion, as a standard deviation [m/s^2].
     """
 
     gyr: Vector
@@ -32,14 +38,14 @@ class Spreads:
 
 @dataclass(frozen=True)
 class Window(Spreads):
-    """A short run of consecutive samples.
+    """Statistics of a short run of consecutive samples.
 
     Attributes
     ----------
     acc : (3,) m/s^2, mean.
-    start_s, end_s : times of its first sample and of the one after its last, or, where there is none or a gap, its
-        length later [s].
-    whole : no sample is missing within it or just before it. count : of its samples.
+    start_s, end_s : times of its first sample and of the one after its last [s]; where that is missing, `end_s` is
+        `start_s` plus the length of a window.
+    whole : no sample is missing within it or just before it. count : number of its samples.
     """
 
     acc: Vector
@@ -50,9 +56,9 @@ class Window(Spreads):
 
 
 class Windows:
-    """Cuts samples, however they arrive, into windows of `length_s` by their own time.
+    """Cutter of samples, as they arrive, into windows of `length_s` by the samples' times.
 
-    Without `spread`, their standard deviations, which take longest, are NaN.
+    Without `spread`, the standard deviations, which take longest, are NaN.
     """
 
     def __init__(self, length_s: float, spread: bool = True) -> None:
@@ -61,7 +67,7 @@ class Windows:
         self._full_s = -math.inf
 
     def add(self, samples: Samples) -> list[Window]:
-        """The windows that `samples` complete."""
+        """Return the windows that `samples` complete."""
         if not len(samples):
             return []
         self._parts.append(samples)
@@ -82,7 +88,7 @@ class Windows:
 
 
 def cut(recording: Recording, n: int) -> list[Window]:
-    """The windows of n samples of a whole recording; what is left at its end is left out."""
+    """Cut a whole recording into windows of n samples, without an incomplete last one."""
     length_s, m = n / recording.rate_hz, len(recording) // n
     acc_rows, gyr_rows = (values[: m * n].reshape(m, n, 3) for values in (recording.acc, recording.gyr))
     gyr, acc_sd, gyr_sd, noise, acc = _of_rows(acc_rows, gyr_rows)
@@ -91,12 +97,12 @@ def cut(recording: Recording, n: int) -> list[Window]:
 
 
 def of_rows(acc: Vector, gyr: Vector, start_s: float = 0.0, end_s: float = 1.0, whole: bool = True) -> Window:
-    """The window of rows (n, 3) m/s^2 and rad/s."""
+    """Return the window of rows (n, 3) [m/s^2] and [rad/s]."""
     return Window(*_of_rows(acc, gyr), start_s, end_s, whole, len(acc))
 
 
 def _of_rows(acc: Vector, gyr: Vector) -> tuple[Vector, Vector, Vector, Vector, Vector]:
-    """(..., 3) of rows (..., n, 3), as a window has them: gyr, acc_sd, gyr_sd, acc_noise, acc."""
+    """Return (..., 3) of rows (..., n, 3), in the order of a window's fields: gyr, acc_sd, gyr_sd, acc_noise, acc."""
     acc_mean, gyr_mean = _mean(acc), _mean(gyr)
     return gyr_mean, _deviation(acc, acc_mean), _deviation(gyr, gyr_mean), _noise(acc), acc_mean
 
@@ -110,7 +116,7 @@ def _window(samples: Samples, first: int, last: int, length_s: float, spread: bo
 
 
 def _span(samples: Samples, first: int, last: int, length_s: float) -> tuple[float, float, bool, int]:
-    """As a window has them: start_s, end_s, whole, count."""
+    """Return start_s, end_s, whole and count of a window."""
     start_s = float(samples.t[first])
     goes_on = last < len(samples) and not samples.gap[last]
     end_s = float(samples.t[last]) if goes_on else start_s + length_s
@@ -118,18 +124,18 @@ def _span(samples: Samples, first: int, last: int, length_s: float) -> tuple[flo
 
 
 def _mean(rows: Vector) -> Vector:
-    """np.mean(rows, -2), in half its time and to the last bit."""
+    """Return np.mean(rows, -2), equal to the last bit, in half the time."""
     return np.asarray(np.add.reduce(rows, -2) / rows.shape[-2])
 
 
 def _deviation(rows: Vector, mean: Vector) -> Vector:
-    """np.std(rows, -2), likewise."""
+    """Return np.std(rows, -2), equal to the last bit, in half the time."""
     beside = rows - mean[..., None, :]
     return np.asarray(np.sqrt(np.add.reduce(beside * beside, -2) / rows.shape[-2]))
 
 
 def _noise(rows: Vector) -> Vector:
-    """Of the median: one sample that a knock or a flipped bit throws off is no noise."""
+    """Return the noise by the median of fourth differences, which a knock or a flipped bit does not move."""
     n = rows.shape[-2] - ORDER
     if n <= 0:
         return np.zeros((*rows.shape[:-2], 3))
@@ -138,12 +144,22 @@ def _noise(rows: Vector) -> Vector:
 
 
 def _tail(samples: Samples, first: int) -> Samples:
-    return Samples(
-        samples.t[first:],
-        samples.acc[first:],
-        samples.gyr[first:],
-        samples.temperature_c[first:],
-        samples.gap[first:],
-        samples.acc_clipped[first:],
-        samples.gyr_clipped[first:],
-    )
+    return Samples(*(getattr(samples, field.name)[first:] for field in fields(Samples)))
+
+
+def noise_variance(recording: Recording) -> Vector:
+    """Return the accelerometer's noise around each sample, (n, 3) (m/s^2)^2, as if white, by fourth differences.
+
+    A motor that starts makes it louder than it was at rest.
+    """
+    acc, n = recording.acc, len(recording)
+    squares = np.zeros((n, 3))
+    if n > ORDER:
+        squares[ORDER // 2 : -ORDER // 2] = np.square(np.diff(acc, ORDER, axis=0)) / SQUARES
+    return _kernel.moving_mean(squares, max(round(NOISE_WINDOW_S * recording.rate_hz) // 2, 2))
+
+
+def noise_ratio(recording: Recording, Sigma_a: Vector) -> Vector:
+    """Return (n,) the noise around each sample as a factor of Sigma_a (3,); 1 where it is as at rest."""
+    ratio = noise_variance(recording) @ (1.0 / (3.0 * Sigma_a))
+    return np.asarray(np.where(ratio > LOUDER, ratio, 1.0))

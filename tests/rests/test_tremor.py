@@ -12,7 +12,7 @@ from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.rests.limits import ANY_HAND, QUIET, learned
-from mpucal.rests.tremor import carried, fit_lambda, mean_variance
+from mpucal.rests.tremor import fit_lambda, level_rests, mean_variance
 
 RATE_HZ, REST_S, NOISE_MPS2 = 100.0, 3.0, 0.02
 
@@ -53,7 +53,7 @@ def held(lam, sigma, seed, rests=14):
 @pytest.mark.parametrize("lam", [6.0, 12.0, 25.0])
 def test_lambda_is_found(lam):
     found = [
-        fit_lambda(carried(recording, flat, runs), recording, flat, runs, 1.0)
+        fit_lambda(level_rests(recording, flat, runs), recording, flat, runs, 1.0)
         for recording, flat, runs in (held(lam, 0.1, seed) for seed in range(6))
     ]
     assert np.exp(np.mean(np.log(found))) == pytest.approx(lam, rel=0.25)
@@ -61,7 +61,7 @@ def test_lambda_is_found(lam):
 
 def test_a_board_that_lies_has_no_law():
     recording, flat, runs = held(10.0, 1e-6, 0)
-    assert fit_lambda(carried(recording, flat, runs), recording, flat, runs, 17.0) == 17.0
+    assert fit_lambda(level_rests(recording, flat, runs), recording, flat, runs, 17.0) == 17.0
 
 
 def test_a_turn_that_the_gyroscope_sees_is_carried_away():
@@ -72,7 +72,7 @@ def test_a_turn_that_the_gyroscope_sees_is_carried_away():
     recording = Recording.from_arrays(np.arange(n) / RATE_HZ, acc, np.tile(rate, (n, 1)), flat=(0, 2))
     flat = flat_statistics(recording, (0, 2))
     flat = type(flat)(**{**vars(flat), "b_omega": np.zeros(3)})
-    still = carried(recording, flat, np.array([[0, n]]))
+    still = level_rests(recording, flat, np.array([[0, n]]))
     assert np.ptp(acc, axis=0).max() > 0.5
     assert np.ptp(still, axis=0).max() < 0.01
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
 from ...data import Mask
 from ...reasons import Reason, reason
-from ...rests.local_noise import noise_variance
+from ...rests.windows import noise_variance
 from ..evidence import Evidence
 
 WARMER_C = 5.0
