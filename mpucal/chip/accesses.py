@@ -17,7 +17,7 @@ from .registers import ACCEL_WORDS, FIFO_R_W, FRAME_WORDS
 Whole = NDArray[np.int64]
 
 # Register addresses are one byte: larger numbers stand for files.
-FILE = 256
+FIRST_FILE_NUMBER = 256
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,8 @@ class Accesses:
     write, has_host_ns, framed : True for a write, for an access with a `host_ns`, for one whose bytes are in `frames`.
     register, count, moved : address, bytes requested (given), bytes moved. t_ns, host_ns : see Transaction.
     data : (bytes,) uint8 of the accesses that are not framed. frames : (rows, words) int16 of the framed ones.
-    failures : errors by the number of the access. files : names of files; `register` is FILE + the index of the name.
+    failures : errors by the number of the access.
+    files : names of files; `register` is FIRST_FILE_NUMBER + the index of the name.
     """
 
     write: NDArray[np.bool_]
@@ -57,7 +58,7 @@ class Accesses:
             and int(framed.sum()) == 2 * self.frames.size
             and not (framed % max(2 * self.frames.shape[1], 1)).any()
             and all(0 <= number < len(self) for number in self.failures)
-            and bool(((self.register >= 0) & (self.register < FILE + len(self.files))).all())
+            and bool(((self.register >= 0) & (self.register < FIRST_FILE_NUMBER + len(self.files))).all())
         )
         if not fits:
             raise ValueError("columns that do not fit each other")
@@ -78,7 +79,7 @@ class Accesses:
             write, has_host_ns, framed, register, count, t_ns, host_ns = row
             moved = frames[begin * size : end * size] if framed else data[begin:end]
             op: Literal["read", "write"] = "write" if write else "read"
-            place = register if register < FILE else self.files[register - FILE]
+            place = register if register < FIRST_FILE_NUMBER else self.files[register - FIRST_FILE_NUMBER]
             yield Transaction(op, place, count, moved, t_ns, self.failures.get(i), host_ns if has_host_ns else None)
 
     @cached_property
@@ -125,7 +126,7 @@ class Accesses:
         words = next((words for words in (FRAME_WORDS, ACCEL_WORDS) if not (moved[framed] % (2 * words)).any()), 0)
         framed &= words > 0
         files = tuple(dict.fromkeys(each.register for each in transactions if isinstance(each.register, str)))
-        numbers = {name: FILE + i for i, name in enumerate(files)}
+        numbers = {name: FIRST_FILE_NUMBER + i for i, name in enumerate(files)}
         shown = [each.host_ns for each in transactions]
         return cls(
             write,

@@ -17,9 +17,10 @@ from ._flips import until_jumps
 
 Counts = NDArray[np.int16]
 
-WITHIN, FLOOR = 6.0, 8.0
-# median difference of a sensor in the hand [counts]
-START = 30.0
+# A count is near the mean of its neighbours within so many median differences, and so many counts more.
+NEAR_MEDIANS, NEAR_COUNTS = 6.0, 8.0
+# Median difference [counts] of consecutive samples of a sensor in the hand.
+INITIAL_MEDIAN = 30.0
 BITS = (1 << np.arange(16)).astype(np.uint16)
 
 
@@ -33,7 +34,7 @@ class BitFlipFilter:
 
     def __init__(self, words: int) -> None:
         self.repaired = 0
-        self._median = np.full(words, START)
+        self._median = np.full(words, INITIAL_MEDIAN)
         self._before: Counts = np.zeros((0, words), np.int16)
 
     def reset(self) -> None:
@@ -79,7 +80,7 @@ class BitFlipFilter:
         mean = (float(run[at - 1, word]) + float(run[at + 1, word])) / 2
         each = (run[at, word].astype(np.uint16) ^ BITS).astype(np.int16)
         best = each[np.argmin(np.abs(each - mean))]
-        if abs(best - mean) > WITHIN * self._median[word] + FLOOR:
+        if abs(best - mean) > NEAR_MEDIANS * self._median[word] + NEAR_COUNTS:
             return np.int16(run[at, word])
         self.repaired += 1
         return np.int16(best)

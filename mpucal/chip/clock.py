@@ -34,9 +34,9 @@ RATE_TOLERANCE = 0.01
 Times = Callable[[Whole, Whole], Vector]
 
 # Larger than the number of samples in any segment.
-FAR = 2.0**40
-# A look falls anywhere between two samples: a uniform distribution's standard deviation.
-LOOK_STD_SAMPLES = 12**-0.5
+SEGMENT_STRIDE = 2.0**40
+# A poll falls anywhere between two samples: a uniform distribution's standard deviation.
+POLL_STD_SAMPLES = 12**-0.5
 
 # The fractional parts of the golden ratio's multiples lie evenly between 0 and 1.
 GOLDEN = (5**0.5 - 1) / 2
@@ -137,7 +137,7 @@ class SampleClock:
     @property
     def rate_hz(self) -> float:
         """Sample rate as far as it is known; a segment must have begun."""
-        prior = (LOOK_STD_SAMPLES / (RATE_TOLERANCE * self._nominal_hz)) ** 2
+        prior = (POLL_STD_SAMPLES / (RATE_TOLERANCE * self._nominal_hz)) ** 2
         spread = self._past_spread_s2 + self._segments[-1].spread_s2
         product = self._past_product_s + self._segments[-1].product_s
         return (product + prior * self._nominal_hz) / (spread + prior)
@@ -158,11 +158,11 @@ class SampleClock:
             for line in fit_lines(np.array(each.looks_ns) * NS, np.array(each.looked, np.float64))
         ]
         rates_hz = merge_equal_slopes([line for _, line in pieces], self._nominal_hz, RATE_TOLERANCE)
-        begins = np.array([number * FAR + line.first for number, line in pieces])
+        begins = np.array([number * SEGMENT_STRIDE + line.first for number, line in pieces])
         t_s, taken = np.array([(line.t_s, line.y) for _, line in pieces]).reshape(-1, 2).T
 
         def times_s(segment: Whole, index: Whole) -> Vector:
-            at = np.searchsorted(begins, segment * FAR + index, side="right") - 1
+            at = np.searchsorted(begins, segment * SEGMENT_STRIDE + index, side="right") - 1
             return np.asarray(t_s[at] + (index + 0.5 - taken[at]) / rates_hz[at], np.float64)
 
         return times_s

@@ -21,7 +21,7 @@ Words = tuple[int, int, int]
 
 # A poll is three accesses: count, bytes, flags. So many polls are checked together, and those after one that is not
 # ordinary are checked again.
-POLL, AT_ONCE = 3, 512
+ACCESSES_A_POLL, POLLS_AT_ONCE = 3, 512
 
 
 class Decoder:
@@ -83,10 +83,10 @@ class Decoder:
             self._feed_each(accesses, at, first)
             at = first
             while at < last:
-                at += self._feed_polls(accesses, at, min(last, at + AT_ONCE * POLL))
+                at += self._feed_polls(accesses, at, min(last, at + POLLS_AT_ONCE * ACCESSES_A_POLL))
                 # The poll that was not ordinary.
-                self._feed_each(accesses, at, min(last, at + POLL))
-                at = min(last, at + POLL)
+                self._feed_each(accesses, at, min(last, at + ACCESSES_A_POLL))
+                at = min(last, at + ACCESSES_A_POLL)
         self._feed_each(accesses, at, len(accesses))
 
     def feed_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
@@ -179,7 +179,7 @@ class Decoder:
         """Decode the leading ordinary polls of the accesses first..last-1; return the number of their accesses."""
         if self._fifo is None or accesses.frames.shape[1] != self._fifo.settings.frame_words:
             return 0
-        looks, reads, checks = (np.arange(first + i, last, POLL) for i in range(POLL))
+        looks, reads, checks = (np.arange(first + i, last, ACCESSES_A_POLL) for i in range(ACCESSES_A_POLL))
         frames = accesses.frames[accesses.begin[reads[0]] : accesses.end[reads[-1]]]
         lengths = accesses.end[reads] - accesses.begin[reads]
         polls = self._fifo.accept_plain_polls(accesses.t_ns[looks], frames, lengths)
@@ -188,7 +188,7 @@ class Decoder:
             self._fifo.add_clock_pairs(accesses.t_ns[timed], accesses.host_ns[timed])
         if polls:
             self.fault = None
-        return POLL * polls
+        return ACCESSES_A_POLL * polls
 
     def _hold(self, register: int, data: bytes) -> None:
         self._held.update(enumerate(data, register))
@@ -213,10 +213,10 @@ class Decoder:
 
 def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
     """Return (first, last + 1) of each run of ordinary polls: count, as many bytes, no overflow, settings kept."""
-    n = len(accesses) - POLL + 1
+    n = len(accesses) - ACCESSES_A_POLL + 1
     if n < 1 or accesses.failures:
         return []
-    look, read, check = (slice(i, n + i) for i in range(POLL))
+    look, read, check = (slice(i, n + i) for i in range(ACCESSES_A_POLL))
     register, moved = accesses.register, accesses.moved
     whole = (register[look] == reg.FIFO_COUNT_H) & (moved[look] == 2) & (register[read] == reg.FIFO_R_W)
     whole &= (register[check] == reg.INT_ENABLE) & (moved[check] == reg.INT_STATUS - reg.INT_ENABLE + 1)
@@ -226,8 +226,8 @@ def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
     counted = accesses.data[counts].astype(np.int64) << 8 | accesses.data[counts + 1]
     flags = (accesses.data[checks] & ~accesses.data[checks + 2]) & reg.INT_FIFO_OFLOW
     at = at[(counted == moved[at + 1]) & (flags > 0)]
-    cuts = np.flatnonzero(np.diff(at) != POLL) + 1
-    return [(int(part[0]), int(part[-1]) + POLL) for part in np.split(at, cuts) if len(part)]
+    cuts = np.flatnonzero(np.diff(at) != ACCESSES_A_POLL) + 1
+    return [(int(part[0]), int(part[-1]) + ACCESSES_A_POLL) for part in np.split(at, cuts) if len(part)]
 
 
 def decode(accesses: Iterable[Transaction | Accesses], name: str = "recording") -> Recording:

@@ -37,7 +37,7 @@ DEAD_NS = 2_000_000_000
 # A longer poll counts as this long: a host that slept says nothing about the chip.
 LONGEST_POLL_NS = 500_000_000
 # Time-out of an adapter on a bus that is held: no reply brings the time that it took.
-HELD_NS = 500_000_000
+BUS_HELD_NS = 500_000_000
 
 # Longer than the chip takes to write a frame, and no whole number of sample intervals.
 FRAME_WRITTEN_NS = 300_000
@@ -45,9 +45,9 @@ FRAME_WRITTEN_NS = 300_000
 # An overflow drops the oldest bytes: a FIFO that is so many frames short of full may have lost the alignment.
 SPARE_FRAMES = 3
 # Share of the samples; jerks of a hand pass for flipped bits four times in ten thousand.
-MANY_REPAIRED = 0.001
+MAX_REPAIRED_SHARE = 0.001
 # Fewer overflows may come from a host that was late.
-OVERFLOWS = 3
+REPEATED_OVERFLOWS = 3
 
 # INT_ENABLE, the DMP's status and INT_STATUS in one read: INT_ENABLE is 0 in a chip that was reset meanwhile.
 STATUS_BYTES = reg.INT_STATUS - reg.INT_ENABLE + 1
@@ -185,7 +185,7 @@ class Driver:
         """Stop the FIFO if the bus still works; the chip stays awake."""
         with suppress(BusError, EndOfCapture):
             stop_fifo(self._port)
-        if self.repaired > MANY_REPAIRED * self._decoder.accepted:
+        if self.repaired > MAX_REPAIRED_SHARE * self._decoder.accepted:
             self._say(f"a bit had flipped on the bus in {self.repaired} samples, which were repaired: {REMEDY}")
         if self._port.stats.errors:
             self._say(f"{self._port.stats}: {self._port.stats.remedy}")
@@ -254,7 +254,7 @@ class Driver:
     def _check_pace(self, settings: Settings) -> None:
         """Raise BusError if the chip makes frames faster than the quickest read moved them, after several overflows."""
         rate_hz = settings.nominal_rate_hz
-        if self.faults[FifoFault.OVERFLOW] < OVERFLOWS or self._frame_ns * rate_hz < 1e9 or self._frame_ns == math.inf:
+        if self.faults[FifoFault.OVERFLOW] < REPEATED_OVERFLOWS or not 1e9 <= self._frame_ns * rate_hz < math.inf:
             return
         raise BusError(
             f"the bus moves {1e9 / self._frame_ns:.0f} samples a second, but the chip takes {rate_hz:g}",
@@ -303,7 +303,7 @@ class Driver:
 
     def _spent_ns(self, begun_ns: int, trouble: BusError | ChipError | None) -> int:
         """Return the time this poll took, as far as it counts against the chip."""
-        held_ns = HELD_NS if isinstance(trouble, BusHeld) else 0
+        held_ns = BUS_HELD_NS if isinstance(trouble, BusHeld) else 0
         return min(self._port.now_ns - begun_ns, LONGEST_POLL_NS) + held_ns
 
     def _diagnose_silence(self, settings: Settings) -> ChipError:

@@ -31,18 +31,18 @@ Whole = NDArray[np.int64]
 
 # A ceramic resonator is within 0.5 %, and RC oscillators within 1 %; warming moves either by some 50 ppm a minute.
 RATE_STD, DRIFT_STD_PER_S = 0.01, 100e-6 / 60
-GROUPS, LEAST_IN_GROUP, ROUNDS = 6, 3, 6
+GROUPS, LEAST_IN_GROUP, ITERATIONS = 6, 3, 6
 # No working clock is off by more. An emulated bridge runs in a time of its own, which pairs cannot correct.
-MOST = 0.03
-# Delays scatter by at least the time between two looks of a bridge at its line.
-STEADY_S = 20e-6
+MAX_RATE_ERROR = 0.03
+# Delays scatter by at least the time between two reads of its line by a bridge.
+LEAST_SCATTER_S = 20e-6
 # A clock began anew if host - bus moves by more than this and what the rate may be off.
 LEAP_S = 0.5
-HELD_BACK_S = 0.05
-# Silence: longer than both this time and so many usual distances of pairs. A lost bridge is given up after 0.25 s.
-SILENT_S, SILENT = 0.2, 4.0
+ADAPTER_DELAY_S = 0.05
+# A silence is longer than both this time and so many usual intervals of pairs. A lost bridge is given up after 0.25 s.
+SILENCE_S, SILENCE_INTERVALS = 0.2, 4.0
 # Pairs kept of a stream of days, and the growth of their number until the next estimate of the rate.
-KEPT, GROWTH = 20_000, 1.1
+MAX_PAIRS, REFIT_GROWTH = 20_000, 1.1
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class HostClock:
     def _estimate_if_due(self) -> None:
         if len(self._bus_ns) < self._next:
             return
-        self._next = int(GROWTH * len(self._bus_ns)) + 1
+        self._next = int(REFIT_GROWTH * len(self._bus_ns)) + 1
         at_s = self._bus_ns[-1] * NS
         self._shown_s = float(self.provisional_s(at_s))
         self._since_s, self._slope = at_s, float(self.fit().slope(at_s))
@@ -111,9 +111,9 @@ class HostClock:
 
     def forget(self) -> None:
         """Forget pairs that are too old for the present rate."""
-        if len(self._bus_ns) > KEPT:
-            del self._bus_ns[: KEPT // 2], self._host_ns[: KEPT // 2]
-            self._next = int(GROWTH * len(self._bus_ns)) + 1
+        if len(self._bus_ns) > MAX_PAIRS:
+            del self._bus_ns[: MAX_PAIRS // 2], self._host_ns[: MAX_PAIRS // 2]
+            self._next = int(REFIT_GROWTH * len(self._bus_ns)) + 1
 
     def fit(self) -> ClockFit:
         """Fit the parabola to all pairs; there must be one."""
@@ -135,18 +135,18 @@ def fit_pairs(t_ns: Whole, host_ns: Whole) -> ClockFit:
         for run in _runs(t_ns, ahead_ns)
     ]
     # The median, since a machine that was busy once is no reason.
-    if not groups or np.median([_crude_slope(t, ahead) for t, ahead in groups]) > MOST:
+    if not groups or np.median([_crude_slope(t, ahead) for t, ahead in groups]) > MAX_RATE_ERROR:
         return unknown
     x, H = np.zeros(2), np.eye(2)
-    for _ in range(ROUNDS):
-        x, H = _parabola([_least(t, ahead, x) for t, ahead in groups], x)
+    for _ in range(ITERATIONS):
+        x, H = _parabola([_least_delayed(t, ahead, x) for t, ahead in groups], x)
     return ClockFit(float(x[0]), float(x[1]), float(np.sqrt(np.linalg.inv(H)[0, 0])), first_s, mid_ns * NS, last_s)
 
 
 def _runs(t_ns: Whole, ahead_ns: Whole) -> Iterator[slice]:
     """Yield the runs that are long enough, between silences and leaps of one of the clocks."""
     passed, moved = np.diff(t_ns) * NS, np.abs(np.diff(ahead_ns)) * NS
-    silent_s = max(SILENT_S, SILENT * float(np.median(passed))) if len(passed) else SILENT_S
+    silent_s = max(SILENCE_S, SILENCE_INTERVALS * float(np.median(passed))) if len(passed) else SILENCE_S
     cuts = np.flatnonzero((passed > silent_s) | (moved > LEAP_S + 2.0 * RATE_STD * passed)) + 1
     for first, last in pairwise((0, *cuts.tolist(), len(t_ns))):
         if last - first >= GROUPS * LEAST_IN_GROUP:
@@ -162,10 +162,10 @@ def _grouped(each: NDArray[np.floating]) -> Vector:
 def _crude_slope(t: Vector, ahead: Vector) -> float:
     """Return the slope from the first group's median to the last's, less what adapters hold back."""
     moved, passed = (float(np.median(each[-1]) - np.median(each[0])) for each in (ahead, t))
-    return max(abs(moved) - HELD_BACK_S, 0.0) / passed
+    return max(abs(moved) - ADAPTER_DELAY_S, 0.0) / passed
 
 
-def _least(t: Vector, ahead: Vector, x: Vector) -> tuple[Vector, Vector, float]:
+def _least_delayed(t: Vector, ahead: Vector, x: Vector) -> tuple[Vector, Vector, float]:
     """Return time and `ahead` of each group's least delayed pair for (b, c) = x, and the mean spacing."""
     delay = ahead - x[0] * t - x[1] * t * t
     two = np.argpartition(delay, 1, axis=1)[:, :2]
@@ -183,7 +183,7 @@ def _parabola(least: list[tuple[Vector, Vector, float]], x: Vector) -> tuple[Vec
         A -= A.mean(axis=0)
         ahead = seen - seen.mean()
         scatter = float(np.sqrt(np.sum((ahead - A @ x) ** 2) / (GROUPS - 1)))
-        var = STEADY_S**2 + max(spacing, scatter) ** 2
+        var = LEAST_SCATTER_S**2 + max(spacing, scatter) ** 2
         H += A.T @ A / var
         g += A.T @ ahead / var
     return np.asarray(np.linalg.solve(H, g), np.float64), np.asarray(H, np.float64)

@@ -20,9 +20,9 @@ from ..errors import ChipError
 from . import registers as reg
 from .families import FIFO_SLACK_BYTES, PARTS, Family, Part, families_with_fifo, part_of
 
-# Magnitudes [g] that a board in a hand shows at half the sensitivity.
-HALF_G = (0.35, 0.65)
-HALF = 0.5
+# A board in a hand shows a median magnitude [g] in this range if its sensitivity is half of the data sheet's.
+MIN_HALF_G, MAX_HALF_G = 0.35, 0.65
+HALF_SENSITIVITY = 0.5
 
 
 class Behaviour:
@@ -67,8 +67,8 @@ class Behaviour:
             return part_of(who_am_i)
         part = replace(self._part_by_behaviour(who_am_i, fifo_bytes), wide_fifo_bytes=self._wide_bytes(fifo_bytes))
         revision = part.family.half_range_revision
-        if revision and self._magnitudes_g and HALF_G[0] < np.median(self._magnitudes_g) < HALF_G[1]:
-            return replace(part, chip=f"{part.chip}{revision}", accel_sensitivity=HALF)
+        if revision and self._magnitudes_g and MIN_HALF_G < np.median(self._magnitudes_g) < MAX_HALF_G:
+            return replace(part, chip=f"{part.chip}{revision}", accel_sensitivity=HALF_SENSITIVITY)
         return part
 
     def _wide_bytes(self, fifo_bytes: int) -> int | None:

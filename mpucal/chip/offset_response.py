@@ -19,13 +19,13 @@ from .quick_measure import TemporaryMeasurement
 # A different step on each axis shows axes that are swapped.
 STEPS = (256, 320, 384)
 # Words beyond this take the step in the other direction, so that it fits.
-ROOM = 30_000
+LARGEST_TO_STEP_UP = 30_000
 
 SCALES_LSB_PER_G = (2048.0, 4096.0)
 # The accelerometer's own scale is within 3 %.
 TOLERANCE = 0.15
 # Half of the smallest step [g], and the largest difference between two readings of a board at rest [g].
-NOTHING_G, MOVED_G = 0.03, 0.006
+LEAST_SHIFT_G, MOTION_G = 0.03, 0.006
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
     """
     for place in sorted(PLACES, key=lambda place: place != likely):
         old = OffsetRegisters.read(port, place)
-        steps = [step if word < ROOM else -step for step, word in zip(STEPS, old.words, strict=True)]
+        steps = [step if word < LARGEST_TO_STEP_UP else -step for step, word in zip(STEPS, old.words, strict=True)]
         probe = old.with_words(shift_words(old.words, steps))
         before = measurement.rest()
         with restoring(port, old):
@@ -61,12 +61,12 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
         if not kept:
             continue
         after = measurement.rest()
-        if (np.abs(after - before) > MOVED_G).any():
+        if (np.abs(after - before) > MOTION_G).any():
             raise ChipError(
                 "the board moved while its offset registers were tried", "put it on a firm surface and let go of it"
             )
         shift = during - (before + after) / 2
-        if (np.abs(shift) > NOTHING_G).any():
+        if (np.abs(shift) > LEAST_SHIFT_G).any():
             return _identify_scale(place, shift / np.array(word_difference(probe.words, old.words)))
     raise OddOffsets(
         "the accelerometer does not respond to its offset registers, neither at "

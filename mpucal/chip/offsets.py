@@ -24,8 +24,8 @@ Words = tuple[int, int, int]
 # The last family of the table first.
 PLACES: tuple[Place, ...] = tuple(dict.fromkeys(family.accel_offset_h for family in reversed(FAMILIES)))
 
-RESERVED = 1
-LEAST, MOST = -32768, 32767
+RESERVED_BIT = 1
+WORD_MIN, WORD_MAX = -32768, 32767
 
 # A wire that was touched makes contact again within seconds.
 RESTORE_WAITS_NS = tuple(1_000_000 * 4**i for i in range(7))
@@ -80,9 +80,10 @@ def shift_words(words: Words, counts: Iterable[float]) -> Words:
     ChipError : the sum does not fit into a register.
     """
     x, y, z = (
-        (old & ~RESERVED) + 2 * round(count / 2) | (old & RESERVED) for old, count in zip(words, counts, strict=True)
+        (old & ~RESERVED_BIT) + 2 * round(count / 2) | (old & RESERVED_BIT)
+        for old, count in zip(words, counts, strict=True)
     )
-    if not all(LEAST <= word <= MOST for word in (x, y, z)):
+    if not all(WORD_MIN <= word <= WORD_MAX for word in (x, y, z)):
         raise ChipError(
             f"the offset registers cannot hold {x}, {y}, {z}",
             "use the calibration's files: so large a bias does not fit into the registers with the factory trim",
@@ -92,7 +93,7 @@ def shift_words(words: Words, counts: Iterable[float]) -> Words:
 
 def word_difference(new: Words, old: Words) -> tuple[int, int, int]:
     """Return by how many counts `new` acts more than `old`: bit 0 has no effect."""
-    x, y, z = ((a & ~RESERVED) - (b & ~RESERVED) for a, b in zip(new, old, strict=True))
+    x, y, z = ((a & ~RESERVED_BIT) - (b & ~RESERVED_BIT) for a, b in zip(new, old, strict=True))
     return x, y, z
 
 

@@ -15,11 +15,11 @@ from ..data import Vector
 from ._pieces import best_break
 
 # A break must explain this many times the residual variance. Chance alone, over all places, stays below 30.
-BREAK = 100.0
-# Variance of a look that falls anywhere between two samples: the least that a residual variance can be.
+LEAST_BREAK_RATIO = 100.0
+# Variance of a poll that falls anywhere between two samples: the least that a residual variance can be.
 LEAST_VARIANCE = 1 / 12
 # Two slopes differ if they do by so many standard deviations.
-DIFFERENT = 8.0
+DIFFERENT_SLOPE_STDS = 8.0
 # Points on either side of a break, and time [s].
 LEAST_POINTS, LEAST_S = 20, 2.0
 
@@ -81,7 +81,7 @@ def _have_equal_slopes(group: list[Line], piece: Line) -> bool:
         return True
     variance = max(piece.variance, *(p.variance for p in group))
     std = float(np.sqrt(variance * (1 / spread + 1 / piece.spread_s2)))
-    return abs(product / spread - piece.product_s / piece.spread_s2) < DIFFERENT * std
+    return abs(product / spread - piece.product_s / piece.spread_s2) < DIFFERENT_SLOPE_STDS * std
 
 
 def find_breaks(t_s: Vector, y: Vector) -> list[int]:
@@ -114,4 +114,4 @@ def _find_break(t_s: Vector, y: Vector) -> int | None:
     if at < 0:
         return None
     variance = max(both / (n - 4), LEAST_VARIANCE)
-    return at if one - both > BREAK * variance else None
+    return at if one - both > LEAST_BREAK_RATIO * variance else None

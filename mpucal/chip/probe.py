@@ -13,7 +13,7 @@ from .port import Port
 # Awake after a reset a chip takes 8000 samples a second, and 293 frames fill the largest FIFO; clones may be slower.
 COUNT_NS, COUNTS = 15_000_000, 45
 IDENTITY_TRIES = 5
-SAMPLES, SAMPLE_NS = 8, 10_000_000
+PROBED_SAMPLES, PROBE_INTERVAL_NS = 8, 10_000_000
 
 # In every part this bit reads 0, and the count stays below this.
 POWER_UNUSED = reg.PWR_MGMT_1_DEVICE_RESET
@@ -85,8 +85,8 @@ def probe(port: Port) -> None:
         if _fill_fifo(port) is None:
             port.write(reg.ACCEL_CONFIG2, 0)
     if any(family.half_range_revision for family in families_with_fifo(full)):
-        for _ in range(SAMPLES):
-            port.sleep(SAMPLE_NS)
+        for _ in range(PROBED_SAMPLES):
+            port.sleep(PROBE_INTERVAL_NS)
             port.read(reg.ACCEL_XOUT_H, 6)
 
 

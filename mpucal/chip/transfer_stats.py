@@ -9,7 +9,7 @@ from ..errors import BusError, BusHeld, LinkError, NoAnswer
 
 ON_THE_LINK = "lost on the link to the board"
 KINDS = {NoAnswer: "not acknowledged", BusHeld: "timed out", LinkError: ON_THE_LINK}
-OTHER = "broken off"
+OTHER_KIND = "broken off"
 REMEDY = "shorten the wires, keep them away from motors, add pull-ups of 2.2 to 4.7 kΩ, or run the bus at 100 kHz"
 LINK_REMEDY = "the sensor's wires are not the cause: check the board's cable and supply, or the network in between"
 
@@ -29,7 +29,7 @@ class TransferStats:
 
     def count_error(self, error: BusError) -> None:
         """Count a failed transfer."""
-        self.errors[next((word for kind, word in KINDS.items() if isinstance(error, kind)), OTHER)] += 1
+        self.errors[next((word for kind, word in KINDS.items() if isinstance(error, kind)), OTHER_KIND)] += 1
 
     @property
     def error_share(self) -> float:

@@ -29,7 +29,7 @@ TRIES = 3
 MAX_MESSAGE_BYTES = 8192
 SMBUS_BLOCK_BYTES = 32
 # An adapter that refuses even so few bytes does not support the kind of transfer.
-SHORTEST_LIMIT = 4
+LEAST_LIMIT_BYTES = 4
 
 
 def open_source(request: Request) -> OpenedChip:
@@ -146,7 +146,7 @@ class I2cBus(HostBus):
             if error.errno != errno.EOPNOTSUPP:
                 raise
             # The kernel refused it before anything was sent (i2c_check_for_quirks).
-            if count > SHORTEST_LIMIT:
+            if count > LEAST_LIMIT_BYTES:
                 self._longest = count // 2
             elif self._repeated_start:
                 self._repeated_start, self._longest = False, MAX_MESSAGE_BYTES

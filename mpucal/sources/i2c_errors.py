@@ -12,7 +12,7 @@ from pathlib import Path
 from ..errors import BusError, BusHeld, NoAnswer
 
 DEVICES = Path("/dev")
-HELD = Path("/sys/bus/i2c/devices")
+SYSFS_DEVICES = Path("/sys/bus/i2c/devices")
 
 WIRES = "check VCC, GND, SDA and SCL, and that AD0 is tied to GND (0x68) or to VCC (0x69)"
 
@@ -85,7 +85,7 @@ def no_answer_error(path: str, addresses: Sequence[int]) -> NoAnswer:
 
 def _iio_device(chip: str) -> str:
     """Return the IIO device that a driver of the kernel made of `chip`; empty if there is none."""
-    return next((path.name for path in sorted((HELD / chip).glob("iio:device*"))), "")
+    return next((path.name for path in sorted((SYSFS_DEVICES / chip).glob("iio:device*"))), "")
 
 
 def _number(path: str) -> str:

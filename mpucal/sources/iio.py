@@ -27,13 +27,13 @@ from .opened_source import Say
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
-GROUPS = ("buffer", "scan_elements", "trigger")
+ATTRIBUTE_GROUPS = ("buffer", "scan_elements", "trigger")
 # Attributes that keep what is written to them.
-STAYS = "_calibbias"
+PERSISTENT_SUFFIX = "_calibbias"
 # Key of a capture's head: the devices and the trigger.
-OF_IIO = "iio"
-SHOWN = ("name", "in_", "sampling", "trigger/")
-NOWHERE = Devices("", "")
+META_KEY = "iio"
+SHOWN_PREFIXES = ("name", "in_", "sampling", "trigger/")
+NO_DEVICES = Devices("", "")
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class OpenedIio(OpenedChip):
     devices : their names. trigger : see IioDriver. rules : folder of udev's rules; None without udev.
     """
 
-    devices: Devices = NOWHERE
+    devices: Devices = NO_DEVICES
     trigger: str | None = None
     rules: Path | None = None
 
     def source_meta(self) -> dict[str, Any]:
         """Return the entries for the head of a capture."""
-        return {**super().source_meta(), DRIVER: IIO_VERSION, OF_IIO: [*self.devices, self.trigger]}
+        return {**super().source_meta(), DRIVER: IIO_VERSION, META_KEY: [*self.devices, self.trigger]}
 
     @property
     def where(self) -> str:
@@ -67,7 +67,7 @@ class OpenedIio(OpenedChip):
                 names = files.read(f"{device}/", LIST_BYTES).data.decode().split("\n")
                 before = "" if len(self.devices.each) == 1 else f"{device}/"
                 for name in names:
-                    if name.startswith(SHOWN) and not name.endswith(("_raw", "_available")):
+                    if name.startswith(SHOWN_PREFIXES) and not name.endswith(("_raw", "_available")):
                         facts[before + name] = files.read(f"{device}/{name}", TEXT_BYTES).data.decode().strip()
         return facts
 
@@ -78,7 +78,7 @@ class OpenedIio(OpenedChip):
 
 def iio_replay(replay: OpenedChip, capture: Capture) -> OpenedIio:
     """Convert the replay of a chip to one of IIO devices; see OpenedIio.source_meta."""
-    accel, gyro, trigger = capture.meta[OF_IIO]
+    accel, gyro, trigger = capture.meta[META_KEY]
     held = {field.name: getattr(replay, field.name) for field in fields(OpenedChip)}
     return OpenedIio(**held, devices=Devices(accel, gyro), trigger=trigger)
 
@@ -143,7 +143,7 @@ class IioFiles(HostBus):
         device, _, name = register.partition("/")
         t_ns = self.now_ns()
         with converting(lambda error: attribute_error(error, device, name, data.decode())):
-            if not name.endswith(STAYS) and register not in self._before:
+            if not name.endswith(PERSISTENT_SUFFIX) and register not in self._before:
                 self._before[register] = (self._sysfs / register).read_bytes().strip()
             self._put(register, data)
         return t_ns
@@ -183,7 +183,7 @@ class IioFiles(HostBus):
         folder = self._sysfs / device
         with converting(lambda error: attribute_error(error, device, "", None)):
             names = [path.name for path in folder.iterdir() if path.is_file()]
-            groups = [folder / group for group in GROUPS if (folder / group).is_dir()]
+            groups = [folder / group for group in ATTRIBUTE_GROUPS if (folder / group).is_dir()]
             return sorted(
                 [*names, *(f"{g.name}/{path.name}" for g in groups for path in g.iterdir() if path.is_file())]
             )

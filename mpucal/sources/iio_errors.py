@@ -9,7 +9,7 @@ import errno
 
 from ..errors import BusError, NoAnswer
 
-GONE = (errno.ENODEV, errno.ENOENT, errno.ENXIO)
+GONE_ERRNOS = (errno.ENODEV, errno.ENOENT, errno.ENXIO)
 
 
 def attribute_error(error: OSError, device: str, name: str, text: str | None) -> BusError:
@@ -22,7 +22,7 @@ def attribute_error(error: OSError, device: str, name: str, text: str | None) ->
         )
     if error.errno == errno.EBUSY:
         return in_use(device)
-    if error.errno in GONE:
+    if error.errno in GONE_ERRNOS:
         return gone(device)
     if text is not None and error.errno in (errno.EINVAL, errno.ERANGE):
         return BusError(
@@ -42,7 +42,7 @@ def buffer_error(error: OSError, device: str) -> BusError:
         )
     if error.errno == errno.EBUSY:
         return in_use(device)
-    if error.errno in GONE:
+    if error.errno in GONE_ERRNOS:
         return gone(device)
     return BusError(
         f"the buffer of {device} cannot be read ({error.strerror})", "check the output of `dmesg`, and start again"

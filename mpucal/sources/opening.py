@@ -14,7 +14,7 @@ from .opened_source import OpenedSource
 from .table import DLPF, SOURCES, kinds_for, matching_kinds, unique
 
 # Options of the plan, which a capture fixes.
-OF_THE_PLAN = ("gravity", "gravity_anyway", "model", "target", "tilt_only")
+PLAN_OPTIONS = ("gravity", "gravity_anyway", "model", "target", "tilt_only")
 OUTPUT_FOLDER = "folder"
 
 
@@ -135,7 +135,7 @@ def _dependent_options(kinds: Iterable[SourceKind]) -> list[Option]:
 
 
 def _fixed_by_capture() -> tuple[str, ...]:
-    return (*(option.name for option in _dependent_options(SOURCES)), *OF_THE_PLAN)
+    return (*(option.name for option in _dependent_options(SOURCES)), *PLAN_OPTIONS)
 
 
 def _plan(values: Mapping[str, Any], until_end: bool, kind: SourceKind) -> Plan:

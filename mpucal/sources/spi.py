@@ -33,8 +33,8 @@ READ, MODE = 0x80, 3
 REGISTER_HZ, LEAST_DATA_HZ = 1_000_000, 8_000_000
 I2C_IF_DIS = 0x10
 I2C_IF, I2C_IF_OFF = 0x70, 0x40
-# spidev's buffer, less the address
-LONGEST = 4095
+# Size of spidev's buffer, less the byte of the address.
+MAX_DATA_BYTES = 4095
 DATA = (*range(ACCEL_XOUT_H, ACCEL_XOUT_H + FRAME_BYTES), FIFO_R_W)
 
 
@@ -94,7 +94,7 @@ class SpiBus(HostBus):
         data = b""
         hz = self._data_hz if register in DATA else REGISTER_HZ
         while len(data) < count:
-            part = min(count - len(data), LONGEST)
+            part = min(count - len(data), MAX_DATA_BYTES)
             data += self._transfer(bytes([READ | register_after(register, len(data))]) + bytes(part), hz)[1:]
         return data
 

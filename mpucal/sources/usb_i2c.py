@@ -22,7 +22,7 @@ from .kind import Request
 
 I2C_HZ = 400_000
 # Command buffer of an MPSSE engine; shorter transfers are not faster, by the adapter's latency.
-LONGEST = 1024
+MAX_READ_BYTES = 1024
 MCP2221_VENDOR, MCP2221_PRODUCT = 0x04D8, 0x00DD
 
 
@@ -143,7 +143,7 @@ class UsbBus(HostBus):
         t_ns, data = self.now_ns(), b""
         while len(data) < count:
             place = register_after(register, len(data))
-            data += self._exchange(self.address, place, min(count - len(data), LONGEST))
+            data += self._exchange(self.address, place, min(count - len(data), MAX_READ_BYTES))
         return Reply(data, t_ns)
 
     def write(self, register: int, data: bytes) -> int:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpucal.chip.config import RateOnlyConfig
-from mpucal.chip.offsets import RESERVED
+from mpucal.chip.offsets import RESERVED_BIT
 from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
 from mpucal.errors import RecordingError, WriteBackError
 from mpucal.iio.devices import Devices
@@ -64,7 +64,7 @@ def test_b_a_is_gone_from_the_samples_and_udev_has_the_rest(made, tmp_path):
     # steps of 1 mg
     np.testing.assert_allclose(applied.calibration.applied_in_hardware, BIAS, atol=0.6e-3 * STANDARD_GRAVITY_MPS2)
     np.testing.assert_allclose(sink._rest(), showed - BIAS, atol=0.02)
-    assert all((new ^ old) & RESERVED == 0 for new, old in zip(files._words(), before, strict=True))
+    assert all((new ^ old) & RESERVED_BIT == 0 for new, old in zip(files._words(), before, strict=True))
     rule = (tmp_path / "61-mpucal-iio-device0.rules").read_text()
     assert 'KERNEL=="iio:device0", ATTR{name}=="mpu6050"' in rule
     rows = matrix_in(tmp_path / "61-mpucal-iio-device0.rules")

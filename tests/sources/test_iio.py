@@ -319,7 +319,7 @@ def test_what_is_no_device_is_wrong_usage():
 
 
 def test_a_chip_that_the_kernel_holds_is_pointed_to_by_its_other_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(i2c_errors, "HELD", tmp_path)
+    monkeypatch.setattr(i2c_errors, "SYSFS_DEVICES", tmp_path)
     (tmp_path / "1-0068" / "iio:device2").mkdir(parents=True)
     error = OSError(errno.EBUSY, "busy")
     assert "use --iio iio:device2 instead of --bus; or" in str(i2c_errors.transfer_error(error, "/dev/i2c-1", 0x68))

@@ -13,8 +13,8 @@ from .port import Port
 CTRL_A, CTRL_B, CTRL_C, CTRL_D = b"\x01", b"\x02", b"\x03", b"\x04"
 BANNER = b"raw REPL; CTRL-B to exit\r\n>"
 REBOOT = b"soft reboot\r\n"
-RAW_PASTE, TAKEN, NOT_HERE = b"\x05A\x01", b"R\x01", b"R\x00"
-MORE = 0x01
+RAW_PASTE, PASTE_ACCEPTED, PASTE_REFUSED = b"\x05A\x01", b"R\x01", b"R\x00"
+WINDOW_FREED = 0x01
 STARTED = b"OK"
 # Pieces and pauses for a board whose UART has no flow control.
 PIECE_BYTES, PIECE_NS = 128, 10_000_000
@@ -71,10 +71,10 @@ class RawRepl:
         text = program.encode()
         self._port.write(RAW_PASTE)
         answer = self._read(2)
-        if answer == TAKEN:
+        if answer == PASTE_ACCEPTED:
             self._paste(text)
         else:
-            if answer != NOT_HERE:
+            if answer != PASTE_REFUSED:
                 # MicroPython before 1.14 takes the request for a line, and shows its banner.
                 self._expect(b"\n>", ANSWER_NS)
             self._type(text)
@@ -113,7 +113,7 @@ class RawRepl:
         at = 0
         while at < len(text):
             while self._received or not room:
-                if self._read(1)[0] != MORE:
+                if self._read(1)[0] != WINDOW_FREED:
                     # The board rejects the program; the error follows.
                     self._port.write(CTRL_D)
                     return
