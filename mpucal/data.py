@@ -76,10 +76,10 @@ class Sensor:
         ValueError : a value is not a name or a finite number as required.
         """
         known = {f.name for f in fields(cls)}
-        return cls(**{key: _checked(key, value) for key, value in document.items() if key in known})
+        return cls(**{key: _parse_field(key, value) for key, value in document.items() if key in known})
 
 
-def _checked(key: str, value: Any) -> Any:
+def _parse_field(key: str, value: Any) -> Any:
     """Return a value of a Sensor's document as the Sensor holds it."""
     if value is None:
         return None

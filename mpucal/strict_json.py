@@ -34,7 +34,7 @@ def parse_json(data: bytes | str) -> Any:
     parse = partial(
         json.loads, parse_constant=_not_finite, parse_int=_integer, parse_float=_number, object_pairs_hook=_object
     )
-    return _checked(data, parse, _check_string)
+    return _parse_checked(data, parse, _check_string)
 
 
 def parse_own_json(data: bytes | str) -> Any:
@@ -44,10 +44,10 @@ def parse_own_json(data: bytes | str) -> Any:
     ------
     ValueError : it is not JSON, too long or too deep.
     """
-    return _checked(data, json.loads, lambda text: None)
+    return _parse_checked(data, json.loads, lambda text: None)
 
 
-def _checked(data: bytes | str, parse: Callable[[bytes | str], Any], check_string: Callable[[str], None]) -> Any:
+def _parse_checked(data: bytes | str, parse: Callable[[bytes | str], Any], check_string: Callable[[str], None]) -> Any:
     if len(data) > MOST_BYTES:
         raise ValueError(f"{len(data)} bytes are more than {MOST_BYTES}")
     try:

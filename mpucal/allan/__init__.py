@@ -142,7 +142,7 @@ class NoiseMeter:
             found.append({"code": "step", "message": f"{what}: the board was moved, or its bias jumped"})
         T = course[:, 6]
         if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > WARMED_C:
-            found.append({"code": "temperature", "message": _warmed(course[np.isfinite(T)])})
+            found.append({"code": "temperature", "message": _temperature_sentence(course[np.isfinite(T)])})
         return found
 
 
@@ -171,7 +171,7 @@ def data_sheet(sensor: Sensor) -> dict[str, float]:
     }
 
 
-def _warmed(course: Vector) -> str:
+def _temperature_sentence(course: Vector) -> str:
     """Return a sentence on the change of temperature and the axes that are correlated with it."""
     T = course[:, 6]
     r = np.asarray(np.corrcoef(course, rowvar=False))[6, :6]

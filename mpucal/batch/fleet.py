@@ -72,7 +72,7 @@ def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
     b_a, b_omega = (_numbers(columns, [f"{name}_{i}" for i in AXES]) for name in ("b_a", "b_omega"))
     for values in (D, b_a, b_omega):
         values[refused] = np.nan
-    families = [_family(number) for number in columns["who_am_i"]]
+    families = [_find_family(number) for number in columns["who_am_i"]]
     n, made = len(refused), []
     known = np.isfinite(D).all(axis=(1, 2))
     scale, angle = np.full((n, 3), np.nan), np.full(n, np.nan)
@@ -115,7 +115,7 @@ def repeatability(columns: Mapping[str, Sequence[Any]], pairs: Sequence[tuple[in
     return found
 
 
-def _family(who_am_i: int | None) -> Any:
+def _find_family(who_am_i: int | None) -> Any:
     part = None if who_am_i is None else PARTS.get(who_am_i)
     return None if part is None else part.family
 

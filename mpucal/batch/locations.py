@@ -64,7 +64,7 @@ def fetch(path: str) -> Iterator[Path]:
         yield local
 
 
-def digest_of(path: Path) -> str:
+def compute_digest(path: Path) -> str:
     """Return the SHA-256 of a file; for a folder, of its captures or else of all its files, by name.
 
     Raises

@@ -125,7 +125,7 @@ def run_batch(paths: Sequence[str], client: Any, journal: RowJournal, settings: 
         if not rows and not alone:
             # one of these, or of those that waited with them, ended the worker: each is tried alone later
             suspects += task
-        for row in rows or ([_died(task[0], result)] if alone else ()):
+        for row in rows or ([_worker_failure(task[0], result)] if alone else ()):
             if "batch" in row:
                 journal.add(row)
             else:
@@ -138,7 +138,7 @@ def run_batch(paths: Sequence[str], client: Any, journal: RowJournal, settings: 
             send([[suspects.pop(0)]])
 
 
-def _died(path: str, result: Any) -> dict[str, Any]:
+def _worker_failure(path: str, result: Any) -> dict[str, Any]:
     error = result[1] if isinstance(result, tuple) else result
     return {"path": path, "batch": Path(path).parent.name, "error": f"the workers died or could not run it: {error}"}
 
@@ -151,7 +151,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
     ------
     SourceError : they could not be started. UsageError : dask.distributed or pyarrow is not installed.
     """
-    distributed = _distributed()
+    distributed = _import_distributed()
     import dask  # noqa: PLC0415
 
     with (
@@ -186,7 +186,7 @@ def remote_client(scheduler: str) -> Iterator[Any]:
     ------
     SourceError : it does not answer, or has no workers. UsageError : dask.distributed or pyarrow is not installed.
     """
-    distributed = _distributed()
+    distributed = _import_distributed()
     try:
         client = distributed.Client(scheduler, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -201,7 +201,7 @@ def remote_client(scheduler: str) -> Iterator[Any]:
         yield client
 
 
-def _distributed() -> Any:
+def _import_distributed() -> Any:
     try:
         import distributed  # noqa: PLC0415
         import pyarrow  # noqa: F401, PLC0415 - the table at the end needs it

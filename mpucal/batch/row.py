@@ -22,7 +22,7 @@ from ..files.hints import NO_HINTS, Hints
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..report import render
 from ..result.calibration import Calibration
-from .locations import digest_of, fetch, write_bytes
+from .locations import compute_digest, fetch, write_bytes
 
 AXES = "xyz"
 TEXTS = ("path", "batch", "digest", "sensor", "recorded", "chip", "model", "verdict", "reasons", "report", "error")
@@ -63,7 +63,7 @@ class Settings:
         hints = f" {self.hints} {self.by_pattern}" if self.hints != NO_HINTS or self.by_pattern else ""
         return f"{__version__} {self.model} {self.gravity!r} {self.gravity_anyway} {bool(self.reports)}{hints}"
 
-    def hints_of(self, path: str) -> Hints:
+    def find_hints(self, path: str) -> Hints:
         """Return the hints for a file: those of the first pattern that its path or name matches."""
         names = (path, PurePosixPath(path).name)
         fitting = (hints for pattern, hints in self.by_pattern if any(fnmatch(name, pattern) for name in names))
@@ -84,10 +84,10 @@ def make_row(path: str, settings: Settings, known: str | None = None) -> dict[st
     local = None
     try:
         with fetch(path) as local:
-            row["digest"] = digest_of(local)
+            row["digest"] = compute_digest(local)
             if row["digest"] == known:
                 return {"path": path, "digest": known}
-            recording = load(local, settings.hints_of(path))
+            recording = load(local, settings.find_hints(path))
             calibration = calibrate_vehicle(
                 recording, model=settings.model, gravity=settings.gravity, gravity_anyway=settings.gravity_anyway
             )
@@ -111,7 +111,7 @@ def _numbers(calibration: Calibration, recording: Recording) -> dict[str, Any]:
         "chip": sensor.chip,
         "who_am_i": sensor.who_am_i,
         "sensor": _factory_trim(recording),
-        "recorded": _recorded_at(recording),
+        "recorded": _recording_time(recording),
         "model": fit.get("model"),
         "verdict": calibration.verdict,
         "reasons": " ".join(dict.fromkeys(reason["code"] for reason in quality.get("reasons", ()))),
@@ -143,7 +143,7 @@ def _factory_trim(recording: Recording) -> str | None:
     return "-".join(f"{word & 0xFFFF:04x}" for word in words)
 
 
-def _recorded_at(recording: Recording) -> str | None:
+def _recording_time(recording: Recording) -> str | None:
     """Return the time of day of the first sample, ISO 8601; None if it is not known."""
     if recording.utc_ns is None:
         return None

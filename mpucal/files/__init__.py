@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Recording
 from ..errors import RecordingError
 from .budget import limit_memory
-from .formats import format_of, written_format
+from .formats import find_format, written_format
 from .hints import NO_HINTS, Hints
 from .rows import Rows, Write, check_units, cut_span
 
@@ -31,7 +31,7 @@ def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
     ChipError : a capture of an unknown chip.
     """
     with limit_memory(Path(path)):
-        recording = format_of(Path(path), hints).read(Path(path), hints=hints)
+        recording = find_format(Path(path), hints).read(Path(path), hints=hints)
     return recording if hints.span is None else _cut(recording, hints.span)
 
 
@@ -46,7 +46,7 @@ def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     RecordingError, CaptureError, ChipError : see load; of a bad line or sample only when its run is read.
     """
     with limit_memory(path):
-        rows = format_of(path, hints).read_rows(path, hints=hints)
+        rows = find_format(path, hints).read_rows(path, hints=hints)
     rows = replace(rows, runs=check_units(rows.runs, path)) if rows.plain else rows
     return rows if hints.span is None else replace(rows, runs=cut_span(rows.runs, hints.span, rows.name))
 

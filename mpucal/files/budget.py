@@ -44,7 +44,7 @@ def limit_memory(path: Path) -> Iterator[None]:
     ------
     RecordingError : it needs more.
     """
-    with _limited():
+    with _limit_growth():
         try:
             yield
             return
@@ -62,7 +62,7 @@ def _too_much(path: Path, what: str) -> RecordingError:
 
 
 @contextmanager
-def _limited() -> Iterator[None]:
+def _limit_growth() -> Iterator[None]:
     """Limit the growth of this program's memory within the block, where the system can do that."""
     before = None
     with suppress(ImportError, OSError, ValueError):

@@ -26,17 +26,17 @@ def all_captures_in(folder: Path) -> list[Path]:
 
 def load_folder(folder: Path) -> Recording:
     """Return the recording in a session's captures; see load."""
-    row, captures = _captured(folder)
+    row, captures = _find_session(folder)
     return row.read(*captures)
 
 
 def folder_rows(folder: Path) -> Rows:
     """Return the samples in a session's captures; see open_rows."""
-    row, captures = _captured(folder)
+    row, captures = _find_session(folder)
     return row.read_rows(*captures)
 
 
-def _captured(folder: Path) -> tuple[formats.Format, list[Path]]:
+def _find_session(folder: Path) -> tuple[formats.Format, list[Path]]:
     captured = {row.session: row for row in formats.FORMATS if row.session}
     for capture, row in captured.items():
         if captures := captures_in(folder, capture):

@@ -163,7 +163,7 @@ def recognise(path: Path) -> Format | None:
     return next((row for row in FORMATS if row.is_read and row.matches(path)), None)
 
 
-def format_of(path: Path, hints: Hints = NO_HINTS) -> Format:
+def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
     """Return the format to read `path` with.
 
     Raises
@@ -209,20 +209,20 @@ def is_of_session(name: str) -> bool:
 
 def readable_formats() -> str:
     """Return the formats that can be read, as text."""
-    return _listed(row for row in FORMATS if row.is_read)
+    return _list_formats(row for row in FORMATS if row.is_read)
 
 
 def formats_in_memory() -> str:
     """Return the formats that are loaded whole into memory, as text."""
-    return _listed(row for row in FORMATS if row.is_read and (row.hinted or not row.rows))
+    return _list_formats(row for row in FORMATS if row.is_read and (row.hinted or not row.rows))
 
 
 def writable_formats() -> str:
     """Return the formats that can be written, as text."""
-    return _listed(row for row in FORMATS if row.writer)
+    return _list_formats(row for row in FORMATS if row.writer)
 
 
-def _listed(rows: Iterable[Format]) -> str:
+def _list_formats(rows: Iterable[Format]) -> str:
     suffixes: dict[str, list[str]] = {}
     for row in rows:
         suffixes.setdefault(row.what, []).extend([row.suffix] if row.suffix != FOLDER else [])

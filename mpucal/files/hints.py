@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
-from .tables.units import QUANTITIES, unit_named
+from .tables.units import QUANTITIES, find_unit
 
 ROLES = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 SKIPPED = ("-", "_", "")
@@ -73,7 +73,7 @@ def parse_units(text: str) -> Mapping[str, str]:
     found = {}
     for item in text.split(","):
         quantity, _, said = (word.strip() for word in item.partition("="))
-        unit = unit_named(said)
+        unit = find_unit(said)
         if quantity not in QUANTITIES or unit not in QUANTITIES[quantity]:
             known = "; ".join(f"{name} in {', '.join(units)}" for name, units in QUANTITIES.items())
             raise ValueError(f"{item!r} is not a unit: {known}")

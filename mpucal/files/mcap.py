@@ -97,7 +97,7 @@ class CaptureWriter:
                 self._stream.finish()
             finally:
                 path = self._file.close()
-        if self._stream.started and path is not None:
+        if self._stream.is_started and path is not None:
             # the file is complete without this, only longer
             with suppress(OutputError, CaptureError, ZstdError, MemoryError):
                 self._with_longer_chunks(path)
@@ -147,7 +147,7 @@ class _Stream:
         self._ahead_ns = 0
 
     @property
-    def started(self) -> bool:
+    def is_started(self) -> bool:
         return bool(self._channels)
 
     def start(self, meta: Mapping[str, Any]) -> None:
@@ -187,7 +187,7 @@ class _Stream:
             self._chunk_began_ns = None
 
     def finish(self) -> None:
-        if self.started:
+        if self.is_started:
             self._put_waiting()
             self._writer.finish()
 
@@ -307,7 +307,7 @@ class CaptureReader:
                 "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
             )
         self.meta = meta
-        self.recovered = None if finished else self._why_recovered(size - whole)
+        self.recovered = None if finished else self._recovery_sentence(size - whole)
 
     def _block(self, channel: Channel | None, message: Message) -> Accesses | Record | None:
         if channel is None:
@@ -337,7 +337,7 @@ class CaptureReader:
         self._first_ns = self._first_ns if self._count else first_ns
         self._count += count
 
-    def _why_recovered(self, lost: int) -> str:
+    def _recovery_sentence(self, lost: int) -> str:
         held = f"{self._count} records over {(self._last_ns - self._first_ns) / 1e9:.1f} s are whole"
         if lost:
             return f"{self.name} is cut short or damaged: {held}, the {lost} bytes after them are lost."

@@ -74,15 +74,15 @@ def encode_accesses(a: Accesses) -> bytes:
     """Encode one or more register accesses."""
     ahead = (a.host_ns - a.t_ns)[a.has_host_ns]
     columns: dict[str, bytes | int] = {
-        "kind": protobuf.packed(WRITE * a.write + HEARD * a.has_host_ns + FRAMED * a.framed),
-        "register": protobuf.packed(a.register),
-        "count": protobuf.packed(a.count),
-        "moved": protobuf.packed(a.moved),
-        "step_ns": protobuf.packed(protobuf.zigzag(np.diff(a.t_ns, prepend=0))),
-        "heard_ns": protobuf.packed(protobuf.zigzag(np.diff(ahead, prepend=0))),
+        "kind": protobuf.pack_varints(WRITE * a.write + HEARD * a.has_host_ns + FRAMED * a.framed),
+        "register": protobuf.pack_varints(a.register),
+        "count": protobuf.pack_varints(a.count),
+        "moved": protobuf.pack_varints(a.moved),
+        "step_ns": protobuf.pack_varints(protobuf.zigzag(np.diff(a.t_ns, prepend=0))),
+        "heard_ns": protobuf.pack_varints(protobuf.zigzag(np.diff(ahead, prepend=0))),
         "data": a.data.tobytes(),
         "frame_words": a.frames.shape[1],
-        "words": protobuf.packed(protobuf.zigzag(np.diff(a.frames, axis=0, prepend=np.int16(0)).ravel())),
+        "words": protobuf.pack_varints(protobuf.zigzag(np.diff(a.frames, axis=0, prepend=np.int16(0)).ravel())),
     }
     message = b"".join(protobuf.field(number, columns[name]) for number, name in _NAMES.items() if columns.get(name))
     for number, failure in a.failures.items():

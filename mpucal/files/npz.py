@@ -59,7 +59,7 @@ def load_npz(path: Path) -> Recording:
     RecordingError : the file cannot be read, or holds no recording.
     """
     # no pickles: a recording must not run code
-    with _opened(path) as file, np.load(file, allow_pickle=False) as archive:
+    with _open_archive(path) as file, np.load(file, allow_pickle=False) as archive:
         there = archive.files
         arrays = _arrays(archive, path, (*NEEDED, *TEMPERATURES, *MASKS, *SMALL))
     missing = [key for key in NEEDED if key not in arrays]
@@ -80,7 +80,7 @@ def npz_rows(path: Path) -> Rows:
     ------
     RecordingError : it cannot be read, or holds no recording.
     """
-    with _opened(path) as file, np.load(file, allow_pickle=False) as archive:
+    with _open_archive(path) as file, np.load(file, allow_pickle=False) as archive:
         small = _arrays(archive, path, SMALL)
         by_rows = _by_rows(archive.zip)
     done = str(small.get(DONE, ""))
@@ -105,7 +105,7 @@ def _arrays(archive: Any, path: Path, keys: Sequence[str]) -> dict[str, Any]:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[IO[bytes]]:
+def _open_archive(path: Path) -> Iterator[IO[bytes]]:
     """Open an archive; an error of the block becomes a RecordingError."""
     try:
         with reading(path), path.open("rb") as file:
@@ -178,7 +178,7 @@ def _by_rows(archive: zipfile.ZipFile) -> bool:
 
 
 def _runs(path: Path) -> Iterator[Samples]:
-    with _opened(path) as file, ExitStack() as stack:
+    with _open_archive(path) as file, ExitStack() as stack:
         archive = stack.enter_context(zipfile.ZipFile(file))
         names = set(archive.namelist())
 

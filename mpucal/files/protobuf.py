@@ -22,7 +22,7 @@ VARINT, BYTES = 0, 2
 LONGEST = 10
 # from this number on NumPy packs faster than a loop
 FEW = 100
-__all__ = ["field", "fields", "frames", "packed", "schema", "unpacked", "unzigzag", "zigzag"]
+__all__ = ["field", "fields", "frames", "pack_varints", "schema", "unpacked", "unzigzag", "zigzag"]
 
 # descriptor.proto: types and labels of fields
 TYPES = {"uint64": 4, "string": 9, "message": 11, "bytes": 12, "uint32": 13, "sint32": 17, "sint64": 18}
@@ -56,7 +56,7 @@ def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
             raise ValueError(f"a field of wire type {key & 7} at byte {at}")
 
 
-def packed(values: ArrayLike) -> bytes:
+def pack_varints(values: ArrayLike) -> bytes:
     """Encode (n,) whole numbers >= 0 as consecutive varints."""
     value = np.asarray(values, np.uint64)[:, None]
     if len(value) < FEW:

@@ -35,12 +35,12 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     ------
     RecordingError : one of them cannot be read.
     """
-    from .formats import format_of  # noqa: PLC0415 - its table names this module
+    from .formats import find_format  # noqa: PLC0415 - its table names this module
 
     with reading(path):
         files = _recordings(path)
     try:
-        parts = [format_of(file, hints).read(file, hints=hints) for file in files]
+        parts = [find_format(file, hints).read(file, hints=hints) for file in files]
     except RecordingError as error:
         raise RecordingError(f"{path.name}: {error.what}", error.remedy, error.options) from error
     utc_ns = [part.utc_ns for part in parts if part.utc_ns is not None]

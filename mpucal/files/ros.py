@@ -64,7 +64,7 @@ def bag_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     ------
     CaptureError : they are calibrated already. RecordingError : see load_bag.
     """
-    done = _done(path)
+    done = _read_done(path)
     if done:
         raise CaptureError(
             f"{path} holds samples that are calibrated already ({done})", "give the recording from which it was made"
@@ -115,10 +115,10 @@ def _read_ros1(path: Path, store: Any, hints: Hints) -> tuple[list[str], dict[st
 
 def _recording(path: Path, topics: list[str], found: dict[str, _Messages], hints: Hints) -> Recording:
     acc, gyr = found[topics[0]], found[topics[-1]]
-    done = _done(path)
+    done = _read_done(path)
     remarks = [
         f"from {' and '.join(dict.fromkeys(topics))}",
-        "" if acc.stamped else "times are those of receipt, as the headers hold none",
+        "" if acc.is_stamped else "times are those of receipt, as the headers hold none",
         f"its samples are {done} already" if done else "",
     ]
     return join_streams(acc.stream("acc", path.name), gyr.stream("gyr", path.name), hints, path.name, remarks=remarks)
@@ -169,12 +169,12 @@ class _Messages:
         self.measured["gyr"] &= message.angular_velocity_covariance[0] != NOT_MEASURED
 
     @property
-    def stamped(self) -> bool:
+    def is_stamped(self) -> bool:
         return any(self.stamps)
 
     def stream(self, quantity: str, name: str) -> Stream:
         """Return the samples of a quantity."""
-        times = self.stamps if self.stamped else self.received
+        times = self.stamps if self.is_stamped else self.received
         if times and max(times) >> 63:
             raise RecordingError(f"{name} holds impossible times", "give the bag as it was recorded")
         values = np.array(getattr(self, quantity), float).reshape(-1, 3)
@@ -194,7 +194,7 @@ class _Messages:
 _NAMES = {"acc": "acceleration", "gyr": "rate"}
 
 
-def _done(path: Path) -> str:
+def _read_done(path: Path) -> str:
     """Return the processing of samples that `mpucal apply` wrote; empty for another file."""
     if path.suffix.lower() != ".mcap" or not path.is_file():
         return ""

@@ -79,7 +79,7 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise
     except Exception as error:
         # pyulog raises bare Exceptions, too
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     topics = {(data.name, data.multi_id): data.data for data in log.data_list}
     if hints.topic not in (None, COMBINED, ACCEL):
         raise RecordingError(f"{path.name} is read from {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
@@ -102,7 +102,7 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
             remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
             return join_streams(acc, gyr, hints, path.name, remarks=[remark, *slow, *damage])
     except _DAMAGE as error:
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     has = ", ".join(sorted({name for name, _ in topics})) or "none of them"
     raise RecordingError(
         f"{path.name} holds no {hints.topic or f'{ACCEL} with {GYRO}, and no {COMBINED}'}: it has {has}",
@@ -110,7 +110,7 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
     )
 
 
-def _damaged(path: Path, error: Exception) -> RecordingError:
+def _damage_error(path: Path, error: Exception) -> RecordingError:
     return RecordingError(f"{path} is not a whole log of PX4 ({error})", "fetch it from the vehicle again")
 
 

@@ -30,7 +30,7 @@ def accelerometer_table(c: Calibration, id_: str) -> str:
         # a narrow column breaks before ±, not after it
         cells = [f"{row.name}, {row.unit}", *(cell.replace("± ", "±\u00a0") for cell in row.cells)]
         if sheet is not None:
-            cells.append(f"{_format_tolerance(tolerance(row, sheet))}: {comparison(row, sheet)}")
+            cells.append(f"{_format_tolerance(tolerance(row, sheet))}: {describe_comparison(row, sheet)}")
         rows.append(cells)
     return table(id_, CAPTION, ["", *AXES, *(() if sheet is None else ("data sheet",))], rows, words=len(AXES))
 
@@ -57,7 +57,7 @@ def tolerance(row: ParameterRow, sheet: Family) -> Vector:
     return np.full(3, math.degrees(math.atan(0.01 * sheet.cross_axis_percent)))
 
 
-def comparison(row: ParameterRow, sheet: Family) -> str:
+def describe_comparison(row: ParameterRow, sheet: Family) -> str:
     """Return the comparison in words, for each axis if they differ; empty if a value is not known."""
     judged = _by_axis(row, sheet)
     if len(set(judged.values())) == 1:
@@ -65,7 +65,7 @@ def comparison(row: ParameterRow, sheet: Family) -> str:
     return ", ".join(f"{axis} {words}" for axis, words in judged.items() if words != USUAL)
 
 
-def compared(c: Calibration) -> str:
+def unusual_parameters(c: Calibration) -> str:
     """Return a sentence on the unusual parameters; empty without a data sheet."""
     sheet = family_of(c.sensor.chip)
     if sheet is None:
@@ -80,13 +80,13 @@ def compared(c: Calibration) -> str:
 
 def _by_axis(row: ParameterRow, sheet: Family) -> dict[str, str]:
     return {
-        axis: _judged(float(row.value[i]), float(row.std[i]), float(allowed))
+        axis: _judge(float(row.value[i]), float(row.std[i]), float(allowed))
         for i, (axis, allowed) in enumerate(zip(AXES, tolerance(row, sheet), strict=True))
         if axis in row.axes
     }
 
 
-def _judged(value: float, std: float, allowed: float) -> str:
+def _judge(value: float, std: float, allowed: float) -> str:
     # two standard deviations are allowed for the uncertainty
     size = abs(value) - (2.0 * std if math.isfinite(std) else 0.0)
     if not math.isfinite(size):

@@ -12,7 +12,7 @@ from ..chip.families import family_of
 from ..result.calibration import REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
-from .data_sheet import CAPTION, about, accelerometer_table, compared
+from .data_sheet import CAPTION, about, accelerometer_table, unusual_parameters
 from .elements import as_float, code, escape, heading, number, pair, paragraph, quantity, section, table
 from .units import AXES, ParameterRow, gyroscope, with_std
 
@@ -67,7 +67,7 @@ def is_regular(c: Calibration) -> bool:
 
 def accelerometer_section(c: Calibration) -> str:
     """Return the section on the errors of the accelerometer, with their uncertainties."""
-    return section("The accelerometer", compared(c), accelerometer_table(c, "accelerometer"), about(c))
+    return section("The accelerometer", unusual_parameters(c), accelerometer_table(c, "accelerometer"), about(c))
 
 
 def formula(c: Calibration) -> str:

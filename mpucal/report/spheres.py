@@ -72,7 +72,7 @@ def coverage(track: Track) -> str:
             (x,), (y,) = disc.place(np.array([[at_x, at_y]]))
             marks.append(text(float(x), float(y), letter, colour=FAINT))
         for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
-            marks.append(dots(*disc.place(_flattened(units[sign * units[:, 2] >= 0.0])), radius, colour))
+            marks.append(dots(*disc.place(_project(units[sign * units[:, 2] >= 0.0])), radius, colour))
     label = "Upward direction in the board's axes: large dots held still, small dots moving"
     return svg("coverage", label, _LOW, *marks)
 
@@ -91,7 +91,7 @@ def _view() -> Vector:
     return np.stack([right, np.cross(eye, right), eye])
 
 
-def _flattened(units: Vector) -> Vector:
+def _project(units: Vector) -> Vector:
     """Project unit vectors (k, 3) of a hemisphere to (k, 2) by Lambert's azimuthal projection, rim at 1."""
     return np.asarray(units[:, :2] / np.sqrt(1.0 + np.abs(units[:, 2:])))
 

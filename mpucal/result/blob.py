@@ -82,7 +82,7 @@ class Blob:
         """
         _check_usable(self)
         try:
-            minor, appended = self._appended()
+            minor, appended = self._encode_appended()
             body = FIELDS.pack(
                 MAGIC,
                 MAJOR,
@@ -106,7 +106,7 @@ class Blob:
         body += appended
         return body + CHECKSUM.pack(zlib.crc32(body))
 
-    def _appended(self) -> tuple[int, bytes]:
+    def _encode_appended(self) -> tuple[int, bytes]:
         """Return the minor version and the fields appended to those of version 0."""
         slope = SLOPE.pack(*self.b_a_slope, *self.temperature_range_c)
         if self.gyro_counts is not None:

@@ -106,7 +106,7 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     ]
     std = np.hypot(a.b_omega_std, b.b_omega_std)
     gyroscope = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
-    margin = RESERVED if _reserved(a) or _reserved(b) else 1.0
+    margin = RESERVED if _has_reservations(a) or _has_reservations(b) else 1.0
     return Comparison(tuple(numbers), tuple(gyroscope), tuple(_remarks(a, b)), margin)
 
 
@@ -144,7 +144,7 @@ def _misalignments(a: Calibration, b: Calibration) -> list[Difference]:
 
 
 def _remarks(a: Calibration, b: Calibration) -> list[str]:
-    remarks = [_reservations(name, c) for name, c in (("A", a), ("B", b)) if _reserved(c)]
+    remarks = [_reservations(name, c) for name, c in (("A", a), ("B", b)) if _has_reservations(c)]
     if None not in (a.sensor.who_am_i, b.sensor.who_am_i) and a.sensor.who_am_i != b.sensor.who_am_i:
         remarks.append(
             f"They are of two chips: WHO_AM_I of A is 0x{a.sensor.who_am_i:02x}, of B 0x{b.sensor.who_am_i:02x}."
@@ -175,7 +175,7 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
     return remarks
 
 
-def _reserved(c: Calibration) -> bool:
+def _has_reservations(c: Calibration) -> bool:
     """Return True if the verdict has reservations; a blob has no verdict."""
     return c.verdict != GOOD and "verdict" in c.quality
 

@@ -66,11 +66,11 @@ def to_document(fields: Mapping[str, Any], follows_temperature: bool) -> dict[st
         "version": VERSION,
         "created": fields["created"],
         "accelerometer": {
-            **_written(fields, ACCELEROMETER),
+            **_select(fields, ACCELEROMETER),
             "formula": ACCELEROMETER_FORMULA,
-            **_written(fields, TEMPERATURE if follows_temperature else ()),
+            **_select(fields, TEMPERATURE if follows_temperature else ()),
         },
-        "gyroscope": {**_written(fields, GYROSCOPE), "formula": GYROSCOPE_FORMULA},
+        "gyroscope": {**_select(fields, GYROSCOPE), "formula": GYROSCOPE_FORMULA},
         "fit": fields["fit"],
         "quality": fields["quality"],
         "sensor": asdict(fields["sensor"]),
@@ -215,7 +215,7 @@ def _check_slope(document: Mapping[str, Any]) -> None:
 Rows = tuple[tuple[str, str, tuple[int, ...]], ...]
 
 
-def _written(fields: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
+def _select(fields: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
     return {key: fields[attribute] for key, attribute, _ in rows}
 
 

@@ -181,8 +181,8 @@ class AutopilotSink:
         clauses = [
             f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams; they have no"
             f" cross-axis terms, which leaves an error of |a| of up to {residuals} m/s^2",
-            f"before, it {before}; now it {self._settled()}",
-            *_unchanged(possible, planned, refused_imus(calibration)),
+            f"before, it {before}; now it {self._await_prearm()}",
+            *_unchanged_clauses(possible, planned, refused_imus(calibration)),
             *(["leave it powered for three more seconds, as PX4 saves late"] if self._firmware == PX4 else []),
         ]
         return Applied(now, "; ".join([*clauses, *paths]))
@@ -219,7 +219,7 @@ class AutopilotSink:
                     "connect the vehicle that was calibrated, or calibrate this one",
                 )
 
-    def _settled(self) -> PrearmState:
+    def _await_prearm(self) -> PrearmState:
         """Return the pre-arm state once it has settled; an ArduPilot with wrong saved ids saves those of its sensors.
 
         ArduPilot calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
@@ -237,7 +237,7 @@ class AutopilotSink:
         return now
 
 
-def _unchanged(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:
+def _unchanged_clauses(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:
     """Return clauses on the IMUs that keep their old parameters, with the reason."""
     clauses = [
         f"IMU {change.imu} keeps its old ones, which are predicted to be as good (error of |a| up to"

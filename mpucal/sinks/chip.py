@@ -126,7 +126,7 @@ class ChipSink:
                 raise ChipError(
                     "the calibration is of an autopilot's stream, not of a chip", "write it to the autopilot"
                 )
-            likely = self._identified(calibration)
+            likely = self._find_place(calibration)
             olds = self._blocks()
         with self._restoring(olds):
             with TemporaryMeasurement(self._port) as measurement:
@@ -151,7 +151,7 @@ class ChipSink:
 
         return restore_on_failure(self._journal, {REGISTERS: _hex(olds)}, undo, "the offset registers")
 
-    def _identified(self, calibration: Calibration) -> Place:
+    def _find_place(self, calibration: Calibration) -> Place:
         """Return the place of the offset registers by the chip's name.
 
         Raises
@@ -197,7 +197,7 @@ class ChipSink:
         counts = calibration.b_a / STANDARD_GRAVITY_MPS2 * response.lsb_per_g
         new = old.with_words(shift_words(reference, -counts))
         before = measurement.rest()
-        _check_gravity(calibration, before, _subtracted(old.words, reference, response))
+        _check_gravity(calibration, before, _subtraction(old.words, reference, response))
         if not new.write(self._port):
             raise ChipError("the offset registers do not read back as written", "check the wires, and try again")
         after = measurement.rest()
@@ -207,7 +207,7 @@ class ChipSink:
                 f"the samples changed by ({_mg(after - before)}) mg, but ({_mg(expected)}) was written",
                 "put the board on a firm surface, and try again",
             )
-        applied = _subtracted(new.words, reference, response)
+        applied = _subtraction(new.words, reference, response)
         _check_gravity(calibration, after, applied)
         return applied
 
@@ -223,7 +223,7 @@ def _check_gravity(calibration: Calibration, mean_g: Vector, applied_mps2: Vecto
         )
 
 
-def _subtracted(words: Words, reference: Words, response: OffsetResponse) -> Vector:
+def _subtraction(words: Words, reference: Words, response: OffsetResponse) -> Vector:
     """Return (3,) m/s^2 that `words` subtract from the samples more than `reference`; larger words add."""
     return -np.array(word_difference(words, reference)) / response.lsb_per_g * STANDARD_GRAVITY_MPS2
 

@@ -84,7 +84,7 @@ class KernelSink:
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
         """Save calibbias and the rule to iio-state.json; see Sink."""
-        return save_state(IIO_STATE, folder, FORMAT, self.where, self._held())
+        return save_state(IIO_STATE, folder, FORMAT, self.where, self._read_state())
 
     def put_back(self, path: Path) -> str:
         """Restore the state from the file of an earlier `keep`; see Restorable."""
@@ -177,7 +177,7 @@ class KernelSink:
         x, y, z = (int(self._attributes.read(name)) for name in CALIBBIAS)
         return x, y, z
 
-    def _held(self) -> dict[str, Any]:
+    def _read_state(self) -> dict[str, Any]:
         there = self._rule is not None and self._rule.exists()
         return {WORDS: self._words(), RULE: self._rule.read_text(encoding="utf-8") if self._rule and there else None}
 
@@ -196,12 +196,12 @@ class KernelSink:
         if held[WORDS] is not None:
             x, y, z = held[WORDS]
             self._set_words((x, y, z))
-        if held[RULE] != self._held()[RULE]:
+        if held[RULE] != self._read_state()[RULE]:
             self._write_rule(held[RULE])
 
     def _restoring(self) -> AbstractContextManager[None]:
         with nothing_written():
-            held = self._held()
+            held = self._read_state()
         return restore_on_failure(self._journal, held, lambda: self._restore(held), self.where)
 
 

@@ -38,7 +38,7 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
     OutputError : the record could not be saved, and the sink keeps the new state.
     """
     kept = keep(kind, sink, folder, say)
-    with _interrupted_as_refused(sink):
+    with _report_interruption(sink):
         applied = sink.write(calibration)
     entry = {"to": kind.name, "where": sink.where, "what": applied.what, "at": now().isoformat()}
     extra = {**applied.calibration.extra, WRITTEN: [*applied.calibration.extra.get(WRITTEN, ()), entry]}
@@ -121,12 +121,12 @@ def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> 
     if not isinstance(sink, Restorable):
         raise WriteBackError(f"nothing was written: {kept} is not a calibration", "give a calibration.json")
     keep(kind, sink, folder, say)
-    with _interrupted_as_refused(sink):
+    with _report_interruption(sink):
         return sink.put_back(kept)
 
 
 @contextmanager
-def _interrupted_as_refused(sink: Sink) -> Iterator[None]:
+def _report_interruption(sink: Sink) -> Iterator[None]:
     """Report a write that Ctrl-C, SIGTERM, SIGHUP or lack of memory ended, and that the sink has undone, as failed."""
     with interrupting():
         try:

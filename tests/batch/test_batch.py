@@ -189,8 +189,8 @@ def _mortal():
     """Have a worker die of one path."""
     from mpucal.batch import row
 
-    digest_of = row.digest_of
-    row.digest_of = lambda path: os._exit(1) if path.stem == "deadly" else digest_of(path)
+    compute_digest = row.compute_digest
+    row.compute_digest = lambda path: os._exit(1) if path.stem == "deadly" else compute_digest(path)
 
 
 cloudpickle.register_pickle_by_value(sys.modules[__name__])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mpucal
-from mpucal.files.tables.clock import fit_even_clock, period_of
+from mpucal.files.tables.clock import fit_even_clock, sample_period
 
 HZ, N = 199.7, 8000
 TRUE = np.arange(N) / HZ
@@ -80,8 +80,8 @@ def test_true_times_stay(times):
 
 
 def test_the_period_is_that_of_the_samples_and_not_of_the_bursts():
-    assert period_of(in_bursts(10)) == pytest.approx(1 / HZ, rel=1e-2)
-    assert period_of(TRUE) == pytest.approx(1 / HZ, rel=1e-9)
+    assert sample_period(in_bursts(10)) == pytest.approx(1 / HZ, rel=1e-2)
+    assert sample_period(TRUE) == pytest.approx(1 / HZ, rel=1e-9)
 
 
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".txt"])

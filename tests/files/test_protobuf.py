@@ -13,14 +13,14 @@ from mpucal.files import protobuf
 def test_numbers_come_back(numbers):
     given_ = np.array(numbers, np.int64)
     np.testing.assert_array_equal(
-        protobuf.unzigzag(protobuf.unpacked(protobuf.packed(protobuf.zigzag(given_)))), given_
+        protobuf.unzigzag(protobuf.unpacked(protobuf.pack_varints(protobuf.zigzag(given_)))), given_
     )
 
 
 @given(arrays(np.int16, st.tuples(st.integers(0, 5), st.integers(1, 7))))
 def test_frames_come_back(frames):
     steps = np.diff(frames, axis=0, prepend=np.int16(0)).ravel()
-    read = protobuf.frames(protobuf.packed(protobuf.zigzag(steps)), frames.shape[1])
+    read = protobuf.frames(protobuf.pack_varints(protobuf.zigzag(steps)), frames.shape[1])
     np.testing.assert_array_equal(read, frames)
 
 

@@ -12,7 +12,7 @@ from mpucal.errors import RecordingError, UsageError
 from mpucal.files import load
 from mpucal.files.hints import Hints, parse_columns, parse_units
 from mpucal.files.tables.names import parse_column_name
-from mpucal.files.tables.units import rate_factor, unit_named
+from mpucal.files.tables.units import find_unit, rate_factor
 
 COUNTS_A, COUNTS_G = 32768 / (4 * G), 32750 / np.radians(500)
 
@@ -405,7 +405,7 @@ def test_names_of_something_else(name):
     ("text", "unit"), [("m/s²", "m/s^2"), ("m s^-2", "m/s^2"), ("°/s", "deg/s"), ("µs", "us"), ("G", "g"), ("Hz", "")]
 )
 def test_units_as_people_spell_them(text, unit):
-    assert unit_named(text) == unit
+    assert find_unit(text) == unit
 
 
 def test_gravity_turns_as_the_rates_say():

@@ -66,7 +66,7 @@ class EvenClock:
         )
 
 
-def period_of(stamps: Vector) -> float:
+def sample_period(stamps: Vector) -> float:
     """Return the sample period of (n,) stamps that may come in bursts, repeat or be late, in their unit."""
     lag = min(LAG, max((len(stamps) - 1) // STRETCHES, 1))
     return float(np.median(stamps[lag:] - stamps[:-lag])) / lag if len(stamps) > 1 else 0.0
@@ -74,7 +74,7 @@ def period_of(stamps: Vector) -> float:
 
 def fit_even_clock(stamps: Vector) -> EvenClock | None:
     """Return the clock behind (n,) stamps [s] that do not decrease; None if the stamps are the samples' times."""
-    if len(stamps) < FEWEST or not (period := period_of(stamps)) > 0.0:
+    if len(stamps) < FEWEST or not (period := sample_period(stamps)) > 0.0:
         return None
     off = np.diff(stamps) - period
     if np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period:

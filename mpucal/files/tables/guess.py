@@ -11,7 +11,7 @@ import numpy as np
 
 from ...data import Vector
 from ..hints import ROLES, Hints
-from .clock import period_of
+from .clock import sample_period
 from .units import ANY_HZ, BEYOND, FASTEST_HZ, QUANTITIES, rate_factor, to_signed
 
 FEWEST, WIDEST = 300, 16
@@ -49,7 +49,7 @@ def _is_clock(column: Vector) -> bool:
 def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
     if clock is None:
         return np.arange(n) / (hints.rate_hz or ANY_HZ)
-    step = period_of(clock)
+    step = sample_period(clock)
     si = next((si for si in QUANTITIES["t"].values() if 1 / FASTEST_HZ <= step * si <= 1.0), 1.0 / ANY_HZ / step)
     return np.asarray((clock - clock[0]) * si)
 

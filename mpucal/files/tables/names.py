@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data import Mask, Vector
-from .units import QUANTITIES, unit_named
+from .units import QUANTITIES, find_unit
 
 Times = Sequence[Decimal] | NDArray[Any]
 
@@ -151,16 +151,16 @@ def parse_column_name(name: str, place: int) -> Column | None:
             axis = int(inside)
         elif inside.lower().replace("°", "").removeprefix("deg ").strip() in ("c", "degc", "celsius", "℃"):
             unit = "C"
-        elif not (unit := unit_named(inside)):
+        elif not (unit := find_unit(inside)):
             return None
     text = text.lower()
-    found = _known(name, place, text, axis, unit)
+    found = _match_stem(name, place, text, axis, unit)
     if found is None and not unit and (tail := _UNIT_TAIL.fullmatch(text)):
-        found = _known(name, place, tail[1], axis, unit_named(tail[2]))
+        found = _match_stem(name, place, tail[1], axis, find_unit(tail[2]))
     return found
 
 
-def _known(name: str, place: int, text: str, axis: int, unit: str) -> Column | None:
+def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Column | None:
     """Return the column whose stem is `text`, without or with prefixes; None if no stem is known."""
     word = re.sub(r"[^a-z0-9]", "", text)
     words = [word]
@@ -202,7 +202,7 @@ def _split_axis(word: str, axis: int) -> list[tuple[str, int]]:
 def parse_axis_name(name: str) -> tuple[int, str] | None:
     """Return (axis, unit) of a column called x, y, z, `x-axis (g)` and the like; None for any other."""
     found = _AXIS.fullmatch(name.strip().lower())
-    return ("xyz".index(found[1]), unit_named(found[2] or "")) if found else None
+    return ("xyz".index(found[1]), find_unit(found[2] or "")) if found else None
 
 
 def parse_header(header: list[str]) -> list[Column]:

@@ -115,7 +115,7 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     size = float(np.median(np.linalg.norm(values, axis=1)))
     seen = units.acceleration_unit(values)
     if said == COUNTS or (not said and are_counts(values) and (not seen or hints.accel_range_g)):
-        return _scaled(values, hints, name, size)
+        return _scale_counts(values, hints, name, size)
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
         raise RecordingError(
             f"{name}: the median |a| is only {size:.3g}, so gravity is not in it",
@@ -127,7 +127,7 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     return values * QUANTITIES["acc"][unit], f"in {unit}", np.zeros(len(values), bool)
 
 
-def _scaled(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
+def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
     """Return the same of (n, 3) counts, whose median magnitude is `size`."""
     ranges = (g for g in ACCEL_RANGES_G if LEAST_LIKELY <= size * g / ACCEL_COUNTS <= MOST_LIKELY)
     range_g = next(ranges, None) if hints.accel_range_g is None else hints.accel_range_g
@@ -145,7 +145,7 @@ def _scaled(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vecto
             "--accel-range G",
         )
     by = "" if hints.accel_range_g else " (by |a|)"
-    return values * scale, f"{OF_COUNTS} ±{range_g:g} g{by}", _clipped(values)
+    return values * scale, f"{OF_COUNTS} ±{range_g:g} g{by}", _is_clipped(values)
 
 
 def _rates(
@@ -172,7 +172,7 @@ def _rates(
             remedy = "the --gyro-range that the sensor had (if it was this one: --units gyr=counts)"
             raise _wrong_rates(name, factor, of, hints, remedy)
         by = "" if hints.gyro_range_dps else " (by how gravity turns)"
-        return values * scale, f"in {of}{by}{_sign_remark(factor)}", _clipped(values)
+        return values * scale, f"in {of}{by}{_sign_remark(factor)}", _is_clipped(values)
     factor = units.rate_factor(t, a, values)
     seen = hints.units.get("gyr", units.gyro_unit(factor))
     if factor and not seen:
@@ -216,6 +216,6 @@ def are_counts(values: Vector) -> bool:
     return bool((values == np.rint(values)).all() and np.abs(values).max() <= FULL_SCALE)
 
 
-def _clipped(values: Vector) -> Mask:
+def _is_clipped(values: Vector) -> Mask:
     """Return (n,) True where one of (n, 3) counts is at the end of the range."""
     return np.asarray(((values >= FULL_SCALE - 1) | (values <= -FULL_SCALE)).any(axis=1))

@@ -119,7 +119,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     temperature_c = plausible_celsius(table.numbers(warm[:1])[a.kept, 0]) if warm else None
     if w.times is None and hints.rate_hz is None:
         raise RecordingError(
-            f"{table.name} holds no times that are known as such; its columns are {_listed(table.header)}"
+            f"{table.name} holds no times that are known as such; its columns are {_list_names(table.header)}"
             f"{likely_sample_rates(to_signed(a.values), to_signed(w.values), w.unit)}",
             "name them with --columns t=NAME,ax=NAME,... and --units t=UNIT, or"
             " give the rate of its samples with --rate HZ",
@@ -157,18 +157,18 @@ def _missing_sensors(table: Table, has_acc: bool, has_gyr: bool) -> RecordingErr
     if has_acc or has_gyr:
         return RecordingError(
             f"{table.name} holds no columns of {'a gyroscope' if has_acc else 'an accelerometer'}; its columns are"
-            f" {_listed(table.header)}",
+            f" {_list_names(table.header)}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
         )
     return RecordingError(
         f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are"
-        f" {_listed(table.header)}",
+        f" {_list_names(table.header)}",
         f"name its columns in their order with --columns {','.join(ROLES)}, and - for one to leave out",
         f"--columns {','.join(ROLES)}",
     )
 
 
-def _listed(header: Sequence[str]) -> str:
+def _list_names(header: Sequence[str]) -> str:
     return ", ".join(name.strip() for name in header if name.strip()) or "unnamed"
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
-from .units import unit_named
+from .units import find_unit
 
 # separator -> its name for messages; None: any blanks
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
@@ -289,4 +289,4 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
 
 def _are_units(cells: list[str]) -> bool:
     """Return True if a line below the header holds the units."""
-    return any(map(unit_named, cells)) and not any(_is_number(cell) for cell in cells)
+    return any(map(find_unit, cells)) and not any(_is_number(cell) for cell in cells)

@@ -14,7 +14,7 @@ from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import units
-from .clock import fit_even_clock, period_of
+from .clock import fit_even_clock, sample_period
 from .names import Times
 from .units import QUANTITIES, resolve_unit
 
@@ -96,7 +96,7 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
-    step, said = period_of(ticks), hints.units.get("t", stream.time_unit)
+    step, said = sample_period(ticks), hints.units.get("t", stream.time_unit)
     unit = resolve_unit(name, "t", said, hints.units.get("t", units.time_unit(step, said)), f"the step of {step:g}")
     t = ticks * QUANTITIES["t"][unit]
     back = np.diff(t) < 0

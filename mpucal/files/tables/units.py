@@ -63,7 +63,7 @@ LEAST_TURNS = 30
 TURN_S, EXPLAINED = 0.2, 0.5
 
 
-def unit_named(text: str) -> str:
+def find_unit(text: str) -> str:
     """Return the unit that a text names, or an empty text."""
     return _NAMES.get(text.strip().lower().translate(_PLAIN), "")
 
