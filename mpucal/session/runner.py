@@ -33,7 +33,7 @@ class Runner:
     operator : the person. note : writes a session event into the capture (name, time [ns], data).
     plan : settings of the session.
     listeners : called with each prompt, such as the hand that turns a simulated board.
-    go_on : called when the source has ended; continues with the next recorded part and returns True, if there is one.
+    open_next_part : called when the source has ended; returns True if another recorded part continues the session.
         The last part of a resumed session is the sensor itself.
     late : called with True if a due answer is not there; returns True to poll the source meanwhile. In a replay it
         returns what the recorded session did.
@@ -48,14 +48,14 @@ class Runner:
         note: Note,
         plan: Plan | None = None,
         listeners: Sequence[Callable[[Prompt], None]] = (),
-        go_on: Callable[[], bool] = lambda: False,
+        open_next_part: Callable[[], bool] = lambda: False,
         late: Callable[[bool], bool] = bool,
         start_worker: Callable[[Plan, Sensor], Worker] = InlineWorker,
         checking: bool = False,
     ) -> None:
         self._source, self._operator, self._note = source, operator, note
         self._plan = plan = plan or Plan()
-        self._go_on, self._start_worker, self._checking = go_on, start_worker, checking
+        self._open_next_part, self._start_worker, self._checking = open_next_part, start_worker, checking
         self._machine = Machine(plan.until_end, plan.target, plan.tilt_only, plan.attended, checking)
         self._dialogue = Dialogue(self._machine, operator, listeners, note, source.now_ns, late)
         self._ended = False
@@ -199,7 +199,7 @@ class Runner:
     def _next_part(self) -> bool:
         """Continue with the next part of a resumed session; return False if there is none."""
         ended_ns = self._source.now_ns()
-        while self._go_on():
+        while self._open_next_part():
             self._note(RESUMED, ended_ns, {})
             try:
                 sensor = self._source.start()
