@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..chip.access import Reply
-from ..errors import BusError
+from ..errors import BusError, CaptureError
 from ..files.mcap import Capture
 from ..iio import IIO_VERSION
 from ..iio.devices import Devices
@@ -77,10 +77,20 @@ class OpenedIio(OpenedChip):
 
 
 def iio_replay(replay: OpenedChip, capture: Capture) -> OpenedIio:
-    """Convert the replay of a chip to one of IIO devices; see OpenedIio.source_meta."""
-    accel, gyro, trigger = capture.meta[META_KEY]
+    """Convert the replay of a chip to one of IIO devices; see OpenedIio.source_meta.
+
+    Raises
+    ------
+    CaptureError : the capture's head does not name the devices.
+    """
+    try:
+        accel, gyro, trigger = capture.meta[META_KEY]
+    except (KeyError, TypeError, ValueError) as error:
+        raise CaptureError(
+            f"the head of {capture.name} does not name the IIO devices", "use `mpucal calibrate`"
+        ) from error
     held = {field.name: getattr(replay, field.name) for field in fields(OpenedChip)}
-    return OpenedIio(**held, devices=Devices(accel, gyro), trigger=trigger)
+    return OpenedIio(**held, devices=Devices(str(accel), str(gyro)), trigger=trigger)
 
 
 def open_source(request: Request) -> OpenedIio:

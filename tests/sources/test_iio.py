@@ -6,6 +6,7 @@ import struct
 import time
 from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 
 from mpucal.chip.access import Transaction
 from mpucal.chip.config import Config
-from mpucal.errors import BusError, ChipError, MpucalError, NoAnswer, UsageError
+from mpucal.errors import BusError, CaptureError, ChipError, MpucalError, NoAnswer, UsageError
 from mpucal.iio import decode
 from mpucal.iio.decode import IioDecoder
 from mpucal.iio.devices import Devices
@@ -311,6 +312,12 @@ def test_a_device_that_is_not_there_names_those_that_are(tree):
 def test_devices_by_their_names(text):
     assert Devices.parse(text) == BOTH
     assert Devices.parse(f"gyro=1,accel={text}") == ("iio:device0", "iio:device1")
+
+
+@pytest.mark.parametrize("head", [{}, {"iio": None}, {"iio": ["iio:device0"]}])
+def test_a_capture_whose_head_names_no_devices_is_not_replayed(head):
+    with pytest.raises(CaptureError, match=r"the head of a\.mcap does not name the IIO devices"):
+        iio.iio_replay(None, SimpleNamespace(meta=head, name="a.mcap"))
 
 
 def test_what_is_no_device_is_wrong_usage():
