@@ -69,7 +69,8 @@ class Decoder:
         if isinstance(transaction, Accesses):
             self._feed_many(transaction)
             return
-        if transaction.error is not None:
+        # A damaged capture may hold an access of no bytes, which says nothing.
+        if transaction.error is not None or not transaction.data:
             return
         if transaction.op == "read":
             self.feed_read(transaction.register, transaction.data, transaction.t_ns, transaction.host_ns)
