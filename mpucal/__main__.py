@@ -94,13 +94,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
             print(f"mpucal: the output cannot be written ({error.strerror}): free space there.", file=sys.stderr)
             return OutputError.exit_code
         what = error.filename or "a file or device"
-        return _report_shortage(
-            arguments, f"cannot use {what} ({error.strerror})", "check its permissions, and the disk"
-        )
+        return _report(arguments, f"cannot use {what} ({error.strerror})", "check its permissions, and the disk")
     except MemoryError:
-        return _report_shortage(
-            arguments, "there is not enough memory", "end other programs, or give a shorter recording"
-        )
+        return _report(arguments, "there is not enough memory", "end other programs, or give a shorter recording")
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -141,7 +137,7 @@ def _words(arguments: Sequence[str] | None) -> Sequence[str]:
     return sys.argv[1:] if arguments is None else arguments
 
 
-def _report_shortage(arguments: Sequence[str] | None, what: str, do: str) -> int:
+def _report(arguments: Sequence[str] | None, what: str, do: str) -> int:
     """Report a missing resource of the computer as a sentence or event; return the exit code."""
     if EVENTS in _words(arguments):
         return _event(SourceError.exit_code, what, do)

@@ -9,16 +9,20 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.errors import MpucalError, RefusedError
+from mpucal.export.c_code import c_functions
 from mpucal.export.forms import FORMS, form
+from mpucal.export.ros import ros_node
 from mpucal.result.calibration import Calibration
 
 ROOT = Path(__file__).parents[2]
+LIBRARY = ROOT / "mpucal" / "firmware" / "src"
 # what the header says of itself
 FLOAT_MPS2 = 2e-4
 USABLE_ONLY = [row.name for row in FORMS if row.only_usable]
@@ -31,7 +35,19 @@ def compiled(folder, name, source, *flags):
     if shutil.which(compiler) is None:
         pytest.skip(f"needs {compiler}")
     (folder / name).write_text(source)
-    words = [compiler, "-Wall", "-Wextra", "-Wpedantic", "-Werror", *flags, "-I.", "-o", "program", name]
+    words = [
+        compiler,
+        "-Wall",
+        "-Wextra",
+        "-Wpedantic",
+        "-Werror",
+        *flags,
+        "-I.",
+        f"-I{LIBRARY}",
+        "-o",
+        "program",
+        name,
+    ]
     subprocess.run(words, cwd=folder, check=True)
 
     def run(text):
@@ -48,6 +64,8 @@ def table(values):
 C = """
 #include <stdio.h>
 #define MPUCAL_USED_RANGE_G 4
+/* a file can include both */
+#include "mpucal_apply.h"
 #include "calibration.h"
 int main(void) {
     float y[3], T, a[3];
@@ -105,6 +123,11 @@ def test_the_c_header_takes_counts_of_its_range_alone(calibrated, tmp_path):
         ["gcc", "-DMPUCAL_USED_RANGE_G=2", "-c", "main.c"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert "this calibration is of +-4 g, but MPUCAL_USED_RANGE_G is another range" in refused.stderr
+
+
+def test_c_says_what_a_count_is(calibration):
+    scale = float(re.search(r"one count of the chip is (\S+) m/s\^2", c_functions(calibration))[1])
+    np.testing.assert_allclose(scale * 32768, calibration.sensor.accel_range_g * 9.80665)
 
 
 # what a sketch needs of Arduino: a chip at 0x68 that answers with the counts on stdin, and a port that is stdout
@@ -224,6 +247,41 @@ def test_the_yaml_is_what_a_yaml_parser_reads(calibrated):
     yaml = pytest.importorskip("yaml", reason="PyYAML is not installed; the test above reads the file by YAML's rules")
     text, _ = form("ros").export(calibrated)
     assert yaml.safe_load(text) == yaml_of(text)
+
+
+def test_the_node_publishes_what_it_hears_calibrated(calibrated, samples, monkeypatch):
+    published = []
+
+    class Node:
+        def __init__(self, name):
+            self.listening = {}
+
+        def create_publisher(self, kind, topic, depth):
+            assert topic == "imu/data"
+            return SimpleNamespace(publish=published.append)
+
+        def create_subscription(self, kind, topic, hear, depth):
+            assert topic == "imu/data_raw"
+
+    for name, contents in (
+        ("rclpy", {}),
+        ("rclpy.node", {"Node": Node}),
+        ("sensor_msgs", {}),
+        ("sensor_msgs.msg", {"Imu": SimpleNamespace}),
+    ):
+        module = ModuleType(name)
+        vars(module).update(contents)
+        monkeypatch.setitem(sys.modules, name, module)
+    names = {"__name__": "node"}
+    exec(ros_node(calibrated), names)
+    node = names["Calibrated"]()
+    for x, y, z in samples.tolist():
+        node.correct(SimpleNamespace(linear_acceleration=SimpleNamespace(x=x, y=y, z=z)))
+    heard = [(m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z) for m in published]
+    np.testing.assert_allclose(heard, calibrated.apply(samples), atol=1e-6)
+    np.testing.assert_allclose(
+        np.reshape(published[0].linear_acceleration_covariance, (3, 3)), np.diag(calibrated.noise_std**2), rtol=1e-5
+    )
 
 
 def device(folder, *writable, words=(-1501, 2000, 701)):
