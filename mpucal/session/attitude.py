@@ -1,7 +1,7 @@
 """The board's attitude, carried from the flat rest by the gyroscope and corrected by gravity.
 
-The room's axes are x to the operator's right, y away from the operator and z up. An attitude is the matrix (3, 3), or
-the unit quaternion, that takes the board's axes to the room's.
+The room's axes are x to the operator's right, y away from the operator and z up. An attitude is the unit quaternion
+(w, x, y, z) that takes the board's axes to the room's.
 """
 
 from __future__ import annotations
@@ -27,8 +27,6 @@ STRAIGHTEN_RAD_S = math.radians(30.0)
 FALLING_MPS2 = 1e-3
 # A board that lies on its component side was turned over about its x axis.
 _LAID, _TURNED_OVER = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
-
-Matrix = tuple[Direction, Direction, Direction]
 
 
 class Attitude:
@@ -91,7 +89,9 @@ class Attitude:
             turn = min(share * missing, CORRECT_RAD_S * seconds) / aside if aside else 0.0
             q = compose(from_vector(y * turn, -x * turn, 0.0), q)
         if still and not self._levelled:
-            most, yaw = STRAIGHTEN_RAD_S * seconds, yaw_between(straight(matrix(q)[2]), q)
+            w, x, y, z = q
+            up = rotate((w, -x, -y, -z), (0.0, 0.0, 1.0))
+            most, yaw = STRAIGHTEN_RAD_S * seconds, yaw_between(straight(up), q)
             q = compose(from_vector(0.0, 0.0, min(max(yaw, -most), most)), q)
         size = math.hypot(*q)
         w, x, y, z = q
@@ -114,16 +114,6 @@ def compose(p: Quaternion, q: Quaternion) -> Quaternion:
         a * x + b * w + c * z - d * y,
         a * y - b * z + c * w + d * x,
         a * z + b * y - c * x + d * w,
-    )
-
-
-def matrix(attitude: Quaternion) -> Matrix:
-    """Return the rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = attitude
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
 
 

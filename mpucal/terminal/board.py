@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from ..session.attitude import Matrix, matrix
+from ..session.attitude import rotate
 from ..session.events import Direction, Quaternion
 from .canvas import Canvas, Point
 from .models import MODELS
+
+View = tuple[Direction, Direction, Direction]
 
 _AXES: tuple[tuple[str, Direction, str], ...] = (
     ("X", (1.0, 0.0, 0.0), "bold red"),
@@ -29,16 +31,15 @@ _LARGE = 14
 def picture(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
     """Return the picture of a kind of board (`models.py`) in an attitude."""
     canvas, model = Canvas(columns, rows), MODELS[kind]
-    board = matrix(attitude)
-    across, up, eye = view_of(board)
+    face = rotate(attitude, (0.0, 0.0, model.up))
+    across, up, eye = view_of(face)
     scale = min(canvas.centre[0], canvas.centre[1] * 1.15) / _REACH
 
     def seen(point: Direction) -> Point:
-        room = _times(board, point)
+        room = rotate(attitude, point)
         return (canvas.centre[0] + scale * _dot(across, room), canvas.centre[1] - scale * _dot(up, room))
 
-    front = _dot(eye, _times(board, (0.0, 0.0, model.up))) > 0.0
-    for stroke in model.strokes(front, rows >= _LARGE):
+    for stroke in model.strokes(_dot(eye, face) > 0.0, rows >= _LARGE):
         for a, b in pairwise(stroke):
             canvas.line(seen(a), seen(b))
     for (letter, axis, style), tip, end in zip(_AXES, _TIPS, _LETTERS, strict=True):
@@ -47,9 +48,11 @@ def picture(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
     return canvas
 
 
-def view_of(board: Matrix) -> Matrix:
-    """Return unit vectors of the room across, up and toward the eye: the first view that does not show an edge."""
-    face = (board[0][2], board[1][2], board[2][2])
+def view_of(face: Direction) -> View:
+    """Return unit vectors of the room across, up and toward the eye, from which a board is not seen edge-on.
+
+    face : unit vector at right angles to the board, in the room's axes.
+    """
     views = [_view(turn, tilt) for tilt in _VIEWS_DEG[1] for turn in _VIEWS_DEG[0]]
     for view in views:
         if abs(_dot(view[2], face)) >= _LEAST_FACE:
@@ -57,18 +60,13 @@ def view_of(board: Matrix) -> Matrix:
     return max(views, key=lambda view: abs(_dot(view[2], face)))
 
 
-def _view(turn_deg: float, tilt_deg: float) -> Matrix:
+def _view(turn_deg: float, tilt_deg: float) -> View:
     turn, tilt = math.radians(turn_deg), math.radians(tilt_deg)
     across = (math.cos(turn), -math.sin(turn), 0.0)
     away = (math.sin(turn), math.cos(turn), 0.0)
     up = (away[0] * math.sin(tilt), away[1] * math.sin(tilt), math.cos(tilt))
     eye = (-away[0] * math.cos(tilt), -away[1] * math.cos(tilt), math.sin(tilt))
     return across, up, eye
-
-
-def _times(matrix: Matrix, v: Direction) -> Direction:
-    x, y, z = (_dot(row, v) for row in matrix)
-    return (x, y, z)
 
 
 def _dot(a: Direction, b: Direction) -> float:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import STANDARD_GRAVITY_MPS2, Samples, Sensor
 from mpucal.session.aims import ALL_AROUND
-from mpucal.session.attitude import straight
+from mpucal.session.attitude import compose, from_vector, rotate, straight
 from mpucal.session.events import Connected, FitKind, Knowledge, Learnt, Measured, Meter, Prompt, RequestFit, Target
 from mpucal.session.machine import Machine
 from mpucal.session.meter import MotionWatch
@@ -25,6 +25,14 @@ BEYOND_DEG = 20.0
 
 def matrix(q):
     return Rotation.from_quat(q, scalar_first=True)
+
+
+def test_rotations_are_those_of_scipy():
+    one, other = Rotation.random(2, random_state=0)
+    p, q = (turn.as_quat(scalar_first=True).tolist() for turn in (one, other))
+    assert np.allclose(rotate(p, (0.1, -0.7, 0.4)), one.apply((0.1, -0.7, 0.4)))
+    assert np.allclose(rotate(compose(p, q), (0.1, -0.7, 0.4)), (one * other).apply((0.1, -0.7, 0.4)))
+    assert np.allclose(from_vector(*one.as_rotvec()), one.as_quat(canonical=True, scalar_first=True))
 
 
 def test_the_gyroscope_carries_the_heading(board):

@@ -26,7 +26,6 @@ import numpy as np
 from mpucal.data import Vector
 from mpucal.page.state import HOLD, state
 from mpucal.result.calibration import GOOD
-from mpucal.session.attitude import matrix
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind, Use
 from mpucal.session.plan import Plan
 from mpucal.session.turn_guide import TURN_WORDS
@@ -149,8 +148,7 @@ class Watcher:
 
 def angle(a: Any, b: Any) -> float:
     """Return the angle [deg] between two attitudes, quaternions (4,)."""
-    turned = np.array(matrix(a)).T @ np.array(matrix(b))
-    return math.degrees(math.acos(min(1.0, max(-1.0, 0.5 * (float(np.trace(turned)) - 1.0)))))
+    return math.degrees(2.0 * math.acos(min(1.0, abs(float(np.dot(a, b))))))
 
 
 @dataclass(frozen=True)
