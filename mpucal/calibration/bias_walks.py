@@ -1,18 +1,18 @@
-"""Whether the sensor changed while the board was turned: a random walk over the parts, its size by likelihood.
+"""Changes of the sensor while the board was turned: random walks over the parts of a recording, by likelihood.
 
-Three things may have changed: the accelerometer's bias (a step, warming), the gyroscope's, the accelerometer's mount.
-Beside theta every part has three numbers delta_k of one of them, delta_0 ~ N(0, q) and delta_k - delta_k-1 ~ N(0, q).
-A fourth explanation is no change at all: a sensor whose bias depends on which side is down, as a nonlinear one's does;
-then each side has a delta ~ N(0, q) of its own.
+The accelerometer's bias (a step, warming), the gyroscope's bias, or the accelerometer's mount may walk. Each part then
+has three numbers delta_k beside theta, with delta_0 ~ N(0, q) and delta_k - delta_k-1 ~ N(0, q). A fourth hypothesis is
+no change, but a bias that depends on which side is down, as a nonlinear sensor's does: each side has its own
+delta ~ N(0, q).
 
-To second order all that is needed are the parts' scores. With theta eliminated and delta in independent x, the
-quadratic form is S + I/q, and by the eigenvalues of S the marginal likelihood of every q is a sum:
+To second order the parts' scores are enough. With theta eliminated and delta as sums of independent x, the quadratic
+form is S + I/q, and by the eigenvalues of S the marginal likelihood of every q is a sum:
 
     2 log p(q)/p(0) = sum c^2 / (lambda + 1/q) - log(1 + q lambda)
 
-Where nothing changed, c^2 / lambda is 1 on average for each eigenvector. A change is in few of them, those that are
-slow; where parts differ by what no model holds (a pivot that swings), all are larger. So what nothing but a change
-explains is the gain with c^2 over the median of them all.
+Where nothing changed, c^2 / lambda is 1 on average for each eigenvector. A change is in the few slow ones; an effect
+that no model has (a pivot that swings) enlarges all of them. So only a change explains a gain that is large with c^2
+divided by the median of them all.
 """
 
 from __future__ import annotations
@@ -33,28 +33,29 @@ from .rotation import cross
 What = Literal["accelerometer", "gyroscope", "mount", "side"]
 
 TIMES = 16
-# variance of a step from part to part: (m/s^2)^2, (rad/s)^2 and rad^2
-STEPS: dict[What, Vector] = {
-    "accelerometer": 10.0 ** np.arange(-8.0, -2.9, 0.5),
-    "gyroscope": 10.0 ** np.arange(-11.0, -2.9, 0.5),
-    "mount": 10.0 ** np.arange(-8.0, -1.9, 0.5),
-    "side": 10.0 ** np.arange(-8.0, -0.9, 0.5),
+# Variances of a step from part to part, (m/s^2)^2, (rad/s)^2 and rad^2: powers of ten from the first to the last.
+EXPONENTS: dict[What, tuple[float, float]] = {
+    "accelerometer": (-8.0, -3.0),
+    "gyroscope": (-11.0, -3.0),
+    "mount": (-8.0, -2.0),
+    "side": (-8.0, -1.0),
 }
-# twice the logarithm of how much likelier a walk must be than none; sensors that stayed reach 10
+STEPS = {what: 10.0 ** np.arange(first, last + 0.1, 0.5) for what, (first, last) in EXPONENTS.items()}
+# Twice the log likelihood ratio of a walk that is significant; sensors that stayed the same reach 10.
 SIGNIFICANT = 20.0
-# the median of the square of a normal variable; an eigenvector of less than so much of the largest is not seen
+# Median of the square of a normal variable; eigenvalues below this share of the largest are left out.
 MEDIAN_SQUARE, UNSEEN = 0.455, 1e-9
 
 
 class BiasWalk(NamedTuple):
-    """The likeliest walk.
+    """Most likely random walk of one quantity.
 
     Attributes
     ----------
-    what : changed. gain : 2 log of how much likelier it is than none. q : variance of a step from part to part.
-    alone : the gain where all eigenvectors are taken to be as loud as their median is.
-    delta : (k, 3) from the estimate, m/s^2, rad/s or rad. t : (k,) s after the flat segment, the middles of the parts;
-    of sides none.
+    what : quantity that changed. gain : 2 log of its likelihood ratio to no walk.
+    q : variance of a step from part to part. alone : gain with c^2 of all eigenvectors divided by their median.
+    delta : (k, 3) from the estimate, m/s^2, rad/s or rad.
+    t : (k,) s after the flat segment, the middles of the parts; empty for sides.
     """
 
     what: What
@@ -65,28 +66,28 @@ class BiasWalk(NamedTuple):
     t: Vector
 
     def error(self, gravity: float) -> float:
-        """m/s^2 by which readings before and after are off; 0 where it is no change of the accelerometer."""
+        """Return the error of readings before and after [m/s^2]; 0 if the accelerometer did not change."""
         return 0.5 * self.size * {"accelerometer": 1.0, "mount": gravity}.get(self.what, 0.0)
 
     @property
     def size(self) -> float:
-        """From one end of what it was to the other."""
+        """Range of the quantity over the recording."""
         return float(np.linalg.norm(np.ptp(self.delta, axis=0)))
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """s after the flat segment, between which it changed most."""
+        """Times [s after the flat segment] between which it changed most."""
         at = int(np.linalg.norm(np.diff(self.delta, axis=0), axis=1).argmax())
         return float(self.t[at]), float(self.t[at + 1])
 
     def at(self, t: Vector) -> Vector:
-        """(n, 3) drawn straight between the middles, beginning at 0 where the turning begins."""
+        """Return (n, 3) values, interpolated linearly between the middles, from 0 where the turning begins."""
         at, delta = np.concatenate([[0.0], self.t]), np.vstack([np.zeros(3), self.delta])
         return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
 
 
 def find_walk(parts: Parts, D: Vector) -> BiasWalk | None:
-    """Of what changed most likely; None where nothing did, beyond chance, or a fit that failed cannot say."""
+    """Return the most likely walk; None if none is significant, or the fit failed."""
     if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
         return None
     times = parts.by_time(min(TIMES, len(parts)))
@@ -100,12 +101,12 @@ def find_walk(parts: Parts, D: Vector) -> BiasWalk | None:
 
 
 def remove_walk(recording: Recording, flat: Flat, walk: BiasWalk) -> Recording:
-    """With a walk of the gyroscope's bias taken from its rates."""
+    """Subtract a walk of the gyroscope's bias from the rates."""
     return replace(recording, gyr=recording.gyr - walk.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0)))
 
 
 def walked_covariance(parts: Parts, D: Vector, q: float) -> Vector:
-    """(p, p) covariance of theta where the gyroscope's bias walks by q [(rad/s)^2] from part to part."""
+    """Return the covariance (p, p) of theta if the gyroscope's bias walks by q [(rad/s)^2] from part to part."""
     gradient, fisher = parts.grouped(parts.by_time(min(TIMES, len(parts))))
     k, B = len(gradient), _directions("gyroscope", D, len(parts.H))
     back = np.kron(np.eye(k) - np.eye(k, k=-1), np.eye(3))
@@ -115,7 +116,7 @@ def walked_covariance(parts: Parts, D: Vector, q: float) -> Vector:
 
 
 def _directions(what: What, D: Vector, p: int) -> Vector:
-    """(p, 3) by which the three numbers move the parameters."""
+    """Return (p, 3), the derivatives of the parameters by the three numbers."""
     B = np.zeros((p, 3))
     if what == "mount":
         B[PLACES["D"]] = (D @ cross(np.eye(3))).reshape(3, 9).T
@@ -125,7 +126,7 @@ def _directions(what: What, D: Vector, p: int) -> Vector:
 
 
 def _block_diagonal(blocks: Vector) -> Vector:
-    """(3 k, 3 k) with the blocks (k, 3, 3) along its diagonal."""
+    """Return (3 k, 3 k) with the blocks (k, 3, 3) along its diagonal."""
     k = len(blocks)
     M, at = np.zeros((k, 3, k, 3)), np.arange(k)
     M[at, :, at] = blocks
@@ -134,7 +135,7 @@ def _block_diagonal(blocks: Vector) -> Vector:
 
 @cache
 def _sums(k: int) -> Vector:
-    """(3 k, 3 k) adds up k vectors of three numbers: each with all before it."""
+    """Return (3 k, 3 k) that gives the cumulative sums of k vectors of three numbers."""
     return np.asarray(np.kron(np.tri(k), np.eye(3)))
 
 
@@ -143,10 +144,10 @@ def _walk(what: What, parts: Parts, D: Vector, gradient: Vector, fisher: Vector,
     to_theta = fisher @ B  # (k, p, 3)
     S = _block_diagonal(B.T @ to_theta)
     across = to_theta.transpose(1, 0, 2).reshape(-1, 3 * k)
-    # how theta follows a delta
+    # Theta follows a delta by these derivatives.
     follow = across.T @ parts.covariance
     S -= follow @ across
-    # the deltas of a walk are sums of x
+    # The deltas of a walk are cumulative sums of x.
     sums = np.eye(3 * k) if what == "side" else _sums(k)
     eigenvalues, U = np.linalg.eigh(sums.T @ S @ sums)
     eigenvalues = np.maximum(eigenvalues, 0.0)

@@ -9,12 +9,14 @@ import numpy as np
 from ..data import Mask, Recording, Vector
 from ..rests.flat import Flat
 
+# A rate that follows a hand's motion, with few enough samples for a search.
+SEARCH_HZ = 50.0
+
 
 def downsampled(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recording, tuple[int, int]]:
-    """The recording at about `rate_hz` or a little more, by means over blocks, and where the flat segment lies then.
+    """Return the recording at about `rate_hz` or a little more, by means over blocks, and its flat segment.
 
-    Blocks are aligned to the end of the flat segment; what does not fill a block at either end is left out. A block
-    with a gap or a clipped sample carries the mark.
+    Incomplete blocks at either end are left out. A block with a gap or a clipped sample is marked so.
     """
     size = _size(recording, rate_hz)
     if size < 2:
@@ -44,7 +46,7 @@ def downsampled(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recor
 
 
 def means(x: Vector, recording: Recording, flat: Flat, rate_hz: float) -> Vector:
-    """(m, ...) means of x (n, ...), a row a sample of the recording, over the same blocks."""
+    """Return means (m, ...) of x (n, ...), which has a row for each sample of the recording, over the blocks."""
     size = _size(recording, rate_hz)
     if size < 2:
         return x
@@ -54,5 +56,5 @@ def means(x: Vector, recording: Recording, flat: Flat, rate_hz: float) -> Vector
 
 
 def _size(recording: Recording, rate_hz: float) -> int:
-    """Samples in a block."""
+    """Return the number of samples in a block."""
     return int(recording.rate_hz / rate_hz * (1.0 + 1e-6))

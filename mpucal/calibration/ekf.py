@@ -1,4 +1,4 @@
-"""The paper's quaternion EKF, many parameter sets in one pass.
+"""The paper's quaternion EKF, for many parameter sets in one pass.
 
 Olsson, Kok, Halvorsen, Schön (2016), equations (1) to (3) and (6); quaternions (4,) are scalar first.
 """
@@ -14,47 +14,47 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 
-# x_0 comes from the uncalibrated mean, which misalignment and a bias of 1 m/s^2 tilt by some 10 deg.
+# x_0 comes from the uncalibrated mean, which misalignment and a bias of 1 m/s^2 tilt by about 10 deg.
 P_0_RAD = np.radians(10.0)
 
-# samples whose innovations are held at a time: bounds the memory of a long recording
+# The innovations of so many samples are held at a time, which bounds the memory for a long recording.
 BLOCK = 4096
 
 
 def gravity_jacobian(x: Vector) -> Vector:
-    """J: R(x) g = |g| J x / 2 and d(R(x) g)/dx = |g| J, for g upwards; (..., 4) -> (..., 3, 4)."""
+    """Return J of R(x) g = |g| J x / 2 and d(R(x) g)/dx = |g| J, for g upwards; (..., 4) -> (..., 3, 4)."""
     J: Vector = (x @ _J).reshape(*x.shape[:-1], 3, 4)
     return J
 
 
 def product(r: Vector) -> Vector:
-    """F: x (*) r = F x, the product of equation (1); (..., 4) -> (..., 4, 4)."""
+    """Return F of x (*) r = F x, the product of equation (1); (..., 4) -> (..., 4, 4)."""
     F: Vector = (r @ _F).reshape(*r.shape[:-1], 4, 4)
     return F
 
 
 def turning(x: Vector) -> Vector:
-    """Xi: x (*) (0, v) = Xi v; (..., 4) -> (..., 4, 3)."""
+    """Return Xi of x (*) (0, v) = Xi v; (..., 4) -> (..., 4, 3)."""
     Xi: Vector = (x @ _XI).reshape(*x.shape[:-1], 4, 3)
     return Xi
 
 
 def exponential(v: Vector) -> Vector:
-    """exp v of equation (1), v half a rotation vector [rad]; (..., 3) -> (..., 4)."""
+    """Return exp v of equation (1), v half a rotation vector [rad]; (..., 3) -> (..., 4)."""
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
     return np.concatenate([np.cos(angle), np.sinc(angle / np.pi) * v], axis=-1)
 
 
 def specific_force(x: Vector, gravity: float) -> Vector:
-    """R(x) g of equation (3), g upwards; (..., 4) -> (..., 3) m/s^2."""
+    """Return R(x) g of equation (3), g upwards; (..., 4) -> (..., 3) m/s^2."""
     s: Vector = 0.5 * gravity * (gravity_jacobian(x) @ x[..., None])[..., 0]
     return s
 
 
 def orientation_of(y: Vector) -> Vector:
-    """The x of least rotation with R(x) g along y, (3,) -> (4,): the direction of y says no yaw."""
+    """Return the x of least rotation with R(x) g along y, (3,) -> (4,): the direction of y does not give yaw."""
     u = y / np.linalg.norm(y)
-    # the half-way quaternion between e_z and u vanishes where they are opposite
+    # The half-way quaternion between e_z and u vanishes where they are opposite.
     if u[2] < -1.0 + 1e-12:
         return np.array([0.0, 1.0, 0.0, 0.0])
     x = np.array([1.0 + u[2], u[1], -u[0], 0.0])
@@ -62,7 +62,7 @@ def orientation_of(y: Vector) -> Vector:
 
 
 def inverse(S: Vector) -> tuple[Vector, Vector]:
-    """Inverses (..., 3, 3) and determinants (...) of symmetric S (..., 3, 3).
+    """Return inverses (..., 3, 3) and determinants (...) of symmetric S (..., 3, 3).
 
     By cofactors, three times faster than LAPACK at this size; a singular S gives infinities, not an exception.
     """
@@ -75,7 +75,7 @@ def inverse(S: Vector) -> tuple[Vector, Vector]:
 
 @dataclass(frozen=True)
 class Innovations:
-    """What the EKF says of a block of t samples under b parameter sets.
+    """Innovations of the EKF in a block of t samples under b parameter sets.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Innovations:
 
 @dataclass(frozen=True)
 class Ekf:
-    """The state space model (1)-(3) with everything filled in but theta = {D, b_a}.
+    """State space model (1)-(3) of a recording, without theta = {D, b_a}.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Ekf:
 
     @classmethod
     def after(cls, flat: Flat, recording: Recording, gravity: float, P_0_rad: float = P_0_RAD) -> Self:
-        """The filter over the samples that follow the flat segment."""
+        """Build the filter over the samples that follow the flat segment."""
         y, gyr = recording.acc[flat.last :], recording.gyr[flat.last :]
         delta = np.diff(recording.t[flat.last :], append=recording.t[-1])
         x_0 = orientation_of(flat.y)
@@ -124,7 +124,7 @@ class Ekf:
         )
 
     def run(self, D: Vector, b_a: Vector) -> Iterator[Innovations]:
-        """One-step-ahead predictors (6) of every sample, in blocks.
+        """Yield the one-step-ahead predictors (6) of every sample, in blocks.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class Ekf:
             yield Innovations(np.array(e_s), np.array(S_s), np.array(x_s))
 
     def correct(self, x: Vector, P: Vector, y_less_b: Vector, g_D: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-        """x, P of t|t and e, S of (6): (b, 4), (b, 4, 4), (b, 3), (b, 3, 3), from y - b_a and |g| D."""
+        """Return x, P of t|t and e, S of (6), (b, 4), (b, 4, 4), (b, 3), (b, 3, 3), from y - b_a and |g| D."""
         H = g_D @ gravity_jacobian(x)
         e = y_less_b - 0.5 * (H @ x[..., None])[..., 0]
         H_P = H @ P
@@ -155,7 +155,7 @@ class Ekf:
         return _unit(x), P - gain @ H_P, e, S
 
     def predict(self, x: Vector, P: Vector, t: int) -> tuple[Vector, Vector]:
-        """x and P of t+1|t. P loses its part along x, which the normalisation of x took away."""
+        """Return x and P of t+1|t. P loses its part along x, which the normalisation of x removes."""
         following = x @ self.F[t].T
         N = self.F[t] - following[..., :, None] * x[..., None, :]
         G = turning(following) * self.sigma_phi[t]
@@ -168,17 +168,17 @@ def _unit(x: Vector) -> Vector:
 
 
 def _transposed(matrices: Vector) -> Vector:
-    # a copy: matmul is three times slower on a transposed view of small matrices
+    # It is copied, since matmul is three times slower on a transposed view of small matrices.
     return np.ascontiguousarray(np.swapaxes(matrices, -1, -2))
 
 
-# S[i, k] is element 3 i + k of a row; cofactor (i, k) is a b - c d of the rows and columns after it
+# S[i, k] is element 3 i + k of a row; cofactor (i, k) is a b - c d of the rows and columns after it.
 _I, _K = np.divmod(np.arange(9), 3)
 _MINORS = np.array([3 * ((_I + i) % 3) + (_K + k) % 3 for i, k in ((1, 1), (2, 2), (1, 2), (2, 1))])
 
 
 def _linear(matrix: Callable[..., list[list[float]]]) -> Vector:
-    """T with x @ T = matrix(*x), flattened, for a matrix that is linear in the quaternion x."""
+    """Return T with x @ T = matrix(*x), flattened, for a matrix that is linear in the quaternion x."""
     return np.array([matrix(*e) for e in np.eye(4)]).reshape(4, -1)
 
 

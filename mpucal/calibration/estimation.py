@@ -1,4 +1,4 @@
-"""The estimate of a recording: with the gyroscope, from the rests alone, or from the part before it was shaken."""
+"""Estimation of a recording: with the gyroscope, from the rests alone, or from the part before a sensor clipped."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .uncertainty import claim_uncertainty, inflate
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
-# Each walk is what is left of a drift after the one before; it must make the recording as much likelier.
+# Each walk is what is left of a drift after the one before; removing it must reduce V by so much.
 MOST_WALKS, LEAST_GAIN = 3, 10.0
 
 
@@ -33,27 +33,27 @@ def estimate(
 ) -> tuple[Evidence, Mapping[str, str]]:
     """Estimate as `calibrate` does; return the evidence, with the fit and its covariance, and the model and why.
 
-    Where the gyroscope is at fault and the rests suffice, the estimate is of the rests alone. Where a sensor was at the
-    end of its range and the part before is good by itself, the estimate is of that part.
+    Where the gyroscope is at fault and the rests suffice, the estimate uses the rests alone. Where a sensor was at the
+    end of its range and the part before is good by itself, the estimate uses that part.
 
     Raises
     ------
-    WrongValue : no such model, or a gravity that is none.
+    WrongValue : the model does not exist, or the gravity is impossible.
     """
-    if model not in tuple(MODELS):  # which takes what has no hash
+    if model not in tuple(MODELS):  # a tuple, since a caller's value may not be hashable
         raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
     before = Evidence(recording, gravity, None, None, model, gravity_anyway=gravity_anyway)
-    of_all = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
+    whole = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
     if model != "auto":
-        return of_all
-    at_fault = find_gyroscope_fault(of_all[0])
-    other = _before_it_clipped(of_all[0]) if at_fault is None else _of_rests(before, at_fault)
-    return other or of_all
+        return whole
+    at_fault = find_gyroscope_fault(whole[0])
+    other = _before_clipping(whole[0]) if at_fault is None else _of_rests(before, at_fault)
+    return other or whole
 
 
-def _before_it_clipped(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
+def _before_clipping(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     """Return the estimate up to the last rest before a sensor was at the end of its range; None if it is not good."""
     recording, flat = evidence.recording, evidence.flat
     clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
@@ -72,7 +72,7 @@ def _before_it_clipped(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]]
 
 
 def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str, str]] | None:
-    """The estimate from the rests alone; None where they do not suffice."""
+    """Return the estimate from the rests alone; None where they do not suffice."""
     recording = with_masks(before.recording)
     segment = recording.flat or find_flat(recording)
     if segment is None or not is_long_enough(recording, segment):
@@ -88,13 +88,13 @@ def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str
 
 def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     recording, gravity, model = before.recording, before.gravity, before.model
-    # an acceleration that jumps alone may be a knock, which the fit weighs itself
+    # A spike of the acceleration may be a knock, which the fit weighs itself: only the rates are repaired.
     recording = replace(with_masks(recording), gyr=remove_spikes(recording).gyr)
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
-    over = None if flat is None else find_reset(recording, flat)
-    if over is not None:
-        recording = recording.part(0, over)
+    end = None if flat is None else find_reset(recording, flat)
+    if end is not None:
+        recording = recording.part(0, end)
     before = replace(before, recording=recording, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
@@ -102,11 +102,11 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     claim = claim_uncertainty(choice.fit, gravity, walk, choice.walked)
     evidence = replace(before, fit=inflate(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
-    return evidence, {"model": choice.model, "why": choice.why + (left_out if over is not None else "")}
+    return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 
 
 def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, BiasWalk | None]:
-    """The fit, with a gyroscope's bias that walked while the board was turned taken away, and the walk that is left."""
+    """Return the fit without the walk of the gyroscope's bias while the board was turned, and the walk that is left."""
     choice, walk = _fit_once(recording, flat, gravity, model)
     for _ in range(MOST_WALKS):
         if walk is None or walk.what != "gyroscope" or not choice.fit.converged:

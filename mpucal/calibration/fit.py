@@ -1,4 +1,4 @@
-"""What a fit returns, whatever the model: parameters, covariance, how it ended."""
+"""Result of a fit, for all models: parameters, covariance, and how the search ended."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fit:
-    """Estimated parameters, whatever the method.
+    """Estimated parameters of any model.
 
     Attributes
     ----------
     D : (3, 3). b_a : (3,) m/s^2. b_omega : (3,) rad/s. K : (3, 3).
-    names : p names of the parameters that were estimated, D row-major first, then b_a.
+    names : names of the p estimated parameters, D row-major first, then b_a.
     covariance : (p, p), in the order of `names`.
-    iterations : of the minimiser. converged : whether it met its stopping rule.
+    iterations : of the minimiser. converged : True if it met its stopping rule.
     nis : mean of ||e_t||^2 weighted by the inverse of S_t, over all samples; 3 where the model holds.
     V : the cost function (8) at the estimate.
-    parts : what each part of the recording says against the estimate; None where that is not known.
-    at_prior : names of those parameters of which the data say little: they are what was known beforehand.
-    delay_s : by which the accelerometer lags behind the gyroscope; 0 where a model does not estimate it.
+    at_prior : names of parameters that the data hardly determine: they keep what was known beforehand.
+    parts : scores of the parts of the recording at the estimate; None where they are not known.
+    delay_s : delay of the accelerometer behind the gyroscope; 0 where the model does not estimate it.
     """
 
     D: Vector
@@ -46,12 +46,12 @@ class Fit:
     delay_s: float = 0.0
 
     def std(self, *names: str) -> Vector:
-        """Standard deviations of the named parameters, NaN for those that were not estimated."""
+        """Return standard deviations of the named parameters, NaN for those that were not estimated."""
         variance = dict(zip(self.names, np.diag(self.covariance), strict=True))
         return np.sqrt([max(variance.get(name, np.nan), 0.0) for name in names])
 
     def right_handed(self) -> Fit:
-        """Of (D, u) and (-D, -u), which fit equally well, the one with det D > 0."""
+        """Return the one with det D > 0 of (D, u) and (-D, -u), which fit equally well."""
         if not np.linalg.det(self.D) < 0.0:
             return self
         sign = np.array([-1.0 if name in D_NAMES else 1.0 for name in self.names])

@@ -1,8 +1,8 @@
-"""The estimator for a sensor in a hand: gyro matrix, lever arm, the hand's own acceleration, jerks, drift.
+"""Estimator for a sensor in a hand: gyroscope's matrix, lever arm, the hand's own acceleration, jerks, drift.
 
-The noise of the hand is found first, on means over blocks. While it moves, its acceleration is white; a recording that
-needs none (a bench, or a hand that only jerks) ends there. Else it is coloured: where the board rests often, white of a
-correlation time; where it hardly rests, the second derivative of a position that stays bounded.
+The noise of the hand is found first, on means over blocks. White noise in motion comes first; a recording that needs
+none (a bench, or a hand that only jerks) ends there. Else the noise is coloured: with many rests, white with a
+correlation time; with few, the second derivative of a position that stays bounded.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..rests.windows import noise_ratio
-from .downsampling import downsampled, means
+from .downsampling import SEARCH_HZ, downsampled, means
 from .fit import Fit
 from .hand_noise import (
     CALM_MPS2,
@@ -32,7 +32,7 @@ from .hand_noise import (
 )
 from .hypothesis_tests import WALD_99, undetermined, wald
 from .initial_estimate import initialise, perfect
-from .levenberg_marquardt import Minimum, information, minimise
+from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import value
 from .parameters import HAND
 from .parts import ends_of, parts_of
@@ -41,15 +41,14 @@ from .problem import Problem
 from .theta import Prior, Theta
 from .transitions import leverages, miss_variances, q_scale, transitions_of
 
-SEARCH_HZ = 50.0
-ROUGHLY, MOST_ROUGHLY = 0.05, 20
+MOST_ITERATIONS = 20  # of a rough search
 PASSES = 3
 
 
 def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves.
+    """Estimate D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves.
 
-    A search that does not settle where there are gaps begins once more, from a perfect sensor.
+    If the search does not settle and there are gaps, it begins once more, from a perfect sensor.
     """
     fit = _fit_from(initialise, recording, flat, gravity)
     if fit.converged or not recording.gap.any():
@@ -66,9 +65,9 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
     theta, noise = search.run(begin(search.prepared.problem, fine.flat.b_omega))
     if search.trembles:
         fine = remove_tremor(fine)
-    if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
+    if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
         noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
-    problem = _moved(noise.problem(fine), fine, theta)
+    problem = _with_transition_noise(noise.problem(fine), fine, theta)
     prior = fine.prior()
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
     iterations = search.iterations + minimum.iterations
@@ -77,17 +76,17 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
     parts = parts_of(problem, minimum, prior)
-    minimum = _doubted(minimum, noise, search.prepared, fine)
+    minimum = _with_honest_information(minimum, noise, search.prepared, fine)
     known = undetermined(minimum.covariance()) if minimum.free.all() else ()
     return replace(minimum, iterations=iterations).as_fit(known, parts)
 
 
-def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
-    """The minimum with an honest H.
+def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
+    """Return the minimum with an honest H.
 
-    What transitions miss by after the fit is less than what the gyroscope erred by: few transitions and many parameters
-    leave next to nothing. Their noise is found anew, by misses that count for what an estimate leaves of them; the
-    estimate itself gains nothing by it.
+    After the fit the transitions miss by less than the gyroscope's error, since few transitions and many parameters
+    leave few degrees of freedom. Their noise is estimated again, with the degrees of freedom that are left; the
+    estimate itself would not improve.
     """
     if noise.kind == "none":
         return minimum
@@ -104,14 +103,14 @@ def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preproce
         if at.theta is not before.theta:
             transitions = transitions_of(rough, at.theta)
     problem, transitions = noise.problem(fine), transitions_of(fine, at.theta)
-    if transitions:  # rests are found anew here, and their number may differ by one
+    if transitions:  # rests are found again here, and their number may differ by one
         variance = miss_variances(transitions, float(leverage.mean()))
         problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
     return replace(minimum, H=information(problem, minimum.theta, prior))
 
 
-def _moved(problem: Problem, prepared: Preprocessed, theta: Theta) -> Problem:
-    """The problem with as much noise of the gyroscope between rests as the rests show, under theta."""
+def _with_transition_noise(problem: Problem, prepared: Preprocessed, theta: Theta) -> Problem:
+    """Return the problem with the gyroscope's noise between rests that the rests show, under theta."""
     transitions = transitions_of(prepared, theta)
     if not transitions:
         return problem
@@ -119,12 +118,12 @@ def _moved(problem: Problem, prepared: Preprocessed, theta: Theta) -> Problem:
 
 
 def _scaled(problem: Problem, factor: Vector) -> Problem:
-    """The problem with `factor` (n,) of the gyroscope's noise."""
+    """Return the problem with the gyroscope's noise multiplied by `factor` (n,)."""
     return replace(problem, series=replace(problem.series, q_scale=factor))
 
 
 class _Search:
-    """The minimiser's way to a theta and a noise, each step rough."""
+    """Search for theta and the hand's noise in turn, by rough fits."""
 
     def __init__(self, prepared: Preprocessed) -> None:
         self.prepared = prepared
@@ -133,7 +132,7 @@ class _Search:
         self.trembles = False
 
     def run(self, theta: Theta) -> tuple[Theta, Noise]:
-        """First Huber's loss, which finds the way from afar; then the redescending one, and the likeliest sigma."""
+        """Search with Huber's loss, which converges from afar, then with the redescending one and the best sigma."""
         prepared = self.prepared
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
         sigma, sigmas = HAND_MPS2[0], HAND_MPS2 if prepared.rests_often else WHITE_MPS2
@@ -146,24 +145,25 @@ class _Search:
         if not prepared.rests_often:
             theta, noise = self._pivoting(theta)
         for _ in range(PASSES):
-            before, theta = theta, self._roughly(_moved(noise.problem(self.prepared), self.prepared, theta), theta)
+            problem = _with_transition_noise(noise.problem(self.prepared), self.prepared, theta)
+            before, theta = theta, self._roughly(problem, theta)
             if theta is before:
                 break
         return theta, noise
 
     def _pivoting(self, theta: Theta) -> tuple[Theta, Noise]:
-        """A pivot's travel, and whether the tremor has a lever arm of its own (BIC of its three components)."""
+        """Fit a pivot's travel, and a lever arm of the tremor where the BIC of its three components wants one."""
         theta, noise = self._travel(theta)
         one, theta = self.prepared, self._roughly(noise.problem(self.prepared), theta)
         two = remove_tremor(one)
         there = self._roughly(noise.problem(two), theta)
-        if _likeliest_cost(two, there) + 1.5 * math.log(len(two.problem.series)) > _likeliest_cost(one, theta):
+        if _least_cost(two, there) + 1.5 * math.log(len(two.problem.series)) > _least_cost(one, theta):
             return theta, noise
         self.prepared, self.trembles = two, True
         return self._travel(there)
 
     def _travel(self, theta: Theta) -> tuple[Theta, Noise]:
-        """The likeliest size of a pivot's travel, with theta for it."""
+        """Fit theta and the most likely size of a pivot's travel."""
         pivot = self.prepared.pivot
         sigma = most_likely_sigma(pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
         theta = self._roughly(pivot(sigma), theta)
@@ -176,9 +176,9 @@ class _Search:
 
 
 def _roughly(problem: Problem, theta: Theta, prior: Prior, fixed: tuple[str, ...] = ()) -> Minimum:
-    return minimise(problem, theta, HAND, prior, fixed, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
+    return minimise(problem, theta, HAND, prior, fixed, until=ROUGHLY, most=MOST_ITERATIONS, frozen=True)
 
 
-def _likeliest_cost(prepared: Preprocessed, theta: Theta) -> float:
-    """V at theta with the likeliest size of a pivot's travel."""
+def _least_cost(prepared: Preprocessed, theta: Theta) -> float:
+    """Return V at theta with the most likely size of a pivot's travel."""
     return value(prepared.pivot(most_likely_sigma(prepared.pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])), theta)

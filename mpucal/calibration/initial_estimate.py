@@ -1,4 +1,4 @@
-"""A first estimate of D and b_a without iteration: linear least squares for every direction gravity may start in."""
+"""First estimate of D and b_a without iteration: linear least squares for each direction gravity may start in."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from .theta import Theta
 
 POINTS = 300
 REFINEMENTS = 5
-# keeps the equations solvable for a board that hardly turned; nothing beside a second of data
+# The ridge keeps the equations solvable for a board that hardly turned; a second of data outweighs it.
 RIDGE = 1e-9
-# of the parts between gaps, the longest so many are tried
+# So many of the longest stretches between gaps are tried.
 STRETCHES, FEWEST_OF_A_STRETCH = 4, 50
 ROUGH_MPS2 = 0.5
 
 
 def initialise(problem: Problem, b_omega: Vector) -> Theta:
-    """The D, b_a and starting direction u that fit y_t = D g C_t u + b_a best, det D > 0.
+    """Fit D, b_a and the starting direction u of y_t = D g C_t u + b_a by least squares, det D > 0.
 
     C_t turns the first body frame into the frame at t, by the gyro alone. The residual depends on the data only
     through sums of C_t's products, so a search over the whole sphere costs as much as one sample.
     (u, D) and (-u, -D) fit equally well: det D > 0 decides.
 
-    A gap in which the board turned breaks C_t: where there are gaps, stretches between them and a perfect sensor are
-    tried as well, and the filter, which knows how little is known across a gap, says which estimate is best.
+    A gap in which the board turned breaks C_t: with gaps, the stretches between them and a perfect sensor are tried as
+    well, and the filter, which allows for the unknown turn across a gap, decides which estimate is best.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ def initialise(problem: Problem, b_omega: Vector) -> Theta:
 
 
 def perfect(problem: Problem, b_omega: Vector) -> Theta:
-    """A perfect sensor, as it lay in the flat segment."""
+    """Return a perfect sensor in the orientation of the flat segment."""
     return _from_the_flat_mean(problem, Theta.start(np.eye(3), np.zeros(3), b_omega, np.array([0.0, 0.0, 1.0])))
 
 
 def _between_gaps(problem: Problem, part: slice, b_omega: Vector) -> Theta:
-    """The estimate from a part of the series alone; u is gravity's direction before its first step."""
+    """Return the estimate from a part of the series alone; u is gravity's direction before its first step."""
     series = problem.series
     r_scale = None if series.r_scale is None else series.r_scale[part]
     CC, yC, C, y, _, n = _kernel.moments(
@@ -67,7 +67,7 @@ def _between_gaps(problem: Problem, part: slice, b_omega: Vector) -> Theta:
 
 
 def _stretches(series: Series) -> list[slice]:
-    """The longest parts of the series between gaps that leave unknown how the board turned; none without gaps."""
+    """Return the longest parts of the series between gaps with an unknown turn; none without gaps."""
     if series.q_extra is None:
         return []
     lost = series.q_extra >= 0.9 * GAP_ANGLE_VARIANCE * series.dt
@@ -81,15 +81,15 @@ def _stretches(series: Series) -> list[slice]:
 
 
 def _from_the_flat_mean(problem: Problem, theta: Theta) -> Theta:
-    """The same D and b_a, with the u that the flat mean then says."""
+    """Return theta with the u that D, b_a and the flat mean give."""
     s = np.linalg.lstsq(theta.D, problem.flat.y - theta.b_a, rcond=None)[0]
     length = float(np.linalg.norm(s))
-    # a dead accelerometer has a D of zeros, and says of no direction
+    # A dead accelerometer has a D of zeros, which gives no direction.
     return replace(theta, u=np.asarray(s / length)) if length > 1e-9 else theta
 
 
 def _misfit(problem: Problem, theta: Theta) -> float:
-    """V of the exact filter, with noise enough for a hand and the gyroscope's scale."""
+    """Return V of the exact filter, with noise enough for a hand and for an error of the gyroscope's scale."""
     of = problem.series
     series = Series(of.y, of.omega, of.dt, of.r_scale, of.q_scale, of.q_extra)
     flat = replace(problem.flat, Sigma_a=problem.flat.Sigma_a + ROUGH_MPS2**2)
@@ -98,17 +98,17 @@ def _misfit(problem: Problem, theta: Theta) -> float:
 
 
 class _Sums:
-    """The normal equations of (D, b_a) for any u, from sums over the recording."""
+    """Normal equations of (D, b_a) for any u, from sums over the recording."""
 
     def __init__(self, CC: Vector, yC: Vector, C: Vector, y: Vector, n: float, problem: Problem) -> None:
-        # ordered so that a product with u, or with all products of u's elements, gives the sums for that u
+        # In this order a product with u, or with all products of u's elements, gives the sums for that u.
         self.CC = CC.reshape(3, 3, 3, 3).transpose(1, 3, 0, 2).reshape(9, 9)
         self.yC = yC.reshape(3, 3, 3).transpose(2, 1, 0).reshape(3, 9)
         self.C, self.y, self.n = C, y, n
         self.g, self.Sigma_a = problem.gravity, problem.flat.Sigma_a
 
     def _equations(self, u: Vector) -> tuple[Vector, Vector]:
-        """(m, 4, 4) and (m, 4, 3): sums of z z' and z y', z = (g C_t u, 1), for u (m, 3)."""
+        """Return sums of z z' (m, 4, 4) and z y' (m, 4, 3), z = (g C_t u, 1), for u (m, 3)."""
         m, g = len(u), self.g
         zz, zy = np.empty((m, 4, 4)), np.empty((m, 4, 3))
         zz[:, :3, :3] = g * g * ((u[:, :, None] * u[:, None, :]).reshape(m, 9) @ self.CC).reshape(m, 3, 3)
@@ -120,18 +120,18 @@ class _Sums:
         return zz, zy
 
     def solve(self, u: Vector) -> tuple[Vector, Vector]:
-        """D (m, 3, 3) and b_a (m, 3) for u (m, 3)."""
+        """Return D (m, 3, 3) and b_a (m, 3) for u (m, 3)."""
         solution = np.swapaxes(np.linalg.solve(*self._equations(u)), 1, 2)
         return solution[:, :, :3], solution[:, :, 3]
 
     def cost(self, u: Vector) -> Vector:
-        """(m,) residual sum of squares in units of Sigma_a, up to a constant."""
+        """Return residual sums of squares (m,) in units of Sigma_a, up to a constant."""
         zz, zy = self._equations(u)
         return np.asarray(-(zy * np.linalg.solve(zz, zy)).sum(1) @ (1.0 / self.Sigma_a))
 
 
 def _refine(u: Vector, sums: _Sums, step: float) -> Vector:
-    """Newton's method on the sphere by differences; a step that does not help halves the distance instead."""
+    """Refine u by Newton's method on the sphere, with differences; each round takes smaller ones."""
     grid = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]], float)
     for _ in range(REFINEMENTS):
         across = np.stack(tangents(u))

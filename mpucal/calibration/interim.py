@@ -1,7 +1,7 @@
-"""The estimate while the board is still being turned: D and b_a so far, with their covariance.
+"""Interim estimate while the board is being turned: D and b_a so far, with their covariance.
 
-The hand's model on samples averaged to 50 Hz, by one search from the last estimate: rougher than a calibration, and
-twenty times as fast.
+It fits the hand's model to means over blocks at 50 Hz, by one search from the last estimate: rougher than a
+calibration, and twenty times as fast.
 """
 
 from __future__ import annotations
@@ -13,39 +13,37 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
-from .downsampling import downsampled
+from .downsampling import SEARCH_HZ, downsampled
 from .hand_noise import FARTHER, FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, most_likely_sigma
 from .initial_estimate import initialise
-from .levenberg_marquardt import Minimum, information, minimise
+from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import value
 from .parameters import ACCELEROMETER, HAND, PLACES
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
 from .problem import Problem
 from .theta import Prior, Theta
 
-# Fast enough for a hand's moves, few enough samples for a fit within a poll or two.
-FIT_HZ = 50.0
-ROUGHLY, MOST_ROUGHLY = 0.05, 4
+MOST_ITERATIONS = 4
 
-# So weak that nothing measured gives way to them, strong enough for a D of which nothing is known yet.
+# These priors are too weak to change what is measured, and strong enough for a D of which nothing is known yet.
 D_SD, B_A_SD_MPS2 = 0.5, 5.0
 
-# A search that settled is compared with others where the recording has grown by so much since.
+# A search that settled is compared with other starts when the recording has grown by this factor since.
 GROWN = 1.25
 
-# times a pivot's travel that the covariance admits: more than a calibration's, which hears its parts as well
+# The covariance admits so many times a pivot's travel: more than a calibration's, which compares its parts as well.
 DOUBT = 6.0
 
 
 @dataclass(frozen=True)
 class InterimEstimate:
-    """A rough estimate and what it rests on.
+    """Rough estimate, with its problem and covariance.
 
     Attributes
     ----------
     theta : the estimate. H : (p, p) its Fisher matrix with the prior's. covariance : (12, 12) of D row-major and b_a.
     problem : the series up to now. sigma : m/s^2, of the hand's acceleration while it moves.
-    converged : whether the search settled. compared : samples of which it was the best of several.
+    converged : True if the search settled. compared : number of samples when it was last the best of several starts.
     """
 
     theta: Theta
@@ -58,24 +56,24 @@ class InterimEstimate:
 
     @property
     def D_std(self) -> Vector:  # noqa: N802 - the paper's letter
-        """(3, 3) standard deviations."""
+        """Standard deviations (3, 3) of D."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance)[PLACES["D"]], 0.0)).reshape(3, 3))
 
     @property
     def b_a_std(self) -> Vector:
-        """(3,) standard deviations [m/s^2]."""
+        """Standard deviations (3,) of b_a [m/s^2]."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance)[PLACES["b_a"]], 0.0)))
 
 
 def interim_estimate(
     recording: Recording, flat: Flat, gravity: float, before: InterimEstimate | None = None
 ) -> InterimEstimate:
-    """What `recording` tells so far.
+    """Estimate D and b_a from the recording so far.
 
-    The search goes on from `before`, where that had settled and, asked as the recording grows, nothing else explains it
-    better; else it begins with a loss that finds its way from afar.
+    The search goes on from `before` if that settled and, compared as the recording grows, no other start fits better;
+    else it begins with Huber's loss, which converges from far away.
     """
-    prepared = preprocess(*downsampled(recording, flat, FIT_HZ), gravity)
+    prepared = preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity)
     prior = prepared.prior(D=(np.eye(3).ravel(), D_SD), b_a=(0.0, B_A_SD_MPS2))
     rough = replace(prepared.white(FIRST_MPS2), tail=0.0)
     if before is not None and before.converged and len(recording) < GROWN * before.compared:
@@ -92,7 +90,7 @@ def interim_estimate(
     minimum = _minimum(problem, theta, prior)
     H = minimum.H
     if not prepared.rests_often:
-        # who does not pause leans on a hand's travel, of which little is known: admit more of it
+        # With few rests the estimate depends on the hand's travel, of which little is known: admit more of it.
         pivots = partial(prepared.pivot, floor=FLOOR_MPS2)
         pivot = most_likely_sigma(pivots, PIVOT_MPS2, minimum.theta, PIVOT_MPS2[0])
         doubt = prepared.pivot(DOUBT * FARTHER * pivot, FLOOR_MPS2)
@@ -103,7 +101,7 @@ def interim_estimate(
 
 
 def _starts(prepared: Preprocessed) -> tuple[Theta, ...]:
-    """A perfect sensor, but for the bias that the flat mean then says, and the linear estimate."""
+    """Return a perfect sensor with the bias that the flat mean gives, and the linear estimate."""
     flat = prepared.flat
     u = flat.y / np.linalg.norm(flat.y)
     perfect = Theta.start(np.eye(3), flat.y - prepared.problem.gravity * u, flat.b_omega, u)
@@ -111,5 +109,5 @@ def _starts(prepared: Preprocessed) -> tuple[Theta, ...]:
 
 
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:
-    # what is asked for next hangs on H, so that it is that of the estimate itself
-    return minimise(problem, theta, HAND, prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True, unseen=0.0)
+    # The next orientation depends on H, which is therefore evaluated at the estimate itself.
+    return minimise(problem, theta, HAND, prior, until=ROUGHLY, most=MOST_ITERATIONS, frozen=True, unseen=0.0)

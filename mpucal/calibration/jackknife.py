@@ -1,12 +1,12 @@
-"""How far the estimate moves when a part of the recording is left out: by time, and by the side that was down.
+"""Delete-a-group jackknife: the spread of the estimate without a stretch of time, or without a side that was down.
 
-Delete-a-group jackknife: with theta_k the estimate without group k, sqrt((K - 1) / K sum |theta_k - theta|^2) is its
-standard deviation whatever the noise is, as long as the groups err independently. What errs by time (drift, a knock,
-vibration) disagrees between times; what errs by orientation (nonlinearity, hysteresis, the gyroscope's sensitivity to
-acceleration) is alike at all times, and disagrees between sides.
+With theta_k the estimate without group k, sqrt((K - 1) / K sum |theta_k - theta|^2) is its standard deviation under any
+noise, if the groups err independently. Errors by time (drift, a knock, vibration) disagree between times; errors by
+orientation (nonlinearity, hysteresis, the gyroscope's sensitivity to acceleration) are alike at all times, and disagree
+between sides.
 
-Source: Busing, Meijer, van der Leeden, "Delete-m jackknife for unequal m" (1999); the spread is the median of the
-groups', 1.2 times, which one group that holds all of an orientation cannot blow up.
+Source: Busing, Meijer, van der Leeden, "Delete-m jackknife for unequal m" (1999). The spread here is 1.2 times the
+median of the groups', so that one group that holds all of an orientation cannot enlarge it.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from .parts import Parts
 
 TIMES, FEWEST_GROUPS = 8, 4
 ROBUST = 1.2
-# the jackknife by side is this many times what it is by chance at most, times how much more than by chance sides differ
+# The spread by sides is at most so many times the model's, times the ratio by which sides differ more than by chance.
 MOST_BY_CHANCE, TINY_MPS2 = 3.0, 1e-9
-# of the jackknife that is claimed: less than all of it, since the groups are few and not alike
+# Shares of the spread that are claimed: not all of it, since the groups are few and not alike.
 OF_TIME, OF_SIDE = 0.7, 0.75
 
 
 @dataclass(frozen=True)
 class Jackknife:
-    """What the estimate's error is by leaving parts out: rms over all directions of gravity [m/s^2].
+    """Error of the estimate by leaving parts out, rms over all directions of gravity [m/s^2].
 
     Attributes
     ----------
@@ -44,23 +44,23 @@ class Jackknife:
     worst: tuple[float, float]
 
     def claim(self) -> float:
-        """m/s^2 that is claimed at least."""
+        """Return the least error to be claimed [m/s^2]."""
         return max(OF_TIME * self.time, OF_SIDE * self.side)
 
     def decided_by(self) -> Literal["time", "side"]:
-        """Which of the two is larger."""
+        """Return the kind of group with the larger claim."""
         return "time" if OF_TIME * self.time >= OF_SIDE * self.side else "side"
 
 
 def jackknife(parts: Parts, D: Vector, gravity: float) -> Jackknife:
-    """By the parts' scores: one Newton step from the estimate leads to that without a group, weights and noise held."""
+    """Compute the jackknife by the parts' scores: one Newton step leads to the estimate without a group."""
     groups = parts.by_time(min(TIMES, len(parts)))
     to_sphere = _to_sphere(D, gravity)
     gradient, fisher = parts.grouped(groups)
     by_time = _moved(gradient, parts.H - fisher, to_sphere)
     gradient, fisher = parts.grouped(parts.side)
     by_side = _moved(gradient, parts.H - fisher, to_sphere)
-    # without a side that few others make up for, the estimate moves far by chance
+    # Without a side that no other can replace, the estimate moves far by chance.
     chance = _rms(inverse(parts.H - fisher) - parts.covariance, to_sphere)
     most = MOST_BY_CHANCE * float(np.median(by_side / chance)) * float(_rms(parts.covariance, to_sphere))
     worst = np.flatnonzero(groups == int(np.argmax(by_time)))
@@ -69,7 +69,7 @@ def jackknife(parts: Parts, D: Vector, gravity: float) -> Jackknife:
 
 
 def _to_sphere(D: Vector, gravity: float) -> Vector:
-    """(12, 12) takes an error of (D row-major, b_a) to twelve numbers whose squares add up to its mean square [m/s^2].
+    """Return (12, 12), which maps an error of (D row-major, b_a) to numbers whose squares add up to its mean square.
 
     A calibrated reading moves by inv(D) (dD s + db), and the mean of |A s + c|^2 over |s| = g is g^2/3 |A|^2 + |c|^2.
     """
@@ -80,9 +80,9 @@ def _to_sphere(D: Vector, gravity: float) -> Vector:
 
 
 def _moved(gradient: Vector, H: Vector, to_sphere: Vector) -> Vector:
-    """(m,) m/s^2, rms over the sphere, by which the estimate without each group differs from their median.
+    """Return (m,) m/s^2, rms over the sphere, the distance of the estimate without each group from their median.
 
-    Infinite where a group is all that tells a parameter.
+    It is infinite where a parameter is determined by one group alone.
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(H, axis1=1, axis2=2), 1e-300))
     try:
@@ -95,7 +95,7 @@ def _moved(gradient: Vector, H: Vector, to_sphere: Vector) -> Vector:
 
 
 def _rms(covariance: Vector, to_sphere: Vector) -> Vector:
-    """(...,) m/s^2 over the sphere, of covariances (..., p, p)."""
+    """Return the rms error [m/s^2] over the sphere (...,) of covariances (..., p, p)."""
     of = covariance[..., ACCELEROMETER, ACCELEROMETER]
     trace = np.trace(to_sphere @ of @ to_sphere.T, axis1=-2, axis2=-1)
     return np.asarray(np.sqrt(np.maximum(trace, TINY_MPS2**2)))

@@ -22,27 +22,29 @@ if TYPE_CHECKING:
     from .parts import Parts
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
-LAST = 30.0  # so near, a whole step leaves next to nothing of the decrement: nobody need look back
+ROUGHLY = 0.05  # the decrement at which a search on block means ends
+# Below so many times the decrement that ends a search, a whole step leaves nearly nothing of it, and is not evaluated.
+LAST = 30.0
 MOST_ITERATIONS = 60
-# Trials since the decrement last halved: so many bring no end. Who goes down a valley without one (a turn so slow that
-# the gyroscope's noise loses gravity) halves it no more; estimates that end have halved it within 5 of them.
+# After so many trials that do not halve the decrement the search has failed, as in a valley without an end: turns so
+# slow that the gyroscope's noise loses gravity. Estimates that converge halve it within 5 trials.
 MOST_IN_VAIN, HALF = 10, 0.5
-# By how much V may rise in such a step; where the decrement falls to less than this share of it, the root is near, and
-# V, which then has its minimum elsewhere, says nothing.
+# V may rise by so much in a step with frozen gains. If the decrement falls to less than this share, the root is near,
+# and V, whose minimum is elsewhere, may rise by more.
 FROZEN_SLACK, NEAR_A_ROOT, SLACK_NEAR_A_ROOT = 1.0, 0.1, 200.0
 DAMPING, EASIER, HARDER, HOPELESS = 1e-3, 0.1, 8.0, 1e12
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where the minimiser stopped.
+    """Point where the minimiser stopped.
 
     Attributes
     ----------
     theta : the estimate. V : its cost with the prior. nis : mean of e' S^-1 e over the samples.
-    H : (p, p) Fisher matrix with the prior's, over all p parameters, those held fixed as well.
+    H : (p, p) Fisher matrix with the prior's, over all p parameters, including those held fixed.
     free : (p,) True where a parameter was estimated.
-    seen : the last evaluation, and where it was; last : (p,) the step from there to theta, which was not looked at.
+    seen : the last evaluation, and its theta. last : (p,) the step from there to `theta`, which was not evaluated.
     """
 
     theta: Theta
@@ -56,14 +58,14 @@ class Minimum:
     last: Vector
 
     def covariance(self) -> Vector:
-        """(p, p) inverse of H over the free parameters; zero for those held fixed."""
+        """Return the inverse (p, p) of H over the free parameters; zero for those held fixed."""
         covariance = np.zeros_like(self.H)
         free = np.ix_(self.free, self.free)
         covariance[free] = inverse(self.H[free])
         return covariance
 
     def as_fit(self, at_prior: tuple[str, ...] = (), parts: Parts | None = None, spread: float = 1.0) -> Fit:
-        """The estimate of the free parameters, with `spread` times the standard deviations of H [1]."""
+        """Return the estimate of the free parameters, with `spread` times the standard deviations of H."""
         theta, covariance = self.theta, spread**2 * self.covariance()
         return Fit(
             D=theta.D,
@@ -97,10 +99,10 @@ def minimise(
 ) -> Minimum:
     """Minimise V + prior over the first `parameters` of NAMES, those of `fixed` (keys of PLACES) excepted.
 
-    Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, after `most` iterations, or where it no longer
-    falls. Below `unseen` times `until` a whole step is the last, and nobody looks where it led. With `frozen` gains the
-    gradient is not exactly that of V, and a step that brings it nearer to zero is accepted too. Evaluations give sums
-    up to `ends` as well, see evaluate.
+    The search stops where the Newton decrement g' H^-1 g / 2 falls below `until`, after `most` iterations, or where it
+    no longer falls. Below `unseen` times `until` a whole step is the last, and is not evaluated. With `frozen` gains
+    the gradient is not exactly that of V, and a step that brings it nearer to zero is accepted, too. Evaluations give
+    sums up to `ends` as well, see evaluate.
     """
     free = np.ones(parameters, bool)
     for name in fixed:
@@ -131,13 +133,13 @@ def minimise(
 
 
 def _nearer(trial: _At, at: _At, free: Vector, decrement: float) -> bool:
-    """Whether a step came nearer to the root of frozen gains' gradient than the decrement before it."""
+    """Return True if a step came nearer to the root of the gradient with frozen gains."""
     then, risen = trial.decrement(free), trial.V - at.V
     return then < decrement and risen < (SLACK_NEAR_A_ROOT if then < NEAR_A_ROOT * decrement else FROZEN_SLACK)
 
 
 class _At:
-    """V, gradient and H with the prior's share, at theta."""
+    """V, gradient and H at theta, with the prior's share."""
 
     def __init__(
         self, problem: Problem, theta: Theta, parameters: int, prior: Prior, ends: NDArray[np.int64] | None
@@ -153,18 +155,18 @@ class _At:
         self.H = self.data.fisher + np.diag(precision)
 
     def decrement(self, free: Vector) -> float:
-        """Newton decrement g' H^-1 g / 2 over the free parameters: how much V would still fall."""
+        """Return the Newton decrement g' H^-1 g / 2 over the free parameters, by which V would still fall."""
         gradient = self.gradient[free]
         return float(gradient @ _solve(self.H[np.ix_(free, free)], gradient)) / 2.0
 
 
 def information(problem: Problem, theta: Theta, prior: Prior) -> Vector:
-    """(p, p) Fisher matrix of the hand's filter over all parameters, with the prior's."""
+    """Return the Fisher matrix (p, p) of the hand's filter over all parameters, with the prior's."""
     return np.asarray(evaluate(problem, theta, HAND).fisher + np.diag(prior.precision))
 
 
 def inverse(H: Vector) -> Vector:
-    """(..., p, p) H^-1, by a unit diagonal; of what nothing is known, the variance is infinite in all but name."""
+    """Return H^-1 (..., p, p), scaled to a unit diagonal; directions without information get huge variances."""
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(H, axis1=-2, axis2=-1), 1e-300))
     scale = scale[..., :, None] * scale[..., None, :]
     scaled = H * scale
@@ -176,7 +178,7 @@ def inverse(H: Vector) -> Vector:
 
 
 def _solve(H: Vector, g: Vector) -> Vector:
-    """H^-1 g with H scaled to a unit diagonal; directions that nothing is known of stay put."""
+    """Return H^-1 g with H scaled to a unit diagonal; zero along directions without information."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     scaled = H * np.outer(scale, scale)
     try:

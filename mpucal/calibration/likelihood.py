@@ -1,7 +1,7 @@
-"""V(theta), its gradient and its Fisher matrix over a recording, by the kernel.
+"""Likelihood: V(theta), its gradient and its Fisher matrix over a recording, by the kernel.
 
-Two filters: the exact one for a sensor that turns in place, and the hand's, whose state holds the hand's travel as well
-(kernel/filter.hpp and kernel/hand.hpp).
+There are two filters: the exact one for a sensor that turns in place, and the hand's, whose state includes the hand's
+travel (kernel/filter.hpp and kernel/hand.hpp).
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from .theta import Theta
 if _kernel.layout != LAYOUT:
     raise ImportError("the kernel was built for another table of parameters: build it again")
 
-EXACT = estimated("imu")  # what the exact filter knows
+EXACT = estimated("imu")  # parameters of the exact filter
 USED = {0: 0, ACCEL: lanes_used("accel"), IMU: lanes_used("imu")}
 
 
 class Evaluation(NamedTuple):
-    """V, sum of e' S^-1 e over the samples, gradient (p,), Fisher matrix (p, p) in the order of NAMES.
+    """Cost V, sum of e' S^-1 e over the samples, gradient (p,) and Fisher matrix (p, p) in the order of NAMES.
 
     to_ends : gradients (k, lanes) and Fisher matrices (k, lanes, lanes) up to each of k ends, in the kernel's order;
-        None where none were asked for.
+        None where no ends were given.
     """
 
     V: float
@@ -40,19 +40,19 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.int64] | None = None) -> Evaluation:
-    """V(theta) with its derivatives by the first `parameters` of NAMES.
+    """Evaluate V(theta) with its derivatives by the first `parameters` of NAMES.
 
-    ACCEL, IMU (or 0: V alone): equation (8) by the exact filter. HAND: by the hand's filter, whose derivatives hold
-    gains and weights: the gradient is zero where the estimate should be, not where V is least.
+    ACCEL, IMU (or 0: V alone) use equation (8) by the exact filter. HAND uses the hand's filter, whose derivatives hold
+    gains and weights fixed: the gradient is zero where the estimate should be, not where V is least.
 
     Parameters
     ----------
-    ends : (k,) where parts of the series end, the last one the number of samples; moved on by less than a block of
-        steps. Their sums cost next to nothing.
+    ends : (k,) where parts of the series end, the last one the number of samples; the kernel moves them on by less
+        than a block of steps. Their sums cost next to nothing.
 
     Raises
     ------
-    ValueError : the exact filter was asked of a problem that only the hand's filter can solve.
+    ValueError : the exact filter was called with a problem that only the hand's filter can solve.
     """
     if parameters == HAND:
         V, squares, gradient, fisher = _hand(problem, theta, derivatives=True, ends=ends)
@@ -65,26 +65,26 @@ def evaluate(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.i
 
 
 class PartScores(NamedTuple):
-    """What each part of a series adds to gradient (k, p) and Fisher matrix (k, p, p), and what the flat mean does."""
+    """Shares of each part of a series in gradient (k, p) and Fisher matrix (k, p, p), and those of the flat mean."""
 
     gradient: Vector
     fisher: Vector
     flat: Evaluation
 
     def moved(self, step: Vector) -> PartScores:
-        """The same to second order after a step (p,)."""
+        """Return the scores after a step (p,), to second order."""
         flat = self.flat._replace(gradient=self.flat.gradient + self.flat.fisher @ step)
         return PartScores(self.gradient + self.fisher @ step, self.fisher, flat)
 
 
 def part_scores(problem: Problem, theta: Theta, parameters: int, to_ends: tuple[Vector, Vector]) -> PartScores:
-    """Gradient and Fisher matrix, part by part, with the filter's memory of the parts before.
+    """Return gradient and Fisher matrix, part by part, with the filter's memory of the parts before.
 
     The flat segment's mean, by which the filter begins, belongs to no part.
 
     Parameters
     ----------
-    to_ends : what evaluate gave of the same problem at theta.
+    to_ends : as evaluate returned it for this problem at theta.
     """
     begin = evaluate(problem.first(0), theta, parameters)
     lanes = _lanes(parameters)
@@ -97,12 +97,12 @@ def part_scores(problem: Problem, theta: Theta, parameters: int, to_ends: tuple[
 
 
 def value(problem: Problem, theta: Theta) -> float:
-    """V(theta) of the hand's filter."""
+    """Return V(theta) of the hand's filter."""
     return _hand(problem, theta, derivatives=False)[0]
 
 
 class Trace(NamedTuple):
-    """What the hand's filter made of every sample, (n, 3) each.
+    """Predictions of the hand's filter for every sample, (n, 3) each.
 
     innovation : whitened, L^-1 e. s, a : m/s^2, gravity and the hand's acceleration in the body frame, as predicted.
     """
@@ -113,7 +113,7 @@ class Trace(NamedTuple):
 
 
 def trace(problem: Problem, theta: Theta) -> Trace:
-    """The hand's filter, sample by sample."""
+    """Run the hand's filter, and return its predictions sample by sample."""
     series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
     return Trace(*_kernel.trace_hand(theta.packed(TABLE), problem.constants_of_a_hand(), **series))
 
@@ -142,4 +142,4 @@ def _refuse_a_hand(problem: Problem) -> None:
     given = [name for name in SERIES_OF_A_HAND if getattr(problem.series, name) is not None]
     given += ["huber"] if np.isfinite(problem.huber) else []
     if given:
-        raise ValueError(f"the exact filter knows no {', '.join(given)}: ask for all {HAND} parameters")
+        raise ValueError(f"the exact filter does not support {', '.join(given)}: evaluate all {HAND} parameters")

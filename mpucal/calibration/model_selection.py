@@ -1,6 +1,6 @@
-"""The models `accel` and `imu`, of a sensor that turns in place, and the choice among all models.
+"""Selection of the model, and the models `accel` and `imu` of a sensor that turns in place.
 
-The simplest model is chosen that explains the data: by the mean squared innovation, for K by a Wald test, and for a
+The simplest model that explains the data is selected: by the mean squared innovation, for K by a Wald test, and for a
 lever arm by a score test.
 """
 
@@ -16,12 +16,12 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat, flat_statistics
 from .bias_walks import find_walk, remove_walk
-from .downsampling import downsampled
+from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import fit_hand
 from .hypothesis_tests import WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
-from .levenberg_marquardt import MOST_ITERATIONS, Minimum, minimise
+from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
@@ -35,18 +35,18 @@ from .tilt import fit_tilt
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
 EXPLAINED_NIS = 4.0
-EXPLAINED_BY_ERRORS_NIS = 3.3  # whose sizes are the likeliest, and leave 3 where they are what the sensors err by
-HOPELESS_NIS = 10.0  # of means over blocks, in which white noise is less and a hand's is not
+EXPLAINED_BY_ERRORS_NIS = 3.3  # errors of the most likely size leave 3 if they are those of the sensors
+HOPELESS_NIS = 10.0  # of means over blocks, which reduce white noise and not a hand's
 
-SEARCH_HZ, ROUGHLY = 50.0, 0.05
-COARSE_HZ, MANY_MEANS = 10.0, 20_000  # of more means than so many, 10 a second show first whether a search has an end
+# With more block means than so many, means at 10 Hz show first whether a search converges.
+COARSE_HZ, MANY_MEANS = 10.0, 20_000
 
 
 class Errors(NamedTuple):
-    """What a sensor errs by beyond the noise that it has at rest.
+    """Model errors beyond the noise at rest: angle random walk and white-noise floor.
 
-    kappa : rad a root of rad, by which a turn is off for each rad turned (nonlinearity, steps too long for a turn).
-    floor : m/s^2 of white noise beside the accelerometer's own.
+    kappa : rad a root of rad, error of a turn (nonlinearity, steps too long for a turn).
+    floor : m/s^2, white noise in addition to the accelerometer's own.
     """
 
     kappa: float = 0.0
@@ -57,13 +57,13 @@ NO_ERRORS = Errors()
 ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
 ERROR_PASSES, ERRING_NIS = 2, 30.0
 MOST_WALKS = 2
-PROMISING = WALD_99 / 3.0  # of the decrement, of which twice is as much of the statistic
+PROMISING = WALD_99 / 3.0  # least decrement for a search with K: twice the decrement estimates the statistic
 
 
 class ModelChoice(NamedTuple):
-    """A fit, the model that made it, and why it was chosen.
+    """Chosen model: its name, its fit, and why it was chosen.
 
-    recording : what it was fitted to, without a walk of its gyroscope's bias of `walked` [(rad/s)^2] from part to part.
+    recording : as fitted, without a walk of its gyroscope's bias with variance `walked` [(rad/s)^2] from part to part.
     """
 
     fit: Fit
@@ -74,13 +74,13 @@ class ModelChoice(NamedTuple):
 
 
 def fit_accel(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """D, b_a, b_omega and the first tilts, with the gyroscope's scale trusted: the paper's model, made efficient."""
-    return _InPlace(recording, flat, gravity).fit(ACCEL)
+    """Estimate D, b_a, b_omega and the first tilts with a trusted gyroscope: the paper's model, made efficient."""
+    return InPlaceFits(recording, flat, gravity).fit(ACCEL)
 
 
 def fit_imu(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """As `accel`, with the gyroscope's matrix K."""
-    return _InPlace(recording, flat, gravity).fit(IMU)
+    """Estimate the parameters of `accel` and the gyroscope's matrix K."""
+    return InPlaceFits(recording, flat, gravity).fit(IMU)
 
 
 METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
@@ -94,14 +94,14 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 
 
 def choose(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
-    """The simplest model that explains the data.
+    """Choose the simplest model that explains the data.
 
-    White noise and a trusted gyroscope first, then its matrix K; the same with a steadied gyroscope, and with small
-    errors of both sensors. K is kept where a Wald test tells it from the identity. Data that none of them explains, or
-    that show a lever arm, were measured in a hand.
+    White noise and a trusted gyroscope come first, then its matrix K; then the same without a walk of the gyroscope's
+    bias, and with small errors of both sensors. K is kept where a Wald test finds it different from the identity. Data
+    that none of them explains, or that show a lever arm, were measured in a hand.
     """
     least = np.inf
-    for in_place, erring in _InPlace(recording, flat, gravity).attempts():
+    for in_place, erring in InPlaceFits(recording, flat, gravity).attempts():
         for parameters in (ACCEL, IMU):
             minimum, errors = in_place.explained(parameters, erring)
             least = min(least, minimum.nis)
@@ -122,11 +122,11 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
 
 def _in_a_hand(recording: Recording, flat: Flat, gravity: float, why: str) -> ModelChoice:
     hand = fit_hand(recording, flat, gravity)
-    kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
+    kept = "K" if "K_xx" in hand.names else "no K (it is not significantly different from the identity)"
     return ModelChoice(hand, "hand", f"{why}: a hand's model, with {kept}", recording)
 
 
-def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> ModelChoice:
+def _chosen(in_place: InPlaceFits, minimum: Minimum, errors: Errors) -> ModelChoice:
     perfect = len(minimum.free) == ACCEL
     noise = "white noise" if errors == NO_ERRORS else "white noise with small errors of the sensors"
     gyroscope = "a perfect gyroscope explain" if perfect else "a gyroscope that is not perfect explain"
@@ -135,28 +135,28 @@ def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> ModelChoice
     return ModelChoice(in_place.as_fit(minimum, errors), model, why, in_place.recording, in_place.walked)
 
 
-class _InPlace:
-    """The exact filter's fits of a recording of a sensor that turns in place."""
+class InPlaceFits:
+    """Fits of a sensor that turns in place, by the exact filter, to one recording."""
 
     def __init__(self, recording: Recording, flat: Flat, gravity: float, walked: float = 0.0) -> None:
         self.recording, self._flat, self._gravity, self.walked = recording, flat, gravity, walked
         self._prior = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
-    def attempts(self) -> Iterator[tuple[_InPlace, bool]]:
-        """Recordings to explain, and whether with errors of the sensors: the simplest first."""
+    def attempts(self) -> Iterator[tuple[InPlaceFits, bool]]:
+        """Yield the recordings to explain, and True with errors of the sensors: the simplest first."""
         yield self, False
-        if self._errs():
-            yield self._steadied(), False
+        if self._errors_may_explain():
+            yield self._without_walk(), False
             yield self, True
 
-    def _errs(self) -> bool:
-        """Whether errors of the largest size could explain the data."""
-        squares = evaluate(_erring(self._thin, ERRORS[-1]), self._rough(IMU).theta, 0).squares
+    def _errors_may_explain(self) -> bool:
+        """Return True if errors of the largest size could explain the data."""
+        squares = evaluate(_with_errors(self._thin, ERRORS[-1]), self._rough(IMU).theta, 0).squares
         return squares < ERRING_NIS * (self._thin.flat.last + len(self._thin.series))
 
-    def _steadied(self) -> _InPlace:
-        """Without the walk of the gyroscope's bias that the parts show; small errors would explain that as well."""
+    def _without_walk(self) -> InPlaceFits:
+        """Remove the walk of the gyroscope's bias that the parts show, which small errors would explain as well."""
         steady = self
         for _ in range(MOST_WALKS):
             rough = steady._rough(IMU)
@@ -165,37 +165,37 @@ class _InPlace:
             if walk is None or walk.what != "gyroscope":
                 break
             recording, walked = remove_walk(steady.recording, self._flat, walk), steady.walked + walk.q
-            steady = _InPlace(recording, self._flat, self._gravity, walked)
+            steady = InPlaceFits(recording, self._flat, self._gravity, walked)
         return steady
 
     def fit(self, parameters: int) -> Fit:
-        """With white noise alone, whether it explains the data or not."""
+        """Fit with white noise alone, whether or not it explains the data."""
         return self.as_fit(self.minimum(parameters, self._rough(parameters)), NO_ERRORS)
 
     def explained(self, parameters: int, erring: bool) -> tuple[Minimum, Errors]:
-        """The minimum, rough where it is hopeless, and the errors that make it likeliest."""
+        """Return the minimum, a rough one where it explains nothing, and the most likely errors."""
         errors = NO_ERRORS
         minimum = self._rough(parameters)
         for _ in range(ERROR_PASSES if erring else 0):
             theta = minimum.theta
-            errors = min(ERRORS, key=lambda these: evaluate(_erring(self._thin, these), theta, 0).V)
-            minimum = minimise(_erring(self._thin, errors), theta, parameters, self._prior, until=ROUGHLY)
+            errors = min(ERRORS, key=lambda these: evaluate(_with_errors(self._thin, these), theta, 0).V)
+            minimum = minimise(_with_errors(self._thin, errors), theta, parameters, self._prior, until=ROUGHLY)
         if minimum.nis < HOPELESS_NIS:
             minimum = self.minimum(parameters, minimum, errors)
         return minimum, errors
 
     def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
-        """On all samples, from where another search ended; a search without an end has none on all samples either."""
-        problem, most = _erring(self._problem, errors), MOST_ITERATIONS if near.converged else 0
+        """Search on all samples from the end of a rough search; if that did not converge, evaluate without a step."""
+        problem, most = _with_errors(self._problem, errors), MOST_ITERATIONS if near.converged else 0
         minimum = minimise(problem, near.theta, parameters, self._prior, most=most, ends=ends_of(problem))
         return replace(minimum, iterations=near.iterations + minimum.iterations)
 
     def with_matrix(self, near: Minimum, errors: Errors) -> Minimum | None:
-        """With K beside the parameters of `accel`; None where it is not told from the identity.
+        """Fit K as well; None where a Wald test does not find it different from the identity.
 
-        The statistic is twice what V falls by: where the first decrement promises little of it, the search ends there.
+        The statistic is twice the fall of V: where the first decrement promises little, the search ends there.
         """
-        problem = _erring(self._problem, errors)
+        problem = _with_errors(self._problem, errors)
         if not near.converged:
             return None
         if minimise(problem, near.theta, IMU, self._prior, until=PROMISING, most=1).iterations == 0:
@@ -204,13 +204,13 @@ class _InPlace:
         return imu if imu.converged and wald(imu) > WALD_99 else None
 
     def lever_arm(self, minimum: Minimum, errors: Errors) -> Vector | None:
-        """The lever arm r (3,) [m] of a sensor that does not turn in place."""
-        return find_lever_arm(_erring(self._thin, errors), *self._means(SEARCH_HZ), minimum, self._prior)
+        """Return the lever arm r (3,) [m] of a sensor that does not turn in place, else None."""
+        return find_lever_arm(_with_errors(self._thin, errors), *self._means(SEARCH_HZ), minimum, self._prior)
 
     def as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
-        """With what the parts of the recording say."""
+        """Return the fit with the scores of the recording's parts."""
         known = undetermined(minimum.covariance()) if len(minimum.free) > ACCEL else ()
-        return minimum.as_fit(known, parts_of(_erring(self._problem, errors), minimum, self._prior))
+        return minimum.as_fit(known, parts_of(_with_errors(self._problem, errors), minimum, self._prior))
 
     def _rough(self, parameters: int) -> Minimum:
         if parameters not in self._roughly:
@@ -218,7 +218,7 @@ class _InPlace:
         return self._roughly[parameters]
 
     def _searched(self, parameters: int) -> Minimum:
-        """A long recording is searched by coarser means first, as far as they explain it."""
+        """Search on block means; of a long recording on coarser means first, as far as they explain it."""
         theta, most, iterations = self._first, MOST_ITERATIONS, 0
         if len(self._thin.series) > MANY_MEANS:
             coarse = minimise(
@@ -240,7 +240,7 @@ class _InPlace:
 
     @cached_property
     def _thin(self) -> Problem:
-        """Means over blocks: white noise leaves little in a block beside its mean."""
+        """Problem of means over blocks, which lose little where the noise is white."""
         return _problem(*self._means(SEARCH_HZ), self._gravity)
 
     def _means(self, rate_hz: float) -> tuple[Recording, Flat]:
@@ -252,8 +252,8 @@ def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
     return Problem(mask(Series.after(recording, flat), recording, flat), flat, gravity)
 
 
-def _erring(problem: Problem, errors: Errors) -> Problem:
-    """With errors of the sensors."""
+def _with_errors(problem: Problem, errors: Errors) -> Problem:
+    """Return the problem with errors of the sensors."""
     series, flat = problem.series, problem.flat
     if errors.kappa > 0.0:
         turned = series.dt * lengths(series.omega - flat.b_omega)

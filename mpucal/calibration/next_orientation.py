@@ -1,4 +1,4 @@
-"""The orientation to ask for next: the rest that reduces the uncertainty fastest, by its Fisher information.
+"""Next orientation to ask for: the rest that reduces the uncertainty fastest, by its Fisher information.
 
 A weighted A-criterion: the sum of (variance / wanted^2) over D and b_a (docs/method.md, equation 17).
 """
@@ -20,19 +20,19 @@ from .preprocessing import CORRELATION_S, MOVING_RAD_S, POSE_MPS2, jerk_density
 from .problem import Problem, Series
 from .rotation import cross, shortest_turn
 
-# What a person does when asked for an orientation.
+# These describe how a person turns the board to an orientation, and holds it there.
 MOVE_S, REST_S = 1.6, 2.0
 FAST_RAD_S = math.radians(130.0) / MOVE_S
 TREMOR_MPS2 = 0.07
 
-NEAR_RAD = math.radians(25.0)  # a direction as near as that is where the board is already
+NEAR_RAD = math.radians(25.0)  # a direction nearer than this is the present one
 
 
 def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector) -> int:
-    """Which of `directions`, pointing down at rest, would reduce the uncertainty fastest.
+    """Return the index of the direction that, pointing down at rest, would reduce the uncertainty fastest.
 
-    The Fisher information of a move there and a rest is added to what is known; what counts is the sum of
-    (variance / wanted^2), by how much a second reduces its logarithm.
+    The Fisher information of a move there and of a rest is added to the present one; the criterion is the reduction
+    per second of the logarithm of the sum of (variance / wanted^2).
 
     Parameters
     ----------
@@ -44,20 +44,20 @@ def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector)
     seconds = np.maximum(MOVE_S, angle[there] / FAST_RAD_S)
     moves = _moves(known, s, directions[there], seconds.tolist())
     begin = replace(known.theta, u=s / np.linalg.norm(s))
-    F = _whatever_the_pose(np.array([evaluate(move, begin, HAND).fisher for move in moves]))
-    then, now = _badness(known.H + F, wanted), _badness(known.H, wanted)
+    F = _without_pose(np.array([evaluate(move, begin, HAND).fisher for move in moves]))
+    then, now = _criterion(known.H + F, wanted), _criterion(known.H, wanted)
     gain = (np.log(now) - np.log(then)) / (seconds + REST_S)
     return int(there[np.argmax(gain)])
 
 
-def _badness(H: Vector, wanted: Vector) -> Vector:
-    """(...) of Fisher matrices (..., p, p)."""
+def _criterion(H: Vector, wanted: Vector) -> Vector:
+    """Return the A-criterion (...) of Fisher matrices (..., p, p)."""
     variance = np.diagonal(inverse(H), axis1=-2, axis2=-1)
     return np.asarray(np.sum(np.abs(variance[..., ACCELEROMETER]) / wanted**2, axis=-1))
 
 
-def _whatever_the_pose(F: Vector) -> Vector:
-    """(k, p, p) Fisher matrices without what is known of the pose in which they begin."""
+def _without_pose(F: Vector) -> Vector:
+    """Return Fisher matrices (k, p, p) with the pose in which they begin eliminated."""
     pose = PLACES["tilt"]
     F = F - F[:, :, pose] @ np.linalg.solve(F[:, pose, pose], F[:, pose])
     F[:, :, pose] = F[:, pose] = 0.0
@@ -65,7 +65,7 @@ def _whatever_the_pose(F: Vector) -> Vector:
 
 
 def _moves(known: InterimEstimate, s: Vector, directions: Vector, seconds: list[float]) -> Iterator[Problem]:
-    """To each of `directions` (k, 3) a rest with gravity s (3,), the shortest turn there in so long, and a rest."""
+    """Yield for each of `directions` (k, 3) a rest with gravity s (3,), the shortest turn there, and a rest."""
     problem, theta = known.problem, known.theta
     dt = float(np.median(problem.series.dt))
     rest = max(round(REST_S / dt), 2)
@@ -75,7 +75,7 @@ def _moves(known: InterimEstimate, s: Vector, directions: Vector, seconds: list[
     for down, each_s in zip(directions, seconds, strict=True):
         move = max(round(each_s / dt), 2)
         turn = shortest_turn(s / np.linalg.norm(s), -down)
-        # s in the body's axes turns against the body, in the plane across the turn
+        # In the body's axes, s turns against the body, in the plane perpendicular to the turn.
         angle = float(np.linalg.norm(turn))
         across = cross(turn / angle) @ s
         share = angle * np.minimum(np.arange(1, move + rest + 1) / move, 1.0)[:, None]

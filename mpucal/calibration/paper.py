@@ -1,4 +1,4 @@
-"""Algorithm 1 of the paper, as printed: the estimator that the others are measured against."""
+"""Algorithm 1 of the paper, as printed: the reference for the other estimators."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .ekf import Ekf, inverse
 from .fit import Fit
+from .levenberg_marquardt import DECREMENT
 from .parameters import B_A_NAMES, D_NAMES
 
 MAX_ITERATIONS = 10
-EPSILON_1 = 1e-3  # of the Newton decrement: 0.04 sigma from the optimum, whatever the units
-EPSILON_2 = 0.01  # of the step length
+EPSILON_2 = 0.01  # least length of a step, in units of the first
 WOLFE_1, WOLFE_2 = 1e-4, 0.9  # sufficient decrease and curvature, as Nocedal and Wright set them
 
 H_DIFFERENCE = 1e-5
@@ -22,7 +22,7 @@ STEPS = 2.0 ** np.arange(2, -9, -1)
 
 
 def fit_paper(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """Maximum likelihood (7) of D and b_a from the samples that follow the flat segment.
+    """Estimate D and b_a by maximum likelihood (7) from the samples that follow the flat segment.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def fit_paper(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """
     ekf = Ekf.after(flat, recording, gravity)  # 1:
     theta = np.concatenate([np.eye(3).ravel(), np.zeros(3)])  # 2:
-    # far from the optimum V overflows; it is then infinite, and the line search turns back
+    # Far from the optimum V overflows; it is then infinite, and the line search turns back.
     with np.errstate(all="ignore"):
         here, iterations, converged = _minimise(ekf, expand(ekf, theta))
         covariance = _covariance(here.H)
@@ -62,16 +62,16 @@ class Expansion:
 
     @property
     def finite(self) -> bool:
-        """Whether the filter stayed finite at theta and around it."""
+        """True if the filter stayed finite at theta and around it."""
         return bool(np.isfinite(self.V) and np.isfinite(self.gradient).all() and np.isfinite(self.H).all())
 
     def direction(self) -> Vector:
-        """The Gauss-Newton step; of least norm where the data leave a direction of theta open."""
+        """Return the Gauss-Newton step, of least norm where the data leave a direction of theta open."""
         return np.asarray(np.linalg.lstsq(self.H, -self.gradient, rcond=None)[0], np.float64)
 
 
 def expand(ekf: Ekf, theta: Vector) -> Expansion:
-    """V (8) at theta, and around it by central differences: theta and its 24 neighbours in one pass of the EKF.
+    """Expand V (8) at theta by central differences: theta and its 24 neighbours in one pass of the EKF.
 
     Read literally, the paper's Hessian (dV/dtheta)^T (dV/dtheta) has rank 1 and leads nowhere. Gauss-Newton on the
     whitened innovations is the reading that works: the Fisher information
@@ -95,12 +95,12 @@ def expand(ekf: Ekf, theta: Vector) -> Expansion:
 
 
 def _minimise(ekf: Ekf, here: Expansion) -> tuple[Expansion, int, bool]:
-    """Lines 3 to 7: where the minimisation ends, after how many iterations, and whether it converged."""
+    """Run lines 3 to 7; return where the minimisation ends, its iterations, and True if it converged."""
     for i in range(MAX_ITERATIONS + 1):  # 3:, 7:
         if not here.finite:
             return here, i, False
         direction = here.direction()  # 6:
-        if -0.5 * here.gradient @ direction < EPSILON_1:
+        if -0.5 * here.gradient @ direction < DECREMENT:
             return here, i, True
         if i == MAX_ITERATIONS:
             break
@@ -115,7 +115,7 @@ def _minimise(ekf: Ekf, here: Expansion) -> tuple[Expansion, int, bool]:
 
 
 def _line_search(ekf: Ekf, here: Expansion, direction: Vector) -> float:
-    """The longest of STEPS that meets both Wolfe conditions; else that of least V that decreases it enough; else 0."""
+    """Return the longest of STEPS with both Wolfe conditions, else the best with sufficient decrease, else 0."""
     h = H_DIFFERENCE
     V = _costs(ekf, here.theta + np.concatenate([STEPS, STEPS + h])[:, None] * direction).reshape(2, -1)
     slopes = (V[1] - V[0]) / h
@@ -127,13 +127,13 @@ def _line_search(ekf: Ekf, here: Expansion, direction: Vector) -> float:
 
 
 def _wolfe(here: Expansion, direction: Vector, step: float, V: float, slope: float) -> bool:
-    """Both Wolfe conditions for a step that ends at V with a slope along the direction."""
+    """Return True if a step that ends at V, with this slope along the direction, meets both Wolfe conditions."""
     descent = here.gradient @ direction
     return bool(here.V + WOLFE_1 * step * descent >= V and slope >= WOLFE_2 * descent)
 
 
 def _costs(ekf: Ekf, thetas: Vector) -> Vector:
-    """V (8) of each of the parameter sets (b, 12)."""
+    """Return V (8) of each of the parameter sets (b, 12)."""
     V = np.zeros(len(thetas))
     for block in ekf.run(thetas[:, :9].reshape(-1, 3, 3), thetas[:, 9:]):
         chi2, log_det = _terms(block.e, block.S)
@@ -142,20 +142,20 @@ def _costs(ekf: Ekf, thetas: Vector) -> Vector:
 
 
 def _terms(e: Vector, S: Vector) -> tuple[Vector, Vector]:
-    """The terms of (8): ||e||^2 weighted by S^-1, and log det S."""
+    """Return the terms of (8): ||e||^2 weighted by S^-1, and log det S."""
     W, determinant = inverse(S)
     return (e * (W @ e[..., None])[..., 0]).sum(-1), np.log(determinant)
 
 
 def _inner(a: Vector, b: Vector) -> Vector:
-    """Inner products over samples and components of (t, p, ...) with (t, p, ...): (p, p)."""
+    """Return inner products (p, p) over samples and components of (t, p, ...) with (t, p, ...)."""
     p = a.shape[1]
     product: Vector = np.swapaxes(a, 0, 1).reshape(p, -1) @ np.swapaxes(b, 0, 1).reshape(p, -1).T
     return product
 
 
 def _covariance(H: Vector) -> Vector:
-    """The inverse of H; not a number where H has none."""
+    """Return the inverse of H; NaN where H is singular."""
     try:
         return np.asarray(np.linalg.inv(H), np.float64)
     except np.linalg.LinAlgError:

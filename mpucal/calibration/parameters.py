@@ -1,8 +1,8 @@
-"""The parameters of the model, in one table. Run as a program, this file writes the kernel's header from it.
+"""Parameters of the model, in one table. Run as a program, this file writes the kernel's header from it.
 
 A row is a field of Theta. From the rows follow names and order of the parameters, their places in vectors and matrices,
 priors, starting values, which model estimates which, and the structures and lanes of the kernel. CMake runs this file
-before anything is installed: the standard library has to do.
+before anything is installed, so that only the standard library is imported.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 
 class Form(Enum):
-    """What a row's numbers are: the endings of their names, and their declarations in C++."""
+    """Shape of a row's numbers: the endings of their names, and their declaration in C++."""
 
     MATRIX = ("xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"), "{0}[3][3]"  # row-major
     SYMMETRIC = ("xx", "xy", "xz", "yy", "yz", "zz"), "{0}[3][3]"
@@ -24,20 +24,20 @@ class Form(Enum):
     DIRECTION = ("0", "1"), "{0}[3], d{0}[2][3]"  # a unit vector; it has two parameters, the tilts across it
 
 
-# Each estimates what the one before it does, and more.
+# Each model estimates the parameters of the one before it, and more.
 MODELS = ("accel", "imu", "hand")
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A row of the table.
+    """Row of the table.
 
     Attributes
     ----------
-    name : of the row; those of its parameters begin with it. form : what it is.
-    model : the simplest of MODELS that estimates it; the others leave it at its start.
+    name : of the row; the names of its parameters begin with it. form : their shape.
+    model : the simplest of MODELS that estimates it; simpler ones leave it at its start.
     lanes : places of its parameters in the kernel's gradient; four lanes in a row are one group (kernel/filter.hpp).
-    meaning : what it is, and its unit. start : starting value and mean of the prior; times the identity for a matrix.
+    meaning : description and unit. start : starting value and mean of the prior; times the identity for a matrix.
     sd : standard deviation of the prior of each parameter; empty: it has none, or the recording gives it.
     stored_as : field of Theta and of the kernel's structures; empty: the name.
     """
@@ -53,17 +53,17 @@ class Parameter:
 
     @property
     def field(self) -> str:
-        """Of Theta and of the kernel's structures."""
+        """Name of the field of Theta and of the kernel's structures."""
         return self.stored_as or self.name
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its parameters."""
+        """Names of its parameters."""
         return tuple(f"{self.name}_{ending}".rstrip("_") for ending in self.form.value[0])
 
     @property
     def mean(self) -> tuple[float, ...]:
-        """The start, parameter by parameter."""
+        """Start of each parameter."""
         return tuple(self.start if len(set(ending)) <= 1 else 0.0 for ending in self.form.value[0])
 
 
@@ -83,34 +83,34 @@ TABLE = (
 
 
 def estimated(model: str) -> tuple[Parameter, ...]:
-    """The rows that a model estimates; they come first in the table."""
+    """Return the rows that a model estimates; they come first in the table."""
     return tuple(row for row in TABLE if MODELS.index(row.model) <= MODELS.index(model))
 
 
 def lanes_used(model: str) -> int:
-    """How many of the kernel's lanes a model uses."""
+    """Return the number of the kernel's lanes that a model uses."""
     return 1 + max(lane for row in estimated(model) for lane in row.lanes)
 
 
 BY_NAME = {row.name: row for row in TABLE}
 NAMES = tuple(name for row in TABLE for name in row.names)
 LANES = tuple(lane for row in TABLE for lane in row.lanes)
-# slices of vectors and matrices in the order of NAMES, by the rows' names
+# Slices of vectors and matrices in the order of NAMES, by the rows' names.
 PLACES = {row.name: slice(NAMES.index(row.names[0]), NAMES.index(row.names[-1]) + 1) for row in TABLE}
 
 D_NAMES, B_A_NAMES, K_NAMES, B_OMEGA_NAMES = (BY_NAME[name].names for name in ("D", "b_a", "K", "b_omega"))
-# what a calibration is for: D row-major, then b_a
+# The accelerometer's parameters: D row-major, then b_a.
 ACCELEROMETER = slice(PLACES["D"].start, PLACES["b_a"].stop)
 
-# how many parameters each model estimates
+# Number of parameters of each model.
 ACCEL, IMU, HAND = (sum(len(row.names) for row in estimated(model)) for model in MODELS)
 
-# of what the kernel was built for; a kernel of another table must not run
+# A kernel that was built for another table must not run.
 LAYOUT = ", ".join(f"{row.name} {row.form.name} {row.model} {[*row.lanes]}" for row in TABLE)
 
 
 def header() -> str:
-    """The kernel's parameters.hpp: lanes, and structures of doubles in the order of the table."""
+    """Return the kernel's parameters.hpp: lanes, and structures of doubles in the order of the table."""
 
     def fields(rows: Sequence[Parameter]) -> list[str]:
         return [f"  double {row.form.value[1].format(row.field)};  // {row.meaning}" for row in rows]

@@ -1,7 +1,7 @@
-"""A series cut into parts: what each of them says against the estimate, by its score.
+"""Parts of a series, with their scores at the estimate.
 
-Where the model holds, the parts differ by chance. Where it does not (a sensor that drifts, a nonlinear one, vibration),
-the covariance of the estimate knows nothing of it, and only the parts show it: see jackknife.py and bias_walks.py.
+Where the model holds, the parts differ by chance. Where it does not (drift, a nonlinear sensor, vibration), only the
+parts show it, and not the covariance of the estimate: see jackknife.py and bias_walks.py.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ MOST_PARTS, FEWEST_SAMPLES = 96, 16
 
 @dataclass(frozen=True)
 class Parts:
-    """k parts of about equal length, and what each says at the estimate.
+    """Scores of k parts of about equal length, at the estimate.
 
     Attributes
     ----------
-    gradient : (k, p) and fisher : (k, p, p) what each part adds to those of V, by the parameters that were estimated.
-    H : (p, p) Fisher matrix of all with the prior's and the flat mean's. left : (p,) gradient of all likewise, which a
-        minimiser leaves at nearly 0.
+    gradient : (k, p) and fisher : (k, p, p), the share of each part in those of V, by the estimated parameters.
+    H : (p, p) Fisher matrix of all parts, the prior and the flat mean. left : (p,) gradient of them, which a minimiser
+        leaves at nearly 0.
     start, end : (k,) s after the flat segment. side : (k,) 0 to 5, the body's axis nearest to gravity, with its sign.
     """
 
@@ -46,31 +46,31 @@ class Parts:
 
     @cached_property
     def covariance(self) -> Vector:
-        """(p, p) of the estimate, by the model."""
+        """Covariance (p, p) of the estimate, by the model."""
         return inverse(self.H)
 
     def grouped(self, groups: NDArray[np.intp]) -> tuple[Vector, Vector]:
-        """Gradients (m, p) and Fisher matrices (m, p, p) of groups of parts, by (k,) which group each part is in."""
+        """Return gradients (m, p) and Fisher matrices (m, p, p) of groups; `groups` (k,) is the group of each part."""
         member = (groups == np.unique(groups)[:, None]).astype(np.float64)
         fisher = member @ self.fisher.reshape(len(self), -1)
         return member @ self.gradient, fisher.reshape(-1, *self.fisher.shape[1:])
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
-        """(k,) the group of each part, in so many stretches of time."""
+        """Return (k,) the group of each part, in `groups` stretches of time."""
         return np.arange(len(self)) * groups // len(self)
 
 
 def ends_of(problem: Problem) -> NDArray[np.int64] | None:
-    """(k,) where the parts of a problem end; None for a series too short to be cut."""
+    """Return (k,) where the parts of a problem end; None for a series too short to be cut."""
     n = len(problem.series)
     k = min(MOST_PARTS, n // FEWEST_SAMPLES)
     return np.arange(1, k + 1, dtype=np.int64) * n // k if k > 1 else None
 
 
 def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
-    """The parts of a problem at its minimum; None for a series too short to be cut.
+    """Return the parts of a problem at its minimum; None for a series too short to be cut.
 
-    A minimum that was found with the sums up to the parts' ends costs no further pass of the filter.
+    A minimum that was found with sums up to the parts' ends needs no further pass of the filter.
     """
     series, theta, free, ends = problem.series, minimum.theta, minimum.free, ends_of(problem)
     if ends is None:

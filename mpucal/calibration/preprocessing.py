@@ -1,4 +1,4 @@
-"""A recording prepared for the hand's model: its rests, rates for the lever arm, and the hand's noise."""
+"""Preprocessing of a recording for the hand's model: its rests, rates for the lever arm, and the hand's noise."""
 
 from __future__ import annotations
 
@@ -21,26 +21,28 @@ from .rotation import lengths
 from .theta import Prior
 
 HUBER = 2.0
-MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it grows to
-SHAKEN_S, SHAKEN_MPS2 = 0.5, 0.3  # likewise of |y| by its standard deviation, at any rate: who walks, shakes
+MOVING_RAD_S = 0.3  # rate at which a hand's acceleration reaches half of its maximum
+# Standard deviation of |y| within this time that does the same, at any rate: walking shakes the board.
+SHAKEN_S, SHAKEN_MPS2 = 0.5, 0.3
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
-TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0  # lambda: 4.5 Hz of a tremor at rest where rests say nothing, 1.1 Hz of a pivot
+# Lambda: 4.5 Hz for a tremor where the rests do not show it, 1.1 Hz for a pivot.
+TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest
 FLOOR_CORRELATION_S = 0.05  # of jerks
-FLOOR_MPS2 = 0.12  # white acceleration that jerks leave beside the pivot's own
-POSE_MPS2 = 0.0003  # no pose is known better than its mounting is stiff
+FLOOR_MPS2 = 0.12  # white acceleration by jerks, in addition to the pivot's own
+POSE_MPS2 = 0.0003  # standard deviation of a rest's mean, since no mounting is perfectly stiff
 MANY_RESTS = 6
 
 
 @dataclass(frozen=True)
 class Preprocessed:
-    """A recording after its flat segment, and the parts that its noise is made of.
+    """Recording after its flat segment, with the components of its noise.
 
     Attributes
     ----------
     recording, flat : with the gyroscope's drift removed.
     problem : the series with the tremor of the rests, and no noise of moving yet.
-    runs : (k, 2) rests in samples of the recording. rests : how many end after the flat segment.
+    runs : (k, 2) rests in samples of the recording. rests : number of those that end after the flat segment.
     motion : (n,) 0 at rest to 1. pose : (n,) (m/s^2)^2, r_extra of the rests.
     """
 
@@ -54,27 +56,27 @@ class Preprocessed:
 
     @property
     def rests_often(self) -> bool:
-        """Whether there are rests enough to lean on them alone."""
+        """True if the rests alone suffice for an estimate."""
         return self.rests >= MANY_RESTS
 
     def prior(self, **more: tuple[Vector | float, Vector | float]) -> Prior:
-        """What is known of the parameters beforehand; `more` as in prior_of."""
+        """Return the prior of the sensor, with `more` rows, as for Prior.of."""
         return Prior.of_sensor(self.flat, self.recording.sensor, **more)
 
     def white(self, sigma: float, correlation_s: float = 0.0) -> Problem:
-        """White acceleration of sigma m/s^2 while moving; a correlation time tau makes it (1 + 2 tau / dt) of that."""
+        """Return the problem with white acceleration of sigma [m/s^2] in motion, (1 + 2 correlation_s / dt) times."""
         longer = 1.0 + 2.0 * correlation_s / self._dt
         return self._with(r_extra=self.pose + longer * sigma**2 * self.motion)
 
     def pivot(self, sigma: float, floor: float = 0.0, lam: float | None = None) -> Problem:
-        """A pivot whose bounded travel accelerates the board by sigma m/s^2 while moving, over a white floor.
+        """Return the problem with a pivot whose bounded travel accelerates the board by sigma [m/s^2] in motion.
 
-        lam : 1/s, what brings the travel back, where it is not the problem's own.
+        floor : m/s^2, white noise beside it. lam : 1/s, the poles of the travel, if not the problem's own.
         """
         lam = lam or self.problem.lam
         jerk = jerk_density(sigma, lam) * self.motion
         if self.problem.series.jerk is not None:
-            jerk = jerk + lam / self.problem.lam * self.problem.series.jerk  # of the same tremor
+            jerk = jerk + lam / self.problem.lam * self.problem.series.jerk  # which keeps the size of the tremor
         white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
         return replace(self._with(jerk=jerk, r_extra=self.pose + white), lam=lam)
 
@@ -87,9 +89,9 @@ class Preprocessed:
 
 
 def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise: Vector | None = None) -> Preprocessed:
-    """A recording whose flat segment is at[0]..at[1]-1, prepared.
+    """Prepare a recording whose flat segment is at[0]..at[1]-1.
 
-    noise : (n,) factors of Sigma_a, where a recording before downsampling gave them.
+    noise : (n,) factors of Sigma_a, known from before the downsampling of a recording.
     """
     flat = flat_statistics(recording, at)
     rests = RestFinder(recording, flat)
@@ -103,7 +105,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     rest = np.zeros(len(series), bool)
     for a, b in after:
         rest[a:b] = True
-    # at rest they are noise alone, and noise in a regressor pulls the lever arm to zero
+    # At rest, rates are noise alone, and noise in a regressor biases the lever arm towards zero.
     rate, alpha = (np.where(rest[:, None], 0.0, values) for values in smoothed_rates(recording, flat))
     speed2 = np.sum(rate * rate, axis=1)
     acc = level_rests(recording, flat, runs)
@@ -117,7 +119,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
             reset[b] = 0.0
     series = replace(series, rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)
     problem = Problem(series, flat, gravity, huber=HUBER, tail=1.0, lam=lam)
-    # between rests nothing is trusted to be at rest: the ends of a move are slow, and yet the hand's
+    # With many rests, all between them is motion: the ends of a move are slow, but in the hand, too.
     if len(after) >= MANY_RESTS:
         motion = np.where(rest, 0.0, 1.0)
     else:
@@ -126,7 +128,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
 
 
 def jerk_density(sigma: float, lam: float) -> float:
-    """Spectral density of the jerk [(m/s^3)^2/Hz] that gives an acceleration of sigma m/s^2 rms.
+    """Return the spectral density of the jerk [(m/s^3)^2/Hz] for an acceleration of sigma [m/s^2] rms.
 
     The position's three poles at lam leave the acceleration a variance of 3 q / (16 lam).
     """
@@ -134,16 +136,16 @@ def jerk_density(sigma: float, lam: float) -> float:
 
 
 def smoothed_rates(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
-    """Rate and angular acceleration (n, 3) after the flat segment, by which a lever arm accelerates the sensor."""
+    """Return rate and angular acceleration (n, 3) after the flat segment, for the acceleration by a lever arm."""
     k = int(SMOOTH_S * recording.rate_hz)
     rate = _kernel.moving_mean(recording.gyr - flat.b_omega, k)
-    # the times are smoothed as the rates are: those of a computer jitter
+    # The times are smoothed as the rates are, since a computer's times jitter.
     times = _kernel.moving_mean((recording.t - recording.t[0])[:, None], k)[:, 0]
     return rate[flat.last :], np.gradient(rate, times, axis=0)[flat.last :]
 
 
 def _shaken(recording: Recording, flat: Flat) -> Vector:
-    """(n,) 0 to 1 after the flat segment: by how much |y| varies within half a second, which no turn makes it do."""
+    """Return (n,) 0 to 1 after the flat segment, by the variation of |y| within half a second, which no turn causes."""
     size = lengths(recording.acc)
     away = size - size.mean()
     half = max(round(0.5 * SHAKEN_S * recording.rate_hz), 2)

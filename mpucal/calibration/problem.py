@@ -1,4 +1,4 @@
-"""What a filter runs over: the series of a recording, and what is constant over it."""
+"""Problem for a filter: the series of a recording, and what is constant over it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..rests.flat import Flat
 
 @dataclass(frozen=True)
 class Series:
-    """What the filter runs over, one row a sample after the flat segment; None stands for the value in brackets.
+    """Series of samples after the flat segment, a row each; None stands for the value in brackets.
 
     Attributes
     ----------
@@ -22,7 +22,7 @@ class Series:
     dt : (n,) s, that step. r_scale, q_scale : (n,) factors of Sigma_a and Sigma_omega [1].
     q_extra : (n,) rad^2 added to the step's angle variance [0].
 
-    What follows is for the hand's filter alone.
+    The hand's filter alone uses these:
 
     rate, alpha : (n, 3) rad/s, rad/s^2 at the sample, for lever arm and delay [neither].
     r_extra : (n,) (m/s^2)^2 added to the noise of every axis [0].
@@ -48,13 +48,13 @@ class Series:
 
     @classmethod
     def after(cls, recording: Recording, flat: Flat) -> Series:
-        """The samples after the flat segment, with the mean rates from sample to sample."""
+        """Return the samples after the flat segment, with the mean rates from sample to sample."""
         dt = np.diff(recording.t[flat.last - 1 :])
         omega = _kernel.mean_rates(np.ascontiguousarray(recording.gyr), flat.b_omega, dt)
         return cls(y=np.ascontiguousarray(recording.acc[flat.last :]), omega=omega, dt=dt)
 
     def arrays(self, names: tuple[str, ...]) -> dict[str, Any]:
-        """The named fields as the kernel's keyword arguments."""
+        """Return the named fields as the kernel's keyword arguments."""
         return {name: getattr(self, name) for name in names}
 
 
@@ -65,7 +65,7 @@ SERIES_OF_A_HAND = ("rate", "alpha", "r_extra", "jerk", "reset")
 
 @dataclass(frozen=True)
 class Problem:
-    """A series with what is constant over it; huber, tail and lam are the hand's filter's alone.
+    """Series with what is constant over it; the hand's filter alone uses huber, tail and lam.
 
     Attributes
     ----------
@@ -82,15 +82,15 @@ class Problem:
     lam: float = 5.0
 
     def first(self, n: int) -> Problem:
-        """The problem of the first n samples."""
+        """Return the problem of the first n samples."""
         given = {f.name: x[:n] for f in fields(Series) if (x := getattr(self.series, f.name)) is not None}
         return replace(self, series=Series(**given))
 
     def constants(self) -> Vector:
-        """The exact filter's: gravity, Sigma_a, Sigma_omega, the flat mean, its count."""
+        """Return the exact filter's constants: gravity, Sigma_a, Sigma_omega, the flat mean, its count."""
         flat = self.flat
         return np.concatenate([[self.gravity], flat.Sigma_a, flat.Sigma_omega, flat.y, [flat.worth]])
 
     def constants_of_a_hand(self) -> Vector:
-        """The hand's filter's: the exact one's, then huber, tail and lam."""
+        """Return the hand's filter's constants: the exact one's, then huber, tail and lam."""
         return np.concatenate([self.constants(), [self.huber, self.tail, self.lam]])

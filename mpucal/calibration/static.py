@@ -1,4 +1,4 @@
-"""The multi-position calibration: D and b_a by the magnitude of gravity at rest, without the gyroscope.
+"""Multi-position calibration: D and b_a by the magnitude of gravity at rest, without the gyroscope.
 
 Source: Frosio, Pedersini, Borghese, IEEE TIM 58 (2009), equation 5. D is symmetric, nine parameters in all: without a
 gyroscope the orientation of the accelerometer on its board is not observable.
@@ -23,13 +23,13 @@ from .theta import UPPER, from_elements
 # PS-MPU-6000A r3.4, section 6.2: +-3 % of scale factor, +-2 % across axes, both taken as uniform
 SCALE_FACTOR_SD, CROSS_AXIS_SD, BIAS_SD_MPS2 = 0.02, 0.012, 0.5
 PRIOR_SD = np.append(np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD)[UPPER], np.full(3, BIAS_SD_MPS2))
-# (12, 9) D row-major and b_a by the upper triangle of D and b_a
+# (12, 9) maps the upper triangle of D and b_a to D row-major and b_a.
 ALL_OF_NINE = np.zeros((12, 9))
 ALL_OF_NINE[[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11], [0, 1, 2, 1, 3, 4, 2, 4, 5, 6, 7, 8]] = 1.0
 MOST_ITERATIONS, ROUNDS, SETTLED = 30, 8, 1e-9
-# m/s^2 that every rest may be off by, beside its noise and tremor: the least of these that explains the residuals
+# Errors [m/s^2] that rests may have beside noise and tremor: the least that explains the residuals is taken.
 SPREADS_MPS2 = np.append(0.0, np.geomspace(1e-4, 1.0, 80))
-# times the standard deviation, at most, where few residuals are left to tell the spread
+# Largest factor of the standard deviations, where few residuals are left to estimate the spread.
 HONEST = 2.5
 
 
@@ -53,7 +53,7 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
             break
         step = covariance @ (weighted.T @ e + (start - x) / PRIOR_SD**2)
         x, iterations = x + step, iterations + 1
-        if iterations <= ROUNDS:  # the spread goes from one step of its scale to the next and back near the end
+        if iterations <= ROUNDS:  # later, the spread would alternate between two steps of its scale
             extra = _spread(e - J @ step, along, left)
         settled = iterations > ROUNDS and bool(np.abs(step / PRIOR_SD).max() < SETTLED)
     doubt = min(left / (left - 2.0), HONEST**2) if left > 2.0 else HONEST**2
@@ -75,7 +75,7 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
 
 
 def _rests(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
-    """(k, 3) mean accelerations of the rests, and (k,) the variance of a mean beside its noise."""
+    """Return the mean accelerations (k, 3) of the rests, and the variance (k,) of each."""
     runs = RestFinder(recording, flat).typical()
     y, spread = statistics(recording.acc, runs)
     lam = fit_lambda(recording.acc, recording, flat, runs, TREMOR_PER_S)
@@ -86,7 +86,7 @@ def _rests(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
 
 
 def _residuals(x: Vector, y: Vector, gravity: float, variance: Vector) -> tuple[Vector, Vector, Vector]:
-    """(k,) what |s| lacks of gravity, s = inv(D) (y - b_a), its (k, 9) derivatives, and (k,) its variance."""
+    """Return g - |s| (k,) of s = inv(D) (y - b_a), its derivatives (k, 9), and its variance (k,)."""
     inverse = np.linalg.inv(from_elements(Form.SYMMETRIC, x[:6]))
     s = (y - x[6:]) @ inverse
     length = np.linalg.norm(s, axis=1)

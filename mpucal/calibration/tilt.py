@@ -1,7 +1,7 @@
-"""The estimator for a board that cannot be turned upside down: the hand's model with priors from the data sheet.
+"""Estimator for a board that cannot be turned upside down: the hand's model with priors from the data sheet.
 
-Near level, the scale factor and the bias of the vertical axis look alike. So every parameter has its data sheet's
-tolerance as prior, and those that the tilts do not observe keep it and are named (`Fit.at_prior`): no claim is made.
+Near level, the scale factor and the bias of the vertical axis have the same effect. So each parameter has the data
+sheet's tolerance as prior; those that the tilts do not observe keep it, and are named (`Fit.at_prior`).
 """
 
 from __future__ import annotations
@@ -14,27 +14,28 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .fit import Fit
-from .hand import ROUGHLY
 from .hand_noise import HAND_MPS2, WHITE_MPS2, most_likely_sigma
 from .hypothesis_tests import KNOWN, undetermined
-from .levenberg_marquardt import Minimum, minimise
+from .levenberg_marquardt import ROUGHLY, Minimum, minimise
 from .parameters import B_A_NAMES, D_NAMES, NAMES
 from .preprocessing import CORRELATION_S, Preprocessed, preprocess
 from .problem import Problem
+from .static import BIAS_SD_MPS2, SCALE_FACTOR_SD
 from .theta import Theta
 
-# PS-MPU-6000A r3.4, section 6.2: +-3 % of scale factor, +-2 % across axes; a breakout is mounted askew by some degrees.
-SCALE_FACTOR_SD, CROSS_AXIS_SD, BIAS_SD_MPS2 = 0.02, 0.025, 0.5
+# A breakout is mounted askew by some degrees, which adds to the data sheet's +-2 % across axes.
+CROSS_AXIS_SD = 0.025
 D_SD = np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD).ravel()
-# as far as tilts may be asked for, and a little more
+# The largest tilt that is asked for, and a little more.
 CONE_RAD = np.deg2rad(35.0)
 ROUNDS = 2
-# Small angles tell a scale factor from a bias by second-order effects, which no noise model knows to the last bit.
+# Factor of the standard deviations: small angles separate a scale factor from a bias by second-order effects, for which
+# no noise model is exact.
 HONEST = 2.5
 
 
 def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """D, b_a, b_omega, K of a sensor that stayed within a tilt of how it lay flat."""
+    """Estimate D, b_a, b_omega and K of a sensor that stayed within a tilt of its flat orientation."""
     prepared = preprocess(recording, (flat.first, flat.last), gravity)
     prior = prepared.prior(D=(np.eye(3).ravel(), D_SD), b_a=(0.0, BIAS_SD_MPS2))
     u = prepared.flat.y / np.linalg.norm(prepared.flat.y)
@@ -47,12 +48,12 @@ def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
 
 
 def tilted_directions(down: Vector, directions: Vector) -> Vector:
-    """Those of `directions` (n, 3) within the cone about the unit vector `down` (3,)."""
+    """Return those of `directions` (n, 3) within the cone about the unit vector `down` (3,)."""
     return np.asarray(directions[directions @ down >= np.cos(CONE_RAD)])
 
 
 def _white(prepared: Preprocessed, sigma: float) -> Problem:
-    # a redescending loss forgets a start that is far away
+    # A redescending loss does not converge from far away.
     return replace(prepared.white(sigma, CORRELATION_S), tail=0.0 if sigma == 0.0 else 1.0)
 
 

@@ -1,7 +1,7 @@
-"""Transitions between two rests: how far the gyroscope is believed over each.
+"""Transitions from rest to rest, which measure the gyroscope's error between them.
 
-A real gyroscope errs by more than its noise: by its scale's non-linearity, by steps too long for a fast turn. The rests
-on both sides of a transition show by how much.
+A real gyroscope errs by more than its noise: by a nonlinear scale, and by steps too long for a fast turn. The rests on
+both sides of a transition show by how much.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from .problem import Series
 from .rotation import cross, lengths, turned
 from .theta import UPPER, Theta
 
-SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration
+SPEED_OF_TREMOR_S = 0.04  # ratio of a tremor's speed to its acceleration
 FEWEST_TRANSITIONS = 3
 DEGREES_OF_FREEDOM = 4.0
-# a transition of less weight is weighed down by itself; the others differ by chance
+# A transition of less weight gets a scale of its own; the others differ by chance.
 WORTHLESS = 0.02
-# of the two that a miss has, what an estimate leaves at least, in all transitions together
+# Least number of degrees of freedom that an estimate leaves in all transitions together.
 LEAST_LEFT = 1.0
 
 
 class StaticPoses(NamedTuple):
-    """The k rests as the transitions see them.
+    """Poses of the k rests between the transitions.
 
     first, last : (k,) samples of the recording. coming, leaving : (k, 3) m/s^2, the mean specific force of each in the
     body's axes at its first and at its last sample. variance : (k,) rad^2 an axis, of its direction.
@@ -44,11 +44,11 @@ class StaticPoses(NamedTuple):
 
 
 class Transition(NamedTuple):
-    """From one rest to the next.
+    """Transition from one rest to the next.
 
-    span : its steps of the series. F : (3, 3) what they do to gravity in the body frame.
-    leaving, coming : (3,) m/s^2, gravity at its start and its end. miss : (3,) rad, from where the gyroscope carries
-    the one to where the other is. variance : rad^2 an axis, of the miss by noise; of_gyro : the gyroscope's share.
+    span : its steps of the series. F : (3, 3), their effect on gravity in the body frame.
+    leaving, coming : (3,) m/s^2, gravity at its start and its end. miss : (3,) rad, from gravity as the gyroscope
+    carries it to gravity at the end. variance : rad^2 an axis, of the miss by noise; of_gyro : the gyroscope's share.
     """
 
     span: slice
@@ -61,7 +61,7 @@ class Transition(NamedTuple):
 
 
 def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
-    """The transitions under theta; none where they are too few to speak for each other."""
+    """Return the transitions under theta; none where they are too few to be compared."""
     series, flat = prepared.problem.series, prepared.flat
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
     rests = _rests(prepared, turns, theta)
@@ -69,7 +69,7 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
         return []
     spans = [slice(*span) for span in zip(rests.last[:-1] - flat.last, rests.first[1:] + 1 - flat.last, strict=True)]
     F, leaving, coming = np.array([turned(turns[span]) for span in spans]), rests.leaving[:-1], rests.coming[1:]
-    # the sine of the angle between two directions, along their axis
+    # The miss is the sine of the angle between two directions, along their axis.
     carried = np.einsum("kij,kj->ki", F, leaving)
     miss = np.cross(carried, coming) / (lengths(carried) * lengths(coming))[:, None]
     of_gyro = flat.Sigma_omega.mean() * np.array([series.dt[span] @ series.dt[span] for span in spans])
@@ -81,13 +81,13 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
 
 
 def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0) -> Vector:
-    """(k,) rad^2 an axis: the variances with which noise explains all misses.
+    """Return the variances (k,) [rad^2 an axis] with which noise explains all misses.
 
-    z = |miss|^2 / (2 variance). All transitions have a common scale c, the mean of z by Student's t; a lost one has a
-    scale of its own.
+    With z = |miss|^2 / (2 variance), all transitions have a common scale c, the mean of z by Student's t; a lost one
+    has a scale of its own.
 
-    leverage : (k,), what the estimate took of the two degrees of freedom of each miss. The likeliest scale, of the
-        estimate itself, knows of none; an honest one counts what is left.
+    leverage : (k,), the share that the estimate took of the two degrees of freedom of each miss. The most likely scale,
+        for the estimate itself, has none; an honest one counts what is left.
     """
     z = np.array([0.5 * float(transition.miss @ transition.miss) / transition.variance for transition in transitions])
     left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(transitions)))), LEAST_LEFT)
@@ -102,7 +102,7 @@ def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0
 
 
 def q_scale(transitions: list[Transition], variance: Vector, n: int) -> Vector:
-    """(n,) factor of Sigma_omega over a series, that gives the misses these variances (k,)."""
+    """Return the factor (n,) of Sigma_omega over a series that gives the misses these variances (k,)."""
     factor = np.ones(n)
     for transition, wanted in zip(transitions, variance.tolist(), strict=True):
         factor[transition.span] += (wanted - transition.variance) / transition.of_gyro
@@ -112,9 +112,9 @@ def q_scale(transitions: list[Transition], variance: Vector, n: int) -> Vector:
 def leverages(
     transitions: list[Transition], prepared: Preprocessed, theta: Theta, covariance: Vector, variance: Vector
 ) -> Vector:
-    """(k,) tr(J C J') / variance of each miss, 0 to 2.
+    """Return tr(J C J') / variance (k,) of each miss, 0 to 2.
 
-    J : (3, p) the miss by the parameters, C : `covariance` (p, p) of theta, which the misses of `variance` (k,) gave.
+    J (3, p) are the derivatives of the miss, C is the covariance (p, p) of theta from a fit with `variance` (k,).
     """
     J = _jacobians(transitions, prepared.problem.series, theta)
     taken = np.sum((J @ covariance) * J, axis=(1, 2))
@@ -122,8 +122,9 @@ def leverages(
 
 
 def _jacobians(transitions: list[Transition], series: Series, theta: Theta) -> Vector:
-    """(k, 3, p) of the misses u x v by the parameters in the order of NAMES, with u and v near each other."""
-    # phi, the error of the turn in the axes of its end: a step's is -dt dK (omega - b_omega); b_omega the rests tell
+    """Return derivatives (k, 3, p) of the misses u x v in the order of NAMES, with u and v near each other."""
+    # phi is the error of the turn in the axes of its end; that of a step is -dt dK (omega - b_omega), as the rests
+    # determine b_omega.
     steps = [series.dt[of.span, None] * (series.omega[of.span] - theta.b_omega) for of in transitions]
     arrived = np.array([_kernel.turn(-step @ theta.K.T, step)[1] for step in steps])
     by_K = -arrived - np.swapaxes(arrived, 2, 3) * (1.0 - np.eye(3))
@@ -137,7 +138,7 @@ def _jacobians(transitions: list[Transition], series: Series, theta: Theta) -> V
 
 
 def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
-    """(k, 3, p) of measured gravities s (k, 3) by D and b_a: s = inv(D) (y - b_a), ds = -inv(D) (dD s + db_a)."""
+    """Return derivatives (k, 3, p) of gravities s = inv(D) (y - b_a) (k, 3): ds = -inv(D) (dD s + db_a)."""
     ds = np.zeros((len(s), 3, len(NAMES)))
     ds[:, :, PLACES["D"]] = -np.einsum("ai,kj->kaij", inverse, s).reshape(-1, 3, 9)
     ds[:, :, PLACES["b_a"]] = -inverse
@@ -145,13 +146,13 @@ def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
 
 
 def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> StaticPoses:
-    """The flat segment and the rests after it; `turns` (n, 3) rad are the steps of the series."""
+    """Return the flat segment and the rests after it; `turns` (n, 3) [rad] are the steps of the series."""
     recording, flat = prepared.recording, prepared.flat
-    inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
+    inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D, and must not stop there
     runs = prepared.runs[prepared.runs[:, 1] > flat.last + 1]
     mean, spread = statistics(recording.acc, runs)
     s, n = (mean - theta.b_a) @ inverse.T, runs[:, 1] - runs[:, 0]
-    # a board in a hand turns a little as it rests: each sample counts in the axes of either end
+    # A board in a hand turns a little as it rests: each sample is rotated into the axes of either end.
     path = np.zeros((len(recording) + 1, 3))
     np.cumsum(turns, axis=0, out=path[flat.last + 1 :])
     across = statistics(np.cross(path[1:], (recording.acc - theta.b_a) @ inverse.T), runs)[0]

@@ -1,8 +1,7 @@
-"""Orientations that a fit has not seen, against what its covariance predicts of them.
+"""Verification of a fit by orientations that it has not seen, with the predictions of its covariance.
 
-Two things can be wrong where the board was held still: the calibrated magnitude, which must be g, and the direction,
-which must be that of the orientation before, as the gyroscope carries it there. Both errors are compared with their
-predicted standard deviations (1 sigma).
+At rest, the calibrated magnitude must be g, and the direction that of the rest before, as the gyroscope carries it.
+Both errors are compared with their predicted standard deviations (1 sigma).
 """
 
 from __future__ import annotations
@@ -22,25 +21,26 @@ from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import turned
 from .theta import UPPER, from_elements
 
-# What no covariance holds: a mounting is not stiffer, and the gyroscope's bias wanders while the board is turned.
+# Errors in no covariance: a mounting is not perfectly stiff, and the gyroscope's bias wanders during the turning.
 FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02)
-# Beyond so many standard deviations chance is no excuse.
+# Larger errors than so many predicted standard deviations are not by chance.
 MOST_STD = 4.0
 LEAST_REST_S, BLOCK_S = 0.75, 0.25
-# No hand turns so fast so soon. An autopilot's simulator does; its low pass and 200 samples a second carry it so well.
+# Only an autopilot's simulator turns so fast and so suddenly; the last number is the error of its rates, low-passed and
+# at 200 samples/s.
 LEAP_RAD_S, LEAP_RAD_S2, LEAP_RAD = np.radians([200.0, 10_000.0, 0.5]).tolist()
 
 
 @dataclass(frozen=True)
 class NewOrientation:
-    """One orientation that the fit has not seen; `_std` are predicted standard deviations.
+    """Orientation that the fit has not seen; `_std` are predicted standard deviations.
 
     Attributes
     ----------
-    down : (3,) unit, what pointed down, calibrated. magnitude, magnitude_std : |a| - g [m/s^2].
-    direction, direction_std : angle of gravity carried here to gravity here [rad].
-    turn : (3,) rad, how the board turned on its way here, in its own axes. miss : (3,) rad, that angle about its axis.
-    clipped : the gyroscope was at the end of its range on that way, or samples are missing: nothing says the direction.
+    down : (3,) unit, the calibrated direction that points down. magnitude, magnitude_std : |a| - g [m/s^2].
+    direction, direction_std : angle between gravity as carried here and gravity here [rad].
+    turn : (3,) rad, the turn on the way here, in the board's axes. miss : (3,) rad, `direction` about its axis.
+    clipped : the gyroscope clipped on the way, or samples are missing, so that the direction cannot be compared.
     """
 
     down: Vector
@@ -54,34 +54,34 @@ class NewOrientation:
 
     @property
     def magnitude_agrees(self) -> bool:
-        """|a| is g as far as predicted."""
+        """True if |a| is g within the prediction."""
         return abs(self.magnitude) <= MOST_STD * self.magnitude_std
 
     @property
     def agrees(self) -> bool:
-        """Both."""
+        """True if magnitude and direction both agree."""
         return self.magnitude_agrees and self.direction_agrees
 
     @property
     def direction_agrees(self) -> bool:
-        """Gravity is where it was carried, as far as predicted."""
+        """True if gravity is where the gyroscope carried it, within the prediction."""
         return self.clipped or self.direction <= MOST_STD * self.direction_std
 
 
 def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[NewOrientation]:
-    """What the still intervals that begin after sample `since` say of `fit`, one after the other."""
+    """Verify `fit` by the rests that begin after sample `since`, one after the other."""
     rests = RestFinder(recording, flat)
     runs = rests.any_hand()
     recording = remove_drift(recording, flat, rests.bias_runs(runs))
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))
     return [
-        _Move(recording, flat, long[k - 1], long[k]).judged_by(fit, gravity) for k in range(max(first, 1), len(long))
+        _Transition(recording, flat, long[k - 1], long[k]).verify(fit, gravity) for k in range(max(first, 1), len(long))
     ]
 
 
-class _Move:
-    """From one still interval to the next: their means, and the gyroscope's steps between them."""
+class _Transition:
+    """Transition from one rest to the next: their means, and the gyroscope's steps between them."""
 
     def __init__(self, recording: Recording, flat: Flat, start: tuple[int, int], end: tuple[int, int]) -> None:
         (a, b), (c, d) = start, end
@@ -94,8 +94,8 @@ class _Move:
         noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
         self.gyro_var = 2.0 * noise + (LEAP_RAD**2 if _leaps(r.gyr[between], dt) else 0.0)
 
-    def judged_by(self, fit: Fit, gravity: float) -> NewOrientation:
-        """What its end says of a fit."""
+    def verify(self, fit: Fit, gravity: float) -> NewOrientation:
+        """Compare the rest at its end with a fit."""
         theta, covariance = _theta(fit)
         s, miss = self._end(theta), self._miss(theta)
         of_length = _slope(lambda x: np.array([np.linalg.norm(self._end(x))]), theta)
@@ -116,17 +116,17 @@ class _Move:
         )
 
     def _end(self, theta: Vector) -> Vector:
-        """(3,) m/s^2, the calibrated mean at its end."""
+        """Return the calibrated mean (3,) [m/s^2] at its end."""
         return _calibrated(theta, self.y)
 
     def _miss(self, theta: Vector) -> Vector:
-        """(3,) sine of the angle between gravity carried to its end and gravity there, along the axis of that angle."""
+        """Return the sine (3,) of the angle from gravity as carried to its end to gravity there, along its axis."""
         F = turned(-(self.steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
         return np.cross(_unit(F @ _calibrated(theta, self.z)), _unit(self._end(theta)))
 
 
 def _leaps(gyr: Vector, dt: Vector) -> bool:
-    """Whether rates (n, 3) change as no hand's do, over the (n - 1,) seconds between them."""
+    """Return True if rates (n, 3) change faster than any hand's over the intervals dt (n - 1,) [s]."""
     fast = bool((np.abs(gyr) > LEAP_RAD_S).any())
     return fast and bool((np.abs(np.diff(gyr, axis=0)) > LEAP_RAD_S2 * dt[:, None]).any())
 
@@ -136,7 +136,7 @@ def _calibrated(theta: Vector, y: Vector) -> Vector:
 
 
 def _theta(fit: Fit) -> tuple[Vector, Vector]:
-    """(18,) D, b_a and K's six, and their covariance; zero for those that were not estimated."""
+    """Return D, b_a and K's six (18,), and their covariance, zero for those that were not estimated."""
     names = (*D_NAMES, *B_A_NAMES, *K_NAMES)
     place = {name: i for i, name in enumerate(fit.names)}
     covariance = np.zeros((18, 18))
@@ -147,14 +147,14 @@ def _theta(fit: Fit) -> tuple[Vector, Vector]:
 
 
 def _slope(function: Callable[[Vector], Vector], theta: Vector) -> Vector:
-    """(m, 18) derivatives by central differences: a prediction needs no more digits."""
+    """Return derivatives (m, 18) by central differences, exact enough for a prediction."""
     h = 1e-5
     steps = h * np.eye(len(theta))
     return np.stack([(function(theta + step) - function(theta - step)) / (2.0 * h) for step in steps], axis=1)
 
 
 def _mean(part: Vector, rate_hz: float) -> tuple[Vector, Vector]:
-    """(3,) mean of a still interval, and its variance by the spread of shorter means: a tremor is not white."""
+    """Return the mean (3,) of a rest, and its variance by the spread of shorter means, as a tremor is not white."""
     n = max(round(BLOCK_S * rate_hz), 1)
     blocks = part[: len(part) // n * n].reshape(-1, n, 3).mean(1)
     return part.mean(0), blocks.var(0, ddof=1) / len(blocks)
