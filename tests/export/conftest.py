@@ -1,8 +1,11 @@
-"""A calibration like a real one, and what it makes of samples."""
+"""A calibration like a real one, samples, and a compiler."""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ from mpucal.data import Sensor
 from mpucal.result.calibration import Calibration
 
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
+LIBRARY = Path(__file__).parents[2] / "mpucal" / "firmware" / "src"
 APPLIED = np.array([0.25, -0.2, 1.0])
 
 
@@ -41,3 +45,24 @@ def calibrated(request, calibration):
 def samples():
     """(200, 3) m/s^2 as measured."""
     return np.random.default_rng(2).uniform(-35.0, 35.0, (200, 3))
+
+
+@pytest.fixture(scope="session")
+def compiled():
+    """Return a function that compiles a program, and returns what runs it: text in, rows of numbers out."""
+
+    def compiled(folder, name, source, *flags):
+        compiler = "g++" if name.endswith(".cpp") else "gcc"
+        if shutil.which(compiler) is None:
+            pytest.skip(f"needs {compiler}")
+        (folder / name).write_text(source)
+        words = [compiler, "-Wall", "-Werror", *flags, "-I.", f"-I{LIBRARY}", "-o", "program", name]
+        subprocess.run(words, cwd=folder, check=True)
+
+        def run(text=""):
+            done = subprocess.run([folder / "program"], input=text, capture_output=True, text=True, check=True)
+            return np.array([line.split() for line in done.stdout.splitlines()], float)
+
+        return run
+
+    return compiled

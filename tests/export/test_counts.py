@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +14,6 @@ from mpucal.files.capture import load_capture
 from mpucal.result.calibration import Calibration
 
 ROOT = Path(__file__).parents[2]
-LIBRARY = ROOT / "mpucal" / "firmware" / "src"
 RANGES = tuple(zip(reg.ACCEL_RANGES_G, reg.GYRO_RANGES_DPS, strict=True))
 # rounding of float32 at full scale: eight roundings of 16 g and of 2000 deg/s
 ATOL_A, ATOL_W = 8 * 2**-24 * 160, 8 * 2**-24 * 40
@@ -53,18 +50,16 @@ def _samples_applied(calibration, words, code):
 
 
 @pytest.fixture(scope="module")
-def in_c(tmp_path_factory, words):
+def in_c(tmp_path_factory, words, compiled):
     """Compiles the C header of each range and the blob of each into one program, once; gives what it prints of each."""
-    if shutil.which("g++") is None:
-        pytest.skip("needs g++")
     folder, printed = tmp_path_factory.mktemp("counts"), {}
 
     def of(calibration, code):
         if not printed:
-            _compile(folder, [_at(calibration, each) for each in range(4)])
+            program = _program(folder, [_at(calibration, each) for each in range(4)])
+            run = compiled(folder, "main.cpp", program, "-std=c++11", "-Wno-unused")
             fed = "".join(" ".join(map(str, row)) + "\n" for row in words)
-            said = subprocess.run([folder / "program"], input=fed, capture_output=True, text=True, check=True).stdout
-            printed["all"] = np.array([line.split() for line in said.splitlines()], float).reshape(len(words), 4, 18)
+            printed["all"] = run(fed).reshape(len(words), 4, 18)
         return np.split(printed["all"][:, code], 6, axis=1)
 
     return of
@@ -103,7 +98,8 @@ int main() {{
 """
 
 
-def _compile(folder, calibrations):
+def _program(folder, calibrations):
+    """Return the program, whose headers are written to the folder."""
     for code, each in enumerate(calibrations):
         (folder / f"range{code}.h").write_text(form("c-header").export(each)[0])
     namespaces = "\n".join(
@@ -116,10 +112,7 @@ def _compile(folder, calibrations):
     )
     blobs = [each.blob().encode() for each in calibrations]
     text = ", ".join("{" + ", ".join(map(str, blob)) + "}" for blob in blobs)
-    filled = PROGRAM.format(namespaces=namespaces, calls=calls, blobs=text, length=len(blobs[0]))
-    (folder / "main.cpp").write_text(filled)
-    words = ["g++", "-std=c++11", "-Wno-unused", f"-I{LIBRARY}", "-I.", "-o", "program", "main.cpp"]
-    subprocess.run(words, cwd=folder, check=True)
+    return PROGRAM.format(namespaces=namespaces, calls=calls, blobs=text, length=len(blobs[0]))
 
 
 def test_the_c_header_and_mpucal_apply(ranged, calibration, in_c):

@@ -4,7 +4,6 @@ import ast
 import json
 import math
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -22,39 +21,11 @@ from mpucal.export.ros import ros_node
 from mpucal.result.calibration import Calibration
 
 ROOT = Path(__file__).parents[2]
-LIBRARY = ROOT / "mpucal" / "firmware" / "src"
 # what the header says of itself
 FLOAT_MPS2 = 2e-4
 USABLE_ONLY = [row.name for row in FORMS if row.only_usable]
 FOLLOWING = {"b_a_slope": np.array([0.001, -0.02, 0.003]), "temperature_range_c": np.array([5.0, 40.0])}
 TEMPERATURES_C = np.array([-20.0, 5.0, 12.5, 27.5, 33.0, 60.0, np.nan])
-
-
-def compiled(folder, name, source, *flags):
-    compiler = "g++" if name.endswith(".cpp") else "gcc"
-    if shutil.which(compiler) is None:
-        pytest.skip(f"needs {compiler}")
-    (folder / name).write_text(source)
-    words = [
-        compiler,
-        "-Wall",
-        "-Wextra",
-        "-Wpedantic",
-        "-Werror",
-        *flags,
-        "-I.",
-        f"-I{LIBRARY}",
-        "-o",
-        "program",
-        name,
-    ]
-    subprocess.run(words, cwd=folder, check=True)
-
-    def run(text):
-        done = subprocess.run([folder / "program"], input=text, capture_output=True, text=True, check=True)
-        return np.array([line.split() for line in done.stdout.splitlines()], float)
-
-    return run
 
 
 def table(values):
@@ -93,15 +64,16 @@ int main(void) {
 }
 """
 FAST = ("-std=c99", "-O2", "-ffast-math")
+STRICT = ("-Wextra", "-Wpedantic")
 
 
 @pytest.mark.parametrize("flags", [FAST, ("-x", "c++", "-std=c++11")], ids=["C99", "C++11"])
-def test_the_c_header_compiled_and_run(calibrated, samples, tmp_path, flags):
+def test_the_c_header_compiled_and_run(calibrated, samples, compiled, tmp_path, flags):
     calibrated = replace(calibrated, **FOLLOWING)
     text, notes = form("c-header").export(calibrated)
     (tmp_path / "calibration.h").write_text(text)
     T = np.resize(TEMPERATURES_C, len(samples))
-    run = compiled(tmp_path, "main.c" if flags == FAST else "main.cpp", C, "-Wconversion", *flags)
+    run = compiled(tmp_path, "main.c" if flags == FAST else "main.cpp", C, *STRICT, "-Wconversion", *flags)
     out = run(table(np.column_stack([samples, T])))
     error = np.abs(out[:, :3] - calibrated.apply(samples, temperature_c=T)).max()
     assert error < FLOAT_MPS2
@@ -114,9 +86,9 @@ COUNTS = np.random.default_rng(3).integers(-32768, 32768, (100, 3))
 MEASURED_A, MEASURED_W = COUNTS * (4 * STANDARD_GRAVITY_MPS2 / 32768), COUNTS * np.radians(1 / 65.5)
 
 
-def test_the_c_header_takes_counts_of_its_range_alone(calibrated, tmp_path):
+def test_the_c_header_takes_counts_of_its_range_alone(calibrated, compiled, tmp_path):
     (tmp_path / "calibration.h").write_text(form("c-header").export(calibrated)[0])
-    out = compiled(tmp_path, "main.c", C_COUNTS, "-std=c99", "-Wconversion")(table(COUNTS))
+    out = compiled(tmp_path, "main.c", C_COUNTS, *STRICT, "-std=c99", "-Wconversion")(table(COUNTS))
     assert (out[:, :2] == (2, 0)).all()
     np.testing.assert_allclose(out[:, 2:], np.hstack(calibrated.apply(MEASURED_A, MEASURED_W)), atol=FLOAT_MPS2)
     refused = subprocess.run(
@@ -175,7 +147,7 @@ int main() {
 
 
 @pytest.mark.parametrize(("range_g", "bits"), [(2.0, 0x00), (4.0, 0x08), (8.0, 0x10), (16.0, 0x18)])
-def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibrated, tmp_path, range_g, bits):
+def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibrated, compiled, tmp_path, range_g, bits):
     calibrated = replace(
         calibrated, sensor=replace(calibrated.sensor, accel_range_g=range_g, gyro_range_dps=125 * range_g), **FOLLOWING
     )
@@ -183,7 +155,7 @@ def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibrated, tmp_p
     (tmp_path / "Arduino.h").write_text(ARDUINO)
     (tmp_path / "Wire.h").write_text(WIRE)
     counts = np.random.default_rng(1).integers(-32768, 32768, (100, 7))
-    run = compiled(tmp_path, "host.cpp", HOST, "-std=c++11", f"-DRANGE_BITS={bits}")
+    run = compiled(tmp_path, "host.cpp", HOST, *STRICT, "-std=c++11", f"-DRANGE_BITS={bits}")
     out = run("".join(" ".join(map(str, row)) + "\n" for row in counts))
     y = counts[:, :3] * range_g * STANDARD_GRAVITY_MPS2 / 32768
     a, w = calibrated.apply(y, counts[:, 4:] * np.radians(range_g / 2 / 131), counts[:, 3] / 340 + 36.53)
@@ -353,7 +325,7 @@ def test_json_and_blob_make_each_other(calibrated, tmp_path):
     np.testing.assert_allclose(document["accelerometer"]["D"], calibrated.D, rtol=1e-7)
 
 
-@pytest.mark.parametrize("name", USABLE_ONLY)
+@pytest.mark.parametrize("name", [*USABLE_ONLY, "kalibr", "openvins"])
 @pytest.mark.parametrize(
     "changes",
     [{"quality": {"verdict": "refused"}}, {"b_a": np.full(3, math.nan)}, {"D": np.ones((3, 3))}],
