@@ -1,1 +1,1 @@
-"""The C++ kernel: the gravity filter with exact derivatives. Arrays in, arrays out."""
+"""Kernel in C++: the gravity filter with exact derivatives. Arrays in, arrays out."""

@@ -1,16 +1,17 @@
 // One step of position, velocity and acceleration under d^3p/dt^3 = -3 lam a - 3 lam^2 v - lam^3 p + white noise.
 //
-// They are carried as a, b = -2 lam a - 3 lam^2 v - lam^3 p and c = lam^2 a + 2 lam^3 v + lam^4 p. Beside the noise
-// a' = -lam a + b, b' = -lam b + c and c' = -lam c: a step is a triangle, and a, which is measured, is one of them.
+// The state is a, b = -2 lam a - 3 lam^2 v - lam^3 p and c = lam^2 a + 2 lam^3 v + lam^4 p. Without noise
+// a' = -lam a + b, b' = -lam b + c and c' = -lam c: the matrix of a step is triangular, and a, which is measured, is a
+// component of the state.
 #pragma once
 #include <cmath>
 
 #include "lane.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filters keeps its own
+namespace {  // each instruction set has its own copy
 
-// exp(-z), and the sum of (2 z)^n / (5 6 ... (5 + n)) for n = 0, 1 ...: all that is transcendental in a step
+// exp(-z), and the sum of (2 z)^n / (5 6 ... (5 + n)) for n = 0, 1 ...: the only transcendental functions of a step
 struct Decay {
   Lane decay, sum;
 };
@@ -26,10 +27,10 @@ struct Factorials {
 };
 constexpr Factorials kOfDecay(1.0, 1), kOfSum(0.2, 6);
 
-// sum of c_n x^n; remainders below 1e-17 for |x| < 1
+// Sum of c_n x^n; remainders below 1e-17 for |x| < 1
 MPUCAL_INLINE Lane series(const Factorials& f, const Lane& x) {
   const Lane x2 = x * x;
-  Lane even = all(f.c[f.count - 2]), odd = all(f.c[f.count - 1]);  // powers, which need not wait for each other
+  Lane even = all(f.c[f.count - 2]), odd = all(f.c[f.count - 1]);  // powers in two independent chains
   for (int n = f.count - 4; n >= 0; n -= 2) even = madd(x2, even, f.c[n]), odd = madd(x2, odd, f.c[n + 1]);
   return madd(x, odd, even);
 }
@@ -54,8 +55,8 @@ MPUCAL_INLINE Decay decay_of(const Lane& z) {
   return {series(kOfDecay, -1.0 * z), series(kOfSum, 2.0 * z)};
 }
 
-// Three equal poles at -lam keep the position bounded. Phi holds the first row of the triangle exp(A h), its diagonals
-// being constant; Q is the integral of g g', g(t) the response of (a, b, c) to an impulse of jerk, for unit spectral
+// Three equal poles at -lam keep the position bounded. Phi holds the first row of the triangle exp(A h), whose diagonals
+// are constant; Q is the integral of g g', g(t) the response of (a, b, c) to an impulse of jerk, for unit spectral
 // density. Four steps, one to a lane.
 struct Chain {
   Lane Phi[3], Q[6];

@@ -1,12 +1,12 @@
-// What the derivatives of four steps are linear in: functions of the recursion's s and P alone, shared by all
-// parameters. Everything is computed for four steps at once; what a group of parameters needs as a vector over the
-// parameters is then turned round, [step][...].
+// Coefficients of the derivatives, which are linear in them: functions of the recursion's s and P alone, shared by all
+// parameters. They are computed for four steps at once; those that a group of parameters needs as a vector over the
+// parameters are then transposed, [step][...].
 #pragma once
 #include "filter.hpp"
 #include "recursion.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
 struct Coefficients {
   // the measurement, whitened by L^-1 =: V
@@ -24,7 +24,7 @@ struct Coefficients {
   Lane sc[3][3];                             // s_a c_b
   Lane eta_b[4][3], eta_K[4][3], eta_K2[4][3];  // of d(F x) = eta x (F x): for b_omega, K_xx to K_xz, K_yy to K_zz
 
-  // In an order that lets the roots and the division of the whitening end while other things are computed
+  // The order lets the roots and the division of the whitening end while other values are computed.
   template <int G>
   MPUCAL_APART void compute(const Model& model, const Steps& steps, const Predicted& predicted) {
     Lane S[6], e[3], s_before[3], A[3][3], P[6], K[3][3], plus[3];
@@ -73,7 +73,7 @@ struct Coefficients {
     turn_round(plus, 1.0, q_plus);
   }
 
-  // V(theta) and what it is linear in
+  // V(theta) and its coefficients
   MPUCAL_INLINE void whiten(const Parameters& p, const Lane (&e)[3], const Lane (&A)[3][3]) {
     multiply_lower(white, p.D, T);
     multiply_lower(white, e, residual);

@@ -1,10 +1,10 @@
-// ds and dP by the parameters, four parameters at a time, carried through the steps beside the recursion.
+// Derivatives of s and P by the parameters, four parameters at a time, propagated step by step with the recursion.
 #pragma once
 #include "coefficients.hpp"
 #include "fisher.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
 // x += n x (a, b, c)
 MPUCAL_INLINE void add_cross(const Lane (&n)[3], double a, double b, double c, Lane (&x)[3]) {
@@ -43,7 +43,7 @@ class Derivatives {
   }
 
  private:
-  // `width` groups from `first` on: what they share is loaded once, and one computes while the other waits
+  // `width` groups from `first` on: shared values are loaded once, and one group computes while the other waits.
   template <int first, int width>
   MPUCAL_APART void run_groups(const Coefficients* steps, int count, Lane (*rows)[G]) {
     Lane s[width][3], P[width][6], gradient[width];
@@ -107,7 +107,7 @@ class Derivatives {
     for (int w = 0; w < width; ++w) out(w) = sum[w];
   }
 
-  // F N W (ds + dP z), what the parameters do of themselves in D and b_a, and eta x s
+  // F N W (ds + dP z), the direct effect of D and b_a, and eta x s
   template <int first, int width>
   MPUCAL_INLINE static void carry_s(const Coefficients& c, int t, const Lane (&s)[width][3], const Lane (&P)[width][6],
                                     Lane (&out)[width][3]) {
@@ -129,7 +129,7 @@ class Derivatives {
     });
   }
 
-  // F W dP (F W)', and what the parameters do of themselves in D
+  // F W dP (F W)', and the direct effect of D
   template <int first, int width>
   MPUCAL_INLINE static void carry_P(const Coefficients& c, int t, const Lane (&P)[width][6], Lane (&out)[width][6]) {
     for (int m = 0; m < 6; ++m) {
@@ -177,7 +177,7 @@ class Derivatives {
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
         if (a != b) {
-          // s_a c_b stands in the diagonal's place of the third axis, and beside b
+          // s_a c_b is in the diagonal's place of the third axis, and next to b.
           const int other = 3 - a - b;
           const Lane factor = all(at(c.sc[a][b], t));
           for (int w = 0; w < width; ++w) {

@@ -8,7 +8,7 @@
 //
 // Derivatives run forward, four parameters to a lane group. A parameter's lane is given by `Lanes`, which the
 // table of calibration/parameters.py makes: row j of D and b_a[j] share lane group j, so that their partial derivatives
-// are products of one vector with scalars; what turns the body stands where `eta` in coefficients.hpp has it.
+// are products of one vector with scalars; the gyroscope's parameters are in the order of `eta` in coefficients.hpp.
 #pragma once
 #include <cstddef>
 
@@ -19,10 +19,10 @@ namespace mpucal {
 static_assert(Lanes::D == 0 && Lanes::b_a == 3);
 static_assert(Lanes::b_omega % 4 == 0 && Lanes::K % 4 == 1);
 
-// How many groups of four hold so many lanes
+// Number of groups of four for so many lanes
 constexpr int groups_of(int lanes) { return (lanes + 3) / 4; }
 
-// What the filter runs over, (n,) or (n, 3) row by row; a null pointer means the value in brackets.
+// Input series of the filter, (n,) or (n, 3) row by row; a null pointer means the value in brackets.
 struct Series {
   std::size_t n;
   const double* y;        // m/s^2
@@ -45,13 +45,13 @@ struct Ends {
   int count;
 };
 
-// What comes out; gradient and fisher are not written for the value alone.
+// Output; gradient and fisher are not written for the value alone.
 struct Result {
   double V;
   double squares;         // sum of e' S^-1 e over the n samples
   Ends ends;
   double* gradient;       // (ends, lanes), filled up to whole groups: of the samples before each end
-  double* fisher;         // (ends, lanes, lanes), likewise
+  double* fisher;         // (ends, lanes, lanes), as the gradient
 };
 
 // lanes: 0 (value only) or those of a model

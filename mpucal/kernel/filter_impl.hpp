@@ -6,7 +6,7 @@
 namespace mpucal {
 namespace {
 
-constexpr int kFours = 2;             // worked on together: what they share stays in the first cache
+constexpr int kFours = 2;             // processed together, so that shared values stay in the first cache
 constexpr long kBlock = 4 * kFours;
 
 template <int lanes>

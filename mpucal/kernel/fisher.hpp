@@ -5,7 +5,7 @@
 #include "lane.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
 // Lower triangle of the matrix over so many lanes, filled up to G groups
 template <int used>
@@ -38,7 +38,7 @@ class Fisher {
  private:
   template <int height, int width>
   MPUCAL_INLINE void tile(const Lane (*rows)[G], int count, int i, int j) {
-    constexpr int abreast = height * width < 8 ? 2 : 1;  // rows: a small tile's sums would wait for each other
+    constexpr int abreast = height * width < 8 ? 2 : 1;  // rows: the sums of a small tile would depend on each other
     Lane sum[abreast][height][width];
     for (int a = 0; a < height; ++a)
       for (int b = 0; b < width; ++b) {

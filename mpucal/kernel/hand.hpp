@@ -1,6 +1,6 @@
-// The filter of a sensor that a hand moves: gravity, and the hand's bounded travel beside it: arrays in, numbers out.
+// Filter for a sensor that a hand moves: gravity and the hand's bounded travel. Arrays in, numbers out.
 //
-// The state is four vectors that turn with the body, s gravity (|s| = g), p, v, a the hand's travel, speed and
+// The state is four vectors in the body frame, s gravity (|s| = g), p, v, a the hand's travel, speed and
 // acceleration; x = (s, p, v, a), P its covariance:
 //   e = y - D (E s + a + L r) - b_a,  E = I + tau [omega]x,  L = [alpha]x + [omega]x^2,  S = H P H' + R
 //   x <- x + K e,  s <- g s / |s|,  P <- P - K H P,  K = P H' (H P H' + R / w)^-1
@@ -21,7 +21,7 @@ struct HandSeries : Series {
   const double* alpha;    // rad/s^2 at the sample
   const double* r_extra;  // (m/s^2)^2 added to R on each axis [0]
   const double* jerk;     // (m/s^3)^2/Hz, the chain's noise [0]
-  const double* reset;    // m/s^2: here p = v = a = 0 anew, with this standard deviation of a; below zero: not [none]
+  const double* reset;    // m/s^2: reset to p = v = a = 0 with this standard deviation of a; below zero: no reset [none]
 };
 
 struct HandConstants : Constants {
@@ -30,13 +30,13 @@ struct HandConstants : Constants {
   double lam;    // 1/s, the chain's poles
 };
 
-// What comes out: V and squares, and either the next two or the last three where their pointers are not null.
+// Output: V and squares, and either the next two or the last three where their pointers are not null.
 struct HandResult {
   double V;
   double squares;      // sum of e' S^-1 e over the n samples
   Ends ends;
   double* gradient;    // (ends, lanes), filled up to whole groups: of the samples before each end
-  double* fisher;      // (ends, lanes, lanes), likewise
+  double* fisher;      // (ends, lanes, lanes), as the gradient
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update
   double* motion;      // (n, 3) a before the update

@@ -1,16 +1,16 @@
-// dx by the parameters with the gains held, four parameters at a time, carried through the steps beside the recursion.
+// Derivatives of x by the parameters with fixed gains, four parameters at a time, propagated with the recursion.
 #pragma once
 #include "fisher.hpp"
 #include "hand_recursion.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filters keeps its own
+namespace {  // each instruction set has its own copy
 
 constexpr int kHandGroups = groups_of(LanesUsed::hand);
 
-// What the derivatives of four steps share
+// Shared coefficients of the derivatives of four steps
 struct HandCoefficients {
-  Lane white[3][3], residual[3];                // sqrt(w) L^-1, and it times e
+  Lane white[3][3], residual[3];                // sqrt(w) L^-1, and its product with e
   Lane q[4];                                    // E s + a + L r in the body, and 1
   Lane delay[3], lever[4][3];                   // D [omega]x s, D L
   Lane direction[3], stretch;                   // of s after the update
@@ -139,7 +139,7 @@ class HandDerivatives {
     }
   }
 
-  // x + K e, and s keeps its length; then Phi x + eta x (Phi x). A new beginning forgets the chain.
+  // x + K e, and s keeps its length; then Phi x + eta x (Phi x). A reset forgets the chain.
   template <int g>
   MPUCAL_INLINE static void follow(const HandSteps& four, const HandPredicted& met, const HandCoefficients& c, int t,
                                    const Lane (&e)[3], State& x) {

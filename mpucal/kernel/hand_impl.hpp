@@ -7,7 +7,7 @@
 namespace mpucal {
 namespace {
 
-constexpr int kFours = 4;  // worked on together: what they share stays in the first cache
+constexpr int kFours = 4;  // processed together, so that shared values stay in the first cache
 constexpr long kBlock = 4 * kFours;
 
 // Whitened innovations, s and a of the samples among these steps

@@ -1,4 +1,4 @@
-// The recursion of the hand's x and P, a step at a time, and V along it.
+// Recursion of the hand's x and P, a step at a time, with V.
 //
 // The four vectors of x, s and the chain's a, b and c, are the four places of a Lane, so that the chain is one 4 x 4
 // matrix for all axes.
@@ -6,12 +6,12 @@
 #include "hand_steps.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filters keeps its own
+namespace {  // each instruction set has its own copy
 
-constexpr double kSpeedOfReset = 0.04;     // s: a rest that trembles by a moves at this times a
+constexpr double kSpeedOfReset = 0.04;     // s: ratio of a tremor's speed to its acceleration
 constexpr int kState = 4, kS = 0, kA = 1;  // places of s and a in (s, a, b, c)
 
-// What four measurements met and did, one to a lane or [step]
+// State before and effect of four measurements, one to a lane or [step]
 struct HandPredicted {
   Lane s[3], a[3];             // of x before the measurement
   Lane e[3], S[6], w;          // w: the robust weight
@@ -32,7 +32,8 @@ class HandRecursion {
   double V() const { return V_; }
   double squares() const { return squares_; }
 
-  // The next `count` steps; the flat mean, which begins them, is no sample: nothing robust, not among the squares
+  // The next `count` steps. The flat mean, which begins them, is no sample: it has no robust weight, and is not among
+  // the squares.
   template <bool kept>
   MPUCAL_APART void run(const HandSteps* steps, int count, bool flat, HandPredicted* predicted) {
     double determinants = 1.0, outliers = 1.0;
@@ -114,7 +115,7 @@ class HandRecursion {
     for (int m = 0; m < 6; ++m) put(kept.S[m], t, S[m]);
   }
 
-  // The weight, and rho added to V; the redescending one's logarithm is left to `outliers`
+  // The weight, and rho added to V; the logarithm of the redescending rho is left to `outliers`
   MPUCAL_INLINE double weigh(double square, double& outliers) {
     if (!(square > threshold_)) return plain(square);
     if (c_.tail != 0.0) {
@@ -144,8 +145,8 @@ class HandRecursion {
       }
   }
 
-  // P <- Phi (P - K A') Phi' + the noise of the jerk and of the gyro; s its length again, x <- Phi x. The length comes
-  // late, so what needs it comes last.
+  // P <- Phi (P - K A') Phi' + noise of the jerk and of the gyroscope; restore the length of s, x <- Phi x. The length is
+  // computed last, and so is all that depends on it.
   MPUCAL_INLINE void follow(const HandSteps& four, int t, const Lane (&A)[3][3], const Lane (&K)[3][3]) {
     const double Phi[3] = {at(four.chain.Phi[0], t), at(four.chain.Phi[1], t), at(four.chain.Phi[2], t)};
     for (int m = 0; m < 6; ++m) {

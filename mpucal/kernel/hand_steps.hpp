@@ -1,27 +1,27 @@
 // Four consecutive steps of the hand's filter, one to a lane: everything that does not depend on x and P.
 //
 // Step k is measurement k, as in steps.hpp, then the turn and the travel that lead to the next. The state is held in the
-// first body frame, where a turn does nothing: only the measurement knows the turn C since then.
+// first body frame, where a turn has no effect: only the measurement depends on the turn C since then.
 #pragma once
 #include "chain.hpp"
 #include "hand.hpp"
 #include "steps.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filters keeps its own
+namespace {  // each instruction set has its own copy
 
-constexpr double kLongestStep = 0.2;  // s: over a gap the hand's travel is as good as forgotten
+constexpr double kLongestStep = 0.2;  // s: the hand's travel is practically forgotten over a gap
 
 struct HandSteps : Given {
   Lane omega[3], L[3][3], L_r[3];   // rate and lever arm's matrix at the measurement
   Lane C[3][3], C_next[3][3];       // the turn at the measurement, and after the step's
-  Lane Hs[3][3], Ha[3][3];          // what s and a add to the measurement: D E C and D C
+  Lane Hs[3][3], Ha[3][3];          // derivatives of the measurement by s and a: D E C and D C
   Chain chain;
   Lane column[4][3], noise[4][3];   // [step][k] of the triangle Phi, in the places of a, b, c; of jerk Q
   Lane c_first[6];                  // C_next' diag(c) C_next
   Lane reset;                       // of the next sample
 
-  // The rows of C are the first measurement's, and become those of the measurement after these
+  // On entry the rows of C belong to the first measurement, on return to the measurement after these.
   MPUCAL_APART void read(const HandParameters& p, const HandSeries& series, const HandConstants& constants, long k,
                          Lane (&rows)[3]) {
     Given::read(p, series, constants, k);

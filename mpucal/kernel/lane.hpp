@@ -1,4 +1,4 @@
-// Four doubles that are worked on at once, in the widest registers the build may use; and the same names for one double.
+// Lane: four doubles that are processed at once, in the widest registers of the build; with overloads for one double.
 #pragma once
 #include <cmath>
 #include <type_traits>
@@ -17,7 +17,7 @@
 #endif
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
 #ifdef __FP_FAST_FMA
 inline double madd(double x, double y, double z) { return __builtin_fma(x, y, z); }
@@ -32,7 +32,7 @@ inline double root(double x) { return std::sqrt(x); }
 
 typedef double Lane __attribute__((vector_size(32)));
 constexpr int kLanesInATile = 3;   // of the Fisher matrix: four times as many sums stay in registers
-constexpr int kGroupsAbreast = 2;  // of derivatives: what they share is loaded once
+constexpr int kGroupsAbreast = 2;  // of derivatives: shared values are loaded once
 inline Lane all(double x) { return Lane{x, x, x, x}; }
 inline Lane madd(Lane x, Lane y, Lane z) { return (Lane)_mm256_fmadd_pd((__m256d)x, (__m256d)y, (__m256d)z); }
 inline Lane nmadd(Lane x, Lane y, Lane z) { return (Lane)_mm256_fnmadd_pd((__m256d)x, (__m256d)y, (__m256d)z); }
@@ -40,7 +40,7 @@ inline Lane root(Lane x) { return (Lane)_mm256_sqrt_pd((__m256d)x); }
 
 #else
 
-// Two registers of 16 bytes (SSE2, NEON) where the compiler has vectors; any compiler can work on two doubles.
+// Two registers of 16 bytes (SSE2, NEON) where the compiler has vectors; any compiler supports pairs of doubles.
 #if defined(__GNUC__) || defined(__clang__)
 typedef double Pair __attribute__((vector_size(16)));
 #else

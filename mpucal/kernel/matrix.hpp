@@ -5,7 +5,7 @@
 #include "lane.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
 // A symmetric matrix is stored as xx, xy, xz, yy, yz, zz.
 constexpr int kSym[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
@@ -83,7 +83,7 @@ MPUCAL_INLINE void multiply(const T (&a)[6], const T (&x)[3], T (&c)[3]) {
   for (int i = 0; i < 3; ++i) c[i] = madd(a[kSym[i][2]], x[2], madd(a[kSym[i][1]], x[1], a[kSym[i][0]] * x[0]));
 }
 
-// The inverse of a symmetric matrix is adjugate / determinant: the division need not wait for what the adjugate can do.
+// The inverse of a symmetric matrix is adjugate / determinant: products with the adjugate need not wait for the division.
 template <typename T>
 struct Adjugate {
   T m[6], determinant;
@@ -124,7 +124,7 @@ MPUCAL_INLINE void gather(double& product, double factor, double& V, double weig
   }
 }
 
-// What one step needs as a vector: out[step], from four steps to a lane
+// Transpose values of four steps, one to a lane, to a vector for each step: out[step]
 MPUCAL_INLINE void turn_round(const Lane (&x)[3], double last, Lane (&out)[4]) {
   transpose(x[0], x[1], x[2], all(last), out[0], out[1], out[2], out[3]);
 }

@@ -1,4 +1,4 @@
-// The Python face of the kernel: NumPy arrays to plain pointers, without the GIL while it runs.
+// Python module of the kernel: NumPy arrays become plain pointers, and the GIL is released while it runs.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
@@ -88,7 +88,7 @@ HandSeries make_hand_series(const Series& common, const std::optional<Array>& ra
   return series;
 }
 
-// A structure of doubles from an array of as many
+// A structure of doubles from an array of the same size
 template <typename Values>
 Values make(const Array& array, const char* name) {
   constexpr std::size_t count = sizeof(Values) / sizeof(double);
@@ -107,7 +107,7 @@ HandConstants make_hand_constants(const Array& array) {
 
 using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-// The samples at which sums are wanted: those given, or the last alone
+// The samples up to which sums are wanted: those given, or the last alone
 std::vector<long> make_ends(const std::optional<Indices>& given, std::size_t n) {
   std::vector<long> ends{static_cast<long>(n)};
   if (given) ends.assign(aligned(*given), aligned(*given) + given->size());
@@ -124,7 +124,7 @@ void check(int lanes) {
 }  // namespace
 
 NB_MODULE(_kernel, m) {
-  m.doc() = "The gravity filter: value, gradient and Fisher matrix of V(theta).";
+  m.doc() = "Gravity filter: value, gradient and Fisher matrix of V(theta).";
   m.attr("layout") = kLayout;
 
   m.def(
@@ -154,7 +154,7 @@ NB_MODULE(_kernel, m) {
       nb::arg("theta"), nb::arg("constants"), nb::arg("lanes"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
       nb::arg("q_extra").none() = nb::none(), nb::arg("ends").none() = nb::none(),
-      "V, sum of e' S^-1 e over the samples, gradient and Fisher matrix up to each of `ends`, by default the last sample "
+      "Return V, sum of e' S^-1 e over the samples, gradient and Fisher matrix up to each of `ends`, by default the last sample "
       "(in lane order; empty for lanes = 0).");
 
   m.def(
@@ -191,8 +191,8 @@ NB_MODULE(_kernel, m) {
       nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
       nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
       nb::arg("ends").none() = nb::none(),
-      "V, sum of squared whitened innovations, gradient and Fisher matrix of the hand's filter up to each of `ends` (in lane "
-      "order).");
+      "Return V, sum of squared whitened innovations, gradient and Fisher matrix of the hand's filter up to each of `ends` "
+      "(in lane order).");
 
   m.def(
       "trace_hand",
@@ -222,7 +222,7 @@ NB_MODULE(_kernel, m) {
       nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
       nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
       nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
-      "Whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter.");
+      "Return whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter.");
 
   m.def(
       "moments",
@@ -240,7 +240,7 @@ NB_MODULE(_kernel, m) {
                                give(copy(sums.C, 9), {9}), give(copy(sums.y, 3), {3}), sums.yy, sums.n);
       },
       nb::arg("b_omega"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), nb::arg("r_scale").none() = nb::none(),
-      "Sums of C C', y C', C, y, y y and the count, C_t the turn since the start.");
+      "Return sums of C C', y C', C, y, y y and the count, C_t the rotation since the start.");
 
   m.def(
       "turn",
@@ -252,7 +252,7 @@ NB_MODULE(_kernel, m) {
         return std::make_tuple(give({F, F + 9}, {3, 3}), give({sums, sums + 27}, {3, 3, 3}));
       },
       nb::arg("phi"), nb::arg("x").none() = nb::none(),
-      "The turn of steps phi (n, 3), and what unit vectors times x (n, 3) that enter before each step become by its end.");
+      "Return the rotation of steps phi (n, 3), and sums of unit vectors times x (n, 3), rotated from each step to the end.");
 
   m.def(
       "statistics",
@@ -267,7 +267,7 @@ NB_MODULE(_kernel, m) {
         statistics(aligned(x), ends, k, mean.data(), variance.data());
         return std::make_tuple(give(std::move(mean), {k, 3}), give(std::move(variance), {k, 3}));
       },
-      nb::arg("x"), nb::arg("runs"), "Means and variances (k, 3) of x (n, 3) over runs (k, 2), first and last + 1.");
+      nb::arg("x"), nb::arg("runs"), "Return means and variances (k, 3) of x (n, 3) over runs (k, 2), first and last + 1.");
 
   m.def(
       "moving_mean",
@@ -276,7 +276,7 @@ NB_MODULE(_kernel, m) {
         moving_mean(aligned(x), x.shape(0), x.shape(1), half, mean.data());
         return give(std::move(mean), {x.shape(0), x.shape(1)});
       },
-      nb::arg("x"), nb::arg("half"), "Means of x (n, m) over up to `half` samples on both sides of each.");
+      nb::arg("x"), nb::arg("half"), "Return means of x (n, m) over up to `half` samples on both sides of each.");
 
   m.def(
       "moving_statistics",
@@ -289,7 +289,7 @@ NB_MODULE(_kernel, m) {
         return std::make_tuple(give(std::move(mean), {3, n - size + 1}), give(std::move(variance), {3, n - size + 1}));
       },
       nb::arg("x"), nb::arg("size"),
-      "Means and variances (3, n - size + 1) of x (n, 3) over all windows of so many samples.");
+      "Return means and variances (3, n - size + 1) of x (n, 3) over all windows of `size` samples.");
 
   m.def(
       "mean_rates",
@@ -302,10 +302,10 @@ NB_MODULE(_kernel, m) {
         return give(std::move(mean), {n, 3});
       },
       nb::arg("rate"), nb::arg("bias"), nb::arg("dt"),
-      "Rotation vectors over their times (n, 3) of the steps that lead to the last n rates; the bias is left in.");
+      "Return rotation vectors divided by their times (n, 3) of the steps to the last n rates; the bias stays in.");
 
   m.def("instruction_set", []() -> std::string { return evaluate == evaluate_portable ? "portable" : "avx2"; },
-        "Which build of the filter runs.");
+        "Return the build of the filter in use, portable or avx2.");
   m.def(
       "use_instruction_set",
       [](const std::string& name) {

@@ -1,16 +1,16 @@
-// The recursion of s and P, a step at a time, and V along it. Each step waits for the one before: what can be known
-// without s and P is in Steps, and what only the derivatives need is left to them.
+// Recursion of s and P, a step at a time, with V. Each step depends on the one before: values that do not depend on s and
+// P are in Steps, and values for the derivatives alone are computed there.
 //
 // It runs in the accelerometer's axes, m = D s and M = D P D', where a measurement is simple:
 //   S = M + R,  e = y - m,  m <- m + M S^-1 e = y - R S^-1 e,  M <- M - M S^-1 M = R - R S^-1 R
-// and where the turn is D F D^-1. The division of S^-1 = adjugate / determinant comes last, beside the turn.
+// and where the turn is D F D^-1. The division of S^-1 = adjugate / determinant comes last, in parallel with the turn.
 #pragma once
 #include <cmath>
 
 #include "steps.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
 // m and M before the measurement of four steps, one to a lane; g / |s| after it, over the determinant
 struct Predicted {
@@ -60,8 +60,8 @@ class Recursion {
   }
 
  private:
-  // Update and turn. x is F s times the determinant; its length, which a turn keeps, gives the one that s should have
-  // and, as Q = [s]x diag(c) [s]x', that of Q.
+  // Update and turn. x is F s times the determinant; its length, which a turn keeps, scales s to g
+  // and, as Q = [s]x diag(c) [s]x', also Q.
   MPUCAL_INLINE double follow(const Steps& four, int t, const Adjugate<double>& adjugate, const double (&adjugate_e)[3],
                             double reciprocal, double (&m)[3], double (&M)[6]) const {
     double x[3], GR[3][3], GR_S[3][3], spent[6], Q[6];

@@ -1,11 +1,11 @@
-// exp([phi]x) and its left Jacobian. Steps are small, so short series serve; large ones take the closed form.
+// exp([phi]x) and its left Jacobian. Steps are small, so that short series suffice; large steps use the closed form.
 #pragma once
 #include <cmath>
 
 #include "matrix.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
 // M += factor [v]x
 template <typename T>
@@ -21,7 +21,7 @@ struct TurnFactors {
   T a, b, c;
 };
 
-// remainders below 1e-17 for x < 1/4
+// Remainders are below 1e-17 for x < 1/4.
 constexpr double kSmall = 0.0625;
 template <typename T>
 MPUCAL_INLINE TurnFactors<T> small_turn(T x2) {

@@ -69,7 +69,7 @@ void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_
 void moving_statistics(const double* x, std::size_t n, std::size_t size, double* mean, double* variance) {
   const std::size_t windows = n - size + 1;
   for (int j = 0; j < 3; ++j, mean += windows, variance += windows) {
-    const auto from_first = [&](std::size_t i) { return x[3 * i + j] - x[j]; };  // squares of it cancel the less
+    const auto from_first = [&](std::size_t i) { return x[3 * i + j] - x[j]; };  // less cancellation in squares
     double sum = 0.0, squares = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
       const double in = from_first(i), out = i < size ? 0.0 : from_first(i - size);

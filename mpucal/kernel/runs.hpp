@@ -1,4 +1,4 @@
-// Passes over runs of samples that have no filter: what their steps turn, their means and variances, moving or of steps.
+// Functions of runs of samples without a filter: products of rotations, means and variances, moving ones, mean rates.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -6,7 +6,7 @@
 namespace mpucal {
 
 // F = exp([phi_n]x) ... exp([phi_1]x) of steps phi (n, 3) [rad]. Where x (n, 3) is given, sums[j][k] (3,) is the sum of
-// F_n ... F_i e_j x_i[k]: vectors that enter along the way, as they arrive. Else it is 0.
+// F_n ... F_i e_j x_i[k]: vectors that enter on the way, rotated to the end. Without x it is 0.
 struct Turned {
   double F[3][3], sums[3][3][3];  // sums: row, then j and k
 };
@@ -15,7 +15,7 @@ void turn(const double* phi, const double* x, std::size_t n, Turned&);
 // Means and variances (runs, 3) of x (n, 3) over samples first..last-1 of each run.
 void statistics(const double* x, const std::int64_t* runs, std::size_t count, double* mean, double* variance);
 
-// Means (n, columns) of x (n, columns) over samples i - half..i + half, as far as there are any.
+// Means (n, columns) of x (n, columns) over samples i - half..i + half, as far as they exist.
 void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_t half, double* mean);
 
 // Means and variances (3, n - size + 1) of x (n, 3) over all windows of so many samples.

@@ -1,4 +1,4 @@
-// Four consecutive steps as the series give them, one to a lane: everything that does not depend on s and P.
+// Four consecutive steps of the series, one to a lane: everything that does not depend on s and P.
 //
 // Step k is measurement k (the flat segment's mean for k = 0, then sample k - 1) and the turn that leads to the next.
 #pragma once
@@ -8,9 +8,9 @@
 #include "rotation.hpp"
 
 namespace mpucal {
-namespace {  // each build of the filter keeps its own
+namespace {  // each instruction set has its own copy
 
-// Reads what four samples in a row say of one quantity; beside the series' ends, its first or last sample again.
+// Reads one quantity of four consecutive samples; beyond an end of the series, its first or last sample is repeated.
 class FourSamples {
  public:
   MPUCAL_INLINE FourSamples(long first, long n) {
@@ -27,7 +27,7 @@ class FourSamples {
   long at_[4];
 };
 
-// What is constant over the steps; the inverse of D takes the recursion to the accelerometer's axes.
+// Constants over the steps; the inverse of D transforms the recursion to the accelerometer's axes.
 struct Model {
   const Parameters& p;
   const Constants& constants;
@@ -46,13 +46,13 @@ struct Model {
   }
 };
 
-// What the series give, whatever the filter
+// Values of the series for both filters
 struct Given {
   Lane y[3];  // y - b_a
   Lane R[3];  // diagonal of R
   Turn<Lane> turn;
   Lane rate[3], dt;  // turn.phi = -dt Gyro rate
-  Lane c[3];         // variance of the angle turned through
+  Lane c[3];         // variance of the step's angle
 
   MPUCAL_INLINE void read(const Parameters& p, const Series& series, const Constants& constants, long k) {
     read_measurements(p, series, constants, k);
@@ -87,7 +87,7 @@ struct Given {
 };
 
 struct Steps : Given {
-  // H = F D^-1 and G = D F D^-1, with what is known of the measurement
+  // H = F D^-1 and G = D F D^-1, with the values of the measurement
   Lane H_y[3], H_R[3][3], G_R[3][3], G_R_G[6];
 
   MPUCAL_APART void read(const Model& model, const Series& series, long k) {

@@ -1,4 +1,4 @@
-"""A series, parameters and constants that leave nothing at its neutral value, and the builds of the kernel."""
+"""Series, parameters and constants without neutral values, and the builds of the kernel."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def hand_series():
     reset = np.full(N, -1.0)
     reset[[100, 160]] = 0.1, 0.0
     dt = rng.uniform(0.004, 0.02, N)
-    dt[200:220] = 0.01  # the same step again and again
+    dt[200:220] = 0.01  # equal steps, which the filter may compute once
     dt[230] = 0.7  # a gap
     return Series(
         y=rng.normal([1.0, -2.0, 9.3], 0.4, (N, 3)),

@@ -15,7 +15,7 @@ def x():
     return np.random.default_rng(4).standard_normal((200, 3))
 
 
-def test_a_turn_is_its_steps_and_carries_what_enters_before_each(x):
+def test_a_turn_is_the_product_of_its_steps_and_turns_vectors_that_enter_on_the_way(x):
     phi, entering = 0.3 * x[:100], x[100:]
     turn, sums = np.eye(3), np.zeros((3, 3, 3))
     for step, vector in zip(Rotation.from_rotvec(phi).as_matrix(), entering, strict=True):
@@ -38,7 +38,7 @@ def test_means_and_variances_of_runs(x):
 
 
 @pytest.mark.parametrize("half", [0, 3, 500, (1 << 64) - 1])
-def test_moving_means_are_of_what_there_is(x, half):
+def test_moving_means_use_the_samples_that_exist(x, half):
     wanted = [x[max(i - half, 0) : i + half + 1].mean(0) for i in range(len(x))]
     np.testing.assert_allclose(_kernel.moving_mean(x, half), wanted, atol=1e-13)
 
@@ -54,7 +54,7 @@ def test_moving_statistics_are_of_whole_windows(x, size):
             _kernel.moving_statistics(x, wrong)
 
 
-def test_mean_rates_turn_as_far_as_a_body_whose_axis_goes_round():
+def test_mean_rates_follow_a_coning_body():
     bias, angle, slow, t = np.array([0.1, -0.2, 0.3]), 0.2, 20.0, np.arange(302) / 100.0
     round_, zero = np.stack([np.cos(slow * t), np.sin(slow * t)]), np.zeros_like(t)
     at = Rotation.from_rotvec(angle * np.stack([*round_, zero], axis=1))
