@@ -9,10 +9,6 @@ import pandas as pd
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
 
 import mpucal
 
@@ -25,7 +21,6 @@ class Whole(dict):
 
 
 N, S = 120, 1_000_000_000
-IMU = "sensor_msgs/msg/Imu"
 
 
 def table(walk):
@@ -43,28 +38,8 @@ def archive(walk, folder):
             file.writestr(f"{name}.csv", made.to_csv(index=False))
 
 
-def bag(walk, folder, kind):
-    store = get_typestore(Stores.ROS1_NOETIC if kind == "bag" else Stores.ROS2_HUMBLE)
-    plugin = StoragePlugin.SQLITE3 if kind == "db3" else StoragePlugin.MCAP
-    writer = Writer1(folder / "a.bag") if kind == "bag" else Writer2(folder / kind, version=9, storage_plugin=plugin)
-    kinds, zeros = store.types, np.zeros(9)
-    vector = kinds["geometry_msgs/msg/Vector3"]
-    with writer:
-        connection = writer.add_connection("/imu", IMU, typestore=store)
-        for t, acc, gyr in zip(walk.t.tolist(), walk.acc.tolist(), walk.gyr.tolist(), strict=True):
-            stamp = kinds["builtin_interfaces/msg/Time"](sec=int(t), nanosec=int(t % 1 * S))
-            head = kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="imu", **({"seq": 0} if kind == "bag" else {}))
-            turned = kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
-            made = kinds[IMU](head, turned, zeros, vector(*gyr), zeros, vector(*acc), zeros)
-            serialize = store.serialize_ros1 if kind == "bag" else store.serialize_cdr
-            writer.write(connection, int(t * S), serialize(made, IMU))
-    if kind != "bag":
-        made = next(path for path in (folder / kind).iterdir() if path.suffix != ".yaml")
-        made.rename(folder / f"a.{kind}")
-
-
 @pytest.fixture(scope="module")
-def files(walk, tmp_path_factory):
+def files(walk, write_bag, tmp_path_factory):
     """suffix -> the bytes of a whole file."""
     folder = tmp_path_factory.mktemp("whole")
     some = walk.part(1000, 1000 + N)
@@ -75,7 +50,9 @@ def files(walk, tmp_path_factory):
     (folder / "a.txt").write_text("".join("a/g:\t" + "\t".join(map(str, row)) + "\n" for row in counts.tolist()))
     archive(some, folder)
     for kind in ("mcap", "db3", "bag"):
-        bag(some, folder, kind)
+        bag = write_bag(folder / ("a.bag" if kind == "bag" else kind), some, np.rint(some.t * S).astype(int), kind)
+        if kind != "bag":
+            next(bag.glob(f"*.{kind}")).rename(folder / f"a.{kind}")
     return Whole({path.suffix: path.read_bytes() for path in folder.iterdir() if path.is_file()})
 
 

@@ -87,35 +87,23 @@ def test_a_parquet_file_without_lines(tmp_path):
         mpucal.load(tmp_path / "a.parquet")
 
 
-def test_a_bag_without_messages(tmp_path):
-    with pytest.raises(RecordingError, match="holds 0 accelerations: record for longer"):
-        load_bag(bag(tmp_path / "a.mcap", []))
-
-
-def test_times_of_receipt_beyond_any_clock(tmp_path):
-    with pytest.raises(RecordingError, match="holds impossible times"):
-        load_bag(bag(tmp_path / "a.mcap", range(1 << 63, (1 << 63) + N)))
-
-
-def bag(path, received_ns):
-    """A bag of ROS 1 as an MCAP file, whose messages have no times of their own."""
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    kinds, zeros = store.types, np.zeros(9)
-    vector = kinds["geometry_msgs/msg/Vector3"]
-    head = kinds["std_msgs/msg/Header"](0, kinds["builtin_interfaces/msg/Time"](0, 0), "imu")
-    turned = kinds["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
-    made = kinds["sensor_msgs/msg/Imu"](head, turned, zeros, vector(0.0, 0.0, 0.0), zeros, vector(0.0, 0.0, 9.8), zeros)
-    with path.open("wb") as file:
+@pytest.mark.parametrize(
+    ("received_ns", "says"),
+    [([], "holds 0 accelerations: record for longer"), (range(1 << 63, (1 << 63) + N), "holds impossible times")],
+    ids=["no messages", "times beyond any clock"],
+)
+def test_a_bag_without_usable_messages(received_ns, says, ros1, encode_imu, tmp_path):
+    """Refuse a bag of ROS 1 as an MCAP file, whose messages have no times of their own."""
+    with (tmp_path / "a.mcap").open("wb") as file:
         writer = Writer(file)
         writer.start("ros1")
         schema = writer.register_schema("sensor_msgs/Imu", "ros1msg", b"")
         channel = writer.register_channel("/imu", "ros1", schema)
         for t_ns in received_ns:
-            writer.add_message(channel, t_ns, bytes(store.serialize_ros1(made, "sensor_msgs/msg/Imu")), t_ns)
+            writer.add_message(channel, t_ns, encode_imu(ros1, 0, (0.0, 0.0, 9.8), np.zeros(3)), t_ns)
         writer.finish()
-    return path
+    with pytest.raises(RecordingError, match=says):
+        load_bag(tmp_path / "a.mcap")
 
 
 @pytest.mark.parametrize(
