@@ -16,8 +16,9 @@ from .intervals import BIAS_RUN_S, Intervals, gravity_turns, statistics
 TURNING_RAD_S = 0.005  # gravity that turns more slowly is moved by a hand that settles, and by noise
 TREMOR_S = 0.05  # correlation time of a hand's tremor
 RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # densities, (rad/s)^2 a second; the first is none
-# scipy.stats.chi2.ppf(0.99, 3): twice the gain of the log likelihood by walks of chance, on three axes.
-DRIFTS_99 = 11.3
+# Twice the gain of the log likelihood by walks on three axes; by chance 5 % gain as much, since a density is not
+# negative: the mixture 1/8 chi2(0) + 3/8 chi2(1) + 3/8 chi2(2) + 1/8 chi2(3).
+DRIFTS_95 = 5.4
 
 
 def remove_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
@@ -58,5 +59,5 @@ def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
         m[i], P[i] = m_before[i] + gain * e, (1.0 - gain) * P_before[i]
     for i in range(k - 2, -1, -1):
         m[i] += P[i] / P_before[i + 1] * (m[i + 1] - m_before[i + 1])
-    likeliest = cost.argmin(1) if np.sum(cost[:, 0] - cost.min(1)) > DRIFTS_99 else 0
+    likeliest = cost.argmin(1) if np.sum(cost[:, 0] - cost.min(1)) > DRIFTS_95 else 0
     return np.asarray(m[:, np.arange(3), likeliest])
