@@ -60,8 +60,8 @@ def test_a_batch_takes_hints_by_pattern(table, recording, tmp_path):
     by_pattern = read_hints_file(tmp_path / "hints")
     settings = Settings("accel", 9.80665, by_pattern=by_pattern)
     assert [pattern for pattern, _ in by_pattern] == ["odd*.csv", "*.txt"]
-    assert settings.hints_of("line3/b.txt").rate_hz == 100
-    assert settings.hints_of("b.csv") == Hints()
+    assert settings.find_hints("line3/b.txt").rate_hz == 100
+    assert settings.find_hints("b.csv") == Hints()
     assert settings.key != Settings("accel", 9.80665).key
     # Dask sends settings to a worker by pickle.
     row = make_row(str(table), pickle.loads(pickle.dumps(settings)))
