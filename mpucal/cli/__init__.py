@@ -27,6 +27,8 @@ COMMANDS = {
     "doctor": "Examine a chip and its bus.",
     "show": "Show a calibration, a config blob, a recording or a device.",
 }
+# Key of the words of the command line in the context.
+TYPED = "mpucal.typed"
 
 
 class Commands(click.Group):
@@ -47,6 +49,7 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is called; fail with a suggestion if its name is misspelt."""
+        ctx.meta[TYPED] = args
         if nearly := did_you_mean(args[0], COMMANDS):
             ctx.fail(f"there is no command {args[0]}{nearly}")
         return super().resolve_command(ctx, args)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,6 +20,7 @@ from ..session.aims import AIMS, NORMAL
 from ..sources import opening
 from ..sources.kind import Option, SourceKind
 from ..sources.table import SOURCES, kinds_for, matching_kinds, unique
+from . import TYPED
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -180,6 +182,11 @@ def check_gyroscope(config: Config) -> None:
         )
 
 
+def typed_words(context: click.Context) -> str:
+    """Return the command line as it was typed, without the program's name, ready for a shell."""
+    return shlex.join(context.find_root().meta.get(TYPED, [str(context.command.name)]))
+
+
 def given_options() -> dict[str, str]:
     """Return the options that the command line holds: name to spelling."""
     context = click.get_current_context()
@@ -212,4 +219,17 @@ def check_source(context: click.Context) -> SourceKind:
     ------
     UsageError : no source or several were given, or an option does not belong to it.
     """
-    return opening.check_source(context.params, given_options(), str(context.command.name))
+    command = str(context.command.name)
+    if not matching_kinds(context.params) and not context.params.get("json_events"):
+        _list_sources(command, typed_words(context))
+    return opening.check_source(context.params, given_options(), command)
+
+
+def _list_sources(command: str, words: str) -> None:
+    """Print the sources that there are, and the simulated chip, each with the whole command that takes it."""
+    found = opening.found_sources(command)
+    click.echo("Found on this computer:" if found else "No sensor was found on this computer. Without one:", err=True)
+    lines = [(f"mpucal {words} {option}", what) for option, what in (*found, ("--bus sim", "the simulated chip"))]
+    width = max(len(line) for line, _ in lines)
+    for line, what in lines:
+        click.echo(f"  {line:<{width}}  {what}", err=True)

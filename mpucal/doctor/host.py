@@ -9,12 +9,10 @@ import errno
 import os
 import stat
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..chip.families import PARTS
-from ..chip.registers import WHO_AM_I
+from ..sources.i2c import found_chips
 from ..sources.i2c_errors import transfer_error
 from ..sources.usb_i2c import adapters
 from .finding import Finding, Mark
@@ -141,27 +139,10 @@ def _addresses(path: str) -> Iterator[Finding]:
         yield Finding("adapter", Mark.NOTE, "SMBus only: 32 bytes per transfer", "keep to 200 Hz or less")
     words = [f"0x{address:02x}{_guess(address, answer)}" for address, answer in found.items()]
     ours = any(address in OURS for address in found)
-    elsewhere = [] if ours else _elsewhere(path)
+    elsewhere = [] if ours else [other for other, _ in found_chips(Path(path).parent) if other != path]
     remedy = f"it is on another bus: give --bus {elsewhere[0]}" if elsewhere else "check VCC, GND, SDA, SCL and AD0"
     data = {"addresses": sorted(found), "smbus_only": not can_i2c, "elsewhere": elsewhere}
     yield Finding.check("on the bus", ours, "; ".join(words) or "nothing answers", remedy, data, Mark.BAD)
-
-
-def _elsewhere(path: str) -> list[str]:
-    """Return the other adapters beside `path` on which an MPU answers at one of our addresses."""
-    import smbus2  # noqa: PLC0415
-
-    found = []
-    for other in sorted(Path(path).parent.glob("i2c-*")):
-        if other == Path(path):
-            continue
-        for address in OURS:
-            # Nothing is written to a bus that was not named. One that cannot be opened or read does not count.
-            with suppress(OSError), smbus2.SMBus(str(other)) as bus:
-                if bus.read_byte_data(address, WHO_AM_I) in PARTS:
-                    found.append(str(other))
-                    break
-    return found
 
 
 def _probe_all(bus: Any) -> dict[int, str]:

@@ -10,16 +10,18 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 from ..chip.access import Reply
+from ..chip.families import PARTS
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .chip import OpenedChip
 from .device_lock import lock_device
 from .host_bus import ADDRESSES, HostBus, converting, find_chip, register_after
-from .i2c_errors import no_answer_error, opening_error, transfer_error
+from .i2c_errors import DEVICES, no_answer_error, opening_error, transfer_error
 from .kind import Request
 from .read_timer import ReadTimer
 
@@ -35,6 +37,37 @@ LEAST_LIMIT_BYTES = 4
 def open_source(request: Request) -> OpenedChip:
     """Open the chip on the bus that --bus names; see I2cBus."""
     return OpenedChip(I2cBus(request.value, request.values.get("address")), request.plan, words=request.words)
+
+
+def found_chips(folder: Path = DEVICES) -> Iterator[tuple[str, str]]:
+    """Yield the path of each adapter in `folder` on which a known chip answers, and the chip with its address.
+
+    Nothing is written to a bus that was not named. One without permission is yielded as well, the others are not.
+    """
+    for path in sorted(folder.glob("i2c-*")):
+        # A wire that is held low, or an adapter without a driver, is the matter of `mpucal doctor`.
+        with suppress(OSError):
+            if not os.access(path, os.R_OK | os.W_OK):
+                yield str(path), "an I2C bus, not permitted to you so far"
+            elif answer := _known_chip(path):
+                yield str(path), answer
+
+
+def _known_chip(path: Path) -> str:
+    """Return the chip that answers on an adapter, with its address; empty if none does."""
+    import smbus2  # noqa: PLC0415 - only needed with an I2C bus
+
+    with smbus2.SMBus(str(path)) as bus:
+        for address in ADDRESSES:
+            try:
+                part = PARTS.get(bus.read_byte_data(address, WHO_AM_I))
+            except OSError as error:
+                if error.errno == errno.ETIMEDOUT:
+                    raise
+                continue
+            if part is not None:
+                return f"{part.chip} at 0x{address:02x}"
+    return ""
 
 
 class I2cBus(HostBus):

@@ -110,6 +110,15 @@ def open_source(request: Request) -> OpenedIio:
     )
 
 
+def found_devices() -> list[tuple[str, str]]:
+    """List the IIO devices with an accelerometer and a gyroscope: (name, name of the part)."""
+    return [
+        (path.name, _name(path))
+        for path in sorted(SYSFS.glob("iio:device*"))
+        if all((path / f"in_{channel}_x_raw").exists() for channel in ("accel", "anglvel"))
+    ]
+
+
 class IioFiles(HostBus):
     """Files of IIO devices; see Files.
 

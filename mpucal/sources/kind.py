@@ -67,6 +67,7 @@ class SourceKind:
         mpucal.sources.bridge; empty: there is none.
     doctor : "module:attribute" of its examination, from an OpenedSource and seconds to findings; empty: none.
     host : "module:attribute" of the examination of this computer before it is opened, from the option's value.
+    found : "module:attribute" of a function that lists those there are: (the option's value, description); empty: none.
     """
 
     what: str
@@ -83,6 +84,7 @@ class SourceKind:
     store: str = ""
     doctor: str = ""
     host: str = ""
+    found: str = ""
 
     @property
     def flag(self) -> str:

@@ -48,6 +48,19 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
     return kind
 
 
+def found_sources(command: str) -> list[tuple[str, str]]:
+    """List the sources of this computer that a command takes: (option with value, description).
+
+    Of a serial port only the name and the USB description are known: no port is opened.
+    """
+    return [
+        (f"{kind.option.flag} {value}", what)
+        for kind in kinds_for(command)
+        if kind.found
+        for value, what in resolve_name(kind.found)()
+    ]
+
+
 def check_resume_options(given: Mapping[str, str]) -> None:
     """Refuse a source, or an option that the capture fixes, together with --resume.
 

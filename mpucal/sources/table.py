@@ -115,6 +115,7 @@ SOURCES = [
         settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.sources:examine_chip",
         host="mpucal.doctor.host:examine_host",
+        found="mpucal.sources.i2c:found_chips",
     ),
     SourceKind(
         what="the simulated chip",
@@ -139,6 +140,7 @@ SOURCES = [
         settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.sources:examine_chip_alone",
         host="mpucal.doctor.host:examine_adapters",
+        found="mpucal.sources.usb_i2c:adapters",
     ),
     SourceKind(
         what="a chip on a USB adapter",
@@ -162,6 +164,7 @@ SOURCES = [
         settings=CHIP_SETTINGS,
         store="mpucal.sources.bridge:open_store",
         doctor="mpucal.doctor.sources:examine_bridge_and_chip",
+        found="mpucal.sources.bridge.port_errors:boards",
     ),
     SourceKind(
         what="a chip on an SPI bus of this computer",
@@ -181,6 +184,7 @@ SOURCES = [
         options=(TRIGGER,),
         settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
         doctor="mpucal.doctor.iio:examine_iio",
+        found="mpucal.sources.iio:found_devices",
     ),
     SourceKind(
         what="a simulated sensor with a kernel driver",
@@ -202,6 +206,7 @@ SOURCES = [
         delivers=Delivery.SAMPLES,
         options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
+        found="mpucal.sources.bridge.port_errors:autopilots",
     ),
     SourceKind(
         what="the simulated vehicle",

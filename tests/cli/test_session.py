@@ -88,6 +88,31 @@ def test_errors_name_the_problem(mpucal, tmp_path, words, code, sentence):
     assert "Traceback" not in result.err
 
 
+def test_without_a_source_it_lists_those_there_are_with_the_whole_command(mpucal, tmp_path, monkeypatch):
+    for channel in ("in_accel_x_raw", "in_anglvel_x_raw", "name"):
+        for device in ("iio:device0", "iio:device1"):
+            (tmp_path / device).mkdir(exist_ok=True)
+            (tmp_path / device / channel).write_text("mpu6050\n")
+    (tmp_path / "iio:device1" / "in_anglvel_x_raw").unlink()
+    ports = [("/dev/ttyACM0", "ArduPilot"), ("/dev/ttyUSB0", "CP2102")]
+    monkeypatch.setattr("mpucal.sources.i2c.found_chips", lambda: [("/dev/i2c-1", "MPU-6050 at 0x68")])
+    monkeypatch.setattr("mpucal.sources.bridge.port_errors.ports", lambda: ports)
+    monkeypatch.setattr("mpucal.sources.iio.SYSFS", tmp_path)
+    result = mpucal("session", "-o", "board 7")
+    assert result.code == 2
+    found = [line.partition("  ") for line in result.err.replace("\n  ", "\n").splitlines()[1:-1]]
+    assert [(command, what.strip()) for command, _, what in found] == [
+        ("mpucal session -o 'board 7' --bus /dev/i2c-1", "MPU-6050 at 0x68"),
+        ("mpucal session -o 'board 7' --serial /dev/ttyUSB0", "CP2102"),
+        ("mpucal session -o 'board 7' --iio iio:device0", "mpu6050"),
+        ("mpucal session -o 'board 7' --mavlink /dev/ttyACM0", "ArduPilot"),
+        ("mpucal session -o 'board 7' --bus sim", "the simulated chip"),
+    ]
+    events = mpucal("session", "--json-events").err.splitlines()
+    assert len(events) == 1
+    assert json.loads(events[0])["exit_code"] == 2
+
+
 def test_no_folder_is_left_if_nothing_answered(mpucal, tmp_path):
     mpucal("session", "--bus", "/dev/i2c-99")
     mpucal("session", "--bus", "sim:who_am_i=0xff")

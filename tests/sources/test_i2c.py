@@ -14,7 +14,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, BusHeld, NoAnswer
 from mpucal.sources.device_lock import lock_device
-from mpucal.sources.i2c import I2cBus
+from mpucal.sources.i2c import I2cBus, found_chips
 
 
 def measured(bus, config=None, seconds=3):
@@ -41,6 +41,25 @@ def test_both_addresses_are_tried(adapter, address):
     bus = I2cBus(str(adapter(address=address).path))
     assert bus.address == address
     assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+
+
+@pytest.mark.parametrize("address", [0x68, 0x69])
+def test_the_chips_that_answer_are_found_without_a_write(adapter, address):
+    kernel = adapter(address=address)
+    (kernel.path.parent / "i2c-2").symlink_to("nowhere")
+    assert list(found_chips(kernel.path.parent)) == [
+        (str(kernel.path), f"MPU-6050 at {address:#x}"),
+        (str(kernel.path.with_name("i2c-2")), "an I2C bus, not permitted to you so far"),
+    ]
+    assert smbus2.I2C_RDWR not in kernel.requests
+
+
+@pytest.mark.parametrize(("number", "asked"), [(errno.EREMOTEIO, 2), (errno.ETIMEDOUT, 1)], ids=["silent", "held"])
+def test_no_chip_is_found_on_a_silent_bus_and_a_held_one_is_left_at_once(adapter, number, asked):
+    kernel = adapter()
+    kernel.failures[smbus2.I2C_SMBUS] = number
+    assert list(found_chips(kernel.path.parent)) == []
+    assert kernel.requests.count(smbus2.I2C_SMBUS) == asked
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ IDS = [kind.flag for kind in SOURCES]
 
 @pytest.mark.parametrize("kind", SOURCES, ids=IDS)
 def test_all_that_a_row_names_is_there(kind):
-    for place in filter(None, (kind.opener, kind.store, kind.doctor, kind.host)):
+    for place in filter(None, (kind.opener, kind.store, kind.doctor, kind.host, kind.found)):
         assert callable(resolve_name(place))
 
 

@@ -7,6 +7,8 @@ import re
 
 from ...errors import BusError, LinkError
 
+AUTOPILOT = re.compile("ardupilot|px4", re.IGNORECASE)
+
 
 def opening_error(error: Exception, port: str) -> BusError:
     """Convert the error of a port that did not open."""
@@ -34,14 +36,27 @@ def port_gone(port: str) -> LinkError:
     return LinkError(f"{port} is gone", "check its cable, plug it in again, then start again")
 
 
-def other_ports() -> str:
-    """Return the remedy for a missing or wrong port: the ports that there are."""
+def ports() -> list[tuple[str, str]]:
+    """List the serial ports with a device behind them: (name, description)."""
     from serial.tools.list_ports import comports  # noqa: PLC0415 - only needed for an error
 
-    ports = [f"{port.device} ({port.description})" for port in sorted(comports()) if port.hwid != "n/a"]
-    if not ports:
-        return "connect the bridge (no serial ports found)"
-    return f"use one of {', '.join(ports)}"
+    return [(port.device, port.description) for port in sorted(comports()) if port.hwid != "n/a"]
+
+
+def boards() -> list[tuple[str, str]]:
+    """List the ports but those of autopilots."""
+    return [port for port in ports() if not AUTOPILOT.search(port[1])]
+
+
+def autopilots() -> list[tuple[str, str]]:
+    """List the ports whose USB description names an autopilot's firmware."""
+    return [port for port in ports() if AUTOPILOT.search(port[1])]
+
+
+def other_ports() -> str:
+    """Return the remedy for a missing or wrong port: the ports that there are."""
+    there = [f"{port} ({what})" for port, what in ports()]
+    return f"use one of {', '.join(there)}" if there else "connect the bridge (no serial ports found)"
 
 
 def _reason(error: Exception) -> str:
