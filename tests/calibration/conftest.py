@@ -1,4 +1,4 @@
-"""Recordings whose truth is known: a sensor that is nearly ideal, the other simulator's, and those of the paper."""
+"""Recordings with a known truth: of a nearly ideal sensor, of another simulator, and of real sensors."""
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -16,14 +16,14 @@ G = 9.82
 
 @dataclass(frozen=True)
 class Other:
-    """A recording of a simulator that is not the project's, and its truth."""
+    """Recording of a simulator that is not the project's, and its truth."""
 
     recording: Recording
     truth: SensorTruth
 
 
 def near_ideal(seed=0, D=None, G_gyro=None, **scenario):
-    """The paper's turns of a sensor whose axes, gains and biases are nearly right, unless told otherwise."""
+    """Simulate the paper's turns of a sensor whose axes, gains and biases are nearly right by default."""
     scenario = {"rate_hz": 50, **scenario}
     sensor = SensorTruth(
         D=np.eye(3) if D is None else np.asarray(D, float),
@@ -38,26 +38,26 @@ def near_ideal(seed=0, D=None, G_gyro=None, **scenario):
 
 
 def samples_of(recording, kept):
-    """The recording with only those of its samples (n,) bool; what was flat is then to be found."""
+    """Return the recording with the samples `kept` (n,) bool, and without a known flat segment."""
     arrays = {f.name: getattr(recording, f.name)[kept] for f in fields(Samples)}
     return replace(recording, flat=None, **arrays)
 
 
 @pytest.fixture(scope="session")
 def ideal():
-    """A factory of near-ideal simulated recordings."""
+    """Return a factory of near-ideal simulated recordings."""
     return near_ideal
 
 
 @pytest.fixture(scope="session")
 def pick():
-    """A function that keeps some of a recording's samples."""
+    """Return a function that keeps some of a recording's samples."""
     return samples_of
 
 
 @pytest.fixture(scope="session")
 def other_simulator():
-    """A function that loads a recording of another simulator by its name."""
+    """Return a function that loads a recording of another simulator by its name."""
 
     def load(name):
         path = SHARED / "simulated" / f"{name}.npz"
@@ -75,7 +75,7 @@ def other_simulator():
 
 @pytest.fixture(scope="session")
 def real():
-    """A function that loads what a real sensor measured, by its name, as a recording without a known flat part."""
+    """Return a function that loads a real sensor's recording by its name, without a known flat segment."""
 
     def load(name):
         path = SHARED / "recordings" / f"{name}.npz"

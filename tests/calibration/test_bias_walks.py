@@ -1,4 +1,4 @@
-"""A walk of the sensor's bias or mount, against recordings with one and without, and an independent likelihood."""
+"""Walks of the sensor's bias or mount, in recordings with one and without, and an independent likelihood."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_a_mount_that_slips_is_told_from_a_bias(hand):
 
 
 def test_the_likelihood_is_that_of_the_joint_gaussian():
-    """Parts that measure theta + delta linearly: 2 log p(q)/p(0) by SciPy's density of all the measurements."""
+    """Compare 2 log p(q)/p(0) with SciPy's density, for parts that measure theta + delta linearly."""
     from scipy.stats import multivariate_normal  # slow to import
 
     rng = np.random.default_rng(3)
@@ -56,10 +56,10 @@ def test_the_likelihood_is_that_of_the_joint_gaussian():
     A = rng.standard_normal((k, m, p))
     y = rng.standard_normal((k, m))
     y[:, 0] += np.linspace(0.0, 4.0, k)
-    # a prior on theta, so that the density of y exists: H has it beside the parts'
+    # With a prior on theta, which H includes, the density of y exists.
     prior = np.eye(p)
     H = prior + np.einsum("kmp,kmq->pq", A, A)
-    # a minimiser may stop short of the minimum
+    # A minimiser may stop short of the minimum.
     theta = np.linalg.solve(H, np.einsum("kmp,km->p", A, y)) + 0.1 * rng.standard_normal(p)
     gradient = -np.einsum("kmp,km->kp", A, y - A @ theta)
     parts = Parts(

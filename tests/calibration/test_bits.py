@@ -1,4 +1,4 @@
-"""Bits that never move: counts as a chip, a microcontroller or an autopilot delivers them, whole and damaged."""
+"""Bits that never change: counts as a chip, a microcontroller or an autopilot delivers them, whole and damaged."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ KNOWN, UNKNOWN = Sensor(accel_range_g=4.0, gyro_range_dps=500.0), Sensor()
 
 @pytest.fixture(scope="module")
 def counted(in_hand):
-    """A good recording as counts, with and without a known range; `spoil` changes the counts in place."""
+    """Return a function that makes counts of a good recording; `spoil` changes them in place."""
 
     def make(sensor=KNOWN, spoil=lambda acc, gyr: None):
         r = in_hand.recording
@@ -95,23 +95,23 @@ def test_a_bit_that_died_midway_is_named_across_gaps_and_errors(hand):
     assert against(recording).what.startswith("bit 12 of the accelerometer's y never moves")
 
 
-def test_where_the_range_is_not_known_the_other_axes_tell(counted):
+def test_without_a_known_range_steps_are_compared_with_the_other_axes(counted):
     found = against(counted(UNKNOWN, low_byte))
     assert found.what.startswith("the low 8 bits of the accelerometer's x never move")
 
 
-def test_beside_numbers_as_fine_as_they_can_be_an_axis_is_judged_too(counted):
+def test_an_axis_is_judged_beside_axes_as_fine_as_a_float(counted):
     recording = counted(UNKNOWN, low_byte)
     acc = 1.001 * recording.acc
     acc[:2, 1:] = [[0.0, 0.0], [5e-324, 5e-324]]
     assert against(replace(recording, acc=acc)).what.startswith("the low 15 bits of the accelerometer's x")
 
 
-def test_where_the_range_is_not_known_counts_are_known_again(counted):
+def test_without_a_known_range_counts_are_recovered(counted):
     assert against(counted(UNKNOWN, middle_bit)).what.startswith("bit 6 of the accelerometer's x never moves")
 
 
-def test_a_byte_that_is_lost_of_all_axes_is_no_coarse_sensor(counted):
+def test_a_lost_byte_of_all_axes_is_no_coarse_sensor(counted):
     def all_of_them(acc, gyr):
         acc &= ~0xFF
 
@@ -137,15 +137,15 @@ def test_a_stream_in_coarse_units_is_not_accused(in_hand, sensor, step):
     )
 
 
-def test_nor_is_one_of_single_precision(in_hand):
+def test_a_stream_in_single_precision_is_not_accused(in_hand):
     r = in_hand.recording
-    # beside gravity a float32 is coarser than about zero
+    # Near gravity, a float32 is coarser than near zero.
     lying = replace(r.part(0, 400), acc=np.float64(np.float32(r.acc[:400])), gyr=np.float64(np.float32(r.gyr[:400])))
     assert against(lying) is None
 
 
 @pytest.mark.parametrize(("bits", "verdict"), [(3, "usable"), (8, "refused")])
-def test_what_is_coarser_than_the_calibration_is_sure_is_refused(counted, bits, verdict):
+def test_an_axis_coarser_than_the_calibrations_uncertainty_is_refused(counted, bits, verdict):
     def dead(acc, gyr):
         acc[:, 0] &= -(1 << bits)
 

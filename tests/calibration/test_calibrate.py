@@ -1,4 +1,4 @@
-"""The one function that everything calls: what it promises whatever it is given."""
+"""`calibrate`, with every kind of recording: reproducible numbers, a complete document, a verdict."""
 
 import json
 from dataclasses import replace
@@ -20,7 +20,7 @@ G = 9.82
 
 
 def numbers(calibration):
-    """Everything of the document but the time it was made."""
+    """Return the document without the time of its creation."""
     return {key: value for key, value in calibration.document().items() if key != "created"}
 
 
@@ -35,34 +35,33 @@ def test_the_same_recording_twice_gives_the_same_bits(hand, model, prepared):
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_the_other_simulators_sensors_are_found_and_their_flat_part_too(other_simulator, number):
+def test_sensors_of_another_simulator_are_found_with_and_without_a_known_flat_segment(other_simulator, number):
     other = other_simulator(f"paper_{number}")
     given_flat = calibrate(other.recording, "auto", G)
     found = calibrate(replace(other.recording, flat=None), "auto", G)
     for calibration in (given_flat, found):
-        # noise as loud as the paper's leaves readings uncertain by 0.08 m/s^2
+        # With the paper's noise, readings are uncertain by 0.08 m/s^2.
         assert {reason["code"] for reason in calibration.quality["reasons"]} <= {"few_orientations"}
         assert calibration.verdict != "refused"
         assert calibration.fit["model"] == "accel"
         assert sph_rms(other.truth, calibration.D, calibration.b_a) < 0.2
-    # nearly the same: ten seconds of rest are not always found whole
+    # They are nearly equal: ten seconds of rest are not always found whole.
     assert (np.abs(found.D - given_flat.D) < 1.0 * given_flat.D_std).all()
     assert (np.abs(found.b_a - given_flat.b_a) < 1.0 * given_flat.b_a_std).all()
 
 
-def test_when_it_began_makes_no_difference(ideal):
+def test_the_time_of_the_first_sample_makes_no_difference(ideal):
     recording = ideal(0).recording
     late = replace(recording, t=recording.t + 86400.0)
     np.testing.assert_allclose(calibrate(late, "auto", G).D, calibrate(recording, "auto", G).D, atol=1e-7)
 
 
 @pytest.mark.parametrize("prepared", ["paper", "pose12"])
-def test_jittered_times_are_measured_times(hand, prepared):
-    """A jitter of the clock that is written down does no harm: the motion is sampled where the times say."""
+def test_jittered_times_do_no_harm_if_they_are_recorded(hand, prepared):
     simulated = paper_scenario(0, rate_hz=200) if prepared == "paper" else hand(1, prepared, rate_hz=200)
     recording, truth = simulated.recording, simulated.truth
     rng = np.random.default_rng(0)
-    # one of each two samples: 5, 10 or 15 ms apart
+    # One of each two samples is kept: they are 5, 10 or 15 ms apart.
     kept = np.arange(0, len(recording), 2) + rng.integers(0, 2, len(recording) // 2)
     thin = Recording.from_arrays(recording.t[kept], recording.acc[kept], recording.gyr[kept], flat=(0, 1000))
     plain, jittered = calibrate(recording, "auto", G), calibrate(thin, "auto", G)
@@ -70,7 +69,7 @@ def test_jittered_times_are_measured_times(hand, prepared):
     assert sph_rms(truth, jittered.D, jittered.b_a) < limit
 
 
-def test_the_document_says_what_was_done(ideal):
+def test_the_document_describes_the_fit(ideal):
     simulated = ideal(0)
     recording = replace(simulated.recording, sensor=Sensor(chip="mpu6050", rate_hz=50.0))
     calibration = calibrate(recording, "auto", G)
@@ -99,18 +98,17 @@ def test_a_model_that_was_asked_for_is_used(ideal, model):
     assert calibration.fit["why"] == "asked for"
 
 
-def test_no_such_model(ideal):
-    with pytest.raises(UsageError, match="choose one of auto, hand, imu, accel, paper"):
-        calibrate(ideal(0).recording, "magic", G)
+@pytest.mark.parametrize(
+    ("model", "gravity", "remedy"),
+    [("magic", G, "choose one of auto, hand, imu, accel, paper")]
+    + [("auto", gravity, "give the local gravity") for gravity in (0.0, -9.81, np.nan, np.inf)],
+)
+def test_an_unknown_model_or_an_impossible_gravity_is_refused(ideal, model, gravity, remedy):
+    with pytest.raises(UsageError, match=remedy):
+        calibrate(ideal(0).recording, model, gravity)
 
 
-@pytest.mark.parametrize("gravity", [0.0, -9.81, np.nan, np.inf])
-def test_no_such_gravity(ideal, gravity):
-    with pytest.raises(UsageError, match="give the local gravity"):
-        calibrate(ideal(0).recording, "auto", gravity)
-
-
-# ---- whatever it is given
+# ---- spoilt recordings
 
 
 @cache
@@ -119,14 +117,14 @@ def scene(name):
     return scenario.recording
 
 
-# units that are wrong, and numbers no sensor reads
+# These are wrong units, and values that no sensor reads.
 FACTORS = (1.0, 1.0, 1.0, 1e-300, 1e-30, 1e-3, 1 / 9.80665, 57.3, 1e3, 1e11, 1e150)
 ends = st.floats(0.0, 1.0)
 
 
 @st.composite
 def recordings(draw):
-    """Recordings of simulated sensors, ill-treated."""
+    """Draw a spoilt recording of a simulated sensor: t, acc, gyr, flat."""
     base = scene(draw(st.sampled_from(("continuous", "paper", "pose6"))))
     n, rng = len(base), np.random.default_rng(draw(st.integers(0, 2**16)))
     faster = draw(st.sampled_from((1.0, 1.0, 0.8, 4.0, 160.0)))  # 20 Hz to 4 kHz
@@ -165,7 +163,7 @@ def recordings(draw):
 
 
 @given(recordings(), st.sampled_from([model for model in MODELS if model != "paper"]))
-def test_whatever_is_recorded_there_is_a_verdict(arrays, model):
+def test_every_recording_gets_a_verdict(arrays, model):
     try:
         recording = Recording.from_arrays(*arrays)
     except MpucalError as error:
@@ -184,19 +182,19 @@ def test_whatever_is_recorded_there_is_a_verdict(arrays, model):
         assert not {"nan", "inf", "-inf"} & set(reason["message"].replace("(", " ").split())
 
 
-def test_a_recording_is_known_again_by_its_digest(ideal, tmp_path):
+def test_a_recording_is_identified_by_its_digest(ideal):
     recording = ideal(0).recording
     digest = calibrate(recording, "accel", G).fit["recording_digest"]
     assert len(digest) == 64
     later = replace(recording, t=recording.t + 1.0, name="another name")
-    # what a text file rounds away makes no other recording of it
+    # The rounding of a text file does not change the digest.
     rounded = replace(recording, acc=recording.acc * (1.0 + 1e-15))
     assert {calibrate(r, "accel", G).fit["recording_digest"] for r in (later, rounded)} == {digest}
     for other in (recording.part(0, len(recording) - 1), replace(recording, acc=recording.acc + 1e-4)):
         assert calibrate(other, "accel", G).fit["recording_digest"] != digest
 
 
-def test_a_gyroscopes_words_that_jump_alone_move_nothing(hand):
+def test_spikes_of_the_gyroscope_are_removed(hand):
     scenario = hand(3, "pose12")
     rng, gyr = np.random.default_rng(5), scenario.recording.gyr.copy()
     gyr[rng.integers(0, len(gyr), 10), rng.integers(0, 3, 10)] += 40.0 * rng.normal(size=10)
@@ -205,7 +203,7 @@ def test_a_gyroscopes_words_that_jump_alone_move_nothing(hand):
     assert np.abs(spoilt.D - whole.D).max() < 1e-3
 
 
-def test_a_gyroscopes_axis_that_stood_still_while_others_turned_is_not_believed(hand):
+def test_a_rate_that_repeats_while_the_board_turns_is_lost_data(hand):
     recording = hand(3, "pose12").recording
     rates = np.abs(recording.gyr[:, 1])
     turning = int(np.flatnonzero(rates > 0.5 * rates.max())[0])

@@ -1,4 +1,4 @@
-"""A bus whose clock is off, or not known: what is said of it, and K's uncertainty."""
+"""Checks of the sample clock: one that is off, or not known, a lag between the sensors, and K's uncertainty."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from mpucal.calibration import calibrate
         (None, None, "imu", None),
     ],
 )
-def test_a_clock_that_is_off_is_said(ideal, ppm, std, model, words):
+def test_a_clock_that_is_off_is_reported(ideal, ppm, std, model, words):
     recording = ideal(0).recording
     spoilt = replace(recording, sensor=replace(recording.sensor, clock_ppm=ppm, clock_std=std))
     found = calibrate(spoilt, model)
@@ -29,7 +29,7 @@ def test_a_clock_that_is_off_is_said(ideal, ppm, std, model, words):
     assert found.verdict == (calibrate(recording, model).verdict if words is None else "usable")
 
 
-def test_what_is_not_known_of_the_clock_is_not_known_of_k(ideal):
+def test_the_clocks_uncertainty_is_in_that_of_k(ideal):
     recording = ideal(0).recording
     plain = calibrate(recording, "imu")
     found = calibrate(replace(recording, sensor=replace(recording.sensor, clock_ppm=0.0, clock_std=0.01)), "imu")
@@ -39,7 +39,7 @@ def test_what_is_not_known_of_the_clock_is_not_known_of_k(ideal):
 
 
 @pytest.mark.parametrize(("lag_s", "words"), [(0.03, "lags behind"), (-0.03, "runs ahead of"), (0.01, None)])
-def test_an_accelerometer_that_lags_behind_the_gyroscope_is_said(in_hand, lag_s, words):
+def test_a_lag_between_the_sensors_is_reported(in_hand, lag_s, words):
     recording = in_hand.recording
     acc = np.column_stack([np.interp(recording.t - lag_s, recording.t, axis) for axis in recording.acc.T])
     plain, found = calibrate(recording), calibrate(replace(recording, acc=acc))

@@ -19,7 +19,7 @@ def test_blocks_are_means_and_none_holds_both_rest_and_move(flat):
     thin, (first, last) = downsampled(recording, flat_statistics(recording, flat), 50.0)
     assert thin.rate_hz == pytest.approx(50.0)
     boundary = recording.t[flat[1]]
-    # block `last` is the first that moves
+    # Block `last` is the first in motion.
     assert thin.t[last - 1] < boundary < thin.t[last]
     np.testing.assert_allclose(thin.acc[last], recording.acc[flat[1] : flat[1] + 4].mean(0))
     np.testing.assert_allclose(thin.gyr[last - 1], recording.gyr[flat[1] - 4 : flat[1]].mean(0))
@@ -27,7 +27,7 @@ def test_blocks_are_means_and_none_holds_both_rest_and_move(flat):
     assert last - first == (flat[1] - flat[0]) // 4
 
 
-def test_a_mark_survives_in_its_block():
+def test_a_block_with_a_marked_sample_is_marked():
     recording = recording_of(1000)
     marks = np.zeros(1000, bool)
     marks[[401, 777]] = True
@@ -38,7 +38,7 @@ def test_a_mark_survives_in_its_block():
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 60.0, 20.0])
-def test_what_is_slow_already_stays(rate_hz):
+def test_a_slow_recording_stays_as_it_is(rate_hz):
     recording = recording_of(1000, rate_hz)
     thin, flat = downsampled(recording, flat_statistics(recording, (5, 300)), 50.0)
     assert thin is recording

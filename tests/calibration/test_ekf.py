@@ -15,7 +15,7 @@ B_A = np.array([0.3, -0.2, 0.5])
 
 
 def ekf(n=60, jitter=0.0, noise=0.0, seed=0):
-    """A filter over a constant turn, and the true specific forces it turned through."""
+    """Return a filter over a constant turn, and the true specific forces on the way."""
     rng = np.random.default_rng(seed)
     t = 0.01 * np.arange(n) + jitter * rng.uniform(-0.5, 0.5, n)
     omega = np.array([0.7, -1.1, 0.4])

@@ -1,4 +1,4 @@
-"""The facts that a verdict rests on, against what the recordings were made from."""
+"""Evidence for a verdict, compared with the truth of the recordings."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ G = 9.82
 
 
 def exact_fit(truth, sd=1e-3):
-    """A fit that found the truth."""
+    """Return a fit that found the truth."""
     return Fit(
         truth.D,
         truth.b_a,
@@ -82,7 +82,7 @@ def test_an_only_rest_is_compared_with_gravity_piece_by_piece(hand):
 
 
 @pytest.mark.parametrize("broken", [{"D": np.zeros((3, 3))}, {"D": np.full((3, 3), np.nan)}], ids=["singular", "nan"])
-def test_a_fit_without_a_usable_matrix_is_sure_of_nothing(in_hand, broken):
+def test_a_fit_without_a_usable_matrix_has_no_uncertainty(in_hand, broken):
     fit = replace(exact_fit(in_hand.truth), **broken)
     seen = evidence(in_hand.recording, fit)
     assert seen.uncertainty is None
@@ -90,7 +90,7 @@ def test_a_fit_without_a_usable_matrix_is_sure_of_nothing(in_hand, broken):
     assert seen.agreement is None
 
 
-def test_how_far_gravity_moved(ideal):
+def test_the_largest_turn_of_gravity(ideal):
     simulated = ideal(0)
     recording = simulated.recording
     assert np.rad2deg(evidence(recording.part(0, 600)).gravity_moved) == pytest.approx(72.0, abs=12.0)
@@ -103,14 +103,14 @@ def test_how_far_gravity_moved(ideal):
 
 @pytest.mark.parametrize("flat", [True, False], ids=["flat known", "flat not found"])
 @pytest.mark.parametrize("motion", ["paper", "pose12", "continuous", "turns"])
-def test_rates_in_degrees_are_told_from_rates_in_radians(ideal, hand, motion, flat):
+def test_rates_in_degrees_are_distinguished_from_rates_in_radians(ideal, hand, motion, flat):
     recording = ideal(0).recording if motion == "paper" else hand(0, motion).recording
     in_degrees = replace(recording, gyr=np.rad2deg(recording.gyr))
     assert not evidence(recording, flat=flat).rates_in_degrees
     assert evidence(in_degrees, flat=flat).rates_in_degrees
 
 
-def test_turns_about_the_vertical_and_noise_are_no_degrees(in_hand):
+def test_turns_about_the_vertical_and_noise_are_not_taken_for_degrees(in_hand):
     recording = in_hand.recording
     rng = np.random.default_rng(0)
     upright = np.tile(recording.acc[:1000], (5, 1))

@@ -1,4 +1,4 @@
-"""The hand's estimator on simulated hands whose truth is known, and against what happens without its parts."""
+"""Estimator for a hand, on simulated hands with a known truth, and compared with models without a hand."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def z_scores(fits, runs):
 
 @pytest.fixture(scope="module")
 def fits(hand):
-    """The runs and fits of a motion, (runs, fits), made once."""
+    """Return a function that gives the runs and fits of a motion, (runs, fits), made once."""
     made = {}
 
     def of(motion, **how):
@@ -69,22 +69,21 @@ def test_it_finds_the_sensor_in_a_hand(fits, motion, how, mean, worst):
 
 
 @pytest.mark.parametrize("motion", ["pose12", "continuous", "turns", "pose6"])
-def test_it_knows_how_well_it_knows(fits, motion):
+def test_its_standard_deviations_are_right(fits, motion):
     runs, found = fits(motion)
     rms = np.sqrt(np.mean(np.square(z_scores(found, runs))))
-    # three runs of twelve correlated numbers: a factor of two either way would show; where few sides were down, leaving
-    # one out claims more
+    # Three runs of twelve correlated numbers show a factor of two; with few sides, the jackknife claims more.
     assert 0.3 < rms < 1.7
 
 
-def test_poses_tell_the_gyroscopes_matrix(fits):
+def test_twelve_poses_determine_the_gyroscopes_matrix(fits):
     runs, found = fits("pose12")
     z = [(fit.K - run.truth.K)[np.triu_indices(3)] / fit.std(*K_NAMES) for fit, run in zip(found, runs, strict=True)]
     assert all(fit.at_prior == () for fit in found)
     assert np.sqrt(np.mean(np.square(z))) < 1.6
 
 
-def test_six_faces_do_not_and_it_says_so(fits):
+def test_six_faces_leave_elements_of_k_at_their_prior(fits):
     _, found = fits("pose6")
     for fit in found:
         assert len(set(fit.at_prior) & set(K_NAMES)) >= 2
@@ -119,7 +118,7 @@ def test_a_model_without_a_hand_is_far_worse(fits, motion):
 
 
 @pytest.mark.parametrize("motion", ["pose12", "continuous", "wobble100", "turns"])
-def test_auto_takes_it_for_a_hand(hand, motion):
+def test_auto_chooses_the_hands_model(hand, motion):
     calibration = calibrate(hand(1, motion).recording, "auto", G)
     assert calibration.fit["model"] == "hand"
     assert "white noise does not explain the data" in calibration.fit["why"]
@@ -134,23 +133,23 @@ def test_a_perfect_gyroscope_keeps_its_matrix_where_all_of_it_is_known(hand):
         assert np.isnan(fit.std("K_xx")).all()
 
 
-def test_what_is_not_known_of_the_gyroscope_is_not_taken_for_perfect(ideal):
-    """Three turns in noise leave two elements of K open: D is as unsure as they are, whatever the Wald test says."""
+def test_k_stays_where_two_of_its_elements_are_unknown(ideal):
+    """Keep K after three turns in noise, whatever the Wald test says: D is as uncertain as its unknown elements."""
     for seed in range(4):
         fit = fitted(ideal(seed).recording)
         assert fit.at_prior == ("K_xy", "K_zz")
         assert (fit.std(*fit.at_prior) > 0.5 * np.array(BY_NAME["K"].sd)[[1, 5]]).all()
 
 
-def test_a_tremor_about_another_joint_does_little(hand):
-    """A lever arm for both joints would be the tremor's, and wrong for the turns: a bias of |omega|^2 r."""
+def test_a_tremor_about_another_joint_has_a_lever_arm_of_its_own(hand):
+    """Compare with a hand that turns about the same joint: a common lever arm would give a bias of |omega|^2 r."""
     for seed in range(2):
         run = hand(seed, "continuous")
         recording, rng = run.recording, np.random.default_rng(seed)
         away = np.arange(len(recording)) >= recording.flat[1] + 50
         w = 2.0 * np.pi * rng.uniform(8.0, 12.0, (40, 3))
         phase = w * recording.t[:, None, None] + rng.uniform(0.0, 2.0 * np.pi, (40, 3))
-        # rad: 0.5 mrad rms of each axis
+        # The tremor has 0.5 mrad rms on each axis.
         size = 0.5e-3 * np.sqrt(2.0 / 40.0) * away[:, None]
         rate, alpha = -size * np.sum(w * np.sin(phase), axis=1), -size * np.sum(w * w * np.cos(phase), axis=1)
         acc = recording.acc + np.cross(alpha, [0.05, -0.06, 0.03])
@@ -189,7 +188,7 @@ def test_one_lost_move_does_little(hand, pick, how, k):
 
 
 @pytest.mark.parametrize("k", [2, 6])
-def test_a_move_that_slipped_unseen_never_passes_for_good_unless_it_did_no_harm(hand, k):
+def test_a_calibration_with_an_unseen_move_is_good_only_if_its_claim_holds(hand, k):
     run = hand(1, "pose12")
     recording = run.recording
     flat = flat_statistics(recording, recording.flat)

@@ -1,4 +1,4 @@
-"""What a verdict promises of recordings whose truth is known: no `good` that is three times worse than it claims."""
+"""Verdicts on recordings with a known truth: no `good` one has an error of three times its claim."""
 
 from dataclasses import replace
 from functools import cache
@@ -17,26 +17,26 @@ from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
 
 G = 9.82
 SCENES = ("paper", "pose12", "pose9", "pose6", "continuous", "turns")
-# units of accelerometer and gyroscope, of which only the first pair is right
+# Units of accelerometer and gyroscope; only the first pair is right.
 UNITS = ((1.0, 1.0), (1 / 9.80665, 1.0), (1e3 / 9.80665, 1.0), (1.0, np.degrees(1.0)), (1.0, 16.4 * np.degrees(1.0)))
 
 
 @cache
 def base(prepared, seed):
-    """200 Hz, of which a recording takes some samples."""
+    """Return a recording at 200 Hz, from which samples are drawn."""
     if prepared == "paper":
         return paper_scenario(seed, rate_hz=200)
     return hand_scenario(seed, prepared, rate_hz=200, truth_hz=400)
 
 
 def turned(truth, Q):
-    """The same sensor with the axes of both its sensors turned by Q, so that it starts in another orientation."""
+    """Return the sensor with the axes of both its sensors turned by Q, so that it starts in another orientation."""
     return SensorTruth(Q @ truth.D @ Q.T, Q @ truth.b_a, Q @ truth.K @ Q.T, Q @ truth.b_omega, truth.gravity)
 
 
 @st.composite
 def measured(draw):
-    """A recording and its truth: any rate, orientation at the start, noise, jitter and gaps."""
+    """Draw a recording and its truth: any rate, orientation at the start, noise, jitter and gaps."""
     simulated = base(draw(st.sampled_from(SCENES)), draw(st.integers(0, 1)))
     rng = np.random.default_rng(draw(st.integers(0, 2**16)))
     whole = simulated.recording

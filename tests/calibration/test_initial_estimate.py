@@ -1,3 +1,5 @@
+"""First estimate: exact without noise, near enough for the minimiser with noise, and robust to gaps."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +24,7 @@ def problem_of(simulated):
 
 
 def exact(D, b_a, u, n=400, seed=0, lost=()):
-    """The problem of a sensor without noise, turned at random about all axes from u on; `lost` samples left out."""
+    """Return the problem of a sensor without noise, turned at random from u on, without `lost` samples."""
     rng = np.random.default_rng(seed)
     t = 0.01 * np.arange(n + 100)
     rates = np.zeros((n + 100, 3))
@@ -39,13 +41,13 @@ def exact(D, b_a, u, n=400, seed=0, lost=()):
 
 
 def linear(problem, b_omega):
-    """The start from a series as if it had no gaps."""
+    """Return the start from a series as if it had no gaps."""
     whole = replace(problem, series=replace(problem.series, q_extra=None))
     return initialise(whole, b_omega)
 
 
 @pytest.mark.parametrize("u", [(0, 0, 1), (0, 0, -1), (0.6, 0.8, 0), (-0.5, 0.5, np.sqrt(0.5))], ids=str)
-def test_without_noise_it_is_exact_whatever_lay_down(u):
+def test_without_noise_it_is_exact_in_every_orientation(u):
     D = np.array([[1.3, 0.1, -0.2], [0.3, 0.6, 0.1], [0.0, -0.2, 0.9]])
     b_a = np.array([1.0, -0.5, 0.3])
     theta = initialise(exact(D, b_a, np.array(u)), np.zeros(3))
@@ -54,7 +56,7 @@ def test_without_noise_it_is_exact_whatever_lay_down(u):
     np.testing.assert_allclose(theta.u, u, atol=2e-3)
 
 
-def test_of_a_mirrored_sensor_it_finds_the_right_handed_equal():
+def test_it_finds_the_right_handed_equivalent_of_a_mirrored_sensor():
     D, u = np.diag([1.0, 1.0, -1.0]), np.array([0.1, 0.2, np.sqrt(0.95)])
     theta = initialise(exact(D, np.zeros(3), u), np.zeros(3))
     np.testing.assert_allclose(theta.D, -D, atol=2e-3)
@@ -68,9 +70,9 @@ def test_from_it_the_minimiser_finds_every_sensor_of_the_paper():
         theta = initialise(problem, problem.flat.b_omega)
         assert np.linalg.det(theta.D) > 0
         assert np.linalg.norm(theta.u) == pytest.approx(1.0)
-        # the gyroscope's noise, integrated over half a minute, is what is left
+        # The error left is the gyroscope's noise, integrated over half a minute.
         assert sph_rms(simulated.truth, theta.D, theta.b_a) < 2.0
-        # and little enough for the minimiser to find the right optimum, soon
+        # It is small enough for the minimiser to find the right optimum soon.
         fit = fit_accel(simulated.recording, problem.flat, simulated.truth.gravity)
         assert fit.iterations <= 4
         assert fit.nis < 3.6
@@ -96,7 +98,7 @@ def test_a_gap_in_which_the_board_turned_does_no_harm(first):
 
 
 @pytest.mark.parametrize("begin", [initialise, linear], ids=["the best of all", "a start that does not settle"])
-def test_pieces_lost_all_over_do_not_lead_it_astray(begin, hand, pick, monkeypatch):
+def test_many_gaps_do_not_lead_to_a_wrong_optimum(begin, hand, pick, monkeypatch):
     monkeypatch.setattr("mpucal.calibration.hand.initialise", begin)
     simulated, rng = hand(4, "pose12"), np.random.default_rng(4)
     t = simulated.recording.t - simulated.recording.t[0]

@@ -1,4 +1,4 @@
-"""Leaving a part out by one step, against really leaving it out, and claims where the model is wrong."""
+"""Jackknife by one Newton step, compared with fits without a part, and claims where the model is wrong."""
 
 from dataclasses import replace
 
@@ -43,27 +43,27 @@ def test_the_parts_scores_sum_to_the_whole(hand, made, parameters, block):
     begin, whole = evaluate(problem.first(0), theta, parameters), evaluate(problem, theta, parameters)
     np.testing.assert_allclose(scores.gradient.sum(0) + begin.gradient, whole.gradient, rtol=1e-9)
     np.testing.assert_allclose(scores.fisher.sum(0) + scores.flat.fisher, whole.fisher, rtol=1e-9, atol=1e-6)
-    # the kernel sums up to whole blocks of steps, the first of which is the flat mean's
+    # The kernel sums up to whole blocks of steps, of which the flat mean is the first.
     end = (n // 3 // block + 1) * block - 1
     first = evaluate(problem.first(end), theta, parameters)
     np.testing.assert_allclose(scores.gradient[0] + begin.gradient, first.gradient, rtol=1e-9)
 
 
 @pytest.mark.parametrize("motion", ["continuous", "pose12"])
-def test_where_the_model_holds_it_claims_no_more_than_the_model(hand, motion):
+def test_where_the_model_holds_the_claim_is_the_models(hand, motion):
     inflations = [estimate(hand(seed, motion).recording, "auto", G)[0].claim.inflation for seed in range(3)]
     assert np.median(inflations) < 1.3
 
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
-def test_a_side_that_no_other_makes_up_for_says_little(hand, seed):
+def test_a_side_that_no_other_can_replace_counts_little(hand, seed):
     claim = estimate(hand(seed, "pose7").recording, "auto", G)[0].claim
-    # leaving a side out moves the estimate by 15 times as much
+    # Leaving a side out moves the estimate by 15 times as much.
     assert 0.0 < claim.left_out.claim() < 5.0 * claim.model
 
 
 def test_linear_measurements_without_a_part_are_fitted_exactly():
-    """One Newton step from the fit of all is the fit of the others, where the problem is quadratic."""
+    """Compare with least squares: where the problem is quadratic, one Newton step gives the fit of the others."""
     rng = np.random.default_rng(0)
     k, m, p = 16, 20, 12
     A, y = rng.standard_normal((k, m, p)), rng.standard_normal((k, m))
@@ -87,7 +87,7 @@ def test_a_nonlinear_sensor_is_claimed_by_its_sides(hand):
     assert sph_rms(made.truth, fit.D, fit.b_a) < 3.0 * fit.quality["error_std"]["rms"]
 
 
-def test_where_too_few_sides_were_down_to_be_compared_the_model_is_believed_half(hand):
+def test_with_too_few_sides_to_compare_the_models_uncertainty_is_doubled(hand):
     fit = estimate(hand(1, "continuous").recording, "hand", G)[0].fit
     alike = np.zeros_like(fit.parts.side)
     one_side = replace(fit, parts=replace(fit.parts, side=alike))
@@ -96,7 +96,7 @@ def test_where_too_few_sides_were_down_to_be_compared_the_model_is_believed_half
     assert sides[1].floored == 2.0 * sides[0].floored
 
 
-def test_what_decided_is_in_the_document(hand):
+def test_the_document_names_the_estimate_that_set_the_uncertainty(hand):
     made = hand(1, "pose12")
     error = calibrate(made.recording, gravity=G).quality["error_std"]
     assert error["decided_by"] in ("model", "time", "side")
@@ -105,7 +105,7 @@ def test_what_decided_is_in_the_document(hand):
     )
 
 
-def test_a_group_that_is_all_that_tells_a_parameter_moves_it_without_bound():
+def test_leaving_out_the_only_group_that_determines_a_parameter_moves_it_without_bound():
     told = np.tile(np.eye(12), (4, 1, 1))
     told[2, 3, 3] = 0.0
     assert np.isinf(_moved(np.ones((4, 12)), told, np.eye(12))).all()

@@ -1,4 +1,4 @@
-"""The minimiser on problems whose answer is known otherwise."""
+"""Minimiser, on problems whose solution is known otherwise."""
 
 from dataclasses import replace
 
@@ -49,7 +49,7 @@ def test_it_ends_where_the_gradient_vanishes_and_nowhere_near_is_lower(problem, 
     for _ in range(20):
         direction = rng.standard_normal(ACCEL)
         away = evaluate(problem, minimum.theta.moved(L @ direction / np.linalg.norm(direction)), 0).V
-        # one standard deviation away, V is higher by about a half
+        # One standard deviation away, V is higher by about a half.
         assert minimum.V + 0.3 < away < minimum.V + 0.8
 
 
@@ -62,7 +62,7 @@ def test_it_finds_the_same_from_afar(problem, start):
     assert from_afar.iterations > near.iterations
 
 
-def test_a_lower_bar_is_met_sooner(problem, start):
+def test_a_larger_decrement_is_reached_sooner(problem, start):
     far = replace(start, D=start.D + 0.2)
     rough, fine = (minimise(problem, far, ACCEL, NOTHING, until=until) for until in (10.0, 1e-8))
     assert rough.iterations < fine.iterations
@@ -96,7 +96,7 @@ def test_a_tight_prior_wins_and_a_loose_one_is_forgotten(problem, start):
     assert tight.V > free.V + 1.0
 
 
-def test_a_prior_and_the_data_meet_where_their_information_says(problem, start):
+def test_a_prior_and_the_data_are_weighted_by_their_information(problem, start):
     free = minimise(problem, start, ACCEL, NOTHING, until=1e-8)
     sd = np.sqrt(np.diag(free.covariance()))[9]
     prior = Prior.of(b_a=(free.theta.b_a + sd * np.eye(3)[0], [sd, 1e6, 1e6]))
@@ -105,7 +105,7 @@ def test_a_prior_and_the_data_meet_where_their_information_says(problem, start):
     assert np.sqrt(both.covariance()[9, 9]) == pytest.approx(sd / np.sqrt(2.0), rel=0.05)
 
 
-def test_without_turning_it_ends_and_claims_nothing():
+def test_without_turning_it_ends_with_finite_numbers():
     recording = paper_scenario(0, rate_hz=50).recording.part(0, 500)
     flat = flat_statistics(recording, (0, 200))
     problem = Problem(Series.after(recording, flat), flat, 9.82)
@@ -115,7 +115,7 @@ def test_without_turning_it_ends_and_claims_nothing():
     assert np.isfinite(minimum.covariance()).all()
 
 
-def test_a_cost_that_overflows_is_turned_away_from(problem, start):
+def test_a_cost_that_overflows_ends_the_search(problem, start):
     absurd = replace(problem, series=replace(problem.series, y=1e160 * problem.series.y))
     minimum = minimise(absurd, start, ACCEL, NOTHING)
     assert not minimum.converged
@@ -126,8 +126,8 @@ def test_a_cost_that_overflows_is_turned_away_from(problem, start):
     ("then", "risen", "accepted"),
     [(5.0, 0.9, True), (5.0, 1.1, False), (0.9, 100.0, True), (0.9, 300.0, False), (11.0, 0.5, False)],
 )
-def test_a_step_of_frozen_gains_may_raise_V_where_it_all_but_ends_at_a_root(then, risen, accepted):  # noqa: N802
-    """Of a decrement of 10: a search that may not take such a step creeps beside the root for ever."""
+def test_a_step_with_frozen_gains_may_raise_V_near_a_root(then, risen, accepted):  # noqa: N802
+    """Judge steps from a decrement of 10: a search without such steps never reaches the root."""
 
     class At:
         def __init__(self, cost, decrement):

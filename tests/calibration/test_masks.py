@@ -1,3 +1,5 @@
+"""Masks: clipped samples and gaps are found, and nothing else is, and the series counts them as it should."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +14,7 @@ from tools.lab.judge import sph_rms
 
 
 def noise(n=1000, seed=0, **changes):
-    """A recording of nothing but noise about gravity."""
+    """Return a recording of noise about gravity."""
     rng = np.random.default_rng(seed)
     acc = [0.0, 0.0, 9.8] + 3.0 * rng.standard_normal((n, 3))
     return replace(Recording.from_arrays(0.01 * np.arange(n), acc, rng.standard_normal((n, 3))), **changes)
@@ -26,7 +28,7 @@ def test_white_noise_is_neither_clipped_nor_broken():
         assert not marked.gyr_clipped.any()
 
 
-def test_what_the_source_marked_stays_marked():
+def test_marks_of_the_source_stay():
     marks = np.zeros(1000, bool)
     marks[[3, 500]] = True
     marked = with_masks(noise(gap=marks, acc_clipped=marks, gyr_clipped=marks))
@@ -45,7 +47,7 @@ def test_a_gap_is_where_time_jumps(pick, jitter):
 
 
 @pytest.mark.parametrize("full_scale", GYRO_RANGES, ids=lambda x: f"{np.rad2deg(x):.0f} deg/s")
-def test_few_samples_at_a_chips_range_are_clipped(full_scale):
+def test_samples_at_a_gyroscopes_range_are_clipped(full_scale):
     recording = noise()
     gyr = np.clip(0.4 * full_scale * recording.gyr, -full_scale, full_scale * 32767 / 32768)
     at_the_end = (np.abs(gyr) >= full_scale * 32767 / 32768).any(1)
@@ -54,14 +56,14 @@ def test_few_samples_at_a_chips_range_are_clipped(full_scale):
 
 
 @pytest.mark.parametrize("full_scale", ACC_RANGES, ids=lambda x: f"{x / 9.80665:.0f} g")
-def test_an_accelerometers_range_likewise(full_scale):
+def test_samples_at_an_accelerometers_range_are_clipped(full_scale):
     recording = noise()
     acc = np.clip(0.35 * full_scale * (recording.acc - [0, 0, 9.8]), -full_scale, full_scale)
     at_the_end = (np.abs(acc) == full_scale).any(1)
     np.testing.assert_array_equal(with_masks(replace(recording, acc=acc)).acc_clipped, at_the_end)
 
 
-def test_any_other_end_of_range_must_hold_long_and_far_out():
+def test_clipping_at_another_value_must_be_long_and_far_from_rest():
     recording = noise()
     t = recording.t
     gyr = recording.gyr * 0.001
@@ -70,17 +72,14 @@ def test_any_other_end_of_range_must_hold_long_and_far_out():
     np.testing.assert_array_equal(marked.gyr_clipped, gyr[:, 1] == 3.3)
 
 
-def test_a_constant_axis_is_not_clipped():
+@pytest.mark.parametrize(
+    "change",
+    [lambda acc: acc * [0.0, 1.0, 1.0], lambda acc: np.rint(acc / 2.0) * 2.0],
+    ids=["a constant axis", "coarse counts"],
+)
+def test_values_that_repeat_without_a_rail_are_not_clipped(change):
     recording = noise()
-    acc = recording.acc.copy()
-    acc[:, 0] = 0.0
-    assert not with_masks(replace(recording, acc=acc)).acc_clipped.any()
-
-
-def test_coarse_counts_that_repeat_are_not_clipped():
-    recording = noise()
-    acc = np.rint(recording.acc / 2.0) * 2.0
-    assert not with_masks(replace(recording, acc=acc)).acc_clipped.any()
+    assert not with_masks(replace(recording, acc=change(recording.acc))).acc_clipped.any()
 
 
 def masked(recording):
@@ -103,31 +102,31 @@ def test_a_clipped_acceleration_hardly_counts():
     assert not series.q_extra.any()
 
 
-def test_both_steps_beside_a_clipped_rate_are_doubted():
+def test_both_steps_beside_a_clipped_rate_get_more_noise():
     marks = np.zeros(1000, bool)
     marks[300] = True
     plain, series, flat = masked(noise(gyr_clipped=marks))
     assert np.flatnonzero(series.q_extra).tolist() == [200, 201]
     omega = np.linalg.norm(plain.omega[[200, 201]] - flat.b_omega, axis=1)
-    # two steps in a row: 0.15 % of the rate, times the root of two
+    # Two steps in a row get 0.15 % of the rate, times the root of two.
     np.testing.assert_allclose(np.sqrt(series.q_extra[[200, 201]]), 0.0015 * np.sqrt(2.0) * omega * 0.01, rtol=1e-6)
 
 
-def test_the_longer_a_rate_is_clipped_the_less_its_range_says():
+def test_a_longer_clipped_run_gets_more_noise():
     short, long = np.zeros(1000, bool), np.zeros(1000, bool)
     short[300], long[300:307] = True, True
     variance = [masked(noise(gyr_clipped=marks))[1].q_extra[201] for marks in (short, long)]
     np.testing.assert_allclose(variance[1] / variance[0], 8.0 / 2.0)
 
 
-def test_across_a_gap_nothing_is_integrated_and_nothing_known(pick):
+def test_a_gap_gets_no_rate_and_an_unknown_turn(pick):
     kept = np.ones(1000, bool)
     kept[400:600] = False
     recording = with_masks(pick(noise(), kept))
     plain, series, flat = masked(recording)
     np.testing.assert_array_equal(series.omega[300], flat.b_omega)
     assert series.q_extra[300] == pytest.approx(2.01)
-    # so long a gap is corrected for by more than one sample
+    # More than one sample corrects a long gap.
     after = np.flatnonzero(series.q_extra)[1:]
     assert after.tolist() == [301, 302, 303, 304, 305]
     assert (series.q_extra[after] < 0.1 * series.q_extra[300]).all()
@@ -142,7 +141,7 @@ def test_a_short_gap_is_corrected_for_at_once(pick):
 
 
 def drawn(recording, first, last, at=slice(None)):
-    """The recording with a line through samples first..last-1 of its gyroscope."""
+    """Return the recording with a line through samples first..last-1 of its gyroscope."""
     gyr = recording.gyr.copy()
     share = np.linspace(0.0, 1.0, last - first + 2)[1:-1, None]
     gyr[first:last, at] = ((1.0 - share) * gyr[first - 1] + share * gyr[last])[:, at]
@@ -162,7 +161,7 @@ def test_one_axis_alone_on_a_line_is_chance():
 
 def test_a_constant_rate_is_no_line():
     gyr = noise().gyr.copy()
-    gyr[:400] = 0.01  # a sensor of coarse steps at rest
+    gyr[:400] = 0.01  # as of a sensor with coarse steps at rest
     assert not with_masks(replace(noise(), gyr=gyr)).gap.any()
 
 
@@ -172,7 +171,7 @@ def test_computed_rates_may_follow_lines():
     assert not with_masks(replace(noise(), gyr=ramps)).gap.any()
 
 
-def test_a_mask_saves_what_a_clipped_gyroscope_would_spoil(hand, monkeypatch):
+def test_masks_reduce_the_error_by_a_clipped_gyroscope(hand, monkeypatch):
     simulated = hand(3, "pose12")
     recording, truth = simulated.recording, simulated.truth
     limit = np.deg2rad(125.0)

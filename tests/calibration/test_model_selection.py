@@ -1,12 +1,10 @@
-"""The estimators without a hand, against truth, against the quaternion EKF, and against each other."""
+"""Estimators without a hand, compared with the truth, with the quaternion EKF, and with each other."""
 
 import numpy as np
 import pytest
-from scipy.special import chdtri
 
 from mpucal.calibration import model_selection
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
-from mpucal.calibration.hypothesis_tests import WALD_99
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import minimise
 from mpucal.calibration.model_selection import METHODS, choose, fit_accel, fit_imu
@@ -23,8 +21,8 @@ THETA_A = (*D_NAMES, *B_A_NAMES)
 K_SD = np.array(BY_NAME["K"].sd)
 
 
-def by(fit, recording):
-    return fit(recording, flat_statistics(recording, recording.flat), G)
+def by(method, recording):
+    return method(recording, flat_statistics(recording, recording.flat), G)
 
 
 def theta_a(fit):
@@ -32,10 +30,10 @@ def theta_a(fit):
 
 
 def ekf_of(problem, theta):
-    """The quaternion EKF over a problem of the 3-state filter, with the same samples, turns and start.
+    """Return the quaternion EKF over a problem of the 3-state filter, with the same samples, turns and start.
 
-    The flat mean counts n times in the 3-state filter, so it is measured n times at rest here. What the EKF does not
-    estimate, b_omega and the starting orientation, is that filter's estimate.
+    The flat mean counts n times in the 3-state filter, so it is measured n times at rest here. The EKF does not
+    estimate b_omega and the starting orientation, and takes them from that filter.
     """
     series, flat = problem.series, problem.flat
     n = flat.n
@@ -54,10 +52,10 @@ def ekf_of(problem, theta):
 
 @pytest.mark.parametrize("number", [0, 2])
 def test_the_3_state_filter_equals_the_quaternion_ekf(other_simulator, number):
-    """Estimates of D and b_a by both filters from the same samples: less than a tenth of a standard deviation apart.
+    """Compare D and b_a by both filters from the same samples: within a tenth of a standard deviation.
 
     From the 3-state filter's optimum over all parameters, a Gauss-Newton step of the EKF leads to the EKF's own optimum
-    over D and b_a; it is that step which is compared (a second one is a hundred times smaller).
+    over D and b_a, and this step is compared (a second one is a hundred times smaller).
     """
     other = other_simulator(f"paper_{number}")
     recording, flat = other.recording, flat_statistics(other.recording, other.recording.flat)
@@ -86,7 +84,7 @@ def test_accel_finds_the_other_simulators_sensors(other_simulator):
 
 @pytest.fixture(scope="module")
 def paper_runs():
-    """Forty sensors of the paper's section 4.3, and what `accel` and `imu` make of them."""
+    """Return forty sensors of the paper's section 4.3, and their fits by `accel` and `imu`."""
     runs = [paper_scenario(seed, rate_hz=50) for seed in range(40)]
     return runs, {model: [by(METHODS[model], run.recording) for run in runs] for model in ("accel", "imu")}
 
@@ -96,11 +94,11 @@ def z_scores(runs, fits):
     return np.array([(theta_a(fit) - t) / fit.std(*THETA_A) for fit, t in zip(fits, truth, strict=True)])
 
 
-def test_accel_knows_how_well_it_knows(paper_runs):
+def test_the_standard_deviations_of_accel_are_right(paper_runs):
     runs, fits = paper_runs
     z = z_scores(runs, fits["accel"])
     assert 0.85 < np.sqrt((z**2).mean()) < 1.15
-    # each of the twelve, within what forty runs can tell
+    # Forty runs estimate each of the twelve within these limits.
     assert (np.sqrt((z**2).mean(0)) < 1.4).all()
     assert (np.sqrt((z**2).mean(0)) > 0.65).all()
 
@@ -126,7 +124,7 @@ def test_the_gyroscopes_bias_is_estimated_beyond_the_flat_segment(paper_runs):
     assert np.median(gained) < 0.9
 
 
-def test_with_a_perfect_gyroscope_imu_says_the_same_less_surely(paper_runs):
+def test_with_a_perfect_gyroscope_imu_agrees_with_accel_and_is_less_certain(paper_runs):
     _, fits = paper_runs
     for fit, plain in zip(fits["imu"], fits["accel"], strict=True):
         assert fit.converged
@@ -137,15 +135,14 @@ def test_with_a_perfect_gyroscope_imu_says_the_same_less_surely(paper_runs):
 def test_auto_keeps_a_perfect_gyroscope_perfect(paper_runs):
     runs, _ = paper_runs
     for run in runs:
-        recording = run.recording
-        chosen = choose(recording, flat_statistics(recording, recording.flat), G)
+        chosen = by(choose, run.recording)
         assert chosen.model == "accel"
         assert "perfect gyroscope" in chosen.why
         np.testing.assert_array_equal(chosen.fit.K, np.eye(3))
 
 
 def wrong_gyro(seed):
-    """A gyroscope off by up to 3 % of scale and 1 % across axes, and its K."""
+    """Return the inverse K and K of a gyroscope with errors up to 3 % of scale and 1 % across axes."""
     rng = np.random.default_rng(seed)
     off = np.triu(rng.uniform(-0.01, 0.01, (3, 3)), 1)
     K = np.eye(3) + np.diag(rng.choice([-0.03, 0.03], 3)) + off + off.T
@@ -156,9 +153,7 @@ def test_auto_finds_a_gyroscope_that_is_off(ideal):
     z = []
     for seed in range(10):
         G_gyro, K = wrong_gyro(seed)
-        simulated = ideal(seed, G_gyro=G_gyro, rate_hz=100)
-        recording = simulated.recording
-        chosen = choose(recording, flat_statistics(recording, recording.flat), G)
+        chosen = by(choose, ideal(seed, G_gyro=G_gyro, rate_hz=100).recording)
         assert chosen.model == "imu", seed
         assert "not perfect" in chosen.why
         sd = chosen.fit.std(*K_NAMES)
@@ -168,7 +163,7 @@ def test_auto_finds_a_gyroscope_that_is_off(ideal):
     assert np.sqrt(np.mean(np.square(z))) < 1.3
 
 
-def test_what_one_turn_about_each_axis_cannot_tell_of_k_stays_at_its_prior(ideal):
+def test_elements_of_k_that_one_turn_about_each_axis_leaves_open_keep_their_prior(ideal):
     G_gyro, _ = wrong_gyro(0)
     fit = by(fit_imu, ideal(0, G_gyro=G_gyro, rate_hz=100).recording)
     assert set(fit.at_prior) < set(K_NAMES)
@@ -178,7 +173,7 @@ def test_what_one_turn_about_each_axis_cannot_tell_of_k_stays_at_its_prior(ideal
         assert (fit.std(name)[0] > 0.5 * before) == (name in fit.at_prior)
 
 
-def test_imu_of_many_gyroscopes_is_as_sure_as_it_says(ideal):
+def test_the_standard_deviations_of_imu_are_right_for_many_gyroscopes(ideal):
     z = []
     for seed in range(25):
         rng = np.random.default_rng(1000 + seed)
@@ -212,16 +207,11 @@ def test_gravity_scales_the_gains_alone(gravity):
     np.testing.assert_allclose(there.b_a, here.b_a, atol=1e-2)
 
 
-def test_the_wald_threshold_is_the_quantile_that_it_is_said_to_be():
-    assert pytest.approx(chdtri(len(BY_NAME["K"].names), 0.01), rel=1e-3) == WALD_99
-
-
 def test_a_long_recording_is_searched_by_coarser_means_to_the_same_end(monkeypatch):
     recording = paper_scenario(4, rate_hz=50, turn_s=20.0).recording
-    flat = flat_statistics(recording, recording.flat)
-    at_once = fit_accel(recording, flat, G)
+    at_once = by(fit_accel, recording)
     monkeypatch.setattr(model_selection, "MANY_MEANS", 100)
-    by_coarser = fit_accel(recording, flat, G)
+    by_coarser = by(fit_accel, recording)
     assert by_coarser.converged
-    assert not np.array_equal(by_coarser.D, at_once.D)  # another way
+    assert not np.array_equal(by_coarser.D, at_once.D)  # the search took another way
     np.testing.assert_array_less(np.abs(by_coarser.D - at_once.D).ravel(), 0.05 * at_once.std(*D_NAMES))

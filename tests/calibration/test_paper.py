@@ -21,7 +21,7 @@ def fitted(recording):
     return fit_paper(recording, flat_statistics(recording, recording.flat), G)
 
 
-def test_it_finds_simulated_sensors_and_knows_how_well():
+def test_it_finds_simulated_sensors_with_right_standard_deviations():
     z = []
     for seed in (0, 1):
         simulated = paper_scenario(seed, rate_hz=20)
@@ -85,7 +85,7 @@ def test_it_is_invariant_to_when_the_recording_began():
 
 
 @pytest.mark.parametrize("scale", [1e3, 1e150], ids=["nonsense", "overflow"])
-def test_what_cannot_be_fitted_ends_unconverged(scale):
+def test_data_that_cannot_be_fitted_end_unconverged(scale):
     recording = paper_scenario(8, rate_hz=10).recording
     noise = np.random.default_rng(0).standard_normal(recording.acc.shape)
     noise[: recording.flat[1]] = 0.0

@@ -1,4 +1,4 @@
-"""The table of the model's parameters, and what follows from it in Python and in the kernel."""
+"""Table of the model's parameters, and the layouts in Python and in the kernel that follow from it."""
 
 from dataclasses import fields
 
@@ -10,7 +10,7 @@ from mpucal.calibration.parameters import LANES, MODELS, NAMES, PLACES, TABLE, e
 from mpucal.calibration.theta import Theta
 
 
-def test_what_a_model_estimates_comes_first():
+def test_the_parameters_of_a_model_come_first():
     stages = [MODELS.index(row.model) for row in TABLE]
     assert stages == sorted(stages)
     assert [row.name for row in estimated("hand")] == [row.name for row in TABLE]
@@ -22,7 +22,7 @@ def test_every_parameter_has_a_name_a_place_and_a_lane_of_its_own():
     assert all(len(row.sd) in (0, len(row.names)) for row in TABLE)
 
 
-def test_what_a_model_does_not_estimate_lies_in_no_lane_that_it_uses():
+def test_a_model_uses_only_the_lanes_of_its_parameters():
     for model in MODELS:
         beyond = {lane for row in TABLE if row not in estimated(model) for lane in row.lanes}
         assert not beyond & set(range(lanes_used(model)))
@@ -41,7 +41,7 @@ def test_a_step_changes_its_own_parameter_alone(row):
     moved = theta.moved(step)
     changed = [name for name in vars(theta) if not np.array_equal(getattr(theta, name), getattr(moved, name))]
     assert changed == [row.field]
-    # the tilts are measured from the direction itself
+    # The tilts are measured from the direction itself.
     expected = step if row.name != "tilt" else 0.0 * step
     np.testing.assert_allclose(moved.values() - theta.values(), expected, atol=1e-15)
 

@@ -1,4 +1,4 @@
-"""The multi-position calibration against the truth, a least-squares ellipsoid of SciPy's, and faces of a box."""
+"""Multi-position calibration, compared with the truth and with SciPy's least squares, and on faces of a box."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ FACES = np.vstack([np.eye(3), -np.eye(3)])
 
 
 def sigmas(calibration, D, b_a):
-    """(12,) errors in units of their standard deviations; D is known up to a rotation."""
+    """Return (12,) errors in units of their standard deviations; D is known up to a rotation."""
     symmetric = polar(D, "left")[1]
     return np.append((calibration.D - symmetric) / calibration.D_std, (calibration.b_a - b_a) / calibration.b_a_std)
 

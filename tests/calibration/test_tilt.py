@@ -1,4 +1,4 @@
-"""A sensor that was tilted and never turned over: right where it was, and nothing claimed of the rest."""
+"""Estimator for a board that was only tilted: right within the tilts, and no claim beyond."""
 
 from itertools import pairwise
 
@@ -20,14 +20,14 @@ B_OMEGA = np.array([0.02, -0.01, 0.03])
 
 
 def tilts(angle_rad, around=8):
-    """(k, 3) unit vectors that point up one after the other: level, then leaning to so many sides."""
+    """Return (k, 3) unit vectors that point up one after the other: level, then tilted to `around` sides."""
     side = np.arange(around) * 2.0 * np.pi * 3 / around
     across, along = np.sin(angle_rad), np.full(around, np.cos(angle_rad))
     return np.vstack([[0.0, 0.0, 1.0], np.stack([across * np.cos(side), across * np.sin(side), along], axis=1)])
 
 
 def tilted(seed):
-    """Ten seconds flat, then a move of 1.6 s to each tilt and a rest of 2 s there; and gravity's path (n, 3)."""
+    """Return ten seconds flat, then a move of 1.6 s to each tilt and a rest of 2 s; and gravity's path (n, 3)."""
     rng = np.random.default_rng(seed)
     ups = tilts(TILT_RAD)
     s, rate = [np.tile(ups[0], (1000, 1))], [np.zeros((1000, 3))]
@@ -63,23 +63,23 @@ def test_gravity_is_right_where_the_board_was_tilted(found):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_claimed_is_within_its_standard_deviations(seed):
+def test_errors_are_within_their_standard_deviations(seed):
     fit = fitted(tilted(seed)[0])
     z = np.append((fit.D - D).ravel(), fit.b_a - B_A) / fit.std(*D_NAMES, *B_A_NAMES)
     assert np.abs(z).max() < 3.5
     assert np.sqrt(np.mean(z**2)) < 1.5
 
 
-def test_what_tilts_do_not_show_is_named_and_no_better_known_than_before(found):
+def test_parameters_that_tilts_do_not_show_are_named_and_keep_their_prior(found):
     fit = found[0]
-    # near level a gain of the vertical looks like its bias, and those of the others are cosines
+    # Near level, a gain of the vertical has the effect of its bias, and the others' gains are cosines.
     left = {name for name in fit.at_prior if name in D_NAMES + B_A_NAMES}
     assert left == {"D_xx", "D_yy", "D_zz", "b_a_z"}
     assert fit.std("D_zz")[0] > SCALE_FACTOR_SD
     assert fit.std("b_a_x")[0] < 0.1 * BIAS_SD_MPS2
 
 
-def test_nothing_is_claimed_beyond_the_data_sheet_of_a_board_that_lay_still():
+def test_a_board_that_lay_still_keeps_the_data_sheets_tolerances():
     recording = tilted(1)[0].part(0, 1200)
     fit = fitted(recording)
     assert set(D_NAMES) <= set(fit.at_prior)

@@ -57,7 +57,7 @@ def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand, k)
 
 
 def test_the_doubt_is_as_large_as_the_miss(in_hand):
-    """The variance of the move's angle grows to about the square of what gravity missed by."""
+    """Compare the variance of the move's angle with the square of the miss of gravity."""
     prepared = Moved(in_hand)
     gyr = in_hand.recording.gyr.copy()
     first, last = prepared.runs[5][1], prepared.runs[6][0]
@@ -78,7 +78,7 @@ def test_fewer_than_three_moves_cannot_outvote_one(in_hand):
 
 
 def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
-    """The trace of J C J' for a C of one parameter, against central differences of the miss."""
+    """Compare the trace of J C J', for a C of one parameter, with central differences of the miss."""
     moved = Moved(in_hand)
     prepared, theta = moved.prepared, moved.theta
     moves = transitions_of(prepared, theta)
@@ -99,7 +99,7 @@ def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
 
 
 def test_misses_that_an_estimate_took_up_leave_more_noise():
-    """Misses of twice the variance that noise explains, and an estimate that took half of them."""
+    """Draw misses of twice the variance by noise, for an estimate that took half of them."""
     rng = np.random.default_rng(0)
     still = np.eye(3)
     moves = [
@@ -108,7 +108,7 @@ def test_misses_that_an_estimate_took_up_leave_more_noise():
         )
         for _ in range(400)
     ]
-    # Student's t weighs the many that agree more than the tail
+    # Student's t gives the tail less weight.
     blind = miss_variances(moves).mean()
     assert blind == pytest.approx(2.0, rel=0.35)
     assert miss_variances(moves, np.ones(400)).mean() > 1.8 * blind

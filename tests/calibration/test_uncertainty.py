@@ -56,7 +56,7 @@ def test_twice_the_standard_deviation_is_twice_the_error():
 
 
 def test_a_rotation_of_the_sensor_is_an_error_of_direction_alone():
-    # D exp([phi]x) with an unknown turn phi about z
+    # The error is D exp([phi]x) with an unknown turn phi about z.
     d_D = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]).ravel()
     C = np.zeros((12, 12))
     C[:9, :9] = 1e-4 * np.outer(d_D, d_D)

@@ -1,4 +1,4 @@
-"""New orientations of a perfect sensor whose gyroscope carries a turn 1 deg too short, or not."""
+"""Verification of a perfect sensor, with a gyroscope that is exact, or whose turn is 1 deg too short."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ KNOWN = Fit(
 
 
 def turned(turn_s, missing_deg):
-    """A rest, a quarter turn about x at a constant rate, and a rest."""
+    """Return a rest, a quarter turn about x at a constant rate, and a rest."""
     n_rest, n_turn = round(REST_S * HZ), round(turn_s * HZ)
     rate = np.concatenate([np.zeros(n_rest), np.full(n_turn, 0.5 * np.pi / turn_s), np.zeros(n_rest)])
     angle = np.cumsum(rate) / HZ

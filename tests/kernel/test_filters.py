@@ -1,4 +1,4 @@
-"""Both filters, compared with their NumPy twins, with differences, with each other, and on each instruction set."""
+"""Filters of the kernel, compared with NumPy twins, differences, each other, and on each instruction set."""
 
 from dataclasses import replace
 

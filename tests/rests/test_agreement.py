@@ -1,4 +1,4 @@
-"""What the session calls held, the verification finds again: a hand of any tremor."""
+"""Rests that the session accepts are found by the verification, for a hand with any tremor."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -17,7 +17,7 @@ GRAVITY = np.array([0.0, 0.0, 9.81])
 
 
 def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
-    """A board on a table, then turned by 60 degrees and held, again and again; when each hold begins."""
+    """Return a board on a table, then turned by 60 degrees and held repeatedly; and the begin of each hold."""
     rng = np.random.default_rng(seed)
     omega, starts = [np.zeros((int(FLAT_S * RATE_HZ), 3))], []
     for hold_s in holds_s:
@@ -48,7 +48,7 @@ def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
     holds_s=st.lists(st.floats(1.5, 3.0), min_size=2, max_size=3),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_what_was_told_to_be_held_is_found_by_the_verification(tremor_dps, hertz, holds_s, seed):
+def test_an_accepted_rest_is_found_by_the_verification(tremor_dps, hertz, holds_s, seed):
     recording, starts = held_in_a_hand(np.radians(tremor_dps), hertz, holds_s, seed)
     pauses = PauseDetector(Rested(FLAT_S, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0)))
     told = {}
@@ -60,5 +60,5 @@ def test_what_was_told_to_be_held_is_found_by_the_verification(tremor_dps, hertz
     long = recording.t[runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * RATE_HZ]]
     for t_s in told.values():
         assert any(first <= t_s <= last + HOLD_S for first, last in long), (told, long)
-    # else this would show nothing; where a hand trembles by more than most, its first hold teaches that
+    # Enough holds must be accepted; the first one teaches the tremor of a hand that trembles strongly.
     assert len(told) >= len(starts) - (tremor_dps > 3.0)

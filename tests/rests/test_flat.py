@@ -9,12 +9,12 @@ from tools.lab.scenarios.recordings import paper_scenario
 
 
 def record(acc, gyr, rate_hz=100.0):
-    """A recording of rows (n, 3)."""
+    """Return a recording of rows (n, 3)."""
     return Recording.from_arrays(np.arange(len(acc)) / rate_hz, acc, gyr)
 
 
 def parts(*spans, rate_hz=100.0, noise=(0.02, 0.002), seed=0):
-    """Consecutive spans of (seconds, mean acceleration, mean rate), with white noise."""
+    """Return a recording of consecutive spans (seconds, mean acceleration, mean rate), with white noise."""
     rng = np.random.default_rng(seed)
     acc, gyr = [], []
     for seconds, a, w in spans:
@@ -35,7 +35,7 @@ def test_it_finds_the_ten_seconds_at_the_start(hand, prepared, rate_hz):
         recording = made.recording
         first, last = find_flat(replace(recording, flat=None))
         assert first <= 1.0 * rate_hz
-        # within, and most of it: what is turned slowly looks still for a moment
+        # The segment lies within the rest and is most of it: a slow turn looks still for a moment.
         assert 8.0 * rate_hz <= last <= 10.3 * rate_hz
 
 
@@ -47,7 +47,7 @@ def test_a_turn_at_constant_rate_has_no_variance_and_is_no_rest():
     assert find_flat(recording) is None
 
 
-def test_two_rests_side_by_side_are_two():
+def test_a_rest_ends_where_the_orientation_changes():
     recording = parts((6, UP, REST), (6, ASIDE, REST))
     first, last = find_flat(recording)
     assert first < 100
@@ -64,7 +64,7 @@ def test_a_gyroscopes_bias_is_no_turn(bias):
     assert find_flat(parts((10, UP, REST + bias)))[1] >= 900
 
 
-def test_the_earliest_rest_that_is_long_enough_is_flat_not_the_longest():
+def test_the_earliest_long_rest_is_flat_and_not_the_longest():
     recording = parts((6, UP, REST), (2, UP, TURNING), (20, ASIDE, REST))
     assert find_flat(recording)[1] <= 600
 
@@ -76,7 +76,7 @@ def test_a_second_among_much_longer_rests_is_not_flat():
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.4])
-def test_too_short_to_tell(seconds):
+def test_a_short_recording_has_no_flat_segment(seconds):
     assert find_flat(parts((seconds, UP, REST))) is None
 
 
@@ -110,7 +110,7 @@ def test_statistics_are_those_of_the_segment():
     np.testing.assert_allclose(np.sqrt(flat.Sigma_omega), sd_omega, rtol=0.03)
 
 
-def test_coarse_steps_hide_noise_but_do_not_abolish_it():
+def test_coarse_steps_hide_noise_but_the_variance_keeps_it():
     acc = np.tile([0.0, 0.0, 9.8], (1000, 1))
     acc[500:] += 0.06 * np.arange(500)[:, None]
     flat = flat_statistics(record(0.06 * np.rint(acc / 0.06), np.zeros((1000, 3))), (0, 400))
@@ -118,7 +118,7 @@ def test_coarse_steps_hide_noise_but_do_not_abolish_it():
 
 
 @pytest.mark.parametrize("noise", [0.06, 2.0])
-def test_a_mean_of_readings_on_one_step_is_known_to_that_step_alone(noise):
+def test_a_mean_of_readings_on_one_step_is_no_finer_than_the_step(noise):
     rng, step = np.random.default_rng(2), 0.01
     off, claimed = [], []
     for true in rng.uniform(0.0, step, (60, 3)):
@@ -128,7 +128,7 @@ def test_a_mean_of_readings_on_one_step_is_known_to_that_step_alone(noise):
         off.append(of.y - true)
         claimed.append(np.sqrt(of.Sigma_a / of.worth))
     z = np.sqrt(np.mean(np.square(np.array(off) / claimed)))
-    # an axis that leaves its step now and then is off by less than is claimed
+    # An axis that leaves its step sometimes has a smaller error than claimed.
     assert 0.4 < z < 1.3
 
 

@@ -28,7 +28,7 @@ def test_it_finds_every_pose_and_nothing_else(hand, motion, tremble):
         s = simulated.specific_force
         for a, b in runs:
             assert b - a >= 0.3 * recording.rate_hz
-            # trembling by a degree a second at 2 Hz, a pose still is one
+            # A pose with a tremor of 1 deg/s at 2 Hz is a rest.
             assert np.ptp(s[a:b], axis=0).max() < (0.2 if tremble else 0.01)
 
 
@@ -55,7 +55,7 @@ def test_a_turn_at_constant_rate_is_no_rest():
     assert runs[:, 1].max() <= 1010
 
 
-def test_a_gap_parts_a_rest(in_hand):
+def test_a_gap_divides_a_rest(in_hand):
     recording = in_hand.recording
     gap = np.zeros(len(recording), bool)
     gap[500] = True
@@ -65,7 +65,7 @@ def test_a_gap_parts_a_rest(in_hand):
     assert len(runs) == len(RestFinder(recording, flat).typical()) + 1
 
 
-def test_shorter_than_a_window_has_no_runs():
+def test_a_recording_shorter_than_a_window_has_no_rests():
     recording = Recording.from_arrays(0.01 * np.arange(20), np.ones((20, 3)), np.zeros((20, 3)))
     assert RestFinder(recording, flat_statistics(recording, (0, 20))).typical().shape == (0, 2)
 
@@ -108,7 +108,7 @@ def test_a_bias_that_stays_is_left_nearly_alone(in_hand):
 
 
 def test_a_slow_turn_about_gravity_is_no_bias(in_hand):
-    """Between two turns a hand turns the board at 2 deg/s for 0.8 s, about gravity: nothing but its shortness tells."""
+    """Turn the board about gravity at 2 deg/s for 0.8 s between two turns: only its shortness excludes it."""
     recording = in_hand.recording
     flat = flat_statistics(recording, recording.flat)
     at = recording.flat[1] + 200
@@ -122,13 +122,13 @@ def test_a_slow_turn_about_gravity_is_no_bias(in_hand):
     assert remove_drift(turning, flat, runs) is turning
 
 
-def test_of_one_rest_no_drift_is_known(in_hand):
+def test_one_rest_shows_no_drift(in_hand):
     recording = in_hand.recording
     flat = flat_statistics(recording, recording.flat)
     assert remove_drift(recording, flat, np.array([[0, 900]])) is recording
 
 
-def test_rests_between_which_it_turned_as_slowly_as_a_hand_trembles_are_two():
+def test_rests_with_a_turn_as_slow_as_a_tremor_between_them_are_two():
     rng = np.random.default_rng(3)
     rate = np.zeros((700, 3))
     rate[400:500, 0] = np.radians(6.0)

@@ -1,4 +1,4 @@
-"""The law of a hand's rests, against integrals of its autocovariance and recordings that follow it."""
+"""Tremor of a hand at rest, compared with integrals of its autocovariance and recordings that follow it."""
 
 from __future__ import annotations
 
