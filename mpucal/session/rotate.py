@@ -159,18 +159,28 @@ class Rotate(PoseStep):
             outputs.append(RequestFit(FitKind.KNOW, WAIT_S))
         if t_s - self._reported_s >= REPORT_EVERY_S:
             self._reported_s = t_s
-            number, least = self.coverage.number, self._least
-            more = number <= least
-            text = f"orientation {number} of {least}" if more else f"{number} orientations, of at least {least}"
-            outputs.append(Progress(t_s, min(number, least), least, text))
+            outputs.append(Progress(t_s, min(self.coverage.number, self._least), self._least, self._count()))
         return (
             outputs if self._until_end else outputs + self._remind(t_s, self._new_s, "no new orientation for a while")
         )
 
+    def _count(self) -> str:
+        """Return the number of orientations as text; with the reason where more are asked for than the target needs."""
+        number, least = self.coverage.number, self._least
+        text = f"orientation {number} of {least}" if number <= least else f"{number} orientations, of at least {least}"
+        if not self._is_certain() or self._tilt_only or self._until_end:
+            return text
+        if number < least:
+            return f"{text} (the bars are full; the others confirm them from more sides)"
+        return text if self.coverage.varied else f"{text} (the bars are full, but these are too much alike)"
+
+    def _is_certain(self) -> bool:
+        return self._knowledge is not None and self._knowledge.overall >= 1.0
+
     def _is_enough(self) -> bool:
         if self.coverage.number < self._least or self._tilt_only:
             return self.coverage.number >= self._least
-        return self.coverage.varied and self._knowledge is not None and self._knowledge.overall >= 1.0
+        return self.coverage.varied and self._is_certain()
 
     def _time_out(self, t_s: float) -> Turned | None:
         known = f": {self._knowledge.words}" if self._knowledge else ""

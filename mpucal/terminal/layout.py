@@ -11,6 +11,7 @@ from . import board, letters, orientation_map
 from .bars import NARROWEST, caution_rows, keys, knowledge_rows, meter
 from .glyphs import Glyphs
 from .view import View
+from .words import sentence
 
 # Smaller screens show text only.
 LEAST_COLUMNS, LEAST_ROWS = 60, 20
@@ -77,6 +78,10 @@ def _headline_style(view: View) -> str:
 
 def _prompt(view: View, columns: int, rows: int) -> list[Text]:
     text = view.prompt.text if view.prompt is not None else "Looking for the sensor."
+    # The bars of the uncertainties have taken the place of the progress.
+    turning = view.prompt is not None and view.prompt.kind is PromptKind.ROTATE and view.knowledge is not None
+    if turning and view.progress is not None:
+        text = f"{text} {sentence(view.progress.text)}"
     wrapped = textwrap.wrap(text, max(columns - 2, NARROWEST), max_lines=rows, placeholder=" ...")
     return [Text(f" {line}", style="bold") for line in [*wrapped, *[""] * (rows - len(wrapped))]]
 

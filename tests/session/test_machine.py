@@ -228,7 +228,8 @@ def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, v
     show(rotating, board, varied[8:9])
     assert rotating.state is State.VERIFY
     assert "target reached: bias to 3 mg" in rotating.words()
-    assert "orientation 5 of 10" in rotating.words()
+    full = "orientation 5 of 10 (the bars are full; the others confirm them from more sides)"
+    assert full in [progress.text for progress in rotating.of(Progress)]
 
 
 def test_enough_tilts_end_the_turning_and_claim_no_target(board):
@@ -246,16 +247,23 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
 
 
 @pytest.mark.parametrize(
-    "ups",
+    ("ups", "why"),
     [
-        [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1)] * 2,
-        [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))],
+        (
+            [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1)] * 2,
+            "; the others confirm them from more sides",
+        ),
+        (
+            [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))],
+            ", but these are too much alike",
+        ),
     ],
     ids=["faces", "tilts about one axis"],
 )
-def test_the_target_is_not_enough_without_varied_orientations(board, rotating, ups):
+def test_the_target_is_not_enough_without_varied_orientations(board, rotating, ups, why):
     rotating.overall = 1.0
     assert show(rotating, board, ups).state is State.ROTATE
+    assert f"(the bars are full{why})" in rotating.of(Progress)[-1].text
 
 
 def test_without_the_target_turning_goes_on_for_two_minutes(board, rotating):

@@ -41,6 +41,7 @@ def test_all_that_a_person_needs_is_there(views, size):
         "turn it like this",
         "+Z up",
         "-Z up",
+        "Orientation 5 of 10.",
         "turning at 30 deg/s about z",
         "y ±0.31 %",
         "z not observable",
