@@ -43,6 +43,8 @@ HEADLINES = {
     PromptKind.REST: "PUT IT DOWN",
 }
 CONNECTING = "WAIT"
+# Prompts that ask for one orientation.
+TURNING = (PromptKind.ROTATE, PromptKind.VERIFY)
 
 
 class Moment(StrEnum):
@@ -135,7 +137,7 @@ class View:
     @property
     def wanted(self) -> Direction | None:
         """Unit vector that is to point down, if one orientation is wanted."""
-        if self.prompt is None or self.prompt.kind not in (PromptKind.ROTATE, PromptKind.VERIFY):
+        if self.prompt is None or self.prompt.kind not in TURNING:
             return None
         if self.prompt.down is not None or self.prompt.kind is PromptKind.VERIFY or self.knowledge is None:
             return self.prompt.down
@@ -182,7 +184,12 @@ class View:
     def _prompted(self, prompt: Prompt) -> View:
         if self.prompt is not None and self.prompt.kind is prompt.kind:
             return replace(self, prompt=prompt)
-        return replace(self, prompt=prompt, countdown=None, progress=None, caution=None, held=None, verified=())
+        meter = self.meter
+        if meter is not None and prompt.kind not in TURNING:
+            # Perhaps no other meter follows.
+            meter = replace(meter, missing_deg=None, turn="", wanted=None)
+        view = replace(self, prompt=prompt, meter=meter)
+        return replace(view, countdown=None, progress=None, caution=None, held=None, verified=())
 
     def _at(self, t_s: float) -> View:
         return replace(self, now_s=t_s, begun_s=t_s if self.begun_s is None else self.begun_s)

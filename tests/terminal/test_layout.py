@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Caution
+from mpucal.session.events import Caution, Prompt, PromptKind
 from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.terminal.glyphs import ASCII, UNICODE
 from mpucal.terminal.layout import lines
@@ -81,6 +81,15 @@ def test_on_a_low_screen_the_words_are_left(views):
     assert not BRAILLE.search("".join(drawn))
     assert "ROLL LEFT 60" in drawn[1]
     assert "Turn the board: corner" in drawn[2]
+
+
+@pytest.mark.parametrize("kind", [PromptKind.REST, PromptKind.AGAIN])
+def test_nothing_shows_where_to_turn_once_no_orientation_is_asked_for(views, kind):
+    ended = views["turned"].after(Prompt(kind, "You can put the board down."))
+    drawn = "\n".join(text_of(ended))
+    assert "turn it like this" not in drawn
+    assert "now" in drawn
+    assert (ended.meter.wanted, ended.meter.missing_deg, ended.meter.turn) == (None, None, "")
 
 
 def test_a_warning_grows_quiet(views):
