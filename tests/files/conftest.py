@@ -59,47 +59,49 @@ def load_table(tmp_path):
     return load_table
 
 
+def encode_imu_message(store, t_ns, acc, gyr):
+    """Serialise a sensor_msgs/Imu message of ROS 1 or 2."""
+    kinds, zeros = store.types, np.zeros(9)
+    vector = kinds["geometry_msgs/msg/Vector3"]
+    stamp = kinds["builtin_interfaces/msg/Time"](sec=int(t_ns // S), nanosec=int(t_ns % S))
+    more = {"seq": 0} if store is ROS1 else {}
+    message = kinds[IMU](
+        header=kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="imu", **more),
+        orientation=kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+        orientation_covariance=np.array([-1.0, *[0.0] * 8]),
+        angular_velocity=vector(*(float(v) for v in gyr)),
+        angular_velocity_covariance=zeros,
+        linear_acceleration=vector(*(float(v) for v in acc)),
+        linear_acceleration_covariance=zeros,
+    )
+    return bytes((store.serialize_ros1 if store is ROS1 else store.serialize_cdr)(message, IMU))
+
+
+def write_bag_file(path, walk, t_ns, kind, topics=BOTH, stamped=True, gyro_late_ns=0):
+    """Write a bag; each topic says whether it holds accelerations and rates."""
+    store = ROS1 if kind == "bag" else ROS2
+    plugin = StoragePlugin.SQLITE3 if kind == "db3" else StoragePlugin.MCAP
+    with Writer1(path) if kind == "bag" else Writer2(path, version=9, storage_plugin=plugin) as writer:
+        for topic, has_acc, has_gyr in topics:
+            connection = writer.add_connection(topic, IMU, typestore=store)
+            for t, acc, gyr in zip(t_ns.tolist(), walk.acc, walk.gyr, strict=True):
+                late = t if has_acc else t + gyro_late_ns
+                writer.write(
+                    connection, late, encode_imu_message(store, late if stamped else 0, acc * has_acc, gyr * has_gyr)
+                )
+    return path
+
+
 @pytest.fixture(scope="session")
 def encode_imu():
-    """Return a function that serialises a sensor_msgs/Imu message of ROS 1 or 2."""
-
-    def encode_imu(store, t_ns, acc, gyr):
-        kinds, zeros = store.types, np.zeros(9)
-        vector = kinds["geometry_msgs/msg/Vector3"]
-        stamp = kinds["builtin_interfaces/msg/Time"](sec=int(t_ns // S), nanosec=int(t_ns % S))
-        more = {"seq": 0} if store is ROS1 else {}
-        message = kinds[IMU](
-            header=kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="imu", **more),
-            orientation=kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
-            orientation_covariance=np.array([-1.0, *[0.0] * 8]),
-            angular_velocity=vector(*(float(v) for v in gyr)),
-            angular_velocity_covariance=zeros,
-            linear_acceleration=vector(*(float(v) for v in acc)),
-            linear_acceleration_covariance=zeros,
-        )
-        return bytes((store.serialize_ros1 if store is ROS1 else store.serialize_cdr)(message, IMU))
-
-    return encode_imu
+    """Return encode_imu_message."""
+    return encode_imu_message
 
 
 @pytest.fixture(scope="session")
-def write_bag(encode_imu):
-    """Return a function that writes a bag; each topic says whether it holds accelerations and rates."""
-
-    def write_bag(path, walk, t_ns, kind, topics=BOTH, stamped=True, gyro_late_ns=0):
-        store = ROS1 if kind == "bag" else ROS2
-        plugin = StoragePlugin.SQLITE3 if kind == "db3" else StoragePlugin.MCAP
-        with Writer1(path) if kind == "bag" else Writer2(path, version=9, storage_plugin=plugin) as writer:
-            for topic, has_acc, has_gyr in topics:
-                connection = writer.add_connection(topic, IMU, typestore=store)
-                for t, acc, gyr in zip(t_ns.tolist(), walk.acc, walk.gyr, strict=True):
-                    late = t if has_acc else t + gyro_late_ns
-                    writer.write(
-                        connection, late, encode_imu(store, late if stamped else 0, acc * has_acc, gyr * has_gyr)
-                    )
-        return path
-
-    return write_bag
+def write_bag():
+    """Return write_bag_file."""
+    return write_bag_file
 
 
 @pytest.fixture(scope="session")

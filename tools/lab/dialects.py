@@ -52,9 +52,9 @@ def own(path: Path, w: Walk, _ns: Any) -> None:
 
 def dialects() -> dict[str, tuple[str, Write, Hints]]:
     """Return by name whose program writes it, how, and what has to be said to read it; the writers are the tests'."""
-    tables, ros, logs, loggers, strangers = (
-        run_path(str(ROOT / "tests" / "files" / f"test_{name}.py"))
-        for name in ("tables", "ros", "logs", "loggers", "strangers")
+    tables, fixtures, logs, loggers, strangers = (
+        run_path(str(ROOT / "tests" / "files" / f"{name}.py"))
+        for name in ("test_tables", "conftest", "test_logs", "test_loggers", "test_strangers")
     )
     counts = Hints(rate_hz=100.0, accel_range_g=4.0, gyro_range_dps=500.0)
 
@@ -65,7 +65,8 @@ def dialects() -> dict[str, tuple[str, Write, Hints]]:
         return lambda folder, w, ns: write(folder, w, ns) or folder
 
     def bag(kind: str) -> Write:
-        return lambda folder, w, ns: ros["bag"](folder / ("walk.bag" if kind == "bag" else "walk"), w, ns, kind)
+        name = "walk.bag" if kind == "bag" else "walk"
+        return lambda folder, w, ns: fixtures["write_bag_file"](folder / name, w, ns, kind)
 
     def ulog(path: Path, w: Walk, ns: Any) -> None:
         t_us = (ns - ns[0]) // 1000 + 5_000_000
