@@ -13,7 +13,7 @@ from ..errors import WrongValue
 from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
-from .bias_walks import BiasWalk, find_walk, remove_walk
+from .bias_walks import SIGNIFICANT, BiasWalk, find_walk, remove_walk
 from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
@@ -24,8 +24,7 @@ from .uncertainty import claim_uncertainty, inflate
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
-# Each walk is what is left of a drift after the one before; removing it must reduce V by so much.
-MOST_WALKS, LEAST_GAIN = 3, 10.0
+MOST_WALKS = 3  # each is what is left of a drift after the one before
 
 
 def estimate(
@@ -112,7 +111,7 @@ def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[
         if walk is None or walk.what != "gyroscope" or not choice.fit.converged:
             break
         without, left = _fit_once(remove_walk(choice.recording, flat, walk), flat, gravity, model)
-        if not without.fit.V < choice.fit.V - LEAST_GAIN:
+        if not without.fit.V < choice.fit.V - 0.5 * SIGNIFICANT:
             break
         choice, walk = without._replace(walked=without.walked + choice.walked + walk.q), left
     return choice, walk

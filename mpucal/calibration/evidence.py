@@ -12,13 +12,13 @@ from ..data import Recording, Vector
 from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
 from ..rests.intervals import RestFinder, cut_runs, statistics
+from ..rests.windows import WINDOW_S
 from .fit import Fit
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere, lengths, turned
 from .tilt import tilted_directions
 from .uncertainty import DIRECTIONS, Uncertainty, UncertaintyClaim, is_usable, propagate
 
-HALF_SECOND = 0.5
 LEAST_STEP_RAD = np.deg2rad(2.0)  # turn of gravity in half a second that is above noise
 ENOUGH_STEPS = 100  # half seconds that tell a unit as well as all do
 LEAST_TURN_RAD = np.deg2rad(20.0)  # turn of gravity beyond the effect of biases and skew
@@ -99,7 +99,7 @@ class Evidence:
 
     @property
     def _half_second(self) -> int:
-        return max(round(HALF_SECOND * self.recording.rate_hz), 1)
+        return max(round(WINDOW_S * self.recording.rate_hz), 1)
 
     @cached_property
     def rates_in_degrees(self) -> bool:

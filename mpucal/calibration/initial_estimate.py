@@ -8,6 +8,7 @@ import numpy as np
 
 from ..data import Vector
 from ..kernel import _kernel
+from ..rests.intervals import true_runs
 from .likelihood import evaluate
 from .masks import GAP_ANGLE_VARIANCE, LOST_RAD
 from .problem import Problem, Series
@@ -71,8 +72,7 @@ def _stretches(series: Series) -> list[slice]:
     if series.q_extra is None:
         return []
     lost = series.q_extra >= 0.9 * GAP_ANGLE_VARIANCE * series.dt
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]))).reshape(-1, 2)
-    gaps = [(a, b) for a, b in edges.tolist() if series.q_extra[a:b].sum() > LOST_RAD**2]
+    gaps = [(a, b) for a, b in true_runs(lost).tolist() if series.q_extra[a:b].sum() > LOST_RAD**2]
     if not gaps:
         return []
     starts, ends = [0, *(b for _, b in gaps)], [*(a for a, _ in gaps), len(series)]

@@ -14,7 +14,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .downsampling import SEARCH_HZ, downsampled
-from .hand_noise import FARTHER, FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, most_likely_sigma
+from .hand_noise import FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, most_likely_sigma
 from .initial_estimate import initialise
 from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import value
@@ -32,7 +32,7 @@ D_SD, B_A_SD_MPS2 = 0.5, 5.0
 GROWN = 1.25
 
 # The covariance admits so many times a pivot's travel: more than a calibration's, which compares its parts as well.
-DOUBT = 6.0
+DOUBT = 9.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def interim_estimate(
         # With few rests the estimate depends on the hand's travel, of which little is known: admit more of it.
         pivots = partial(prepared.pivot, floor=FLOOR_MPS2)
         pivot = most_likely_sigma(pivots, PIVOT_MPS2, minimum.theta, PIVOT_MPS2[0])
-        doubt = prepared.pivot(DOUBT * FARTHER * pivot, FLOOR_MPS2)
+        doubt = prepared.pivot(DOUBT * pivot, FLOOR_MPS2)
         H = information(doubt, minimum.theta, prior)
     covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
     sigma = most_likely_sigma(prepared.white, SOME_MPS2, minimum.theta, max(sigma, SOME_MPS2[0]))

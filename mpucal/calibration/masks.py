@@ -8,12 +8,14 @@ import numpy as np
 
 from ..data import ACCEL_RANGES_G, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
 from ..rests.flat import Flat
+from ..rests.intervals import true_runs
 from .problem import Series
 from .rotation import lengths
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
-RANGE_TOLERANCE = 2e-3
-FEWEST_AT_A_RANGE, FEWEST_ANYWHERE = 2, 8
+RANGE_TOLERANCE, FEWEST_AT_A_RANGE = 2e-3, 2
+# Fewer samples in a row that repeat, or follow a line, do so by chance.
+SHORTEST_RUN = 8
 
 CLIPPED_R_SCALE = 1e4
 GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: the turn across a gap is unknown
@@ -22,10 +24,10 @@ CLIPPED_RATE_SD = 0.0015  # of |omega|, in a run of one: a longer run hides more
 # After a long gap a linear correction falls short of the turn: the samples that follow correct it again.
 LOST_RAD, SETTLING = 0.2, 5
 
-LINE_TOLERANCE, SHORTEST_LINE = 1e-6, 8
+LINE_TOLERANCE = 1e-6
 
 # A rate may repeat as often as chance makes it with this probability, while the board turns by so much [rad/s].
-SHORTEST_REPEAT, BY_CHANCE, TURNING = 8, 1e-6, 0.3
+BY_CHANCE, TURNING = 1e-6, 0.3
 
 GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
 
@@ -124,12 +126,6 @@ def _run_lengths(mask: Mask) -> Vector:
     return np.repeat(np.diff(edges), np.diff(edges)).astype(np.float64)
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return first and last + 1 of the runs of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return [(first, last) for first, last in edges.reshape(-1, 2).tolist()]
-
-
 def _on_a_line(values: Vector, t: Vector) -> Mask:
     """Return (n,) True within straight lines that all axes follow exactly, and not at rest: those are interpolated."""
     dt, straight = np.diff(t), np.ones(max(len(t) - 2, 0), bool)
@@ -144,8 +140,8 @@ def _on_a_line(values: Vector, t: Vector) -> Mask:
     if 2 * np.count_nonzero(straight) > len(straight):  # the data are computed, and have no noise anywhere
         return np.zeros(len(values), bool)
     drawn = np.zeros(len(values), bool)
-    for first, last in _runs(straight & turns):
-        if last - first >= SHORTEST_LINE:
+    for first, last in true_runs(straight & turns).tolist():
+        if last - first >= SHORTEST_RUN:
             drawn[first + 1 : last + 2] = True
     return drawn
 
@@ -157,10 +153,10 @@ def _stuck(values: Vector, clipped: Mask) -> Mask:
         same = np.diff(column) == 0.0
         start = same[: max(len(same) // 20, 50)]
         by_chance = (np.count_nonzero(start) + 1) / (len(start) + 2)
-        longest = max(np.log(BY_CHANCE / len(values)) / np.log(by_chance), SHORTEST_REPEAT)
+        longest = max(np.log(BY_CHANCE / len(values)) / np.log(by_chance), SHORTEST_RUN)
         if not same.any() or _run_lengths(same)[same].max() < longest:
             continue
-        for first, last in _runs(same):
+        for first, last in true_runs(same).tolist():
             # The board turns where this rate is far from rest, or where others change.
             most = np.ptp(values[first : last + 1], axis=0).max()
             if last - first >= longest and not clipped[first] and max(most, abs(column[first] - column[0])) > TURNING:
@@ -178,7 +174,7 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
                 continue
             known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
             runs = int(np.count_nonzero(at[1:] & at[:-1]))
-            if known or (runs >= FEWEST_ANYWHERE and _is_motion(column, rail)):
+            if known or (runs >= SHORTEST_RUN and _is_motion(column, rail)):
                 clipped |= at
     return clipped
 

@@ -14,7 +14,7 @@ from ..rests.flat import Flat, flat_statistics, rounding_variance
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.tremor import fit_lambda, level_rests, tremor_variance
-from ..rests.windows import noise_ratio, noise_variance
+from ..rests.windows import WINDOW_S, noise_ratio, noise_variance
 from .masks import mask
 from .problem import Problem, Series
 from .rotation import lengths
@@ -22,8 +22,7 @@ from .theta import Prior
 
 HUBER = 2.0
 MOVING_RAD_S = 0.3  # rate at which a hand's acceleration reaches half of its maximum
-# Standard deviation of |y| within this time that does the same, at any rate: walking shakes the board.
-SHAKEN_S, SHAKEN_MPS2 = 0.5, 0.3
+SHAKEN_MPS2 = 0.3  # standard deviation of |y| in a window that does the same, at any rate: walking shakes the board
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
 # Lambda: 4.5 Hz for a tremor where the rests do not show it, 1.1 Hz for a pivot.
 TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0
@@ -148,7 +147,7 @@ def _shaken(recording: Recording, flat: Flat) -> Vector:
     """Return (n,) 0 to 1 after the flat segment, by the variation of |y| within half a second, which no turn causes."""
     size = lengths(recording.acc)
     away = size - size.mean()
-    half = max(round(0.5 * SHAKEN_S * recording.rate_hz), 2)
+    half = max(round(0.5 * WINDOW_S * recording.rate_hz), 2)
     mean, square = _kernel.moving_mean(np.stack([away, away**2], axis=1), half).T
     variance = np.maximum(square - mean**2 - 1.3 * noise_variance(recording) @ np.full(3, 1.0 / 3.0), 0.0)[flat.last :]
     return np.asarray(variance / (variance + SHAKEN_MPS2**2))

@@ -10,9 +10,9 @@ import numpy as np
 from ..data import Recording, Sensor, Vector
 from .limits import QUIET
 from .stillness import Detector, still_windows
-from .windows import cut
+from .windows import WINDOW_S, cut
 
-WINDOW_S, FEWEST = 0.5, 4  # below 8 Hz, a window of the fewest samples is longer
+FEWEST = 4  # samples of a window, which is longer than WINDOW_S below 8 Hz
 SHORTEST_FLAT_S = 1.0
 SHORTEST_GIVEN_S = 0.25  # the block means that a fit starts from have no variance in a shorter one
 ENOUGH_FLAT_S = 5.0

@@ -14,13 +14,12 @@ from ..kernel import _kernel
 from .flat import Flat, samples_of_window, with_rates
 from .limits import ANY_HAND, QUIET, TURNS_RAD_S, Limits, learned
 from .stillness import Detector
-from .windows import Spreads, noise_variance
+from .windows import WINDOW_S, Spreads, noise_variance
 
 SHORTEST_S = 0.3
 # A share of a rest, within limits, is cut off at either end, since a hand settles, and leaves early.
 TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25
 FEW = 0.25  # of the windows that hold a sample
-FEWEST_S = 0.5  # of windows that may be rests, to learn from
 # The mean rate of a shorter rest, or of its quiet part, may be a slow turn about gravity instead of the bias.
 BIAS_RUN_S = 1.0
 
@@ -68,14 +67,14 @@ class RestFinder:
         still = (covered > 0) & ~recording.gap
         # Where readings step from one rest to another, few still windows hold samples of both.
         few = (covered < FEW * self._n) & still
-        for first, last in _runs(few).tolist():
+        for first, last in true_runs(few).tolist():
             if few[first - 1] < still[first - 1] and few[last % len(few)] < still[last % len(few)]:
                 still[first:last] = False
-        rests = self._trimmed(_runs(still))
+        rests = self._trimmed(true_runs(still))
         # Of a run in which gravity turns, keep the samples in which the gyroscope hardly turns.
         slow = np.asarray(np.all(np.abs(self._windows.gyr - flat.b_omega) < TURNS_RAD_S, axis=1))
         still[self._n // 2 : self._n // 2 + len(slow)] &= slow
-        return _and_others(rests, self._trimmed(_runs(still)))
+        return _and_others(rests, self._trimmed(true_runs(still)))
 
     def _trimmed(self, runs: Intervals) -> Intervals:
         """Return the runs without their ends, if they are long enough and gravity does not turn in them."""
@@ -91,7 +90,7 @@ class RestFinder:
         after, flat = self._windows.gyr_sd[self._flat.last :], self._flat
         spread = np.sqrt(np.maximum((after**2 - flat.Sigma_omega).max(1), 0.0))
         speed = np.abs(self._windows.gyr[flat.last :] - flat.b_omega).max(1)
-        noise, fewest = float(np.sqrt(flat.Sigma_omega.max())), FEWEST_S * self._recording.rate_hz
+        noise, fewest = float(np.sqrt(flat.Sigma_omega.max())), WINDOW_S * self._recording.rate_hz
         return learned(spread, speed, noise, fewest)
 
 
@@ -144,7 +143,7 @@ def _windows(recording: Recording, n: int) -> Spreads | None:
     return Spreads(gyr.T, *(np.sqrt(np.maximum(x, 0.0)) for x in (acc_variance.T, gyr_variance.T, noise)))
 
 
-def _runs(mask: Mask) -> Intervals:
+def true_runs(mask: Mask) -> Intervals:
     """Return (k, 2) first and last + 1 of the runs of True."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
     return np.asarray(np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)], axis=1))

@@ -47,10 +47,10 @@ class Limits:
         return replace(self, gyro_sd=gyro_sd, acc_sd=self.acc_sd * gyro_sd / self.gyro_sd)
 
 
-# For a board that nobody touches: its mean acceleration repeats to the last mg.
-UNTOUCHED = Limits(gyro_sd=0.03, acc_sd=0.06, gyro_step=0.02, acc_step=0.03, vibration=2.0)
 # For a board on a table that hums, or in a hand with a braced elbow.
 QUIET = Limits(gyro_sd=0.03, acc_sd=0.15, gyro_step=0.02, acc_step=0.08)
+# For a board that nobody touches: its mean acceleration repeats to the last mg.
+UNTOUCHED = replace(QUIET, acc_sd=0.06, acc_step=0.03, vibration=2.0)
 # For a hand, which trembles by 0.1 m/s^2 and 1 deg/s at 2 to 10 Hz.
 HAND = Limits(gyro_sd=0.06, acc_sd=0.3, gyro_step=0.06, acc_step=0.3, gyro_mean=0.12)
 # For the strongest tremor (7 deg/s) of a hand that holds an orientation.

@@ -11,11 +11,11 @@ from ..data import Recording, Samples, Vector
 from ..kernel import _kernel
 from .limits import OF_NORMAL
 
+WINDOW_S = 0.5  # length of a window for the detection of rests, noise and turns of gravity
 UNKNOWN = np.full(3, np.nan)
 # Fourth differences leave noise and vibration, and next to nothing of a hand's motion below 10 Hz at 100 samples/s or
 # more. SQUARES is the sum of the squares of their coefficients 1, -4, 6, -4, 1.
 ORDER, SQUARES = 4, 70.0
-NOISE_WINDOW_S = 0.5
 # Ratio of variances up to which a window may be as noisy as the flat segment, but for chance and a hand.
 LOUDER = 2.0
 
@@ -156,7 +156,7 @@ def noise_variance(recording: Recording) -> Vector:
     squares = np.zeros((n, 3))
     if n > ORDER:
         squares[ORDER // 2 : -ORDER // 2] = np.square(np.diff(acc, ORDER, axis=0)) / SQUARES
-    return _kernel.moving_mean(squares, max(round(NOISE_WINDOW_S * recording.rate_hz) // 2, 2))
+    return _kernel.moving_mean(squares, max(round(WINDOW_S * recording.rate_hz) // 2, 2))
 
 
 def noise_ratio(recording: Recording, Sigma_a: Vector) -> Vector:

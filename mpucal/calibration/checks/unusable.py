@@ -7,6 +7,7 @@ import numpy as np
 from ...data import Vector
 from ...reasons import Reason, reason
 from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
+from ...rests.intervals import true_runs
 from ..evidence import LEAST_TURN_RAD, Evidence
 from ..rotation import lengths
 
@@ -129,9 +130,8 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
 
 def _repeats(column: Vector, least: int) -> list[tuple[int, int]]:
     """Return first and last + 1 of the runs of at least `least` samples in which a column (n,) repeats its value."""
-    same = np.concatenate([[False], np.diff(column) == 0.0, [False]])
-    edges = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2)
-    return [(first, last + 1) for first, last in edges.tolist() if last + 1 - first >= least]
+    runs = true_runs(np.diff(column) == 0.0).tolist()
+    return [(first, last + 1) for first, last in runs if last + 1 - first >= least]
 
 
 def dead_gyroscope(e: Evidence) -> Reason | None:
