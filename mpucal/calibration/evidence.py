@@ -35,14 +35,12 @@ FEWEST_RESTS, PIECE_S = 3, 3.0
 class Agreement(NamedTuple):
     """Agreement of the calibrated rests with gravity and, by the gyroscope, with each other.
 
-    number : of rests. magnitude_rms : m/s^2, of |a| - g. miss_median, miss_max : rad, of gravity carried from one rest
-        to the next; NaN where no two are near enough in time.
+    magnitude_rms : m/s^2, of |a| - g.
+    miss : rad, median angle from gravity as carried from the rest before; NaN where no two are near enough in time.
     """
 
-    number: int
     magnitude_rms: float
-    miss_median: float
-    miss_max: float
+    miss: float
 
 
 @dataclass(frozen=True)
@@ -180,8 +178,7 @@ class Evidence:
             carried = [turned(-dt * (rate @ fit.K.T)) @ rests[k] for rate in rates]
             misses.append(float(np.arccos(np.clip(_units(np.array(carried)) @ there, -1.0, 1.0)).min()))
         magnitude = np.linalg.norm(rests, axis=1) - self.gravity
-        median, most = (float(np.median(misses)), max(misses)) if misses else (np.nan, np.nan)
-        return Agreement(len(runs), float(np.sqrt(np.mean(magnitude**2))), median, most)
+        return Agreement(float(np.sqrt(np.mean(magnitude**2))), float(np.median(misses)) if misses else np.nan)
 
 
 class _Turn(NamedTuple):

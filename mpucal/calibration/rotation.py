@@ -1,7 +1,4 @@
-"""Rotations and directions: rotation vectors as matrices, turns in succession, unit vectors over the sphere.
-
-Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), appendix B.
-"""
+"""Rotations and directions: rotation vectors as matrices, turns in succession, unit vectors over the sphere."""
 
 from __future__ import annotations
 
@@ -62,15 +59,6 @@ def _sinc(angle: float) -> float:
 def turned(phi: Vector) -> Vector:
     """Return exp([phi_n]x) ... exp([phi_1]x), (3, 3), of rotation vectors phi (n, 3) [rad]; the identity of none."""
     return _kernel.turn(np.ascontiguousarray(phi))[0]
-
-
-def left_jacobian(phi: Vector) -> Vector:
-    """Return J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x)."""
-    angle = float(np.linalg.norm(phi))
-    X = cross(phi)
-    if angle < 1e-3:
-        return np.eye(3) + X / 2 + X @ X / 6
-    return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))
 
 
 def shortest_turn(a: Vector, b: Vector) -> Vector:

@@ -36,13 +36,12 @@ class Uncertainty:
     Attributes
     ----------
     rms_mps2 : of the vector. magnitude_mps2, direction_rad : of its length and angle.
-    worst_mps2 : of the least known direction, `worst` (3,) unit, in the body frame.
+    worst : (3,) unit, the least known direction in the body frame.
     """
 
     rms_mps2: float
     magnitude_mps2: float
     direction_rad: float
-    worst_mps2: float
     worst: Vector
 
 
@@ -62,13 +61,11 @@ def propagate(D: Vector, covariance: Vector, gravity: float, unit: Vector | None
     C = ((s[:, :, None] * s[:, None, :]).reshape(-1, 16) @ by_products).reshape(-1, 3, 3)
     total = np.maximum(np.einsum("nii->n", C), 0.0)
     along = np.maximum(np.einsum("ni,nij,nj->n", unit, C, unit), 0.0)
-    worst = int(np.argmax(total))
     return Uncertainty(
         rms_mps2=float(np.sqrt(total.mean())),
         magnitude_mps2=float(np.sqrt(along.mean())),
         direction_rad=float(np.sqrt(np.maximum(total - along, 0.0).mean()) / gravity),
-        worst_mps2=float(np.sqrt(total[worst])),
-        worst=unit[worst],
+        worst=unit[int(np.argmax(total))],
     )
 
 

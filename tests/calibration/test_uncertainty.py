@@ -34,7 +34,6 @@ def test_a_bias_alone_is_equally_bad_everywhere():
     C[9:, 9:] = 0.04 * np.eye(3)
     known = propagate(np.eye(3), C, G)
     assert known.rms_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
-    assert known.worst_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
     assert known.magnitude_mps2 == pytest.approx(0.2)
     assert known.direction_rad == pytest.approx(0.2 * np.sqrt(2.0) / G)
 
@@ -45,13 +44,12 @@ def test_a_gain_that_is_not_known_is_worst_along_its_axis(axis):
     C[4 * axis, 4 * axis] = 0.01**2
     known = propagate(np.eye(3), C, G)
     assert abs(known.worst[axis]) > 0.95
-    assert known.worst_mps2 == pytest.approx(0.01 * G, rel=0.05)
     assert np.linalg.norm(known.worst) == pytest.approx(1.0)
 
 
 def test_twice_the_standard_deviation_is_twice_the_error():
     one, two = propagate(D, covariance(), G), propagate(D, 4.0 * covariance(), G)
-    for name in ("rms_mps2", "magnitude_mps2", "direction_rad", "worst_mps2"):
+    for name in ("rms_mps2", "magnitude_mps2", "direction_rad"):
         assert getattr(two, name) == pytest.approx(2.0 * getattr(one, name))
 
 

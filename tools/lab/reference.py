@@ -14,13 +14,25 @@ from scipy.linalg import expm
 from mpucal.calibration.likelihood import Evaluation
 from mpucal.calibration.parameters import ACCEL, HAND, PLACES
 from mpucal.calibration.problem import Problem
-from mpucal.calibration.rotation import cross, left_jacobian, rotation, tangents
+from mpucal.calibration.rotation import cross, rotation, tangents
 from mpucal.calibration.theta import Theta
 from mpucal.data import Vector
 
 K_BASIS = np.zeros((6, 3, 3))
 for _m, (_i, _j) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
     K_BASIS[_m, _i, _j] = K_BASIS[_m, _j, _i] = 1.0
+
+
+def left_jacobian(phi: Vector) -> Vector:
+    """Return J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x).
+
+    Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), appendix B.
+    """
+    angle = float(np.linalg.norm(phi))
+    X = cross(phi)
+    if angle < 1e-3:
+        return np.eye(3) + X / 2 + X @ X / 6
+    return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))
 
 
 class _State(NamedTuple):

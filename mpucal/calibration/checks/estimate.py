@@ -82,7 +82,7 @@ def inconsistent(e: Evidence) -> Reason | None:
     # Where every sample is explained, so are the rests.
     if e.model in ("accel", "imu") or e.agreement is None:
         return None
-    magnitude, miss = e.agreement.magnitude_rms, e.agreement.miss_median
+    magnitude, miss = e.agreement.magnitude_rms, e.agreement.miss
     too_long = magnitude > max(RESTS_MPS2, MOST_STDS * e.uncertainty.magnitude_mps2)
     too_far = miss > max(RESTS_RAD, MOST_STDS * e.uncertainty.direction_rad)
     if not (too_long or too_far):
