@@ -15,6 +15,7 @@ from ...calibration.verification import new_orientations
 from ...data import Recording, Samples, Sensor
 from ...reasons import KINDS, Reason, reason
 from ...rests.flat import Flat, find_flat, flat_statistics
+from ...result.calibration import REFUSED
 from ..aims import AIMS, directions, unseen_rad
 from ..events import Checked, Event, FitKind, Learnt, Tried, down_of
 from ..plan import Plan
@@ -91,7 +92,9 @@ class Fits:
         evidence, _ = estimate(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
         reasons = find_reasons(evidence)
-        return Tried(verdict(reasons), _most_specific_reason(reasons, evidence.recording))
+        # The rests may suffice for an estimate; without a gyroscope nothing can be verified.
+        told = verdict(reasons) if evidence.gyroscope is None else REFUSED
+        return Tried(told, _most_specific_reason(reasons, evidence.recording))
 
     def _check(self) -> Event:
         of = AIMS[self._plan.target].verify
