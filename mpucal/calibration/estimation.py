@@ -18,7 +18,7 @@ from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
 from .masks import find_reset, remove_spikes, with_masks
-from .model_selection import METHODS, ModelChoice, choose
+from .model_selection import METHODS, ModelChoice, choose_model
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
 
@@ -119,7 +119,7 @@ def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[
 
 def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, BiasWalk | None]:
     if model == "auto":
-        choice = choose(recording, flat, gravity)
+        choice = choose_model(recording, flat, gravity)
     else:
         choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
     fit = choice.fit

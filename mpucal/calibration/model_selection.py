@@ -93,7 +93,7 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 }
 
 
-def choose(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
+def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
     """Choose the simplest model that explains the data.
 
     White noise and a trusted gyroscope come first, then its matrix K; then the same without a walk of the gyroscope's
@@ -103,12 +103,12 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
     least = np.inf
     for in_place, erring in InPlaceFits(recording, flat, gravity).attempts():
         for parameters in (ACCEL, IMU):
-            minimum, errors = in_place.explained(parameters, erring)
+            minimum, errors = in_place.explain(parameters, erring)
             least = min(least, minimum.nis)
             if minimum.nis >= (EXPLAINED_BY_ERRORS_NIS if erring else EXPLAINED_NIS):
                 continue
             if parameters == ACCEL:
-                imu = in_place.with_matrix(minimum, errors)
+                imu = in_place.fit_matrix(minimum, errors)
                 minimum = minimum if imu is None else imu
             r = in_place.lever_arm(minimum, errors)
             if r is None:
@@ -172,7 +172,7 @@ class InPlaceFits:
         """Fit with white noise alone, whether or not it explains the data."""
         return self.as_fit(self.minimum(parameters, self._rough(parameters)), NO_ERRORS)
 
-    def explained(self, parameters: int, erring: bool) -> tuple[Minimum, Errors]:
+    def explain(self, parameters: int, erring: bool) -> tuple[Minimum, Errors]:
         """Return the minimum, a rough one where it explains nothing, and the most likely errors."""
         errors = NO_ERRORS
         minimum = self._rough(parameters)
@@ -190,7 +190,7 @@ class InPlaceFits:
         minimum = minimise(problem, near.theta, parameters, self._prior, most=most, ends=ends_of(problem))
         return replace(minimum, iterations=near.iterations + minimum.iterations)
 
-    def with_matrix(self, near: Minimum, errors: Errors) -> Minimum | None:
+    def fit_matrix(self, near: Minimum, errors: Errors) -> Minimum | None:
         """Fit K as well; None where a Wald test does not find it different from the identity.
 
         The statistic is twice the fall of V: where the first decrement promises little, the search ends there.
@@ -214,10 +214,10 @@ class InPlaceFits:
 
     def _rough(self, parameters: int) -> Minimum:
         if parameters not in self._roughly:
-            self._roughly[parameters] = self._searched(parameters)
+            self._roughly[parameters] = self._search(parameters)
         return self._roughly[parameters]
 
-    def _searched(self, parameters: int) -> Minimum:
+    def _search(self, parameters: int) -> Minimum:
         """Search on block means; of a long recording on coarser means first, as far as they explain it."""
         theta, most, iterations = self._first, MOST_ITERATIONS, 0
         if len(self._thin.series) > MANY_MEANS:

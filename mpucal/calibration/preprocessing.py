@@ -70,7 +70,7 @@ class Preprocessed:
     def pivot(self, sigma: float, floor: float = 0.0, lam: float | None = None) -> Problem:
         """Return the problem with a pivot whose bounded travel accelerates the board by sigma [m/s^2] in motion.
 
-        floor : m/s^2, white noise beside it. lam : 1/s, the poles of the travel, if not the problem's own.
+        floor : m/s^2, white noise in addition. lam : 1/s, the poles of the travel, if not the problem's own.
         """
         lam = lam or self.problem.lam
         jerk = jerk_density(sigma, lam) * self.motion

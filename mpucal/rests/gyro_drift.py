@@ -59,5 +59,5 @@ def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
         m[i], P[i] = m_before[i] + gain * e, (1.0 - gain) * P_before[i]
     for i in range(k - 2, -1, -1):
         m[i] += P[i] / P_before[i + 1] * (m[i + 1] - m_before[i + 1])
-    likeliest = cost.argmin(1) if np.sum(cost[:, 0] - cost.min(1)) > DRIFTS_95 else 0
-    return np.asarray(m[:, np.arange(3), likeliest])
+    best = cost.argmin(1) if np.sum(cost[:, 0] - cost.min(1)) > DRIFTS_95 else 0
+    return np.asarray(m[:, np.arange(3), best])

@@ -44,7 +44,7 @@ class RestFinder:
         return self.within(self._learned())
 
     def any_hand(self) -> Intervals:
-        """Return the typical rests, and beside them those of a hand with any tremor."""
+        """Return the typical rests, and in addition those of a hand with any tremor."""
         return _and_others(self.typical(), self.within(ANY_HAND))
 
     def bias_runs(self, rests: Intervals) -> Intervals:

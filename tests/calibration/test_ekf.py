@@ -57,7 +57,7 @@ def test_process_noise_alone():
     _, P = filter_.predict(X[None], np.zeros((1, 4, 4)), 0)
     delta, omega = 0.01, np.array([0.7, -1.1, 0.4])
     M = central(lambda v: product(exponential(0.5 * delta * (omega - v))) @ X, np.zeros(3))
-    # the filter lets v_t turn x_{t+1} itself, which differs by half the step's angle, 0.7 %
+    # The filter lets v_t turn x_{t+1} itself, which differs by half of the step's angle, 0.7 %.
     np.testing.assert_allclose(P[0], M @ np.diag([1e-3, 2e-3, 3e-3]) @ M.T, atol=1e-2 * np.abs(P).max())
 
 

@@ -7,7 +7,7 @@ from mpucal.calibration import model_selection
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import minimise
-from mpucal.calibration.model_selection import METHODS, choose, fit_accel, fit_imu
+from mpucal.calibration.model_selection import METHODS, choose_model, fit_accel, fit_imu
 from mpucal.calibration.paper import expand
 from mpucal.calibration.parameters import ACCEL, B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
 from mpucal.calibration.problem import Problem, Series
@@ -135,7 +135,7 @@ def test_with_a_perfect_gyroscope_imu_agrees_with_accel_and_is_less_certain(pape
 def test_auto_keeps_a_perfect_gyroscope_perfect(paper_runs):
     runs, _ = paper_runs
     for run in runs:
-        chosen = by(choose, run.recording)
+        chosen = by(choose_model, run.recording)
         assert chosen.model == "accel"
         assert "perfect gyroscope" in chosen.why
         np.testing.assert_array_equal(chosen.fit.K, np.eye(3))
@@ -153,7 +153,7 @@ def test_auto_finds_a_gyroscope_that_is_off(ideal):
     z = []
     for seed in range(10):
         G_gyro, K = wrong_gyro(seed)
-        chosen = by(choose, ideal(seed, G_gyro=G_gyro, rate_hz=100).recording)
+        chosen = by(choose_model, ideal(seed, G_gyro=G_gyro, rate_hz=100).recording)
         assert chosen.model == "imu", seed
         assert "not perfect" in chosen.why
         sd = chosen.fit.std(*K_NAMES)

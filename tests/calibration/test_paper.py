@@ -32,7 +32,7 @@ def test_it_finds_simulated_sensors_with_right_standard_deviations():
         assert sph_rms(truth, fit.D, fit.b_a) < 0.3
         error = np.concatenate([(fit.D - truth.D).ravel(), fit.b_a - truth.b_a])
         z.append(error / fit.std(*D_NAMES, *B_A_NAMES))
-    # a little above 1: b_omega is held at what the flat segment said
+    # It is a little above 1, as b_omega is fixed at the value of the flat segment.
     assert 0.7 < np.sqrt(np.mean(np.square(z))) < 1.7
 
 

@@ -47,7 +47,7 @@ def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand, k)
     gyr[first:last] = prepared.flat.b_omega
     factor = Moved(in_hand, gyr).scale()
     assert factor.shape == (len(in_hand.recording) - prepared.flat.last,)
-    # rests are found anew without a gyroscope: they reach a little into the move
+    # Without a gyroscope the rests that are found reach a little into the move.
     in_the_middle = [
         factor[(move.start + move.stop) // 2] for move in map(prepared.move, range(len(prepared.runs) - 1))
     ]

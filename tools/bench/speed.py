@@ -19,7 +19,7 @@ import numpy as np
 import mpucal
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.likelihood import evaluate, value
-from mpucal.calibration.model_selection import METHODS, choose, fit_accel
+from mpucal.calibration.model_selection import METHODS, choose_model, fit_accel
 from mpucal.calibration.parameters import ACCEL, HAND, IMU
 from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.theta import Theta
@@ -59,7 +59,7 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
     ):
         found = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
         flat = flat_statistics(recording, recording.flat)
-        estimate = choose if model == "auto" else METHODS[model]
+        estimate = choose_model if model == "auto" else METHODS[model]
         estimation_s = median_s(lambda e=estimate, r=recording, f=flat: e(r, f, GRAVITY_MPS2), runs)
         whole_s = median_s(lambda r=recording, m=model: mpucal.calibrate(r, model=m, gravity=GRAVITY_MPS2), runs)
         length_s = float(recording.t[-1] - recording.t[0])
