@@ -71,7 +71,7 @@ def test_the_messages():
 
 
 def test_the_screen():
-    view = View("mpucal").after(Prompt(PromptKind.ROTATE, "Turn the board: side +X down.", (1.0, 0.0, 0.0)))
+    view = View("mpucal").after(Prompt(PromptKind.ROTATE, "Turn the board: on its right edge (+X).", (1.0, 0.0, 0.0)))
     three = (0.5, 0.5, 0.5)
     view = view.after(Knowledge(0.0, three, three, three, AIMS["normal"].target, three, three, three, 0.5, None, ""))
     drawn = "\n".join(line.plain for line in lines(view, 160, 50, UNICODE))

@@ -38,7 +38,7 @@ from .arguments import PATH, calibration_argument, json_option, output_option, y
 from .destination import write_back
 from .loading import at_gravity_of, force_option, load_calibration, load_trusted
 from .options import check_gyroscope, check_input, check_source, given_options, source_options
-from .page import choose_board, page_options, with_page
+from .page import BOARD_KIND, choose_board, page_options, with_page
 from .recording_options import given_hints, hint_options, say_interpretation
 from .running import open_runner
 
@@ -97,7 +97,7 @@ def command(
         with nullcontext() if folder is None else OutputFolder(folder) as place:
             return _check(old, place, as_json, recording)[0].exit_code
     check_source(click.get_current_context())
-    options = at_gravity_of(old, options)
+    options = {**at_gravity_of(old, options), BOARD_KIND: board}
     source = open_source(options, given_options())
     check_gyroscope(source.plan.config)
     board, title = choose_board(board, source), source_title(options)

@@ -10,9 +10,9 @@ import click
 
 from ..page.address import LOOPBACK, Address, parse_address
 from ..result.session_files import CAPTURE_OF_VEHICLE
+from ..session.boards import BOARD, BOARDS, VEHICLE
 from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
-from ..terminal.flat import BOARD, BOARDS, VEHICLE
 from .options import Parsed, decorated
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 UNPACED = "pace=fast"
+# Key of --board among the options of a source.
+BOARD_KIND = "board"
 
 
 def page_options(command: F) -> F:
@@ -34,13 +36,13 @@ def page_options(command: F) -> F:
             flag_value=LOOPBACK,
             help="Show it on a page in a browser, on this computer or (lan, HOST:PORT) in its network.",
         ),
-        click.option("--board", type=click.Choice(BOARDS), help=f"Board to draw; default: {BOARD}."),
+        click.option("--board", type=click.Choice(BOARDS), help=f"Board to draw and to speak of; default: {BOARD}."),
     )
 
 
 def choose_board(board: str | None, source: OpenedSource) -> str:
     """Return the board to draw: the given one, or the default of the source."""
-    return board or (VEHICLE if source.capture_name == CAPTURE_OF_VEHICLE.name else BOARD)
+    return board or source.plan.board or (VEHICLE if source.capture_name == CAPTURE_OF_VEHICLE.name else BOARD)
 
 
 def with_page(

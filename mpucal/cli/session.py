@@ -38,7 +38,7 @@ from .options import (
     given_options,
     source_options,
 )
-from .page import choose_board, page_options, with_page
+from .page import BOARD_KIND, choose_board, page_options, with_page
 from .running import open_runner
 from .summary import files_written, page_result, summary
 
@@ -86,7 +86,7 @@ def command(
     check_gravity(options["gravity"], options["gravity_anyway"])
     resume: Path | None = options.pop("resume")
     attended = not yes and sys.stdin.isatty()
-    source, kinds, options = _open(resume, {**options, NAME: name}, sinks, no_write, attended)
+    source, kinds, options = _open(resume, {**options, NAME: name, BOARD_KIND: board}, sinks, no_write, attended)
     name = name or options.get(NAME)
     check_gyroscope(source.plan.config)
     title = f"{name}, {source_title(options)}" if name else source_title(options)

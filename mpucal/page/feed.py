@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OutputError
+from ..session.boards import BOARD
 from ..session.events import Key, Output
-from ..terminal.flat import BOARD
 from ..terminal.view import View
 from .address import Address
 from .state import changes, state

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
+from ..session.boards import flat_caption
 from ..session.events import Knowledge
 from ..terminal.lines import plain
 from ..terminal.view import HEADLINES, USE_HEADLINES, Moment, View
@@ -24,6 +25,7 @@ def state(view: View) -> dict[str, Any]:
         "headline": headline(view),
         "prompt": view.prompt,
         "confirming": view.confirming,
+        "flat": flat_caption(view.board),
         "meter": view.meter,
         "countdown": view.waiting,
         "progress": view.progress,
@@ -68,8 +70,6 @@ def headline(view: View) -> str:
             return words[:1].upper() + words[1:]
         case Moment.STEP if view.prompt is not None:
             return HEADLINES[view.prompt.kind].capitalize()
-        case Moment.POINT:
-            return view.headline.replace("DOWN", "down")
     return CONNECTING
 
 

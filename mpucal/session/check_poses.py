@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..data import Samples
-from ..result.orientation import side_down
 from .aims import ALL_AROUND
+from .boards import BOARD, describe
 from .coverage import Directions
 from .events import Caution, Finished, Output, Progress, Prompt, PromptKind, Rested, Use, triple
 from .pauses import PATIENCE_S, Pause, PoseStep, classify_use, countdown, held
@@ -21,8 +21,9 @@ OTHER_WAY = 0.1
 class CheckPoses(PoseStep):
     """Step that asks for the orientations that would show most, and takes any new one."""
 
-    def __init__(self, flat: Rested) -> None:
+    def __init__(self, flat: Rested, board: str = BOARD) -> None:
         super().__init__(flat, CHECK_HOLD_S)
+        self._board = board
         self._shown = Directions()
         self._shown.add(np.array(flat.acc))
         self.prompt = self._next()
@@ -68,5 +69,6 @@ class CheckPoses(PoseStep):
         along = -ALL_AROUND @ self._shown.units.T
         down = ALL_AROUND[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
         number = f"{self._number + 1} of {ORIENTATIONS}"
-        text = f"Orientation {number}: {side_down(down)} down, or any other new one, then hold it still for 2 s."
+        words = describe(triple(down), self._board)
+        text = f"Orientation {number}: {words}, or any other new one, then hold it still for 2 s."
         return Prompt(PromptKind.VERIFY, text, triple(down))

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import lay_flat
 from .aims import NORMAL, select_aim
+from .boards import BOARD, VEHICLE
 from .check_poses import CheckPoses
 from .events import (
     Abort,
@@ -62,6 +63,7 @@ class Machine:
     until_end : no step has a time limit, and the turning ends with the source.
     target : one of AIMS. tilt_only : ask for tilts alone, for a board that cannot be turned over.
     attended : somebody can press keys. checking : an existing calibration is checked, and none is made.
+    board : its kind, for the words of the prompts; empty: the sensor's.
 
     Attributes
     ----------
@@ -75,11 +77,12 @@ class Machine:
         tilt_only: bool = False,
         attended: bool = False,
         checking: bool = False,
+        board: str = "",
     ) -> None:
         self.state = State.CONNECT
         self._until_end, self._target, self._tilt_only = until_end, target, tilt_only
         self._aim = select_aim(target)
-        self._attended, self._checking = attended, checking
+        self._attended, self._checking, self._board = attended, checking, board
         self._step: lay_flat.LayFlat | Rotate | CheckPoses | Verify = lay_flat.LayFlat(patient=until_end)
         self._watch: MotionWatch | None = None
         self._flat: Rested | None = None
@@ -108,6 +111,7 @@ class Machine:
                 return self._tick(t_s)
             case Connected(sensor):
                 self._aim, self._watch = select_aim(self._target, sensor), MotionWatch(sensor)
+                self._board = self._board or (VEHICLE if sensor.message else BOARD)
                 return [lay_flat.PROMPT]
             case Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples
@@ -152,7 +156,11 @@ class Machine:
         return [*again, *meters, *self._dispatch(self._step.add(samples))]
 
     def _turn(self, flat: Rested) -> list[Output]:
-        turning = CheckPoses(flat) if self._checking else Rotate(flat, self._aim, self._until_end, self._tilt_only)
+        turning = (
+            CheckPoses(flat, self._board)
+            if self._checking
+            else Rotate(flat, self._aim, self._until_end, self._tilt_only, self._board)
+        )
         self._step = turning
         return [turning.prompt]
 
@@ -160,7 +168,13 @@ class Machine:
         if not isinstance(self._step, Rotate):
             raise TypeError("the board is verified after it was turned")
         verify = Verify(
-            self._step.flat, self._aim, self._step.coverage, self._step.directions, self._tilt_only, self._attended
+            self._step.flat,
+            self._aim,
+            self._step.coverage,
+            self._step.directions,
+            self._tilt_only,
+            self._attended,
+            self._board,
         )
         self._step = verify
         return verify.begin()

@@ -28,6 +28,7 @@ class Plan:
     until_end : no step has a time limit, and the turning ends with the source.
     target : one of AIMS. tilt_only : the board cannot be turned over.
     attended : somebody can press keys. gravity_anyway : allow a gravity outside the range found on Earth.
+    board : kind of board, one of BOARDS, for the words of the prompts; empty: the sensor's.
     """
 
     config: Config = field(default_factory=Config)
@@ -38,6 +39,7 @@ class Plan:
     tilt_only: bool = False
     attended: bool = False
     gravity_anyway: bool = False
+    board: str = ""
 
     def meta(self) -> dict[str, Any]:
         """Return the head of a capture, in JSON's own types."""

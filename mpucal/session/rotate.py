@@ -9,8 +9,8 @@ import numpy as np
 
 from ..data import Samples, Vector
 from ..rests.windows import Windows
-from ..result.orientation import side_down, tilt_down
 from .aims import Aim, directions
+from .boards import BOARD, describe, describe_tilt, name_board
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Direction,
@@ -56,11 +56,15 @@ class Rotate(PoseStep):
     ----------
     flat : the flat rest, the first orientation. aim : the conditions for its end.
     until_end : go on until the source ends, and ask for nothing. tilt_only : ask for small tilts from flat alone.
+    board : its kind, for the words of the prompts.
     """
 
-    def __init__(self, flat: Rested, aim: Aim, until_end: bool = False, tilt_only: bool = False) -> None:
+    def __init__(
+        self, flat: Rested, aim: Aim, until_end: bool = False, tilt_only: bool = False, board: str = BOARD
+    ) -> None:
         super().__init__(flat)
         self.flat, self._aim, self._until_end, self._tilt_only = flat, aim, until_end, tilt_only
+        self._board = board
         self._least = TILTS if tilt_only else aim.least
         self._passes = Windows(PASS_WINDOW_S, spread=False)
         self.coverage = Coverage()
@@ -194,5 +198,6 @@ class Rotate(PoseStep):
         if self._until_end:
             text = "Turn the board through many different orientations, tilted ones too, and hold each for 2 s."
             return Prompt(PromptKind.ROTATE, text)
-        side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
-        return Prompt(PromptKind.ROTATE, f"Turn the board: {side}, then hold it still.", triple(down))
+        words = (describe_tilt if self._tilt_only else describe)(triple(down), self._board)
+        text = f"Turn the {name_board(self._board)}: {words}, then hold it still."
+        return Prompt(PromptKind.ROTATE, text, triple(down))

@@ -9,8 +9,8 @@ import numpy as np
 from ..data import Samples, Vector
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
-from ..result.orientation import side_down, tilt_down
 from .aims import Aim, unseen_rad
+from .boards import BOARD, describe, describe_tilt
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Caution,
@@ -51,6 +51,7 @@ class Verify(PoseStep):
     flat : the flat rest. coverage : the orientations of the turning.
     directions : (k, 3) that may be asked to point down.
     attended : somebody can press keys, and is offered to turn the board again where that may help.
+    board : its kind, for the words of the prompts.
 
     Attributes
     ----------
@@ -65,10 +66,11 @@ class Verify(PoseStep):
         directions: Vector,
         tilt_only: bool = False,
         attended: bool = False,
+        board: str = BOARD,
     ) -> None:
         super().__init__(flat)
         self._aim, self._coverage, self._directions, self._tilt_only = aim, coverage, directions, tilt_only
-        self._attended = attended
+        self._attended, self._board = attended, board
         self._refusal: Finished | None = None
         self._requested, self._more = False, MOST_MORE
         self._now_s = 0.0
@@ -179,6 +181,6 @@ class Verify(PoseStep):
         if last is not None:
             candidates = candidates[candidates @ np.array(last.down) < math.cos(DISTINCT_RAD)]
         down = self._coverage.rested.farthest_down(candidates)
-        side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
+        words = (describe_tilt if self._tilt_only else describe)(triple(down), self._board)
         number = f"{self._number + 1} of {self._aim.verify}"
-        return Prompt(PromptKind.VERIFY, f"Verification {number}: {side}, then hold it still.", triple(down))
+        return Prompt(PromptKind.VERIFY, f"Verification {number}: {words}, then hold it still.", triple(down))

@@ -173,4 +173,5 @@ def _plan(values: Mapping[str, Any], until_end: bool, kind: SourceKind) -> Plan:
             raise UsageError(what, "remove it: tilts are fitted by the model tilt")
         model = "tilt"
     aim = {name: values[name] for name in ("target", "tilt_only", "attended", "gravity_anyway") if name in values}
-    return Plan(config, values.get("gravity", usual.gravity), model, until_end, **aim)
+    board = values.get("board") or usual.board
+    return Plan(config, values.get("gravity", usual.gravity), model, until_end, board=board, **aim)

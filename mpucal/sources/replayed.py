@@ -31,7 +31,7 @@ def open_source(request: Request) -> OpenedSource:
     file: Path = request.value
     if file.suffix.lower() != TLOG:
         refuse_fixed_options(request)
-        return _open_mcap(file)
+        return _open_mcap(file, request.plan.board)
     # pymavlink loads slowly, and a chip on a bus does not need it.
     from .vehicle import OpenedVehicle, open_tlog  # noqa: PLC0415
 
@@ -42,11 +42,12 @@ def open_source(request: Request) -> OpenedSource:
     return source
 
 
-def _open_mcap(file: Path) -> OpenedChip:
+def _open_mcap(file: Path, board: str) -> OpenedChip:
     captures = [read_capture(path) for path in (captures_in(file) or [file])]
     name = captures[0].name
     bus = ChainedBus([ReplayBus(part, name) for part in split_at_resumes(capture.records for capture in captures)])
     recovered = [capture.recovered for capture in captures if capture.recovered]
     plan = Plan.of_capture(captures[0].meta, name)
+    plan = replace(plan, board=board or plan.board)
     opened = OpenedChip(bus, plan, replay=bus, recovered=recovered[-1] if recovered else None, real_time=False)
     return iio_replay(opened, captures[0]) if captures[0].meta[DRIVER] == IIO_VERSION else opened

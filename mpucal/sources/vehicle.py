@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
-from dataclasses import KW_ONLY, asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -252,6 +252,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | Op
     try:
         plan = dict(head.data[PLAN])
         made = Plan(**{**plan, "config": RateOnlyConfig(**plan["config"])})
+        made = replace(made, board=asked.board or made.board)
         return OpenedVehicle(
             replay,
             made,

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Protocol
 
+from ..session.boards import BOARD
 from ..session.events import Key, Output
-from .flat import BOARD
 from .keys import Keys
 from .lines import JsonLines, Lines
 

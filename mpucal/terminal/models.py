@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 
+from ..session.boards import BOARDS
 from ..session.events import Direction
-from .flat import BOARDS
 
 Stroke = tuple[Direction, ...]
 

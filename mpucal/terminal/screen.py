@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import TextIO
 
+from ..session.boards import BOARD
 from ..session.events import Decision, Key, Output, Prompt, Verification
-from .flat import BOARD
 from .glyphs import Glyphs
 from .keys import Keys
 from .layout import lines

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from ..session.boards import BOARD, flat_description
 from ..session.events import (
     Caution,
     Countdown,
@@ -22,7 +23,6 @@ from ..session.events import (
     Use,
     Verification,
 )
-from .flat import BOARD, flat_description
 
 # Time for which the headline shows the use of the last orientation.
 USE_SHOWN_S = 1.2
@@ -33,8 +33,6 @@ NEAR_DEG = 15.0
 COUNTDOWN_HOLDS_S = 1.0
 # Time from the end of a countdown until the session has decided about the orientation.
 DECIDED_S = 2.0
-# Share of gravity along an axis from which it is named: of a tilt by 30 degrees towards a corner, both axes are.
-WORTH_NAMING = 0.3
 HEADLINES = {
     PromptKind.LAY_FLAT: "LAY FLAT",
     PromptKind.ROTATE: "TURN IT",
@@ -54,7 +52,6 @@ class Moment(StrEnum):
     COUNTING = "counting"
     DECIDED = "decided"
     STEP = "step"
-    POINT = "point"
     TURN = "turn"
     NEAR = "near"
 
@@ -173,10 +170,8 @@ class View:
             return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s) or ''}".rstrip()
         if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < USE_SHOWN_S:
             return Moment.DECIDED, USE_HEADLINES[self.held.use]
-        if self.wanted is None:
+        if self.wanted is None or self.meter is None or self.meter.missing_deg is None:
             return Moment.STEP, HEADLINES[self.prompt.kind]
-        if self.meter is None or self.meter.missing_deg is None:
-            return Moment.POINT, f"{axes(self.wanted)} DOWN"
         if self.meter.missing_deg <= NEAR_DEG:
             return Moment.NEAR, "HOLD STILL"
         return Moment.TURN, _turn_headline(self.meter.turn)
@@ -201,9 +196,3 @@ def _turn_headline(turn: str) -> str:
     for long, short in ((" it", ""), (" from you", ""), ("to the ", ""), ("toward", "to")):
         words = words.replace(long, short)
     return f"{words} {degrees}".upper()
-
-
-def axes(down: Direction) -> str:
-    """Return the names of the axes that point down: "+X -Y"."""
-    named = [i for i in range(3) if abs(down[i]) >= WORTH_NAMING]
-    return " ".join(f"{'+' if down[i] > 0 else '-'}{'XYZ'[i]}" for i in named)

@@ -11,7 +11,7 @@ from mpucal.page.server import Server
 from mpucal.session.events import Countdown, Held, Meter, Prompt, PromptKind, Use
 
 FLAT, ON_ITS_SIDE = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.0, -(0.5**0.5), 0.0)
-TURN = Prompt(PromptKind.ROTATE, "Turn the board: side +X down, then hold it still.", (-1.0, 0.0, 0.0))
+TURN = Prompt(PromptKind.ROTATE, "Turn the board: on its right edge (+X), then hold it still.", (-1.0, 0.0, 0.0))
 
 
 def meter(t_s, missing_deg, turn, wanted=ON_ITS_SIDE):

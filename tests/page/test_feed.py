@@ -16,7 +16,7 @@ from mpucal.page.address import Address
 from mpucal.page.feed import Feed
 from mpucal.session.events import Key, Prompt, PromptKind
 
-PROMPT = Prompt(PromptKind.ROTATE, "Turn the board: side +X down.", (1.0, 0.0, 0.0))
+PROMPT = Prompt(PromptKind.ROTATE, "Turn the board: on its right edge (+X).", (1.0, 0.0, 0.0))
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def test_a_late_client_gets_all_values(feed):
     shown = followed(feed.url, lambda shown: shown.get("notes"))
     assert shown["title"] == "a chip"
     assert shown["prompt"] == {"kind": "rotate", "text": PROMPT.text, "down": [1.0, 0.0, 0.0]}
-    assert shown["headline"] == "+X down"
+    assert shown["headline"] == "Turn it"
     assert shown["notes"] == ["a line of talk"]
 
 

@@ -209,9 +209,25 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
     rotating.feed(board.still(0.6))
     asked = rotating.of(Prompt)[-1]
     assert (asked.kind, asked.down) == (PromptKind.ROTATE, DOWN)
-    assert "edge +Y −Z down" in asked.text
+    assert asked.text == "Turn the board: on its far edge, chip tilted up (+Y −Z), then hold it still."
     assert rotating.prompts().count(PromptKind.ROTATE) == 2
     assert rotating.feed(board.still(3.0)).prompts().count(PromptKind.ROTATE) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "sensor", "words"),
+    [
+        ({}, {}, "Turn the board: chip face down (+Z), then"),
+        ({}, {"message": "RAW_IMU"}, "Turn the vehicle: on its feet (+Z), then"),
+        ({"board": "plain"}, {"message": "RAW_IMU"}, "Turn the board: chip face down (+Z), then"),
+    ],
+    ids=["chip", "vehicle", "named"],
+)
+def test_prompts_speak_of_the_kind_of_board(board, options, sensor, words):
+    session = Session(**options)
+    session.machine = Machine(**options)
+    session.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0, **sensor)))
+    assert session.feed(board.still(10.6)).of(Prompt)[-1].text.startswith(words)
 
 
 def test_uncertainties_are_requested_every_second(board, rotating):

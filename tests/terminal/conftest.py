@@ -53,7 +53,11 @@ def knowledge(t_s, down=CORNER, doubt=""):
 
 
 LAY_FLAT = Prompt(PromptKind.LAY_FLAT, "Lay the board flat on a firm surface and let go of it.")
-TURN = Prompt(PromptKind.ROTATE, "Turn the board: corner +X -Y +Z down, then hold it still.", CORNER)
+TURN = Prompt(
+    PromptKind.ROTATE,
+    "Turn the board: on its corner between pin edge and right edge (+X -Y +Z), then hold it still.",
+    CORNER,
+)
 VERIFY = Prompt(PromptKind.VERIFY, "Now show it this side.", (0.0, 1.0, 0.0))
 REST = Prompt(PromptKind.REST, "You can put the board down.")
 

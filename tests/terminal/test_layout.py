@@ -36,7 +36,8 @@ def test_all_that_a_person_needs_is_there(views, size):
         "200.0 Hz",
         "31.2 °C",
         "0:15",
-        "Turn the board: corner +X -Y +Z down, then hold it still.",
+        "Turn the board: on its corner between pin edge and right edge (+X -Y +Z), then",
+        "hold it still.",
         "now",
         "turn it like this",
         "+Z up",
@@ -66,7 +67,7 @@ def test_each_turn_is_shown_in_large_letters(views, words):
     view = views["turned"]
     drawn = text_of(replace(view, meter=replace(view.meter, turn=f"135 deg more, {words}")))
     assert re.search("[█▀▄]{3}", drawn[1])
-    assert "Turn the board: corner" in "\n".join(drawn[6:8])
+    assert "Turn the board: on its corner" in "\n".join(drawn[6:8])
 
 
 @pytest.mark.parametrize("size", [(40, 15), (80, 24), (160, 50)], ids=str)
@@ -80,7 +81,7 @@ def test_on_a_low_screen_the_words_are_left(views):
     drawn = text_of(views["turned"], 40, 12)
     assert not BRAILLE.search("".join(drawn))
     assert "ROLL LEFT 60" in drawn[1]
-    assert "Turn the board: corner" in drawn[2]
+    assert "Turn the board: on its corner" in drawn[2]
 
 
 @pytest.mark.parametrize("kind", [PromptKind.REST, PromptKind.AGAIN])

@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mpucal.session.attitude import straight
+from mpucal.session.boards import BOARDS
 from mpucal.terminal import board, letters, orientation_map
 from mpucal.terminal.canvas import Canvas
-from mpucal.terminal.flat import BOARDS
 from mpucal.terminal.view import HEADLINES
 
 DIRECTIONS = [

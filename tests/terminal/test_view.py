@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from mpucal.session.events import Countdown, Held, Prompt, PromptKind, Seen, Use
-from mpucal.terminal.view import View, axes
+from mpucal.terminal.view import View
 
 
 def test_nothing_is_known_at_first():
@@ -14,7 +14,7 @@ def test_nothing_is_known_at_first():
 def test_the_headline_is_the_instruction(views):
     assert views["laid"].headline == "STILL 7"
     assert views["turned"].headline == "ROLL LEFT 60"
-    assert views["checked"].headline == "+Y DOWN"
+    assert views["checked"].headline == "CHECK"
     assert views["ended"].headline == "PUT IT DOWN"
 
 
@@ -100,21 +100,6 @@ def test_orientations_are_counted_anew_when_the_board_is_turned_anew(views):
 def test_another_step_forgets_the_warnings_of_the_last(views):
     assert views["turned"].caution is not None
     assert views["checked"].caution is None
-
-
-@pytest.mark.parametrize(
-    ("down", "words"),
-    [
-        ((1.0, 0.0, 0.0), "+X"),
-        ((0.0, 0.0, -1.0), "-Z"),
-        ((0.6, -0.8, 0.0), "+X -Y"),
-        ((0.57, -0.58, 0.58), "+X -Y +Z"),
-        ((0.2, 0.95, 0.2), "+Y"),
-        ((0.35, -0.35, -0.87), "+X -Y -Z"),
-    ],
-)
-def test_axes_that_carry_much_of_gravity_are_named(down, words):
-    assert axes(down) == words
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,8 @@ const VERDICTS = {
 };
 const FINE = ["good", "usable", "still good"];
 const REPORT = "report.html";
+// The axes in brackets are for the eye.
+const AXES = / \([+−][^)]*\)/g;
 const SAVE_AT_ONCE_BYTES = 2e7;
 let state = {}, source = null, heardAt = 0, fresh = false;
 
@@ -209,7 +211,7 @@ function pictures(changed) {
   $("goal-figure").hidden = !goes;
   $("pictures").classList.toggle("alone", !goes);
   document.body.toggleAttribute("data-early", !state.known && !state.live);
-  put("goal-caption", laying() ? flatWords() : "turn it like this");
+  put("goal-caption", laying() ? state.flat : "turn it like this");
   const taken = (state.seen ?? []).filter((seen) => seen.paused).length;
   $("ball-figure").hidden = !meter || !state.seen?.length;
   put("ball-caption", ended ? "orientations taken" : `orientations taken: ${taken}; ring: the next`);
@@ -223,11 +225,6 @@ function pictures(changed) {
   }
   view = viewOf([to, ...(goes ? [goes] : [])], view);
   draw();
-}
-
-function flatWords() {
-  if (state.board === "gy-521") return "flat: the chip up, the pins toward you";
-  return state.board === "vehicle" ? "level, on its feet" : "flat: the chip up";
 }
 
 const shownAttitude = (t) => between(from, to, Math.min(1, (t - movedAt) / MOVE_MS));
@@ -320,8 +317,9 @@ function announce(words, tone = null) {
   if (tone) sound.tone(tone);
   if (!words) return;
   saidAt = performance.now();
-  put("spoken", words);
-  sound.say(words);
+  const spoken = words.replace(AXES, "");
+  put("spoken", spoken);
+  sound.say(spoken);
 }
 
 const turnWords = () => (state.meter?.turn ? state.meter.turn.replace(" deg ", " degrees ") : "");
