@@ -2,20 +2,24 @@
 
 import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mpucal import load
 from mpucal.calibration import calibrate, estimate
 from mpucal.calibration.evidence import Evidence
 from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
 from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
+from mpucal.result.calibration import Calibration
 from tools.lab.judge import sph_rms
 from tools.lab.scenarios.recordings import paper_scenario
 
 G = 9.82
+SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 
 
 @dataclass(frozen=True)
@@ -160,6 +164,17 @@ def test_an_axis_that_stops_midway_is_stuck(in_hand, axis):
     acc = recording.acc.copy()
     acc[1900:2300, axis] = acc[1900, axis]
     refused_for("bits_stuck", replace(recording, acc=acc), f"on {'xyz'[axis]} from 19 to 23 s, though")
+
+
+@pytest.mark.parametrize(("axes", "from_s"), [([2], 4.7), ([0, 1, 2], 14.1)])
+def test_an_accelerometer_that_dies_is_refused_and_its_calibration_can_be_read(axes, from_s, tmp_path):
+    recording = load(SESSION)
+    acc = recording.acc.copy()
+    acc[np.ix_(recording.t - recording.t[0] > from_s, axes)] = 0.0
+    calibration = calibrate(replace(recording, acc=acc))
+    assert calibration.verdict == "refused"
+    calibration.save(tmp_path / "calibration.json")
+    assert Calibration.load(tmp_path / "calibration.json") == calibration
 
 
 def test_an_axis_that_repeats_for_a_second_or_at_rest_is_not_stuck(in_hand):

@@ -24,12 +24,8 @@ def errors(fits, runs):
 
 
 def z_scores(fits, runs):
-    z = []
-    for fit, run in zip(fits, runs, strict=True):
-        truth = run.truth
-        off = np.concatenate([(fit.D - truth.D).ravel(), fit.b_a - truth.b_a])
-        z.append(off / fit.std(*D_NAMES, *B_A_NAMES))
-    return np.array(z)
+    off = [np.append(fit.D - run.truth.D, fit.b_a - run.truth.b_a) for fit, run in zip(fits, runs, strict=True)]
+    return np.array(off) / [fit.std(*D_NAMES, *B_A_NAMES) for fit in fits]
 
 
 @pytest.fixture(scope="module")
