@@ -175,7 +175,7 @@ class Rotate(PoseStep):
         if not self._is_certain() or self._tilt_only or self._until_end:
             return text
         if number < least:
-            return f"{text} (the bars are full; the others confirm them from more sides)"
+            return f"{text} (the bars are full; more sides confirm them)"
         return text if self.coverage.varied else f"{text} (the bars are full, but these are too much alike)"
 
     def _is_certain(self) -> bool:

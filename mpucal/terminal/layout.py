@@ -16,7 +16,7 @@ from .words import sentence
 # Smaller screens show text only.
 LEAST_COLUMNS, LEAST_ROWS = 60, 20
 LARGE_COLUMNS, LARGE_ROWS, AIRY_ROWS = 120, 40, 30
-_PROMPT_ROWS = 2
+_PROMPT_ROWS, _LEAST_PICTURE_ROWS = 2, 5
 _BLANK = Text("")
 
 
@@ -34,8 +34,13 @@ def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
         *caution_rows(view, columns, glyphs),
         keys(view, columns),
     ]
-    space = rows - len(above) - len(below)
-    between = _pictures(view, columns, space, glyphs) if roomy and space > 4 else []
+    count = _count(view)
+    space = rows - len(above) - len(below) - len(count)
+    # The pictures say more than the count.
+    if count and roomy and space == _LEAST_PICTURE_ROWS - 1:
+        count, space = [], _LEAST_PICTURE_ROWS
+    above += count
+    between = _pictures(view, columns, space, glyphs) if roomy and space >= _LEAST_PICTURE_ROWS else []
     between += [_BLANK] * max(space - len(between), 0)
     drawn = [*above, *between, *below]
     # A screen with too few rows loses its bars first, and never the headline and the prompt.
@@ -78,12 +83,14 @@ def _headline_style(view: View) -> str:
 
 def _prompt(view: View, columns: int, rows: int) -> list[Text]:
     text = view.prompt.text if view.prompt is not None else "Looking for the sensor."
-    # The bars of the uncertainties have taken the place of the progress.
-    turning = view.prompt is not None and view.prompt.kind is PromptKind.ROTATE and view.knowledge is not None
-    if turning and view.progress is not None:
-        text = f"{text} {sentence(view.progress.text)}"
     wrapped = textwrap.wrap(text, max(columns - 2, NARROWEST), max_lines=rows, placeholder=" ...")
     return [Text(f" {line}", style="bold") for line in [*wrapped, *[""] * (rows - len(wrapped))]]
+
+
+def _count(view: View) -> list[Text]:
+    """Return the progress of the turning, once the bars of the uncertainties have taken its place."""
+    turning = view.prompt is not None and view.prompt.kind is PromptKind.ROTATE and view.knowledge is not None
+    return [Text(f" {sentence(view.progress.text)}")] if turning and view.progress is not None else []
 
 
 def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:

@@ -244,7 +244,7 @@ def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, v
     show(rotating, board, varied[8:9])
     assert rotating.state is State.VERIFY
     assert "target reached: bias to 3 mg" in rotating.words()
-    full = "orientation 5 of 10 (the bars are full; the others confirm them from more sides)"
+    full = "orientation 5 of 10 (the bars are full; more sides confirm them)"
     assert full in [progress.text for progress in rotating.of(Progress)]
 
 
@@ -267,7 +267,7 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
     [
         (
             [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1)] * 2,
-            "; the others confirm them from more sides",
+            "; more sides confirm them",
         ),
         (
             [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))],

@@ -68,6 +68,7 @@ def test_each_turn_is_shown_in_large_letters(views, words):
     drawn = text_of(replace(view, meter=replace(view.meter, turn=f"135 deg more, {words}")))
     assert re.search("[█▀▄]{3}", drawn[1])
     assert "Turn the board: on its corner" in "\n".join(drawn[6:8])
+    assert drawn[8].strip() == "Orientation 5 of 10."
 
 
 @pytest.mark.parametrize("size", [(40, 15), (80, 24), (160, 50)], ids=str)
