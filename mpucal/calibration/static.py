@@ -24,8 +24,7 @@ from .theta import UPPER, from_elements
 SCALE_FACTOR_SD, CROSS_AXIS_SD, BIAS_SD_MPS2 = 0.02, 0.012, 0.5
 PRIOR_SD = np.append(np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD)[UPPER], np.full(3, BIAS_SD_MPS2))
 # (12, 9) maps the upper triangle of D and b_a to D row-major and b_a.
-ALL_OF_NINE = np.zeros((12, 9))
-ALL_OF_NINE[[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11], [0, 1, 2, 1, 3, 4, 2, 4, 5, 6, 7, 8]] = 1.0
+ALL_OF_NINE = np.eye(9)[np.append(from_elements(Form.SYMMETRIC, np.arange(6.0)), [6, 7, 8]).astype(int)]
 MOST_ITERATIONS, ROUNDS, SETTLED = 30, 8, 1e-9
 # Errors [m/s^2] that rests may have beside noise and tremor: the least that explains the residuals is taken.
 SPREADS_MPS2 = np.append(0.0, np.geomspace(1e-4, 1.0, 80))
@@ -34,9 +33,9 @@ HONEST = 2.5
 
 
 def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """Estimate D (symmetric) and b_a from the rests of a recording; the gyroscope says only where these are.
+    """Estimate D (symmetric) and b_a from the rests of a recording; the gyroscope only helps to detect them.
 
-    K is the identity, b_omega the flat segment's mean. Elements of which the rests say little keep the data sheet's
+    K is the identity, b_omega the flat segment's mean. Elements that the rests hardly determine keep the data sheet's
     tolerance (`Fit.at_prior`).
     """
     y, variance = _rests(recording, flat)
