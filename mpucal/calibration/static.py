@@ -28,7 +28,7 @@ ALL_OF_NINE = np.eye(9)[np.append(from_elements(Form.SYMMETRIC, np.arange(6.0)),
 MOST_ITERATIONS, ROUNDS, SETTLED = 30, 8, 1e-9
 # Errors [m/s^2] that rests may have beside noise and tremor: the least that explains the residuals is taken.
 SPREADS_MPS2 = np.append(0.0, np.geomspace(1e-4, 1.0, 80))
-# Largest factor of the standard deviations, where few residuals are left to estimate the spread.
+# Largest factor of the standard deviations, where the residuals hardly show the error of the model.
 HONEST = 2.5
 
 

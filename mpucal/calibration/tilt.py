@@ -20,7 +20,7 @@ from .levenberg_marquardt import ROUGHLY, Minimum, minimise
 from .parameters import B_A_NAMES, D_NAMES, NAMES
 from .preprocessing import CORRELATION_S, Preprocessed, preprocess
 from .problem import Problem
-from .static import BIAS_SD_MPS2, SCALE_FACTOR_SD
+from .static import BIAS_SD_MPS2, HONEST, SCALE_FACTOR_SD
 from .theta import Theta
 
 # A breakout is mounted askew by some degrees, which adds to the data sheet's +-2 % across axes.
@@ -29,9 +29,6 @@ D_SD = np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD).ravel()
 # The largest tilt that is asked for, and a little more.
 CONE_RAD = np.deg2rad(35.0)
 ROUNDS = 2
-# Factor of the standard deviations: small angles separate a scale factor from a bias by second-order effects, for which
-# no noise model is exact.
-HONEST = 2.5
 
 
 def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
@@ -58,6 +55,7 @@ def _white(prepared: Preprocessed, sigma: float) -> Problem:
 
 
 def _as_fit(minimum: Minimum) -> Fit:
+    # Small angles separate a scale factor from a bias by second-order effects, for which no noise model is exact.
     covariance = HONEST**2 * minimum.covariance()
     sd = np.sqrt(np.maximum(np.diag(covariance)[:12], 0.0))
     left = sd > KNOWN * np.append(D_SD, np.full(3, BIAS_SD_MPS2))
