@@ -8,11 +8,11 @@ import numpy as np
 
 from ..chip.families import Family, family_of
 from ..data import Vector
-from ..result.calibration import Calibration
+from ..result.calibration import REFUSED, Calibration
 from .elements import paragraph, table
 from .units import AXES, ParameterRow, accelerometer
 
-USUAL, UNUSUAL, OUTSIDE = "usual", "unusual", "outside the data sheet"
+USUAL, UNUSUAL, OUTSIDE = "usual", "unusual", "outside"
 # share of the tolerance: two of the three standard deviations that it covers
 UNUSUAL_FROM = 2.0 / 3.0
 CAPTION = "value ± standard uncertainty (1 sigma)"
@@ -30,7 +30,9 @@ def accelerometer_table(c: Calibration, id_: str) -> str:
         # a narrow column breaks before ±, not after it
         cells = [f"{row.name}, {row.unit}", *(cell.replace("± ", "±\u00a0") for cell in row.cells)]
         if sheet is not None:
-            cells.append(f"{_format_tolerance(tolerance(row, sheet))}: {describe_comparison(row, sheet)}")
+            compared = describe_comparison(row, sheet)
+            corrected = "; corrected" if OUTSIDE in compared and c.verdict != REFUSED else ""
+            cells.append(f"{_format_tolerance(tolerance(row, sheet))}: {compared}{corrected}")
         rows.append(cells)
     return table(id_, CAPTION, ["", *AXES, *(() if sheet is None else ("data sheet",))], rows, words=len(AXES))
 
@@ -70,12 +72,17 @@ def unusual_parameters(c: Calibration) -> str:
     sheet = family_of(c.sensor.chip)
     if sheet is None:
         return ""
-    named: dict[str, list[str]] = {OUTSIDE: [], UNUSUAL: []}
+    named: dict[str, list[str]] = {}
     for row in accelerometer(c):
         for axis, words in _by_axis(row, sheet).items():
-            named.get(words, []).append(row.name if len(row.axes) == 1 else f"{row.name} {axis}")
-    lists = [f"{words[:1].upper()}{words[1:]}: {', '.join(names)}." for words, names in named.items() if names]
-    return paragraph(" ".join(lists) or "All parameters are usual by the data sheet.", "compared")
+            named.setdefault(words, []).append(row.name if len(row.axes) == 1 else f"{row.name} {axis}")
+    sentences = []
+    if OUTSIDE in named:
+        sentences.append(f"Outside the data sheet: {', '.join(named[OUTSIDE])}.")
+        sentences += [] if c.verdict == REFUSED else ["This calibration corrects them."]
+    if UNUSUAL in named:
+        sentences.append(f"Unusual: {', '.join(named[UNUSUAL])}.")
+    return paragraph(" ".join(sentences) or "All parameters are usual by the data sheet.", "compared")
 
 
 def _by_axis(row: ParameterRow, sheet: Family) -> dict[str, str]:

@@ -66,7 +66,9 @@ def pair(*figures: str) -> str:
 
 
 def first(decision: str, values: str) -> str:
-    """Return the top of the page: the decision, to the right of the values if there is room."""
+    """Return the top of the page: the decision, to the right of the values if there is room; without it the values."""
+    if not decision:
+        return values
     return f'<div class="first">\n{decision}{values}</div>\n'
 
 

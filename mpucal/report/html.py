@@ -52,7 +52,7 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
     no_pictures = recording is not None and track is None
     body = (
         _verdict(calibration, recording),
-        first(sections.what_now(calibration), sections.accelerometer_section(calibration)),
+        first(sections.other_uses(calibration), sections.accelerometer_section(calibration)),
         sections.verification_section(calibration),
         section(
             "At rest, before and after",
@@ -100,7 +100,8 @@ def _verdict(calibration: Calibration, recording: Recording | None) -> str:
     )
     listed = f'<ul id="reasons">\n{reasons}</ul>\n' if reasons else ""
     recovered = paragraph(recording.recovered, note=True) if recording and recording.recovered else ""
-    return f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n{listed}{recovered}'
+    said = f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n'
+    return f"{said}{listed}{sections.next_step(calibration)}{recovered}"
 
 
 def _track(calibration: Calibration, recording: Recording | None) -> Track | None:

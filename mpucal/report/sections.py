@@ -26,21 +26,25 @@ TO_SINKS = (
 TO_AUTOPILOT = (("the autopilot's parameters", "mpucal write calibration.json autopilot --mavlink URL"),)
 RESERVED = "Consider the reservations above; to remove them, follow their remedies and repeat the session."
 IN_PYTHON = ("Python", 'a = mpucal.Calibration.load("calibration.json").apply(y)')
-IN_FIRMWARE = ("firmware, in addition to calibration.bin", "mpucal export calibration.json --to c-header")
+IN_FIRMWARE = ("firmware", "mpucal export calibration.json --to c-header")
 
 
-def what_now(c: Calibration) -> str:
-    """Return the sections on the next steps, for each destination, and on how long the calibration stays valid."""
+def next_step(c: Calibration) -> str:
+    """Return what most people do next, with its commands."""
     if c.verdict == REFUSED:
-        return section("What to do now", _list(["Follow the remedies of the reasons above, and repeat the session."]))
-    first = [RESERVED] if c.verdict == USABLE else []
-    places = TO_AUTOPILOT if c.extra.get("autopilot") else (IN_PYTHON, IN_FIRMWARE, *TO_SINKS)
-    uses = [f"For {escape(where)}: <code>{escape(how)}</code>" for where, how in places]
-    now, later = (
-        section("What to do now", _list([*first, *uses])),
-        section("How long it stays valid", _list(_validity(c))),
-    )
-    return pair(now, later)
+        return '<p id="next">Next: follow the remedies, and repeat the session: <code>mpucal session</code>.</p>\n'
+    places = TO_AUTOPILOT if c.extra.get("autopilot") else (IN_PYTHON, IN_FIRMWARE)
+    steps = "; ".join(f"for {escape(where)}: <code>{escape(how)}</code>" for where, how in places)
+    return f'<p id="next">{f"{RESERVED} " if c.verdict == USABLE else ""}Next, {steps}.</p>\n'
+
+
+def other_uses(c: Calibration) -> str:
+    """Return the sections on further destinations, and on how long the calibration stays valid; empty if refused."""
+    if c.verdict == REFUSED:
+        return ""
+    uses = [f"For {escape(where)}: <code>{escape(how)}</code>" for where, how in TO_SINKS]
+    other = "" if c.extra.get("autopilot") else section("Other uses", _list(uses))
+    return pair(other, section("How long it stays valid", _list(_validity(c))))
 
 
 def _validity(c: Calibration) -> list[str]:

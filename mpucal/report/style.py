@@ -13,7 +13,7 @@ CSS = """
 html { -webkit-text-size-adjust: 100%; }
 body { margin: 0 auto; padding: 1.5rem 1rem 4rem; max-width: 58rem; background: var(--paper);
   color: var(--ink); font: 16px/1.5 system-ui, sans-serif; overflow-wrap: break-word; }
-h1 { font-size: 1.4rem; line-height: 1.25; margin: 0 0 1rem; }
+h1 { font-size: 1.4rem; line-height: 1.25; margin: 0 0 .5rem; }
 h2 { font-size: 1.1rem; margin: 2.4rem 0 .6rem; }
 h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
 p, ul { margin: .5rem 0; }
@@ -40,9 +40,9 @@ svg { display: block; width: 100%; height: auto; }
   #accelerometer th, #accelerometer td { border: 0; }
   #accelerometer td.words { grid-column: 1 / -1; padding-top: 0; }
   #accelerometer td.words:not(:empty)::before { content: "data sheet: "; color: var(--faint); } }
-@media screen and (min-width: 72rem) { body { max-width: 80rem; } p:not(.verdict) { max-width: 58rem; }
+@media screen and (min-width: 72rem) { body { max-width: 80rem; } p:not(.verdict, #next) { max-width: 58rem; }
   .first { display: grid; grid-template-columns: minmax(0, 2.2fr) minmax(0, 1fr); gap: 0 2rem; font-size: .93rem; }
-  .first > :last-child { order: -1; } .first .pair { display: block; } .first h2 { margin-top: 1.2rem; }
+  .first > :last-child { order: -1; } .first .pair { display: block; } .first h2 { margin-top: 1rem; }
   .first ul { padding-left: 1.2rem; } }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(21rem, 100%), 1fr)); gap: 0 1.5rem; }
 details { margin: .8rem 0; } summary { cursor: pointer; font-weight: bold; }

@@ -91,8 +91,8 @@ def estimated_error(c: Calibration) -> str:
         return ""
     where = "the tilts that it is valid for" if c.fit.get("model") == "tilt" else "all orientations"
     return (
-        f"Estimated error at rest: {_before(c)}{error_model.MG_PER_MPS2 * rms:.2g} mg rms (1 sigma) over {where} after"
-        f" calibration, {direction:.2g} deg in direction."
+        f"Estimated error at rest: {_before(c)}{error_model.MG_PER_MPS2 * rms:.2g} mg after calibration (rms over"
+        f" {where}, 1 sigma), {direction:.2g} deg in direction."
     )
 
 

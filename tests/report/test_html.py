@@ -213,6 +213,20 @@ def test_says_whose_calibration_it_is_of_when(calibration):
     assert "MPU-6050, 17 May 2024, 09:30 UTC" in page
 
 
+@pytest.mark.parametrize(
+    ("verdict", "extra", "command"),
+    [
+        ("good", {}, "mpucal export calibration.json --to c-header"),
+        ("good", {"autopilot": {"firmware": "px4"}}, "mpucal write calibration.json autopilot --mavlink URL"),
+        ("refused", {}, "mpucal session"),
+    ],
+)
+def test_the_command_for_what_comes_next_follows_the_verdict(calibration, verdict, extra, command):
+    page = render(replace(calibration, quality={"verdict": verdict}, extra=extra))
+    top = page[page.index('id="verdict"') : page.index("<h2>")]
+    assert f"<code>{command}</code>" in top
+
+
 @pytest.mark.parametrize("verdict", ["good", "usable", "refused"])
 def test_says_what_to_do_now(calibration, verdict):
     page = render(replace(calibration, quality={"verdict": verdict}))

@@ -90,11 +90,22 @@ def test_the_rests_are_nearer_to_gravity(result):
 
 @pytest.mark.parametrize(
     ("bias_mg", "said"),
-    [((10, -10, 50), "±50, ±50, ±80: usual"), ((49, 51, -70), "y outside the data sheet"), ((40, 0, 0), "x unusual")],
+    [((10, -10, 50), "±50, ±50, ±80: usual"), ((49, 51, -70), "y outside, z unusual; corrected"), ((40, 0, 0), "x unusual")],
 )
 def test_a_bias_beside_the_data_sheet(result, bias_mg, said):
     page = render(replace(result.calibration, b_a=np.array(bias_mg) * MG, b_a_std=np.full(3, 1e-4)))
     assert said in table(page, "accelerometer")["bias, mg"][3]
+
+
+@pytest.mark.parametrize(("verdict", "corrects"), [("good", True), ("refused", False)])
+def test_what_is_outside_the_data_sheet_is_corrected_unless_refused(result, verdict, corrects):
+    calibration = replace(result.calibration, b_a=np.array((90, 0, 0)) * MG, quality={"verdict": verdict})
+    page = render(calibration)
+    cell = table(page, "accelerometer")["bias, mg"][3]
+    compared = re.search(r'id="compared">(.*?)</p>', page)[1]
+    assert "x outside" in cell
+    assert compared.startswith("Outside the data sheet: bias x")
+    assert ("corrected" in cell, "This calibration corrects them." in compared) == (corrects, corrects)
 
 
 def test_a_chip_whose_data_sheet_is_not_at_hand_is_compared_with_none(result):
@@ -107,7 +118,7 @@ def test_the_sentence_says_how_sure(result):
     error = result.document["quality"]["error_std"]
     sentence = re.search(r'id="verdict">(.*?)</p>', result.html)[1]
     assert sentence.lower().startswith(result.document["quality"]["verdict"])
-    found = re.search(r": (\S+) mg before, (\S+) mg rms \(1 sigma\) .*?, (\S+) deg in direction", sentence).groups()
+    found = re.search(r": (\S+) mg before, (\S+) mg after .*?, (\S+) deg in direction", sentence).groups()
     before, mg, direction = map(float, found)
     np.testing.assert_allclose([mg * MG, direction], [error["rms"], error["direction_deg"]], rtol=0.06)
     D, b_a = result.calibration.D, result.calibration.b_a
@@ -134,7 +145,7 @@ def test_a_session_is_fitted_again_from_all_its_captures(result, name):
 def test_what_was_only_tilted_claims_its_tilts_alone(result):
     document = {**result.document, "fit": {**result.document["fit"], "model": "tilt"}}
     sentence = re.search(r'id="verdict">(.*?)</p>', render(Calibration.from_document(document)))[1]
-    assert "rms (1 sigma) over the tilts that it is valid for" in sentence
+    assert "(rms over the tilts that it is valid for, 1 sigma)" in sentence
 
 
 def test_the_verification(result):
