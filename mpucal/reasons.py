@@ -180,12 +180,12 @@ KINDS: Mapping[str, Kind] = {
             ),
             "every_turn": Sentence(
                 "every turn went beyond the gyroscope's range, so nothing says where gravity went",
-                f"{_SLOWER}, and run the session again",
+                f"{_SLOWER}, and measure again",
                 True,
             ),
             "disagreement": Sentence(
                 "the new orientations disagree, after turns beyond the gyroscope's range",
-                f"{_SLOWER}, and run the session again",
+                f"{_SLOWER}, and measure again",
                 True,
             ),
         },
@@ -215,6 +215,11 @@ KINDS: Mapping[str, Kind] = {
             "link": Sentence(
                 "samples are missing or stuck in {places} ({seconds:.2f} s in all)",
                 "unless the measurement was interrupted there, use a nearer or faster link or a lower rate",
+            ),
+            "file": Sentence(
+                "samples are missing or stuck in {places} ({seconds:.2f} s in all)",
+                "unless the recording was interrupted there, let what records it keep up: a lower rate, or no other"
+                " programs beside it",
             ),
         },
         "mpucal session --bus sim:fault=overflow@30 --seed 1",
@@ -390,7 +395,7 @@ KINDS: Mapping[str, Kind] = {
             ),
             "since_flat": Sentence(
                 "the chip's temperature {how} by {change:.0f} C since the board lay flat, and its biases with it",
-                "let the board warm up for ten minutes, away from the sun and from draughts, and run the session again",
+                "let the board warm up for ten minutes, away from the sun and from draughts, and measure again",
                 True,
             ),
             "of_vehicle": Sentence(
@@ -544,7 +549,7 @@ KINDS: Mapping[str, Kind] = {
             ),
             "knock": Sentence(
                 "something knocked the board (the accelerometer was at the end of its range), and {contradiction}",
-                "let nothing knock it, fasten the sensor, and run the session again",
+                "let nothing knock it, fasten the sensor, and measure again",
                 True,
             ),
         },

@@ -20,7 +20,7 @@ from ..session.results import check_owner, result_files, save
 from .arguments import PATH, json_option, noise_option, output_option
 from .options import fit_options
 from .recording_options import hint_options, make_hints, say_interpretation
-from .summary import files_written, summary
+from .summary import command_again, files_written, next_after_refusal, summary
 
 EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibrate walk.npz --json`"
 
@@ -68,7 +68,9 @@ def command(
     else:
         click.echo(summary(calibration))
         if paths:
-            click.echo("\n" + files_written(paths))
+            click.echo("\n" + files_written(paths, command_again(folder)))
+        elif calibration.verdict == REFUSED:
+            click.echo("\n" + next_after_refusal(command_again(folder)))
     if calibration.verdict != REFUSED:
         return 0
     if folder is not None and (folder / BLOB.name).exists():

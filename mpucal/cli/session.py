@@ -40,7 +40,7 @@ from .options import (
 )
 from .page import BOARD_KIND, choose_board, page_options, with_page
 from .running import open_runner
-from .summary import files_written, page_result, summary
+from .summary import command_again, files_written, page_result, summary
 
 # Words of remedies that are replaced where the session can be resumed.
 AGAIN = "start again"
@@ -108,7 +108,7 @@ def command(
         if not as_json:
             if not json_events:
                 click.echo(err=True)
-            click.echo(f"{summary(calibration)}\n\n{files_written(files)}")
+            click.echo(f"{summary(calibration)}\n\n{files_written(files, command_again(into.path))}")
         record = session_recorder(into.path, calibration, recording, source.truth)
         device = {**options, "gravity": source.plan.gravity, "model": source.plan.model}
         latest = calibration

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
+import shlex
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
+import click
+
 from ..data import STANDARD_GRAVITY_MPS2
+from ..disk.output_folder import free_name
 from ..page.result import Result
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
+from . import TYPED
+
+OUTPUT, NOT_AGAIN = "-o", frozenset({"--replay", "--resume"})
 
 # For a terminal of 80 columns.
 WIDTH, LABEL, COLUMN = 79, 23, 18
@@ -48,8 +55,26 @@ def page_result(calibration: Calibration) -> Result:
     )
 
 
-def files_written(paths: Sequence[Path]) -> str:
-    """Return the list of files, and the next steps."""
+def command_again(folder: Path | None) -> str:
+    """Return the command line that was typed, for another measurement, with a free name for the results.
+
+    A replay and a resumed session cannot be measured again: a new session can.
+    """
+    words = list(click.get_current_context().find_root().meta.get(TYPED, ()))
+    if NOT_AGAIN.intersection(words) or not words:
+        return "mpucal session"
+    if OUTPUT in words and folder is not None:
+        words[words.index(OUTPUT) + 1] = str(free_name(folder))
+    return f"mpucal {shlex.join(words)}"
+
+
+def next_after_refusal(again: str) -> str:
+    """Return what to do after a refusal, with the whole command."""
+    return f"Next: follow the remedy above, measure again, and run\n  {again}"
+
+
+def files_written(paths: Sequence[Path], again: str) -> str:
+    """Return the list of files, and the next steps; `again` is the command that measures and calibrates again."""
     folder = paths[0].parent
     lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
     if any(path.name == BLOB.name for path in paths):
@@ -60,7 +85,7 @@ def files_written(paths: Sequence[Path]) -> str:
             f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)",
         ]
     else:
-        lines += [f"Next: look at {folder / REPORT.name}, fix the problem above, and calibrate again."]
+        lines += [f"Look at {folder / REPORT.name}.", "", next_after_refusal(again)]
     return "\n".join(lines)
 
 

@@ -85,7 +85,11 @@ def test_a_refusal_has_its_reason(mpucal, tmp_path, change, code):
     assert result.code == 5
     assert code in [reason["code"] for reason in json.loads(result.out)["quality"]["reasons"]]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["calibration.json", "report.html"]
-    assert mpucal("calibrate", "walk.npz").out.startswith("The calibration is refused:")
+    shown = mpucal("calibrate", "walk.npz")
+    assert shown.out.startswith("The calibration is refused:")
+    assert shown.out.endswith("measure again, and run\n  mpucal calibrate walk.npz\n")
+    elsewhere = mpucal("calibrate", "walk.npz", "--model", "hand", "-o", "out").out.splitlines()[-1]
+    assert elsewhere == "  mpucal calibrate walk.npz --model hand -o out-2"
 
 
 @pytest.mark.parametrize(

@@ -73,11 +73,11 @@ def test_the_formula_calibrates():
 
 
 def test_the_next_steps_follow_from_the_files(tmp_path):
-    good = files_written([tmp_path / "calibration.json", tmp_path / "calibration.bin", tmp_path / "report.html"])
+    good = files_written([tmp_path / "calibration.json", tmp_path / "calibration.bin", tmp_path / "report.html"], "")
     assert "firmware" in good
-    refused = files_written([tmp_path / "calibration.json", tmp_path / "report.html"])
+    refused = files_written([tmp_path / "calibration.json", tmp_path / "report.html"], "mpucal session --bus 1")
     assert "firmware" not in refused
-    assert "calibrate again" in refused
+    assert refused.endswith("measure again, and run\n  mpucal session --bus 1")
 
 
 @pytest.mark.parametrize("name", ["calibration.json", "calibration.bin"])

@@ -59,7 +59,7 @@ def data_lost(e: Evidence) -> Reason | None:
     interrupted = float(missing[missing > INTERRUPTED_S].sum())
     return reason(
         "data_lost",
-        "bus" if e.recording.autopilot is None else "link",
+        "link" if e.recording.autopilot is not None else "bus" if e.recording.sensor.chip is not None else "file",
         lost - interrupted > 0.5 * float(t[-1] - t[0] - interrupted),
         places=f"{places} place{'s' if places > 1 else ''}",
         seconds=lost,
