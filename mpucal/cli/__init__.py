@@ -27,6 +27,7 @@ COMMANDS = {
     "doctor": "Examine a chip and its bus.",
     "show": "Show a calibration, a config blob, a recording or a device.",
 }
+HELP = "help"
 # Key of the words of the command line in the context.
 TYPED = "mpucal.typed"
 
@@ -50,6 +51,11 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is called; fail with a suggestion if its name is misspelt."""
         ctx.meta[TYPED] = args
+        if args[0] == HELP:
+            args = [*args[1:2], "--help"]
+            if len(args) == 1:
+                click.echo(ctx.get_help())
+                ctx.exit()
         if nearly := did_you_mean(args[0], COMMANDS):
             ctx.fail(f"there is no command {args[0]}{nearly}")
         return super().resolve_command(ctx, args)

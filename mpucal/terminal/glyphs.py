@@ -9,7 +9,7 @@ from typing import TextIO
 
 # The fonts of the Linux console have no braille.
 _NO_BRAILLE = ("linux",)
-_IN_ASCII = str.maketrans({"²": "2", "±": "+-", "°": " deg ", "−": "-", "·": "-", "→": "->", "…": "..."})
+_IN_ASCII = str.maketrans({"²": "2", "±": "+-", "°": "deg ", "−": "-", "·": "-", "→": "->", "…": "..."})
 
 
 @dataclass(frozen=True)

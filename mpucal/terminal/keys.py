@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import select
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from types import FrameType
@@ -32,12 +32,16 @@ class Keys:
     Parameters
     ----------
     keyboard : file to read from; None: there is no keyboard.
-    single : read single keys without echo; else lines that end with Enter.
+    single : read single keys without echo; else lines that end with Enter. Ctrl-Z is then refused.
+
+    Attributes
+    ----------
+    suspension_refused : set at Ctrl-Z.
     """
 
     def __init__(self, keyboard: TextIO | None = None, single: bool = False) -> None:
         self._keyboard, self._single = keyboard, single
-        self._interrupted = False
+        self._interrupted = self.suspension_refused = False
 
     @property
     def has_keyboard(self) -> bool:
@@ -71,7 +75,7 @@ class Keys:
                 stack.callback(signal.signal, number, signal.signal(number, self._interrupt))
             # The terminal may have been closed before this, as during the wait for a page.
             if self._single and self._keyboard is not None and self._keyboard.isatty():
-                stack.enter_context(_single_keys(self._keyboard))
+                stack.enter_context(_single_keys(self._keyboard, self._refuse_suspension))
             yield
 
     def abort(self) -> None:
@@ -93,6 +97,9 @@ class Keys:
             raise KeyboardInterrupt
         self._interrupted = True
         _set_alarm(PATIENCE_S)
+
+    def _refuse_suspension(self, _number: int, _frame: FrameType | None) -> None:
+        self.suspension_refused = True
 
     def _clear_interrupt(self) -> None:
         _set_alarm(0.0)
@@ -124,7 +131,7 @@ def _words(keys: str) -> list[str]:
 
 
 @contextmanager
-def _single_keys(keyboard: TextIO) -> Iterator[None]:
+def _single_keys(keyboard: TextIO, on_suspend: Callable[[int, FrameType | None], None]) -> Iterator[None]:
     """Read single keys without echo within the context; restore the terminal afterwards."""
     if _windows() is not None:
         yield
@@ -135,7 +142,7 @@ def _single_keys(keyboard: TextIO) -> Iterator[None]:
     handle = keyboard.fileno()
     before = termios.tcgetattr(handle)
     # Ctrl-Z would lose samples, and leave the screen behind.
-    stop = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+    stop = signal.signal(signal.SIGTSTP, on_suspend)
     tty.setcbreak(handle)
     try:
         yield

@@ -27,7 +27,7 @@ def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     headline = _headline(view, columns, rows, glyphs)
     # A headline of two lines leaves one row less.
     prompt = _prompt(view, columns, _PROMPT_ROWS - (len(headline) == letters.TWO_ROWS))
-    above = [_status(view, columns), *air, *headline, *prompt]
+    above = [_status(view, columns, glyphs), *air, *headline, *prompt]
     below = [
         meter(view, columns, glyphs),
         *knowledge_rows(view, columns, glyphs),
@@ -49,7 +49,7 @@ def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     return [_cut(line, columns, glyphs) for line in drawn]
 
 
-def _status(view: View, columns: int) -> Text:
+def _status(view: View, columns: int, glyphs: Glyphs) -> Text:
     minutes, seconds = divmod(int(view.elapsed_s), 60)
     facts = [f"{minutes}:{seconds:02d}"]
     if view.meter is not None:
@@ -58,8 +58,10 @@ def _status(view: View, columns: int) -> Text:
             facts.insert(1, f"{view.meter.temperature_c:.1f} °C")
     # A narrow screen keeps the clock alone.
     right = "   ".join(facts) if columns >= LEAST_COLUMNS else facts[-1]
+    # Replacements may be longer, and the clock comes last.
+    right, title = (text.translate(glyphs.replacements) for text in (right, view.title))
     space = max(columns - len(right) - 3, 1)
-    return Text(f" {view.title[:space]:<{space}} {right} ", style="reverse")
+    return Text(f" {title[:space]:<{space}} {right} ", style="reverse")
 
 
 def _headline(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:

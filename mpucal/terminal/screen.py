@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 from typing import TextIO
 
 from ..session.boards import BOARD
-from ..session.events import Decision, Key, Output, Prompt, Verification
+from ..session.events import Caution, Decision, Key, Output, Prompt, Verification
 from .glyphs import Glyphs
 from .keys import Keys
 from .layout import lines
@@ -24,6 +24,7 @@ LEAST_INTERVAL_S = 0.16
 SWITCH_INTERVAL_S = 0.0005
 # Limit of the wait for a terminal that takes no output any more.
 LAST_WORD_S = 1.0
+NO_SUSPENSION = "Ctrl-Z cannot suspend a session, which would lose samples", "stop it with q, or go on"
 
 
 class Screen:
@@ -70,6 +71,9 @@ class Screen:
 
     def pressed(self) -> Sequence[Key]:
         """Return the keys that were pressed since the last call."""
+        if self._keys.suspension_refused:
+            self._keys.suspension_refused = False
+            self.hear(Caution(self._view.now_s or 0.0, "suspended", *NO_SUSPENSION))
         return self._keys.pressed()
 
     def hung_up(self, stop: bool) -> None:

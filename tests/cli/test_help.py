@@ -35,6 +35,27 @@ def test_no_command_shows_the_help(mpucal):
     assert "Commands:" in result.out + result.err
 
 
+@pytest.mark.parametrize("words", [[], ["session"]], ids=["all", "session"])
+def test_help_is_a_command_too(mpucal, words):
+    result = mpucal("help", *words)
+    assert result.code == 0
+    assert result.out == mpucal(*words, "--help").out
+
+
+def test_a_misspelt_command_has_no_help(mpucal):
+    result = mpucal("help", "sesion")
+    assert result.code == 2
+    assert "did you mean session?" in result.err
+
+
+def test_the_shell_completes_commands_and_options(mpucal, monkeypatch):
+    monkeypatch.setenv("_MPUCAL_COMPLETE", "bash_complete")
+    for typed, completed in (("mpucal se", "session"), ("mpucal session --ta", "--target")):
+        monkeypatch.setenv("COMP_WORDS", typed)
+        monkeypatch.setenv("COMP_CWORD", str(len(typed.split()) - 1))
+        assert mpucal().out == f"plain,{completed}\n"
+
+
 @pytest.mark.parametrize("words", [["--nonsense"], ["nonsense"], ["calibrate"], ["session", "--rate", "fast"]])
 def test_wrong_usage_is_2(mpucal, words):
     result = mpucal(*words)

@@ -29,6 +29,11 @@ def test_ascii_is_ascii(any_view):
     assert "".join(text_of(any_view, glyphs=ASCII)).isascii()
 
 
+@pytest.mark.parametrize("columns", [60, 80, 160])
+def test_the_clock_is_whole_in_ascii(views, columns):
+    assert text_of(views["turned"], columns, 24, ASCII)[0].endswith("200.0 Hz   31.2 deg C   0:15 ")
+
+
 @pytest.mark.parametrize("size", [(80, 24), (160, 50)], ids=["80x24", "160x50"])
 def test_all_that_a_person_needs_is_there(views, size):
     drawn = "\n".join(text_of(views["turned"], *size))

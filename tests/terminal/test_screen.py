@@ -144,6 +144,23 @@ def fill(handle):
 
 
 @pytest.mark.usefixtures("uncollected")
+def test_ctrl_z_is_refused_on_the_screen(out):
+    person, program = pty.openpty()
+    before = signal.getsignal(signal.SIGTSTP)
+    with os.fdopen(program, "r+b", buffering=0) as keyboard:
+        screen = Screen(out, Keys(keyboard, single=True), UNICODE)
+        with screen.listening():
+            screen.hear(Prompt(PromptKind.ROTATE, "Turn it."))
+            signal.raise_signal(signal.SIGTSTP)
+            assert screen.pressed() == []
+            drawn(screen, out, "Ctrl-Z cannot suspend a session")
+            out.taken()
+            assert screen.pressed() == []
+    os.close(person)
+    assert signal.getsignal(signal.SIGTSTP) is before
+
+
+@pytest.mark.usefixtures("uncollected")
 def test_ctrl_c_is_a_key(out):
     screen = Screen(out, Keys(), UNICODE)
     with screen.listening():
