@@ -223,7 +223,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:fault=overflow@30 --seed 1",
-        "more than half of the recording is missing, interruptions of more than 10 s not counted",
+        "more than half of the recording is missing, not counting interruptions of more than 10 s",
         turn_again=True,
     ),
     "left_handed": Kind(
@@ -335,8 +335,8 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal.calibrate(replace(r, acc=r.acc / 9.80665))",
-        "it is far off; where all scale factors are off alike by 10 % and more they are estimated, and the calibration"
-        " is usable",
+        "the unit is wrong by far; if all scale factors err alike by 10 % or more, they are estimated, and the"
+        " calibration is usable",
     ),
     "moved_while_still": Kind(
         "The board moved in the segment in which it was said to lie flat.",
@@ -383,7 +383,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal.calibrate(replace(r, gyr=1.1 * r.gyr))",
-        "it did not measure, or contradicts the rests, and these are too few to do without it",
+        "the gyroscope did not measure or contradicts the rests, and the rests alone are not enough",
     ),
     "temperature_moved": Kind(
         "The chip warmed or cooled while it was measured, and its biases moved with it.",
@@ -410,7 +410,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:hand=warming --seed 1",
-        "it moved by more than 8 °C between laying flat and the verification",
+        "the temperature changed by more than 8 °C between laying flat and the verification",
     ),
     "not_raw": Kind(
         "The accelerations were computed by a fusion filter: they are not what an accelerometer reads.",
@@ -602,7 +602,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:hand=repeating --seed 1",
-        "a new orientation disagrees; where too few were shown the calibration is usable",
+        "a new orientation disagrees; if too few were shown, the calibration is usable",
         turn_again=True,
     ),
 }

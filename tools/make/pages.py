@@ -28,13 +28,13 @@ ROOMS = re.compile(r"(?<=<!-- made by python -m tools.make pages -->\n).*?(?=<!-
 STATES = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
 REASONS = """# The reasons against a calibration
 
-The verdict of a calibration is *good* if nothing speaks against it. Otherwise `quality.reasons` in `calibration.json`
-lists what does: `code`, `message` (what is wrong and what to do) and `remedy` (what to do). A reason that refuses the
-calibration makes the verdict *refused*, the others make it *usable*. Codes never change their meaning; new ones may
-come.
+The verdict of a calibration is *good* if there is no reason against it. Otherwise `quality.reasons` in
+`calibration.json` lists the reasons, each with `code`, `message` (what is wrong and what to do) and `remedy` (what to
+do). A reason that refuses the calibration makes the verdict *refused*, the others make it *usable*. Codes never change
+their meaning, but new codes may be added.
 
-This page is made by `python -m tools.make pages` from the table in `mpucal/reasons.py`; … stands for a number or a
-name. Every reason can be seen without a board: by a session on the simulated chip, or by spoiling a good recording:
+`python -m tools.make pages` makes this page from the table in `mpucal/reasons.py`; … stands for a number or a name.
+You can see every reason without a board: in a session on the simulated chip, or by changing a good recording:
 
     from dataclasses import replace
     import mpucal
@@ -43,8 +43,8 @@ name. Every reason can be seen without a board: by a session on the simulated ch
 REFUSES = {"always": "It always refuses the calibration.", "never": "It never refuses the calibration."}
 SOURCES_HEAD = """# Sources
 
-A command that measures takes exactly one source. This page is made by `python -m tools.make pages` from the table in
-`mpucal/sources/table.py`, from which the options, their help and the messages about them are made, too.
+A command that measures takes exactly one source. `python -m tools.make pages` makes this page from the table in
+`mpucal/sources/table.py`. The options, their help and their messages follow from the same table.
 """
 Arrows = dict[str, set[str]]
 
@@ -144,7 +144,7 @@ def reasons() -> str:
 
 
 def _section(code: str, kind: Kind) -> list[str]:
-    refuses = f"It refuses the calibration where {kind.refused_when}." if kind.refused_when else REFUSES[kind.refuses]
+    refuses = f"It refuses the calibration if {kind.refused_when}." if kind.refused_when else REFUSES[kind.refuses]
     # a | would end the cell, and a number or name stands where braces are
     cells = [
         [re.sub(r"\{[^}]*\}", "…", text).replace("|", "\\|") for text in (s.what, s.remedy)]
@@ -161,7 +161,7 @@ def _section(code: str, kind: Kind) -> list[str]:
 
 def sources() -> str:
     """Return the page of the sources."""
-    lines = ["| source | is | its value | options beside it | commands |", "|---|---|---|---|---|"]
+    lines = ["| source | is | its value | its options | commands |", "|---|---|---|---|---|"]
     options = ["| option | what it sets | default | of |", "|---|---|---|---|"]
     rows = unique(option for kind in SOURCES for option in (*kind.options, *kind.settings))
     return "\n".join([SOURCES_HEAD, *lines, *map(_source, SOURCES), "", *options, *map(_option, rows)]) + "\n"
