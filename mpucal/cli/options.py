@@ -228,7 +228,8 @@ def check_source(context: click.Context) -> SourceKind:
 def _list_sources(command: str, words: str) -> None:
     """Print the sources that there are, and the simulated chip, each with the whole command that takes it."""
     found = opening.found_sources(command)
-    click.echo("Found on this computer:" if found else "No sensor was found on this computer. Without one:", err=True)
+    heading = "Found on this computer:" if found else "No sensor was found on this computer. To try it without:"
+    click.echo(heading, err=True)
     lines = [(f"mpucal {words} {option}", what) for option, what in (*found, ("--bus sim", "the simulated chip"))]
     width = max(len(line) for line, _ in lines)
     for line, what in lines:

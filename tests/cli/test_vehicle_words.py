@@ -65,6 +65,8 @@ def test_a_vehicle_takes_rates_that_a_chip_does_not(tmp_path):
 
 @pytest.mark.parametrize(("capture", "drawn"), [("capture.tlog", "vehicle"), ("capture.mcap", "gy-521")])
 def test_the_board_that_is_drawn_follows_from_the_source(capture, drawn):
-    source = SimpleNamespace(capture_name=capture)
+    source = SimpleNamespace(capture_name=capture, plan=SimpleNamespace(board=None))
     assert choose_board(None, source) == drawn
     assert choose_board("plain", source) == "plain"
+    source.plan.board = "plain"
+    assert choose_board(None, source) == "plain"
