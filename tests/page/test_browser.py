@@ -10,6 +10,7 @@ import pytest
 
 from mpucal.page.state import changes, state
 from mpucal.reasons import Reason
+from mpucal.session.events import Prompt, PromptKind
 from mpucal.terminal.view import View
 
 # Records the page's texts at each change.
@@ -46,6 +47,19 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
     assert tab.inner_text("#reasons") == "Too few orientations. Turn it more."
     assert tab.inner_text("#headline") == "The calibration was refused."
     assert tab.get_attribute("body", "data-look") == "no"
+
+
+def test_the_axes_in_brackets_are_shown_and_not_spoken(tab, server):
+    server.latest.update({"title": "a chip", "headline": "Connecting"})
+    tab.goto(server.url)
+    tab.wait_for_selector("text=Connecting")
+    prompt = Prompt(
+        PromptKind.ROTATE, "Turn the board: on its left edge (−X +Z), then hold it still.", (-0.7, 0.0, 0.7)
+    )
+    server.latest.update(changes(state(View().after(prompt)), {}))
+    tab.wait_for_function("document.querySelector('#spoken').textContent !== ''")
+    assert tab.inner_text("#spoken") == "Turn the board: on its left edge, then hold it still."
+    assert tab.inner_text("#prompt") == prompt.text
 
 
 def test_a_lost_connection_is_shown_and_reopened(tab, serve):

@@ -214,7 +214,7 @@ function pictures(changed) {
   put("goal-caption", laying() ? state.flat : "turn it like this");
   const taken = (state.seen ?? []).filter((seen) => seen.paused).length;
   $("ball-figure").hidden = !meter || !state.seen?.length;
-  put("ball-caption", ended ? "orientations taken" : `orientations taken: ${taken}; ring: the next`);
+  put("ball-caption", ended ? "orientations taken" : `orientations taken: ${taken}${target() ? "; ring: the next" : ""}`);
   $("ball").setAttribute("aria-label", `${taken} orientations taken`);
   $("now").setAttribute("aria-label", meter?.turn ? `the board now; missing: ${meter.turn}` : "the board now");
   $("goal").setAttribute("aria-label", prompt?.text ?? "");
