@@ -313,7 +313,7 @@ def test_a_range_that_is_too_small_for_gravity_is_refused(ideal):
 
 @pytest.mark.parametrize(("chip", "remedy"), [("MPU-6050", "use a faster bus"), (None, "let what records it keep up")])
 def test_lost_samples_are_counted_and_mended(ideal, pick, chip, remedy):
-    """Nothing is known of the bus that a foreign file comes from."""
+    """A foreign file says nothing of the bus that it comes from."""
     simulated = ideal(0)
     kept = np.ones(len(simulated.recording), bool)
     kept[700:710] = kept[1100:1130] = False
