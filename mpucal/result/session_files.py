@@ -48,7 +48,8 @@ CAPTURE = SessionFile(
     "every register access and key press with its time, written as it happens; a killed program loses a second at most",
 )
 CAPTURE_OF_VEHICLE = SessionFile(
-    "capture.tlog", "with `--mavlink`, in place of it: every packet with its time, as ground stations record it"
+    "capture.tlog",
+    "with `--mavlink`, instead of `capture.mcap`: every packet with its time, as ground stations record it",
 )
 DOCUMENT = SessionFile(
     "calibration.json",
@@ -57,16 +58,16 @@ DOCUMENT = SessionFile(
 )
 BLOB = SessionFile(
     "calibration.bin",
-    "the same for firmware, as [firmware_protocol.md](firmware_protocol.md) describes it; not of a refused calibration",
+    "the same for firmware, as [firmware_protocol.md](firmware_protocol.md) describes it; not for a refused calibration",
     "mpucal.session.results:blob",
 )
 REPORT = SessionFile(
     "report.html",
-    "the same for a person: what was found beside the data sheet, what to do now; two pages in print",
+    "the same for a person: verdict, next steps, and values beside the data sheet; two pages in print",
     "mpucal.session.results:report",
 )
-TRUTH = SessionFile("truth.json", "of a simulated chip: what it really is", "mpucal.session.results:simulated_truth")
+TRUTH = SessionFile("truth.json", "true parameters of a simulated chip", "mpucal.session.results:simulated_truth")
 
-LOG = SessionFile("session.log", "what a session said after its terminal had gone")
+LOG = SessionFile("session.log", "messages of a session after its terminal went away")
 
 SESSION_FILES = (CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT, BLOB, REPORT, TRUTH, LOG)
