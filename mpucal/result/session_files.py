@@ -58,7 +58,7 @@ DOCUMENT = SessionFile(
 )
 BLOB = SessionFile(
     "calibration.bin",
-    "the same for firmware, as [firmware_protocol.md](firmware_protocol.md) describes it; not for a refused calibration",
+    "the same for firmware, specified in [firmware_protocol.md](firmware_protocol.md); not for a refused calibration",
     "mpucal.session.results:blob",
 )
 REPORT = SessionFile(
