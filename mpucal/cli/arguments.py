@@ -8,10 +8,25 @@ from typing import Any, TypeVar
 
 import click
 
+from ..result.session_files import DOCUMENT
+
 F = TypeVar("F", bound=Callable[..., Any])
 
-PATH = click.Path(path_type=Path)
-calibration_argument = click.argument("calibration", metavar="CALIBRATION", type=PATH)
+
+class CalibrationPath(click.Path):
+    """Path of a calibration; of the folder of a session, that of its calibration.json."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path of the file."""
+        path = Path(str(super().convert(value, param, ctx)))
+        return path / DOCUMENT.name if path.is_dir() else path
+
+
+PATH, CALIBRATION_PATH = click.Path(path_type=Path), CalibrationPath()
+calibration_argument = click.argument("calibration", metavar="CALIBRATION", type=CALIBRATION_PATH)
 noise_option = click.option("--noise", metavar="FILE", type=PATH, help="noise.json of `mpucal noise`.")
 yes_option = click.option("--yes", is_flag=True, help="Ask no questions.")
 

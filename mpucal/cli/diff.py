@@ -11,15 +11,15 @@ import click
 
 from ..report.units import with_std
 from ..result.comparison import CONFIDENCE, Comparison, Difference, compare
-from .arguments import PATH, json_option
+from .arguments import CALIBRATION_PATH, json_option
 from .loading import load_calibration
 
 EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibration.json`"
 
 
 @click.command("diff", epilog=EXAMPLE)
-@click.argument("a", metavar="A", type=PATH)
-@click.argument("b", metavar="B", type=PATH)
+@click.argument("a", metavar="A", type=CALIBRATION_PATH)
+@click.argument("b", metavar="B", type=CALIBRATION_PATH)
 @json_option("Print JSON.")
 def command(a: Path, b: Path, as_json: bool) -> None:
     """Compare calibration B (.json or .bin) with A: bias in mg, scale factor error in %, misalignment in deg.

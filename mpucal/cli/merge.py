@@ -11,7 +11,7 @@ from ..disk.output_folder import OutputFolder
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import check_owner, save
-from .arguments import PATH, json_option, output_option
+from .arguments import CALIBRATION_PATH, json_option, output_option
 from .loading import force_option, load_trusted
 from .summary import slope, summary
 
@@ -19,7 +19,7 @@ EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json ho
 
 
 @click.command("merge", epilog=EXAMPLE)
-@click.argument("calibrations", metavar="A B ...", nargs=-1, type=PATH)
+@click.argument("calibrations", metavar="A B ...", nargs=-1, type=CALIBRATION_PATH)
 @output_option("folder", "DIR", "Folder for the result.")
 @force_option
 @json_option("Print only calibration.json.")

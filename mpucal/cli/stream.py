@@ -30,7 +30,7 @@ from ..sources.opening import open_source
 from ..sources.table import source_title
 from ..terminal.keys import Keys
 from ..terminal.lines import JsonLines
-from .arguments import PATH, json_option, output_option
+from .arguments import CALIBRATION_PATH, json_option, output_option
 from .loading import at_gravity_of, load_calibration
 from .options import ABOVE_ZERO, check_gyroscope, check_source, source_options
 from .page import choose_board, page_options
@@ -41,7 +41,9 @@ EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.j
 
 @click.command("stream", epilog=EXAMPLE)
 @source_options("stream")
-@click.option("--apply", "calibration", metavar="CALIBRATION", type=PATH, required=True, help="Calibration to apply.")
+@click.option(
+    "--apply", "calibration", metavar="CALIBRATION", type=CALIBRATION_PATH, required=True, help="Calibration to apply."
+)
 @output_option("file", "FILE", "Record a capture as well.")
 @click.option("--seconds", type=ABOVE_ZERO, help="Stop after this time [s].")
 @json_option("Print one JSON object a line instead of a table.")

@@ -80,6 +80,31 @@ def test_the_next_steps_follow_from_the_files(tmp_path):
     assert refused.endswith("measure again, and run\n  mpucal session --bus 1")
 
 
+@pytest.mark.parametrize(
+    ("command", "more"),
+    [
+        ("apply", ("{}/capture.mcap", "-o", "x.npz")),
+        ("check", ("{}/capture.mcap",)),
+        ("diff", ("{}",)),
+        ("export", ("--to", "c-header")),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_the_folder_of_a_session_is_its_calibration(mpucal, session, command, more):
+    words = [word.format(session.folder) for word in more]
+    by_file = mpucal(command, session.folder / "calibration.json", *words)
+    by_folder = mpucal(command, session.folder, *words)
+    assert by_folder.code == by_file.code == 0, by_folder.err
+    assert by_folder.out == by_file.out != ""
+
+
+def test_a_folder_without_a_calibration_is_said_to_have_none(mpucal, tmp_path):
+    (tmp_path / "empty").mkdir()
+    result = mpucal("check", "empty", "walk.npz")
+    assert result.code == 3
+    assert "empty/calibration.json" in result.err
+
+
 @pytest.mark.parametrize("name", ["calibration.json", "calibration.bin"])
 def test_shows_a_calibration(mpucal, session, name):
     result = mpucal("show", session.folder / name)
