@@ -57,7 +57,7 @@ def test_the_axes_in_brackets_are_shown_and_not_spoken(tab, server):
         PromptKind.ROTATE, "Turn the board: on its left edge (−X +Z), then hold it still.", (-0.7, 0.0, 0.7)
     )
     server.latest.update(changes(state(View().after(prompt)), {}))
-    tab.wait_for_function("document.querySelector('#spoken').textContent !== ''")
+    tab.wait_for_function("() => document.querySelector('#spoken').textContent !== ''")
     assert tab.inner_text("#spoken") == "Turn the board: on its left edge, then hold it still."
     assert tab.inner_text("#prompt") == prompt.text
 
