@@ -86,6 +86,7 @@ def damaged(data, kind, place, with_):
 @settings(max_examples=40)
 @given(damage=st.lists(DAMAGE, min_size=1, max_size=3))
 @example(damage=[("twice", 0.015625, b"\0"), ("gone", 0.5, b"\0")])  # of .mcap: no message is left
+@example(damage=[("cut", 0.015625, b""), ("set", 0.0625, b"\0")])  # of .csv: one line is left, and no name of times
 def test_a_damaged_file_is_refused_or_read(suffix, damage, files, tmp_path):
     data = files[suffix]
     for one in damage:

@@ -107,6 +107,8 @@ def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     ----------
     t : (n,) s. acc : in any unit. gyr : in rad/s if the factor is 1.
     """
+    if len(t) < LEAST_TURNS:
+        return None
     # stamps of arrival may repeat
     dt = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)
     if not dt > 0.0:
