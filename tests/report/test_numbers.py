@@ -90,7 +90,11 @@ def test_the_rests_are_nearer_to_gravity(result):
 
 @pytest.mark.parametrize(
     ("bias_mg", "said"),
-    [((10, -10, 50), "±50, ±50, ±80: usual"), ((49, 51, -70), "y outside, z unusual; corrected"), ((40, 0, 0), "x unusual")],
+    [
+        ((10, -10, 50), "±50, ±50, ±80: usual"),
+        ((49, 51, -70), "y outside, z unusual; corrected"),
+        ((40, 0, 0), "x unusual"),
+    ],
 )
 def test_a_bias_beside_the_data_sheet(result, bias_mg, said):
     page = render(replace(result.calibration, b_a=np.array(bias_mg) * MG, b_a_std=np.full(3, 1e-4)))
