@@ -63,13 +63,14 @@ def recording_digest(recording: Recording) -> str:
 
 def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     recording, flat, fit = evidence.recording, evidence.flat, evidence.fit
+    gyroscope_known = evidence.gyroscope is None  # one at fault shows neither bias nor noise
     common: dict[str, Any] = {
         "fit": _fit_document(evidence, chosen),
         "quality": judge(evidence),
         "sensor": recording.sensor,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "noise_std": unknown(3) if flat is None else np.sqrt(flat.Sigma_a),
-        "gyro_noise_std": unknown(3) if flat is None else np.sqrt(flat.Sigma_omega),
+        "gyro_noise_std": np.sqrt(flat.Sigma_omega) if flat is not None and gyroscope_known else unknown(3),
     }
     if fit is None:
         return Calibration(D=unknown(3, 3), b_a=unknown(3), **common)
@@ -84,7 +85,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
             # A clock that runs fast makes every rate smaller.
             (recording.sensor.clock_std or 0.0) * np.abs(fit.K),
         ),
-        b_omega=fit.b_omega,
+        b_omega=fit.b_omega if gyroscope_known else unknown(3),
         b_omega_std=fit.std(*B_OMEGA_NAMES),
         **common,
     ).drop_unserialisable()

@@ -107,7 +107,9 @@ def own_uncertainty(calibration: Calibration) -> Vector:
     # Rounded correlations may have negative eigenvalues, which no covariance has.
     values, vectors = np.linalg.eigh(rho)
     root = to_theta(calibration) @ (np.where(known, std, spread)[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
-    return np.asarray(root @ root.T)
+    # Without a gyroscope the rotation of the mount was not estimated.
+    mount = Spread(turn=TOLERANCE.turn if calibration.fit.get("model") == "static" else 0.0)
+    return np.asarray(root @ root.T) + mount.covariance()
 
 
 def to_theta(calibration: Calibration) -> Vector:

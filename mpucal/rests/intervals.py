@@ -66,9 +66,10 @@ class RestFinder:
         covered = np.cumsum(changes)[:-1]
         still = (covered > 0) & ~recording.gap
         # Where readings step from one rest to another, few still windows hold samples of both.
-        few = (covered < FEW * self._n) & still
-        for first, last in true_runs(few).tolist():
-            if few[first - 1] < still[first - 1] and few[last % len(few)] < still[last % len(few)]:
+        few = true_runs((covered < FEW * self._n) & still)
+        inside = (few[:, 0] > 0) & (few[:, 1] < len(still))
+        for first, last in few[inside].tolist():
+            if still[first - 1] and still[last]:
                 still[first:last] = False
         rests = self._trimmed(true_runs(still))
         # Of a run in which gravity turns, keep the samples in which the gyroscope hardly turns.

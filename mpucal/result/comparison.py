@@ -98,6 +98,8 @@ class Comparison:
 def compare(a: Calibration, b: Calibration) -> Comparison:
     """Compare B with A, both in the body frame, with b_a(T) of B at A's temperature if B has it."""
     a, b = in_body_frame(a), in_body_frame(b)
+    if _has_own_axes(a) or _has_own_axes(b):
+        a, b = (replace(c, D=error_model.sensor_axes(c.D)) for c in (a, b))
     bias = b.b_a_at(a.sensor.temperature_c) - a.b_a_at(b.sensor.temperature_c if not b.follows_temperature else None)
     numbers = [
         *_row("bias", "mg", error_model.bias_mg(bias), error_model.bias_mg(np.hypot(a.b_a_std, b.b_a_std))),
@@ -145,6 +147,11 @@ def _misalignments(a: Calibration, b: Calibration) -> list[Difference]:
 
 def _remarks(a: Calibration, b: Calibration) -> list[str]:
     remarks = [_reservations(name, c) for name, c in (("A", a), ("B", b)) if _has_reservations(c)]
+    if _has_own_axes(a) or _has_own_axes(b):
+        remarks.append(
+            "The model static determines no rotation against the gyroscope: both are compared in the accelerometer's"
+            " own axes."
+        )
     if None not in (a.sensor.who_am_i, b.sensor.who_am_i) and a.sensor.who_am_i != b.sensor.who_am_i:
         remarks.append(
             f"They are of two chips: WHO_AM_I of A is 0x{a.sensor.who_am_i:02x}, of B 0x{b.sensor.who_am_i:02x}."
@@ -173,6 +180,11 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
             "They are of streams with different parameters of the autopilot, or only one is of an autopilot."
         )
     return remarks
+
+
+def _has_own_axes(c: Calibration) -> bool:
+    """Return True if D was estimated without the gyroscope, so that no mount is known."""
+    return c.fit.get("model") == "static"
 
 
 def _has_reservations(c: Calibration) -> bool:

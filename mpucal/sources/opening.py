@@ -167,6 +167,9 @@ def _plan(values: Mapping[str, Any], until_end: bool, kind: SourceKind) -> Plan:
         values.get("dlpf", usual.config.dlpf),
     )
     model = values.get("model", usual.model)
+    if model == "static" and kind.delivers is not Delivery.CAPTURE:
+        what = "a session does not take --model static, which no turn with the gyroscope can verify"
+        raise UsageError(what, "remove it, and run `mpucal calibrate DIR --model static` on the session's folder")
     if values.get("tilt_only"):
         if model not in ("auto", "tilt"):
             what = f"--tilt-only does not take --model {model}, which tilts alone do not determine"

@@ -7,9 +7,13 @@ import pytest
 from scipy.linalg import polar
 from scipy.optimize import least_squares
 
-from mpucal import Recording, calibrate
+from mpucal import Recording, calibrate, check
+from mpucal.errors import UsageError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder, statistics
+from mpucal.result.comparison import compare
+from mpucal.sources.opening import open_source
+from tools.lab.scenarios.recordings import hand_scenario
 
 G = 9.82
 FACES = np.vstack([np.eye(3), -np.eye(3)])
@@ -75,3 +79,22 @@ def test_rests_that_differ_little_are_refused(hand):
     recording = hand(68, "turns").recording.part(0, 2000)
     calibration = calibrate(replace(recording, gyr=np.zeros_like(recording.gyr)), "auto", G)
     assert calibration.verdict == "refused"
+
+
+def test_it_is_compared_and_checked_in_the_accelerometers_own_axes(hand):
+    made = hand(69, "pose12")
+    with_gyroscope = calibrate(made.recording, "auto", G)
+    dead = replace(made.recording, gyr=np.zeros_like(made.recording.gyr))
+    alone = calibrate(dead, "auto", G)
+    assert np.abs(made.truth.D - made.truth.D.T).max() > 0.02
+    assert compare(alone, with_gyroscope).same
+    assert "own axes" in compare(alone, with_gyroscope).remarks[-1]
+    # A dead gyroscope shows neither bias nor noise, and a later one is no change of it.
+    assert np.isnan(alone.b_omega).all() and np.isnan(alone.gyro_noise_std).all()
+    later = hand_scenario(70, "check", rate_hz=100.0, sensor=made.truth, truth_hz=400).recording
+    assert check(alone, later, days=0.0).what == "nothing"
+
+
+def test_a_session_does_not_take_it():
+    with pytest.raises(UsageError, match="does not take --model static"):
+        open_source({"bus": "sim", "model": "static"})
