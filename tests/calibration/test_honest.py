@@ -70,7 +70,9 @@ def test_no_good_calibration_is_three_times_worse_than_it_claims(made, units):
         assert calibration.verdict != "good"
     if calibration.verdict == "refused":
         return
-    numbers = (calibration.D, calibration.b_a, calibration.D_std, calibration.b_a_std, calibration.K)
+    numbers = [calibration.D, calibration.b_a, calibration.b_a_std, calibration.K]
+    if calibration.fit["model"] != "static":  # in which the data sheet's tolerance may determine elements of D
+        numbers.append(calibration.D_std)
     assert all(np.isfinite(x).all() for x in numbers)
     claimed = calibration.quality["error_std"]["rms"]
     assert claimed > 0.0
