@@ -18,6 +18,7 @@ from ..errors import OutputError
 from ..session.boards import BOARD
 from ..session.events import Key, Output
 from ..terminal.view import View
+from ..terminal.voice import Voice
 from .address import Address
 from .state import changes, state
 
@@ -70,7 +71,7 @@ class Feed:
             )
         self.url = f"http://{where.name}:{rest}/{token}/"
         self.visited = False
-        self._view = View(board=str(about.get("board", BOARD)))
+        self._view, self._voice = View(board=str(about.get("board", BOARD))), Voice()
         self._fixed: dict[str, Any] = {**about, "keys": keys}
         self._offered: deque[dict[str, str]] = deque()
         self._pressed: deque[Key] = deque()
@@ -83,8 +84,9 @@ class Feed:
             thread.start()
 
     def hear(self, output: Output) -> None:
-        """Change the view."""
+        """Change the view, and what is said about it."""
         self._view = self._view.after(output)
+        self._voice.hear(self._view)
         self._changed.set()
 
     def say(self, text: str) -> None:
@@ -145,7 +147,7 @@ class Feed:
             self._changed.wait()
             self._changed.clear()
             last = self._closed.is_set()
-            new = {**state(self._view), **self._fixed}
+            new = {**state(self._view, self._voice.said), **self._fixed}
             while self._offered:
                 self._send({"results": self._offered.popleft()})
             if changed := changes(new, old):

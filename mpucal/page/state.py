@@ -9,21 +9,21 @@ from typing import Any
 from ..session.boards import flat_caption
 from ..session.events import Knowledge
 from ..terminal.lines import plain
-from ..terminal.view import HEADLINES, USE_HEADLINES, Moment, View
+from ..terminal.view import View
+from ..terminal.voice import Said, in_words
 from ..terminal.words import groups
 
-CONNECTING = "Connecting"
-HOLD = "Hold still"
 # Number of messages that are kept.
 NOTES = 30
 
 
-def state(view: View) -> dict[str, Any]:
-    """Return the view's values by name, not yet as JSON; see `changes`."""
+def state(view: View, said: Said | None = None) -> dict[str, Any]:
+    """Return the view's values and what was `said` last by name, not yet as JSON; see `changes`."""
     return {
         "moment": view.moment,
-        "headline": headline(view),
+        "headline": in_words(view),
         "prompt": view.prompt,
+        "said": said,
         "confirming": view.confirming,
         "flat": flat_caption(view.board),
         "meter": view.meter,
@@ -54,23 +54,6 @@ def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
         }
         for group in groups(knowledge)
     )
-
-
-def headline(view: View) -> str:
-    """Return what to do at this moment, without the numbers, which the page draws."""
-    match view.moment:
-        case Moment.COUNTING if view.countdown is not None and view.countdown.elsewhere:
-            return f"New: {HOLD.lower()}"
-        case Moment.COUNTING | Moment.NEAR:
-            return HOLD
-        case Moment.DECIDED if view.held is not None:
-            return USE_HEADLINES[view.held.use].capitalize()
-        case Moment.TURN if view.meter is not None:
-            words = view.meter.turn.rpartition(", ")[2]
-            return words[:1].upper() + words[1:]
-        case Moment.STEP if view.prompt is not None:
-            return HEADLINES[view.prompt.kind].capitalize()
-    return CONNECTING
 
 
 def changes(new: Mapping[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:

@@ -27,10 +27,12 @@ from ..session.events import (
 # Time for which the headline shows the use of the last orientation.
 USE_SHOWN_S = 1.2
 USE_HEADLINES = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
-# Angle from the wanted orientation below which the headline asks to hold still.
-NEAR_DEG = 15.0
-# A countdown that is not renewed for this time has ended.
-COUNTDOWN_HOLDS_S = 1.0
+# Angle from the wanted orientation below which the headline asks to hold still, unless the board passes by.
+NEAR_DEG, PASSES_DPS = 15.0, 70.0
+# A countdown that is not renewed for this time has ended; for the second one, if the board moves.
+COUNTDOWN_HOLDS_S, BUMP_S = 1.0, 0.4
+# Time for which a useful orientation is held before the headline asks to hold it instead of the wanted one.
+PREFERRED_S = 0.4
 # Time from the end of a countdown until the session has decided about the orientation.
 DECIDED_S = 2.0
 HEADLINES = {
@@ -126,7 +128,7 @@ class View:
         if self.countdown is None or self.now_s is None:
             return None
         counts = self.countdown.remaining_s > 0.0
-        moved = self.meter is not None and self.meter.t_s > self.countdown.t_s and not self.meter.still
+        moved = self.meter is not None and self.meter.t_s > self.countdown.t_s + BUMP_S and not self.meter.still
         age_s = self.now_s - self.countdown.t_s
         over = (counts and moved) or age_s > (COUNTDOWN_HOLDS_S if counts else DECIDED_S)
         return None if over else self.countdown
@@ -163,7 +165,8 @@ class View:
             return Moment.CONNECTING, CONNECTING
         waiting = self.waiting
         # Before the countdown begins, the headline says what to do for it.
-        counting = waiting is not None and waiting.remaining_s < waiting.of_s and not waiting.paused
+        held_s = waiting.of_s - waiting.remaining_s if waiting is not None and not waiting.paused else 0.0
+        counting = held_s > (PREFERRED_S if waiting is not None and waiting.elsewhere else 0.0)
         if waiting is not None and counting and self.prompt.kind is not PromptKind.REST:
             word = "NEW: HOLD" if waiting.elsewhere else "HOLD"
             word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else word
@@ -172,7 +175,7 @@ class View:
             return Moment.DECIDED, USE_HEADLINES[self.held.use]
         if self.wanted is None or self.meter is None or self.meter.missing_deg is None:
             return Moment.STEP, HEADLINES[self.prompt.kind]
-        if self.meter.missing_deg <= NEAR_DEG:
+        if not self.meter.turn or (self.meter.missing_deg <= NEAR_DEG and self.meter.turning_dps < PASSES_DPS):
             return Moment.NEAR, "HOLD STILL"
         return Moment.TURN, _turn_headline(self.meter.turn)
 
@@ -184,7 +187,9 @@ class View:
             # Perhaps no other meter follows.
             meter = replace(meter, missing_deg=None, turn="", wanted=None)
         view = replace(self, prompt=prompt, meter=meter)
-        return replace(view, countdown=None, progress=None, caution=None, held=None, verified=())
+        # The last orientation of the turning is said to be taken, although the next step has begun.
+        held = self.held if prompt.kind in TURNING else None
+        return replace(view, countdown=None, progress=None, caution=None, held=held, verified=())
 
     def _at(self, t_s: float) -> View:
         return replace(self, now_s=t_s, begun_s=t_s if self.begun_s is None else self.begun_s)

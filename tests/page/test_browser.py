@@ -12,6 +12,7 @@ from mpucal.page.state import changes, state
 from mpucal.reasons import Reason
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.terminal.view import View
+from mpucal.terminal.voice import Voice
 
 # Records the page's texts at each change.
 WATCH = """() => {
@@ -56,7 +57,9 @@ def test_the_axes_in_brackets_are_shown_and_not_spoken(tab, server):
     prompt = Prompt(
         PromptKind.ROTATE, "Turn the board: on its left edge (−X +Z), then hold it still.", (-0.7, 0.0, 0.7)
     )
-    server.latest.update(changes(state(View().after(prompt)), {}))
+    view, voice = View().after(prompt), Voice()
+    voice.hear(view)
+    server.latest.update(changes(state(view, voice.said), {}))
     tab.wait_for_function("() => document.querySelector('#spoken').textContent !== ''")
     assert tab.inner_text("#spoken") == "Turn the board: on its left edge, then hold it still."
     assert tab.inner_text("#prompt") == prompt.text

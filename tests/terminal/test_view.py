@@ -24,12 +24,22 @@ def test_the_headline_is_the_instruction(views):
         (Countdown(26.0, 2.0, 2.0, False), "ROLL LEFT 60"),
         (Countdown(26.0, 1.3, 2.0, False), "HOLD 2"),
         (Countdown(26.0, 1.3, 2.0, False, elsewhere=True), "NEW: HOLD 2"),
+        (Countdown(26.0, 1.75, 2.0, False, elsewhere=True), "ROLL LEFT 60"),
         (Countdown(26.0, 1.3, 2.0, True), "ROLL LEFT 60"),
         (Countdown(24.5, 0.0, 2.0, False), "HOLD"),
         (Countdown(23.5, 0.0, 2.0, False), "ROLL LEFT 60"),
         (Countdown(20.0, 1.3, 2.0, False), "ROLL LEFT 60"),
     ],
-    ids=["not begun", "runs", "runs elsewhere", "paused", "over", "over without a word", "forgotten"],
+    ids=[
+        "not begun",
+        "runs",
+        "runs elsewhere",
+        "perhaps elsewhere",
+        "paused",
+        "over",
+        "over without a word",
+        "forgotten",
+    ],
 )
 def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
     view = replace(views["turned"], now_s=26.0, countdown=countdown)
@@ -38,8 +48,9 @@ def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
 
 def test_a_countdown_ends_when_the_board_moves_or_the_orientation_is_decided(views):
     counting = replace(views["turned"], now_s=26.0, countdown=Countdown(26.0, 1.3, 2.0, False))
-    moves = counting.after(replace(counting.meter, t_s=26.2, still=False))
-    assert moves.headline == "ROLL LEFT 60"
+    bumped = counting.after(replace(counting.meter, t_s=26.2, still=False))
+    assert bumped.headline == "HOLD 2"
+    assert bumped.after(replace(counting.meter, t_s=26.5, still=False)).headline == "ROLL LEFT 60"
     assert counting.after(replace(counting.meter, t_s=26.2, still=True)).headline == "HOLD 2"
     assert counting.after(Held(26.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken")).headline == "TAKEN"
 
@@ -114,4 +125,7 @@ def test_the_use_of_an_orientation_is_the_headline_for_a_moment(views, use, head
 
 def test_near_the_wanted_orientation_nothing_is_turned(views):
     view = views["turned"]
-    assert replace(view, meter=replace(view.meter, missing_deg=10.0)).headline == "HOLD STILL"
+    near = replace(view.meter, missing_deg=10.0)
+    assert replace(view, meter=near).headline == "HOLD STILL"
+    assert replace(view, meter=replace(near, turning_dps=100.0)).headline == "ROLL LEFT 60"
+    assert replace(view, meter=replace(near, turning_dps=100.0, turn="")).headline == "HOLD STILL"

@@ -6,8 +6,10 @@ python -m tools.lab guidance_trials --seeds 20 --hand wandering
 Counted over whole sessions on the simulated chip, as the page shows them: pictures that jump by more than 20 deg
 beyond what gravity and the gyroscope turned meanwhile (the board's, and where the wanted one is drawn), a HOLD
 farther from the wanted orientation than 15 deg that is not said to be useful, an orientation asked for in place of
-another without a word on what was held, and counts above their total. Then the time to the verdict of the hand that is
-given the wanted orientation is compared with that of one that turns the board as the page says in words, by so many
+another without a word on what was held, and counts above their total. In the transcript of what is said, played and
+shown large: "hold" and "turn" that contradict each other within a second, a tone for wrong before a hold that is taken,
+words said twice within five seconds, and words while the board is held. Then the time to the verdict of the hand that
+is given the wanted orientation is compared with that of one that turns the board as the page says in words, by so many
 degrees, and looks again.
 """
 
@@ -24,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from mpucal.data import Vector
-from mpucal.page.state import HOLD, state
+from mpucal.page.state import state
 from mpucal.result.calibration import GOOD
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind, Use
 from mpucal.session.plan import Plan
@@ -34,6 +36,7 @@ from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import HANDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
+from mpucal.terminal.voice import HOLD, REPEAT_S, SETTLED_S, Said, Tone, Voice
 
 from .runner import Asked, Program, option
 from .sessions import session
@@ -79,6 +82,51 @@ class ByWords(Guided):
 
 
 HANDS[BY_WORDS] = ByWords
+STAY, GO = "stay", "go"
+SENSES = {Moment.COUNTING: STAY, Moment.NEAR: STAY, Moment.TURN: GO}
+
+
+@dataclass
+class Transcript:
+    """What a person hears and sees, with its times, and what of it is wrong.
+
+    Attributes
+    ----------
+    said : announcements, with the moment of each. shown : senses of the headline and the times from which they are
+        shown; empty where it neither asks for a turn nor for a hold.
+    """
+
+    said: list[tuple[Said, Moment]] = field(default_factory=list)
+    shown: list[tuple[float, str, Prompt | None]] = field(default_factory=lambda: [(0.0, "", None)])
+    wrong: Counter[str] = field(default_factory=Counter)
+    voice: Voice = field(default_factory=Voice)
+
+    def hear(self, view: View) -> None:
+        """Follow a change of the view."""
+        self.voice.hear(view)
+        t_s, sense = view.now_s or 0.0, SENSES.get(view.moment, "")
+        if sense != self.shown[-1][1]:
+            self.shown.append((t_s, sense, view.prompt))
+            (_, one, prompt), (since_s, other, _) = self.shown[-3:-1] if len(self.shown) > 2 else [self.shown[0]] * 2
+            there_and_back = sense == one and {one, other} == {STAY, GO} and prompt is view.prompt
+            self.wrong["shown for less than a second"] += there_and_back and t_s - since_s < SETTLED_S
+        now = self.voice.said
+        if now is None or (self.said and now is self.said[-1][0]):
+            return
+        if self.said:
+            self._compare(*self.said[-1], now, view)
+        self.said.append((now, view.moment))
+
+    def _compare(self, last: Said, moment: Moment, now: Said, view: View) -> None:
+        after_s = now.t_s - last.t_s
+        senses = SENSES.get(moment), SENSES.get(view.moment)
+        opposite = senses in ((STAY, GO), (GO, STAY)) and bool(last.words and now.words)
+        self.wrong["contradicted within a second"] += opposite and after_s < SETTLED_S
+        self.wrong["wrong before taken"] += last.tone is Tone.WRONG and now.tone is Tone.TAKEN
+        self.wrong["said twice"] += last.words == now.words and after_s < REPEAT_S
+        turning = view.prompt is not None and view.prompt.kind is not PromptKind.LAY_FLAT
+        holding = turning and moment is view.moment is Moment.COUNTING
+        self.wrong["said while holding"] += holding and view.held is None
 
 
 @dataclass
@@ -87,6 +135,7 @@ class Watcher:
 
     view: View = field(default_factory=View)
     wrong: Counter[str] = field(default_factory=Counter)
+    transcript: Transcript = field(default_factory=Transcript)
     holds: int = 0
     told: bool = True
     finished_s: float = math.nan
@@ -94,6 +143,7 @@ class Watcher:
     def hear(self, output: Output) -> None:
         """Look at what the page makes of it."""
         before, self.view = self.view, self.view.after(output)
+        self.transcript.hear(self.view)
         shown = state(self.view)
         if shown["moment"] in (Moment.COUNTING, Moment.TURN, Moment.NEAR):
             self._since_counted = shown["moment"]
@@ -167,7 +217,7 @@ def of_hand(item: tuple[str, int]) -> Trial:
     hand, seed = item
     watcher = Watcher()
     verdict = session(f"sim:hand={hand}", Plan(), seed, watcher).judged().verdict
-    return Trial(hand, verdict, watcher.finished_s, watcher.holds, watcher.wrong)
+    return Trial(hand, verdict, watcher.finished_s, watcher.holds, watcher.wrong + watcher.transcript.wrong)
 
 
 def typical_s(trials: Sequence[Trial]) -> float:

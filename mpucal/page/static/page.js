@@ -7,7 +7,7 @@ const $ = (id) => document.getElementById(id);
 // The attitude comes four times a second; the animation takes a little less.
 const MOVE_MS = 230;
 // The server sends at least every two seconds: after this silence the connection counts as lost.
-const SILENCE_MS = 5000, REOPEN_MS = 1500, REPEAT_MS = 5000;
+const SILENCE_MS = 5000, REOPEN_MS = 1500;
 const VERDICTS = {
   good: "The calibration is good.",
   usable: "The calibration is usable.",
@@ -311,35 +311,19 @@ async function end() {
 
 // Announcements: aloud if sound is on, and for screen readers
 
-let saidAt = 0;
-
 function announce(words, tone = null) {
   if (tone) sound.tone(tone);
   if (!words) return;
-  saidAt = performance.now();
   const spoken = words.replace(AXES, "");
   put("spoken", spoken);
   sound.say(spoken);
 }
 
-const turnWords = () => (state.meter?.turn ? state.meter.turn.replace(" deg ", " degrees ") : "");
-
 function tellChanges(old, begins) {
   if (state.verdict !== old.verdict && state.verdict) return announce(VERDICTS[state.verdict], FINE.includes(state.verdict) ? "done" : "wrong");
   if (state.stopped !== old.stopped && state.stopped) return announce(state.stopped, "wrong");
-  if (state.verdict || state.stopped || state.live) return;
-  if (state.held && state.held.t_s !== old.held?.t_s && !begins) {
-    return announce(state.held.text, state.held.use === "seen" ? "wrong" : "taken");
-  }
-  if (state.caution && state.caution.t_s !== old.caution?.t_s && !begins) {
-    return announce(`${state.caution.what}. ${state.caution.do}`, "wrong");
-  }
-  if (state.moment === "counting" && old.moment !== "counting") return announce(state.confirming || state.headline, "hold");
-  if (old.moment === "counting" && (state.moment === "turn" || state.moment === "near")) return announce(turnWords(), "wrong");
-  const prompted = state.prompt?.text !== old.prompt?.text;
-  if (state.moment === "turn" && (prompted || old.moment !== "turn" || performance.now() - saidAt > REPEAT_MS)) return announce(turnWords());
-  if (state.moment === "near" && old.moment === "turn") return announce("Hold it still");
-  if (prompted && state.prompt && state.moment !== "turn") announce(state.prompt.text);
+  if (state.verdict || state.stopped || state.live || begins) return;
+  if (state.said && state.said.number !== old.said?.number) announce(state.said.words, state.said.tone);
 }
 
 // Keys

@@ -1,8 +1,11 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from mpucal.session.events import Countdown, Meter, Progress, Prompt, PromptKind
+from mpucal.terminal.view import View
+from mpucal.terminal.voice import Said, Tone
 from tools.lab import guidance_trials as trials
 
 
@@ -36,4 +39,29 @@ def test_what_is_wrong_is_counted():
         "jumps of the wanted one",
         "changed without a word",
         "counts above their total",
+    }
+
+
+def test_contradictions_in_a_transcript_are_counted():
+    transcript, view = trials.Transcript(), View()
+    turn = Meter(0.0, 0.5, False, "", (0.0, 0.0, -1.0), 5.0, 200.0, None, (1.0, 0.0, 0.0, 0.0), 90.0, "90 deg more")
+    near = replace(turn, missing_deg=5.0)
+    said = [
+        (turn, 1.0, "", "90 degrees more"),
+        (near, 1.5, "hold", "Hold still"),
+        (turn, 1.9, "wrong", "90 degrees more"),
+        (turn, 2.1, "taken", "taken"),
+        (turn, 2.2, "taken", "taken"),
+    ]
+    transcript.voice = SimpleNamespace(said=None, hear=lambda view: None)
+    view = view.after(Prompt(PromptKind.ROTATE, "One.", (1.0, 0.0, 0.0)))
+    for number, (meter, t_s, tone, words) in enumerate(said):
+        transcript.voice.said = Said(number, t_s, words, Tone(tone))
+        view = view.after(replace(meter, t_s=t_s))
+        transcript.hear(view)
+    assert +transcript.wrong == {
+        "contradicted within a second": 2,
+        "wrong before taken": 1,
+        "said twice": 1,
+        "shown for less than a second": 1,
     }
