@@ -19,6 +19,7 @@ from .arguments import LARGEST, check_column, check_flat, check_mask, check_rows
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
 from .errors import WrongType, escape_line
+from .origin import Origin
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +46,7 @@ class Sensor:
     Attributes
     ----------
     accel_offsets : words of its accelerometer's offset registers x, y, z during the recording.
-    message : for an IMU of a vehicle, the MAVLink message of its samples, which are filtered and come by radio.
+    message : for an IMU of a vehicle, the MAVLink message of its samples.
     steps : m/s^2, rad/s: resolution of the samples if their noise at rest may be smaller; else 0.
     clock_ppm, clock_std : for a bus with its own clock: its rate error, which was corrected, and the remaining relative
         standard deviation of the scale of all times; None: times are the host's.
@@ -66,6 +67,15 @@ class Sensor:
     clock_ppm: float | None = None
     clock_std: float | None = None
     accel_lag_s: float = 0.0
+
+    @property
+    def origin(self) -> Origin:
+        """Origin of its samples; an MPU is a chip behind a kernel driver, too."""
+        if self.message is not None:
+            return Origin.VEHICLE
+        if self.who_am_i is not None:
+            return Origin.CHIP
+        return Origin.FILE if self.chip is None else Origin.DEVICE
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:

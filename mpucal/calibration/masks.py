@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import ACCEL_RANGES_G, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.intervals import true_runs
 from .problem import Series
@@ -69,7 +70,7 @@ def with_masks(recording: Recording) -> Recording:
     dt = np.diff(recording.t, prepend=recording.t[0])
     # An autopilot's stream comes by radio, and its source says which pauses are more than single lost packets. It is
     # rounded, too, and of a range that no hand reaches: values repeat without being clipped.
-    of_a_chip = recording.sensor.message is None
+    of_a_chip = recording.sensor.origin is not Origin.VEHICLE
     paused = of_a_chip & (dt > GAP_INTERVALS * np.median(dt[1:]))
     # A chip whose range is known does not clip at another one.
     acc_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..page.address import LOOPBACK, Address, parse_address
-from ..result.session_files import CAPTURE_OF_VEHICLE
-from ..session.boards import BOARD, BOARDS, VEHICLE
+from ..session.boards import BOARD, BOARDS, usual_board
 from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
 from .options import Parsed, decorated
@@ -42,7 +41,7 @@ def page_options(command: F) -> F:
 
 def choose_board(board: str | None, source: OpenedSource) -> str:
     """Return the board to draw: the given one, or the default of the source."""
-    return board or source.plan.board or (VEHICLE if source.capture_name == CAPTURE_OF_VEHICLE.name else BOARD)
+    return board or source.plan.board or usual_board(source.origin)
 
 
 def with_page(

@@ -12,6 +12,7 @@ import numpy as np
 from ..arguments import is_plausible
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
+from ..origin import Origin
 from .tables.clock import FEWEST, fit_even_clock
 from .tables.units import QUANTITIES, acceleration_unit, gyro_unit, rate_factor
 
@@ -99,7 +100,7 @@ def normalise(arrays: Mapping[str, Any], name: str, sensor: Sensor) -> tuple[dic
         t, acc, gyr = (np.asarray(made[key], float) for key in ("t", "acc", "gyr"))
     if len(t) < FEWEST or not np.isfinite(t).all() or (np.diff(t) < 0).any() or not _is_complete(acc, gyr).all():
         return made, None
-    clock = None if sensor.message else fit_even_clock(t)
+    clock = None if sensor.origin is Origin.VEHICLE else fit_even_clock(t)
     if clock is not None:
         t = clock.t
         made |= {"t": clock.t, "gap": _add_gaps(made.get("gap"), clock.gap)}

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..data import Autopilot, Samples, Sensor
 from ..errors import UsageError
+from ..origin import Origin
 from .calibration import REFUSED, Calibration
 
 # an offset register's bit 0 does nothing
@@ -52,7 +53,7 @@ def make_correction(calibration: Calibration, sensor: Sensor, autopilot: Autopil
             f" 0x{sensor.who_am_i:02x}",
             "give the calibration of this chip",
         )
-    _check_source(calibration, sensor, autopilot)
+    _check_origin(of, sensor)
     _check_parameters(calibration, autopilot)
     return _with_registers(calibration, sensor)
 
@@ -76,14 +77,14 @@ def _with_registers(calibration: Calibration, sensor: Sensor) -> Correction:
     return Correction(calibration)
 
 
-def _check_source(calibration: Calibration, sensor: Sensor, autopilot: Autopilot | None) -> None:
+def _check_origin(of: Sensor, sensor: Sensor) -> None:
     """Refuse a chip's calibration for samples that an autopilot rotated and corrected, and the other way round."""
-    if autopilot is not None and calibration.sensor.who_am_i is not None:
+    if (of.origin, sensor.origin) == (Origin.CHIP, Origin.VEHICLE):
         raise UsageError(
-            f"the calibration is of a chip's own samples, but these came through {autopilot.firmware}",
+            f"the calibration is of a chip's own samples, but these came through {sensor.chip}",
             "give the calibration of this vehicle",
         )
-    if calibration.extra.get("autopilot") and sensor.who_am_i is not None:
+    if (of.origin, sensor.origin) == (Origin.VEHICLE, Origin.CHIP):
         raise UsageError(
             "the calibration is of an autopilot's stream, but these are a chip's own samples",
             "give the calibration of this chip",

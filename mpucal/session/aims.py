@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..data import Sensor, Vector
+from ..origin import Origin
 from .events import Direction, Target
 
 _corners = np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)])
@@ -52,7 +53,7 @@ LEAST_OF_VEHICLE = 14
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     """Return the aim of a target, one of AIMS; a vehicle's IMU needs more orientations for the normal one."""
     aim = AIMS[target]
-    if target == NORMAL and sensor is not None and sensor.message:
+    if target == NORMAL and sensor is not None and sensor.origin is Origin.VEHICLE:
         return replace(aim, least=LEAST_OF_VEHICLE)
     return aim
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ..origin import Origin
 from ..result.orientation import AXES, named_axes
 from .events import Direction
 
@@ -57,6 +58,11 @@ _KINDS = {
     ),
 }
 BOARDS = tuple(_KINDS)
+
+
+def usual_board(origin: Origin) -> str:
+    """Return the kind of board to speak of and to draw for samples of an `origin`, unless another is named."""
+    return VEHICLE if origin is Origin.VEHICLE else BOARD
 
 
 def flat_description(down: Direction, board: str) -> str:

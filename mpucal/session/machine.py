@@ -11,7 +11,7 @@ import numpy as np
 
 from . import lay_flat
 from .aims import NORMAL, select_aim
-from .boards import BOARD, VEHICLE
+from .boards import usual_board
 from .check_poses import CheckPoses
 from .events import (
     Abort,
@@ -111,7 +111,7 @@ class Machine:
                 return self._tick(t_s)
             case Connected(sensor):
                 self._aim, self._watch = select_aim(self._target, sensor), MotionWatch(sensor)
-                self._board = self._board or (VEHICLE if sensor.message else BOARD)
+                self._board = self._board or usual_board(sensor.origin)
                 return [lay_flat.PROMPT]
             case Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..errors import UsageError
-from ..sources.kind import Delivery, SourceKind
+from ..origin import Origin
+from ..sources.kind import SourceKind
 from ..sources.opening import one_of
 from ..sources.table import SOURCES, unique
 from .kind import SinkKind
@@ -50,7 +51,7 @@ def check_behind(kind: SinkKind, source: SourceKind, given: str, otherwise: str 
     UsageError : it does not.
     """
     if not kind.behind(source):
-        has = "has no sensor to write to" if source.delivers is Delivery.CAPTURE else f"has no {kind.name}"
+        has = "has no sensor to write to" if source.origin is Origin.FILE else f"has no {kind.name}"
         raise UsageError(f"{given}, but {source.flag} {has}", f"{one_of(filter(kind.behind, SOURCES))}{otherwise}")
 
 

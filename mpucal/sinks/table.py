@@ -6,9 +6,8 @@ opened.
 
 from __future__ import annotations
 
+from ..origin import Origin
 from ..result.session_files import SessionFile
-from ..sources.kind import Delivery
-from ..sources.table import IIO, MAVLINK
 from .kind import Effect, Flag, SinkKind
 
 CHIP_OFFSETS = SessionFile("chip-offsets.json", "the content of a chip's offset registers before a write")
@@ -26,7 +25,7 @@ SINKS = {
     for kind in (
         SinkKind(
             CHIP,
-            behind=lambda source: source.delivers is Delivery.REGISTERS,
+            behind=lambda source: source.origin is Origin.CHIP,
             where="the chip's offset registers",
             holds="only b_a, in steps of 1 mg, until the next power cycle or reset",
             opener="mpucal.sinks.chip:open_chip",
@@ -35,7 +34,7 @@ SINKS = {
         ),
         SinkKind(
             KERNEL,
-            behind=lambda source: source.option is IIO,
+            behind=lambda source: source.origin is Origin.DEVICE,
             where="the kernel's driver",
             holds="D as ACCEL_MOUNT_MATRIX of udev; b_a in calibbias of an MPU-6050, until its next power cycle",
             opener="mpucal.sinks.iio:open_kernel",
@@ -53,7 +52,7 @@ SINKS = {
         ),
         SinkKind(
             AUTOPILOT,
-            behind=lambda source: source.option is MAVLINK,
+            behind=lambda source: source.origin is Origin.VEHICLE,
             default=True,
             where="the autopilot",
             holds="offsets and scales; without cross-axis terms, and mpucal prints the error that remains",

@@ -15,6 +15,7 @@ from ..chip.driver import Driver
 from ..chip.records import LATE
 from ..errors import CaptureError
 from ..files.mcap import CaptureWriter
+from ..origin import Origin
 from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
@@ -46,6 +47,7 @@ class OpenedChip:
     capture_name: str = CAPTURE.name
     words: Mapping[str, Any] = field(default_factory=dict)
     real_time: bool = True
+    origin = Origin.CHIP
 
     def source_meta(self) -> dict[str, Any]:
         """Return the entries for the head of a capture."""

@@ -18,6 +18,7 @@ from ..iio import IIO_VERSION
 from ..iio.devices import Devices
 from ..iio.driver import IioDriver
 from ..iio.setup import LIST_BYTES, TEXT_BYTES, TRIGGERS
+from ..origin import Origin
 from ..session.plan import DRIVER
 from .chip import OpenedChip
 from .host_bus import HostBus, converting
@@ -45,6 +46,7 @@ class OpenedIio(OpenedChip):
     devices : their names. trigger : see IioDriver. rules : folder of udev's rules; None without udev.
     """
 
+    origin = Origin.DEVICE
     devices: Devices = NO_DEVICES
     trigger: str | None = None
     rules: Path | None = None

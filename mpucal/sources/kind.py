@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import TYPE_CHECKING, Any
+
+from ..origin import Origin
 
 if TYPE_CHECKING:
     from ..session.plan import Plan
@@ -39,14 +40,6 @@ class Option:
         return f"--{self.name.replace('_', '-')}"
 
 
-class Delivery(Enum):
-    """Kind of data that a source delivers."""
-
-    REGISTERS = "a chip's registers"
-    SAMPLES = "samples"
-    CAPTURE = "what was recorded"
-
-
 @dataclass(frozen=True)
 class SourceKind:
     """Kind of source: one row of the table.
@@ -56,8 +49,8 @@ class SourceKind:
     what : description. option : selects it on the command line; several kinds may share one.
     forms : forms of the option's value, for the help.
     opener : "module:attribute" of a function from a Request to an OpenedSource; imported when it is called.
-    delivers : a session on registers can be resumed. Every kind except a capture also has `contents() -> dict`, the
-        present content of the sensor in JSON's types, with the key `where`.
+    origin : of its samples. Every kind except a file also has `contents() -> dict`, the present content of the sensor
+        in JSON's types, with the key `where`.
     options : options that identify the source besides `option`. settings : options that configure its sensor.
     word : selects this kind if the option's value is this word, or begins with it and a colon.
     beside : selects this kind if this one of its `options` is given.
@@ -74,7 +67,7 @@ class SourceKind:
     option: Option
     forms: str
     opener: str
-    delivers: Delivery
+    origin: Origin
     options: tuple[Option, ...] = ()
     settings: tuple[Option, ...] = ()
     word: str = ""
@@ -95,7 +88,7 @@ class SourceKind:
     @property
     def commands(self) -> tuple[str, ...]:
         """Commands that take it."""
-        live = () if self.delivers is Delivery.CAPTURE else ("stream", "write", "show")
+        live = () if self.origin is Origin.FILE else ("stream", "write", "show")
         return ("session", "record", "check", "noise", *live, *(("doctor",) if self.doctor else ()))
 
     def matches(self, values: Mapping[str, Any]) -> bool:

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from ..origin import Origin
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Note, Operator, Source
@@ -34,7 +35,7 @@ class OpenedSource(Protocol):
 
     Attributes
     ----------
-    plan : of the session. listeners : receive the prompts besides the operator.
+    plan : of the session. origin : of its samples. listeners : receive the prompts besides the operator.
     truth : true parameters of a simulated sensor. recovered : description of a damaged capture's readable part.
     capture_name : name of its capture's file.
     real_time : True if its time passes by itself, False if it waits for the program.
@@ -43,6 +44,9 @@ class OpenedSource(Protocol):
 
     @property
     def plan(self) -> Plan: ...  # noqa: D102 - see above
+
+    @property
+    def origin(self) -> Origin: ...  # noqa: D102
 
     @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]: ...  # noqa: D102

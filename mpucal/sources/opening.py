@@ -8,8 +8,9 @@ from typing import Any
 
 from ..chip.config import Config, RateOnlyConfig
 from ..errors import CaptureError, UsageError, did_you_mean
+from ..origin import Origin
 from ..session.plan import Plan
-from .kind import Delivery, Option, Request, SourceKind
+from .kind import Option, Request, SourceKind
 from .opened_source import OpenedSource
 from .table import DLPF, SOURCES, kinds_for, matching_kinds, unique
 
@@ -41,7 +42,7 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
     word = str(values[kind.option.name]).partition(":")[0]
     if nearly := did_you_mean(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
         raise UsageError(f"{kind.option.flag} {word} is not a known source", f"{kind.forms}{nearly}")
-    if kind.delivers is not Delivery.CAPTURE:
+    if kind.origin is not Origin.FILE:
         for option in _dependent_options(SOURCES):
             if option.name in given and option not in _dependent_options([kind]):
                 raise UsageError(f"{kind.flag} does not take {given[option.name]}", "remove it")
@@ -159,7 +160,7 @@ def _plan(values: Mapping[str, Any], until_end: bool, kind: SourceKind) -> Plan:
     UsageError : values that no chip has, or that contradict each other.
     """
     usual = Plan(Config())
-    configures_chip = DLPF in kind.settings or kind.delivers is Delivery.CAPTURE
+    configures_chip = DLPF in kind.settings or kind.origin is Origin.FILE
     config = (Config if configures_chip else RateOnlyConfig)(
         int(values.get("accel_range", usual.config.accel_range_g)),
         int(values.get("gyro_range", usual.config.gyro_range_dps)),
@@ -167,7 +168,7 @@ def _plan(values: Mapping[str, Any], until_end: bool, kind: SourceKind) -> Plan:
         values.get("dlpf", usual.config.dlpf),
     )
     model = values.get("model", usual.model)
-    if model == "static" and kind.delivers is not Delivery.CAPTURE:
+    if model == "static" and kind.origin is not Origin.FILE:
         what = "a session does not take --model static, which no turn with the gyroscope can verify"
         raise UsageError(what, "remove it, and run `mpucal calibrate DIR --model static` on the session's folder")
     if values.get("tilt_only"):

@@ -13,6 +13,7 @@ from ..chip.records import KEY, LATE
 from ..errors import UsageError
 from ..files.folder import captures_in
 from ..files.mcap import CaptureWriter, read_capture
+from ..origin import Origin
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
@@ -43,6 +44,11 @@ class ResumedChip:
     truth: Mapping[str, Any] | None
     real_time: bool
     resumable: bool = True
+
+    @property
+    def origin(self) -> Origin:
+        """See OpenedSource."""
+        return self.live.origin
 
     @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]:

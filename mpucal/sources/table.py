@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ..chip.registers import ACCEL_RANGES_G, DLPF_CODES, GYRO_RANGES_DPS
-from .kind import Delivery, Option, SourceKind
+from ..origin import Origin
+from .kind import Option, SourceKind
 
 
 def bus_name(text: str) -> str:
@@ -110,7 +111,7 @@ SOURCES = [
         option=BUS,
         forms="/dev/i2c-N or N",
         opener="mpucal.sources.i2c:open_source",
-        delivers=Delivery.REGISTERS,
+        origin=Origin.CHIP,
         options=(ADDRESS,),
         settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.sources:examine_chip",
@@ -123,7 +124,7 @@ SOURCES = [
         word="sim",
         forms="sim[:key=value,...] for the simulated chip",
         opener="mpucal.simulated.chip.source:open_source",
-        delivers=Delivery.REGISTERS,
+        origin=Origin.CHIP,
         options=(SEED,),
         settings=CHIP_SETTINGS,
         title="simulated chip",
@@ -135,7 +136,7 @@ SOURCES = [
         word="ftdi",
         forms="ftdi://..., a URL of pyftdi (FT232H); needs the extra usb",
         opener="mpucal.sources.usb_i2c:open_ftdi",
-        delivers=Delivery.REGISTERS,
+        origin=Origin.CHIP,
         options=(ADDRESS,),
         settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.sources:examine_chip_alone",
@@ -148,7 +149,7 @@ SOURCES = [
         word="mcp2221",
         forms="mcp2221 or mcp2221:SERIAL; needs the extra usb",
         opener="mpucal.sources.usb_i2c:open_mcp2221",
-        delivers=Delivery.REGISTERS,
+        origin=Origin.CHIP,
         options=(ADDRESS,),
         settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.sources:examine_chip_alone",
@@ -159,7 +160,7 @@ SOURCES = [
         option=SERIAL,
         forms="a board with the bridge's firmware: /dev/ttyX or COMn, or a URL such as socket://HOST:PORT",
         opener="mpucal.sources.bridge.source:open_source",
-        delivers=Delivery.REGISTERS,
+        origin=Origin.CHIP,
         options=(ADDRESS, MICROPYTHON),
         settings=CHIP_SETTINGS,
         store="mpucal.sources.bridge:open_store",
@@ -171,7 +172,7 @@ SOURCES = [
         option=SPI,
         forms="/dev/spidevB.C[:HZ]; needs the extra spi",
         opener="mpucal.sources.spi:open_source",
-        delivers=Delivery.REGISTERS,
+        origin=Origin.CHIP,
         settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.sources:examine_chip_alone",
     ),
@@ -180,7 +181,7 @@ SOURCES = [
         option=IIO,
         forms="iio:deviceN, or accel=iio:deviceN,gyro=iio:deviceM",
         opener="mpucal.sources.iio:open_source",
-        delivers=Delivery.SAMPLES,
+        origin=Origin.DEVICE,
         options=(TRIGGER,),
         settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
         doctor="mpucal.doctor.iio:examine_iio",
@@ -192,7 +193,7 @@ SOURCES = [
         word="sim",
         forms="sim[:key=value,...] for the simulated chip with a simulated driver",
         opener="mpucal.simulated.iio:open_source",
-        delivers=Delivery.SAMPLES,
+        origin=Origin.DEVICE,
         options=(TRIGGER, SEED),
         settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
         title="simulated sensor of the kernel",
@@ -203,7 +204,7 @@ SOURCES = [
         option=MAVLINK,
         forms="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD]",
         opener="mpucal.sources.vehicle:open_source",
-        delivers=Delivery.SAMPLES,
+        origin=Origin.VEHICLE,
         options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
         found="mpucal.sources.bridge.port_errors:autopilots",
@@ -214,7 +215,7 @@ SOURCES = [
         word="sim",
         forms="sim[:key=value,...] for the simulated vehicle",
         opener="mpucal.simulated.vehicle.source:open_source",
-        delivers=Delivery.SAMPLES,
+        origin=Origin.VEHICLE,
         options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
         title="simulated vehicle",
@@ -224,7 +225,7 @@ SOURCES = [
         option=REPLAY,
         forms="a capture to replay: .mcap, .tlog, or the folder of a session",
         opener="mpucal.sources.replayed:open_source",
-        delivers=Delivery.CAPTURE,
+        origin=Origin.FILE,
         instead="`mpucal calibrate`, `mpucal apply` and `mpucal show` read a capture",
         title="replay of {}",
     ),

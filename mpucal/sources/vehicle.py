@@ -26,6 +26,7 @@ from ..mavlink.transport import Transport
 from ..mavlink.transports import open_transport
 from ..mavlink.url import parse_url
 from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
+from ..origin import Origin
 from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
 from ..session.plan import Plan
@@ -69,6 +70,7 @@ class OpenedVehicle:
     prepare: bool = False
     link: Link | None = None
     capture_name: str = CAPTURE_OF_VEHICLE.name
+    origin = Origin.VEHICLE
     resumable: bool = False
 
     def __post_init__(self) -> None:
@@ -152,6 +154,7 @@ class OpenedLog:
     listeners: Sequence[Callable[[Prompt], None]] = ()
     truth: Mapping[str, Any] | None = None
     capture_name: str = CAPTURE_OF_VEHICLE.name
+    origin = Origin.VEHICLE
     resumable: bool = False
     real_time: bool = False
 

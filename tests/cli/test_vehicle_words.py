@@ -1,7 +1,7 @@
 """The words of the command line that name vehicles, and what contradicts them."""
 
 import re
-from types import SimpleNamespace
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -9,6 +9,8 @@ from click.testing import CliRunner
 from mpucal.cli import commands
 from mpucal.cli.page import choose_board
 from mpucal.errors import UsageError
+from mpucal.origin import Origin
+from mpucal.sources.opening import open_source
 
 
 def run(*words):
@@ -63,10 +65,15 @@ def test_a_vehicle_takes_rates_that_a_chip_does_not(tmp_path):
     assert isinstance(result.exception, UsageError)
 
 
-@pytest.mark.parametrize(("capture", "drawn"), [("capture.tlog", "vehicle"), ("capture.mcap", "gy-521")])
-def test_the_board_that_is_drawn_follows_from_the_source(capture, drawn):
-    source = SimpleNamespace(capture_name=capture, plan=SimpleNamespace(board=None))
-    assert choose_board(None, source) == drawn
-    assert choose_board("plain", source) == "plain"
-    source.plan.board = "plain"
-    assert choose_board(None, source) == "plain"
+def test_a_source_says_what_it_is_and_the_drawn_board_follows_from_it(recorded):
+    chip = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
+    for values, origin, drawn in (
+        ({"replay": recorded}, Origin.VEHICLE, "vehicle"),
+        ({"mavlink": "sim:imus=1"}, Origin.VEHICLE, "vehicle"),
+        ({"replay": chip}, Origin.CHIP, "gy-521"),
+        ({"iio": "sim"}, Origin.DEVICE, "gy-521"),
+    ):
+        source = open_source(values)
+        assert (source.origin, choose_board(None, source)) == (origin, drawn)
+        assert choose_board("plain", source) == "plain"
+    assert choose_board(None, open_source({"replay": chip, "board": "plain"})) == "plain"

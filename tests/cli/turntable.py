@@ -7,9 +7,10 @@ import sys
 
 from mpucal.__main__ import run
 from mpucal.errors import BusError
+from mpucal.origin import Origin
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.chip import OpenedChip
-from mpucal.sources.kind import Delivery, Option, SourceKind
+from mpucal.sources.kind import Option, SourceKind
 from mpucal.sources.table import CHIP_SETTINGS, SOURCES
 
 
@@ -25,7 +26,7 @@ ROW = SourceKind(
     option=Option("turntable", metavar="NAME"),
     forms="the name of a turntable",
     opener="turntable:open_turntable",
-    delivers=Delivery.REGISTERS,
+    origin=Origin.CHIP,
     options=(Option("arm_length", "How far out the chip is [m].", "M", float),),
     settings=CHIP_SETTINGS,
     title="turntable {}",

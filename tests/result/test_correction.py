@@ -11,6 +11,7 @@ from mpucal.result.calibration import Calibration
 from mpucal.result.correction import make_correction
 
 OLD, NEW = {"INS_ACCOFFS_X": 0.0}, {"INS_ACCOFFS_X": 0.3}
+CHIP, STREAM = Sensor(who_am_i=0x68), Sensor(chip="ArduPilot-IMU1", message="RAW_IMU")
 VEHICLE = MappingProxyType({"autopilot": {"params_old": OLD, "params_new": NEW}})
 
 
@@ -25,8 +26,8 @@ def through(parameters):
 @pytest.mark.parametrize(
     ("calibration", "sensor", "autopilot", "says"),
     [
-        (made(Sensor(who_am_i=0x68)), Sensor(), through(OLD), "a chip's own samples, but these came through ArduPilot"),
-        (made(extra=VEHICLE), Sensor(who_am_i=0x68), None, "an autopilot's stream, but these are a chip's own samples"),
+        (made(CHIP), STREAM, None, "a chip's own samples, but these came through ArduPilot-IMU1"),
+        (made(STREAM), CHIP, None, "an autopilot's stream, but these are a chip's own samples"),
         (made(extra=VEHICLE), Sensor(), through(NEW), "INS_ACCOFFS_X was 0.3 while .* but 0 during the calibration"),
     ],
     ids=["a chip's to a vehicle", "a vehicle's to a chip", "other parameters"],

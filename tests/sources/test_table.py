@@ -8,8 +8,9 @@ from pkgutil import resolve_name
 import pytest
 
 from mpucal.errors import CaptureError, UsageError
+from mpucal.origin import Origin
 from mpucal.session.plan import Plan
-from mpucal.sources.kind import Delivery, Option
+from mpucal.sources.kind import Option
 from mpucal.sources.opening import check_source, reopen_source
 from mpucal.sources.table import SOURCES, kinds_for, matching_kinds, source_title
 
@@ -71,7 +72,7 @@ def test_each_option_is_refused_with_sources_that_do_not_have_it():
     every = {option for kind in SOURCES for option in (*kind.options, *kind.settings)}
     refused = 0
     for kind in SOURCES:
-        if kind.delivers is Delivery.CAPTURE:
+        if kind.origin is Origin.FILE:
             continue
         for option in every - {*kind.options, *kind.settings}:
             refused += 1

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
 from ...data import Mask
+from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.windows import noise_variance
 from ..evidence import Evidence
@@ -59,7 +60,7 @@ def data_lost(e: Evidence) -> Reason | None:
     interrupted = float(missing[missing > INTERRUPTED_S].sum())
     return reason(
         "data_lost",
-        "link" if e.recording.autopilot is not None else "bus" if e.recording.sensor.chip is not None else "file",
+        {Origin.VEHICLE: "link", Origin.FILE: "file"}.get(e.recording.sensor.origin, "bus"),
         lost - interrupted > 0.5 * float(t[-1] - t[0] - interrupted),
         places=f"{places} place{'s' if places > 1 else ''}",
         seconds=lost,
@@ -88,7 +89,8 @@ def temperature_moved(e: Evidence) -> Reason | None:
     low, high = np.quantile(known, [0.02, 0.98])
     if high - low <= WARMER_C:
         return None
-    return reason("temperature_moved", "of_vehicle" if e.recording.sensor.message else "range", low=low, high=high)
+    of_vehicle = e.recording.sensor.origin is Origin.VEHICLE
+    return reason("temperature_moved", "of_vehicle" if of_vehicle else "range", low=low, high=high)
 
 
 def gravity_unlikely(e: Evidence) -> Reason | None:

@@ -7,6 +7,7 @@ from itertools import permutations, product
 import numpy as np
 
 from ...data import Mask, Vector
+from ...origin import Origin
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
 from ..evidence import MOST_MISS_RAD, Evidence
@@ -144,7 +145,7 @@ def clock_off(e: Evidence) -> Reason | None:
 
 def sensors_lag(e: Evidence) -> Reason | None:
     """Find an accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters explain."""
-    if e.fit is None or e.claim is None or e.recording.autopilot is not None:
+    if e.fit is None or e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
         return None
     (of_prior,) = BY_NAME["tau"].sd
     std = float(e.fit.std("tau")[0]) / e.claim.inflation

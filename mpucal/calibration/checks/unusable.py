@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...data import Vector
+from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 from ...rests.intervals import true_runs
@@ -117,7 +118,7 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
     axes = _constant_axes(e, e.recording.acc, e.flat.Sigma_a, QUIETEST_ACC_MPS2)
     if axes:
         return reason("bits_stuck", "constant", axes=axes, when="in every sample")
-    if np.sqrt(e.flat.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.message is not None:
+    if np.sqrt(e.flat.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.origin is Origin.VEHICLE:
         return None  # data that are computed, or rounded on their way, repeat
     least, t = max(round(STUCK_S * e.recording.rate_hz), FEWEST_SAMPLES), e.recording.t - e.recording.t[0]
     for axis, column in zip("xyz", e.recording.acc.T, strict=True):

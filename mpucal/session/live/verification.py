@@ -11,6 +11,7 @@ import numpy as np
 from ...calibration.evidence import Evidence
 from ...calibration.verification import NewOrientation
 from ...data import Recording, Vector
+from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.intervals import RestFinder
 from ...result.calibration import REFUSED, USABLE, Calibration
@@ -83,7 +84,7 @@ def _find_reason(
     warmer = _temperature_change_c(recording)
     if abs(warmer) > WARMER_C:
         how = "rose" if warmer > 0 else "fell"
-        if recording.sensor.message:
+        if recording.sensor.origin is Origin.VEHICLE:
             return reason("temperature_moved", "of_vehicle_since_flat", how=how, change=abs(warmer))
         return reason("temperature_moved", "since_flat", how=how, change=abs(warmer))
     if rests and all(rest.clipped for rest in rests) and recording.gyr_clipped.any():

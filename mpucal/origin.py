@@ -1,0 +1,14 @@
+"""Origin of samples, on which words, drawings, limits and sinks depend."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Origin(Enum):
+    """Kind of thing that samples come from."""
+
+    CHIP = "a chip's registers"
+    DEVICE = "a sensor with a kernel driver"
+    VEHICLE = "a vehicle's autopilot, which filters and rounds them and sends them by radio or logs them"
+    FILE = "a file that does not name its sensor, or what was recorded"
