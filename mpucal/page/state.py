@@ -11,7 +11,7 @@ from ..session.events import Knowledge
 from ..terminal.lines import plain
 from ..terminal.view import View
 from ..terminal.voice import Said, in_words
-from ..terminal.words import groups
+from ..terminal.words import count, groups
 
 # Number of messages that are kept.
 NOTES = 30
@@ -29,6 +29,8 @@ def state(view: View, said: Said | None = None) -> dict[str, Any]:
         "meter": view.meter,
         "countdown": view.waiting,
         "progress": view.progress,
+        "count": None if view.progress is None else count(view.progress),
+        "line": view.line,
         "knowledge": view.knowledge,
         "known": None if view.knowledge is None else known(view.knowledge),
         "caution": view.caution,

@@ -216,12 +216,16 @@ class Prompt:
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of the present step: `done` of `of`, and as text; `t_s` is the session's time."""
+    """Progress of the present step: `done` of `of`, and as text; `t_s` is the session's time.
+
+    left_s : estimate of the time until the verification ends; None where it is unknown.
+    """
 
     t_s: float
     done: float
     of: float
     text: str
+    left_s: float | None = None
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,11 @@ SELDOM = 40.0
 SHOW_EVERY_S = 5.0
 # Session time after which the answer of a fit is taken.
 WAIT_S = 0.5
+# Least number of orientations that show a pace, and number of those left from which on the information must be known:
+# at least this share of what the target needs.
+LEAST_FOR_PACE, NEAR_THE_END, LEAST_KNOWN = 3, 3, 0.25
+# An orientation that takes so many times as long as the others shows another pace.
+LATE = 2.5
 
 
 class Rotate(PoseStep):
@@ -163,7 +168,8 @@ class Rotate(PoseStep):
             outputs.append(RequestFit(FitKind.KNOW, WAIT_S))
         if t_s - self._reported_s >= REPORT_EVERY_S:
             self._reported_s = t_s
-            outputs.append(Progress(t_s, min(self.coverage.number, self._least), self._least, self._count()))
+            done = min(self.coverage.number, self._least)
+            outputs.append(Progress(t_s, done, self._least, self._count(), self._estimate_left_s(t_s)))
         return (
             outputs if self._until_end else outputs + self._remind(t_s, self._new_s, "no new orientation for a while")
         )
@@ -175,8 +181,28 @@ class Rotate(PoseStep):
         if not self._is_certain() or self._tilt_only or self._until_end:
             return text
         if number < least:
-            return f"{text} (the bars are full; more sides confirm them)"
-        return text if self.coverage.varied else f"{text} (the bars are full, but these are too much alike)"
+            return f"{text} (bars full; more sides confirm them)"
+        return text if self.coverage.varied else f"{text} (bars full, but all too much alike)"
+
+    def _estimate_left_s(self, t_s: float) -> float | None:
+        """Return the time until the end of the verification, at the pace of the orientations so far; None: unknown.
+
+        The orientations that the target needs at least are most often enough. Near their end the information counts: it
+        is the inverse of the variance, and grows by about as much with each orientation as so far.
+        """
+        taken, left = self.coverage.number - 1, max(self._least - self.coverage.number, 0)
+        if taken < LEAST_FOR_PACE or self._until_end or self._begun_s is None:
+            return None
+        if not self._tilt_only and left < NEAR_THE_END:
+            known = self._knowledge.overall**2 if self._knowledge else 0.0
+            if known < LEAST_KNOWN or not self.coverage.varied:
+                return None
+            left = max(left, math.ceil(taken * (1.0 - known) / known))
+        # The orientation that is being turned to has begun when the last new one was found.
+        pace_s, since_s = (self._new_s - self._begun_s) / taken, t_s - self._new_s
+        if since_s > LATE * pace_s:
+            return None
+        return max((left + self._aim.verify) * pace_s - since_s, self._aim.verify * pace_s)
 
     def _is_certain(self) -> bool:
         return self._knowledge is not None and self._knowledge.overall >= 1.0

@@ -150,10 +150,11 @@ class Verify(PoseStep):
         self._coverage.paused.add(pause.acc)
         self._coverage.rested.add(pause.acc)
         self._number += 1
+        left_s = (self._aim.verify - self._number) * (pause.t_s - (self._begun_s or pause.t_s))
         self._begun_s = pause.t_s
         useful = "" if use is Use.TAKEN else ": not the one asked for, but useful"
         text = f"held {self._number} of {self._aim.verify}{useful}"
-        progress = Progress(pause.t_s, self._number, self._aim.verify, text)
+        progress = Progress(pause.t_s, self._number, self._aim.verify, text, left_s or None)
         if self._number == self._aim.verify:
             self._requested = True
             return [held(pause, use), progress, RequestFit(FitKind.CHECK, CHECK_WAIT_S)]

@@ -14,7 +14,10 @@ _IN_ASCII = str.maketrans({"²": "2", "±": "+-", "°": "deg ", "−": "-", "·"
 
 @dataclass(frozen=True)
 class Glyphs:
-    """Characters of pictures and bars, and `replacements` for those in texts."""
+    """Characters of pictures and bars, and `replacements` for those in texts.
+
+    line : those of the finish line, for orientations that are taken, requested and to come.
+    """
 
     unicode: bool
     block: str
@@ -22,11 +25,12 @@ class Glyphs:
     empty: str
     mark: str
     arrow: str
+    line: tuple[str, str, str]
     replacements: Mapping[int, str] = field(default_factory=dict)
 
 
-UNICODE = Glyphs(True, "█", "█", "░", "│", "→")
-ASCII = Glyphs(False, "#", "#", "-", "|", "->", _IN_ASCII)
+UNICODE = Glyphs(True, "█", "█", "░", "│", "→", ("✓", "◎", "·"))
+ASCII = Glyphs(False, "#", "#", "-", "|", "->", ("x", "O", "."), _IN_ASCII)
 
 
 def glyphs_of(out: TextIO, term: str) -> Glyphs:

@@ -11,7 +11,7 @@ from . import board, letters, orientation_map
 from .bars import NARROWEST, caution_rows, keys, knowledge_rows, meter
 from .glyphs import Glyphs
 from .view import View
-from .words import sentence
+from .words import count, sentence
 
 # Smaller screens show text only.
 LEAST_COLUMNS, LEAST_ROWS = 60, 20
@@ -34,12 +34,12 @@ def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
         *caution_rows(view, columns, glyphs),
         keys(view, columns),
     ]
-    count = _count(view)
-    space = rows - len(above) - len(below) - len(count)
-    # The pictures say more than the count.
-    if count and roomy and space == _LEAST_PICTURE_ROWS - 1:
-        count, space = [], _LEAST_PICTURE_ROWS
-    above += count
+    line = _finish_line(view, glyphs)
+    space = rows - len(above) - len(below) - len(line)
+    # The pictures say more than the finish line.
+    if line and roomy and space == _LEAST_PICTURE_ROWS - 1:
+        line, space = [], _LEAST_PICTURE_ROWS
+    above += line
     between = _pictures(view, columns, space, glyphs) if roomy and space >= _LEAST_PICTURE_ROWS else []
     between += [_BLANK] * max(space - len(between), 0)
     drawn = [*above, *between, *below]
@@ -89,10 +89,19 @@ def _prompt(view: View, columns: int, rows: int) -> list[Text]:
     return [Text(f" {line}", style="bold") for line in [*wrapped, *[""] * (rows - len(wrapped))]]
 
 
-def _count(view: View) -> list[Text]:
-    """Return the progress of the turning, once the bars of the uncertainties have taken its place."""
-    turning = view.prompt is not None and view.prompt.kind is PromptKind.ROTATE and view.knowledge is not None
-    return [Text(f" {sentence(view.progress.text)}")] if turning and view.progress is not None else []
+def _finish_line(view: View, glyphs: Glyphs) -> list[Text]:
+    """Return the finish line: a mark for each orientation, the count, and the time that is left."""
+    taken, of = view.line
+    if (
+        view.progress is None
+        or not of
+        or (view.prompt and view.prompt.kind is PromptKind.ROTATE and not view.knowledge)
+    ):
+        return []
+    done, next_one, to_come = glyphs.line
+    marks = f"{done * taken}{next_one * (taken < of)}{to_come * (of - taken - 1)}"
+    words = sentence(count(view.progress).removeprefix("orientation "))
+    return [Text.assemble(" ", (marks, "green"), f"  {words}")]
 
 
 def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:

@@ -143,6 +143,13 @@ class View:
         return self.knowledge.down
 
     @property
+    def line(self) -> tuple[int, int]:
+        """Finish line of this step: the number of orientations that are taken, and how many there are to be."""
+        p = self.progress
+        turning = p is not None and self.prompt is not None and self.prompt.kind in TURNING
+        return (int(p.done), int(p.of)) if p is not None and turning else (0, 0)
+
+    @property
     def confirming(self) -> str:
         """Question to confirm while the board is laid flat, else empty."""
         if self.prompt is None or self.prompt.kind is not PromptKind.LAY_FLAT or self.meter is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..report.units import UNKNOWN
-from ..session.events import Direction, Knowledge
+from ..session.events import Direction, Knowledge, Progress
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,14 @@ def known(k: Knowledge) -> str:
 def rounded(value: float) -> str:
     """Return a number with two digits, and no exponent."""
     return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+
+
+def count(p: Progress) -> str:
+    """Return the progress as text, with the time that is left if that is known."""
+    if p.left_s is None:
+        return p.text
+    what, comma, reason = p.text.partition(" (")
+    return f"{what}, about {max(10.0 * round(p.left_s / 10.0), 10.0):.0f} s more{comma}{reason}"
 
 
 def sentence(text: str) -> str:

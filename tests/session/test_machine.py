@@ -244,8 +244,29 @@ def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, v
     show(rotating, board, varied[8:9])
     assert rotating.state is State.VERIFY
     assert "target reached: bias to 3 mg" in rotating.words()
-    full = "orientation 5 of 10 (the bars are full; more sides confirm them)"
+    full = "orientation 5 of 10 (bars full; more sides confirm them)"
     assert full in [progress.text for progress in rotating.of(Progress)]
+
+
+def test_the_time_that_is_left_follows_the_pace_and_the_information(board, rotating, varied):
+    rotating.overall = 0.1
+    show(rotating, board, varied[:2])
+    assert {one.left_s for one in rotating.of(Progress)} == {None}
+    show(rotating, board, varied[2:5])
+    # 6 of 10 orientations, at 3.6 s for each; the verification needs 3 more.
+    assert rotating.of(Progress)[-1].left_s == pytest.approx(7 * 3.6, abs=3.6)
+    show(rotating, board, varied[5:7])
+    assert rotating.of(Progress)[-1].text.startswith("orientation 8 of 10")
+    assert rotating.of(Progress)[-1].left_s is None
+    rotating.overall = 0.7
+    rotating.feed(board.turn_to(varied[7])).feed(board.still(1.5))
+    # What is known is half of what is needed.
+    assert rotating.of(Progress)[-1].left_s > 8 * 3.6
+    rotating.overall = 1.0
+    rotating.feed(board.still(2.0))
+    assert rotating.of(Progress)[-1].left_s == pytest.approx(4 * 3.6, abs=3.6)
+    rotating.feed(board.still(10.0))
+    assert rotating.of(Progress)[-1].left_s is None
 
 
 def test_enough_tilts_end_the_turning_and_claim_no_target(board):
@@ -271,7 +292,7 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
         ),
         (
             [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))],
-            ", but these are too much alike",
+            ", but all too much alike",
         ),
     ],
     ids=["faces", "tilts about one axis"],
@@ -279,7 +300,7 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
 def test_the_target_is_not_enough_without_varied_orientations(board, rotating, ups, why):
     rotating.overall = 1.0
     assert show(rotating, board, ups).state is State.ROTATE
-    assert f"(the bars are full{why})" in rotating.of(Progress)[-1].text
+    assert f"(bars full{why})" in rotating.of(Progress)[-1].text
 
 
 def test_without_the_target_turning_goes_on_for_two_minutes(board, rotating):

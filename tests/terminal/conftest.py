@@ -69,7 +69,7 @@ TURNED = [
     *(Seen(20.0 + k, k + 1, (math.cos(k), math.sin(k), 0.5 * (-1) ** k), True) for k in range(4)),
     Seen(24.5, 1, (0.0, 0.6, -0.8), False),
     knowledge(25.0),
-    Progress(25.0, 5.0, 10.0, "orientation 5 of 10"),
+    Progress(25.0, 5.0, 10.0, "orientation 5 of 10", 21.0),
     Caution(25.0, "too_fast", "turned at 480 deg/s, close to the gyroscope's range", "turn it more slowly"),
     meter(25.25, still=False, down=(0.1, -0.2, 0.97), what="turning at 30 deg/s about z", wanted=CORNER),
 ]

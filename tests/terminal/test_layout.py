@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Caution, Prompt, PromptKind
+from mpucal.session.events import Caution, Progress, Prompt, PromptKind
 from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.terminal.glyphs import ASCII, UNICODE
 from mpucal.terminal.layout import lines
@@ -47,7 +47,7 @@ def test_all_that_a_person_needs_is_there(views, size):
         "turn it like this",
         "+Z up",
         "-Z up",
-        "Orientation 5 of 10.",
+        "✓✓✓✓✓◎····  5 of 10, about 20 s more.",
         "turning at 30 deg/s about z",
         "y ±0.31 %",
         "z not observable",
@@ -73,7 +73,7 @@ def test_each_turn_is_shown_in_large_letters(views, words):
     drawn = text_of(replace(view, meter=replace(view.meter, turn=f"135 deg more, {words}")))
     assert re.search("[█▀▄]{3}", drawn[1])
     assert "Turn the board: on its corner" in "\n".join(drawn[6:8])
-    assert drawn[8].strip() == "Orientation 5 of 10."
+    assert drawn[8].strip() == "✓✓✓✓✓◎····  5 of 10, about 20 s more."
 
 
 @pytest.mark.parametrize("size", [(40, 15), (80, 24), (160, 50)], ids=str)
@@ -97,6 +97,29 @@ def test_nothing_shows_where_to_turn_once_no_orientation_is_asked_for(views, kin
     assert "turn it like this" not in drawn
     assert "now" in drawn
     assert (ended.meter.wanted, ended.meter.missing_deg, ended.meter.turn) == (None, None, "")
+
+
+@pytest.mark.parametrize(
+    ("progress", "shown"),
+    [
+        (Progress(25.0, 5.0, 6.0, "orientation 5 of 6"), "xxxxxO  5 of 6."),
+        (
+            Progress(25.0, 9.0, 10.0, "orientation 9 of 10 (bars full; more sides confirm them)", 14.9),
+            "xxxxxxxxxO  9 of 10, about 10 s more (bars full; more sides confirm them).",
+        ),
+        (
+            Progress(25.0, 10.0, 10.0, "12 orientations, of at least 10 (bars full, but all too much alike)"),
+            "xxxxxxxxxx  12 orientations, of at least 10 (bars full, but all too",
+        ),
+    ],
+    ids=["count", "reason", "long"],
+)
+def test_the_finish_line_has_a_mark_for_each_orientation(views, progress, shown):
+    drawn = text_of(replace(views["turned"], progress=progress), glyphs=ASCII)
+    assert drawn[8].strip().startswith(shown)
+    assert not any(
+        "xxxx" in line for line in text_of(views["turned"].after(Prompt(PromptKind.REST, "Done.")), glyphs=ASCII)
+    )
 
 
 def test_a_warning_grows_quiet(views):

@@ -88,7 +88,7 @@ SENSES = {Moment.COUNTING: STAY, Moment.NEAR: STAY, Moment.TURN: GO}
 
 @dataclass
 class Transcript:
-    """What a person hears and sees, with its times, and what of it is wrong.
+    """Transcript of what a person hears and sees, with times, and the number of contradictions in it.
 
     Attributes
     ----------

@@ -35,6 +35,13 @@ export function turn(from, to) {
   return sine < 1e-9 ? [0, 0, 0] : [x, y, z].map((v) => v * angle / sine);
 }
 
+// Returns the attitude nearest to `from` in which the direction `down` of the board points down.
+export function pointing(down, from) {
+  const v = rotate(from, down), axis = cross(v, [0, 0, -1]), sine = Math.hypot(...axis), angle = Math.atan2(sine, -v[2]);
+  const [x, y, z] = sine < 1e-6 ? [0, angle > 1 ? 1 : 0, 0] : axis.map((c) => c * Math.sin(angle / 2) / sine);
+  return times([sine < 1e-6 && angle > 1 ? 0 : Math.cos(angle / 2), x, y, z], from);
+}
+
 // The viewer's eye: in front, above and a little to one side; it moves so that no board is seen edge-on.
 const TURNS = [-28, 28, 0, -48, 48], TILTS = [32, 52, 16, 68], LEAST_FACE = 0.5, KEEPS_FACE = 0.38;
 
@@ -182,7 +189,8 @@ export class Picture {
   }
 }
 
-export function drawBoard(picture, kind, attitude, view, way = null) {
+// `small`: without axes and print.
+export function drawBoard(picture, kind, attitude, view, way = null, small = false) {
   picture.begin(REACH);
   picture.look(view);
   const model = MODELS[kind] ?? MODELS.plain;
@@ -195,13 +203,15 @@ export function drawBoard(picture, kind, attitude, view, way = null) {
   rods(picture, model, at);
   const [x, y, z] = model.half;
   boxes(picture, [{ low: [-x, -y, -z], high: [x, y, z], colour: model.colour }], room);
-  print(picture, model, at, top);
-  axis(picture, AXES[0], at, model, 1);
-  axis(picture, AXES[1], at, model, 1);
+  if (!small) {
+    print(picture, model, at, top);
+    axis(picture, AXES[0], at, model, 1);
+    axis(picture, AXES[1], at, model, 1);
+  }
   boxes(picture, near, room);
   if (top && model.dot) spot(picture, at, [...model.dot, z + 0.1], 0.025, "#ddd");
   rotors(picture, model, at);
-  axis(picture, AXES[2], at, model, top ? 1 : -1);
+  if (!small) axis(picture, AXES[2], at, model, top ? 1 : -1);
   if (way) arc(picture, way);
 }
 

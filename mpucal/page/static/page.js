@@ -1,6 +1,6 @@
 // The page: changes from the server are shown at once; the board moves to its new attitude by an animation.
 
-import { FLAT, TURNED_OVER, Picture, between, drawBall, drawBoard, turn, viewOf } from "./board.js";
+import { FLAT, TURNED_OVER, Picture, between, drawBall, drawBoard, pointing, turn, viewOf } from "./board.js";
 import * as sound from "./sound.js";
 
 const $ = (id) => document.getElementById(id);
@@ -73,12 +73,37 @@ function show(changed) {
   put("facts", facts());
   $("keys").hidden = !state.keys || Boolean(state.verdict || state.stopped || state.ended);
   task();
+  line();
   caution();
   if (changed.known !== undefined) known();
   if (changed.notes !== undefined) notes();
   if (changed.live !== undefined) live();
   if (changed.verdict || changed.results) result();
   pictures(changed);
+}
+
+// The finish line: a picture of each orientation, ticked as it is taken; that of the next is marked.
+let lined = "";
+
+function line() {
+  const [taken, of] = state.line ?? [0, 0], verifying = state.prompt?.kind === "verify";
+  const done = state.verdict || state.stopped || state.ended;
+  $("line").hidden = !of || Boolean(done);
+  const held = verifying ? [] : [state.meter && flatDown(), ...(state.seen ?? []).filter((seen) => seen.paused).map((seen) => seen.down)];
+  const downs = Array.from({ length: of }, (_, k) => (k < taken ? held[k] : k === taken ? target() : null) ?? null);
+  const key = JSON.stringify([taken, downs, innerWidth, dark.matches]);
+  if (key === lined || $("line").hidden) return;
+  lined = key;
+  $("line").setAttribute("aria-label", `${taken} of ${of} orientations taken`);
+  $("line").replaceChildren(...downs.map((down, k) => {
+    const mark = element("i", "", k < taken ? "taken" : k === taken ? "next" : "");
+    mark.append(document.createElement("canvas"));
+    return mark;
+  }));
+  downs.forEach((down, k) => {
+    const canvas = $("line").children[k].firstChild;
+    if (down) drawBoard(new Picture(canvas), state.board, pointing(down, flat()), LINE_VIEW, null, true);
+  });
 }
 
 function put(id, text) {
@@ -106,7 +131,7 @@ function task() {
   document.body.dataset.look = look;
   put("headline", VERDICTS[done] ?? (done ? "Stopped" : state.headline ?? "Connecting"));
   put("prompt", done ? state.stopped ?? state.estimated_error ?? "" : promptWords());
-  put("step", done ? "" : state.confirming || (state.progress?.text ?? ""));
+  put("step", done ? "" : state.confirming || (state.count ?? ""));
   put("number", number ?? "");
   $("arc").setAttribute("stroke-dasharray", `${Math.max(0, Math.min(100, 100 * share))} 100`);
   if (look === "turn") $("way").setAttribute("transform", `rotate(${wayDegrees()})`);
@@ -199,6 +224,9 @@ const now = new Picture($("now")), goal = new Picture($("goal")), ball = new Pic
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 let from = FLAT, to = FLAT, movedAt = 0, view = viewOf([FLAT]), seenFrom = { ...view }, drawing = false;
 
+const LINE_VIEW = { turn: -28, tilt: 40 };
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const flatDown = () => (state.board === "vehicle" ? [0, 0, 1] : [0, 0, -1]);
 const flat = () => (state.board === "vehicle" ? TURNED_OVER : FLAT);
 const laying = () => state.prompt?.kind === "lay_flat";
 const wanted = () => state.meter?.wanted ?? (laying() ? flat() : null);
@@ -212,10 +240,9 @@ function pictures(changed) {
   $("pictures").classList.toggle("alone", !goes);
   document.body.toggleAttribute("data-early", !state.known && !state.live);
   put("goal-caption", laying() ? state.flat : "turn it like this");
-  const taken = (state.seen ?? []).filter((seen) => seen.paused).length;
   $("ball-figure").hidden = !meter || !state.seen?.length;
-  put("ball-caption", ended ? "orientations taken" : `orientations taken: ${taken}${target() ? "; ring: the next" : ""}`);
-  $("ball").setAttribute("aria-label", `${taken} orientations taken`);
+  put("ball-caption", `orientations taken${!ended && target() ? "; ring: the next" : ""}`);
+  $("ball").setAttribute("aria-label", "orientations taken");
   $("now").setAttribute("aria-label", meter?.turn ? `the board now; missing: ${meter.turn}` : "the board now");
   $("goal").setAttribute("aria-label", prompt?.text ?? "");
   if (changed.meter?.attitude) {
@@ -356,7 +383,13 @@ for (const woken of ["visibilitychange", "pageshow", "online", "focus"]) {
     }
   }, true);
 }
-addEventListener("resize", draw);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+addEventListener("resize", () => {
+  line();
+  draw();
+});
+dark.addEventListener("change", () => {
+  line();
+  draw();
+});
 setInterval(watch, 1000);
 open();
