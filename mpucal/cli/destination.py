@@ -21,7 +21,7 @@ from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from ..sources.table import matching_kinds
 from .options import decorated
-from .person import ask, ask_in_doubt, say
+from .person import ask, ask_in_doubt, confirm, say
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -43,12 +43,13 @@ def sink_flags(command: F) -> F:
     return decorated(command, *options)
 
 
-def make_device(options: Mapping[str, Any]) -> Device:
-    """Return the device that a command's source options name, with the flags of sinks that are given."""
+def make_device(options: Mapping[str, Any], yes: bool) -> Device:
+    """Return the device that a command's source options name, with the flags of sinks; `yes` : ask no questions."""
     kind = matching_kinds(options)[0]
     flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
     given = frozenset(name for name in flags if options.get(name))
-    return Device(kind, str(options[kind.option.name]), partial(open_source, options), say, given, options)
+    opener, answer = partial(open_source, options), partial(confirm, yes=yes)
+    return Device(kind, str(options[kind.option.name]), opener, say, given, answer, options)
 
 
 def check_sink(kind: SinkKind, source: SourceKind, options: Mapping[str, Any]) -> None:
@@ -76,8 +77,8 @@ def write_back(
     ----------
     sinks : those that the person named with --to. yes : ask no questions.
     """
-    confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
-    device = make_device(options)
-    for applied in write_to_all(kinds, calibration, device, folder, record, confirm, sinks, in_doubt):
+    agree, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
+    device = make_device(options, yes)
+    for applied in write_to_all(kinds, calibration, device, folder, record, agree, sinks, in_doubt):
         click.echo(f"Done: {applied.what}.", err=as_json)
         yield applied

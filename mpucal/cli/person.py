@@ -27,3 +27,10 @@ def ask(question: str, yes: bool) -> None:
     """Ask for confirmation; raise WriteBackError if a person declines."""
     if not yes and sys.stdin.isatty() and not click.confirm(question, err=True):
         raise WriteBackError("nothing was written: you declined", "give the command again to write it")
+
+
+def confirm(question: str, with_yes: bool, yes: bool) -> bool:
+    """Return the answer to a question: `with_yes` if `yes` is given, and False without a person."""
+    if yes:
+        return with_yes
+    return sys.stdin.isatty() and click.confirm(question, err=True)

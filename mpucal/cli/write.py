@@ -42,7 +42,7 @@ def command(
     written = load_trusted(calibration, force) if is_calibration(calibration) else None
     with (
         OutputFolder(folder or calibration.parent) as into,
-        kind.open(make_device(at_gravity_of(written, options))) as sink,
+        kind.open(make_device(at_gravity_of(written, options), yes)) as sink,
     ):
         objection = write_objection(written, sink) if written is not None and written.quality else None
         if objection is not None:

@@ -7,14 +7,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import numpy as np
+
+from ..data import Vector
 from ..disk.atomic import write_atomically
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.ftp import Storage
+from ..mavlink.horizon import Horizon
 from ..mavlink.link import Link, S
 from ..mavlink.parameters.client import ParameterClient
 from ..mavlink.parameters.document import adapt_to_write, select_imu
+from ..mavlink.parameters.level import Level, Leveller, trim_names, trim_of
 from ..mavlink.parameters.plan import NOTHING, Change, plan_changes, refused_imus, select_improving, swap_slots
 from ..mavlink.parameters.slots import all_slots
 from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
@@ -22,13 +27,13 @@ from ..mavlink.parameters.verify import SwappedSlotsError, verify
 from ..mavlink.parameters.write import NEW, OLD, Writer, is_partial_write
 from ..mavlink.prearm import ArmingMonitor, PrearmState, check_prearm
 from ..mavlink.request import send_command
-from ..mavlink.rest_monitor import RestMonitor
-from ..mavlink.stream_parameters import read_stream_parameters
+from ..mavlink.rest_monitor import RestMeans, RestMonitor
+from ..mavlink.stream_parameters import read_parameters, read_stream_parameters
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.vehicle import OpenedVehicle
-from .kind import Device
+from .kind import Confirm, Device, Say, nobody
 from .old_state import nothing_written
 from .signals import interrupting
 from .sink import Applied
@@ -40,6 +45,18 @@ SAVE_IDS = 76
 # ArduPilot's complaint about sensors with other ids than their calibration's
 UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)
 INCONSISTENT, AGREE_NS = re.compile(r"accel\w* inconsistent", re.IGNORECASE), 13 * S
+# An estimator that has just started is not ready yet, and says so.
+READY_NS = 40 * S
+REBOOT = (
+    "Reboot {} now? Its attitude estimate keeps biases that it learnt under the old parameters until it is rebooted."
+)
+NOT_REBOOTED = "reboot it before it flies: its attitude estimate keeps biases that it learnt under the old parameters"
+TILTED_DEG = 0.1
+KEPT_LEVEL = "what was level stays level"
+MEASURED_LEVEL = "it is level as it stands now"
+TOO_TILTED = "it stands too tilted for a level, so what was level stays level"
+# PX4 saves parameters late.
+SAVED_NS = 3 * S
 
 
 @contextmanager
@@ -53,7 +70,8 @@ def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
     source: OpenedVehicle = device.open()
     with source.connected(device.say) as link:
         put_down(source.listeners, device.say)
-        sink = AutopilotSink(link, "store" in device.flags, Journal.of(AUTOPILOT, device.name))
+        journal = Journal.of(AUTOPILOT, device.name)
+        sink = AutopilotSink(link, "store" in device.flags, journal, device.say, device.confirm)
         recovered = sink.recover()
         if recovered is not None:
             device.say(recovered)
@@ -67,10 +85,19 @@ class AutopilotSink:
     ----------
     link : locked to the vehicle; the sink leaves it open.
     store : also save D and b_a, which parameters do not hold in full, as files in the vehicle's storage.
-    journal : notes a write.
+    journal : notes a write. say : shows the user a sentence. confirm : asks the user; see Device.
     """
 
-    def __init__(self, link: Link, store: bool = False, journal: Journal | None = None) -> None:
+    def __init__(
+        self,
+        link: Link,
+        store: bool = False,
+        journal: Journal | None = None,
+        say: Say = lambda _sentence: None,
+        confirm: Confirm = nobody,
+    ) -> None:
+        self._say, self._confirm = say, confirm
+        self._stands_level: bool | None = None
         self._link = link
         self._journal = journal or Journal()
         self._store = store
@@ -93,7 +120,8 @@ class AutopilotSink:
         if note is None:
             return None
         old, new = note[OLD], note[NEW]
-        writer = Writer(self._link, self._watch, [s for s in all_slots(self._firmware) if set(s.names) <= set(old)])
+        slots = [slot for slot in all_slots(self._firmware) if set(slot.names) <= set(old)]
+        writer = Writer(self._link, self._watch, slots, others=[n for n in trim_names(self._firmware) if n in old])
         held = writer.read()
         interrupted = f"a write to this vehicle was interrupted at {note[AT]}"
         if held == old:
@@ -108,7 +136,7 @@ class AutopilotSink:
         return f"{interrupted}; the old parameters are restored and read back"
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
-        """Save all accelerometer parameters of the vehicle to a file that ground stations can load.
+        """Save all accelerometer parameters and the level of the vehicle to a file that ground stations can load.
 
         Raises
         ------
@@ -116,7 +144,8 @@ class AutopilotSink:
         """
         held = read_stream_parameters(self._link, self._firmware)
         values = {name: value for name, value in held.items() if CORRECTION.search(name)}
-        remarks = [f"Accelerometer parameters of {self.where} before mpucal wrote new ones"]
+        values |= read_parameters(self._link, trim_names(self._firmware), self._firmware)
+        remarks = [f"Accelerometer parameters and level of {self.where} before mpucal wrote new ones"]
         file, text = OLD_PARAM, param_text(values, remarks)
         if self._firmware == PX4:
             file, text = OLD_PARAMS, params_text(values, remarks, self._link.vehicle.system)
@@ -132,11 +161,12 @@ class AutopilotSink:
             raise RecordingError(
                 f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write saved"
             )
-        writer = Writer(self._link, self._watch, slots, self._journal)
+        trim = [name for name in trim_names(self._firmware) if name in wanted]
+        writer = Writer(self._link, self._watch, slots, self._journal, trim)
         with nothing_written():
             old = writer.read()
-        writer.write(old, {name: wanted[name] for slot in slots for name in slot.names}, lambda: None)
-        return f"{self.where} has the parameters of {kept.name} again, read back"
+        writer.write(old, {name: wanted[name] for name in old}, lambda: None)
+        return f"{self.where} has the parameters of {kept.name} again, read back; {NOT_REBOOTED}"
 
     def reason_to_keep(self, calibration: Calibration) -> str | None:
         """See ComparableSink; residual cross-axis errors count, and one IMU with better parameters is enough."""
@@ -163,29 +193,76 @@ class AutopilotSink:
         possible = plan_changes(calibration, self._firmware)
         planned = select_improving(possible)
         slots = [change.slot for change in planned]
-        writer = self._writer = Writer(self._link, self._watch, slots, self._journal)
-        monitor = RestMonitor(self._link, [change.stream for change in planned])
+        writer = self._writer = Writer(self._link, self._watch, slots, self._journal, trim_names(self._firmware))
+        first = possible[0]
+        monitor = RestMonitor(self._link, list(dict.fromkeys(change.stream for change in (first, *planned))))
         with nothing_written():
             self._check(planned)
             before = check_prearm(self._link)
             old = writer.read()
-            rest = monitor.wait()
-        if rest is None:
-            raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
+            rest = _at_rest(monitor)
+            held = first.slot.correction(old) if first in planned else None
+            leveller = Leveller(self._firmware, trim_of(self._firmware, old), held, first.new, first.mounting)
+            level, of_level = leveller.keep(), KEPT_LEVEL
+            if self._does_stand_level(leveller.standing_deg(level, rest.mean[first.stream])):
+                rest = _at_rest(monitor)
+                measured = leveller.measure(rest.mean[first.stream])
+                level, of_level = (level, TOO_TILTED) if measured is None else (measured, MEASURED_LEVEL)
         new = {name: value for change in planned for name, value in change.slot.values(change.new).items()}
-        now = adapt_to_write(calibration, [change.imu for change in planned])
+        new |= level.values()
+        now = adapt_to_write(calibration, [change.imu for change in planned], level)
         with self._storing(now, planned) as paths:
-            writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait()))
+            writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
         imus = " and ".join(str(change.imu) for change in planned)
         residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
         clauses = [
             f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams; they have no"
             f" cross-axis terms, which leaves an error of |a| of up to {residuals} m/s^2",
-            f"before, it {before}; now it {self._await_prearm()}",
+            _level_clause(level, of_level),
+            *self._finish(before, first, level),
             *_unchanged_clauses(possible, planned, refused_imus(calibration)),
-            *(["leave it powered for three more seconds, as PX4 saves late"] if self._firmware == PX4 else []),
         ]
         return Applied(now, "; ".join([*clauses, *paths]))
+
+    def _does_stand_level(self, standing_deg: Vector) -> bool:
+        """Return True if the user says that the vehicle stands as it should hover."""
+        if self._stands_level is None:
+            stands = f"{self.where} stands {_tilt_words(standing_deg)} by what it calls level."
+            self._stands_level = self._confirm(f"{stands} Is this how it should hover? (No: its level stays.)", False)
+        return self._stands_level
+
+    def _finish(self, before: PrearmState, first: Change, level: Level) -> Iterator[str]:
+        """Reboot the vehicle if the user agrees, and yield clauses on its horizon and on its pre-arm check."""
+        try:
+            now = self._await_prearm()
+            if not self._confirm(REBOOT.format(self.where), True):
+                yield NOT_REBOOTED
+                if self._firmware == PX4:
+                    yield f"leave it powered for {SAVED_NS // S} more seconds, as PX4 saves late"
+                if now.complaints:
+                    yield f"before, it {before}; now it {now}"
+                return
+            if self._firmware == PX4:
+                list(self._link.messages(self._link.now_ns() + SAVED_NS))
+            self._say(f"{self.where} reboots: leave it as it stands.")
+            horizon = Horizon(self._link)
+            if not horizon.reboot():
+                yield f"it refused to reboot; {NOT_REBOOTED}"
+                return
+            yield _horizon_clause(horizon.error_deg(first.stream, level.wanted_deg))
+            yield f"before, it {before}; now it {self._await_ready(before)}"
+        except LinkError as error:
+            yield f"but {error.what}: {error.remedy}, and {NOT_REBOOTED}"
+        except KeyboardInterrupt:
+            yield f"you interrupted what follows the write; {NOT_REBOOTED}"
+
+    def _await_ready(self, before: PrearmState) -> PrearmState:
+        """Return the pre-arm state after a reboot, once it is ready or complains of nothing but what it did before."""
+        end_ns = self._link.now_ns() + READY_NS
+        now = self._await_prearm()
+        while not now.ready and not set(now.complaints) <= set(before.complaints) and self._link.now_ns() < end_ns:
+            now = check_prearm(self._link)
+        return now
 
     @contextmanager
     def _storing(self, now: Calibration, planned: Sequence[Change]) -> Iterator[list[str]]:
@@ -235,6 +312,39 @@ class AutopilotSink:
         while any(map(INCONSISTENT.search, now.complaints)) and self._link.now_ns() < until_ns:
             now = check_prearm(self._link)
         return now
+
+
+def _at_rest(monitor: RestMonitor) -> RestMeans:
+    rest = monitor.wait()
+    if rest is None:
+        raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
+    return rest
+
+
+def _tilt_words(roll_pitch_deg: Vector) -> str:
+    """Return roll and pitch as a pilot says them, such as: 1.2 deg nose up and 0.3 deg right side down."""
+    roll, pitch = roll_pitch_deg.tolist()
+    nose, side = ("up" if pitch > 0 else "down"), ("right" if roll > 0 else "left")
+    return f"{abs(pitch):.1f} deg nose {nose} and {abs(roll):.1f} deg {side} side down"
+
+
+def _level_clause(level: Level, words: str) -> str:
+    """Return a clause on the new trim."""
+    if not level.wanted_deg[:2].any():
+        return f"its level was never set ({trim_names(level.firmware)[0]} is 0) and stays that of its autopilot's axes"
+    changes = zip(trim_names(level.firmware)[:2], level.held_deg, level.wanted_deg, strict=False)
+    listed = " and ".join(f"{name} from {old:.2f} to {new:.2f} deg" for name, old, new in changes)
+    return f"{words} ({listed}, read back)"
+
+
+def _horizon_clause(error_deg: Vector | None) -> str:
+    """Return a clause on what the attitude after a reboot differs from gravity by."""
+    if error_deg is None:
+        return "it is rebooted, but its horizon was not checked, as it did not rest"
+    apart = float(np.abs(error_deg).max())
+    if apart <= TILTED_DEG:
+        return f"it is rebooted, and its horizon is level within {max(apart, 0.01):.2f} deg"
+    return f"it is rebooted, and its horizon is tilted by {apart:.2f} deg: calibrate its level before it flies"
 
 
 def _unchanged_clauses(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:

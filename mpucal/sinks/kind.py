@@ -17,6 +17,13 @@ if TYPE_CHECKING:
     from .sink import Sink
 
 Say = Callable[[str], None]
+# asks the user a question, and returns the answer; True or False as the second argument says with --yes
+Confirm = Callable[[str, bool], bool]
+
+
+def nobody(_question: str, _with_yes: bool) -> bool:
+    """Answer for a user who is not there: no."""
+    return False
 
 
 class Effect(Enum):
@@ -42,7 +49,8 @@ class Device:
     Attributes
     ----------
     kind : of the source. name : value of the source's option, such as /dev/i2c-1. open : opens the source.
-    say : shows the user a sentence. flags : names of the given flags. values : of the source's options.
+    say : shows the user a sentence. flags : names of the given flags.
+    confirm : asks the user. values : of the source's options.
     """
 
     kind: SourceKind
@@ -50,6 +58,7 @@ class Device:
     open: Callable[[], Any]
     say: Say
     flags: frozenset[str] = frozenset()
+    confirm: Confirm = nobody
     values: Mapping[str, Any] = field(default_factory=dict)
 
 

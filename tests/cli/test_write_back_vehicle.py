@@ -77,7 +77,7 @@ def test_a_recording_before_the_write_takes_the_calibration_before_it(flown, mpu
 def test_a_vehicle_that_refuses_keeps_its_parameters(flown, tmp_path):
     measured = Calibration.load(flown.folder / "calibration.json")
     record = session_recorder(tmp_path, measured, None, None)
-    vehicle = make_device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"})
+    vehicle = make_device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"}, yes=True)
     with pytest.raises(WriteBackError) as raised:
         list(write_to_all((SINKS["autopilot"],), measured, vehicle, tmp_path, record, lambda question: None))
     assert raised.value.exit_code == 6

@@ -11,6 +11,7 @@ import numpy as np
 from ...data import STANDARD_GRAVITY_MPS2, Autopilot
 from ...result.calibration import Calibration
 from .compose import compose
+from .level import Level
 from .mounting import mounting
 from .slots import find_slot, slot_of
 
@@ -77,29 +78,46 @@ def select_imu(calibration: Calibration, imu: int) -> Calibration:
     raise KeyError(imu)
 
 
-def adapt_to_write(calibration: Calibration, imus: Collection[int]) -> Calibration:
-    """Return the calibration of the streams once the new parameters of `imus` (from 1) are in place.
+def adapt_to_write(calibration: Calibration, imus: Collection[int], level: Level) -> Calibration:
+    """Return the calibration of the streams once the new parameters of `imus` (from 1) and the level are in place.
 
-    The streams are then y' = A y + c of the y that was calibrated, so D' = A D and b_a' = A b_a + c.
+    The streams are then y' = Q (A y + c) of the y that was calibrated, where Q is the turn of the axes by the level, so
+    D' = Q A D Q^T and b_a' = Q (A b_a + c).
     """
     extra = dict(calibration.extra)
     if OTHERS in extra:
-        extra[OTHERS] = [_adapt(Calibration.from_document(o), imus).document() for o in extra[OTHERS]]
-    return _adapt(replace(calibration, extra=extra), imus)
+        extra[OTHERS] = [_adapt(Calibration.from_document(o), imus, level).document() for o in extra[OTHERS]]
+    return _adapt(replace(calibration, extra=extra), imus, level)
 
 
-def _adapt(calibration: Calibration, imus: Collection[int]) -> Calibration:
+def _adapt(calibration: Calibration, imus: Collection[int], level: Level) -> Calibration:
     autopilot = calibration.extra.get(AUTOPILOT, {})
     if autopilot.get("imu") not in imus:
-        return calibration
+        return _turn(calibration, level)
     slot = slot_of(autopilot["firmware"], autopilot["imu"], autopilot[NEW])
     old = None if slot is None else slot.correction(autopilot[OLD])
     new = None if slot is None else slot.correction(autopilot[NEW])
     if slot is None or old is None or new is None:
-        return calibration
+        return _turn(calibration, level)
     R_b, old = np.array(autopilot["mounting"]), slot.effective(old)
     A = R_b @ np.diag(new.scale / old.scale) @ R_b.T
     c = R_b @ (new.scale * (old.offset - new.offset))
     now = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}
     extra = {**calibration.extra, AUTOPILOT: now}
-    return replace(calibration, D=A @ calibration.D, b_a=A @ calibration.b_a + c, extra=extra)
+    return _turn(replace(calibration, D=A @ calibration.D, b_a=A @ calibration.b_a + c, extra=extra), level)
+
+
+def _turn(calibration: Calibration, level: Level) -> Calibration:
+    autopilot, Q = calibration.extra.get(AUTOPILOT, {}), level.turn
+    if "mounting" not in autopilot or np.array_equal(Q, np.eye(3)):
+        return calibration
+    names = {name: value for name, value in level.values().items() if name in autopilot[OLD]}
+    now = {**autopilot, OLD: {**autopilot[OLD], **names}, "mounting": (Q @ np.array(autopilot["mounting"])).tolist()}
+    return replace(
+        calibration,
+        D=Q @ calibration.D @ Q.T,
+        b_a=Q @ calibration.b_a,
+        K=Q @ calibration.K @ Q.T,
+        b_omega=Q @ calibration.b_omega,
+        extra={**calibration.extra, AUTOPILOT: now},
+    )

@@ -30,12 +30,15 @@ class SwappedSlotsError(WriteBackError):
         self.order = order
 
 
-def verify(planned: Sequence[Change], old: Mapping[str, float], before: RestMeans, after: RestMeans | None) -> None:
+def verify(
+    planned: Sequence[Change], old: Mapping[str, float], before: RestMeans, after: RestMeans | None, turn: Vector
+) -> None:
     """Check that each stream changed as its new parameters must change it.
 
     Parameters
     ----------
     old : the vehicle's parameters before the write, by name. before, after : its streams at rest then and now.
+    turn : rotation (3, 3) of the streams by the new level.
 
     Raises
     ------
@@ -56,7 +59,7 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: RestMean
         held = at.slot.correction(old)
         if held is None or not held.scale.all():
             return 0.0
-        expected = at.slot.effective(held).recorrect(at.new, imu.mounting, before.mean[imu.stream])
+        expected = turn @ at.slot.effective(held).recorrect(at.new, imu.mounting, before.mean[imu.stream])
         apart: Vector = np.abs(after.mean[imu.stream] - turned.T @ expected)
         noise = np.hypot(before.error[imu.stream], after.error[imu.stream])
         return float((apart - AGREE_MPS2 - SIGMAS * noise).max() - PER_TURN * angle * STANDARD_GRAVITY_MPS2)

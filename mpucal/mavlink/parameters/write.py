@@ -36,6 +36,7 @@ class Writer:
     Parameters
     ----------
     monitor : says whether it is armed. slots : to be written. journal : keeps old and new values meanwhile.
+    others : names of parameters besides, which the firmware uses as they are set.
 
     Attributes
     ----------
@@ -43,22 +44,27 @@ class Writer:
     """
 
     def __init__(
-        self, link: Link, monitor: ArmingMonitor, slots: Sequence[Slot], journal: Journal | None = None
+        self,
+        link: Link,
+        monitor: ArmingMonitor,
+        slots: Sequence[Slot],
+        journal: Journal | None = None,
+        others: Sequence[str] = (),
     ) -> None:
-        self._link, self._monitor, self._slots = link, monitor, tuple(slots)
+        self._link, self._monitor, self._slots, self._others = link, monitor, tuple(slots), tuple(others)
         self._parameters = ParameterClient(link)
         self._journal = journal or Journal()
         self._touched: set[str] = set()
         self.restored = False
 
     def read(self) -> dict[str, float]:
-        """Return the vehicle's values of all slots.
+        """Return the vehicle's values of all parameters to be written.
 
         Raises
         ------
         LinkError : it does not answer, or with two values.
         """
-        names = [name for slot in self._slots for name in slot.names]
+        names = [*(name for slot in self._slots for name in slot.names), *self._others]
         return {name: float(value) for name, value in self._parameters.read_agreed(names).items()}
 
     def write(self, old: Mapping[str, float], new: Mapping[str, float], verify: Callable[[], None]) -> None:
@@ -84,10 +90,12 @@ class Writer:
             self._restore(old, failure)
         self._journal.end()
 
-    def _vectors(self) -> Iterator[tuple[Slot, tuple[str, ...]]]:
+    def _vectors(self) -> Iterator[tuple[Slot | None, tuple[str, ...]]]:
         for slot in self._slots:
             yield slot, slot.offset
             yield slot, slot.scale
+        for name in self._others:
+            yield None, (name,)
 
     def _set(self, step: Step) -> None:
         self._parameters.set(step.name, step.value)
@@ -136,13 +144,13 @@ def is_partial_write(held: Mapping[str, float], old: Mapping[str, float], new: M
     return all(min(abs(held[name] - old[name]), abs(held[name] - new.get(name, old[name]))) <= reach for name in old)
 
 
-def _steps(slot: Slot, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
+def _steps(slot: Slot | None, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
     """Yield the steps that set `names` of one vector to `values`, which holds all of it.
 
     If the firmware ignores small changes, the steps have it use the same values at once as after a start.
     """
-    wanted = slot.correction(values)
-    if not slot.limits.unnoticed or wanted is None or not names:
+    wanted = None if slot is None else slot.correction(values)
+    if slot is None or not slot.limits.unnoticed or wanted is None or not names:
         yield from (Step(name, values[name]) for name in names)
         return
     used = slot.values(slot.effective(wanted))

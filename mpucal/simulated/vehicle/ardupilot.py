@@ -10,11 +10,12 @@ from ...data import Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.firmwares import ARDUPILOT, FILTERS
 from ...mavlink.parameters.encoding import INT32, REAL32, Parameter
+from ...mavlink.parameters.level import tilt_deg
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES, ORIENTATION
 from ...mavlink.parameters.slots import AXES, all_slots
 from ...mavlink.prearm import SYS_STATUS
 from .filter import LowPass
-from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, Firmware
+from .firmware import ATTITUDE, HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .imus import BLOCK
 from .options import VehicleOptions
 from .store import INT8, INT16
@@ -37,6 +38,7 @@ FORCE_SAVE = 76
 class ArduPilot(Firmware):
     """Firmware that corrects in the sensor's axes, turns to the vehicle's, then filters (AP_InertialSensor)."""
 
+    name = ARDUPILOT
     autopilot = 3
     tick_us = 1_000_000 // LOOP_HZ
     folder = "/APM/"
@@ -81,12 +83,14 @@ class ArduPilot(Firmware):
         return self._low_pass(in_sensor @ self.rotation.T, again)
 
     def process(self, corrected: Vector) -> None:
-        """Compare the accelerometers once a second."""
+        """Compare the accelerometers and learn the first one's bias, once a second."""
         super().process(corrected)
         self._ticks += len(corrected)
         since = self._ticks % LOOP_HZ
         if since < len(corrected):
             self._compare(corrected[-1 - since], self._ticks - since)
+            acc: list[float] = corrected[-1 - since, 0, 0].tolist()
+            self.bias = np.array(learn_bias(self.bias.tolist(), acc, 1 / LEARN_S))
 
     def message(self, message_id: int, t_us: int) -> Message | None:
         """Return a message; RAW_IMU is IMU 1, corrected and filtered like the others."""
@@ -101,6 +105,8 @@ class ArduPilot(Firmware):
                 return self.scaled_imu(imu, t_us)
             if self.options.has_fault("phantom"):
                 return self.scaled_imu(imu, t_us, [0] * 10)
+        if message_id == ATTITUDE:
+            return self.attitude(t_us)
         return self.sys_status() if message_id == SYS_STATUS else None
 
     def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
@@ -129,7 +135,10 @@ class ArduPilot(Firmware):
         return self.store.vector(SLOTS[imu].offset), self.store.vector(SLOTS[imu].scale)
 
     def calibrate(self, how: float) -> bool:
-        """Save the ids of the present sensors as those of the calibrated ones."""
+        """Store the level, or the ids of the present sensors as those of the calibrated ones."""
+        if how == LEVEL:
+            self.store_level(tilt_deg(self.mean_force))
+            return True
         if how != FORCE_SAVE:
             return False
         self._saved_ids = list(DEVICE_IDS[: self.options.imus])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 
 import numpy as np
 
-from ...data import Vector
+from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, HIGHRES, MESSAGE_ID, RAW, SCALED
 from ...mavlink.parameters.encoding import Parameter
+from ...mavlink.parameters.level import attitude_deg, trim_of, trim_values
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES, euler_matrix, orientation_matrix
 from ...mavlink.prearm import PREARM_CHECK
 from .imus import Imus
@@ -20,6 +22,11 @@ LSB = np.array([[ACC_LSB_MPS2], [GYRO_LSB_RAD_S]])
 SCALED_IMUS = tuple(MESSAGE_ID[name] for name in SCALED)
 RAW_IMU, HIGHRES_IMU = MESSAGE_ID[RAW], MESSAGE_ID[HIGHRES]
 ACCELEROMETER = 2
+ATTITUDE = 30
+# An estimator learns nothing of a sensor that reads less than LEAST_MPS2, as without a scale.
+LEARN_S, LARGEST_BIAS_MPS2, LEAST_MPS2 = 15.0, 0.4, 1.0
+# param5 of MAV_CMD_PREFLIGHT_CALIBRATION, of both firmwares
+LEVEL = 2
 
 
 class Firmware(ABC):
@@ -31,8 +38,11 @@ class Firmware(ABC):
     folder : of its card. store : its parameters.
     check_is_present : SYS_STATUS lists the pre-arm check as present.
     sends_on_request : it answers MAV_CMD_REQUEST_MESSAGE. streams : message ids and intervals [us] after a start.
-    corrected : (imus, 2, 3) specific force [m/s^2] and rate [rad/s] in the vehicle's axes.
+    rotation : R_b (3, 3) of the board. mounting : the same with the level that turns the streams.
+    corrected : (imus, 2, 3) specific force [m/s^2] and rate [rad/s] of the streams.
     """
+
+    name: str
 
     autopilot: int
     tick_us: int
@@ -45,8 +55,10 @@ class Firmware(ABC):
     def __init__(self, options: VehicleOptions) -> None:
         self.options = options
         self.store = ParameterStore()
-        self.rotation = mounted(options)
+        self.rotation = self.mounting = mounted(options)
         self.corrected = np.zeros((options.imus, 2, 3))
+        # Of the first accelerometer, by the attitude estimator [m/s^2].
+        self.bias = np.zeros(3)
         self.temperature_c = 0.0
         self.armed = False
         # The next samples, and the same ones under the present corrections.
@@ -55,8 +67,9 @@ class Firmware(ABC):
         self._version = -1
 
     def start(self) -> None:
-        """Boot with the stored parameters."""
+        """Boot with the stored parameters; the estimator has learnt nothing yet."""
         self._version = -1
+        self.bias = np.zeros(3)
 
     def sense(self, imus: Imus, ticks: int) -> None:
         """Take that many samples, one a tick."""
@@ -115,6 +128,26 @@ class Firmware(ABC):
         """Return True if it accepts messages of a ground station with this id."""
         return True
 
+    @property
+    def trim_deg(self) -> Vector:
+        """Trim (3,) in the parameters."""
+        return trim_of(self.name, {name: float(value) for name, value in self.store.items()})
+
+    def store_level(self, roll_pitch_deg: Vector) -> None:
+        """Store roll and pitch of the trim."""
+        self.store.set_all(trim_values(self.name, np.append(roll_pitch_deg, self.trim_deg[2])))
+
+    @property
+    def mean_force(self) -> Vector:
+        """Mean of the first accelerometer (3,) over a tenth of a second."""
+        return np.asarray(self._ahead[:, 0, 0].mean(axis=0)) if len(self._ahead) else self.corrected[0, 0]
+
+    def attitude(self, t_us: int) -> Message:
+        """Return ATTITUDE, by gravity as the estimator sees it."""
+        roll, pitch = np.radians(attitude_deg(self.name, self.trim_deg, self.mean_force - self.bias)).tolist()
+        rates: list[float] = self.corrected[0, 1].tolist()
+        return dialect().MAVLink_attitude_message(t_us // 1000, roll, pitch, 0.0, *rates)
+
     def learn_offsets(self) -> list[str]:
         """Change the accelerometers' offsets by those that it learnt; return the names of the changed parameters."""
         return []
@@ -145,6 +178,17 @@ class Firmware(ABC):
         sensors = ACCELEROMETER | (PREARM_CHECK if self.check_is_present else 0)
         health = ACCELEROMETER | (0 if self.complaints() else PREARM_CHECK)
         return dialect().MAVLink_sys_status_message(sensors, sensors, health, 100, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
+
+
+def learn_bias(bias: list[float], acc: list[float], share: float) -> list[float]:
+    """Return the estimator's bias after a sample: it moves by `share` of what |acc| differs from gravity.
+
+    Plain numbers take a tenth as long as arrays of three.
+    """
+    unbiased = [a - b for a, b in zip(acc, bias, strict=True)]
+    gain = (1 - STANDARD_GRAVITY_MPS2 / max(math.hypot(*unbiased), LEAST_MPS2)) * share
+    learnt = [b + f * gain for b, f in zip(bias, unbiased, strict=True)]
+    return [min(max(b, -LARGEST_BIAS_MPS2), LARGEST_BIAS_MPS2) for b in learnt]
 
 
 def mounted(options: VehicleOptions) -> Vector:

@@ -67,12 +67,16 @@ class Imus:
         force, rate = (means @ FROM_HAND @ self._rotation for means in self._motion.means(edges))
         return np.stack([self._in_si(response, force, rate) for response in self._responses], axis=1)
 
-    def truth(self, number: int, offset: Vector, scale: Vector) -> dict[str, Any]:
+    def truth(self, number: int, offset: Vector, scale: Vector, mounting: Vector | None = None) -> dict[str, Any]:
         """Return the truth of IMU `number`'s stream in the vehicle's axes, under the parameters `offset` and `scale`.
 
         The stream is R_b diag(scale) (raw - offset), and raw = D R_b^T s + b_a.
+
+        Parameters
+        ----------
+        mounting : R_b, if it is not that of the board alone.
         """
-        R, true = self._rotation, self.truths[number]
+        R, true = self._rotation if mounting is None else mounting, self.truths[number]
         stream = replace(
             true,
             D=R @ np.diag(scale) @ true.D @ R.T,

@@ -10,11 +10,12 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.firmwares import EKF2_IMU_CTRL, PX4
 from ...mavlink.parameters.encoding import INT32, Parameter
-from ...mavlink.parameters.mounting import BOARD_ANGLES, BOARD_ROTATION
+from ...mavlink.parameters.level import tilt_deg
+from ...mavlink.parameters.mounting import BOARD_ANGLES, BOARD_ROTATION, euler_matrix
 from ...mavlink.parameters.slots import PX4_LIMITS, Slot, all_slots
 from ...mavlink.prearm import SYS_STATUS
 from ...mavlink.px4_preparation import AUTOCAL, QUICK
-from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, Firmware
+from .firmware import ATTITUDE, HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .options import VehicleOptions
 
 LOOP_HZ = 250
@@ -23,7 +24,6 @@ SLOTS = all_slots(PX4)
 DEVICE_IDS = (1310988, 1310996, 1311004)
 # MAV_PARAM_ERROR
 DOES_NOT_EXIST, PERMISSION_DENIED, TYPE_MISMATCH = 1, 3, 7
-LEARN_S, LARGEST_BIAS_MPS2 = 15.0, 0.4
 LEARN_GYROSCOPE, LEARN_ACCELEROMETER = 1, 2
 # A lower rate is taken for a bias.
 STILL_RAD_S = 0.05
@@ -33,6 +33,7 @@ ALL_OF_THEM = 7
 class Px4(Firmware):
     """Firmware that corrects in the sensor's axes and turns to the vehicle's; HIGHRES_IMU lacks the EKF's biases."""
 
+    name = PX4
     autopilot = 12
     tick_us = 1_000_000 // LOOP_HZ
     folder = "/fs/microsd/"
@@ -61,10 +62,12 @@ class Px4(Firmware):
         """Start from the identity, and take over the stored corrections that differ enough from it."""
         super().start()
         self._offset, self._scale = np.zeros((self.options.imus, 3)), np.ones((self.options.imus, 3))
-        self._bias, self._gyro_bias = np.zeros(3), np.zeros(3)
+        self._gyro_bias = np.zeros(3)
         self._take_over()
 
     def _take_over(self) -> None:
+        # The streams are turned by the level, too.
+        self.mounting = euler_matrix(self.store.vector(BOARD_ANGLES).tolist()) @ self.rotation
         self._rates = np.array([self.store.vector(SLOTS[imu].gyro_offset) for imu in range(self.options.imus)])
         for imu in range(self.options.imus):
             slot = self._slot(imu)
@@ -82,35 +85,34 @@ class Px4(Firmware):
     def correct(self, raw: Vector, again: int) -> Vector:
         """Return R_b ((raw - OFF) * SCALE), and of rates R_b (raw - OFF)."""
         in_sensor = np.stack(((raw[:, :, 0] - self._offset) * self._scale, raw[:, :, 1] - self._rates), axis=2)
-        return np.asarray(in_sensor @ self.rotation.T)
+        return np.asarray(in_sensor @ self.mounting.T)
 
     def process(self, corrected: Vector) -> None:
-        """Estimate the EKF's biases of IMU 1; plain numbers take a tenth as long as arrays of three."""
+        """Estimate the EKF's biases of IMU 1."""
         super().process(corrected)
         control, share = int(self.store[EKF2_IMU_CTRL]), self.tick_us * 1e-6 / LEARN_S
-        bias, gyro_bias = self._bias.tolist(), self._gyro_bias.tolist()
+        bias, gyro_bias = self.bias.tolist(), self._gyro_bias.tolist()
         for acc, rate in corrected[:, 0].tolist():
             if control & LEARN_GYROSCOPE and math.hypot(*rate) < STILL_RAD_S:
                 gyro_bias = [b + (r - b) * share for b, r in zip(gyro_bias, rate, strict=True)]
             if control & LEARN_ACCELEROMETER:
-                unbiased = [a - b for a, b in zip(acc, bias, strict=True)]
-                gain = (1 - STANDARD_GRAVITY_MPS2 / math.hypot(*unbiased)) * share
-                learnt = [b + f * gain for b, f in zip(bias, unbiased, strict=True)]
-                bias = [min(max(b, -LARGEST_BIAS_MPS2), LARGEST_BIAS_MPS2) for b in learnt]
-        self._bias, self._gyro_bias = np.array(bias), np.array(gyro_bias)
+                bias = learn_bias(bias, acc, share)
+        self.bias, self._gyro_bias = np.array(bias), np.array(gyro_bias)
 
     def message(self, message_id: int, t_us: int) -> Message | None:
         """Return a message; there is no RAW_IMU."""
         if message_id == HIGHRES_IMU:
-            return self.highres_imu(t_us, self._bias, self._gyro_bias)
+            return self.highres_imu(t_us, self.bias, self._gyro_bias)
         if message_id in SCALED_IMUS and SCALED_IMUS.index(message_id) < self.options.imus:
             return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
+        if message_id == ATTITUDE:
+            return self.attitude(t_us)
         return self.sys_status() if message_id == SYS_STATUS else None
 
     def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
         """Accept any stream that it knows, at most as fast as it can send it."""
         m = dialect()
-        if message_id == RAW_IMU or message_id not in (HIGHRES_IMU, SYS_STATUS, *SCALED_IMUS):
+        if message_id == RAW_IMU or message_id not in (HIGHRES_IMU, SYS_STATUS, ATTITUDE, *SCALED_IMUS):
             return m.MAV_RESULT_FAILED, -1
         if interval_us <= 0:
             return m.MAV_RESULT_ACCEPTED, 0
@@ -135,8 +137,8 @@ class Px4(Firmware):
             return []
         slot, gyro_offset = self._slot(0) or SLOTS[0], SLOTS[0].gyro_offset
         self.store[slot.sensor_id] = DEVICE_IDS[0]
-        self.store.set_vector(slot.offset, self._offset[0] + self.rotation.T @ self._bias)
-        self.store.set_vector(gyro_offset, self.store.vector(gyro_offset) + self.rotation.T @ self._gyro_bias)
+        self.store.set_vector(slot.offset, self._offset[0] + self.mounting.T @ self.bias)
+        self.store.set_vector(gyro_offset, self.store.vector(gyro_offset) + self.mounting.T @ self._gyro_bias)
         self._gyro_bias = np.zeros(3)
         self._take_over()
         return [slot.sensor_id, *slot.offset, *gyro_offset]
@@ -146,12 +148,17 @@ class Px4(Firmware):
         return self._offset[imu], self._scale[imu]
 
     def calibrate(self, how: float) -> bool:
-        """Store each sensor's id and the offset that makes it level: the quick calibration of `commander`."""
+        """Store the level, or each sensor's id and the offset that makes it level: `commander`'s quick calibration."""
+        if how == LEVEL:
+            at_rest = euler_matrix(self.trim_deg.tolist()).T @ (self.mean_force - self.bias)
+            self.store_level(tilt_deg(at_rest))
+            self._take_over()
+            return True
         if how != QUICK:
             return False
         for imu in range(self.options.imus):
             slot = self._slot(imu) or SLOTS[imu]
-            level = self.rotation.T @ (self.corrected[imu, 0] - [0.0, 0.0, -STANDARD_GRAVITY_MPS2]) + self._offset[imu]
+            level = self.mounting.T @ (self.corrected[imu, 0] - [0.0, 0.0, -STANDARD_GRAVITY_MPS2]) + self._offset[imu]
             self.store[slot.sensor_id] = DEVICE_IDS[imu]
             self.store.set_vector(slot.offset, level)
         self._take_over()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -47,10 +47,14 @@ class ParameterStore(dict[str, Number]):
         """Return the values of several parameters."""
         return np.array([float(self[name]) for name in names])
 
+    def set_all(self, values: Mapping[str, float]) -> None:
+        """Set several parameters by name."""
+        for name, value in values.items():
+            self[name] = value
+
     def set_vector(self, names: Sequence[str], values: Vector) -> None:
         """Set several parameters."""
-        for name, value in zip(names, values.tolist(), strict=True):
-            self[name] = value
+        self.set_all(dict(zip(names, values.tolist(), strict=True)))
 
     def parameter(self, name: str) -> Parameter:
         """Return a parameter as it is sent."""

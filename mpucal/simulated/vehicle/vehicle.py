@@ -36,6 +36,8 @@ SEQUENCE = 256
 # MAV_TYPE
 TYPES = {"plane": 1, "copter": 2, "rover": 10}
 REBOOT_US = 2 * S_US
+# param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+REBOOT = 1
 SECOND_STATION_HZ = 4
 
 
@@ -119,7 +121,8 @@ class SimulatedVehicle:
 
     def truth_document(self) -> dict[str, Any]:
         """Return the truth of IMU 1's stream and, as `others`, of the other streams under the present parameters."""
-        first, *others = (self.imus.truth(imu, *self.firmware.correction(imu)) for imu in range(self.options.imus))
+        of = self.firmware
+        first, *others = (self.imus.truth(n, *of.correction(n), of.mounting) for n in range(self.options.imus))
         return {**first, "others": others}
 
     def _boot(self) -> None:
@@ -216,10 +219,13 @@ class SimulatedVehicle:
             m.MAV_CMD_REQUEST_MESSAGE: self._request_message,
             m.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
             m.MAV_CMD_PREFLIGHT_CALIBRATION: self._preflight_calibration,
+            m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._preflight_reboot,
         }
         answer = handlers.get(message.command)
         result = m.MAV_RESULT_UNSUPPORTED if answer is None else answer(message)
         self._send(m.MAVLink_command_ack_message(message.command, result))
+        if answer == self._preflight_reboot and result == m.MAV_RESULT_ACCEPTED:
+            self.reboot()
 
     def _set_message_interval(self, message: Message) -> int:
         message_id = int(message.param1)
@@ -247,6 +253,11 @@ class SimulatedVehicle:
     def _preflight_calibration(self, message: Message) -> int:
         if self.firmware.armed or not self.firmware.calibrate(message.param5):
             return int(dialect().MAV_RESULT_FAILED)
+        return int(dialect().MAV_RESULT_ACCEPTED)
+
+    def _preflight_reboot(self, message: Message) -> int:
+        if self.firmware.armed or message.param1 != REBOOT:
+            return int(dialect().MAV_RESULT_DENIED)
         return int(dialect().MAV_RESULT_ACCEPTED)
 
     def _statustext(self, message: Message) -> None:
