@@ -12,6 +12,7 @@ MpucalError
 │   │   ├── NoAnswer         no device acknowledged the address or sent a heartbeat
 │   │   ├── KeepsNothing     the bridge's firmware has no memory for a calibration
 │   │   ├── BusHeld          a wire is held low, so that every transfer times out
+│   │   ├── LateRead         this computer was busy during a read, whose time is not known
 │   │   └── LinkError        the link to a vehicle or board broke, or cannot be used
 │   └── ChipError            the chip answers, but not as in its register map
 │       ├── OddOffsets       the offset registers are not at a known place
@@ -115,6 +116,10 @@ class KeepsNothing(BusError):  # noqa: N818 - reads as the sentence it is
 
 class BusHeld(BusError):  # noqa: N818 - reads as the sentence it is
     """A wire of the bus is held low, so that every transfer times out."""
+
+
+class LateRead(BusError):  # noqa: N818 - reads as the sentence it is
+    """This computer was busy during a read, whose time is therefore not known."""
 
 
 class ChipError(SourceError):

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from ..errors import BusError, BusHeld, LinkError, NoAnswer
+from ..errors import BusError, BusHeld, LateRead, LinkError, NoAnswer
 
-ON_THE_LINK = "lost on the link to the board"
-KINDS = {NoAnswer: "not acknowledged", BusHeld: "timed out", LinkError: ON_THE_LINK}
+ON_THE_LINK, LATE = "lost on the link to the board", "delayed by this computer"
+KINDS = {NoAnswer: "not acknowledged", BusHeld: "timed out", LateRead: LATE, LinkError: ON_THE_LINK}
 OTHER_KIND = "broken off"
 REMEDY = "shorten the wires, keep them away from motors, add pull-ups of 2.2 to 4.7 kΩ, or run the bus at 100 kHz"
-LINK_REMEDY = "the sensor's wires are not the cause: check the board's cable and supply, or the network in between"
+LATE_REMEDY = "end other programs on this computer, or start mpucal with a higher priority"
+OTHER_REMEDIES = {
+    ON_THE_LINK: "the sensor's wires are not the cause: check the board's cable and supply, or the network in between",
+    LATE: LATE_REMEDY,
+}
 
 
 @dataclass
@@ -40,7 +44,7 @@ class TransferStats:
     def remedy(self) -> str:
         """Remedy for the most frequent kind of error."""
         worst = self.errors.most_common(1)
-        return LINK_REMEDY if worst and worst[0][0] == ON_THE_LINK else REMEDY
+        return OTHER_REMEDIES.get(worst[0][0], REMEDY) if worst else REMEDY
 
     def __str__(self) -> str:
         """Return a clause, such as: 12 of 5030 transfers failed (0.24 %: 12 not acknowledged), 11 repeated."""

@@ -21,7 +21,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from mcap.well_known import MessageEncoding, SchemaEncoding
-from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from mcap.writer import MCAP0_MAGIC, CompressionType, IndexType, Writer
 from zstandard import ZstdError, frame_content_size
 
 from ..arguments import check_regular
@@ -69,8 +69,8 @@ class CaptureWriter:
     def __init__(self, path: str | Path) -> None:
         self._meta: Mapping[str, Any] = {}
         self._file = GrowingFile(Path(path))
-        # the index of chunks grows by 1 MB an hour, which is wasted if the file is not kept
-        self._stream = _Stream(cast("IO[bytes]", self._file), CHUNK_NS, chunked=self._file.kept)
+        # an index of these chunks would take 9 MB of memory an hour
+        self._stream = _Stream(cast("IO[bytes]", self._file), CHUNK_NS, IndexType.METADATA, self._file.kept)
 
     def start(self, meta: Mapping[str, Any]) -> None:
         """Write the metadata: source, program and settings, values of JSON types."""
@@ -91,7 +91,7 @@ class CaptureWriter:
             self._stream.add(SessionEvent(name, t_ns, data or {}))
 
     def close(self) -> None:
-        """Write the index, close the file, and rewrite it with longer chunks if the disk has room for that."""
+        """Close the file, and rewrite it with longer chunks and their index if the disk has room for that."""
         with self._writing():
             try:
                 self._stream.finish()
@@ -133,11 +133,15 @@ class _Stream:
 
     Parameters
     ----------
-    longest_ns : of a chunk. chunked : False to write no chunks.
+    longest_ns : of a chunk. index : what is indexed at the end. chunked : False to write no chunks.
     """
 
-    def __init__(self, file: IO[bytes], longest_ns: int, chunked: bool = True) -> None:
-        self._writer = Writer(file, compression=CompressionType.ZSTD, enable_data_crcs=True, use_chunking=chunked)
+    def __init__(
+        self, file: IO[bytes], longest_ns: int, index: IndexType = IndexType.ALL, chunked: bool = True
+    ) -> None:
+        self._writer = Writer(
+            file, compression=CompressionType.ZSTD, index_types=index, enable_data_crcs=True, use_chunking=chunked
+        )
         self._longest_ns = longest_ns
         self._channels: dict[str, int] = {}
         self._waiting: list[Transaction] = []

@@ -58,7 +58,7 @@ class Runner:
         self._open_next_part, self._start_worker, self._checking = open_next_part, start_worker, checking
         self._machine = Machine(plan.until_end, plan.target, plan.tilt_only, plan.attended, checking, plan.board)
         self._dialogue = Dialogue(self._machine, operator, listeners, note, source.now_ns, late)
-        self._ended = False
+        self._ended, self._samples = False, 0
         self.sensor: Sensor | None = None
 
     def measure(self) -> Recording:
@@ -90,6 +90,8 @@ class Runner:
     def record(self, seconds: float | None) -> int:
         """Measure for `seconds`, or until any key or the source's end; return the number of samples.
 
+        The samples are in the capture, and are not kept: a recording may last for days.
+
         Raises
         ------
         SourceError : the source failed before the board was turned.
@@ -104,8 +106,9 @@ class Runner:
                 self._end_recording()
                 break
             self._poll()
+            self._source.forget()
         self._stop_source()
-        return len(self._source.recording())
+        return self._samples
 
     def calibrate(self, recording: Recording, fit: Callable[[Recording], Calibration]) -> Calibration:
         """Fit, and add the result of the verification; Abandoned if the person stopped it meanwhile."""
@@ -142,10 +145,11 @@ class Runner:
             self.sensor = self._source.start()
             end_ns = math.inf if seconds is None else self._source.now_ns() + seconds * 1e9
             while self._source.now_ns() < end_ns and not self._operator.pressed():
-                self._source.poll()
+                self._samples += len(self._source.poll())
+                self._source.forget()
             self._end_recording()
             self._source.stop()
-        return len(self._source.recording())
+        return self._samples
 
     def _end_recording(self) -> None:
         """Write a key into the capture, so that a replay calibrates, or aborts where there is too little."""
@@ -181,6 +185,7 @@ class Runner:
             # A CaptureError is not caught: a capture that does not replay is not calibrated.
             self._source_ended(SourceEnded(f"{error.what}: {error.remedy}"), error)
         else:
+            self._samples += len(samples)
             self._dialogue.arrive(samples)
 
     def _source_ended(self, event: SourceEnded, error: BusError | ChipError | None = None) -> None:

@@ -25,6 +25,7 @@ from .host_bus import HostBus, converting
 from .iio_errors import attribute_error, buffer_error
 from .kind import Request
 from .opened_source import Say
+from .read_timer import ReadTimer
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
@@ -133,6 +134,7 @@ class IioFiles(HostBus):
         self._sysfs, self._dev = sysfs or SYSFS, dev or DEVICES
         self._open: dict[str, int] = {}
         self._before: dict[str, bytes] = {}
+        self._timer = ReadTimer(self.now_ns)
 
     def check(self, device: str) -> None:
         """Raise BusError if there is no such device."""
@@ -153,11 +155,10 @@ class IioFiles(HostBus):
             return Reply("\n".join(self._names(device)).encode(), self.now_ns())
         if not name:
             return self._buffer(device, count)
-        begun_ns = self.now_ns()
         with converting(lambda error: attribute_error(error, device, name, None)):
-            data = (self._sysfs / register).read_bytes()[:count]
+            reply = self._timer.read(register, count, lambda: (self._sysfs / register).read_bytes()[:count])
         # The driver reads the count from the chip in between.
-        return Reply(data, (begun_ns + self.now_ns()) // 2)
+        return reply._replace(t_ns=(reply.t_ns + self.now_ns()) // 2)
 
     def write(self, register: str, data: bytes) -> int:
         """See Files."""

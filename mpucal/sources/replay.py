@@ -7,9 +7,9 @@ from typing import Any
 
 from ..chip.access import Reply, Transaction
 from ..chip.records import Record, SessionEvent
-from ..errors import BusError, BusHeld, CaptureError, EndOfCapture, LinkError, NoAnswer
+from ..errors import BusError, BusHeld, CaptureError, EndOfCapture, LateRead, LinkError, NoAnswer
 
-_RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld, LinkError)}
+_RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld, LateRead, LinkError)}
 _RAISES["LinkLost"] = LinkError
 
 

@@ -19,6 +19,7 @@ from .chip import OpenedChip
 from .host_bus import ADDRESSES, HostBus, find_chip, register_after
 from .i2c_errors import no_answer_error
 from .kind import Request
+from .read_timer import ReadTimer
 
 I2C_HZ = 400_000
 # Command buffer of an MPSSE engine; shorter transfers are not faster, by the adapter's latency.
@@ -123,7 +124,7 @@ class UsbBus(HostBus):
     """
 
     def __init__(self, name: str, adapter: Callable[[str], Adapter], address: int | None = None) -> None:
-        self._name = name
+        self._name, self._timer = name, ReadTimer(self.now_ns)
         try:
             self._adapter = adapter(name)
         except Exception as error:  # libusb, hidapi and both libraries have their own
@@ -140,11 +141,14 @@ class UsbBus(HostBus):
 
     def read(self, register: int, count: int) -> Reply:
         """Read `count` bytes from `register` on; the time is just before the first transfer."""
-        t_ns, data = self.now_ns(), b""
+        return self._timer.read(register, count, lambda: self._read(register, count))
+
+    def _read(self, register: int, count: int) -> bytes:
+        data = b""
         while len(data) < count:
             place = register_after(register, len(data))
             data += self._exchange(self.address, place, min(count - len(data), MAX_READ_BYTES))
-        return Reply(data, t_ns)
+        return data
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time just before the transfer."""

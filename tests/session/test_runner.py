@@ -55,6 +55,9 @@ class Source:
     def recording(self):
         return Recording(**vars(Samples.joined(self.parts)), sensor=Sensor(chip="MPU-6050"))
 
+    def forget(self):
+        self.parts = []
+
     def now_ns(self):
         return int(self.polls * POLL / RATE_HZ * 1e9)
 
@@ -287,6 +290,7 @@ def test_recording_ends_when_asked_and_leaves_the_key_that_replays_it(person, se
     assert Runner(source, person, notes, plan=Plan(until_end=True)).record(seconds) == polls * POLL
     assert [note.data for note in notes] == [{module.KEY: key}]
     assert source.stops == 1
+    assert not source.parts
 
 
 def test_recording_ends_with_the_source():

@@ -1,10 +1,12 @@
-"""A read that was delayed by a pause of the process is repeated, since its time would be early by the pause."""
+"""A read that was delayed by a pause of the process is repeated, or fails: its time would be early by the pause."""
 
 from itertools import count
 
 import pytest
 
 from mpucal.chip import registers as reg
+from mpucal.chip.driver import SAMPLE_BYTES, STATUS_BYTES
+from mpucal.errors import LateRead
 from mpucal.sources.read_timer import LATE_NS, TRIES, ReadTimer
 
 USUAL_NS = 400_000
@@ -29,7 +31,7 @@ def host():
 @pytest.fixture
 def read(host):
     stamp = ReadTimer(lambda: host.now_ns)
-    read = lambda register=reg.FIFO_COUNT_H: stamp.read(register, 2, host.transfer)  # noqa: E731
+    read = lambda register=reg.FIFO_COUNT_H, count=2: stamp.read(register, count, host.transfer)  # noqa: E731
     read()
     return read
 
@@ -48,16 +50,28 @@ def test_after_a_pause_it_is_read_again(host, read, pauses):
     assert host.now_ns - reply.t_ns == USUAL_NS
 
 
-def test_of_nothing_but_pauses_the_shortest_counts(host, read):
+def test_of_nothing_but_pauses_no_time_is_known(host, read):
     host.takes_ns = [14_000_000, 5_000_000, 9_000_000]
-    assert read() == (b"\2", USUAL_NS + 14_000_000, None)
+    with pytest.raises(LateRead, match="took 9 ms longer than usual"):
+        read()
     assert next(host.read) == 1 + TRIES
 
 
-def test_what_a_read_takes_away_is_not_read_again(host, read):
-    for register in (reg.FIFO_R_W, reg.INT_STATUS):
-        read(register)
-        host.takes_ns = [14_000_000]
-        before = next(host.read)
-        read(register)
-        assert next(host.read) == before + 2
+@pytest.mark.parametrize(
+    ("register", "count", "tries"),
+    [
+        (reg.FIFO_COUNT_H, 2, 2),
+        (reg.ACCEL_XOUT_H, 14, 2),
+        (reg.INT_ENABLE, SAMPLE_BYTES, 2),
+        ("iio:device0/in_accel_x_raw", 4096, 2),
+        (reg.INT_ENABLE, STATUS_BYTES, 1),
+        (reg.FIFO_R_W, 512, 1),
+        ("iio:device0/in_accel_scale", 4096, 1),
+    ],
+)
+def test_only_what_is_a_time_of_samples_is_read_again(host, read, register, count, tries):
+    read(register, count)
+    host.takes_ns = [14_000_000]
+    before = next(host.read)
+    read(register, count)
+    assert next(host.read) - before - 1 == tries

@@ -3,6 +3,8 @@
 Each part that is claimed is simulated from its row: the driver calls it by its name and knows its temperature.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 
 from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
+from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.chip.families import PARTS
 from mpucal.errors import SourceError
@@ -19,6 +22,7 @@ from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
+from mpucal.sources.tap import Tap
 from tools.lab import session_trials as trials
 from tools.lab.sessions import NOTHING, Ear, Session, by_command, ended_of
 
@@ -37,15 +41,16 @@ def struck(rng, names, end_s):
 def recorded(words):
     """Record a chip for so long, as far as it gives samples, and calibrate."""
     plan = Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True)
-    bus, said = open_simulated(words), ""
-    driver = Driver(bus, plan.config)
+    bus, accesses, said = open_simulated(words), [], ""
+    tapped = Tap(bus, SimpleNamespace(transaction=accesses.append))
     try:
-        Runner(driver, Ear(), lambda *_: None, plan, (bus.hear,)).record(RECORDED_S)
+        Runner(Driver(tapped, plan.config), Ear(), lambda *_: None, plan, (bus.hear,)).record(RECORDED_S)
     except SourceError as error:
         said = str(error)
-    recording = driver.recording()
-    if len(recording) < 2:
-        return Session(code=SourceError.exit_code, said=said)
+    try:
+        recording = decode(accesses)
+    except SourceError as error:
+        return Session(code=SourceError.exit_code, said=said or str(error))
     return Session(calibrate(recording), bus.truth_document(), recording, said=said)
 
 
