@@ -119,7 +119,7 @@ class BusHeld(BusError):  # noqa: N818 - reads as the sentence it is
 
 
 class LateRead(BusError):  # noqa: N818 - reads as the sentence it is
-    """This computer was busy during a read, whose time is therefore not known."""
+    """A busy computer delayed a read, whose time is therefore not known."""
 
 
 class ChipError(SourceError):

@@ -15,6 +15,7 @@ from typing import Any
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import OutputFolder
 from ..errors import SourceError, UsageError
+from ..files.budget import VARIABLE, allowed_bytes
 from .journal import RowJournal
 from .row import Settings, make_rows
 
@@ -164,6 +165,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
+                env={VARIABLE: str(allowed_bytes() >> 20)},
                 local_directory=scratch,
                 dashboard_address=":8787" if dashboard else ":0",
                 # its messages would only be about a worker that could not be started

@@ -12,7 +12,7 @@ import click
 
 from ..arguments import read_limited
 from ..errors import UsageError
-from ..files.budget import MOST_MB, VARIABLE
+from ..files.budget import MOST_MB, VARIABLE, allowed_bytes
 from ..files.hints import Hints, parse_columns, parse_span, parse_units
 from .options import ABOVE_ZERO, Parsed, decorated, given_options
 from .person import say
@@ -31,8 +31,7 @@ NAMES = {
 
 
 def _allow(_context: click.Context, _option: click.Parameter, megabytes: int | None) -> None:
-    if megabytes is not None:
-        os.environ[VARIABLE] = str(megabytes)
+    os.environ[VARIABLE] = str(megabytes or allowed_bytes() >> 20)
 
 
 _MOST = click.option(

@@ -1,14 +1,16 @@
 """Limits on the memory that reading a recording takes: a file of kilobytes may claim, or unpack to, gigabytes.
 
-The limit is $MPUCAL_MOST_MB, or --most-mb. A file that states too large a size is refused at once; otherwise Linux
-enforces the limit while the file is read (RLIMIT_DATA, getrlimit(2)), and the old limit is restored afterwards.
+The limit is $MPUCAL_MOST_MB, or --most-mb. A file that states too large a size is refused at once. Otherwise Linux
+enforces the limit while the file is read (RLIMIT_DATA, getrlimit(2)). That limits the whole process: where it has other
+threads, it is not done unless $MPUCAL_MOST_MB is set, as the command line does.
 """
 
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from ..errors import RecordingError
@@ -22,6 +24,7 @@ HELD = 6
 LONGEST_LINE = 1 << 20
 # bytes of a chunk of an MCAP file; those of mpucal hold ten seconds, 2 MB at most
 LONGEST_CHUNK = 64 << 20
+_ONE = threading.RLock()
 
 
 def allowed_bytes() -> int:
@@ -36,23 +39,6 @@ def check_size(path: Path, count: int, each: int = 1) -> None:
         raise _too_much(path, f"takes {count >> 20} MB")
 
 
-@contextmanager
-def limit_memory(path: Path) -> Iterator[None]:
-    """Limit the memory that the block takes to read `path`.
-
-    Raises
-    ------
-    RecordingError : it needs more.
-    """
-    with _limit_growth():
-        try:
-            yield
-            return
-        except MemoryError:
-            pass
-    raise _too_much(path, f"takes more than {allowed_bytes() >> 20} MB of memory")
-
-
 def _too_much(path: Path, what: str) -> RecordingError:
     megabytes = allowed_bytes() >> 20
     return RecordingError(
@@ -62,18 +48,32 @@ def _too_much(path: Path, what: str) -> RecordingError:
 
 
 @contextmanager
-def _limit_growth() -> Iterator[None]:
-    """Limit the growth of this program's memory within the block, where the system can do that."""
-    before = None
-    with suppress(ImportError, OSError, ValueError):
-        import resource  # noqa: PLC0415 - not on Windows
+def limit_memory(path: Path) -> Iterator[None]:
+    """Limit the memory that the block takes to read `path`; see above.
 
-        data = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5]) * resource.getpagesize()
-        before, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        most = min((data + allowed_bytes(), *(limit for limit in (before, hard) if limit >= 0)))
-        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
-    try:
+    Raises
+    ------
+    RecordingError : it needs more.
+    """
+    with _limited() if VARIABLE in os.environ or threading.active_count() == 1 else nullcontext():
+        try:
+            yield
+            return
+        except MemoryError:
+            pass
+    raise _too_much(path, f"takes more than {allowed_bytes() >> 20} MB of memory")
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Limit the growth of this process within the block, where the system can do that; one block at a time."""
+    with _ONE, ExitStack() as stack:
+        with suppress(ImportError, OSError, ValueError):
+            import resource  # noqa: PLC0415 - not on Windows
+
+            data = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5]) * resource.getpagesize()
+            before, hard = resource.getrlimit(resource.RLIMIT_DATA)
+            most = min((data + allowed_bytes(), *(limit for limit in (before, hard) if limit >= 0)))
+            resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+            stack.callback(resource.setrlimit, resource.RLIMIT_DATA, (before, hard))
         yield
-    finally:
-        if before is not None:
-            resource.setrlimit(resource.RLIMIT_DATA, (before, hard))

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
+from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..chip.config import Config, RateOnlyConfig
 from ..chip.driver import DRIVER_VERSION
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
 from ..iio import IIO_VERSION
-from .aims import NORMAL
+from .aims import AIMS, NORMAL
+from .boards import BOARDS
 
 DRIVER, PLAN = "driver", "plan"
 # The class of a capture's sensor settings, by the version of the driver that recorded it.
@@ -41,6 +43,16 @@ class Plan:
     gravity_anyway: bool = False
     board: str = ""
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for settings of a damaged capture that no session has."""
+        fits = (
+            LEAST_GRAVITY_MPS2 <= self.gravity <= MOST_GRAVITY_MPS2
+            and self.target in list(AIMS)
+            and self.board in ("", *BOARDS)
+        )
+        if not fits:
+            raise ValueError(f"gravity {self.gravity!r}, target {self.target!r}, board {self.board!r}")
+
     def meta(self) -> dict[str, Any]:
         """Return the head of a capture, in JSON's own types."""
         return {DRIVER: DRIVER_VERSION, PLAN: asdict(self)}
@@ -54,7 +66,8 @@ class Plan:
         CaptureError : another version of the driver recorded it, or its head holds no plan.
         """
         version = meta.get(DRIVER)
-        if version not in CONFIGS:
+        # A damaged head may hold a list, which is no key.
+        if version not in list(CONFIGS):
             raise CaptureError(
                 f"{name} was recorded by version {version} of the driver, and this is {DRIVER_VERSION}",
                 "use `mpucal calibrate`, which reads captures of every version",

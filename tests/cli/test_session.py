@@ -3,7 +3,7 @@ import os
 import re
 import signal
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import pytest
 from mpucal.chip.access import Transaction
 from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
+from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -131,9 +132,13 @@ def test_no_capture_is_written_over(mpucal, session):
     ("head", "sentence"),
     [
         ({"driver": 0}, "version 0 of the driver"),
+        ({"driver": [6]}, "version [6] of the driver"),
         ({"plan": {"config": 3}}, "does not hold the session's settings"),
+        *(
+            ({"plan": {**asdict(Plan()), **odd}}, "does not hold the session's settings")
+            for odd in ({"gravity": "9"}, {"gravity": 1e300}, {"target": []}, {"board": "none"})
+        ),
     ],
-    ids=["another driver", "no plan"],
 )
 def test_a_capture_with_another_head_is_not_replayed(mpucal, session, tmp_path, rewritten, head, sentence):
     capture = read_capture(session.folder / "capture.mcap")

@@ -1,6 +1,7 @@
 """A small file that holds, or says that it holds, more than may be taken."""
 
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,23 @@ def test_what_takes_more_than_it_says_is_stopped(tmp_path, monkeypatch):
         bytearray(128 << 20)
     with budget.limit_memory(tmp_path / "a.csv"):
         bytearray(1 << 20)
+    assert resource.getrlimit(resource.RLIMIT_DATA) == before
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not count all memory")
+def test_other_threads_of_a_caller_are_not_limited(tmp_path, monkeypatch):
+    import resource
+
+    def limited():
+        with budget.limit_memory(tmp_path / "a.csv"):
+            return resource.getrlimit(resource.RLIMIT_DATA) != before
+
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    with ThreadPoolExecutor(1) as other:
+        monkeypatch.delenv(budget.VARIABLE, raising=False)
+        assert not other.submit(limited).result()
+        monkeypatch.setenv(budget.VARIABLE, "64")
+        assert other.submit(limited).result()
     assert resource.getrlimit(resource.RLIMIT_DATA) == before
 
 
