@@ -1,8 +1,9 @@
 """A calibration as sysfs commands for Linux's IIO, calibbias and calibscale, and the accelerometer's matrix for udev.
 
 iio-sensor-proxy shows M diag(calibscale) (y + offset of calibbias), with M of udev's ACCEL_MOUNT_MATRIX, so that
-M diag(calibscale) = inv(D); M has columns of length 1 if there is a calibscale. The driver inv_mpu6050 writes calibbias
-to the accelerometer's offset registers and has no calibscale. Its mount matrix, of the device tree, is for all channels
+M diag(calibscale) = inv(D) scale / printed; M has columns of length 1 if there is a calibscale. The driver inv_mpu6050
+prints a scale that is 0.07 to 0.09 % less than the data sheet's, to which D refers. It writes calibbias to the
+accelerometer's offset registers and has no calibscale. Its mount matrix, of the device tree, is for all channels
 (inv_mpu_core.c, inv_ext_info): inv(D) there would distort the gyroscope's rates. For a chip with the MPU-6500's
 registers the driver writes calibbias to wrong addresses, those of the MPU-6050, so it must not be used.
 """
@@ -15,8 +16,10 @@ import numpy as np
 
 from ..chip.families import MPU6050, PARTS
 from ..chip.offsets import shift_words
+from ..chip.registers import ACCEL_RANGES_G
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
+from ..iio.attributes import ACCEL, MPU_SCALES, PRINTED_SCALES
 from ..result.calibration import Calibration
 from .losses import format_xyz, heading
 
@@ -28,7 +31,8 @@ STEP_G = 2 / LSB_PER_G
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """Return a script for /bin/sh, whose argument is the device's folder, with `notes` in its heading."""
     words, _ = offset_words(calibration)
-    gain = calibration.inverse
+    data_sheet, printed = _scales(calibration)
+    gain = calibration.inverse * (data_sheet / printed)
     scale = np.linalg.norm(gain, axis=0)
     usage = "usage: sh FILE /sys/bus/iio/devices/iio:deviceN"
     lines = ["#!/bin/sh", *heading(calibration, (usage, *notes), "# "), "set -e", _DEVICE, _PUT]
@@ -55,17 +59,33 @@ def offset_words(calibration: Calibration) -> tuple[tuple[int, int, int] | None,
         return None, f"calibbias is not used: {error.what}"
 
 
+def _scales(calibration: Calibration) -> tuple[float, float]:
+    """Return the scale of a count by the data sheet, and as inv_mpu6050 prints it; ones for other chips and ranges."""
+    sensor = calibration.sensor
+    if sensor.who_am_i not in PARTS or sensor.accel_range_g not in ACCEL_RANGES_G:
+        return 1.0, 1.0
+    code = ACCEL_RANGES_G.index(int(sensor.accel_range_g))
+    return MPU_SCALES[ACCEL][code], PRINTED_SCALES[ACCEL][code]
+
+
 def losses(calibration: Calibration) -> tuple[str, ...]:
     """Return notes on the errors that remain."""
     _, why = offset_words(calibration)
+    data_sheet, printed = _scales(calibration)
+    scale: tuple[str, ...] = (_SCALE,)
+    if data_sheet != printed:
+        scale += (
+            f"The line is for in_accel_scale {printed:g}, as inv_mpu6050 prints it at this range: where in_accel_scale"
+            f" differs, multiply the line's numbers by {printed:g} / in_accel_scale.",
+        )
     if why:
-        return (f"{why}; programs have to subtract b_a, ({format_xyz(calibration.b_a)}) m/s^2.", _SCALE)
+        return (f"{why}; programs have to subtract b_a, ({format_xyz(calibration.b_a)}) m/s^2.", *scale)
     step = STEP_G * STANDARD_GRAVITY_MPS2 / 2
     return (
         f"calibbias has steps of 1 mg: up to {step:.4f} m/s^2 of b_a remain; where 4096 counts of an offset register"
         " are 1 g, as in some MPU-6050, half of b_a remains (`mpucal write` measures this).",
         "The offset registers are volatile: run the script after each start.",
-        _SCALE,
+        *scale,
     )
 
 

@@ -1,8 +1,8 @@
 """A kernel driver as a sink: b_a in calibbias of an MPU-6050, D as udev's ACCEL_MOUNT_MATRIX.
 
 calibbias of inv_mpu6050 are the words of the accelerometer's offset registers, 2048 for 1 g; for an MPU-6500 the driver
-writes y and z to wrong addresses, so they are not used there. iio-sensor-proxy multiplies the channels by
-ACCEL_MOUNT_MATRIX instead of the device tree's matrix M: it becomes M inv(D).
+writes y and z to wrong addresses, so they are not used there. iio-sensor-proxy multiplies the channels, at the scale
+that the driver prints, by ACCEL_MOUNT_MATRIX instead of the device tree's matrix M: M inv(D) scale / printed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..disk.atomic import write_atomically
 from ..errors import ChipError, OutputError
 from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
-from ..iio.attributes import ACCEL, AXES, mount_matrix
+from ..iio.attributes import ACCEL, AXES, mount_matrix, read_scale
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, DeviceAttributes
@@ -102,7 +102,8 @@ class KernelSink:
         words, why = offset_words(calibration)
         if words is not None and not set(CALIBBIAS) <= self._attributes.names:
             words, why = None, "has no calibbias"
-        matrix = matrix_text(mount_matrix(texts, ACCEL) @ calibration.inverse)
+        accel = read_scale(ACCEL, self._source.devices.accel, texts, {})
+        matrix = matrix_text(mount_matrix(texts, ACCEL) @ calibration.inverse * (accel.scale / accel.printed))
         with self._restoring():
             applied = np.zeros(3) if words is None else self._write_words(calibration, words)
             rule = self._write_matrix(texts["name"], matrix)

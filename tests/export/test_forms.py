@@ -268,7 +268,10 @@ def device(folder, *writable, words=(-1501, 2000, 701)):
 
 
 def seen_by_iio(folder, said, y, trim):
-    """M diag(calibscale) (y + what the registers add), as iio-sensor-proxy has it; 2048 counts to 1 g."""
+    """M diag(calibscale) (y + what the registers add), as iio-sensor-proxy has it; 2048 counts to 1 g.
+
+    inv_mpu6050 prints 0.001196 m/s^2 for a count at 4 g.
+    """
     words = [int((folder / f"in_accel_{axis}_calibbias").read_text()) for axis in "xyz"]
     assert [word & 1 for word in words] == [word & 1 for word in trim]
     added = (np.array(words) - trim) / 2048 * STANDARD_GRAVITY_MPS2
@@ -277,7 +280,7 @@ def seen_by_iio(folder, said, y, trim):
     assert (folder / "in_mount_matrix").read_text() == "1, 0, 0; 0, 1, 0; 0, 0, 1"
     text = re.search(r"ACCEL_MOUNT_MATRIX=(.*)", said)[1]
     M = np.array([[float(word) for word in row.split(",")] for row in text.split(";")])
-    return ((y + added) * scale) @ M.T
+    return ((y + added) * (0.001196 / (STANDARD_GRAVITY_MPS2 / 8192)) * scale) @ M.T
 
 
 @pytest.mark.parametrize("writable", [(), ("calibscale",)], ids=["inv_mpu6050", "scale"])

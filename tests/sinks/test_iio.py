@@ -20,6 +20,8 @@ from mpucal.sinks.iio import KernelSink
 from mpucal.sources.iio import OpenedIio
 
 BIAS = np.array([0.32, -0.11, -0.53])
+# scale of a count by the data sheet, which D is of, over that of inv_mpu6050, at 2 g
+RATIO = STANDARD_GRAVITY_MPS2 / 16384 / 0.000598
 BOTH = Devices("iio:device0", "iio:device0")
 
 
@@ -68,7 +70,7 @@ def test_b_a_is_gone_from_the_samples_and_udev_has_the_rest(made, tmp_path):
     rule = (tmp_path / "61-mpucal-iio-device0.rules").read_text()
     assert 'KERNEL=="iio:device0", ATTR{name}=="mpu6050"' in rule
     rows = matrix_in(tmp_path / "61-mpucal-iio-device0.rules")
-    np.testing.assert_allclose(rows @ found.D, np.eye(3), atol=1e-8)
+    np.testing.assert_allclose(rows @ found.D, RATIO * np.eye(3), atol=1e-8)
     assert "read back and verified in the samples" in applied.what
     sink.put_back(kept)
     assert files._words() == before
@@ -81,7 +83,7 @@ def test_the_device_trees_matrix_stays_in_udevs(made, tmp_path):
     sink._decoder.texts("iio:device0")["in_mount_matrix"] = "0, 1, 0; -1, 0, 0; 0, 0, 1"
     sink.write(found)
     rows = matrix_in(tmp_path / "61-mpucal-iio-device0.rules")
-    np.testing.assert_allclose(rows @ found.D, turned, atol=1e-8)
+    np.testing.assert_allclose(rows @ found.D, RATIO * turned, atol=1e-8)
 
 
 def test_of_an_mpu_6500_calibbias_is_left_alone(made):

@@ -80,15 +80,15 @@ def test_it_is_set_up_read_and_left_as_it_was(tree):
     held = {name: (tree / name).read_text() for name in ("buffer/enable", "trigger/current_trigger", "buffer/length")}
     assert held == {"buffer/enable": "1", "trigger/current_trigger": "mpu6050-dev0", "buffer/length": "100"}
     assert (tree / "current_timestamp_clock").read_text() == "monotonic"
-    # a driver's printed scale is its own: 0.001196 is 4 g but for 0.1 %
     assert (sensor.chip, sensor.accel_range_g, sensor.gyro_range_dps) == ("MPU-6050", 4.0, 500.0)
     os.write(writer, frames((1, 2, 8192, -4, 5, 6), (1, 2, 8192, -4, 5, 6), (1, 2, 32767, -4, 5, 6)))
     samples = driver.poll()
     driver.stop()
     files.close()
     os.close(writer)
-    np.testing.assert_allclose(samples.acc[0], np.array([1, 2, 8192]) * 0.001196)
-    np.testing.assert_allclose(samples.gyr[0], np.array([-4, 5, 6]) * 0.000266181)
+    # by the data sheet; the driver prints 0.001196 and 0.000266181
+    np.testing.assert_allclose(samples.acc[0], np.array([1, 2, 8192]) * 9.80665 / 8192)
+    np.testing.assert_allclose(samples.gyr[0], np.radians(np.array([-4, 5, 6]) / 65.5))
     np.testing.assert_allclose(np.diff(samples.t), 0.02)
     assert samples.acc_clipped.tolist() == [False, False, True]
     assert driver.recording().sensor == sensor.__class__(**{**vars(sensor), "rate_hz": pytest.approx(50)})
@@ -132,7 +132,7 @@ def test_polled_channels_are_interpolated_to_common_times(tree):
     recording = decode.decode(accesses)
     assert len(recording) == 19
     np.testing.assert_allclose(np.ptp(recording.acc, axis=1), 0, atol=1e-12)
-    np.testing.assert_allclose(recording.acc[:, 0] / 0.000598, recording.t * 1e4)
+    np.testing.assert_allclose(recording.acc[:, 0] / (9.80665 / 16384), recording.t * 1e4)
 
 
 def simulated(**kind):

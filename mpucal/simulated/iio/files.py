@@ -20,21 +20,17 @@ from ...chip.families import PARTS, Part
 from ...chip.offsets import OffsetRegisters, Words
 from ...chip.port import Port
 from ...chip.probe import read_identity
-from ...chip.registers import ACCEL_LSB_PER_G, ACCEL_RANGES_G, GYRO_LSB_PER_DPS, GYRO_RANGES_DPS
-from ...data import STANDARD_GRAVITY_MPS2, Samples
-from ...iio.attributes import ACCEL, AXES, GYRO, TEMP, TIMESTAMP
+from ...chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
+from ...data import Samples
+from ...iio.attributes import ACCEL, AXES, GYRO, MPU_SCALES, PRINTED_SCALES, TEMP, TIMESTAMP
 from ...iio.scan_elements import FrameLayout, ScanElement
 from ...iio.setup import TRIGGERS
 from ...sources.iio_errors import attribute_error, buffer_error
 from ..chip import SimulatedBus
 
 RATES_HZ = (10, 20, 50, 100, 200, 500)
-SCALES = {
-    ACCEL: [STANDARD_GRAVITY_MPS2 / lsb for lsb in ACCEL_LSB_PER_G],
-    GYRO: [float(np.radians(1 / lsb)) for lsb in GYRO_LSB_PER_DPS],
-}
 RANGES = {ACCEL: ACCEL_RANGES_G, GYRO: GYRO_RANGES_DPS}
-SETTINGS = ("buffer/enable", "sampling_frequency", *(f"{kind}_scale" for kind in SCALES))
+SETTINGS = ("buffer/enable", "sampling_frequency", *(f"{kind}_scale" for kind in RANGES))
 CHANNELS = [f"{kind}_{axis}" for kind in (ACCEL, GYRO) for axis in AXES]
 REGISTERS = {channel: reg.ACCEL_XOUT_H + 2 * i for i, channel in enumerate([*CHANNELS[:3], TEMP, *CHANNELS[3:]])}
 IDENTITY = "1, 0, 0; 0, 1, 0; 0, 0, 1"
@@ -168,8 +164,8 @@ class _Device:
         self.texts = {"name": part.chip.replace("-", "").lower(), "in_mount_matrix": IDENTITY}
         self.texts |= {"sampling_frequency": "50", "sampling_frequency_available": " ".join(map(str, RATES_HZ))}
         for kind in kinds:
-            self.texts[f"{kind}_scale"] = f"{SCALES[kind][0]:.9f}"
-            self.texts[f"{kind}_scale_available"] = " ".join(f"{scale:.9f}" for scale in SCALES[kind])
+            scales = [f"{scale:.9f}" for scale in PRINTED_SCALES[kind]]
+            self.texts |= {f"{kind}_scale": scales[0], f"{kind}_scale_available": " ".join(scales)}
             self.texts |= {f"{kind}_{axis}_raw": "" for axis in AXES}
         if ACCEL in kinds:
             self.texts |= {f"{ACCEL}_{axis}_calibbias": "" for axis in AXES}
@@ -199,7 +195,7 @@ class _Device:
     def range(self, kind: str) -> int:
         """Return the range in g or deg/s."""
         scale = float(self.texts[f"{kind}_scale"])
-        return RANGES[kind][int(np.argmin(np.abs(np.array(SCALES[kind]) - scale)))]
+        return RANGES[kind][int(np.argmin(np.abs(np.array(PRINTED_SCALES[kind]) - scale)))]
 
     def begin(self) -> None:
         """Empty the buffer, which has just been enabled or disabled."""
@@ -213,8 +209,7 @@ class _Device:
         columns = {TIMESTAMP: np.round(samples.t * 1e9).astype(np.int64), TEMP: np.round(temperature)}
         for kind, values in ((ACCEL, samples.acc), (GYRO, samples.gyr)):
             if kind in self.kinds:
-                scale = SCALES[kind][RANGES[kind].index(self.range(kind))]
-                counts = np.round(values / scale)
+                counts = np.round(values / MPU_SCALES[kind][RANGES[kind].index(self.range(kind))])
                 columns |= {f"{kind}_{axis}": counts[:, i] for i, axis in enumerate(AXES)}
         return columns
 
