@@ -13,6 +13,7 @@ from .losses import (
     float_rounding,
     hardware_offsets,
     optional_temperature,
+    scale_of_rates,
     without_gyroscope,
     without_temperature,
 )
@@ -61,7 +62,7 @@ FORMS = (
         "C99, C++11",
         "`mpucal_correct_at(y, temperature_c, a)`, `mpucal_correct_gyro(y, w)`; of counts, with a check of the range",
         c_header.text,
-        (float_rounding, optional_temperature, hardware_offsets),
+        (float_rounding, scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(
         "arduino",
@@ -77,7 +78,7 @@ FORMS = (
         "NumPy",
         "`apply(y, temperature_c)`, `apply_gyro(y)`",
         python.text,
-        (optional_temperature, hardware_offsets),
+        (scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(
         "ros",
@@ -146,7 +147,7 @@ FORMS = (
         "MicroPython, CircuitPython",
         "`apply(y, temperature_c)`, `apply_gyro(y)` of one sample, without NumPy; of counts, with a check of the range",
         micropython.text,
-        (float_rounding, optional_temperature, hardware_offsets),
+        (float_rounding, scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(
         "esphome",

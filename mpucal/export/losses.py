@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..chip.families import PARTS
+from ..chip.registers import GYRO_RANGES_DPS
+from ..data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..errors import RefusedError
 from ..result.calibration import REFUSED, Calibration
 
@@ -63,6 +65,27 @@ def float_error_mps2(calibration: Calibration) -> float:
     range_mps2 = (calibration.sensor.accel_range_g or 16.0) * STANDARD_GRAVITY_MPS2
     gain = float(np.abs(calibration.inverse).sum(axis=1).max())
     return 8 * FLOAT_EPS * gain * (range_mps2 + float(np.abs(calibration.b_a).max()))
+
+
+def scale_of_rates(calibration: Calibration) -> tuple[str, ...]:
+    """Return the note for a form that takes rates from other programs, which differ in the scale of a count.
+
+    Source: Adafruit_MPU6050 2.2.8, MPU6050_light 1.2.1 and FastIMU 1.2.9, compiled; the first two have the data sheet's
+    sensitivities as it prints them, with one decimal.
+    """
+    range_dps = calibration.sensor.gyro_range_dps
+    if calibration.sensor.who_am_i not in PARTS or range_dps not in GYRO_RANGES_DPS:
+        return ()
+    lsb_per_dps = GYRO_COUNTS / range_dps
+    others = {
+        "those of Adafruit_MPU6050 and MPU6050_light": round(lsb_per_dps, 1),
+        "those of FastIMU": 32768 / range_dps,
+    }
+    factors = [f"{name} by {lsb / lsb_per_dps:.7g}" for name, lsb in others.items() if lsb != lsb_per_dps]
+    return (
+        f"Rates must be at the data sheet's {lsb_per_dps:g} LSB/(deg/s): multiply {', '.join(factors)}, and those of"
+        f" another library by its raw count / (its rate in deg/s * {lsb_per_dps:g}).",
+    )
 
 
 def without_gyroscope(calibration: Calibration) -> tuple[str, ...]:

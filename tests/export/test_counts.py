@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -124,6 +125,18 @@ def test_the_c_header_and_mpucal_apply(ranged, calibration, in_c):
     # in counts
     assert np.abs(fixed_a - a / reg.mps2_per_lsb(code)).max() < 0.6
     assert np.abs(fixed_w - w / reg.rad_s_per_lsb(code)).max() < 0.6
+
+
+def test_the_factors_for_the_rates_of_libraries(ranged, words):
+    """Divide the counts as the libraries do, whose sources were compiled; see losses.scale_of_rates."""
+    code, calibration, _, w = ranged
+    (note,) = [note for note in form("c-header").export(calibration)[1] if note.startswith("Rates")]
+    rounded = {"Adafruit_MPU6050 and MPU6050_light": (131, 65.5, 32.8, 16.4)[code], "FastIMU": 32768 / RANGES[code][1]}
+    for library, lsb_per_dps in rounded.items():
+        factor = re.search(rf"{library} by ([\d.]+)", note)
+        assert factor or lsb_per_dps == reg.GYRO_LSB_PER_DPS[code]
+        rates = np.radians(words[:, 3:] / lsb_per_dps) * (float(factor[1]) if factor else 1.0)
+        np.testing.assert_allclose(calibration.apply(np.zeros((len(words), 3)), rates)[1], w, rtol=2e-6, atol=1e-6)
 
 
 def test_micropythons_module(ranged, words):
