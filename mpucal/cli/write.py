@@ -44,7 +44,7 @@ def command(
         OutputFolder(folder or calibration.parent) as into,
         kind.open(make_device(at_gravity_of(written, options), yes)) as sink,
     ):
-        objection = write_objection(written, sink) if written is not None and written.quality else None
+        objection = write_objection(written, sink) if written is not None else None
         if objection is not None:
             say(f"{objection}.")
         ask(f"Write {calibration} to {sink.where}?", yes)

@@ -22,7 +22,9 @@ def examine_conformance(link: Link) -> Iterator[Finding]:
     hello = link.bridge
     has = {"chip": bool(hello.address), "stream": bool(hello.features & Feature.STREAM), "blob": False}
     why = {"chip": "no chip answers", "stream": "it pushes no samples", "blob": "it stores no calibration"}
-    if hello.features & Feature.BLOB:
+    if hello.features & Feature.OCCUPIED:
+        why["blob"] = "its memory holds other data, which is kept"
+    elif hello.features & Feature.BLOB:
         # The talks about storing would overwrite a stored calibration.
         has["blob"] = link.ask(BlobState())[0][-1].reply.status == Status.NO_BLOB
         why["blob"] = "it stores a calibration, which is kept"

@@ -28,11 +28,6 @@ def open_bridge(device: Device) -> Iterator[BridgeSink]:
     BusError : there is no such port, no bridge on it, or the bridge has no memory.
     """
     with resolve_name(device.kind.store)(device.values) as store:
-        if store.occupied:
-            device.say(
-                f"the memory of the bridge on {store.name} holds something else, perhaps data of another sketch;"
-                " a write overwrites it (MPUCAL_EEPROM_AT in the sketch chooses another address)"
-            )
         yield BridgeSink(store)
 
 
@@ -53,7 +48,12 @@ class BridgeSink:
         return (path,)
 
     def reason_to_keep(self, calibration: Calibration) -> str | None:
-        """See ComparableSink; an empty or damaged memory is never as good."""
+        """See ComparableSink; an empty or damaged memory is never as good, but other data may be needed."""
+        if self._store.occupied:
+            return (
+                f"the memory of {self.where} holds other data, perhaps another sketch's or file system's, which a write"
+                " overwrites (MPUCAL_EEPROM_AT in the sketch chooses another place)"
+            )
         held = self._store.read()
         try:
             old = None if held is None else Calibration.from_blob(Blob.decode(held))
@@ -70,6 +70,9 @@ class BridgeSink:
             self._check_chip(calibration)
             old = self._store.read()
         try:
+            if self._store.occupied:
+                self._store.erase()
+                self._store.greet()
             self._store.write(new)
             read_back, held = self._store.read(), self._store.state()
         except (BusError, KeyboardInterrupt) as error:

@@ -106,9 +106,11 @@ def write_objection(calibration: Calibration, sink: Sink) -> str | None:
     SourceError : the sink cannot be read.
     """
     verification = calibration.quality.get("verification")
-    if not verification or verification.get("agrees") is not True:
-        return "the calibration was not verified in new orientations"
-    return sink.reason_to_keep(calibration) if isinstance(sink, ComparableSink) else None
+    reasons = [sink.reason_to_keep(calibration)] if isinstance(sink, ComparableSink) else []
+    # a blob has no quality
+    if calibration.quality and not (verification and verification.get("agrees") is True):
+        reasons.insert(0, "the calibration was not verified in new orientations")
+    return "; ".join(filter(None, reasons)) or None
 
 
 def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> str:

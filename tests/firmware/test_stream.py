@@ -133,14 +133,14 @@ def test_an_overflow_while_it_was_read_takes_the_last_message_away(stream):
 
 @pytest.mark.parametrize("register", [0x72, 0x74, 0x3A], ids=["count", "frames", "status"])
 @pytest.mark.parametrize("code", [Status.NO_ANSWER, Status.BUS_FAILED])
-def test_a_transfer_that_fails_stands_the_stream(register, code, stream):
+def test_a_transfer_that_fails_halts_the_stream(register, code, stream):
     stream.make(4)
     stream.failures[register] = code
     (message,) = stream.look()
     assert (message.status, message.drops, message.frames) == (code, 1, b"")
 
 
-def test_while_it_stands_it_says_so_every_100_ms_and_leaves_the_fifo_alone(stream):
+def test_once_halted_it_says_so_every_100_ms_and_leaves_the_fifo_alone(stream):
     stream.make(74)
     stream.look()
     del stream.reads[:]

@@ -13,6 +13,7 @@ from mpucal.chip.access import Reply
 from mpucal.doctor.conformance import examine_conformance
 from mpucal.doctor.finding import Mark
 from mpucal.simulated.bridge import EmulatedBridge
+from mpucal.simulated.bridge.storage import Memory
 from mpucal.sources.bridge import board
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.conformance import find_difference, talks
@@ -39,8 +40,10 @@ class Chip:
         return self.read(register, count).data
 
 
-def _core(request, _folder):
+def _core(request, _folder, content=b"\xff" * 1024):
+    """Return a function from bytes of a host to those of the bridge, and the bridge's memory."""
     host = request.getfixturevalue("host")
+    eeprom = host.Eeprom(content)
 
     def read(address, first, count):
         return asked(address), Chip().read(first, count).data
@@ -49,15 +52,17 @@ def _core(request, _folder):
         # 0 is the general call
         return Status.OK if address == 0x68 else Status.BUS_FAILED if address == 0 else Status.NO_ANSWER
 
-    return host.HostBridge(request.getfixturevalue("core"), host.Eeprom(), read, asked).receive
+    return host.HostBridge(request.getfixturevalue("core"), eeprom, read, asked).receive, eeprom.content
 
 
-def _emulated(_request, _folder):
-    return _working(EmulatedBridge(Chip(), lambda: 0))
+def _emulated(_request, _folder, content=b"\xff" * 1024):
+    memory = Memory()
+    memory.data[:] = content
+    return _working(EmulatedBridge(Chip(), lambda: 0, memory)), memory.data
 
 
 def _micropython(_request, folder):
-    return _working(board.Bridge([Chip()], lambda: 0, f"{folder}/"))
+    return _working(board.Bridge([Chip()], lambda: 0, f"{folder}/")), None
 
 
 def _working(bridge):
@@ -71,10 +76,32 @@ def _working(bridge):
 @pytest.mark.parametrize("made", [_core, _emulated, _micropython], ids=["the core", "the emulated", "MicroPython's"])
 @pytest.mark.parametrize("path", sorted(VECTORS.glob("talk_*.json")), ids=lambda path: path.stem)
 def test_answers_as_the_golden_talks_say(path, made, request, tmp_path):
-    said = made(request, tmp_path)
+    said, _ = made(request, tmp_path)
     said(Frame(wire.Hello.TYPE, 0, wire.Hello().payload()).encode())
     for each in json.loads(path.read_text())["talk"]:
         assert find_difference(each, Deframer().feed(said(bytes.fromhex(each["host"])))) == ""
+
+
+@pytest.mark.parametrize("made", [_core, _emulated], ids=["the core", "the emulated"])
+def test_other_data_are_given_up_only_by_an_erase(made, request, tmp_path):
+    others = bytes(range(256)) * 4
+    said, memory = made(request, tmp_path, others)
+
+    def ask(message):
+        (frame,) = Deframer().feed(said(Frame(message.TYPE, 1, message.payload()).encode()))
+        return wire.answer_of(frame.type, frame.payload)
+
+    def occupied():
+        return bool(ask(wire.Hello()).features & wire.Feature.OCCUPIED)
+
+    assert occupied()
+    assert ask(wire.BlobBegin(212)).status == Status.OCCUPIED
+    assert (ask(wire.BlobState()).status, ask(wire.BlobData(0, b"x")).status) == (Status.NO_BLOB, Status.NOT_BEGUN)
+    assert memory == others
+    assert ask(wire.BlobErase()).status == Status.OK
+    assert not occupied()
+    assert ask(wire.BlobBegin(212)).status == Status.OK
+    assert memory[2 * 264 :] == others[2 * 264 :]
 
 
 def test_the_package_holds_the_golden_talks():

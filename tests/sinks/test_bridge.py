@@ -20,6 +20,7 @@ class FakeStore:
     """
 
     name = "/dev/ttyUSB0"
+    occupied = False
 
     def __init__(self, blob=OLD, fails=(), spoils=(), stores_first=False, chip=0x68):
         self.blob, self.fails, self.spoils = blob, list(fails), list(spoils)
@@ -52,7 +53,7 @@ class FakeStore:
         self.generation += 1
 
     def erase(self):
-        self.blob = None
+        self.blob, self.occupied = None, False
 
 
 @pytest.fixture
@@ -113,6 +114,15 @@ def test_what_fails_leaves_the_old_one_and_says_so(calibration, store, words, le
     with pytest.raises(WriteBackError, match=words):
         BridgeSink(held).write(calibration)
     assert held.blob == left
+
+
+def test_other_data_are_an_objection_and_overwritten_only_by_a_write(calibration):
+    held = FakeStore(None)
+    held.occupied = True
+    assert "holds other data, perhaps another sketch's" in BridgeSink(held).reason_to_keep(calibration)
+    assert held.occupied
+    BridgeSink(held).write(calibration)
+    assert (held.occupied, held.blob) == (False, calibration.blob().encode())
 
 
 def test_a_reply_that_was_lost_behind_the_commit_is_no_failure(calibration):

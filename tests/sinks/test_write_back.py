@@ -178,9 +178,10 @@ class ComparableRegisters(Registers):
         ({"verification": {"agrees": True, "orientations": []}}, None, None),
         ({"verification": {"agrees": True, "orientations": []}}, "what it holds is as good", "as good"),
         ({}, None, "not verified"),
+        ({}, "it holds other data", "not verified in new orientations; it holds other data"),
         ({"verification": {"agrees": None, "orientations": []}}, None, "not verified"),
     ],
-    ids=["verified", "as good", "no verification", "a verification that nobody finished"],
+    ids=["verified", "as good", "no verification", "two reasons", "a verification that nobody finished"],
 )
 def test_without_a_person_only_what_is_verified_and_better_is_written(
     monkeypatch, tmp_path, verification, reason, objection

@@ -12,7 +12,7 @@
 
 #include "mpucal_slots.h"
 
-/* Address of the two slots of MPUCAL_SLOTS_BYTES; data of other sketches there is overwritten. */
+/* Address of the two slots of MPUCAL_SLOTS_BYTES; mpucal asks before it overwrites other data there. */
 #ifndef MPUCAL_EEPROM_AT
 #define MPUCAL_EEPROM_AT 0
 #endif
@@ -44,7 +44,7 @@ static const char *const MPUCAL_NEW_FILE = "/mpucal.new";
 static uint8_t mpucalImage[MPUCAL_SLOTS_BYTES];
 static bool mpucalMounted = false;
 
-/* Only storing a blob formats a flash without a file system: reading must not destroy other data. */
+/* Only a write formats a flash without a file system: reading must not destroy other data. */
 static void mpucalMount(bool format) {
 #if defined(ESP32)
     mpucalMounted = LittleFS.begin(format);
@@ -56,10 +56,11 @@ static void mpucalMount(bool format) {
 #endif
 }
 
-/* Content of the file; zeros, which are not a blob, without a file. */
+/* Content of the file; zeros, which are not a blob, without a file; other data, if the flash must be formatted first. */
 static void mpucalReload() {
     memset(mpucalImage, 0, sizeof mpucalImage);
     if (!mpucalMounted) {
+        mpucalImage[0] = 1;
         return;
     }
     File file = LittleFS.open(MPUCAL_FILE, "r");

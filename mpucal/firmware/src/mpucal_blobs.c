@@ -44,6 +44,9 @@ static uint8_t on_begin(struct mpucal_bridge *bridge, struct mpucal_request requ
     if (length > MPUCAL_MAX_LENGTH) {
         return MPUCAL_CODE_NO_ROOM;
     }
+    if (mpucal_slots_occupied(bridge->port->memory)) {
+        return MPUCAL_CODE_OCCUPIED;
+    }
     bridge->stream.frame_bytes = 0;
     bridge->new_blob.length = length;
     bridge->new_blob.at = mpucal_slots_open(bridge->port->memory);

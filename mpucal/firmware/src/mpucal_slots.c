@@ -45,9 +45,13 @@ static int is_sealed(const struct mpucal_memory *memory, uint16_t at) {
     return read_u32(memory, generation_at(at)) == ~read_u32(memory, complement_at(at));
 }
 
-static void break_seal(const struct mpucal_memory *memory, uint16_t at) {
-    /* No number is its own complement. */
-    memory->write(complement_at(at), memory->read(generation_at(at)));
+/* Breaks the seal of the blob at `at`, and begins it with the magic, so that the slot no longer looks like other data. */
+static void claim(const struct mpucal_memory *memory, uint16_t at) {
+    if (is_sealed(memory, at)) {
+        /* No number is its own complement. */
+        memory->write(complement_at(at), memory->read(generation_at(at)));
+    }
+    write_u32(memory, at, MPUCAL_MAGIC);
     commit(memory);
 }
 
@@ -75,7 +79,7 @@ struct mpucal_stored mpucal_slots_stored(const struct mpucal_memory *memory) {
 uint16_t mpucal_slots_open(const struct mpucal_memory *memory) {
     struct mpucal_stored stored = mpucal_slots_stored(memory);
     uint16_t at = blob_at(stored.generation && stored.at == blob_at(0));
-    break_seal(memory, at);
+    claim(memory, at);
     return at;
 }
 
@@ -98,8 +102,8 @@ uint32_t mpucal_slots_seal(const struct mpucal_memory *memory, uint16_t at) {
 
 int mpucal_slots_erase(const struct mpucal_memory *memory) {
     uint16_t at = mpucal_slots_stored(memory).at;
-    break_seal(memory, at == blob_at(0) ? blob_at(1) : blob_at(0));
-    break_seal(memory, at);
+    claim(memory, at == blob_at(0) ? blob_at(1) : blob_at(0));
+    claim(memory, at);
     return !mpucal_slots_stored(memory).generation;
 }
 

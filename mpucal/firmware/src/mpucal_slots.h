@@ -31,7 +31,7 @@ struct mpucal_stored {
 
 struct mpucal_stored mpucal_slots_stored(const struct mpucal_memory *memory);
 
-/* Returns the address for a new blob: the other slot, whose seal this breaks. */
+/* Returns the address for a new blob: the other slot, whose seal this breaks. It overwrites other data. */
 uint16_t mpucal_slots_open(const struct mpucal_memory *memory);
 
 /* Returns true if the blob at `at` is valid and has this length and CRC. */
@@ -40,10 +40,10 @@ int mpucal_slots_check(const struct mpucal_memory *memory, uint16_t at, uint16_t
 /* Seals the checked blob at `at`; returns its generation, 0 if the memory did not keep it. */
 uint32_t mpucal_slots_seal(const struct mpucal_memory *memory, uint16_t at);
 
-/* Breaks both seals, the older one first; returns true if no blob is stored any more. */
+/* Breaks both seals, the older one first, and gives up other data; returns true if no blob is stored any more. */
 int mpucal_slots_erase(const struct mpucal_memory *memory);
 
-/* Returns true if the memory holds other data, neither a blob nor erased, which storing overwrites. */
+/* Returns true if the memory holds other data, neither a blob nor erased: only mpucal_slots_erase gives it up. */
 int mpucal_slots_occupied(const struct mpucal_memory *memory);
 
 /* Loads the stored blob; see mpucal_load. */

@@ -23,7 +23,7 @@ struct mpucal_port {
 
 struct mpucal_stream {
     uint8_t frame_bytes, batch; /* frame_bytes 0: no stream runs */
-    uint8_t seq, code;          /* code: why the stream stands still */
+    uint8_t seq, code;          /* code: why the stream halted */
     uint8_t left;               /* frames of this look that are still in the FIFO */
     uint16_t index, drops;
     uint32_t look_us, sent_us;

@@ -42,7 +42,7 @@ static void push(struct mpucal_bridge *bridge, uint32_t t_us, uint8_t frames) {
     stream->sent_us = bridge->port->now_us();
 }
 
-static void stand(struct mpucal_bridge *bridge, uint8_t code) {
+static void halt(struct mpucal_bridge *bridge, uint8_t code) {
     bridge->stream.code = code;
     bridge->stream.drops++;
     bridge->stream.left = 0;
@@ -60,12 +60,12 @@ static int look(struct mpucal_bridge *bridge, uint32_t now_us) {
     stream->look_us = now_us;
     uint8_t code = read_registers(bridge, FIFO_COUNT_H, count, sizeof count);
     if (code != MPUCAL_CODE_OK) {
-        stand(bridge, code);
+        halt(bridge, code);
         return 0;
     }
     uint16_t bytes = (uint16_t)(count[0] << 8 | count[1]), frames = (uint16_t)(bytes / stream->frame_bytes);
     if (frames > MPUCAL_MAX_LOOK) {
-        stand(bridge, MPUCAL_CODE_OVERFLOW);
+        halt(bridge, MPUCAL_CODE_OVERFLOW);
         return 0;
     }
     if (frames < stream->batch && now_us - stream->sent_us < BEAT_US) {
@@ -93,7 +93,7 @@ static void push_next(struct mpucal_bridge *bridge) {
         code = MPUCAL_CODE_OVERFLOW;
     }
     if (code != MPUCAL_CODE_OK) {
-        stand(bridge, code);
+        halt(bridge, code);
     } else {
         push(bridge, stream->look_us, frames);
     }

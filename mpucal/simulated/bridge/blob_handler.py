@@ -18,7 +18,7 @@ class BlobHandler:
 
     @property
     def occupied(self) -> bool:
-        """True if storing would overwrite bytes that are not a blob's."""
+        """True if the memory holds bytes that are not a blob's."""
         return self._storage.occupied
 
     def discard(self) -> None:
@@ -63,6 +63,8 @@ class BlobHandler:
     def _begin(self, request: wire.BlobBegin) -> Status:
         if request.length > MAX_LENGTH:
             return Status.NO_ROOM
+        if self._storage.occupied:
+            return Status.OCCUPIED
         self._storage.begin()
         self._length, self._arrived = request.length, 0
         return Status.OK

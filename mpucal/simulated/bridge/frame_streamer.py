@@ -41,7 +41,7 @@ class FrameStreamer:
             try:
                 made = list(self._read_fifo(late))
             except BusError as error:
-                made = [self._stop(Status.NO_ANSWER if isinstance(error, NoAnswer) else Status.BUS_FAILED, now_ns)]
+                made = [self._halt(Status.NO_ANSWER if isinstance(error, NoAnswer) else Status.BUS_FAILED, now_ns)]
         else:
             made = [self._frames(now_ns)] if late else []
         if made:
@@ -52,7 +52,7 @@ class FrameStreamer:
         t_ns = self._now_ns()
         n = int.from_bytes(self._bus().read(reg.FIFO_COUNT_H, 2).data, "big") // self._frame_bytes
         if n > MAX_LOOK:
-            yield self._stop(Status.OVERFLOW, t_ns)
+            yield self._halt(Status.OVERFLOW, t_ns)
             return
         if n < self._batch and not late:
             return
@@ -63,7 +63,7 @@ class FrameStreamer:
             yield self._frames(t_ns, self._read(a_message), left)
         last = self._read(left)
         if self._bus().read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW:
-            yield self._stop(Status.OVERFLOW, t_ns)
+            yield self._halt(Status.OVERFLOW, t_ns)
         else:
             yield self._frames(t_ns, last)
 
@@ -75,7 +75,7 @@ class FrameStreamer:
         self._index = (self._index + len(data) // self._frame_bytes) % INDEX_WRAP
         return made
 
-    def _stop(self, status: Status, t_ns: int) -> Frames:
+    def _halt(self, status: Status, t_ns: int) -> Frames:
         self.drops += 1
         self._status = status
         return self._frames(t_ns)

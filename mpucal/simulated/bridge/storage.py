@@ -54,7 +54,7 @@ class SlotStorage:
 
     def begin(self) -> None:
         """Invalidate the slot that is not in use."""
-        self._invalidate(self._other())
+        self._claim(self._other())
 
     def write(self, offset: int, data: bytes) -> None:
         """Write `data` into the slot that is not in use."""
@@ -77,17 +77,19 @@ class SlotStorage:
     def erase(self) -> None:
         """Invalidate both slots."""
         other = self._other()
-        self._invalidate(other)
-        self._invalidate(1 - other)
+        self._claim(other)
+        self._claim(1 - other)
 
     def _other(self) -> int:
         stored = self.stored()
         return 1 - stored.slot if stored else 0
 
-    def _invalidate(self, slot: int) -> None:
+    def _claim(self, slot: int) -> None:
+        """Invalidate a slot, and begin it with the magic, so that it no longer looks like other data."""
         at = slot * SLOT_BYTES
         (generation,) = struct.unpack_from("<I", self._memory.data, at)
         self._memory.write(at + 4, struct.pack("<I", generation))
+        self._memory.write(at + HEADER.size, MAGIC)
 
     def _slot(self, slot: int) -> Stored | None:
         data = bytes(self._memory.data[slot * SLOT_BYTES : (slot + 1) * SLOT_BYTES])

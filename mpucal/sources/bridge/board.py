@@ -331,7 +331,7 @@ class Bridge:
             try:
                 made = self.drain(now, late)
             except Failed as error:
-                made = [self.stop(error.args[0], now)]
+                made = [self.halt(error.args[0], now)]
         if made:
             self.pushed_us = now
         return b"".join(made)
@@ -341,7 +341,7 @@ class Bridge:
         size = self.frame_bytes
         left = struct.unpack(">H", self.chip.read(FIFO_COUNT, 2))[0] // size
         if left > MAX_LOOK:
-            return [self.stop(OVERFLOW, now)]
+            return [self.halt(OVERFLOW, now)]
         if left < self.batch and not late:
             return []
         made = []
@@ -353,11 +353,11 @@ class Bridge:
                 break
             made.append(self.frames(now, data, left))
         if self.chip.read(INT_STATUS, 1)[0] & 0x10:
-            return made + [self.stop(OVERFLOW, now)]
+            return made + [self.halt(OVERFLOW, now)]
         return made + [self.frames(now, data)]
 
-    def stop(self, status, now):
-        """Count a loss, and report why the stream stands still."""
+    def halt(self, status, now):
+        """Count a loss, and report why the stream halted."""
         self.drops = self.drops + 1 & 0xFFFF
         self.status = status
         return self.frames(now)

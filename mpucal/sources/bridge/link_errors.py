@@ -22,6 +22,11 @@ SENTENCES: dict[int, tuple[str, str]] = {
     Status.BAD_OFFSET: ("the bridge on {port} missed a part of the calibration", "try again"),
     Status.NO_ROOM: ("the memory of the bridge on {port} is too small for the calibration", "use another board"),
     Status.NOT_BEGUN: ("the bridge on {port} was reset while it received the calibration", "try again"),
+    Status.OCCUPIED: (
+        "the memory of the bridge on {port} holds other data",
+        "choose another place with MPUCAL_EEPROM_AT in the sketch, or overwrite it:"
+        " mpucal write CALIBRATION bridge --serial {port}",
+    ),
     Status.STORAGE_FAILED: ("the memory of the bridge on {port} does not keep what is written", "use another board"),
 }
 

@@ -44,10 +44,11 @@ class Status(IntEnum):
     NO_ROOM = 11
     NOT_BEGUN = 12
     STORAGE_FAILED = 13
+    OCCUPIED = 14
 
 
 class Feature(IntFlag):
-    """Features of a bridge besides register access; OCCUPIED: storing overwrites other data than a blob."""
+    """Features of a bridge besides register access; OCCUPIED: the memory for the blob holds other data."""
 
     STREAM = 1
     BLOB = 2
@@ -280,7 +281,7 @@ class BlobEraseReply(Reply, code=BlobErase.TYPE | REPLY_BIT):
 
 @dataclass(frozen=True)
 class Frames(Reply, code=0xC0, form="<B I H H B", tail=True):
-    """Content of the FIFO; `left` more frames that were counted at `t_us` follow. `status`: why the stream stands."""
+    """Content of the FIFO; `left` more frames that were counted at `t_us` follow. `status`: why the stream halted."""
 
     index: int
     drops: int

@@ -59,7 +59,7 @@ class BlobStore:
 
     @property
     def occupied(self) -> bool:
-        """True if storing a blob overwrites other data."""
+        """True if the memory holds other data, which `erase` gives up; until then a write is refused."""
         return bool(self._link.bridge.features & Feature.OCCUPIED)
 
     def greet(self) -> None:
@@ -120,7 +120,7 @@ class BlobStore:
         return StoredBlob(reply.generation, len(blob), crc)
 
     def erase(self) -> None:
-        """Erase the stored blob."""
+        """Erase the stored blob, and other data in its place."""
         self._check_feature()
         self._ask(Reply, BlobErase())
 
