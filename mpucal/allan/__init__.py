@@ -63,6 +63,11 @@ class NoiseMeter:
                 continue
             follows = not samples.gap[a]
             values = np.hstack([samples.acc[a:b], samples.gyr[a:b]])
+            if not np.isfinite(values).all():
+                raise RecordingError(
+                    "the recording was read without rates",
+                    "say how to read it: --rate HZ, --units gyr=UNIT or --gyro-range DPS",
+                )
             self._octaves.add(values, follows)
             self._spectrum.add(values, follows)
             self._trace.add(np.hstack([values, samples.temperature_c[a:b, None]]))

@@ -44,16 +44,13 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     try:
         with reading(path):
-            found = dict(read_matlab_arrays(path) if path.suffix.lower() == ".mat" else _read_numpy(path))
-    except NotImplementedError as error:
-        raise RecordingError(
-            f"{path} is a file of MATLAB 7.3 (HDF5) or of level 4, which are not read", "save it with save(NAME, '-v7')"
-        ) from error
+            of_matlab = path.suffix.lower() == ".mat"
+            found = dict(read_matlab_arrays(path.read_bytes(), path) if of_matlab else _read_numpy(path))
     except DAMAGED as error:
         # NumPy takes unknown bytes for pickled objects, and advises to load these, which would run code
         said = "damaged, or pickled Python objects" if "pickle" in str(error) else error
         raise RecordingError(f"{path} is not a whole file of arrays ({said})", _REMEDY) from error
-    columns = _columns(found)
+    columns = columns_of_arrays(found)
     if not columns:
         raise RecordingError(f"{path.name} holds no columns of numbers", _REMEDY)
     return recording_from_arrays(columns, hints, path.name)
@@ -79,7 +76,7 @@ def _fields(name: str, array: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]
         yield field, array[field]
 
 
-def _columns(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def columns_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return name -> (n,) for the arrays of the largest number of samples."""
     tables = {}
     for name, array in arrays.items():

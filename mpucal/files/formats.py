@@ -85,6 +85,7 @@ _HERE = "mpucal.files"
 _TABLES = f"{_HERE}.tables"
 _TABLE = "another program's table"
 _BAG = (f"{_HERE}.ros:load_bag", f"{_HERE}.ros:bag_rows")
+_PHONE = f"{_TABLES}.phone"
 FORMATS = (
     Format(".mcap", "a bag of ROS 2", *_BAG, recognises=f"{_HERE}.ros:is_mcap_of_ros", hinted=True),
     Format(".mcap", "a capture", f"{_HERE}.capture:load_capture", f"{_HERE}.capture:capture_rows", session=CAPTURE),
@@ -98,6 +99,17 @@ FORMATS = (
     Format(".ulg", "a log of PX4", f"{_HERE}.ulog:load_ulog", hinted=True),
     Format(".db3", "a bag of ROS 2", *_BAG, hinted=True),
     Format(".bag", "a bag of ROS 1", *_BAG, hinted=True),
+    *(
+        Format(
+            suffix,
+            "a phone's tables",
+            f"{_PHONE}:load_two_tables",
+            recognises=f"{_PHONE}:is_one_of_two_tables",
+            hinted=True,
+            only_recognised=True,
+        )
+        for suffix in (".csv", ".txt", ".log", ".tsv", ".mat")
+    ),
     *(
         Format(suffix, what, f"{_HERE}.arrays:load_arrays", recognises=recognises, hinted=True, only_recognised=True)
         for suffix, what, recognises in (
@@ -127,8 +139,8 @@ FORMATS = (
     Format(
         ".zip",
         "a phone's tables",
-        f"{_TABLES}.phone:load_archive_of_tables",
-        recognises=f"{_TABLES}.phone:is_archive_of_tables",
+        f"{_PHONE}:load_archive_of_tables",
+        recognises=f"{_PHONE}:is_archive_of_tables",
         hinted=True,
         only_recognised=True,
     ),
@@ -137,8 +149,8 @@ FORMATS = (
     Format(
         FOLDER,
         "the folder of a phone's tables",
-        f"{_TABLES}.phone:load_folder_of_tables",
-        recognises=f"{_TABLES}.phone:is_folder_of_tables",
+        f"{_PHONE}:load_folder_of_tables",
+        recognises=f"{_PHONE}:is_folder_of_tables",
         hinted=True,
     ),
     Format(

@@ -1,6 +1,7 @@
 """Arrays of a MATLAB file of level 5, as written by `save(NAME, '-v7')` or `'-v6'` (MAT-File Format, MathWorks).
 
-SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers and structures of them.
+SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers and structures of them. Files
+of `'-v7.3'` are HDF5, which h5py reads.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
+from io import BytesIO
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -15,9 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .budget import allowed_bytes
+from .budget import allowed_bytes, check_size
+from .reading import import_extra
 
 HEAD = 128
+MATLAB, HDF5 = b"MATLAB", b"MATLAB 7.3"
 ORDERS = {b"IM": "<", b"MI": ">"}
 # data types of elements, and classes of arrays
 MATRIX, COMPRESSED = 14, 15
@@ -26,19 +30,20 @@ STRUCTURE, NUMBERS = 2, range(6, 16)
 DEEPEST, MOST_DIMENSIONS = 8, 8
 
 
-def read_matlab_arrays(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+def read_matlab_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
     """Yield name and array; an array in a structure is `name.field`.
 
     Raises
     ------
-    NotImplementedError : a file of MATLAB 7.3 or of level 4. ValueError, zlib.error : it is not a whole file.
+    RecordingError : h5py is not installed. ValueError, zlib.error : it is not a whole file.
     """
-    data = memoryview(path.read_bytes())
+    if content.startswith(HDF5):
+        yield from _hdf5_arrays(content, path)
+        return
+    data = memoryview(content)
     order = ORDERS.get(bytes(data[HEAD - 2 : HEAD]))
-    if order is None or bytes(data[:10]) == b"MATLAB 7.3":
-        if bytes(data[:6]) != b"MATLAB":
-            raise ValueError("it does not begin as a file of MATLAB")
-        raise NotImplementedError("another level")
+    if order is None:
+        raise ValueError("it does not begin as a file of MATLAB 5 or later")
     for kind, element in _elements(data[HEAD:], order):
         if kind == COMPRESSED:
             whole = memoryview(zlib.decompressobj().decompress(element, allowed_bytes()))
@@ -46,6 +51,22 @@ def read_matlab_arrays(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
                 yield from _matrix(matrix, order, "") if inner == MATRIX else ()
         elif kind == MATRIX:
             yield from _matrix(element, order, "")
+
+
+def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+    h5py = import_extra("h5py", "matlab", path)
+    names: list[str] = []
+    try:
+        with h5py.File(BytesIO(content), "r") as file:
+            file.visit(names.append)
+            for name in names:
+                item = file[name]
+                if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and item.ndim == 2:
+                    check_size(path, item.size * item.dtype.itemsize)
+                    # MATLAB stores by columns
+                    yield name.replace("/", "."), item[()].T
+    except (OSError, RuntimeError, KeyError, TypeError) as error:
+        raise ValueError(f"h5py: {error}") from error
 
 
 def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:

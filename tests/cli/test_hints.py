@@ -77,7 +77,6 @@ def test_a_bad_line_of_hints_is_named(line, tmp_path):
 
 
 def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording, save):
-    flat = recording.part(0, 300)
     save(replace(recording, gyr=np.degrees(recording.gyr)), "in.npz")
     Calibration(np.eye(3), np.zeros(3), quality={"verdict": "good", "reasons": []}).save("c.json")
     refused = mpucal("apply", "c.json", "in.npz", "-o", "out.npz")
@@ -85,9 +84,10 @@ def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording, sav
     command = refused.err.splitlines()[-1].removeprefix("mpucal: try `").removesuffix("`")
     assert command == "mpucal apply c.json in.npz -o out.npz --units acc=m/s^2,gyr=deg/s"
     assert mpucal(*shlex.split(command)[1:]).code == 0
-    names = "time,accX,accY,accZ,gyroX,gyroY,gyroZ"
-    np.savetxt("flat.csv", np.column_stack([flat.t, flat.acc, flat.gyr]), delimiter=",", header=names, comments="")
-    assert mpucal("show", "flat.csv").err.endswith("mpucal: try `mpucal show flat.csv --units gyr=deg/s`\n")
+    names = "time,accX,accY,accZ,gyroX (rad/s),gyroY (rad/s),gyroZ (rad/s)"
+    rows = np.column_stack([recording.t, recording.acc, np.degrees(recording.gyr)])
+    np.savetxt("in.csv", rows, delimiter=",", header=names, comments="")
+    assert mpucal("show", "in.csv").err.endswith("mpucal: try `mpucal show in.csv --units gyr=deg/s`\n")
 
 
 def test_a_part_of_any_recording_is_read(recording):

@@ -102,7 +102,8 @@ def test_a_damaged_file_is_refused_or_read(suffix, damage, files, tmp_path):
     assert len(read) >= 2
     assert (np.diff(read.t) > 0).all()
     assert np.isfinite(read.acc).all()
-    assert np.isfinite(read.gyr).all()
+    # rates that nothing confirms are left out as a whole
+    assert np.isfinite(read.gyr).all() or np.isnan(read.gyr).all()
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

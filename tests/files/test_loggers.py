@@ -163,9 +163,12 @@ def test_a_size_that_is_no_gravity_says_no_unit(walk, load_table):
         load_table(table, Hints(units=parse_units("gyr=rad/s,t=s")))
 
 
-def test_times_that_are_not_known_as_such_are_named(walk, load_table):
-    with pytest.raises(RecordingError, match="no times that are known as such; its columns are Ticks, ax"):
-        load_table(made(walk, walk.t).rename(columns={"time": "Ticks"}))
+def test_times_that_are_not_known_by_their_name_are_known_by_how_gravity_turns(walk, assert_same, load_table):
+    table = made(walk, walk.t).rename(columns={"time": "Ticks"})
+    table.insert(0, "Line", np.arange(len(walk)))
+    read = load_table(table)
+    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
+    assert "its columns were guessed from how gravity turns: --columns -,t,ax,ay,az,gx,gy,gz" in read.taken
 
 
 def sensor_loggers_one_table(walk, sign, in_g, uncalibrated=True):

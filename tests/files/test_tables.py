@@ -178,9 +178,10 @@ def test_rates_of_a_sensor_at_rest_need_a_unit(load_table):
     rng = np.random.default_rng(3)
     acc, gyr = rng.normal([0, 0, G], 0.02, (500, 3)), rng.normal(0, 0.3, (500, 3))
     table = timed("time", np.arange(500) * 5, "accX|accY|accZ|gyroX|gyroY|gyroZ", acc, gyr)
-    with pytest.raises(RecordingError, match="the unit of gyr is not known"):
-        load_table(table)
-    assert len(load_table(table, Hints(units=parse_units("gyr=deg/s")))) == 500
+    read = load_table(table)
+    assert np.isnan(read.gyr).all()
+    assert "rates left out, because gravity turns as in none of their units (--units gyr=UNIT)" in read.taken
+    assert np.isfinite(load_table(table, Hints(units=parse_units("gyr=deg/s"))).gyr).all()
 
 
 def test_linear_acceleration_is_none_that_can_be_calibrated(walk, walk_ns, load_table):
@@ -202,8 +203,10 @@ def even(walk):
 
 def test_counts_need_their_ranges_and_a_rate(walk, assert_same, load_table):
     table, (steady, rate) = frame("ax|ay|az|gx|gy|gz", counts(walk)), even(walk)
-    with pytest.raises(RecordingError, match="give the rate of its samples with --rate HZ"):
-        load_table(table)
+    alone = load_table(table)
+    assert "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|) and without rates; this sample" in alone.taken
+    np.testing.assert_allclose(alone.acc, walk.acc, atol=0.5 / COUNTS_A)
+    assert np.isnan(alone.gyr).all()
     seen = load_table(table, Hints(rate_hz=rate))
     assert "counts of ±4 g (by |a|) and rates in counts of ±500 deg/s (by how gravity turns)" in seen.taken
     assert_same(seen, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
@@ -280,6 +283,9 @@ def test_a_bad_line_is_named(walk, walk_ns, tmp_path):
     lines = DIALECTS["Kalibr"](walk, walk_ns).to_csv(index=False).splitlines()
     lines[40] = lines[40].replace(",", ",x", 1)
     (tmp_path / "walk.csv").write_text("\n".join(lines))
+    assert "1 samples whose rates lack a number were left out" in load(tmp_path / "walk.csv").taken
+    lines[60:] = [line.replace(",", ",x", 1) for line in lines[60:]]
+    (tmp_path / "walk.csv").write_text("\n".join(lines))
     with pytest.raises(RecordingError, match=r"line 41: omega_x is 'x.*', which is not a number"):
         load(tmp_path / "walk.csv")
 
@@ -339,10 +345,36 @@ def test_two_tables_of_different_times_are_none(walk, walk_ns, tmp_path):
         load(tmp_path)
 
 
-def test_one_table_of_two_asks_for_the_other(walk, walk_ns, tmp_path):
+@pytest.mark.parametrize("given", ["Accelerometer.csv", "Gyroscope.csv"])
+def test_one_table_of_two_is_read_with_the_other(given, walk, walk_ns, assert_same, tmp_path):
     phyphox(walk, walk_ns, tmp_path)
-    with pytest.raises(RecordingError, match=r"no columns of a gyroscope.*give the folder"):
-        load(tmp_path / "Accelerometer.csv")
+    read = load(tmp_path / given)
+    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
+    assert "from Accelerometer.csv and Gyroscope.csv" in read.taken
+
+
+def test_one_table_without_the_other(walk, walk_ns, tmp_path):
+    phyphox(walk, walk_ns, tmp_path)
+    (tmp_path / "Accelerometer.csv").rename(tmp_path / "walk.csv")
+    read = load(tmp_path / "walk.csv")
+    np.testing.assert_allclose(read.acc, walk.acc, atol=1e-9)
+    assert np.isnan(read.gyr).all()
+    assert "and without rates" in read.taken
+    with pytest.raises(RecordingError, match=r"no columns of an accelerometer.*give the folder"):
+        load(tmp_path / "Gyroscope.csv")
+
+
+def test_pairs_of_tables_are_told_apart_by_their_names(walk, walk_ns, assert_same, tmp_path):
+    for name, part in (("run1", walk), ("run2", walk.part(0, 900))):
+        (tmp_path / name).mkdir()
+        phyphox(part, walk_ns, tmp_path / name)
+        for sensor in ("Accelerometer", "Gyroscope"):
+            (tmp_path / name / f"{sensor}.csv").rename(tmp_path / f"{name}_{sensor}.csv")
+        (tmp_path / name).rmdir()
+    first = load(tmp_path)
+    assert_same(first, walk, 1e-9, 1e-9, 1e-9)
+    assert "of 2 pairs of tables, it is the first" in first.taken
+    assert len(load(tmp_path / "run2_Gyroscope.csv")) == 900
 
 
 def test_lines_that_hold_one_sensor_each(walk, load_table):
@@ -372,8 +404,7 @@ def test_what_i2cdevlibs_example_prints(ending, walk, assert_same, tmp_path):
     np.testing.assert_allclose(read.gyr[kept], steady.gyr[kept], atol=0.5 * np.radians(250) / 32750 * 1.001)
     assert kept.mean() > 0.5
     assert "MPU6050::initialize()" in read.taken
-    with pytest.raises(RecordingError, match="--rate HZ"):
-        load(tmp_path / f"walk{ending}")
+    assert "this sample rate is" in load(tmp_path / f"walk{ending}").taken
 
 
 @pytest.mark.parametrize(

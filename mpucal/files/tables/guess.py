@@ -1,44 +1,73 @@
 """Columns without names, by physics: which three hold gravity, and which three turn it as it turns.
 
 The first three adjacent columns that keep a magnitude are the accelerometer; the three whose rates turn this vector as
-it turns are the gyroscope; a column before both that increases steadily is the time. Nothing is guessed that physics
-does not confirm.
+it turns are the gyroscope; the time is a column that increases and by which they turn it at the speed of one of their
+units. Nothing is guessed that physics does not confirm.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from ...data import Vector
 from ..hints import ROLES, Hints
 from .clock import sample_period
-from .units import ANY_HZ, BEYOND, FASTEST_HZ, QUANTITIES, rate_factor, to_signed
+from .units import (
+    ANY_HZ,
+    BEYOND,
+    COUNTS,
+    EXPLAINED,
+    FASTEST_HZ,
+    QUANTITIES,
+    acceleration_unit,
+    are_counts,
+    to_signed,
+    turning,
+)
 
 FEWEST, WIDEST = 300, 16
 # largest distance of the quartiles of |a|, over its median: gravity, with the biases of an uncalibrated sensor
 MOST_SCATTER = 0.75
+# factor by which the speed may differ from a unit's
+NEAR = 2.0
+# a correlation that is less by as much is no worse
+ALIKE = 0.1
 # more samples add nothing
 MOST_SAMPLES = 200_000
 
 
-def guess_columns(table: Vector, hints: Hints) -> tuple[dict[str, int], str]:
-    """Return role -> place among the columns of (n, k) numbers, and a remark; both are empty if nothing fits."""
+def guess_columns(table: Vector, hints: Hints, sensors: Sequence[int] = ()) -> dict[str, int]:
+    """Return role -> place among the columns of (n, k) numbers; empty if nothing fits.
+
+    Parameters
+    ----------
+    sensors : the places of ax ... gz, if they are known; then only the time is looked for.
+    """
+    table = table[np.isfinite(table).all(axis=1)][:MOST_SAMPLES]
     n, width = table.shape
-    table = table[:MOST_SAMPLES]
     if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND).all():
-        return {}, ""
-    for at in (0, 1):
-        clock = table[:, 0] if at else None
-        if clock is not None and not _is_clock(clock):
-            continue
-        found = _sensors(table, at, _seconds(clock, len(table), hints))
+        return {}
+    clocks = [place for place in range(width) if place not in sensors and _is_clock(table[:, place])]
+    # an index increases, too
+    clocks.sort(key=lambda place: bool((np.diff(table[:, place]) == 1.0).all()))
+    for at in (*clocks, None):
+        t = _seconds(None if at is None else table[:, at], n, hints)
+        pairs = [tuple(sensors)] if sensors else _pairs(table, [place for place in range(width) if place != at])
+        turned = {pair: _turned(table, pair, t, any_rate=at is None) for pair in pairs}
+        least = max(EXPLAINED, max(turned.values(), default=0.0) - ALIKE)
+        # rates turn a magnetic field, too
+        found = sorted((pair for pair in pairs if turned[pair] >= least), key=lambda pair: not _has_size(table, pair))
         if found:
-            order = {role: place for role, place in zip(ROLES[1:], found, strict=True)} | ({"t": 0} if at else {})
-            words = ["-"] * (max(order.values()) + 1)
-            for role, place in order.items():
-                words[place] = role
-            return order, f"its columns were guessed from how gravity turns: --columns {','.join(words)}"
-    return {}, ""
+            return dict(zip(ROLES[1:], found[0], strict=True)) | ({} if at is None else {"t": at})
+    return {}
+
+
+def _has_size(table: Vector, pair: Sequence[int]) -> bool:
+    """Return True if the first three columns are as large as gravity in some unit, or counts."""
+    acc = to_signed(table[:, list(pair[:3])])
+    return are_counts(acc) or bool(acceleration_unit(acc))
 
 
 def _is_clock(column: Vector) -> bool:
@@ -54,15 +83,22 @@ def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
     return np.asarray((clock - clock[0]) * si)
 
 
-def _sensors(table: Vector, first: int, t: Vector) -> list[int]:
-    """Return the places of ax, ay, az, gx, gy, gz; empty if no columns fit."""
-    triples = range(first, table.shape[1] - 2, 3)
-    for a in triples:
-        acc = to_signed(table[:, a : a + 3])
-        low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
-        if not 0.0 < high - low <= MOST_SCATTER * size:
-            continue
-        for w in triples:
-            if w != a and (rate_factor(t, acc, to_signed(table[:, w : w + 3])) or 0.0) > 0.0:
-                return [a, a + 1, a + 2, w, w + 1, w + 2]
-    return []
+def _pairs(table: Vector, places: list[int]) -> list[tuple[int, ...]]:
+    """Return the places of two sensors' three adjacent columns each, of which the first keep a magnitude."""
+    starts = range(len(places) - 2)
+    gravity = [a for a in starts if _is_gravity(to_signed(table[:, places[a : a + 3]]))]
+    return [(*places[a : a + 3], *places[w : w + 3]) for a in gravity for w in starts if abs(a - w) >= 3]
+
+
+def _is_gravity(acc: Vector) -> bool:
+    low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
+    return bool(0.0 < high - low <= MOST_SCATTER * size)
+
+
+def _turned(table: Vector, pair: Sequence[int], t: Vector, *, any_rate: bool) -> float:
+    """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
+    acc, gyr = (to_signed(table[:, list(places)]) for places in (pair[:3], pair[3:]))
+    factor, correlation = turning(t, acc, gyr)
+    ratios = [factor / si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS]
+    of_a_unit = any_rate or are_counts(gyr) or any(1 / NEAR < ratio < NEAR for ratio in ratios)
+    return correlation if factor > 0.0 and of_a_unit else 0.0

@@ -1,4 +1,6 @@
-"""Tables of one sensor each in a folder or a .zip: phyphox, Sensor Logger, MetaBase, ulog2csv.
+"""Tables of one sensor each in a folder or a .zip: phyphox, Sensor Logger, MetaBase, ulog2csv, imu_tk.
+
+The names of two tables of one recording differ by the sensor's word alone.
 
 Sensor Logger's Accelerometer.csv excludes gravity; TotalAcceleration.csv and AccelerometerUncalibrated.csv include it.
 Of several accelerometers, the one with gravity that is nearest to the sensor's own output is read.
@@ -10,7 +12,7 @@ import lzma
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,16 +21,18 @@ import numpy as np
 from ...data import Recording, Vector
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
+from ..arrays import ArrayTable, columns_of_arrays
 from ..budget import HELD, check_size
 from ..hints import NO_HINTS, Hints
-from ..reading import reading
+from ..matlab import MATLAB, read_matlab_arrays
+from ..reading import first_bytes, reading
 from .app_metadata import is_app_metadata, read_app_metadata
-from .names import ACC, GYR, Column, first_triple, parse_axis_name
-from .streams import are_counts, join_streams
-from .table import columns_by_hint, sensor_stream
-from .text import TextTable, decode_text, find_table
+from .names import ACC, GYR, Column, Table, first_triple, parse_axis_name, parse_header
+from .streams import join_streams
+from .table import SNIFFED, columns_by_hint, sensor_stream
+from .text import decode_text, find_table
 from .times import Stream
-from .units import QUANTITIES, acceleration_unit, to_signed
+from .units import QUANTITIES, acceleration_unit, are_counts, to_signed
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
 NAMES = {
@@ -41,13 +45,18 @@ NAMES = {
         "accel",
         "acce",
         "accm",
+        "alpha",
     ),
-    GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "gyrm", "rotationrate"),
+    GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "gyrm", "rotationrate", "omega"),
 }
 # the unit of tables that name none
 UNITS = {ACC: "", GYR: "rad/s"}
-# imu_tk names tables of text .mat
-SUFFIXES = (".csv", ".txt", ".tsv", ".mat")
+# imu_tk names tables of text .mat, too
+SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat")
+# MATLAB's spelling of a hyphen in a name
+HYPHEN = "0x2d"
+# the columns of a table without names, as data sets have them
+UNNAMED = ["time", "x", "y", "z"]
 # whole numbers that are all smaller are not counts
 FEWEST_COUNTS = 200
 # RuntimeError includes NotImplementedError, of an unknown compression
@@ -57,92 +66,111 @@ _DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, l
 def is_folder_of_tables(path: Path) -> bool:
     """Return True if a folder holds a table of an accelerometer and one of a gyroscope, and no session."""
     names = {child.name for child in path.iterdir()}
-    return _has_both(names) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
+    return bool(_pairs(names)) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
 
 
 def is_archive_of_tables(path: Path) -> bool:
     """Return True if an archive holds a table of an accelerometer and one of a gyroscope."""
     try:
         with zipfile.ZipFile(path) as archive:
-            return _has_both(archive.namelist())
+            return bool(_pairs(archive.namelist()))
     except (OSError, *_DAMAGE):
         return False
 
 
+def is_one_of_two_tables(path: Path) -> bool:
+    """Return True if a file is a table of one sensor, beside that of the other."""
+    try:
+        if not any(path.name in pair for pair in _pairs([path.name, *(child.name for child in path.parent.iterdir())])):
+            return False
+        begun = first_bytes(path, SNIFFED)
+        table = None if begun.startswith(MATLAB) else find_table(decode_text(begun, path.name), path.name)
+    except (OSError, RecordingError):
+        return False
+    return table is None or not all(first_triple(table.columns, quantity) for quantity in NAMES)
+
+
+def load_two_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """Return the recording in a table and the one beside it; see load_folder_of_tables."""
+    return _from_folder(path.parent, path.name, hints)
+
+
 def load_folder_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """Return the recording in a folder's tables.
+    """Return the recording in a folder's tables, the first pair if there are several.
 
     Raises
     ------
     RecordingError : a table cannot be read, or the two do not make a recording.
     """
+    return _from_folder(path, "", hints)
+
+
+def _from_folder(path: Path, wanted: str, hints: Hints) -> Recording:
     with reading(path):
         files = sorted(child for child in (*path.iterdir(), *path.glob("meta/time.csv")) if child.is_file())
-        names = {child: child.relative_to(path).as_posix() for child in files}
-        texts = {name: child.read_bytes() for child, name in names.items() if _is_read(name)}
-    return _recording(path.name, texts, hints)
+        names = [child.relative_to(path).as_posix() for child in files]
+        return _recording(wanted or path.name, names, lambda name: (path / name).read_bytes(), wanted, hints)
 
 
 def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """Return the recording in an archive's tables; see load_folder_of_tables."""
     try:
         with reading(path), zipfile.ZipFile(path) as archive:
-            members = [member for member in archive.infolist() if _is_read(member.filename)]
-            check_size(path, HELD * sum(member.file_size for member in members))
-            texts = {member.filename: archive.read(member) for member in members}
+            sizes = {member.filename: member.file_size for member in archive.infolist()}
+
+            def read(name: str) -> bytes:
+                check_size(path, HELD * sizes[name])
+                return archive.read(name)
+
+            return _recording(path.name, list(sizes), read, "", hints)
     except _DAMAGE as error:
         raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
-    return _recording(path.name, texts, hints)
 
 
-def _is_read(name: str) -> bool:
-    return bool(_sensor(name)) or is_app_metadata(name)
-
-
-def _sensor(name: str) -> str:
-    """Return the quantity that a table of this name holds; empty for another file."""
-    return next((quantity for quantity in NAMES if _rank(name, quantity) is not None), "")
-
-
-def _rank(name: str, quantity: str) -> int | None:
-    """Return the index in NAMES of a table's name or a word of it; None for another file."""
+def _parse(name: str) -> tuple[str, int, str] | None:
+    """Return the sensor of a table's name, the rank of its word in NAMES, and the name without it; None for others."""
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES or "meta" in path.parts[:-1] or path.name.startswith("."):
         return None
-    words = [word for word in re.split(r"[^a-z]+", path.stem.lower()) if word]
-    for word in ("".join(words), *words):
-        if word in NAMES[quantity] and not {"linear", "user"} & set(words):
-            return NAMES[quantity].index(word)
+    stem = path.stem.lower().replace(HYPHEN, "-")
+    words = [word for word in re.split(r"[^a-z]+", stem) if word]
+    for quantity, known in NAMES.items():
+        for word in ("".join(words), *words):
+            if word in known and not {"linear", "user"} & set(words):
+                return quantity, known.index(word), f"{path.parent}/{stem.replace(word, '', 1) if word in stem else ''}"
     return None
 
 
-def _has_both(names: Iterable[str]) -> bool:
-    return {_sensor(name) for name in names} >= {ACC, GYR}
+def _pairs(names: Iterable[str]) -> list[dict[str, tuple[str, int]]]:
+    """Return the tables of each pair, name -> (sensor, rank); all tables as one pair if their names do not agree."""
+    pairs: dict[str, dict[str, tuple[str, int]]] = {}
+    for name in sorted(set(names)):
+        if (found := _parse(name)) is not None:
+            pairs.setdefault(found[2], {})[name] = found[:2]
+    whole = [pairs[rest] for rest in sorted(pairs)]
+    whole += [{name: of for pair in whole for name, of in pair.items()}]
+    both = [pair for pair in whole if {quantity for quantity, _ in pair.values()} == {ACC, GYR}]
+    return both[:-1] or both
 
 
-def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording:
+def _recording(name: str, names: Iterable[str], read: Callable[[str], bytes], wanted: str, hints: Hints) -> Recording:
+    """Return the recording in the pair of tables that holds `wanted`, or in the first."""
+    pairs = _pairs(names)
+    pair = next((pair for pair in pairs if wanted in pair), pairs[0])
+    metadata = read_app_metadata({member: read(member) for member in names if is_app_metadata(member)})
     found: dict[str, tuple[str, Stream]] = {}
-    without_gravity = ""
-    metadata = read_app_metadata({member: data for member, data in texts.items() if is_app_metadata(member)})
-    for quantity in NAMES:
-        ranks = {member: rank for member in texts if (rank := _rank(member, quantity)) is not None}
-        for member in sorted(ranks, key=lambda m: (ranks[m], m)):
-            stream = _stream(f"{name}/{Path(member).name}", texts[member], quantity, hints)
-            if quantity == ACC and len(stream.values) and not _holds_gravity(stream.values):
-                without_gravity = without_gravity or member
-                continue
-            found.setdefault(quantity, (member, stream))
-    if ACC not in found and without_gravity:
-        raise RecordingError(
-            f"{name}: the median |a| of {Path(without_gravity).name} is not gravity in any unit",
-            "record the accelerometer with gravity (TotalAcceleration, AccelerometerUncalibrated)",
-        )
-    if set(found) < {ACC, GYR}:
-        raise RecordingError(f"{name} does not hold tables of both an accelerometer and a gyroscope", "record both")
+    for member, (quantity, _) in sorted(pair.items(), key=lambda item: (item[1][1], item[0])):
+        if quantity in found and (quantity == GYR or _holds_gravity(found[ACC][1].values)):
+            continue
+        stream = _stream(f"{name}/{Path(member).name}" if member != name else name, read(member), quantity, hints)
+        if quantity not in found or _holds_gravity(stream.values):
+            found[quantity] = member, stream
     (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
     acc = replace(acc, values=-acc.values if metadata.sign_flipped else acc.values, zero_ns=metadata.zero_ns)
     of = f"from {Path(of_acc).name} and {Path(of_gyr).name}"
-    return join_streams(acc, gyr, hints, name, remarks=[of, *metadata.remarks])
+    more = f"of {len(pairs)} pairs of tables, it is the first; give one file of another pair to read that"
+    remarks = [of, more if len(pairs) > 1 and not wanted else "", *metadata.remarks]
+    return join_streams(acc, gyr, hints, name, remarks=remarks)
 
 
 def _holds_gravity(values: Vector) -> bool:
@@ -154,12 +182,9 @@ def _are_counts(values: Vector) -> bool:
 
 
 def _stream(name: str, data: bytes, quantity: str, hints: Hints) -> Stream:
-    text, hinted = decode_text(data, name), _hinted_columns(hints, quantity)
-    if hinted:
-        table = find_table(text, name, list(hinted.values()))
-    else:
-        table = find_table(text, name) or find_table(text, name, bare=True) or _unnamed_table(text, name)
-    if table is None or not table.rows:
+    hinted = _hinted_columns(hints, quantity)
+    table = _array_table(data, name) if data.startswith(MATLAB) else _text_table(data, name, list(hinted.values()))
+    if table is None:
         raise RecordingError(
             f"{name} names no columns x, y and z",
             "name its columns in its first line (time, x, y, z), or give their order with --columns t,ax,ay,az",
@@ -183,15 +208,23 @@ def _hinted_columns(hints: Hints, quantity: str) -> dict[str, str | int]:
     return found if len(found) > 1 else {}
 
 
-def _unnamed_table(text: str, name: str) -> TextTable | None:
-    """Return a table of four numbers a line, as data sets have them: time, x, y, z; None for another."""
-    table = find_table(text, name, range(4))
-    if table is None or any(len(row) != 4 for row in table.rows):
-        return None
-    return replace(table, header=["time", "x", "y", "z"])
+def _text_table(data: bytes, name: str, wanted: Sequence[str | int]) -> Table | None:
+    text = decode_text(data, name)
+    table = find_table(text, name, wanted)
+    if table is None and not wanted:
+        table = find_table(text, name, bare=True) or find_table(text, name, range(len(UNNAMED)))
+        if table and not table.header:
+            table = replace(table, header=UNNAMED) if all(len(row) == len(UNNAMED) for row in table.rows) else None
+    return table if table and table.rows else None
 
 
-def _columns_without_sensor(table: TextTable, quantity: str) -> tuple[Column, ...]:
+def _array_table(data: bytes, name: str) -> Table | None:
+    columns = columns_of_arrays(dict(read_matlab_arrays(data, Path(name))))
+    header = list(columns) if len(columns) != len(UNNAMED) or parse_header(list(columns)) else UNNAMED
+    return ArrayTable(name, header, dict(zip(header, columns.values(), strict=True))) if columns else None
+
+
+def _columns_without_sensor(table: Table, quantity: str) -> tuple[Column, ...]:
     """Return the columns x, y, z of a table whose file name alone names the sensor; empty if there are none."""
     found = {axis[0]: (place, axis[1]) for place, name in enumerate(table.header) if (axis := parse_axis_name(name))}
     if set(found) != {0, 1, 2}:

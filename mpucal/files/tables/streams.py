@@ -10,7 +10,6 @@ import numpy as np
 
 from ...data import (
     ACCEL_COUNTS,
-    ACCEL_RANGES_G,
     GYRO_COUNTS,
     GYRO_RANGES_DPS,
     STANDARD_GRAVITY_MPS2,
@@ -30,8 +29,10 @@ ANOTHER_RANGE = 0.5
 # octaves by which the range that the turning of gravity shows may differ from a real one
 SURE_RANGE = 0.35
 OF_COUNTS = "in counts of"
-# |a| / g that alone shows a unit: counts of 512 for 1 g are not mg
+# |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
+# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
+FEWEST_PER_G, MOST_PER_G = 8, 14
 
 
 def index_with_gravity(streams: Sequence[Stream]) -> int:
@@ -41,7 +42,7 @@ def index_with_gravity(streams: Sequence[Stream]) -> int:
 
 def join_streams(
     acc: Stream,
-    gyr: Stream,
+    gyr: Stream | None,
     hints: Hints,
     name: str,
     temperature_c: Vector | None = None,
@@ -49,14 +50,19 @@ def join_streams(
 ) -> Recording:
     """Return the recording of an accelerometer's and a gyroscope's stream.
 
+    Rates whose range, unit or times neither the file nor the turning of gravity shows are left out (NaN).
+
     Parameters
     ----------
+    gyr : None if there is no gyroscope.
     temperature_c : (n,) at the accelerometer's times. remarks : further clauses on how the file was read.
 
     Raises
     ------
     RecordingError : units are not known or do not fit, times do not overlap, or there are too few samples.
     """
+    left_out = "without rates" if gyr is None else ""
+    gyr = replace(acc, values=np.zeros_like(acc.values), unit="rad/s", lost=0) if gyr is None else gyr
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
         if len(stream.values) < 2:
             raise RecordingError(f"{name} holds {len(stream.values)} {what}", "record for longer")
@@ -74,6 +80,13 @@ def join_streams(
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
         if len(stream.values) < 2:
             raise RecordingError(f"{name} repeats one sample of {what} at one time", "record it again")
+    rate_remark = ""
+    if hints.rate_hz is None and (acc.times is None or gyr.times is None):
+        hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints))
+        rate_remark = "this sample rate is that at which its rates turn gravity"
+        if hints.rate_hz is None:
+            rate_remark = "this sample rate is assumed, as nothing shows it (--rate HZ)"
+            left_out = left_out or "without rates"
     (t, gap, of_t, clock), (t_gyr, gap_gyr, of_t_gyr, clock_gyr) = (
         times.to_seconds(stream, acc, hints, name) for stream in (acc, gyr)
     )
@@ -83,10 +96,14 @@ def join_streams(
         kept, values, lost_rates, joined = times.interpolate_rates(t, t_gyr, gyr.values, gap_gyr, name)
         t, a, a_clipped, gap = t[kept], a[kept], a_clipped[kept], gap[kept] | lost_rates
         temperature_c = None if temperature_c is None else temperature_c[kept]
-    w, of_w, w_clipped = _rates(t, a, values, gyr.unit, hints, name, of_counts=of_a.startswith(OF_COUNTS))
+    if left_out:
+        w, of_w, w_clipped = _left_out(t, left_out)
+    else:
+        w, of_w, w_clipped = _rates(t, a, values, gyr.unit, hints, name, of_counts=of_a.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
     said = [
-        f"{name} was read with {of_times}, accelerations {of_a} and rates {of_w}",
+        f"{name} was read with {of_times}, accelerations {of_a} and {of_w}",
+        rate_remark,
         *remarks,
         f"{repeated} repeated samples were left out" if repeated else "",
         *(f"{count} samples whose {what} lack a number were left out" for count, what in lost if count),
@@ -97,7 +114,7 @@ def join_streams(
     recording = Recording.from_arrays(
         t,
         a,
-        w,
+        np.nan_to_num(w),
         temperature_c=temperature_c,
         gap=gap,
         acc_clipped=a_clipped,
@@ -106,7 +123,21 @@ def join_streams(
         name=name,
         taken="; ".join(filter(None, said)) + ".",
     )
-    return replace(recording, utc_ns=times.utc_ns(acc, of_t))
+    return replace(recording, gyr=w, utc_ns=times.utc_ns(acc, of_t))
+
+
+def _rate_hz(acc: Stream, gyr: Stream, hints: Hints) -> float | None:
+    """Return the rate of samples without times at which the rates turn gravity; None if it is not determined."""
+    values, unit = gyr.values, hints.units.get("gyr", gyr.unit)
+    if unit == COUNTS or (not unit and units.are_counts(values)):
+        if not hints.gyro_range_dps:
+            return None
+        values, unit = values * np.radians(hints.gyro_range_dps) / GYRO_COUNTS, "rad/s"
+    return units.likely_rate_hz(acc.values, values, unit)
+
+
+def _left_out(t: Vector, why: str) -> tuple[Vector, str, Mask]:
+    return np.full((len(t), 3), np.nan), why, np.zeros(len(t), bool)
 
 
 def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str, Mask]:
@@ -114,7 +145,7 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     values, said = stream.values, hints.units.get("acc", stream.unit)
     size = float(np.median(np.linalg.norm(values, axis=1)))
     seen = units.acceleration_unit(values)
-    if said == COUNTS or (not said and are_counts(values) and (not seen or hints.accel_range_g)):
+    if said == COUNTS or (not said and units.are_counts(values) and (not seen or hints.accel_range_g)):
         return _scale_counts(values, hints, name, size)
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
         raise RecordingError(
@@ -122,6 +153,7 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
             "give the accelerometer's own values, not the linear acceleration computed from them",
         )
     likely = LEAST_LIKELY <= size * QUANTITIES["acc"].get(seen, 0.0) / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
+    likely = likely or not (values == np.rint(values)).all()
     seen = hints.units.get("acc", (seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
     return values * QUANTITIES["acc"][unit], f"in {unit}", np.zeros(len(values), bool)
@@ -129,20 +161,14 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
 
 def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
     """Return the same of (n, 3) counts, whose median magnitude is `size`."""
-    ranges = (g for g in ACCEL_RANGES_G if LEAST_LIKELY <= size * g / ACCEL_COUNTS <= MOST_LIKELY)
-    range_g = next(ranges, None) if hints.accel_range_g is None else hints.accel_range_g
-    if range_g is None:
-        raise RecordingError(
-            f"{name}: accelerations are counts of an unknown range (the median |a| is {size:.0f})",
-            "give --accel-range G and --gyro-range DPS",
-            "--accel-range G --gyro-range DPS",
-        )
+    per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), FEWEST_PER_G), MOST_PER_G)
+    range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
     scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
     if is_wrong_full_scale(size * scale / STANDARD_GRAVITY_MPS2) and "acc" not in hints.units:
         raise RecordingError(
             f"{name}: at ±{range_g:g} g the median |a| is {size * scale:.3g} m/s^2, which is not gravity",
             "give the --accel-range that the sensor had, or --units acc=counts if it was this one",
-            "--accel-range G",
+            f"--accel-range {ACCEL_COUNTS / per_g:g}" if hints.accel_range_g else "",
         )
     by = "" if hints.accel_range_g else " (by |a|)"
     return values * scale, f"{OF_COUNTS} ±{range_g:g} g{by}", _is_clipped(values)
@@ -158,38 +184,36 @@ def _rates(
     said : their unit as the file names it. of_counts : True if the accelerations are counts.
     """
     said = hints.units.get("gyr", said)
-    if said == COUNTS or (not said and are_counts(values) and (hints.gyro_range_dps or of_counts)):
+    if said == COUNTS or (not said and units.are_counts(values) and (hints.gyro_range_dps or of_counts)):
         range_dps = hints.gyro_range_dps or _gyro_range_dps(units.rate_factor(t, a, values))
         if range_dps is None:
-            raise RecordingError(
-                f"{name}: rates are counts of an unknown range, and gravity turns as with none",
-                "give --gyro-range DPS",
-                "--gyro-range DPS",
-            )
+            return _left_out(t, "rates left out, because nothing shows the range of their counts (--gyro-range DPS)")
         scale, of = np.radians(range_dps) / GYRO_COUNTS, f"counts of ±{range_dps:g} deg/s"
         factor = units.rate_factor(t, a, values * scale)
         if factor and is_wrong_full_scale(abs(factor)) and "gyr" not in hints.units:
             remedy = "the --gyro-range that the sensor had (if it was this one: --units gyr=counts)"
             raise _wrong_rates(name, factor, of, hints, remedy)
         by = "" if hints.gyro_range_dps else " (by how gravity turns)"
-        return values * scale, f"in {of}{by}{_sign_remark(factor)}", _is_clipped(values)
+        return values * scale, f"rates in {of}{by}{_sign_remark(factor)}", _is_clipped(values)
     factor = units.rate_factor(t, a, values)
     seen = hints.units.get("gyr", units.gyro_unit(factor))
+    if not said and not seen and not (factor and hints.rate_hz):
+        return _left_out(t, "rates left out, because gravity turns as in none of their units (--units gyr=UNIT)")
     if factor and not seen:
         known = [unit for unit in QUANTITIES["gyr"] if unit != COUNTS]
         of = said or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))
         raise _wrong_rates(name, factor / QUANTITIES["gyr"][of], of, hints, "their unit with --units gyr=UNIT")
     unit = resolve_unit(name, "gyr", said, seen, "the turning of gravity")
-    return values * QUANTITIES["gyr"][unit], f"in {unit}{_sign_remark(factor)}", np.zeros(len(values), bool)
+    return values * QUANTITIES["gyr"][unit], f"rates in {unit}{_sign_remark(factor)}", np.zeros(len(values), bool)
 
 
 def _gyro_range_dps(factor: float | None) -> float | None:
-    """Return the range of counts by how fast gravity turns; None if no sensor has it."""
+    """Return the range of counts by how fast gravity turns: a usual one, or else what was found; None if unknown."""
     if not factor:
         return None
     dps = math.degrees(abs(factor)) * GYRO_COUNTS
     nearest = min(GYRO_RANGES_DPS, key=lambda each: abs(math.log2(dps / each)))
-    return nearest if abs(math.log2(dps / nearest)) < SURE_RANGE else None
+    return nearest if abs(math.log2(dps / nearest)) < SURE_RANGE else round(dps)
 
 
 def _wrong_rates(name: str, factor: float, of: str, hints: Hints, remedy: str) -> RecordingError:
@@ -209,11 +233,6 @@ def _sign_remark(factor: float | None) -> str:
 def is_wrong_full_scale(ratio: float) -> bool:
     """Return True if a ratio that should be 1 is 0, or nearer to 2, 4, 8 or an inverse of these."""
     return ratio == 0.0 or abs(math.log2(ratio)) > ANOTHER_RANGE
-
-
-def are_counts(values: Vector) -> bool:
-    """Return True if all values are whole 16-bit numbers."""
-    return bool((values == np.rint(values)).all() and np.abs(values).max() <= FULL_SCALE)
 
 
 def _is_clipped(values: Vector) -> Mask:

@@ -31,10 +31,10 @@ from .names import (
     parse_column_name,
     plausible_celsius,
 )
-from .streams import are_counts, index_with_gravity, join_streams
+from .streams import index_with_gravity, join_streams
 from .text import PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
-from .units import acceleration_unit, likely_sample_rates, to_signed
+from .units import acceleration_unit, are_counts
 
 SNIFFED = 1 << 16
 FEWEST_COLUMNS = 6
@@ -106,25 +106,16 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     RecordingError : it does not say all that is needed; the message names what is missing.
     """
     columns, guess_remark = columns_by_hint(table.header, hints) if hints.columns else table.columns, ""
-    if not hints.columns and not (first_triple(columns, ACC) and first_triple(columns, GYR)):
-        by_motion, guess_remark = _guess(table, hints)
-        columns = columns_by_hint(table.header, by_motion) if guess_remark else columns
+    if not hints.columns:
+        columns, guess_remark = _guess(table, columns, hints)
     accelerometers, gyr = axis_triples(columns, ACC), first_triple(columns, GYR)
-    if not accelerometers or not gyr:
-        raise _missing_sensors(table, bool(accelerometers), bool(gyr))
+    if not accelerometers:
+        raise _missing_sensors(table, columns)
     streams = [sensor_stream(table, columns, of) for of in accelerometers]
     chosen = index_with_gravity(streams)
-    acc, a, w = accelerometers[chosen], streams[chosen], sensor_stream(table, columns, gyr)
+    acc, a, w = accelerometers[chosen], streams[chosen], sensor_stream(table, columns, gyr) if gyr else None
     warm = [column for column in columns if column.quantity == TEMPERATURE]
     temperature_c = plausible_celsius(table.numbers(warm[:1])[a.kept, 0]) if warm else None
-    if w.times is None and hints.rate_hz is None:
-        raise RecordingError(
-            f"{table.name} holds no times that are known as such; its columns are {_list_names(table.header)}"
-            f"{likely_sample_rates(to_signed(a.values), to_signed(w.values), w.unit)}",
-            "name them with --columns t=NAME,ax=NAME,... and --units t=UNIT, or"
-            " give the rate of its samples with --rate HZ",
-            "--rate HZ",
-        )
     a, ios_remarks = _undo_ios_sign(a, acc)
     several = len(accelerometers) > 1
     remarks = [
@@ -134,37 +125,44 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
         *table.remarks,
         guess_remark,
     ]
-    recording = join_streams(a, w, hints, table.name, temperature_c, remarks)
-    lost = table.after_lost
-    if lost is None or hints.rate_hz is None or w.times is not None:
-        return recording
-    # without times of their own, only the lines show where samples are missing
-    at = np.rint(recording.t * hints.rate_hz).astype(np.int64)
-    return replace(recording, gap=recording.gap | lost[at])
+    return join_streams(a, w, hints, table.name, temperature_c, remarks)
 
 
-def _guess(table: Table, hints: Hints) -> tuple[Hints, str]:
-    """Return hints of the columns by physics, and a remark on them, empty if nothing fits; see guess_columns."""
+def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Column], str]:
+    """Return the columns with those that only physics shows, and a remark on them; see guess_columns."""
+    acc, gyr = first_triple(columns, ACC), first_triple(columns, GYR)
+    known = (*acc, *gyr) if acc and gyr else ()
+    if known and (table.clocks(columns) or hints.rate_hz):
+        return columns, ""
     places = table.numeric_places()
     try:
-        order, remark = guess_columns(table.numbers([Column("", place, "") for place in places]), hints)
+        numbers = table.numbers([Column("", place, "") for place in places])
     except RecordingError:
-        return hints, ""
-    return replace(hints, columns={role: places[place] for role, place in order.items()}), remark
+        return columns, ""
+    sensors = [places.index(c.place) for c in known if c.place in places]
+    found = {role: places[i] for role, i in guess_columns(numbers, hints, sensors).items()}
+    if not found or (known and "t" not in found):
+        return columns, ""
+    words = ["-"] * (max(found.values()) + 1)
+    for role, place in found.items():
+        words[place] = role
+    kept = [c for c in columns if c.quantity == TEMPERATURE]
+    remark = f"its columns were guessed from how gravity turns: --columns {','.join(words)}"
+    return [*columns_by_hint(table.header, replace(hints, columns=found)), *kept], remark
 
 
-def _missing_sensors(table: Table, has_acc: bool, has_gyr: bool) -> RecordingError:
-    if has_acc or has_gyr:
+def _missing_sensors(table: Table, columns: list[Column]) -> RecordingError:
+    if first_triple(columns, GYR):
         return RecordingError(
-            f"{table.name} holds no columns of {'a gyroscope' if has_acc else 'an accelerometer'}; its columns are"
-            f" {_list_names(table.header)}",
+            f"{table.name} holds no columns of an accelerometer; its columns are {_list_names(table.header)}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
         )
+    order = ",".join(ROLES if table.clocks(columns) else ROLES[1:])
     return RecordingError(
         f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are"
         f" {_list_names(table.header)}",
-        f"name its columns in their order with --columns {','.join(ROLES)}, and - for one to leave out",
-        f"--columns {','.join(ROLES)}",
+        f"name its columns in their order with --columns {order}, and - for one to leave out",
+        f"--columns {order}",
     )
 
 
@@ -190,7 +188,8 @@ def sensor_stream(table: Table, columns: Sequence[Column], axes: Sequence[Column
     clock = min(clocks, key=lambda c: (not c.clock_of, c.rank), default=None)
     unit = axes[0].unit if len({column.unit for column in axes}) == 1 else ""
     times: tuple[Times | None, str] = (None, "") if clock is None else table.times(clock, kept)
-    return Stream(times[0], values[kept], times[1], unit, kept=kept, lost=lost)
+    gap = None if table.after_lost is None else table.after_lost[kept]
+    return Stream(times[0], values[kept], times[1], unit, kept=kept, lost=lost, gap=gap)
 
 
 def complete_lines(values: Vector) -> tuple[Mask, int]:

@@ -28,6 +28,8 @@ NS = 1_000_000_000
 MOST_NUL = 0.1
 # a header may begin with such a mark; any other line that does is a comment
 COMMENT = ("#", "%", "//")
+# the share of lines that may be damaged
+MOST_BAD = 0.01
 # exponents of numbers beyond this would take all memory as integers
 MOST_DIGITS = 40
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -70,7 +72,8 @@ class TextTable(Table):
 
     def numeric_places(self) -> list[int]:
         """See Table; the first row decides, and a date counts as a number."""
-        return [place for place in range(min(map(len, self.rows))) if _is_number(self.rows[0][place])]
+        width = int(np.percentile([len(row) for row in self.rows], 100 * MOST_BAD))
+        return [place for place, cell in enumerate(self.rows[0][:width]) if _is_number(cell)]
 
     def clocks(self, columns: Sequence[Column]) -> list[Column]:
         """See Table."""
@@ -78,15 +81,17 @@ class TextTable(Table):
         return [c for c in columns if c.quantity == TIME and c.place < len(first) and _is_number(first[c.place])]
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
-        """See Table; the error names the line."""
-        found = np.empty((len(self.rows), len(columns)))
+        """See Table; a cell that a line lacks, or of a few damaged lines, is empty. The error names the line."""
+        found, bad = np.full((len(self.rows), len(columns)), np.nan), []
         for j, column in enumerate(columns):
-            for i in range(len(self.rows)):
-                text = self._cell(i, column).strip()
+            for i, row in enumerate(self.rows):
+                text = row[column.place].strip() if column.place < len(row) else ""
                 try:
                     found[i, j] = float(_with_point(text)) if text else np.nan
-                except ValueError as error:
-                    raise self._not_a_number(i, column, text) from error
+                except ValueError:
+                    bad.append((i, column, text))
+        if len({i for i, *_ in bad}) > MOST_BAD * len(self.rows):
+            raise self._not_a_number(*bad[0])
         return found
 
     def times(self, column: Column, kept: Mask) -> tuple[list[Decimal], str]:

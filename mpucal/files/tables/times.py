@@ -35,6 +35,7 @@ class Stream:
     values : (n, 3). time_unit, unit : as the file names them; empty if it does not.
     zero_ns : the time of day at time 0, in ns since 1970, if another file tells it.
     kept : mask of the file's lines that are its samples. lost : number of the other lines that are a loss.
+    gap : (n,) True where lines before a sample are missing that only the file shows; None if none is.
     """
 
     times: Times | None
@@ -44,13 +45,15 @@ class Stream:
     zero_ns: int | None = None
     kept: Mask | EllipsisType = ...
     lost: int = 0
+    gap: Mask | None = None
 
     def part(self, mask: Mask) -> Stream:
         """Return the samples where `mask` (n,) is True."""
         times = self.times
         if times is not None:
             times = times[mask] if isinstance(times, np.ndarray) else list(compress(times, mask))
-        return replace(self, times=times, values=self.values[mask])
+        gap = None if self.gap is None else self.gap[mask]
+        return replace(self, times=times, values=self.values[mask], gap=gap)
 
     @property
     def is_new(self) -> Mask:
@@ -85,14 +88,14 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
 
     Raises
     ------
-    RecordingError : the rate or unit is not known, or times are not finite or decrease.
+    RecordingError : the unit is not known, or times are not finite or decrease.
     """
     none = np.zeros(len(stream.values), bool)
     if stream.times is None or first.times is None:
-        if hints.rate_hz is None:
-            raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ", "--rate HZ")
+        rate_hz = hints.rate_hz or units.ANY_HZ
         places = np.flatnonzero(np.ones(len(stream.values), bool) if stream.kept is ... else stream.kept)
-        return places / hints.rate_hz, none, f"a rate of {hints.rate_hz:g} Hz", ""
+        # without times, only the lines show where samples are missing
+        return places / rate_hz, none if stream.gap is None else stream.gap, f"a rate of {rate_hz:g} Hz", ""
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")

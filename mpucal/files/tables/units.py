@@ -51,6 +51,8 @@ LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 SCATTER = 0.45
 # a rate to try on samples without times, and the rates of most loggers
 ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
+# octaves by which a sample rate may change in the second round
+SETTLED = 0.25
 # the fastest rate of a hand and of usual sensors
 FASTEST_RAD_S = 37.0
 # the units that most programs write
@@ -100,6 +102,11 @@ def to_signed(values: Vector) -> Vector:
     return np.asarray(wrapped if steps[0] < steps[1] else shifted)
 
 
+def are_counts(values: Vector) -> bool:
+    """Return True if all values are whole 16-bit numbers."""
+    return bool((values == np.rint(values)).all() and np.abs(values).max() <= FULL_SCALE)
+
+
 def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     """Return the factor by which (n, 3) rates turn (n, 3) accelerations as these turn; None if it is not determined.
 
@@ -107,15 +114,17 @@ def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     ----------
     t : (n,) s. acc : in any unit. gyr : in rad/s if the factor is 1.
     """
-    if len(t) < LEAST_TURNS:
-        return None
+    factor, correlation = turning(t, acc, gyr)
+    return factor if correlation >= EXPLAINED else None
+
+
+def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
+    """Return the factor of rate_factor, and the correlation of both turnings, 0 if there is none."""
     # stamps of arrival may repeat
-    dt = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)
-    if not dt > 0.0:
-        return None
-    width = max(1, round(min(TURN_S / 2 / dt, len(t))))
+    dt = (float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)) if len(t) >= LEAST_TURNS else 0.0
+    width = max(1, round(min(TURN_S / 2 / dt, len(t)))) if dt > 0.0 else len(t)
     if len(t) < LEAST_TURNS * width:
-        return None
+        return 0.0, 0.0
     kernel = np.full(width, 1.0 / width)
     smooth = np.column_stack([np.convolve(column, kernel, "same") for column in acc.T])
     rates = np.column_stack([np.convolve(column, kernel, "same") for column in gyr.T])
@@ -126,23 +135,26 @@ def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     seen, predicted = (values[inner][lag:] - values[inner][:-lag] for values in (smooth, path))
     power = float((predicted**2).sum())
     both = float((seen * predicted).sum())
-    if power == 0.0 or abs(both) < EXPLAINED * math.sqrt(power * float((seen**2).sum())):
+    size = math.sqrt(power * float((seen**2).sum()))
+    return (both / power, abs(both) / size) if size > 0.0 else (0.0, 0.0)
+
+
+def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
+    """Return the sample rate at which (n, 3) rates in `unit`, or in the only likely one, turn gravity; else None."""
+    if len(acc) != len(gyr):
         return None
-    return both / power
-
-
-def likely_sample_rates(acc: Vector, gyr: Vector, said: str) -> str:
-    """Return as text the sample rates at which gravity turns with (n, 3) rates, in unit `said` or any; or empty."""
-    factor = rate_factor(np.arange(len(acc)) / ANY_HZ, acc, gyr)
-    if not factor or said == COUNTS:
-        return ""
     fastest = float(np.percentile(np.abs(gyr), 99))
-    units = [said] if said else [u for u, si in QUANTITIES["gyr"].items() if fastest * si < FASTEST_RAD_S]
-    rates = {unit: ANY_HZ * QUANTITIES["gyr"][unit] / abs(factor) for unit in units}
-    likely = [
-        f"{round(hz)} Hz if rates are in {unit}" for unit, hz in rates.items() if LIKELY_HZ[0] < hz < LIKELY_HZ[1]
-    ]
-    return f" (by how gravity turns, its rate is about {' or '.join(likely)})" if likely else ""
+    known = QUANTITIES["gyr"].items()
+    units = [si for name, si in known if name == unit or (not unit and fastest * si < FASTEST_RAD_S)]
+    likely = []
+    for si in units:
+        # the second time with the right smoothing
+        hz = [ANY_HZ]
+        while len(hz) < 3 and (factor := rate_factor(np.arange(len(acc)) / hz[-1], acc, gyr)):
+            hz.append(hz[-1] * si / abs(factor))
+        if len(hz) == 3 and LIKELY_HZ[0] < hz[2] < LIKELY_HZ[1] and abs(math.log2(hz[2] / hz[1])) < SETTLED:
+            likely.append(float(f"{hz[2]:.3g}"))
+    return likely[0] if len(likely) == 1 else None
 
 
 def gyro_unit(factor: float | None) -> str:
