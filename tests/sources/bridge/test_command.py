@@ -78,7 +78,7 @@ def test_into_the_memory_and_back(board, mpucal, tmp_path):
     board.memory.write(0, b"another sketch's")
     stored = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "--yes")
     assert stored.code == 0, stored.err
-    assert "holds something else, perhaps data of another sketch; a write overwrites it" in stored.err
+    assert "holds other data, perhaps another sketch's or file system's, which a write overwrites" in stored.err
     assert "as its blob number 1 (212 bytes, CRC-32 " in stored.out
     # another bridge with the same memory: the power was off
     board.server.device = EmulatedBridge(board.chip, board.clock.now, board.memory)
