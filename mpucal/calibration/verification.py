@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Recording, Vector
+from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import RestFinder
@@ -26,6 +27,8 @@ FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02
 # Larger errors than so many predicted standard deviations are not by chance.
 MOST_STD = 4.0
 LEAST_REST_S, BLOCK_S = 0.75, 0.25
+# In longer intervals of a vehicle, in periods, a sample is missing, or its time is late: their turn is not known.
+LONG = 1.5
 # Only an autopilot's simulator turns so fast and so suddenly; the last number is the error of its rates, low-passed and
 # at 200 samples/s.
 LEAP_RAD_S, LEAP_RAD_S2, LEAP_RAD = np.radians([200.0, 10_000.0, 0.5]).tolist()
@@ -40,7 +43,8 @@ class NewOrientation:
     down : (3,) unit, the calibrated direction that points down. magnitude, magnitude_std : |a| - g [m/s^2].
     direction, direction_std : angle between gravity as carried here and gravity here [rad].
     turn : (3,) rad, the turn on the way here, in the board's axes. miss : (3,) rad, `direction` about its axis.
-    clipped : the gyroscope clipped on the way, or samples are missing, so that the direction cannot be compared.
+    clipped : the gyroscope clipped on the way, or samples are missing, so that the direction cannot be compared. A
+        vehicle's samples count as missing where the intervals that are too long explain an error of the direction.
     """
 
     down: Vector
@@ -89,7 +93,10 @@ class _Transition:
         self.z, self.z_var = _mean(r.acc[a:b], r.rate_hz)
         self.y, self.y_var = _mean(r.acc[c:d], r.rate_hz)
         dt = np.diff(r.t[between])
-        self.steps = dt[:, None] * (0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega)
+        rates = 0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega
+        late = np.where(dt > LONG / r.rate_hz, dt - 1.0 / r.rate_hz, 0.0)
+        self.unsure_rad = float(late @ np.linalg.norm(rates, axis=1)) if r.sensor.origin is Origin.VEHICLE else 0.0
+        self.steps = dt[:, None] * rates
         self.clipped = bool(r.gyr_clipped[between].any() or r.gap[b : c + 1].any())
         noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
         self.gyro_var = 2.0 * noise + (LEAP_RAD**2 if _leaps(r.gyr[between], dt) else 0.0)
@@ -104,15 +111,17 @@ class _Transition:
         length_var = float((of_length @ covariance @ of_length.T).item() + along**2 @ self.y_var)
         miss_var = float(np.trace(of_miss @ covariance @ of_miss.T)) + self.gyro_var
         miss_var += float(self.y_var.sum() + self.z_var.sum()) / gravity**2
+        direction = math.asin(min(float(np.linalg.norm(miss)), 1.0))
+        direction_std = math.hypot(math.sqrt(miss_var), FLOOR_RAD)
         return NewOrientation(
             down=-_unit(s),
             magnitude=float(np.linalg.norm(s) - gravity),
             magnitude_std=math.hypot(math.sqrt(length_var), FLOOR_MPS2),
-            direction=math.asin(min(float(np.linalg.norm(miss)), 1.0)),
-            direction_std=math.hypot(math.sqrt(miss_var), FLOOR_RAD),
+            direction=direction,
+            direction_std=direction_std,
             turn=self.steps.sum(0) @ fit.K.T,
             miss=miss,
-            clipped=self.clipped,
+            clipped=self.clipped or 0.0 < direction - MOST_STD * direction_std <= self.unsure_rad,
         )
 
     def _end(self, theta: Vector) -> Vector:

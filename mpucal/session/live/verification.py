@@ -156,7 +156,7 @@ def _verification(rest: NewOrientation, number: int, of: int, t_s: float) -> Ver
     direction_deg, std_deg = np.rad2deg([rest.direction, rest.direction_std]).tolist()
     known = f"1 sigma {std_deg:.2f}"
     if rest.clipped:
-        known = "not judged: on the way samples were lost or the gyroscope clipped"
+        known = "not judged: on the way samples were lost or late, or the gyroscope clipped"
     text = (
         f"new orientation {number} of {of}: |a| error {rest.magnitude:+.3f} m/s² (1 sigma {rest.magnitude_std:.3f}),"
         f" direction error {direction_deg:.2f} deg ({known})"
