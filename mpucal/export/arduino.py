@@ -60,7 +60,7 @@ static void set(uint8_t reg, uint8_t value) {
 static bool measure(int16_t counts[7]) {
     Wire.beginTransmission(CHIP);
     Wire.write((uint8_t)0x3B);
-    if (Wire.endTransmission(false) != 0 || Wire.requestFrom(CHIP, (uint8_t)14) != 14)
+    if (Wire.endTransmission(false) != 0 || Wire.requestFrom(CHIP, (size_t)14) != 14)
         return false;
     for (uint8_t i = 0; i < 7; i++) {
         uint8_t high = (uint8_t)Wire.read();

@@ -44,7 +44,7 @@ WIRE_H = """#pragma once
 struct TwoWire {
     void begin(); void begin(int, int); void setSDA(int); void setSCL(int);
     void setClock(uint32_t); void beginTransmission(uint8_t); uint8_t endTransmission(bool = true);
-    size_t write(uint8_t); uint8_t requestFrom(uint8_t, uint8_t); int read();
+    size_t write(uint8_t); uint8_t requestFrom(uint8_t, size_t); uint8_t requestFrom(int, int); int read();
 };
 extern TwoWire Wire;
 """

@@ -112,7 +112,7 @@ static uint8_t readPiece(uint8_t address, uint8_t first, uint8_t *data, uint8_t 
     if (code != MPUCAL_CODE_OK) {
         return code;
     }
-    if (Wire.requestFrom(address, count) != count) {
+    if (Wire.requestFrom(address, (size_t)count) != count) {
         return whyNothing(address);
     }
     for (uint8_t i = 0; i < count; i++) {

@@ -30,7 +30,7 @@ static void writeRegister(uint8_t address, uint8_t value) {
 static bool readRegisters(uint8_t first, uint8_t *data, uint8_t count) {
     Wire.beginTransmission(ADDRESS);
     Wire.write(first);
-    if (Wire.endTransmission(false) != 0 || Wire.requestFrom(ADDRESS, count) != count) {
+    if (Wire.endTransmission(false) != 0 || Wire.requestFrom(ADDRESS, (size_t)count) != count) {
         return false;
     }
     for (uint8_t i = 0; i < count; i++) {
