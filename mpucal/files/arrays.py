@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,8 +101,11 @@ def columns_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[A
 def _axes(name: str, width: int) -> list[str]:
     """Return the names of the columns of a sensor's matrix; empty for another matrix."""
     last = name.rpartition(".")[2]
-    of_a_sensor = (found := parse_column_name(f"{last}_x", 0)) is not None and found.quantity in (ACC, GYR)
-    return [f"{last}_{axis}" for axis in "xyz"] if width == 3 and of_a_sensor else []
+    for word in (last, *re.split(r"[^A-Za-z]+", last)):
+        found = parse_column_name(f"{word}_x", 0) if width == 3 and word else None
+        if found is not None and found.quantity in (ACC, GYR):
+            return [f"{word}_{axis}" for axis in "xyz"]
+    return []
 
 
 @dataclass(frozen=True)

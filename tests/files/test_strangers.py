@@ -200,7 +200,9 @@ def test_files_of_matlab_7_3_are_read_by_h5py(even_walk, tmp_path):
             file[f"{name}Buffer"] = np.vstack([even_walk.t, values.T]).T.copy()
         path.write_bytes(HEAD_OF_7_3 + path.read_bytes()[512:])
     for given in ("mpu6050_gyroscope.mat", "."):
-        np.testing.assert_allclose(si(mpucal.load(tmp_path / given, units="gyr=deg/s")), si(even_walk), atol=1e-9)
+        read = mpucal.load(tmp_path / given)
+        assert "accelerations in g and rates in deg/s" in read.taken
+        np.testing.assert_allclose(si(read), si(even_walk), atol=1e-9)
     (tmp_path / "a.mat").write_bytes(HEAD_OF_7_3)
     with pytest.raises(RecordingError, match="is not a whole file of arrays"):
         mpucal.load(tmp_path / "a.mat")
@@ -227,6 +229,14 @@ def test_a_rate_that_nothing_says_is_found_by_how_gravity_turns(even_walk, tmp_p
     assert read.rate_hz == pytest.approx(HZ, rel=0.15)
     assert "this sample rate is that at which its rates turn gravity" in read.taken
     np.testing.assert_allclose(si(read), si(even_walk), atol=1e-9)
+
+
+def test_a_rate_above_the_names_of_columns_is_read(even_walk, tmp_path):
+    head = "Fs,100\nLogging Type,1\nWaiting time,3\nax,ay,az,gx,gy,gz\n"
+    (tmp_path / "walk.csv").write_text(head + text(counts(even_walk), ","))
+    read = mpucal.load(tmp_path / "walk.csv")
+    assert "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|) and rates in counts of ±500 deg/s" in read.taken
+    np.testing.assert_allclose(si(read), si(even_walk), atol=1.01 / COUNTS[0])
 
 
 def test_files_of_a_folder_are_one_recording(even_walk, tmp_path):

@@ -81,7 +81,11 @@ def is_archive_of_tables(path: Path) -> bool:
 def is_one_of_two_tables(path: Path) -> bool:
     """Return True if a file is a table of one sensor, beside that of the other."""
     try:
-        if not any(path.name in pair for pair in _pairs([path.name, *(child.name for child in path.parent.iterdir())])):
+        names = [child.name for child in path.parent.iterdir()]
+        if (found := _parse(path.name)) is None:
+            return False
+        alike = [_parse(name) for name in names]
+        if {of[0] for of in alike if of and of[2] == found[2]} != {ACC, GYR}:
             return False
         begun = first_bytes(path, SNIFFED)
         table = None if begun.startswith(MATLAB) else find_table(decode_text(begun, path.name), path.name)
@@ -196,8 +200,9 @@ def _stream(name: str, data: bytes, quantity: str, hints: Hints) -> Stream:
             f"{name} holds the columns {', '.join(table.header)}, but no {quantity}", "record both sensors"
         )
     stream = sensor_stream(table, columns, of)
-    # the unit was assumed, and counts disprove it
-    return stream if of[0].unit != UNITS[quantity] or not _are_counts(stream.values) else replace(stream, unit="")
+    # the unit was assumed, as of a phone's
+    doubtful = of[0].unit == UNITS[quantity] and (isinstance(table, ArrayTable) or _are_counts(stream.values))
+    return replace(stream, unit="") if doubtful else stream
 
 
 def _hinted_columns(hints: Hints, quantity: str) -> dict[str, str | int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -43,6 +44,11 @@ ANOTHERS = 0.1
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
 PREAMBLE_CHARACTERS = 4096
+# a line above a table without times, as `Fs,100` or `Sample rate: 52 Hz`
+RATE = re.compile(
+    r"^\W{0,3}(?:fs|sampl(?:e|ing)[ _](?:rate|freq\w{0,6}))[^\d\n]{1,12}([1-9]\d{0,4}(?:\.\d{1,6})?)(?:[ ,]*Hz)?\W*$",
+    re.IGNORECASE | re.MULTILINE,
+)
 # m/s^2: whole numbers that are larger are counts
 LARGEST_OF_SI = 300.0
 # stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
@@ -94,8 +100,11 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
         )
     if not table.rows:
         raise RecordingError(f"{path.name} holds no lines below the names of its columns", "record it again")
-    known = next((units for words, units in PROGRAMS.items() if words in text[:PREAMBLE_CHARACTERS]), {})
-    return recording_from_table(table, replace(hints, units={**known, **hints.units}))
+    begun = text[:PREAMBLE_CHARACTERS]
+    known = next((units for words, units in PROGRAMS.items() if words in begun), {})
+    rate = RATE.search(begun)
+    rate_hz = hints.rate_hz or (float(rate[1]) if rate and not table.clocks(table.columns) else None)
+    return recording_from_table(table, replace(hints, units={**known, **hints.units}, rate_hz=rate_hz))
 
 
 def recording_from_table(table: Table, hints: Hints) -> Recording:
