@@ -13,7 +13,7 @@ from ..errors import WrongValue
 from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
-from .bias_walks import SIGNIFICANT, BiasWalk, find_walk, remove_walk
+from .changes import SIGNIFICANT, Change, find_changes, remove_walk
 from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
@@ -97,30 +97,32 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     before = replace(before, recording=recording, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
-    choice, walk = _fit(recording, flat, gravity, model)
-    claim = claim_uncertainty(choice.fit, gravity, walk, choice.walked)
+    choice, change = _fit(recording, flat, gravity, model)
+    claim = claim_uncertainty(choice.fit, gravity, change, choice.walked)
     evidence = replace(before, fit=inflate(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 
 
-def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, BiasWalk | None]:
-    """Return the fit without the walk of the gyroscope's bias while the board was turned, and the walk that is left."""
-    choice, walk = _fit_once(recording, flat, gravity, model)
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, Change | None]:
+    """Return the fit without the walk of the gyroscope's bias during the turning, and the change that is left."""
+    choice, changes = _fit_once(recording, flat, gravity, model)
     for _ in range(MOST_WALKS):
-        if walk is None or walk.what != "gyroscope" or not choice.fit.converged:
+        if not changes or changes[0].what != "gyroscope" or not choice.fit.converged:
             break
+        walk = changes[0]
         without, left = _fit_once(remove_walk(choice.recording, flat, walk), flat, gravity, model)
         if not without.fit.V < choice.fit.V - 0.5 * SIGNIFICANT:
             break
-        choice, walk = without._replace(walked=without.walked + choice.walked + walk.q), left
-    return choice, walk
+        choice, changes = without._replace(walked=without.walked + choice.walked + walk.q), left
+    # A walk whose removal explains nothing is none.
+    return choice, next((change for change in changes if change.what != "gyroscope"), None)
 
 
-def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, BiasWalk | None]:
+def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Change]]:
     if model == "auto":
         choice = choose_model(recording, flat, gravity)
     else:
         choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
     fit = choice.fit
-    return choice, None if fit.parts is None else find_walk(fit.parts, fit.D)
+    return choice, [] if fit.parts is None else find_changes(fit.parts, fit.D)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat, flat_statistics
-from .bias_walks import find_walk, remove_walk
+from .changes import find_changes, remove_walk
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import fit_hand
@@ -161,7 +161,7 @@ class InPlaceFits:
         for _ in range(MOST_WALKS):
             rough = steady._rough(IMU)
             parts = parts_of(steady._thin, rough, self._prior)
-            walk = None if parts is None else find_walk(parts, rough.theta.D)
+            walk = next(iter(find_changes(parts, rough.theta.D) if parts else []), None)
             if walk is None or walk.what != "gyroscope":
                 break
             recording, walked = remove_walk(steady.recording, self._flat, walk), steady.walked + walk.q

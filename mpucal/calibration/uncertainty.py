@@ -1,6 +1,7 @@
 """Uncertainty of a calibrated measurement: predicted by a covariance, and claimed where parts of a recording disagree.
 
-The claim is the largest of three errors: the model's own, the jackknife's, and that of a sensor that changed midway.
+The claim is the larger of two errors, the model's own and the jackknife's. Where the sensor changed midway, each
+element's standard deviation also holds what the element was and what it became.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ..data import Vector
-from .bias_walks import SIGNIFICANT, BiasWalk, walked_covariance
+from .changes import SIGNIFICANT, Change, walked_covariance
 from .fit import Fit
 from .jackknife import TINY_MPS2, Jackknife, jackknife
 from .parameters import ACCELEROMETER
@@ -85,12 +86,12 @@ class UncertaintyClaim:
     model: float
     floored: float
     left_out: Jackknife
-    change: BiasWalk | None
+    change: Change | None = None
     change_error: float = 0.0
 
     @property
     def inflation(self) -> float:
-        """Factor of the model's standard deviations that gives the claimed ones, 1 or more."""
+        """Claimed uncertainty as a multiple of the model's, 1 or more."""
         return max(self.floored, self.left_out.claim(), self.change_error) / self.model
 
     @property
@@ -100,11 +101,16 @@ class UncertaintyClaim:
             return "model"
         return "change" if self.change_error > self.left_out.claim() else self.left_out.decided_by()
 
+    def widen(self, covariance: Vector) -> Vector:
+        """Return a covariance (p, p) of the model as it is claimed: it holds what a changed sensor was and became."""
+        same = (max(self.floored, self.left_out.claim()) / self.model) ** 2 * covariance
+        return same if self.change is None else same + np.diag(self.change.away**2)
 
-def claim_uncertainty(fit: Fit, gravity: float, change: BiasWalk | None, walked: float) -> UncertaintyClaim | None:
+
+def claim_uncertainty(fit: Fit, gravity: float, change: Change | None, walked: float) -> UncertaintyClaim | None:
     """Return the claimed uncertainty of a fit; None where its parts are not known, or D or the covariance is unusable.
 
-    change : the most likely walk that the fit's parts show. walked : (rad/s)^2 from part to part, of a walk of the
+    change : the most likely change that the fit's parts show. walked : (rad/s)^2 from part to part, of a walk of the
         gyroscope's bias that was removed.
     """
     if fit.parts is None or not is_usable(fit):
@@ -117,13 +123,17 @@ def claim_uncertainty(fit: Fit, gravity: float, change: BiasWalk | None, walked:
     left_out = jackknife(fit.parts, fit.D, gravity)
     if not left_out.side:
         floored *= UNCOMPARED
+    same = UncertaintyClaim(model, floored, left_out)
+    if change is None or not fit.converged:
+        return same
     # A model that does not explain its innovations leaves the hand's motion in every part, which looks like a walk.
-    if change is None or not fit.converged or (change.alone if fit.nis <= MOST_NIS else change.gain) < SIGNIFICANT:
-        return UncertaintyClaim(model, floored, left_out, None)
+    if (change.alone if fit.nis <= MOST_NIS else change.gain) < SIGNIFICANT:
+        return same
+    error = rms(np.diag(change.away**2))
     # A sensor that changed moves the estimate when parts are left out; a steady pull on a moving hand does not.
-    if change.error(gravity) > MOST_UNFELT * max(left_out.claim(), model):
-        return UncertaintyClaim(model, floored, left_out, None)
-    return UncertaintyClaim(model, floored, left_out, change, change.error(gravity))
+    return (
+        same if error > MOST_UNFELT * max(left_out.claim(), model) else replace(same, change=change, change_error=error)
+    )
 
 
 def is_usable(fit: Fit) -> bool:
@@ -135,7 +145,7 @@ def is_usable(fit: Fit) -> bool:
 
 def inflate(fit: Fit, claim: UncertaintyClaim | None) -> Fit:
     """Return the fit with the claimed covariance."""
-    return fit if claim is None else replace(fit, covariance=claim.inflation**2 * fit.covariance)
+    return fit if claim is None else replace(fit, covariance=claim.widen(fit.covariance))
 
 
 def _rms(D: Vector, covariance: Vector, gravity: float) -> float:

@@ -19,8 +19,6 @@ from .judge import MOST_CLAIMS, Judgement
 from .judge import judged as judged_against
 from .table import Column, count, over, show, table
 
-# a verdict that is false by the lab's judge is wrong only where it is farther from the truth than what matters [m/s^2]
-LEAST_ERROR = 0.1
 WITH_RESULT = (0, 5, 6)
 FOLDER = "board"
 
@@ -34,7 +32,8 @@ class Outcome:
     case : as --case takes it. world : its kind of world, or format. blows : what struck it.
     code : exit code; below 0: the signal that ended it; None: it hung. said : its last line.
     verdict : of the calibration that it left, if any. error : of a calibrated reading, rms over the sphere [m/s^2].
-    z : that in units of what is claimed. wrong : what is wrong with it. recorded : a capture is there.
+    claims : that in units of what is claimed. z : of the farthest element, in its standard uncertainties.
+    wrong : what is wrong with it. recorded : a capture is there.
     """
 
     case: str
@@ -46,13 +45,14 @@ class Outcome:
     said: str = ""
     verdict: str = ""
     error: float = 0.0
+    claims: float = 0.0
     z: float = 0.0
     recorded: bool = False
 
     def __str__(self) -> str:
         """Return it in a few lines, with the command that repeats it where it was wrong."""
         lines = [f"{self.world} {' '.join(self.blows) or 'no fault'}: exit {self.code} {self.verdict}"]
-        lines.append(f"    error {self.error} m/s^2, {self.z} claims; {self.said}")
+        lines.append(f"    error {self.error} m/s^2, {self.claims} claims, an element {self.z} off; {self.said}")
         again = f"python -m tools.lab campaign --case {self.case} --keep /tmp/struck"
         return "\n".join([*lines, *(f"    WRONG {wrong}: {again}" for wrong in self.wrong)])
 
@@ -77,8 +77,9 @@ def judged(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any
     else:
         judgement = judged_against(calibration, *world.truths(blows, folder))
         wrong += false(judgement)
-        error, z = (0.0 if math.isnan(each) else each for each in (judgement.error, judgement.claims))
-        known = {"verdict": calibration.verdict, "error": round(error, 4), "z": round(z, 2)}
+        error, claims = (0.0 if math.isnan(each) else each for each in (judgement.error, judgement.claims))
+        known = {"verdict": calibration.verdict, "error": round(error, 4), "claims": round(claims, 2)}
+        known |= {"z": round(judgement.farthest, 2)}
     recorded = folder.exists() and bool(captures_in(folder))
     faults = tuple(map(str, blows))
     return Outcome(case, world.kind, faults, tuple(wrong), done.cpu_s, done.code, done.last, **known, recorded=recorded)
@@ -86,7 +87,7 @@ def judged(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any
 
 def false(judgement: Judgement) -> list[str]:
     """Return what a calibration promises and does not hold."""
-    return [f"called {judgement.verdict}"] if judgement.false and judgement.error > LEAST_ERROR else []
+    return [f"called {judgement.verdict}"] if judgement.false else []
 
 
 def _unfit(code: int | None, document: Path, names: set[str]) -> list[str]:
@@ -137,7 +138,8 @@ COLUMNS: dict[str, Column] = {
     **{verdict: count("verdict", verdict) for verdict in (GOOD, USABLE, REFUSED)},
     "ended": count("verdict", ""),
     "worst m/s²": largest("error"),
-    "claims": largest("z"),
+    "claims": largest("claims"),
+    "element": largest("z"),
     "wrong": count("wrong"),
 }
 

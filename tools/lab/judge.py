@@ -17,8 +17,10 @@ from mpucal.rests.flat import Flat
 from mpucal.result.calibration import GOOD, USABLE, Calibration
 from mpucal.simulated.sensor import SensorTruth
 
-# a verdict is false where the error is more than so many times what is claimed
+# a verdict is false where the error is more than so many times what is claimed, or that of an element more than so many
+# of its standard uncertainties
 MOST_CLAIMS = {GOOD: 3.0, USABLE: 5.0}
+MOST_Z = 5.0
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class Judgement:
     Attributes
     ----------
     error : of a calibrated reading, rms over all directions of gravity [m/s^2]. claim : what it says of that [m/s^2].
-    z : (12,) errors of D row-major and of b_a in units of their standard uncertainties.
+    z : (12,) errors of D row-major and of b_a in units of their standard uncertainties; 0 between the truths of a
+        sensor that changed, NaN where no uncertainty is claimed.
     """
 
     verdict: str
@@ -45,6 +48,11 @@ class Judgement:
         return math.inf if self.verdict in MOST_CLAIMS else math.nan
 
     @property
+    def farthest(self) -> float:
+        """Return the largest |z|, 0 where none is known."""
+        return max((abs(z) for z in self.z if not math.isnan(z)), default=0.0)
+
+    @property
     def rms_z(self) -> float:
         """Return the rms of z: 1 where the uncertainties are honest."""
         return rms(self.z)
@@ -53,19 +61,20 @@ class Judgement:
     def false(self) -> bool:
         """Return True if it is farther from the truth than a calibration of its verdict may be."""
         most = MOST_CLAIMS.get(self.verdict)
-        return most is not None and not self.claims <= most
+        return most is not None and not (self.claims <= most and self.farthest <= MOST_Z)
 
 
 def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: float | None = None) -> Judgement:
-    """Compare a calibration with the nearest of the truths (D, b_a); z is of the first.
+    """Compare a calibration with the truths (D, b_a) of its sensor, several where it changed.
 
     gravity : that D is in units of [m/s^2]; None: what the calibration was told.
     """
     gravity = gravity or float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
-    (D, b_a), *_ = truths
+    true = np.array([np.append(D, b_a) for D, b_a in truths])
+    found = np.append(calibration.D, calibration.b_a)
     std = np.append(calibration.D_std, calibration.b_a_std)
     # a refused one may claim no uncertainty
-    z = np.append(calibration.D - D, calibration.b_a - b_a) / np.where(std > 0.0, std, np.nan)
+    z = (found - np.clip(found, true.min(axis=0), true.max(axis=0))) / np.where(std > 0.0, std, np.nan)
     claim = (calibration.quality.get("error_std") or {}).get("rms")
     return Judgement(
         calibration.verdict,

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...reasons import Reason, reason
-from ..bias_walks import BiasWalk
+from ..changes import Change
 from ..evidence import Evidence
 from ..tilt import CONE_RAD
 from ..uncertainty import MOST_NIS
@@ -19,7 +19,7 @@ RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)  # disagreement of rests that any 
 MOST_STDS = 5.0
 SLOW_HZ = 20.0  # at a lower sample rate, a hand turns too much from sample to sample
 # Errors of readings by a change of the bias or of the mount: smaller ones are not reported, larger ones refused.
-LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "mount": 0.02}, 0.2
+LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "scale": 0.004, "mount": 0.02}, 0.2
 # Inflation, and jackknife's error [m/s^2], above which parts of the recording contradict each other.
 DISAGREE, DISAGREE_MPS2 = 4.0, 0.02
 
@@ -93,11 +93,11 @@ def inconsistent(e: Evidence) -> Reason | None:
 
 def changed_midway(e: Evidence) -> Reason | None:
     """Find a mount that slipped, where no other reason explains it."""
-    change = _change_of(e, "mount")
-    if change is None:
+    change = _change_of(e, "mount") or _change_of(e, "scale")
+    if change is None or e.claim is None:
         return None
     begin, end = _since_the_start(e, change.steepest)
-    return reason("inconsistent", "change", change.error(e.gravity) > CHANGED_MPS2, begin=begin, end=end)
+    return reason("inconsistent", "change", e.claim.change_error > CHANGED_MPS2, begin=begin, end=end)
 
 
 def zero_moved(e: Evidence) -> Reason | None:
@@ -110,7 +110,7 @@ def zero_moved(e: Evidence) -> Reason | None:
     return reason("zero_moved", "walk", _is_useless(e), size=size, begin=begin, end=end)
 
 
-def _change_of(e: Evidence, what: str) -> BiasWalk | None:
+def _change_of(e: Evidence, what: str) -> Change | None:
     """Return the change of that kind, None where it is too small to report.
 
     Lost and clipped samples pull at an estimate, too, and have reasons of their own.

@@ -25,6 +25,10 @@ def quaternion(R):
     return np.linalg.eigh(N)[1][:, :, -1]
 
 
+def there_and_back(x, sign=1.0):
+    return np.concatenate([x, sign * x[::-1]])
+
+
 @pytest.fixture(scope="module")
 def captured_file(tmp_path_factory):
     """A perfect sensor under motion capture, which loses it for a second; at rest before and after."""
@@ -36,19 +40,16 @@ def captured_file(tmp_path_factory):
     )
     simulated = paper_scenario(0, rate_hz=50.0, sensor=sensor)
     recording = simulated.recording
-    quat = quaternion(simulated.attitude)
+    # The board goes back the way that it came.
+    quat = there_and_back(quaternion(simulated.attitude))
     quat[1000:1050] = np.nan
     path = tmp_path_factory.mktemp("captured") / "desk.npz"
-
-    def longer(x):
-        return np.concatenate([x, x[:500]])
-
     np.savez(
         path,
-        t=np.arange(len(recording) + 500) / 50.0,
-        acc=longer(recording.acc),
-        gyr=longer(recording.gyr),
-        quat=longer(quat),
+        t=np.arange(len(quat)) / 50.0,
+        acc=there_and_back(recording.acc),
+        gyr=there_and_back(recording.gyr, -1.0),
+        quat=quat,
     )
     return path
 
