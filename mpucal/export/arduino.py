@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..chip.families import MPU6050, family_of
+from ..chip.registers import ACCEL_RANGES_G, FULL_SCALE_SHIFT, GYRO_RANGES_DPS
 from ..data import ACCEL_COUNTS, GYRO_COUNTS
 from ..result.calibration import Calibration
 from .c_code import INCLUDES, c_functions, c_temperature_function
 from .losses import heading
 
-ACCEL_CONFIG = {2.0: 0x00, 4.0: 0x08, 8.0: 0x10, 16.0: 0x18}
-GYRO_CONFIG = {250.0: 0x00, 500.0: 0x08, 1000.0: 0x10, 2000.0: 0x18}
+# values of the registers by the range
+ACCEL_CONFIG = {float(g): code << FULL_SCALE_SHIFT for code, g in enumerate(ACCEL_RANGES_G)}
+GYRO_CONFIG = {float(dps): code << FULL_SCALE_SHIFT for code, dps in enumerate(GYRO_RANGES_DPS)}
 DEFAULT_RANGE_G, DEFAULT_RANGE_DPS = 4.0, 500.0
 
 

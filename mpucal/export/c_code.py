@@ -18,6 +18,7 @@ def c_functions(c: Calibration) -> str:
     """
     bias = _row(c.b_a_to_subtract)
     rate_bias = _row(np.nan_to_num(c.b_omega))
+    accel_g, gyro_dps = c.sensor.accel_range_g, c.sensor.gyro_range_dps
     return f"""static const float MPUCAL_INV_D[3][3] = {{
 {c_matrix(c.inverse)}
 }};
@@ -27,7 +28,7 @@ static const float MPUCAL_K[3][3] = {{
 }};
 static const float MPUCAL_B_OMEGA[3] = {{{rate_bias}}}; /* rad/s */
 
-{_about_counts(c)}
+{_about("a", "m/s^2", accel_g, "g", STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS)}
 static inline void mpucal_correct(const float y[3], float a[3])
 {{
     for (int i = 0; i < 3; i++) {{
@@ -37,7 +38,7 @@ static inline void mpucal_correct(const float y[3], float a[3])
     }}
 }}
 
-{_about_rates(c)}
+{_about("w", "rad/s", gyro_dps, "deg/s", np.radians(1) / GYRO_COUNTS)}
 static inline void mpucal_correct_gyro(const float y[3], float w[3])
 {{
     for (int i = 0; i < 3; i++) {{
@@ -119,22 +120,12 @@ def _check(used: str, measured: float, unit: str) -> str:
 """
 
 
-def _about_counts(c: Calibration) -> str:
-    line = "/* y: as measured, a: calibrated, both in m/s^2. */"
-    if c.sensor.accel_range_g is None:
+def _about(result: str, unit: str, full_scale: float | None, of: str, per_count: float) -> str:
+    """Return a comment on y and `result`, and on a count, which is `full_scale` times `per_count`."""
+    line = f"/* y: as measured, {result}: calibrated, both in {unit}. */"
+    if full_scale is None:
         return line
-    scale = c.sensor.accel_range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
-    return f"{line}\n/* At +-{c.sensor.accel_range_g:g} g one count of the chip is {scale:.9g} m/s^2. */"
-
-
-def _about_rates(c: Calibration) -> str:
-    line = "/* y: as measured, w: calibrated, both in rad/s. */"
-    range_dps = c.sensor.gyro_range_dps
-    if range_dps is None:
-        return line
-    lsb, scale = GYRO_COUNTS / range_dps, np.radians(range_dps / GYRO_COUNTS)
-    of = f"{range_dps:g} deg/s one count of the chip is {scale:.9g} rad/s, {lsb:g} LSB/(deg/s)"
-    return f"{line}\n/* At +-{of}; another scale of y changes w by as much. */"
+    return f"{line}\n/* At +-{full_scale:g} {of} one count of the chip is {full_scale * per_count:.9g} {unit}. */"
 
 
 def _row(values: Vector) -> str:

@@ -171,7 +171,7 @@ static inline float mpucal_read_D(const struct mpucal_source *blob, float D[9]) 
     return (det < 0.0f ? -det : det) > 1e-6f * most * most * most ? det : 0.0f;
 }
 
-/* Returns a full scale; 0: unknown. */
+/* Returns true for a possible full scale; 0: unknown. */
 static inline int mpucal_is_range(const struct mpucal_source *blob, uint16_t offset) {
     float value = mpucal_f32(blob, offset);
     return mpucal_is_finite(value) && value >= 0.0f;

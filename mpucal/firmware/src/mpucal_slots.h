@@ -23,12 +23,13 @@ struct mpucal_memory {
     void (*commit)(void); /* makes writes permanent; NULL if `write` does */
 };
 
-/* Returns the stored blob; generation 0: none. */
+/* Place of the stored blob; generation 0: none. */
 struct mpucal_stored {
     uint32_t generation;
     uint16_t at, length;
 };
 
+/* Returns the place of the stored blob. */
 struct mpucal_stored mpucal_slots_stored(const struct mpucal_memory *memory);
 
 /* Returns the address for a new blob: the other slot, whose seal this breaks. It overwrites other data. */

@@ -120,6 +120,12 @@ def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
     assert {finding["topic"]: finding["mark"] for finding in json.loads(told.out)["findings"]} == dict.fromkeys(
         talks(), "ok"
     )
+    board.memory.write(0, b"another sketch's")
+    held = bytes(board.memory.data)
+    told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
+    tried = {finding["topic"]: finding["what"] for finding in json.loads(told.out)["findings"]}
+    assert "not tried, as its memory holds other data" in tried["begin_of_0"]
+    assert board.memory.data == held
     assert "for the firmware of a bridge" in mpucal("doctor", "--bus", "sim", "--conformance").err
 
 
