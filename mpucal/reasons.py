@@ -562,42 +562,42 @@ KINDS: Mapping[str, Kind] = {
         {
             "not_shown": Sentence(
                 "the board was held still in none of the requested orientations, so the calibration is not verified",
-                "run the session again, and hold the board still for 2 s in each",
+                "hold the board still for 2 s in each orientation that is asked for",
                 False,
             ),
             "too_few": Sentence(
                 "the board was held still in {number} of {of} orientations that the calibration has not seen, so it is"
                 " not verified",
-                "run the session again, and hold the board still in each orientation that is asked for",
+                "hold the board still for 2 s in each orientation that is asked for",
                 False,
             ),
             "lost": Sentence(
                 "samples are missing in every turn to an orientation that the calibration has not seen, so it is not"
                 " verified",
-                "use a nearer or faster link or a lower rate, and run the session again",
+                "use a nearer or faster link or a lower rate",
                 False,
             ),
             "never_still": Sentence(
                 "the board was never still in a new orientation, so the calibration is not verified",
-                "run the session again, and hold the board still",
+                "hold the board still for 2 s in each orientation that is asked for",
                 True,
             ),
             "nothing": Sentence("there is nothing to verify", "turn the board again", True),
             "gyroscope": Sentence(
                 "the gyroscope's scale factor about {axis} differs by {share:.0%} from the turning before",
-                "give the gyroscope's true range and rate, turn more slowly, and run the session again",
+                "give the gyroscope's true range and rate, and turn more slowly",
                 True,
             ),
             "direction": Sentence(
                 "gravity, carried by the gyroscope to a new orientation, misses the accelerometer by {miss:.1f} deg,"
                 " where {std:.1f} deg (1 sigma) was predicted: the sensor moved on its mount",
-                "fasten the sensor to its board, and run the session again",
+                "fasten the sensor to its board",
                 True,
             ),
             "magnitude": Sentence(
                 "in a new orientation |a| is {error:+.3f} m/s² off{knock}, where {std:.3f} m/s² (1 sigma) was"
                 " predicted: the accelerometer changed, or slipped on its mount, while it was turned",
-                "fasten the sensor, let nothing press on, knock or warm it, and run the session again",
+                "fasten the sensor, and let nothing press on, knock or warm it",
                 True,
             ),
         },

@@ -26,7 +26,7 @@ def session(tmp_path_factory):
     folder = tmp_path_factory.mktemp("readme")
     said, printed = io.StringIO(), io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
-        assert run(["session", "--bus", "sim"]) == 0
+        assert run(["session", "--bus", "sim", "-o", "first"]) == 0
     return folder, said.getvalue(), printed.getvalue()
 
 

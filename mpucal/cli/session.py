@@ -15,6 +15,7 @@ from ..errors import MpucalError, RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
+from ..result.clock import warn_unset
 from ..result.session_files import DOCUMENT, LOG
 from ..session.folder import SessionFolder, check_unfinished
 from ..sinks.choose import announce_sinks, choose_sinks
@@ -101,14 +102,16 @@ def command(
         on_page as (person, show_result),
     ):
         # A program that reads the events finds the sinks in calibration.json.
-        announcement = "" if json_events else announce_sinks(kinds, no_write)
+        announcement = "" if json_events else " ".join(filter(None, (announce_sinks(kinds, no_write), warn_unset())))
         recording, calibration, paths = _run(source, into, person, announcement, name)
         files = [into.capture, *paths]
         show_result(page_result(calibration), files)
         if not as_json:
             if not json_events:
                 click.echo(err=True)
-            click.echo(f"{summary(calibration)}\n\n{files_written(files, command_again(into.path))}")
+            click.echo(
+                f"{summary(calibration)}\n\n{files_written(files, command_again(into.path), calibration.verdict)}"
+            )
         record = session_recorder(into.path, calibration, recording, source.truth)
         device = {**options, "gravity": source.plan.gravity, "model": source.plan.model}
         latest = calibration

@@ -17,8 +17,8 @@ USUAL, UNUSUAL, OUTSIDE = "usual", "unusual", "outside"
 UNUSUAL_FROM = 2.0 / 3.0
 CAPTION = "value ± standard uncertainty (1 sigma)"
 NOTE = (
-    "Misalignment x->y is the angle from the sensitive axis x towards the board's axis y (cross-axis sensitivity);"
-    " 1 mg is 0.00981 m/s²."
+    "Misalignment to y, in the column of x, is the angle from the sensitive axis x towards the board's axis y"
+    " (cross-axis sensitivity); 1 mg is 0.00981 m/s²."
 )
 
 
@@ -75,7 +75,8 @@ def unusual_parameters(c: Calibration) -> str:
     named: dict[str, list[str]] = {}
     for row in accelerometer(c):
         for axis, words in _by_axis(row, sheet).items():
-            named.setdefault(words, []).append(row.name if len(row.axes) == 1 else f"{row.name} {axis}")
+            of = " of" if " to " in row.name else ""
+            named.setdefault(words, []).append(f"{row.name}{of} {axis}")
     sentences = []
     if OUTSIDE in named:
         sentences.append(f"Outside the data sheet: {', '.join(named[OUTSIDE])}.")

@@ -117,7 +117,7 @@ def _magnitudes(track: Track | None) -> str:
     for name, acc in (("before", track.recording.acc), ("after", track.calibrated)):
         of_rests = np.linalg.norm(track.at_rest(acc), axis=1)
         rows.append([name, *(number(f(of_rests), 4) for f in (np.median, np.mean, np.std))])
-    caption = f"|a| of {len(track.runs)} rests, m/s²; gravity is {track.gravity:.4f}"
+    caption = f"|a| of {len(track.runs)} rests, m/s²; gravity is {track.gravity:.6g}"
     return table("magnitudes", caption, ["", "median", "mean", "standard deviation"], rows)
 
 

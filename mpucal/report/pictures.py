@@ -23,11 +23,11 @@ _XYZ = (("x", X), ("y", Y), ("z", Z))
 RESIDUALS = "|a| of each rest minus gravity. After calibration all should lie at zero, apart from hand tremor."
 MAGNITUDE = "|a| over time. At rest it should equal gravity in every orientation; while the board moves it does not."
 SPHERE = (
-    "Each dot is the mean of a rest. After calibration they lie on the sphere of gravity, before on an ellipsoid beside"
-    " it. Hollow dots are on the far side."
+    "Each dot is the mean of a rest, where gravity pointed: after calibration on the sphere, before on an ellipsoid"
+    " beside it. Hollow dots are on the far side."
 )
 COVERAGE = (
-    "The upward direction in the board's axes: the upper and the lower half of a sphere, seen from above. Large dots: "
+    "The direction that pointed down, in the board's axes and as on the screen: both halves of a sphere. Large dots: "
     "held still. Small dots: moving. Empty areas were not visited."
 )
 

@@ -8,8 +8,8 @@ from ..data import Vector
 from .figure import AFTER, BEFORE, FAINT, INK, LINE, WIDTH, dots, legend, line, svg, text
 from .track import Track
 
-# viewpoint of the sphere; enlargements of deviations, and their largest share of the radius
-_FROM = (0.76, -0.54, 0.36)
+# viewpoint of the sphere, that of the page's ball; enlargements of deviations, and their largest share of the radius
+_FROM = (0.302, -0.830, -0.469)
 _TIMES, _SHOWN = (20, 10, 5, 2, 1), 0.5
 _FEWEST_RESTS, _MOST_LINES = 3, 60
 _POINTS, _SPECKS = 300, 500
@@ -31,8 +31,11 @@ class _Disc:
 
 
 def sphere(track: Track) -> str:
-    """Draw the measurements before and after with the sphere of gravity, as the paper's Fig. 1."""
-    both = [_points(track, acc) / track.gravity for acc in (track.recording.acc, track.calibrated)]
+    """Draw the measurements before and after, as directions that point down, with the sphere of gravity.
+
+    Compare the paper's Fig. 1; the screen and the page show the same directions.
+    """
+    both = [-_points(track, acc) / track.gravity for acc in (track.recording.acc, track.calibrated)]
     farthest = max(float(np.abs(np.linalg.norm(points, axis=1) - 1.0).max()) for points in both)
     times = next((k for k in _TIMES if k * farthest <= _SHOWN), 1)
     disc = _Disc(WIDTH / 2.0, _HEIGHT / 2.0 + 4.0, 145.0 / (1.0 + min(times * farthest, _SHOWN)))
@@ -42,6 +45,11 @@ def sphere(track: Track) -> str:
         circle = np.roll(np.column_stack([_ROUND, 0.0 * _CIRCLE]), k, axis=1) @ view.T
         marks.append(line(*disc.place(np.where(circle[:, 2:] >= 0.0, circle, np.nan)), LINE))
     marks.append(line(*disc.place(_ROUND), INK))
+    for axis, letter in zip(np.vstack([np.eye(3), -np.eye(3)]), ("+X", "+Y", "+Z", "−X", "−Y", "−Z"), strict=True):
+        seen = view @ axis
+        if seen[2] >= 0.0:
+            (x,), (y,) = disc.place(seen[None])
+            marks.append(text(float(x), float(y) + 16.0, letter, colour=FAINT))
     drawn = []
     for points in both:
         size = np.linalg.norm(points, axis=1, keepdims=True)
@@ -60,20 +68,20 @@ def sphere(track: Track) -> str:
 
 
 def coverage(track: Track) -> str:
-    """Draw the upward directions in the board's axes, on both halves of the sphere, in equal areas."""
-    moving = _units(track.calibrated[:: max(len(track.calibrated) // _SPECKS, 1)])
-    rests = _units(track.at_rest(track.calibrated))
+    """Draw the directions that pointed down in the board's axes, on both halves of the sphere, in equal areas."""
+    moving = -_units(track.calibrated[:: max(len(track.calibrated) // _SPECKS, 1)])
+    rests = -_units(track.at_rest(track.calibrated))
     marks = []
-    for centre, sign, name in ((0.25, 1.0, "z up"), (0.75, -1.0, "z down")):
+    for centre, sign, name in ((0.25, -1.0, "+Z up"), (0.75, 1.0, "−Z up")):
         disc = _Disc(centre * WIDTH, _LOW / 2.0 + 8.0, 84.0)
         marks += [line(*disc.place(radius * _ROUND), colour) for radius, colour in ((1.0, INK), (0.5**0.5, LINE))]
         marks.append(text(centre * WIDTH, 12.0, name))
-        for at_x, at_y, letter in ((1.1, -0.04, "x"), (-1.13, -0.04, "−x"), (0.0, 1.05, "y"), (0.0, -1.14, "−y")):
+        for at_x, at_y, letter in ((1.13, -0.04, "+X"), (-1.13, -0.04, "−X"), (0.0, 1.05, "+Y"), (0.0, -1.14, "−Y")):
             (x,), (y,) = disc.place(np.array([[at_x, at_y]]))
             marks.append(text(float(x), float(y), letter, colour=FAINT))
         for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
             marks.append(dots(*disc.place(_project(units[sign * units[:, 2] >= 0.0])), radius, colour))
-    label = "Upward direction in the board's axes: large dots held still, small dots moving"
+    label = "Direction that pointed down, in the board's axes: large dots held still, small dots moving"
     return svg("coverage", label, _LOW, *marks)
 
 

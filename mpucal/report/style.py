@@ -29,6 +29,7 @@ th, td { padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid var(--line); 
 th { font-weight: normal; } th[scope=row], td.words { text-align: left; }
 td.words { white-space: normal; min-width: 7rem; } #accelerometer th:nth-child(5) { text-align: left; }
 pre { background: var(--raised); padding: .8rem 1rem; overflow-x: auto; font-size: .85rem; }
+code { user-select: all; } /* One click selects a whole command. */
 figure { margin: 1.2rem 0 0; max-width: 40rem; }
 figcaption { font-size: .9rem; }
 svg { display: block; width: 100%; height: auto; }

@@ -62,13 +62,11 @@ def _scale_factor_error(matrix: Vector, std: Vector) -> ParameterRow:
 
 
 def _misalignments(matrix: Vector, std: Vector) -> list[ParameterRow]:
-    """Return six rows, each with one number in the column of the misaligned axis."""
+    """Return three rows, each with the angles of the other two axes towards one axis."""
     angle, angle_std = error_model.misalignment(matrix), error_model.misalignment_std(matrix, std)
     return [
-        ParameterRow(f"misalignment {axis}->{other}", "deg", angle[:, j], angle_std[:, j], axis)
-        for axis in AXES
+        ParameterRow(f"misalignment to {other}", "deg", angle[:, j], angle_std[:, j], AXES.replace(other, ""))
         for j, other in enumerate(AXES)
-        if axis != other
     ]
 
 

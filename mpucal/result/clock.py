@@ -4,6 +4,16 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
+# A clock that shows an earlier year was never set, as on a Raspberry Pi without a network.
+LEAST_YEAR = 2025
+
+
+def warn_unset() -> str:
+    """Return a warning if the computer's clock is not set, else empty."""
+    if now().year >= LEAST_YEAR:
+        return ""
+    return f"The computer's clock shows {now():%Y-%m-%d}: set it, or names and dates of the results are wrong."
+
 
 def now() -> datetime:
     """Return the time of day in UTC, in whole seconds."""

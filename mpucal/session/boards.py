@@ -26,11 +26,13 @@ class _Kind:
 
     Attributes
     ----------
-    noun : the thing itself. parts : its parts, by the axis that points there. flat : questions to confirm while it lies
-        with -z and with +z down. picture : caption of the picture of how it should lie.
+    noun : the thing itself. lay : the request to lay it flat. parts : its parts, by the axis that points there.
+    flat : questions to confirm while it lies with -z and with +z down. picture : caption of the picture of how it
+        should lie.
     """
 
     noun: str
+    lay: str
     parts: Mapping[str, str]
     flat: tuple[str, str]
     picture: str
@@ -40,18 +42,21 @@ _EDGES = {"+X": "right edge", "−X": "left edge", "+Y": "far edge", "+Z": "chip
 _KINDS = {
     BOARD: _Kind(
         "board",
+        "Lay the board flat",
         {**_EDGES, "−Y": "pin edge"},
         ("Chip up, pins toward you", "Chip down, pins away from you"),
         "flat: the chip up, the pins toward you",
     ),
     PLAIN: _Kind(
         "board",
+        "Lay the board flat",
         {**_EDGES, "−Y": "near edge"},
         ("Chip up, +Y away from you", "Chip down, +Y toward you"),
         "flat: the chip up",
     ),
     VEHICLE: _Kind(
         "vehicle",
+        "Put the vehicle on its feet",
         {"+X": "nose", "−X": "tail", "+Y": "right side", "−Y": "left side", "+Z": "underside", "−Z": "top"},
         ("Upside down, nose to the right", "On its feet, nose to the right"),
         "level, on its feet",
@@ -75,6 +80,11 @@ def flat_description(down: Direction, board: str) -> str:
 def flat_caption(board: str) -> str:
     """Return the caption of the picture of a `board` that lies flat."""
     return _KINDS[board].picture
+
+
+def lay_flat(board: str) -> str:
+    """Return the request to lay a `board` flat, without the place."""
+    return _KINDS[board].lay
 
 
 def name_board(board: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,6 +12,9 @@ from ..errors import OutputError, UsageError
 from ..files.folder import all_captures_in
 from ..result.clock import stamp
 from ..result.session_files import DOCUMENT
+
+# A long session at 1 kHz takes 8 MB; its capture is written a second time when it is closed.
+LEAST_FREE_BYTES = 20_000_000
 
 
 class SessionFolder(OutputFolder):
@@ -23,7 +27,8 @@ class SessionFolder(OutputFolder):
 
     Raises
     ------
-    OutputError : it cannot be made, another process has it, or it holds a capture or results already.
+    OutputError : it cannot be made, another process has it, it holds a capture or results already, or the
+        disk is nearly full.
     """
 
     def __init__(self, given: Path | None, capture_name: str, again: bool = False) -> None:
@@ -37,6 +42,7 @@ class SessionFolder(OutputFolder):
             raise OutputError(
                 f"{given} holds {there} already, which is not overwritten", "choose another folder with -o"
             )
+        self._check_space()
 
     @property
     def capture(self) -> Path:
@@ -49,6 +55,20 @@ class SessionFolder(OutputFolder):
         with suppress(OutputError):
             return self.capture if self.capture.exists() else None
         return None
+
+    def _check_space(self) -> None:
+        """Raise OutputError if the session may fill the disk; a folder that was created for it is removed."""
+        free = shutil.disk_usage(self.path).free
+        if free >= LEAST_FREE_BYTES:
+            return
+        path = self.path
+        self.close()
+        with suppress(OSError):
+            path.rmdir()
+        raise OutputError(
+            f"only {free / 1e6:.1f} MB are free for {path}, and a session takes up to {LEAST_FREE_BYTES / 1e6:.0f} MB",
+            "free some space, or choose another folder with -o",
+        )
 
     def settle(self, sensor: Sensor | None) -> None:
         """Rename a folder without a given name after its chip; delete the capture, and it, if no chip answered."""

@@ -8,6 +8,7 @@ from ..data import Samples
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import Windows
+from .boards import BOARD, lay_flat, name_board
 from .events import Caution, Countdown, Direction, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
 
 WINDOW_S = 0.5
@@ -24,10 +25,6 @@ SAY_AGAIN_S = 5.0
 # Remedy for missing samples, for every source.
 LOST = "check the wires or the link, end other programs, or take a lower --rate"
 
-PROMPT = Prompt(
-    PromptKind.LAY_FLAT,
-    f"Lay the board flat on a firm surface, let go of it, and leave it still for {FLAT_S:.0f} s.",
-)
 # For commands that need a board at rest, but no session.
 PUT_DOWN = Prompt(PromptKind.LAY_FLAT, "Put the board on a firm surface and let go of it.")
 
@@ -45,12 +42,16 @@ class LayFlat:
     Parameters
     ----------
     patient : there is no time limit, and RECORDED_S of rest is enough once the board is moved.
+    board : its kind, for the words of the prompts.
     """
 
     wanted: Direction | None = None
 
-    def __init__(self, patient: bool = False) -> None:
-        self._patient = patient
+    def __init__(self, patient: bool = False, board: str = BOARD) -> None:
+        self._patient, self._noun = patient, name_board(board)
+        lay = lay_flat(board)
+        text = f"{lay} on a firm surface, let go of it, and leave it still for {FLAT_S:.0f} s."
+        self.prompt = Prompt(PromptKind.LAY_FLAT, text)
         self._windows = Windows(WINDOW_S)
         self._stillness = Detector(QUIET)
         self._still: Still | None = None
@@ -70,7 +71,7 @@ class LayFlat:
                     return [*outputs, self._rested(self._still)]
                 outputs += self._moved(sight, t_s)
                 if not self._patient and t_s - self._begun_s >= PATIENCE_S:
-                    return [*outputs, _never_still(sight)]
+                    return [*outputs, self._never_still(sight)]
                 continue
             outputs += self._rests(sight, t_s)
             if sight.seconds >= FLAT_S - 1e-6:
@@ -82,7 +83,7 @@ class LayFlat:
         self._windows = Windows(WINDOW_S)
         self._stillness.forget()
         self._still, self._begun_s = None, None
-        return [PROMPT]
+        return [self.prompt]
 
     def enough(self) -> Rested | None:
         """Return the stillness so far; None if it is too short to go on with."""
@@ -99,13 +100,13 @@ class LayFlat:
         before, self._still = self._still, still
         if before is not None and still.run != before.run and before.seconds >= WORTH_SAYING_S:
             self._cautioned_s = t_s
-            what, remedy = f"the board was moved: {self._motion}", "let go of it; the countdown starts again"
+            what, remedy = f"the {self._noun} was moved: {self._motion}", "let go of it; the countdown starts again"
             outputs.append(Caution(t_s, "moved", what, remedy))
         return outputs + self._countdown(t_s, f"still for {still.seconds:.0f} of {FLAT_S:.0f} s", paused=False)
 
     def _moved(self, moved: Moved, t_s: float) -> list[Output]:
         self._motion = moved.what
-        outputs = self._countdown(t_s, "waiting for the board to be still", paused=True)
+        outputs = self._countdown(t_s, f"waiting for the {self._noun} to be still", paused=True)
         if moved.after_s >= WORTH_SAYING_S or t_s - self._cautioned_s >= SAY_AGAIN_S:
             self._cautioned_s = t_s
             remedy = LOST if moved.lost else "put it on a firm surface and let go of it"
@@ -116,9 +117,10 @@ class LayFlat:
         still_s = min(self._stillness.seconds, FLAT_S)
         return [Countdown(t_s, FLAT_S - still_s, FLAT_S, paused), Progress(t_s, still_s, FLAT_S, text)]
 
-
-def _never_still(moved: Moved) -> Stopped:
-    return Stopped(
-        f"the board was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
-        f"{LOST}, and start again" if moved.lost else "put it on a firm surface, away from vibration, and start again",
-    )
+    def _never_still(self, moved: Moved) -> Stopped:
+        return Stopped(
+            f"the {self._noun} was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
+            f"{LOST}, and start again"
+            if moved.lost
+            else "put it on a firm surface, away from vibration, and start again",
+        )

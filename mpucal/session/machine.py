@@ -9,9 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from . import lay_flat
 from .aims import NORMAL, select_aim
-from .boards import usual_board
+from .boards import BOARD, name_board, usual_board
 from .check_poses import CheckPoses
 from .events import (
     Abort,
@@ -38,6 +37,7 @@ from .events import (
     Turned,
     Written,
 )
+from .lay_flat import LayFlat
 from .meter import MotionWatch
 from .rotate import Rotate
 from .table import State, next_state
@@ -48,8 +48,6 @@ SILENT_S = 5.0
 # A longer time between two polls means that the computer was stopped or suspended.
 ASKED_S = 2.0
 
-REST = Prompt(PromptKind.REST, "You can put the board down.")
-COMPUTING = Prompt(PromptKind.REST, "You can put the board down. The calibration is being computed.")
 ABORTED = "the session was interrupted"
 START_AGAIN = "start again when you are ready"
 ENOUGH = "you chose to go on"
@@ -83,7 +81,7 @@ class Machine:
         self._until_end, self._target, self._tilt_only = until_end, target, tilt_only
         self._aim = select_aim(target)
         self._attended, self._checking, self._board = attended, checking, board
-        self._step: lay_flat.LayFlat | Rotate | CheckPoses | Verify = lay_flat.LayFlat(patient=until_end)
+        self._step: LayFlat | Rotate | CheckPoses | Verify = LayFlat()
         self._watch: MotionWatch | None = None
         self._flat: Rested | None = None
         self._samples = self._flat_samples = 0
@@ -112,7 +110,8 @@ class Machine:
             case Connected(sensor):
                 self._aim, self._watch = select_aim(self._target, sensor), MotionWatch(sensor)
                 self._board = self._board or usual_board(sensor.origin)
-                return [lay_flat.PROMPT]
+                self._step = LayFlat(self._until_end, self._board)
+                return [self._step.prompt]
             case Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples
                 if self._watch is not None:
@@ -121,7 +120,7 @@ class Machine:
             case Turned(why):
                 return [Decision(why), *self._verify()]
             case Finished(why):
-                return [Decision(why), REST if self._checking else COMPUTING]
+                return [Decision(why), self._rest(computing=not self._checking)]
             case Enough():
                 return self._enough(before)
             case Redo():
@@ -131,9 +130,9 @@ class Machine:
             case Learnt() | Tried() | Checked():
                 return self._answered(event)
             case Stopped(why, remedy):
-                return [Decision(why, remedy), REST]
+                return [Decision(why, remedy), self._rest()]
             case Abort():
-                return [Decision(ABORTED, START_AGAIN), REST]
+                return [Decision(ABORTED, START_AGAIN), self._rest()]
             case SourceEnded(why):
                 return self._ended(before, why)
             case Fitted(verdict):
@@ -154,6 +153,10 @@ class Machine:
         self._samples += len(samples)
         meters = self._watch.add(samples, self._step.wanted) if self._watch else []
         return [*again, *meters, *self._dispatch(self._step.add(samples))]
+
+    def _rest(self, computing: bool = False) -> Prompt:
+        also = " The calibration is being computed." if computing else ""
+        return Prompt(PromptKind.REST, f"You can put the {name_board(self._board or BOARD)} down.{also}")
 
     def _turn(self, flat: Rested) -> list[Output]:
         turning = (
@@ -219,7 +222,7 @@ class Machine:
             return self.handle(Finished(ENOUGH) if self._until_end or self._checking else Turned(ENOUGH))
         if state is State.VERIFY and isinstance(self._step, Verify):
             return self.handle(self._step.enough())
-        if state is State.LAY_FLAT and isinstance(self._step, lay_flat.LayFlat):
+        if state is State.LAY_FLAT and isinstance(self._step, LayFlat):
             rested = self._step.enough()
             return self.handle(rested) if rested else []
         return []
@@ -234,16 +237,16 @@ class Machine:
     def _resumed(self, state: State) -> list[Output]:
         self._sampled_s = self._ticked_s = None
         if state is State.ABORTED:
-            self._step = lay_flat.LayFlat(patient=self._until_end)
+            self._step = LayFlat(self._until_end, self._board)
         return [Decision("the session resumes where it stopped"), *self._step.resumed()]
 
     def _ended(self, state: State, why: str | None) -> list[Output]:
         if state in (State.ROTATE, State.VERIFY):
             what = f"the source failed while the board was turned ({why})" if why else "the source ended"
             if self._checking:
-                return [Decision(f"{what}; checking with the data so far"), REST]
-            return [Decision(f"{what}; calibrating with the data so far"), COMPUTING]
+                return [Decision(f"{what}; checking with the data so far"), self._rest()]
+            return [Decision(f"{what}; calibrating with the data so far"), self._rest(computing=True)]
         if why:
-            return [Decision(why), REST]
+            return [Decision(why), self._rest()]
         remedy = "record it again: flat and still first, then turned through varied orientations"
-        return [Decision("the source ended before the board was turned", remedy), REST]
+        return [Decision("the source ended before the board was turned", remedy), self._rest()]

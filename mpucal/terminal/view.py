@@ -27,8 +27,9 @@ from ..session.events import (
 # Time for which the headline shows the use of the last orientation.
 USE_SHOWN_S = 1.2
 USE_HEADLINES = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
-# Angle from the wanted orientation below which the headline asks to hold still, unless the board passes by.
-NEAR_DEG, PASSES_DPS = 15.0, 70.0
+# Angle from the wanted orientation below which the headline asks to hold still, also once it is held; unless the board
+# passes by.
+NEAR_DEG, NEAR_HELD_DEG, PASSES_DPS = 15.0, 20.0, 70.0
 # A countdown that is not renewed for this time has ended; for the second one, if the board moves.
 COUNTDOWN_HOLDS_S, BUMP_S = 1.0, 0.4
 # Time for which a useful orientation is held before the headline asks to hold it instead of the wanted one.
@@ -182,7 +183,8 @@ class View:
             return Moment.DECIDED, USE_HEADLINES[self.held.use]
         if self.wanted is None or self.meter is None or self.meter.missing_deg is None:
             return Moment.STEP, HEADLINES[self.prompt.kind]
-        if not self.meter.turn or (self.meter.missing_deg <= NEAR_DEG and self.meter.turning_dps < PASSES_DPS):
+        near_deg = NEAR_DEG if waiting is None else NEAR_HELD_DEG
+        if not self.meter.turn or (self.meter.missing_deg <= near_deg and self.meter.turning_dps < PASSES_DPS):
             return Moment.NEAR, "HOLD STILL"
         return Moment.TURN, _turn_headline(self.meter.turn)
 

@@ -1,6 +1,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import sys
 from dataclasses import asdict, replace
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from mpucal.chip.access import Transaction
+from mpucal.errors import OutputError
 from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 from mpucal.session.plan import Plan
@@ -230,3 +232,13 @@ def test_a_folder_renamed_and_a_capture_truncated_during_a_session(mpucal, tmp_p
     assert cut.code == 3
     assert "board/capture.mcap was shortened or overwritten by another program" in cut.err
     assert "is kept in board/capture.mcap, and the results in board" in cut.err
+
+
+def test_a_nearly_full_disk_is_refused_before_the_board_is_lifted(mpucal, tmp_path, monkeypatch):
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr("mpucal.session.folder.shutil.disk_usage", lambda path: usage._replace(free=1_500_000))
+    result = mpucal("session", "--bus", "sim", "-o", tmp_path / "board")
+    assert result.code == OutputError.exit_code
+    assert "only 1.5 MB are free" in result.err
+    assert "Lay the board flat" not in result.err
+    assert not (tmp_path / "board").exists()

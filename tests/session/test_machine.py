@@ -215,18 +215,24 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
 
 
 @pytest.mark.parametrize(
-    ("options", "sensor", "words"),
+    ("options", "sensor", "lay", "words"),
     [
-        ({}, {}, "Turn the board: chip face down (+Z), then"),
-        ({}, {"message": "RAW_IMU"}, "Turn the vehicle: on its feet (+Z), then"),
-        ({"board": "plain"}, {"message": "RAW_IMU"}, "Turn the board: chip face down (+Z), then"),
+        ({}, {}, "Lay the board flat on", "Turn the board: chip face down (+Z), then"),
+        ({}, {"message": "RAW_IMU"}, "Put the vehicle on its feet on", "Turn the vehicle: on its feet (+Z), then"),
+        (
+            {"board": "plain"},
+            {"message": "RAW_IMU"},
+            "Lay the board flat on",
+            "Turn the board: chip face down (+Z), then",
+        ),
     ],
     ids=["chip", "vehicle", "named"],
 )
-def test_prompts_speak_of_the_kind_of_board(board, options, sensor, words):
+def test_prompts_speak_of_the_kind_of_board(board, options, sensor, lay, words):
     session = Session(**options)
     session.machine = Machine(**options)
-    session.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0, **sensor)))
+    (first,) = session.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0, **sensor)))
+    assert first.text.startswith(lay)
     assert session.feed(board.still(10.6)).of(Prompt)[-1].text.startswith(words)
 
 
