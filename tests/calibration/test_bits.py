@@ -152,3 +152,14 @@ def test_an_axis_coarser_than_the_calibrations_uncertainty_is_refused(counted, b
     quality = calibrate(counted(spoil=dead), "hand", G).quality
     assert quality["verdict"] == verdict
     assert quality["reasons"][0]["code"] == "bits_stuck"
+
+
+def test_single_faces_that_were_joined_are_not_accused(in_hand):
+    """A bit is the same in all six by chance, and no value between two faces was passed."""
+    faces = np.repeat([[6200, 400, 300], [-7900, 500, 200], [80, 8200, 350], [60, -8100, 250], [90, 70, 8300]], 400, 0)
+    acc = (faces + np.rint(20.0 * np.random.default_rng(4).standard_normal(faces.shape))) * LSB
+    gap = np.arange(len(faces)) % 400 == 0
+    part = in_hand.recording.part(0, len(faces))
+    joined = replace(part, acc=acc, gyr=np.full(acc.shape, np.nan), sensor=KNOWN, gap=gap)
+    assert against(joined) is None
+    assert against(replace(joined, gap=np.zeros(len(gap), bool))) is not None

@@ -130,7 +130,9 @@ def _stuck_bit(counts: Counts, gap: NDArray[np.bool_], bits: range) -> tuple[int
     halves = [part for part in (counts[: len(counts) // 2], counts[len(counts) // 2 :]) if not gap.any() and len(part)]
     for part in (counts, *halves):
         moved = np.bitwise_or.reduce(part ^ part[0], axis=0)
-        passed = np.ptp(part, axis=0)
+        # across a gap, as between files of single faces, no value is passed
+        pieces = np.split(part, np.flatnonzero(gap)) if part is counts else [part]
+        passed = np.max([np.ptp(piece, axis=0) for piece in pieces if len(piece)], axis=0)
         for axis in range(3):
             for bit in bits:
                 enough = 2 ** (bit + 1) if bit < SIGN else OF_ALL_VALUES * 2**SIGN

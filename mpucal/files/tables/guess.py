@@ -56,11 +56,13 @@ def guess_columns(table: Vector, hints: Hints, sensors: Sequence[int] = ()) -> d
         t = _seconds(None if at is None else table[:, at], n, hints)
         pairs = [tuple(sensors)] if sensors else _pairs(table, [place for place in range(width) if place != at])
         turned = {pair: _turned(table, pair, t, any_rate=at is None) for pair in pairs}
-        least = max(EXPLAINED, max(turned.values(), default=0.0) - ALIKE)
         # rates turn a magnetic field, too
-        found = sorted((pair for pair in pairs if turned[pair] >= least), key=lambda pair: not _has_size(table, pair))
-        if found:
-            return dict(zip(ROLES[1:], found[0], strict=True)) | ({} if at is None else {"t": at})
+        for sized in (True, False):
+            alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and _has_size(table, pair) is sized]
+            best = max((turned[pair] for pair in alike), default=0.0)
+            found = next((pair for pair in alike if turned[pair] >= best - ALIKE), None)
+            if found is not None:
+                return dict(zip(ROLES[1:], found, strict=True)) | ({} if at is None else {"t": at})
     return {}
 
 
