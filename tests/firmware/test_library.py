@@ -12,7 +12,7 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "mpucal" / "firmware"
 # of the others, test_matrix.py compiles the sketches with the same core and more warnings
-OTHERS = ("nano-cpu=atmega328old", "mega-cpu=atmega2560", "leonardo")
+OTHERS = ("nano-atmega328old", "mega-atmega2560", "leonardo")
 BOARDS = ("uno", *(pytest.param(board, marks=pytest.mark.slow) for board in OTHERS))
 SKETCHES = ("mpucal_bridge", "mpucal_corrected")
 
