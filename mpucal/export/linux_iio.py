@@ -74,9 +74,10 @@ def losses(calibration: Calibration) -> tuple[str, ...]:
     data_sheet, printed = _scales(calibration)
     scale: tuple[str, ...] = (_SCALE,)
     if data_sheet != printed:
+        shown, less = ", ".join(f"{value:g}" for value in PRINTED_SCALES[ACCEL]), 100 * (1 - printed / data_sheet)
         scale += (
-            f"The line is for in_accel_scale {printed:g}, as inv_mpu6050 prints it at this range: where in_accel_scale"
-            f" differs, multiply the line's numbers by {printed:g} / in_accel_scale.",
+            f"The line assumes the driver inv_mpu6050, which shows an in_accel_scale of {shown}: {less:.2f} % less"
+            " than the data sheet's. Where `cat in_accel_scale` shows another one, an error of that size remains.",
         )
     if why:
         return (f"{why}; programs have to subtract b_a, ({format_xyz(calibration.b_a)}) m/s^2.", *scale)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..calibration.rotation import rotation
 from ..chip.families import MPU6050, MPU6500
-from ..data import ACCEL_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Vector
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Vector
 
 Counts = NDArray[np.int16]
 
@@ -47,7 +47,7 @@ class Setting:
     @property
     def rad_s_per_lsb(self) -> float:
         """Nominal rad/s of a gyroscope count (131 LSB/(deg/s) at 250 deg/s)."""
-        return float(np.radians(self.gyro_range_dps / 250.0 / 131.0))
+        return float(np.radians(self.gyro_range_dps / GYRO_COUNTS))
 
 
 @dataclass(frozen=True)
