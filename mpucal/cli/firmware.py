@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import shutil
 import subprocess
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -61,18 +62,23 @@ def _library() -> Path:
 
 def _write(folder: Path) -> None:
     source = _library()
-    try:
-        folder.mkdir(parents=True)
-        for name in LIBRARY:
-            copy = shutil.copytree if (source / name).is_dir() else shutil.copyfile
-            copy(source / name, folder / name)
-        # A checkout has one licence for all, at its top.
-        licences = (source / LICENCE, source.parents[1] / LICENCE)
-        shutil.copyfile(next(filter(Path.is_file, licences), licences[0]), folder / LICENCE)
-    except FileExistsError as error:
-        raise OutputError(f"{folder} is there already", "choose another folder with -o") from error
-    except OSError as error:
-        raise OutputError(f"cannot write {folder} ({error.strerror})", "choose another folder with -o") from error
+    with ExitStack() as on_failure:
+        try:
+            folder.mkdir(parents=True)
+            on_failure.callback(shutil.rmtree, folder, ignore_errors=True)
+            for name in LIBRARY:
+                copy = shutil.copytree if (source / name).is_dir() else shutil.copyfile
+                copy(source / name, folder / name)
+            # A checkout has one licence for all, at its top.
+            licences = (source / LICENCE, source.parents[1] / LICENCE)
+            shutil.copyfile(next(filter(Path.is_file, licences), licences[0]), folder / LICENCE)
+            on_failure.pop_all()
+        except FileExistsError as error:
+            raise OutputError(f"{folder} is there already", "choose another folder with -o") from error
+        except OSError as error:
+            # copytree raises a list of (source, target, text of the error).
+            what = error.strerror or error.args[0][0][2].partition(": ")[0]
+            raise OutputError(f"cannot write {folder} ({what})", "choose another folder with -o") from error
 
 
 def _flash(port: str, board: str) -> None:

@@ -69,7 +69,6 @@ class CaptureWriter:
     def __init__(self, path: str | Path) -> None:
         self._meta: Mapping[str, Any] = {}
         self._file = GrowingFile(Path(path))
-        # an index of these chunks would take 9 MB of memory an hour
         self._stream = _Stream(cast("IO[bytes]", self._file), CHUNK_NS, IndexType.METADATA, self._file.kept)
 
     def start(self, meta: Mapping[str, Any]) -> None:
@@ -142,7 +141,7 @@ class _Stream:
         self._writer = Writer(
             file, compression=CompressionType.ZSTD, index_types=index, enable_data_crcs=True, use_chunking=chunked
         )
-        self._longest_ns = longest_ns
+        self._longest_ns, self._index = longest_ns, index
         self._channels: dict[str, int] = {}
         self._waiting: list[Transaction] = []
         self._blocks: list[Accesses] = []
@@ -188,6 +187,9 @@ class _Stream:
         if t_ns - self._chunk_began_ns >= chunk_ns:
             self._put_waiting()
             self._writer.flush()
+            if IndexType.CHUNK not in self._index:
+                # the library keeps what it does not write: 8 MB an hour
+                vars(self._writer).get("_Writer__chunk_indices", []).clear()
             self._chunk_began_ns = None
 
     def finish(self) -> None:

@@ -1,3 +1,4 @@
+import gc
 import json
 import os
 import re
@@ -14,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.records import ChunkIndex
 from mcap_protobuf.decoder import DecoderFactory
 
 from mpucal.chip.access import Failure, Transaction
@@ -66,6 +68,17 @@ def killed_at_the_end(monkeypatch):
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "capture.mcap"
+
+
+def test_a_growing_capture_takes_no_more_memory(path):
+    with CaptureWriter(path) as writer:
+        writer.start(META)
+        for record in polls(5_000, period_ns=200_000_000):
+            writer.transaction(record)
+        chunks = [each for each in gc.get_objects() if isinstance(each, ChunkIndex)]
+    assert chunks == []
+    with path.open("rb") as file:
+        assert len(make_reader(file).get_summary().chunk_indexes) > 100
 
 
 @settings(max_examples=25)

@@ -1,13 +1,12 @@
-"""Processes that share a folder or a name, others that meddle with their files, and every output where no file is.
+"""Processes that share a folder or a name, and others that meddle with their files.
 
-    python -m tools.attack shared --pairs 40 --eights 10 --meddled 10 --ended 8 --outputs
+    python -m tools.attack shared --pairs 40 --eights 10 --meddled 10 --ended 8
 
 A race forks so many processes, which begin together: sessions and recordings of a simulated chip into one -o, and into
 none. Meddling renames a session's folder, or cuts, removes or replaces its capture. Ending sends KILL, TERM, HUP or
-ALRM to a batch and to a session at any time, and counts the processes that are left of it after ten seconds. An output
-is a device, a pipe, a link or a folder in the place of the file. It is judged whether one process at most ends well
-for each capture that is there, whether each capture is whole and the results beside it are its own, and whether all
-others end with a sentence. Exit code 1: what is said last was not so.
+ALRM to a batch and to a session at any time, and counts the processes that are left of it after ten seconds. It is
+judged whether one process at most ends well for each capture that is there, whether each capture is whole and the
+results beside it are its own, and whether all others end with a sentence. Exit code 1: what is said last was not so.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import argparse
 import os
 import random
 import signal
-import stat
 import subprocess
 import sys
 import time
@@ -26,8 +24,6 @@ from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.calibration import recording_digest
@@ -41,7 +37,8 @@ RECORD = ("record", "--seconds", "2")
 RECORDED = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 # starts lie apart by up to this [s]
 APART_S = 0.02
-ENDS_S = 60.0
+# A process that waits for others on a busy computer does not hang; one that computes ends by its processor time.
+ENDS_S = 900.0
 # the time in which a command has all its processes, and that after which none may be left [s]
 LONGEST_START_S, LEFT_S = 4.0, 10.0
 # a kind of trial, and what was not as it ought to be; empty where all was
@@ -182,69 +179,11 @@ def _of_session(leader: int) -> list[int]:
     return found
 
 
-def outputs(tell: Tell) -> None:
-    """Run each command that writes where its output is no file."""
-    with folder() as here:
-        begin((*SESSION, "--bus", "sim:seed=1", "-o", "a"), here).go().wait()
-        np.savez(here / "walk.npz", t=np.arange(9) / 9, acc=np.full((9, 3), 9.0), gyr=np.zeros((9, 3)))
-        calibration, capture = str(here / "a" / "calibration.json"), str(here / "a" / "capture.mcap")
-        # of each command its words and the file that it writes, within the output where that is a folder
-        commands = {
-            "export": (("export", calibration, "--to", "json", "-o", "{}"), "out"),
-            **{
-                f"apply {ending}": (("apply", calibration, "walk.npz", "-o", f"{{}}{ending}"), f"out{ending}")
-                for ending in (".csv", ".npz", ".mcap")
-            },
-            "record": ((*RECORD, "--bus", "sim:seed=1", "-o", "{}.mcap"), "out.mcap"),
-            "stream": (
-                ("stream", "--bus", "sim", "--apply", calibration, "--seconds", "1", "-o", "{}.mcap"),
-                "out.mcap",
-            ),
-            "calibrate": (("calibrate", str(here / "a"), "-o", "{}"), "out/calibration.json"),
-            "noise": (("noise", capture, "-o", "{}"), "out/noise.json"),
-            "check": (("check", calibration, str(here / "a"), "-o", "{}"), "out/check.json"),
-            "session": ((*SESSION, "--bus", "sim:seed=1", "-o", "{}"), "out/capture.mcap"),
-        }
-        for kind, make in OBSTACLES.items():
-            for name, (words, file) in commands.items():
-                with TemporaryDirectory(dir=here.parent) as place:
-                    tell(f"{kind}: {name}", _obstructed(words, here, Path(place), file, make))
-
-
-def _obstructed(words: Sequence[str], here: Path, place: Path, file: str, make: Callable[[Path], None]) -> str:
-    path = place / file
-    path.parent.mkdir(exist_ok=True)
-    try:
-        make(path)
-    except PermissionError:
-        return ""
-    was, target = path.lstat(), path.parent / "target"
-    done = begin([word.format(place / "out") for word in words], here, 1).go().wait()
-    if not os.path.samestat(path.lstat(), was) or (target.exists() and target.read_bytes() != b"old"):
-        return "what was there was replaced"
-    return "" if done.code == 2 else odd_end(done, (3,))
-
-
-def _link(path: Path) -> None:
-    (path.parent / "target").write_bytes(b"old")
-    path.symlink_to("target")
-
-
-OBSTACLES: dict[str, Callable[[Path], None]] = {
-    "device": lambda path: os.mknod(path, 0o600 | stat.S_IFCHR, os.makedev(1, 3)),
-    "pipe": os.mkfifo,
-    "link": _link,
-    "link to nothing": lambda path: path.symlink_to("nothing"),
-    "folder": Path.mkdir,
-}
-
-
 def main() -> int:
     """Run what was asked for; 1 where something was not as it ought to be."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in (("--pairs", 10), ("--eights", 2), ("--meddled", 10), ("--ended", 0), ("--seed", 1)):
         parser.add_argument(name, type=int, default=default)
-    parser.add_argument("--outputs", action="store_true")
     parser.add_argument("--seconds", type=float, default=3600.0, help="begin none of a kind after these")
     asked = parser.parse_args()
     draw, told = random.Random(asked.seed), dict[str, list[str]]()
@@ -261,8 +200,6 @@ def main() -> int:
     races(numbers(asked.eights), 8, draw, tell)
     meddle(numbers(asked.meddled), draw, tell)
     end(numbers(asked.ended), draw, tell)
-    if asked.outputs:
-        outputs(tell)
     bad = {kind: list(filter(None, of)) for kind, of in told.items()}
     for kind, of in told.items():
         print(

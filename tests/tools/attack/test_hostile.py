@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.attack import fuzz, fuzz_targets
+from tools.attack import fuzz, fuzz_targets, outputs
 
 SESSION = Path(__file__).parents[3] / "fixtures" / "sessions" / "mpu6050.mcap"
 
@@ -74,6 +74,15 @@ def test_what_once_ended_in_a_trace(fuzzed, capsys, seed, target):
 @pytest.mark.skipif(not sys.platform.startswith("linux") or not shutil.which("cc"), reason="needs Linux and cc")
 def test_files_are_old_or_new_whatever_call_or_allocation_fails(holds):
     holds("attack", "syscalls", "export", "write", "--most", "6", "--allocations", "1", "--seed", "1")
+
+
+def test_each_option_that_names_an_output_is_tried():
+    assert outputs.check_rows() == ""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs fork and pipes")
+def test_an_output_that_cannot_be_written_is_left_as_it_is(holds):
+    holds("attack", "outputs", "export", "firmware")
 
 
 @pytest.mark.slow

@@ -1,0 +1,220 @@
+"""Each output of each command where it cannot be written: a table of what became of it.
+
+    python -m tools.attack outputs [COMMAND ...]
+
+The commands and their option -o are those of the command line: one without a row here, or with another option that is a
+path and no input, is an error. Each command is first run undisturbed, for the files that it writes. Then each of these,
+and the folder of them, is a file, a folder, a device, a pipe or a link, or lies on a disk that is full or read-only (a
+tmpfs for root; for others a limit of the files' size, and a folder without permission to write). A command may then
+replace an old file as a whole, or follow a link to a folder. Otherwise it has to end with a sentence, leave what was
+there, and leave no temporary file. Exit code 1: one did not.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import stat
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import click
+import numpy as np
+
+from mpucal.__main__ import run
+from mpucal.cli import COMMANDS, commands
+from tools.processes import Child, Ended, ready
+
+QUICK = ("--rate", "25", "--target", "quick", "--yes")
+CALIBRATION, TABLE, RECORDED = "a/calibration.json", "walk.npz", "a/capture.mcap"
+# The words of each command with an output, which is in place of {}.
+WORDS: dict[str, tuple[str, ...]] = {
+    "session": ("session", "--bus", "sim:seed=1", *QUICK, "--no-write", "-o", "{}"),
+    "record": ("record", "--bus", "sim:seed=1", "--seconds", "2", "-o", "{}.mcap"),
+    "calibrate": ("calibrate", RECORDED, "-o", "{}"),
+    "batch": ("batch", RECORDED, "--workers", "1", "--reports", "-o", "{}"),
+    "write": ("write", CALIBRATION, "chip", "--bus", "sim:seed=1", "--yes", "-o", "{}"),
+    "check": ("check", CALIBRATION, RECORDED, "-o", "{}"),
+    "noise": ("noise", RECORDED, "-o", "{}"),
+    "apply": ("apply", CALIBRATION, TABLE, "-o", "{}.csv"),
+    "apply .npz": ("apply", CALIBRATION, TABLE, "-o", "{}.npz"),
+    "apply .mcap": ("apply", CALIBRATION, TABLE, "-o", "{}.mcap"),
+    "stream": ("stream", "--bus", "sim:seed=1", "--apply", CALIBRATION, "--seconds", "1", "-o", "{}.mcap"),
+    "export": ("export", CALIBRATION, "--to", "json", "-o", "{}"),
+    "merge": ("merge", CALIBRATION, "b/calibration.json", "-o", "{}"),
+    "firmware": ("firmware", "-o", "{}"),
+}
+# Paths that are read; `session --resume` goes on in the folder of a session.
+READ = {"--noise", "--hints", "--apply", "--resume", "calibration", "calibrations", "recording", "file", "a", "b"}
+OLD, CODES = b"old", (0, 2, 3, 5, 6)
+# of a library of many files these stand for all
+MOST_FILES = 8
+SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
+
+
+def check_rows() -> str:
+    """Return what the table of words lacks for the command line, in a sentence; empty if nothing."""
+    found: set[str] = set()
+    for name in COMMANDS:
+        command = commands.get_command(click.Context(commands), name)
+        for option in command.params if command else ():
+            if option.opts[0] == "-o":
+                found.add(name)
+            elif isinstance(option.type, click.Path) and option.opts[0] not in READ:
+                return f"{name} {option.opts[0]} is a path: read, or written?"
+    odd = found ^ {name.split()[0] for name in WORDS}
+    return f"no row, or no option -o: {', '.join(sorted(odd))}" if odd else ""
+
+
+def _link(path: Path) -> None:
+    _beside(path).write_bytes(OLD)
+    path.symlink_to(_beside(path))
+
+
+def _link_to_folder(path: Path) -> None:
+    _beside(path).mkdir()
+    path.symlink_to(_beside(path))
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name("target")
+
+
+OBSTACLES: dict[str, Callable[[Path], object]] = {
+    "file": lambda path: path.write_bytes(OLD),
+    "folder": Path.mkdir,
+    "device": lambda path: os.mknod(path, 0o600 | stat.S_IFCHR, os.makedev(1, 3)),
+    "pipe": os.mkfifo,
+    "link": _link,
+    "link to a folder": _link_to_folder,
+    "link to nothing": lambda path: path.symlink_to("nothing"),
+}
+
+
+def obstructed(words: tuple[str, ...], here: Path, file: Path, kind: str) -> str:
+    """Run a command with an obstacle at `file` (relative); return what became of it."""
+    with TemporaryDirectory(dir=here.parent) as place:
+        path = Path(place) / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            OBSTACLES[kind](path)
+        except PermissionError:
+            return "not tried"
+        was, before = path.lstat(), _content(path)
+        done = _run(words, here, Path(place))
+        if odd := _odd(done, Path(place)):
+            return f"WRONG: {odd}"
+        same = os.path.lexists(path) and os.path.samestat(path.lstat(), was)
+        if same and _content(path) == before:
+            # a state that is saved takes the next free name
+            return "left" if done.code in (0, 5) else "refused"
+        if done.code in (0, 5) and (kind == "file" or (same and path.is_dir())):
+            return "replaced" if kind == "file" else "written into"
+        return f"WRONG: exit code {done.code}, and it was changed"
+
+
+def _content(path: Path) -> object:
+    if path.is_file():
+        return path.read_bytes()
+    return sorted(each.name for each in path.iterdir()) if path.is_dir() else None
+
+
+@contextmanager
+def _disk(options: str, here: Path) -> Iterator[Path]:
+    """Yield a folder on a disk of its own (root alone)."""
+    with TemporaryDirectory(dir=here.parent) as place:
+        subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", place], check=True)
+        try:
+            yield Path(place)
+        finally:
+            subprocess.run(["umount", "-l", place], check=True)
+
+
+def on_full_disk(words: tuple[str, ...], here: Path) -> str:
+    """Run a command whose output lies on a disk without a free page."""
+    if os.geteuid():
+        with TemporaryDirectory(dir=here.parent) as place:
+            return _refused(_run(words, here, Path(place), longest=1), Path(place))
+    with _disk("size=64k", here) as place:
+        with (place / "filler").open("wb", buffering=0) as filler:
+            try:
+                while filler.write(bytes(4096)):
+                    pass
+            except OSError:
+                pass
+        return _refused(_run(words, here, place), place)
+
+
+def on_read_only_disk(words: tuple[str, ...], here: Path) -> str:
+    """Run a command whose output lies where nothing may be written."""
+    if os.geteuid():
+        with TemporaryDirectory(dir=here.parent) as place:
+            Path(place).chmod(0o555)
+            return _refused(_run(words, here, Path(place)), Path(place))
+    with _disk("ro", here) as place:
+        return _refused(_run(words, here, place), place)
+
+
+def _refused(done: Ended, place: Path) -> str:
+    odd = _odd(done, place) or ("" if done.code not in (0, 5) else f"exit code {done.code}")
+    return f"WRONG: {odd}" if odd else "refused"
+
+
+def _run(words: tuple[str, ...], here: Path, place: Path, longest: int | None = None) -> Ended:
+    """Run a command in `here` with its output in `place`, whose files may be so long."""
+
+    def call() -> int:
+        if longest is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (longest, longest))
+        return run([word.format(place / "out") for word in words])
+
+    return Child(call, here, here.parent / "said").go().wait()
+
+
+def _odd(done: Ended, place: Path) -> str:
+    """Return what no command may do, in words."""
+    left = [path.name for path in place.rglob(".*")]
+    return "; ".join([*([] if done.code == 2 else done.wrong(CODES)), *(f"{name} is left" for name in left)])
+
+
+def main() -> int:
+    """Run each command with each obstacle, and print the table; 1 where one was wrong."""
+    if lacks := check_rows():
+        sys.exit(lacks)
+    asked, wrong = sys.argv[1:] or list(WORDS), []
+    ready()
+    with TemporaryDirectory() as base:
+        (here := Path(base) / "here").mkdir()
+        (here / "a").mkdir()
+        shutil.copy(SESSION, here / RECORDED)
+        _run(("calibrate", RECORDED, "-o", "a"), here, here)
+        if "merge" in asked:
+            _run((*WORDS["session"], "--bus", "sim:seed=1,temperature_c=45", "-o", "b"), here, here)
+        np.savez(here / TABLE, t=np.arange(9) / 9, acc=np.full((9, 3), 9.0), gyr=np.zeros((9, 3)))
+        for name in asked:
+            words = WORDS[name]
+            with TemporaryDirectory(dir=here.parent) as place:
+                done = _run(words, here, Path(place))
+                files = sorted(path.relative_to(place) for path in Path(place).rglob("*") if path.is_file())
+            folder = {Path("out")} if files and files[0].parts[0] == "out" and len(files[0].parts) > 1 else set()
+            print(f"{name} writes {', '.join(map(str, files))}", flush=True)
+            if done.code or not files:
+                sys.exit(f"exit code {done.code}: {done.last}")
+            for kind in OBSTACLES:
+                cells = Counter(obstructed(words, here, file, kind) for file in files[:MOST_FILES])
+                cells += Counter(f"the folder {obstructed(words, here, file, kind)}" for file in folder)
+                wrong += _show(name, kind, cells)
+            wrong += _show(name, "full disk", Counter([on_full_disk(words, here)]))
+            wrong += _show(name, "read-only", Counter([on_read_only_disk(words, here)]))
+    return int(bool(wrong))
+
+
+def _show(name: str, kind: str, cells: Counter[str]) -> list[str]:
+    print(f"  {kind:17} {', '.join(f'{count} {what}' for what, count in cells.items())}", flush=True)
+    return [f"{name}, {kind}: {what}" for what in cells if "WRONG" in what]
