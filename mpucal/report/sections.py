@@ -16,6 +16,11 @@ from .data_sheet import CAPTION, about, accelerometer_table, unusual_parameters
 from .elements import as_float, code, escape, heading, number, pair, paragraph, quantity, section, table
 from .units import AXES, ParameterRow, gyroscope, with_std
 
+# docs/method.md, "Precision and repeatability"
+REPEATABILITY = (
+    "The uncertainties are those of this measurement. Such a chip repeats its biases less precisely: to about 2 mg from"
+    " one session to the next, and 2 to 10 mg while it warms up. mpucal check tells whether they have moved."
+)
 NO_FORMULA = "D cannot be inverted: no correction is possible."
 UNOBSERVABLE = " ± ?: not observable from this recording."
 TO_SINKS = (
@@ -70,8 +75,11 @@ def is_regular(c: Calibration) -> bool:
 
 
 def accelerometer_section(c: Calibration) -> str:
-    """Return the section on the errors of the accelerometer, with their uncertainties."""
-    return section("The accelerometer", unusual_parameters(c), accelerometer_table(c, "accelerometer"), about(c))
+    """Return the section on the errors of the accelerometer, with their uncertainties, and their repeatability."""
+    lasting = paragraph(REPEATABILITY, "repeatability", note=True) if is_regular(c) else ""
+    return section(
+        "The accelerometer", unusual_parameters(c), accelerometer_table(c, "accelerometer"), about(c), lasting
+    )
 
 
 def formula(c: Calibration) -> str:

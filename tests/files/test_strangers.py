@@ -4,6 +4,7 @@ import json
 import sys
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError
 
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 HZ = 100.0
 COUNTS = np.r_[[16384 / G] * 3, [32750 / np.radians(500)] * 3]
 
@@ -150,6 +152,27 @@ def test_arrays_are_read_at_the_first_try(written, suffix, even_walk, tmp_path):
     np.testing.assert_allclose(read.t - read.t[0], even_walk.t, atol=1e-9)
     np.testing.assert_allclose(si(read), si(even_walk), atol=1.01 / COUNTS[0] if "counts" in read.taken else 1e-9)
     assert read.sensor.temperature_c == (31.5 if written is as_fields else None)
+
+
+def without_times(walk):
+    return "ax,ay,az,gx,gy,gz\n" + text(np.column_stack([walk.acc, np.degrees(walk.gyr)]), ",")
+
+
+def test_one_recording_in_ten_forms_gives_one_calibration(tmp_path):
+    whole = mpucal.load(FIXTURE, span=":30")
+    walk = mpucal.Recording.from_arrays(np.arange(len(whole)) / HZ, whole.acc, whole.gyr)
+    wanted = mpucal.calibrate(walk)
+    for name, form in (FORMS | {"without times.csv": without_times}).items():
+        (tmp_path / name).write_text(form(walk))
+    as_npy(walk, tmp_path / "walk.npy")
+    as_matlabs_matrix(walk, tmp_path / "walk.mat")
+    paths = sorted(tmp_path.iterdir())
+    assert len(paths) >= 10
+    for path in paths:
+        # counts without times show neither their range nor their rate
+        found = mpucal.calibrate(mpucal.load(path, rate=HZ if "board" in path.name else None))
+        np.testing.assert_allclose(found.D, wanted.D, atol=2e-3, err_msg=path.name)
+        np.testing.assert_allclose(found.b_a, wanted.b_a, atol=5e-3, err_msg=path.name)
 
 
 @pytest.mark.parametrize(

@@ -125,6 +125,7 @@ def test_the_sentence_says_how_sure(result):
     assert sentence.lower().startswith(result.document["quality"]["verdict"])
     found = re.search(r": (\S+) mg before, (\S+) mg after .*?, (\S+) deg in direction", sentence).groups()
     before, mg, direction = map(float, found)
+    assert re.search(r'id="repeatability".*?to about 2 mg from one session to the next', result.html)
     np.testing.assert_allclose([mg * MG, direction], [error["rms"], error["direction_deg"]], rtol=0.06)
     D, b_a = result.calibration.D, result.calibration.b_a
     s = result.document["fit"]["gravity"] * np.random.default_rng(1).normal(size=(20000, 3))
