@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from enum import Enum
 
 
@@ -12,3 +13,8 @@ class Origin(Enum):
     DEVICE = "a sensor with a kernel driver"
     VEHICLE = "a vehicle's autopilot, which filters and rounds them and sends them by radio or logs them"
     FILE = "a file that does not name its sensor, or what was recorded"
+
+
+def name_thing(text: str, origin: Origin) -> str:
+    """Return a sentence about a board as one about that what samples of `origin` come from."""
+    return re.sub(r"\bboard\b", "vehicle", text) if origin is Origin.VEHICLE else text

@@ -8,8 +8,10 @@ row here and a check there. `python -m tools.make pages` makes docs/reasons.md f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypedDict
+
+from .origin import Origin, name_thing
 
 if TYPE_CHECKING:
     from typing_extensions import ReadOnly
@@ -45,6 +47,10 @@ class Reason:
     def message(self) -> str:
         """Return both clauses as one sentence, without its full stop."""
         return f"{self.what}; {self.remedy}"
+
+    def about(self, origin: Origin) -> Reason:
+        """Return the reason in the words for samples of `origin`."""
+        return replace(self, what=name_thing(self.what, origin), remedy=name_thing(self.remedy, origin))
 
     def document(self) -> ReasonFound:
         """Return the entry of quality.reasons in calibration.json."""

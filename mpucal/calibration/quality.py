@@ -20,7 +20,7 @@ def judge(evidence: Evidence) -> Quality:
     `error_std` is the error of a calibrated measurement over all directions, rms and magnitude [m/s^2] and direction
     [deg], with the estimates that it is the largest of (uncertainty.py).
     """
-    reasons = find_reasons(evidence)
+    reasons = [reason.about(evidence.recording.sensor.origin) for reason in find_reasons(evidence)]
     return {
         "verdict": verdict(reasons),
         "reasons": [reason.document() for reason in reasons],

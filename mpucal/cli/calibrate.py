@@ -13,6 +13,7 @@ from ..errors import RefusedError
 from ..files import load
 from ..files.formats import readable_formats
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
+from ..mavlink.parameters.document import AUTOPILOT
 from ..result.calibration import REFUSED
 from ..result.noise import Noise, with_noise
 from ..result.session_files import BLOB
@@ -68,7 +69,7 @@ def command(
     else:
         click.echo(summary(calibration))
         if paths:
-            click.echo("\n" + files_written(paths, command_again(folder)))
+            click.echo("\n" + files_written(paths, command_again(folder), of_vehicle=AUTOPILOT in calibration.extra))
         elif calibration.verdict == REFUSED:
             click.echo("\n" + next_after_refusal(command_again(folder)))
     if calibration.verdict != REFUSED:

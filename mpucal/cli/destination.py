@@ -12,7 +12,7 @@ import click
 from ..errors import UsageError
 from ..result.calibration import Calibration
 from ..sinks.choose import FILE, check_behind, default_sinks
-from ..sinks.kind import Device, SinkKind
+from ..sinks.kind import Device, Say, SinkKind
 from ..sinks.record import Recorder
 from ..sinks.sink import Applied
 from ..sinks.table import SINKS
@@ -43,7 +43,7 @@ def sink_flags(command: F) -> F:
     return decorated(command, *options)
 
 
-def make_device(options: Mapping[str, Any], yes: bool) -> Device:
+def make_device(options: Mapping[str, Any], yes: bool, say: Say = say) -> Device:
     """Return the device that a command's source options name, with the flags of sinks; `yes` : ask no questions."""
     kind = matching_kinds(options)[0]
     flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
@@ -70,15 +70,16 @@ def write_back(
     sinks: tuple[str, ...],
     yes: bool,
     as_json: bool,
+    say: Say = say,
 ) -> Iterator[Applied]:
     """Write a calibration to each of `kinds`, and print what was done; see write_to_all.
 
     Parameters
     ----------
-    sinks : those that the person named with --to. yes : ask no questions.
+    sinks : those that the person named with --to. yes : ask no questions. say : shows the person a sentence.
     """
     agree, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
-    device = make_device(options, yes)
+    device = make_device(options, yes, say)
     for applied in write_to_all(kinds, calibration, device, folder, record, agree, sinks, in_doubt):
         click.echo(f"Done: {applied.what}.", err=as_json)
         yield applied

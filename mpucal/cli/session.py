@@ -13,6 +13,7 @@ import click
 from ..data import Recording
 from ..errors import MpucalError, RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
+from ..mavlink.parameters.document import AUTOPILOT
 from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import warn_unset
@@ -40,6 +41,7 @@ from .options import (
     source_options,
 )
 from .page import BOARD_KIND, choose_board, page_options, with_page
+from .person import say
 from .running import open_runner
 from .summary import command_again, files_written, page_result, summary
 
@@ -107,17 +109,19 @@ def command(
         files = [into.capture, *paths]
         show_result(page_result(calibration), files)
         if not as_json:
+            of_vehicle = AUTOPILOT in calibration.extra
             if not json_events:
                 click.echo(err=True)
-            click.echo(
-                f"{summary(calibration)}\n\n{files_written(files, command_again(into.path), calibration.verdict)}"
-            )
+            steps = files_written(files, command_again(into.path), calibration.verdict, of_vehicle)
+            click.echo(f"{summary(calibration)}\n\n{steps}")
         record = session_recorder(into.path, calibration, recording, source.truth)
         device = {**options, "gravity": source.plan.gravity, "model": source.plan.model}
         latest = calibration
         # Whatever happens to the writing, there is a result to print.
         try:
-            for applied in write_back(kinds, calibration, device, into.path, record, sinks, yes, as_json):
+            # A program that reads the events gets these sentences as events, too.
+            tell = person.say if json_events else say
+            for applied in write_back(kinds, calibration, device, into.path, record, sinks, yes, as_json, tell):
                 latest = applied.calibration
         finally:
             if as_json:

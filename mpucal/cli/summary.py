@@ -73,7 +73,7 @@ def next_after_refusal(again: str) -> str:
     return f"Next: follow the remedy above, measure again, and run\n  {again}"
 
 
-def files_written(paths: Sequence[Path], again: str, verdict: str = GOOD) -> str:
+def files_written(paths: Sequence[Path], again: str, verdict: str = GOOD, of_vehicle: bool = False) -> str:
     """Return the list of files, and the next steps; `again` is the command that measures and calibrates again."""
     folder = paths[0].parent
     lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
@@ -82,7 +82,8 @@ def files_written(paths: Sequence[Path], again: str, verdict: str = GOOD) -> str
             "Next:",
             f"  look at      {folder / REPORT.name}",
             f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT.name}").apply(acc)',
-            f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)",
+            # an autopilot takes parameters
+            *([] if of_vehicle else [f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)"]),
             *([f"  better       follow the remedies above, and run {again}"] if verdict == USABLE else []),
         ]
     else:

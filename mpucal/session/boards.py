@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
-from ..origin import Origin
+from ..origin import Origin, name_thing
 from ..result.orientation import AXES, named_axes
-from .events import Direction
+from .events import Direction, Output
+
+T = TypeVar("T", bound=Output)
 
 BOARD, PLAIN, VEHICLE = "gy-521", "plain", "vehicle"
 # A board lies flat if at least this share of gravity is along its z axis.
@@ -90,6 +93,15 @@ def lay_flat(board: str) -> str:
 def name_board(board: str) -> str:
     """Return the noun for a `board`."""
     return _KINDS[board].noun
+
+
+def speak_of(output: T, board: str) -> T:
+    """Return a session's output, which speaks of a board, in the words for `board`."""
+    if board != VEHICLE:
+        return output
+    texts = {f.name: getattr(output, f.name) for f in fields(output)}
+    said: dict[str, Any] = {k: name_thing(text, Origin.VEHICLE) for k, text in texts.items() if type(text) is str}
+    return replace(output, **said)
 
 
 def describe(down: Direction, board: str) -> str:

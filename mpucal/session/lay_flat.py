@@ -26,14 +26,19 @@ SAY_AGAIN_S = 5.0
 LOST = "check the wires or the link, end other programs, or take a lower --rate"
 
 # For commands that need a board at rest, but no session.
+STAND = Prompt(
+    PromptKind.LAY_FLAT, "Put the vehicle on its feet on a firm surface, level if you can, and let go of it."
+)
 PUT_DOWN = Prompt(PromptKind.LAY_FLAT, "Put the board on a firm surface and let go of it.")
 
 
-def put_down(listeners: Sequence[Callable[[Prompt], None]], say: Callable[[str], None]) -> None:
+def put_down(
+    listeners: Sequence[Callable[[Prompt], None]], say: Callable[[str], None], prompt: Prompt = PUT_DOWN
+) -> None:
     """Prompt for a board at rest outside a session; `listeners` get the prompt as well."""
-    say(PUT_DOWN.text)
+    say(prompt.text)
     for listener in listeners:
-        listener(PUT_DOWN)
+        listener(prompt)
 
 
 class LayFlat:

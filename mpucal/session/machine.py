@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .aims import NORMAL, select_aim
-from .boards import BOARD, name_board, usual_board
+from .boards import BOARD, name_board, speak_of, usual_board
 from .check_poses import CheckPoses
 from .events import (
     Abort,
@@ -101,6 +101,9 @@ class Machine:
         ------
         IllegalEvent : the event is not legal in this state, which does not change.
         """
+        return [speak_of(output, self._board) for output in self._handle(event)]
+
+    def _handle(self, event: Event) -> list[Output]:
         before, self.state = self.state, next_state(self.state, event)
         match event:
             case Measured(samples):

@@ -31,7 +31,7 @@ from ..mavlink.rest_monitor import RestMeans, RestMonitor
 from ..mavlink.stream_parameters import read_parameters, read_stream_parameters
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
-from ..session.lay_flat import put_down
+from ..session.lay_flat import STAND, put_down
 from ..sources.vehicle import OpenedVehicle
 from .kind import Confirm, Device, Say, nobody
 from .old_state import nothing_written
@@ -69,7 +69,7 @@ def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
     """
     source: OpenedVehicle = device.open()
     with source.connected(device.say) as link:
-        put_down(source.listeners, device.say)
+        put_down(source.listeners, device.say, STAND)
         journal = Journal.of(AUTOPILOT, device.name)
         sink = AutopilotSink(link, "store" in device.flags, journal, device.say, device.confirm)
         recovered = sink.recover()

@@ -73,7 +73,9 @@ def test_the_formula_calibrates():
 
 
 def test_the_next_steps_follow_from_the_files(tmp_path):
-    good = files_written([tmp_path / "calibration.json", tmp_path / "calibration.bin", tmp_path / "report.html"], "")
+    good = files_written(
+        [tmp_path / "calibration.json", tmp_path / "calibration.bin", tmp_path / "report.html"], "", False
+    )
     assert "firmware" in good
     refused = files_written([tmp_path / "calibration.json", tmp_path / "report.html"], "mpucal session --bus 1")
     assert "firmware" not in refused

@@ -58,6 +58,12 @@ def test_the_new_parameters_are_there_and_the_files_say_so(flown):
     assert entry["to"] == "autopilot"
     assert "read back and verified in its streams" in entry["what"]
     assert "Results are written to files and the autopilot" in flown.err
+    assert "horizon is level within" in entry["what"]
+
+
+def test_a_session_with_a_vehicle_does_not_speak_of_a_board(flown):
+    assert "Put the vehicle on its feet on a firm surface" in flown.err
+    assert "board" not in flown.err
     # This file is of the samples that were measured, as truth.json is; the other one is of the streams from now on.
     truth = json.loads((flown.folder / "truth.json").read_text())
     measured = Calibration.load(flown.folder / "calibration.json")

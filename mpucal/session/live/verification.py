@@ -69,12 +69,16 @@ def judge_verification(
     shown = [rest for rest in rests if any(rest is other for other in unseen) or not rest.agrees]
     t_s, number_of = float(recording.t[-1]), max(of, len(shown))
     verifications = tuple(_verification(rest, i + 1, number_of, t_s) for i, rest in enumerate(shown))
-    against = _find_reason(rests, shown, recording, contradiction)
-    if against is None and rests and all(rest.clipped for rest in rests):
-        return Checked(verifications, None, reason("verification_failed", "lost"))
-    if against is None and len(unseen) < of:
-        return Checked(verifications, None, reason("verification_failed", "too_few", number=len(unseen), of=of))
-    return Checked(verifications, against is None, against)
+    against, agrees = _find_reason(rests, shown, recording, contradiction), None
+    if against is not None:
+        agrees = False
+    elif rests and all(rest.clipped for rest in rests):
+        against = reason("verification_failed", "lost")
+    elif len(unseen) < of:
+        against = reason("verification_failed", "too_few", number=len(unseen), of=of)
+    else:
+        return Checked(verifications, True)
+    return Checked(verifications, agrees, against.about(recording.sensor.origin))
 
 
 def _find_reason(
