@@ -30,7 +30,7 @@ from ..sources.table import matching_kinds, source_title
 from ..terminal.console import Console, console
 from ..terminal.hangup import logging_after_hangup
 from .arguments import PATH, json_option, output_option, yes_option
-from .destination import session_sink_options, write_back
+from .destination import interrupted_writes, session_sink_options, write_back
 from .options import (
     aim_options,
     check_gravity,
@@ -104,7 +104,11 @@ def command(
         on_page as (person, show_result),
     ):
         # A program that reads the events finds the sinks in calibration.json.
-        announcement = "" if json_events else " ".join(filter(None, (announce_sinks(kinds, no_write), warn_unset())))
+        announcements = [] if json_events else [announce_sinks(kinds, no_write), warn_unset()]
+        if resume is None:
+            cut_off = interrupted_writes(check_source(click.get_current_context()), options)
+            announcements += [f"{left[:1].upper()}{left[1:]}." for left in cut_off]
+        announcement = " ".join(filter(None, announcements))
         recording, calibration, paths = _run(source, into, person, announcement, name)
         files = [into.capture, *paths]
         show_result(page_result(calibration), files)

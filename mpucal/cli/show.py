@@ -19,12 +19,11 @@ from ..files.hints import Hints
 from ..rests.flat import find_flat
 from ..result.blob import Blob
 from ..result.calibration import Calibration
-from ..result.journal import AT, Journal
-from ..sinks.table import SINKS
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_for, matching_kinds
 from .arguments import PATH, json_option
+from .destination import interrupted_writes
 from .loading import load_calibration
 from .options import check_source, given_options, source_options
 from .person import say
@@ -68,13 +67,8 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
 
 
 def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) -> None:
-    for sink in SINKS.values():
-        left = Journal.of(sink.name, options[kind.option.name]).interrupted() if sink.behind(kind) else None
-        if left is not None:
-            say(
-                f"a write to {sink.where} was cut off at {left[AT]}: it may hold old and new values;"
-                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.flag} ...` first restores the old"
-            )
+    for left in interrupted_writes(kind, options):
+        say(left)
     if kind.store:
         with resolve_name(kind.store)(options) as store:
             number, blob = store.take()

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from mpucal.__main__ import run
-from mpucal.cli.destination import make_device
+from mpucal.cli.destination import interrupted_writes, make_device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
+from mpucal.result.journal import Journal
 from mpucal.sinks.record import session_recorder
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import write_to_all
+from mpucal.sources.table import matching_kinds
 
 SOURCE = {
     "bus": None,
@@ -89,3 +91,15 @@ def test_a_vehicle_that_refuses_keeps_its_parameters(flown, tmp_path):
     assert raised.value.exit_code == 6
     # No file claims that something was written.
     assert not (tmp_path / "calibration.json").exists()
+
+
+def test_a_write_that_was_killed_is_told_before_the_next_session():
+    options = {**WORDS, "mavlink": "sim:imus=1,seed=77"}
+    kind = matching_kinds(options)[0]
+    assert list(interrupted_writes(kind, options)) == []
+    journal = Journal.of("autopilot", "sim:imus=1,seed=77")
+    journal.begin({"old": {}, "new": {}})
+    (sentence,) = interrupted_writes(kind, options)
+    journal.end()
+    assert "a write to the autopilot was cut off" in sentence
+    assert "first restores the old" in sentence
