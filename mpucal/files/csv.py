@@ -23,7 +23,7 @@ from ._text import lines, numbers
 from .budget import LONGEST_LINE
 from .reading import reading
 from .rows import Rows, Write, check_runs
-from .tables.names import COLDEST_C, WARMEST_C, parse_header
+from .tables.names import COLDEST_C, WARMEST_C, ignored_sensors, parse_header
 from .tables.times import plausible_utc_ns
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
@@ -63,7 +63,14 @@ def csv_rows(path: Path) -> Rows:
         raise RecordingError(f"{path}: its first line is empty", _REMEDY)
     begin = len(begun) - len(text.removeprefix(first).encode())
     table = _Table(path, begin, len(header), _column_places(header, path))
-    return Rows(check_runs(table.runs(), path.name), name=path.name, utc_ns=_utc_ns(header, second), plain=True)
+    others = ignored_sensors(header, [c for c in parse_header(header) if c.name in table.places])
+    return Rows(
+        check_runs(table.runs(), path.name),
+        name=path.name,
+        utc_ns=_utc_ns(header, second),
+        taken=f"{path.name}: {others}." if others else None,
+        plain=True,
+    )
 
 
 def _utc_ns(header: list[str], second: bytes) -> int | None:

@@ -68,7 +68,8 @@ class Rows:
     def recording(self) -> Recording:
         """Return the whole recording, checked; see Recording.from_arrays."""
         arrays: dict[str, Any] = {**vars(Samples.joined(list(self.runs))), "flat": self.flat}
-        arrays, taken = normalise(arrays, self.name, self.sensor) if self.plain else (arrays, self.taken)
+        arrays, made = normalise(arrays, self.name, self.sensor) if self.plain else (arrays, None)
+        taken = " ".join(filter(None, (self.taken, made))) or None
         recording = Recording.from_arrays(**arrays, sensor=self.sensor, name=self.name, taken=taken)
         return replace(recording, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns)
 

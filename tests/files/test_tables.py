@@ -247,6 +247,23 @@ def test_columns_are_named(names, said, walk, assert_same, load_table):
     assert_same(read, walk, 1e-9, 1e-9, 1e-9)
 
 
+@pytest.mark.parametrize("names", ["t,{0}x,{0}y,{0}z,{1}x,{1}y,{1}z", "time,imu_{0}x,imu_{0}y,imu_{0}z,{1}x,{1}y,{1}z"])
+def test_columns_of_a_second_imu_are_said_to_be_left_out(names, walk, assert_same, tmp_path):
+    first = names.format("a", "g")
+    second = ",".join(f"imu2_{sensor}{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
+    rows = np.column_stack([walk.t, walk.acc, walk.gyr, -walk.acc, walk.gyr])
+    np.savetxt(tmp_path / "two.csv", rows, "%.17g", ",", header=f"{first},{second}", comments="")
+    read = load(tmp_path / "two.csv")
+    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
+    assert "columns of another IMU were not read (--columns chooses): imu2_accx, imu2_accy" in read.taken
+
+
+def test_fractions_of_a_second_are_no_milliseconds(walk, load_table):
+    slow = walk.part(0, 1400)
+    read = load_table(timed("time", slow.t * 40, "ax|ay|az|gx|gy|gz", slow.acc, slow.gyr / 40))
+    assert read.rate_hz == pytest.approx(2.5, rel=0.01)
+
+
 def test_a_column_that_is_not_there(walk, load_table):
     hints = Hints(columns=parse_columns("t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g"))
     with pytest.raises(RecordingError, match="there is no column h for t: name one of a, b, c, d, e, f, g"):

@@ -199,6 +199,22 @@ def _split_axis(word: str, axis: int) -> list[tuple[str, int]]:
     return found
 
 
+def ignored_sensors(header: Sequence[str], read: Sequence[Column]) -> str:
+    """Return a remark on the columns of another IMU, which are not read; empty if there are none."""
+    places = {column.place for column in read}
+    # ax2, imu2_gyro_x
+    others = (
+        name.strip()
+        for place, name in enumerate(header)
+        if place not in places
+        and re.search(r"\d", name)
+        and (found := parse_column_name(re.sub(r"\d", "", name), place)) is not None
+        and found.quantity in (ACC, GYR)
+    )
+    names = ", ".join(others)
+    return f"columns of another IMU were not read (--columns chooses): {names}" if names else ""
+
+
 def parse_axis_name(name: str) -> tuple[int, str] | None:
     """Return (axis, unit) of a column called x, y, z, `x-axis (g)` and the like; None for any other."""
     found = _AXIS.fullmatch(name.strip().lower())

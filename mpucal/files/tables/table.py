@@ -29,6 +29,7 @@ from .names import (
     Times,
     axis_triples,
     first_triple,
+    ignored_sensors,
     parse_column_name,
     plausible_celsius,
 )
@@ -133,6 +134,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
         *ios_remarks,
         *table.remarks,
         guess_remark,
+        "" if hints.columns else ignored_sensors(table.header, columns),
     ]
     return join_streams(a, w, hints, table.name, temperature_c, remarks)
 

@@ -100,7 +100,10 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     if not (np.abs(ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
     step, said = sample_period(ticks), hints.units.get("t", stream.time_unit)
-    unit = resolve_unit(name, "t", said, hints.units.get("t", units.time_unit(step, said)), f"the step of {step:g}")
+    # milliseconds are whole numbers: a fraction of them is a slow recording's second
+    slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
+    seen = hints.units.get("t", units.time_unit(step, said or slow))
+    unit = resolve_unit(name, "t", said, seen, f"the step of {step:g}")
     t = ticks * QUANTITIES["t"][unit]
     back = np.diff(t) < 0
     if back.any():
