@@ -16,9 +16,8 @@ from .events import Abort, Command, Decision, Enough, Event, Forget, Key, Measur
 from .live.scheduler import FitScheduler
 from .machine import Machine
 from .ports import Note, Operator
-from .table import State
+from .table import MEASURING, State
 
-MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
 _PRESSED: dict[Key, Event] = {Key.ENOUGH: Enough(), Key.REDO: Redo(), Key.ABORT: Abort()}
 
 

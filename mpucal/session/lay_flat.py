@@ -9,7 +9,8 @@ from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import Windows
 from .boards import BOARD, lay_flat, name_board
-from .events import Caution, Countdown, Direction, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
+from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
+from .step import SAY_AGAIN_S, Step
 
 WINDOW_S = 0.5
 FLAT_S = 10.0
@@ -20,8 +21,6 @@ RECORDED_S = 5.0
 PATIENCE_S = 60.0
 # Shorter stillness is interrupted without a caution.
 WORTH_SAYING_S = 1.0
-# Least time between two cautions about a board that keeps moving.
-SAY_AGAIN_S = 5.0
 # Remedy for missing samples, for every source.
 LOST = "check the wires or the link, end other programs, or take a lower --rate"
 
@@ -41,7 +40,7 @@ def put_down(
         listener(prompt)
 
 
-class LayFlat:
+class LayFlat(Step):
     """Step that waits for stillness, and says what disturbs it.
 
     Parameters
@@ -49,8 +48,6 @@ class LayFlat:
     patient : there is no time limit, and RECORDED_S of rest is enough once the board is moved.
     board : its kind, for the words of the prompts.
     """
-
-    wanted: Direction | None = None
 
     def __init__(self, patient: bool = False, board: str = BOARD) -> None:
         self._patient, self._noun = patient, name_board(board)
@@ -83,18 +80,16 @@ class LayFlat:
                 return [*outputs, self._rested(sight)]
         return outputs
 
-    def resumed(self) -> list[Output]:
-        """Start again after a gap, in which the board may have been moved."""
+    def resumed(self) -> Sequence[Output]:
+        """See Step."""
         self._windows = Windows(WINDOW_S)
         self._stillness.forget()
         self._still, self._begun_s = None, None
-        return [self.prompt]
+        return super().resumed()
 
-    def enough(self) -> Rested | None:
-        """Return the stillness so far; None if it is too short to go on with."""
-        if self._still is None or self._still.seconds < SHORTEST_S:
-            return None
-        return self._rested(self._still)
+    def enough(self) -> list[Rested]:
+        """Return the stillness so far, unless it is too short to go on with."""
+        return [self._rested(self._still)] if self._still is not None and self._still.seconds >= SHORTEST_S else []
 
     def _rested(self, still: Still) -> Rested:
         return Rested(still.seconds, triple(still.acc), triple(still.gyr))

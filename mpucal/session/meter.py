@@ -12,11 +12,10 @@ from ..rests.stillness import Detector, Moved
 from ..rests.windows import Window, Windows
 from .attitude import Attitude, canonical
 from .events import Caution, Direction, Meter, Output, down_of
+from .step import SAY_AGAIN_S
 from .turn_guide import TurnGuide
 
 WINDOW_S = 0.25
-# Least time between two cautions of one kind.
-SAY_AGAIN_S = 5.0
 NEAR_RANGE = 0.8
 
 

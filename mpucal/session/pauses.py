@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,13 +12,14 @@ from ..data import Samples, Vector
 from ..rests.limits import HAND
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
-from .events import Caution, Countdown, Direction, Held, Output, Prompt, Rested, Use, down_of
+from .events import Caution, Countdown, Direction, Held, Output, Rested, Use, down_of
+from .step import Step
 
 WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
 # The prompt is repeated after this time without a new orientation.
-SAY_AGAIN_S = 8.0
+REMIND_S = 8.0
 # A check and a verification end after this time without a new orientation.
 PATIENCE_S = 40.0
 # A board this near to the wanted orientation is in it.
@@ -72,19 +74,13 @@ def countdown(pause: Pause, use: Use) -> list[Countdown]:
     return [replace(pause.countdown, elsewhere=use is Use.USEFUL)]
 
 
-class PoseStep:
+class PoseStep(Step):
     """Base of the steps that ask for one orientation after another.
 
     Parameters
     ----------
     flat : the flat rest. hold_s : time for which each orientation is to be held.
-
-    Attributes
-    ----------
-    prompt : the last one.
     """
-
-    prompt: Prompt
 
     def __init__(self, flat: Rested, hold_s: float = HOLD_S) -> None:
         self._pauses = PauseDetector(flat, hold_s)
@@ -92,20 +88,15 @@ class PoseStep:
         self._prompted_s = 0.0
         self._number = 0
 
-    @property
-    def wanted(self) -> Direction | None:
-        """Unit vector that is to point down."""
-        return self.prompt.down
-
-    def resumed(self) -> list[Output]:
-        """Start again after a gap, in which the board may have been moved."""
+    def resumed(self) -> Sequence[Output]:
+        """See Step."""
         self._begun_s = None
         self._pauses.forget()
-        return [self.prompt]
+        return super().resumed()
 
     def _remind(self, t_s: float, since_s: float, what: str) -> list[Output]:
-        """Return the prompt as a caution, if it is SAY_AGAIN_S since the last one and since `since_s`."""
-        if t_s - max(since_s, self._prompted_s) < SAY_AGAIN_S:
+        """Return the prompt as a caution, if it is REMIND_S since the last one and since `since_s`."""
+        if t_s - max(since_s, self._prompted_s) < REMIND_S:
             return []
         self._prompted_s = t_s
         return [Caution(t_s, "not_turned", what, self.prompt.text)]

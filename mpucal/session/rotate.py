@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,14 @@ import numpy as np
 from ..data import Samples, Vector
 from ..rests.windows import Windows
 from .aims import Aim, directions
-from .boards import BOARD, describe, describe_tilt, name_board
+from .boards import describe, describe_tilt, name_board
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
+    Checked,
     Direction,
     FitKind,
     Knowledge,
+    Learnt,
     Output,
     Progress,
     Prompt,
@@ -23,12 +26,15 @@ from .events import (
     RequestFit,
     Rested,
     Seen,
+    Tried,
     Turned,
     Use,
     down_of,
     triple,
 )
 from .pauses import HOLD_S, Pause, PoseStep, classify_use, countdown, held
+from .plan import Plan
+from .step import ENOUGH, End
 
 PASS_WINDOW_S = 0.1
 # Least length of a pause. A fit uses shorter rests, too.
@@ -60,30 +66,25 @@ class Rotate(PoseStep):
     Parameters
     ----------
     flat : the flat rest, the first orientation. aim : the conditions for its end.
-    until_end : go on until the source ends, and ask for nothing. tilt_only : ask for small tilts from flat alone.
-    board : its kind, for the words of the prompts.
+    plan : with until_end, nothing is asked for. coverage : empty; the orientations of the turning are added to it.
     """
 
-    def __init__(
-        self, flat: Rested, aim: Aim, until_end: bool = False, tilt_only: bool = False, board: str = BOARD
-    ) -> None:
+    def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         super().__init__(flat)
-        self.flat, self._aim, self._until_end, self._tilt_only = flat, aim, until_end, tilt_only
-        self._board = board
-        self._least = TILTS if tilt_only else aim.least
+        self._aim, self._plan, self._coverage = aim, plan, coverage
+        self._least = TILTS if plan.tilt_only else aim.least
         self._passes = Windows(PASS_WINDOW_S, spread=False)
-        self.coverage = Coverage()
         acc = np.array(flat.acc)
-        self.coverage.paused.add(acc)
-        self.coverage.passed.add(acc)
-        self.coverage.rested.add(acc)
-        self.directions = directions(down_of(acc), tilt_only)
+        self._coverage.paused.add(acc)
+        self._coverage.passed.add(acc)
+        self._coverage.rested.add(acc)
+        self._directions = directions(down_of(acc), plan.tilt_only)
         self._knowledge: Knowledge | None = None
         self._requested = False
         self._advised_run = -1
         self._held: tuple[Pause, Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
-        self.prompt = self._prompt_for(self.coverage.paused.farthest_down(self.directions))
+        self.prompt = self._prompt_for(self._coverage.paused.farthest_down(self._directions))
 
     def add(self, samples: Samples) -> list[Output | Turned]:
         """Return the outputs for `samples`; Turned comes last and ends the step."""
@@ -91,37 +92,44 @@ class Rotate(PoseStep):
             self._begun_s = self._new_s = self._known_s = self._reported_s = self._prompted_s = float(samples.t[0])
         for window in self._passes.add(samples):
             steady = window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2
-            if steady and self.coverage.passed.add(window.acc):
+            if steady and self._coverage.passed.add(window.acc):
                 self._new_s = window.end_s
         outputs: list[Output | Turned] = []
         for pause in self._pauses.add(samples):
             outputs += self._hold(pause)
         self._t_s = t_s = float(samples.t[-1])
         outputs += self._periodic(t_s)
-        turned = None if self._until_end else self._time_out(t_s)
+        turned = None if self._plan.until_end else self._time_out(t_s)
         return [*outputs, turned] if turned else outputs
 
-    def learn(self, knowledge: Knowledge, advice: bool) -> list[Output | Turned]:
+    def answer(self, event: Learnt | Tried | Checked) -> list[Output | Turned]:
         """Return the outputs for new uncertainties; Turned comes last and ends the step."""
+        return self._learn(event.knowledge, event.advice) if isinstance(event, Learnt) else []
+
+    def enough(self) -> Sequence[End]:
+        """See Step; the turning alone is verified, unless the source is recorded until its end."""
+        return super().enough() if self._plan.until_end else [Turned(ENOUGH)]
+
+    def _learn(self, knowledge: Knowledge, advice: bool) -> list[Output | Turned]:
         self._knowledge, self._requested = knowledge, False
         outputs: list[Output | Turned] = [knowledge]
-        if self._until_end:
+        if self._plan.until_end:
             return outputs
         if advice and self._held is not None:
             # The output goes out now, so it has the time of the last samples and not that of the pause.
             outputs.append(replace(held(*self._held), t_s=self._t_s))
         if self._is_enough():
             # Tilts leave some parameters at their prior: the target does not apply to them.
-            what = "enough tilts seen" if self._tilt_only else "target reached"
+            what = "enough tilts seen" if self._plan.tilt_only else "target reached"
             return [*outputs, Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._prompted_s = knowledge.t_s
             # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
             # even if the estimate takes up for down, as for a sensor whose axes are mirrored.
             down = np.array(knowledge.down)
-            if self._tilt_only or knowledge.down == self.prompt.down:
-                others = self.directions @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)
-                down = self.coverage.paused.farthest_down(self.directions[others])
+            if self._plan.tilt_only or knowledge.down == self.prompt.down:
+                others = self._directions @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)
+                down = self._coverage.paused.farthest_down(self._directions[others])
             self.prompt = self._prompt_for(down)
             outputs.append(self.prompt)
         return outputs
@@ -133,25 +141,25 @@ class Rotate(PoseStep):
             return self.prompt.down
         return self._knowledge.down
 
-    def resumed(self) -> list[Output]:
-        """Start again after a gap, in which the board may have been moved."""
+    def resumed(self) -> Sequence[Output]:
+        """See Step."""
         self._requested = False
         prompt = super().resumed()
-        return [] if self._until_end else prompt
+        return [] if self._plan.until_end else prompt
 
     def _hold(self, pause: Pause) -> list[Output | Turned]:
         # A pause that the coverage has counted is not new any more: its use was decided before.
         if self._held is None or self._held[0].run != pause.run or pause.seconds < PAUSE_S - 1e-6:
-            self._held = pause, classify_use(pause.acc, self.prompt.down, not self.coverage.paused.near(pause.acc))
+            self._held = pause, classify_use(pause.acc, self.prompt.down, not self._coverage.paused.near(pause.acc))
         # The advice ends the countdown of its pause, also where a bump had delayed it.
         advised = pause.run <= self._advised_run
         outputs: list[Output | Turned] = [*countdown(pause, self._held[1])] if self._requested or not advised else []
         if pause.seconds >= REST_S - 1e-6:
-            self.coverage.rested.add(pause.acc)
-        if pause.seconds >= PAUSE_S - 1e-6 and self.coverage.paused.add(pause.acc):
+            self._coverage.rested.add(pause.acc)
+        if pause.seconds >= PAUSE_S - 1e-6 and self._coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
-            outputs.append(Seen(pause.t_s, len(self.coverage.paused), down_of(pause.acc), paused=True))
-        if self._until_end or self._requested or advised:
+            outputs.append(Seen(pause.t_s, len(self._coverage.paused), down_of(pause.acc), paused=True))
+        if self._plan.until_end or self._requested or advised:
             return outputs
         if pause.seconds >= HOLD_S - WAIT_S - 1e-6:
             self._requested, self._advised_run, self._known_s = True, pause.run, pause.t_s
@@ -162,27 +170,27 @@ class Rotate(PoseStep):
         """Return the request of the next fit, the progress and the reminder, each if its time has come."""
         outputs: list[Output] = []
         turning_s = t_s - (self._begun_s or t_s)
-        every_s = SHOW_EVERY_S if self._until_end else max(KNOW_EVERY_S, turning_s / SELDOM)
+        every_s = SHOW_EVERY_S if self._plan.until_end else max(KNOW_EVERY_S, turning_s / SELDOM)
         if not self._requested and t_s - self._known_s >= every_s:
             self._requested, self._known_s = True, t_s
             outputs.append(RequestFit(FitKind.KNOW, WAIT_S))
         if t_s - self._reported_s >= REPORT_EVERY_S:
             self._reported_s = t_s
-            done = min(self.coverage.number, self._least)
+            done = min(self._coverage.number, self._least)
             outputs.append(Progress(t_s, done, self._least, self._count(), self._estimate_left_s(t_s)))
-        return (
-            outputs if self._until_end else outputs + self._remind(t_s, self._new_s, "no new orientation for a while")
-        )
+        if not self._plan.until_end:
+            outputs += self._remind(t_s, self._new_s, "no new orientation for a while")
+        return outputs
 
     def _count(self) -> str:
         """Return the number of orientations as text; with the reason where more are asked for than the target needs."""
-        number, least = self.coverage.number, self._least
+        number, least = self._coverage.number, self._least
         text = f"orientation {number} of {least}" if number <= least else f"{number} orientations, of at least {least}"
-        if not self._is_certain() or self._tilt_only or self._until_end:
+        if not self._is_certain() or self._plan.tilt_only or self._plan.until_end:
             return text
         if number < least:
             return f"{text} (bars full; more sides confirm them)"
-        return text if self.coverage.varied else f"{text} (bars full, but all too much alike)"
+        return text if self._coverage.varied else f"{text} (bars full, but all too much alike)"
 
     def _estimate_left_s(self, t_s: float) -> float | None:
         """Return the time until the end of the verification, at the pace of the orientations so far; None: unknown.
@@ -190,12 +198,12 @@ class Rotate(PoseStep):
         The orientations that the target needs at least are most often enough. Near their end the information counts: it
         is the inverse of the variance, and grows by about as much with each orientation as so far.
         """
-        taken, left = self.coverage.number - 1, max(self._least - self.coverage.number, 0)
-        if taken < LEAST_FOR_PACE or self._until_end or self._begun_s is None:
+        taken, left = self._coverage.number - 1, max(self._least - self._coverage.number, 0)
+        if taken < LEAST_FOR_PACE or self._plan.until_end or self._begun_s is None:
             return None
-        if not self._tilt_only and left < NEAR_THE_END:
+        if not self._plan.tilt_only and left < NEAR_THE_END:
             known = self._knowledge.overall**2 if self._knowledge else 0.0
-            if known < LEAST_KNOWN or not self.coverage.varied:
+            if known < LEAST_KNOWN or not self._coverage.varied:
                 return None
             left = max(left, math.ceil(taken * (1.0 - known) / known))
         # The orientation that is being turned to has begun when the last new one was found.
@@ -208,22 +216,22 @@ class Rotate(PoseStep):
         return self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _is_enough(self) -> bool:
-        if self.coverage.number < self._least or self._tilt_only:
-            return self.coverage.number >= self._least
-        return self.coverage.varied and self._is_certain()
+        if self._coverage.number < self._least or self._plan.tilt_only:
+            return self._coverage.number >= self._least
+        return self._coverage.varied and self._is_certain()
 
     def _time_out(self, t_s: float) -> Turned | None:
         known = f": {self._knowledge.words}" if self._knowledge else ""
         if t_s - self._new_s >= PATIENCE_S:
-            return Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self.coverage.number} seen{known}")
+            return Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self._coverage.number} seen{known}")
         if self._begun_s is not None and t_s - self._begun_s >= self._aim.longest_s:
             return Turned(f"time limit of {self._aim.longest_s:.0f} s for turning reached{known}")
         return None
 
     def _prompt_for(self, down: Vector) -> Prompt:
-        if self._until_end:
+        if self._plan.until_end:
             text = "Turn the board through many different orientations, tilted ones too, and hold each for 2 s."
             return Prompt(PromptKind.ROTATE, text)
-        words = (describe_tilt if self._tilt_only else describe)(triple(down), self._board)
-        text = f"Turn the {name_board(self._board)}: {words}, then hold it still."
+        words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
+        text = f"Turn the {name_board(self._plan.board)}: {words}, then hold it still."
         return Prompt(PromptKind.ROTATE, text, triple(down))

@@ -56,7 +56,7 @@ class Runner:
         self._source, self._operator, self._note = source, operator, note
         self._plan = plan = plan or Plan()
         self._open_next_part, self._start_worker, self._checking = open_next_part, start_worker, checking
-        self._machine = Machine(plan.until_end, plan.target, plan.tilt_only, plan.attended, checking, plan.board)
+        self._machine = Machine(plan, checking)
         self._dialogue = Dialogue(self._machine, operator, listeners, note, source.now_ns, late)
         self._ended, self._samples = False, 0
         self.sensor: Sensor | None = None

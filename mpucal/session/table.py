@@ -46,6 +46,8 @@ def _stay(state: State, *events: type[Event]) -> dict[type[Event], State]:
     return dict.fromkeys(events, state)
 
 
+# States that need samples.
+MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
 # An event that a row does not name is illegal in that state.
 TRANSITIONS: Mapping[State, Mapping[type[Event], State]] = MappingProxyType(
     {

@@ -6,17 +6,18 @@ import math
 
 import numpy as np
 
-from ..data import Samples, Vector
+from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
-from .aims import Aim, unseen_rad
-from .boards import BOARD, describe, describe_tilt
+from .aims import Aim, directions, unseen_rad
+from .boards import describe, describe_tilt
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Caution,
     Checked,
     Finished,
     FitKind,
+    Learnt,
     Output,
     Progress,
     Prompt,
@@ -25,9 +26,12 @@ from .events import (
     Rested,
     Tried,
     Use,
+    down_of,
     triple,
 )
 from .pauses import HOLD_S, PATIENCE_S, Pause, PoseStep, classify_use, countdown, held, is_wanted
+from .plan import Plan
+from .step import ENOUGH
 
 # Bias and scale factor errors bend raw directions by up to a tenth: these must be farther apart by that.
 BENT = 1.1
@@ -49,36 +53,20 @@ class Verify(PoseStep):
     Parameters
     ----------
     flat : the flat rest. coverage : the orientations of the turning.
-    directions : (k, 3) that may be asked to point down.
-    attended : somebody can press keys, and is offered to turn the board again where that may help.
-    board : its kind, for the words of the prompts.
-
-    Attributes
-    ----------
-    checked : the result; None before it is known, or if the person skipped it.
+    plan : a person who can press keys is offered to turn the board again where that may help.
     """
 
-    def __init__(
-        self,
-        flat: Rested,
-        aim: Aim,
-        coverage: Coverage,
-        directions: Vector,
-        tilt_only: bool = False,
-        attended: bool = False,
-        board: str = BOARD,
-    ) -> None:
+    def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         super().__init__(flat)
-        self._aim, self._coverage, self._directions, self._tilt_only = aim, coverage, directions, tilt_only
-        self._attended, self._board = attended, board
+        self._aim, self._plan, self._coverage = aim, plan, coverage
+        self._directions = directions(down_of(np.array(flat.acc)), plan.tilt_only)
         self._refusal: Finished | None = None
         self._requested, self._more = False, MOST_MORE
         self._now_s = 0.0
-        self.checked: Checked | None = None
         self.prompt = self._next()
 
     def begin(self) -> list[Output]:
-        """Return the first outputs."""
+        """See Step."""
         return [RequestFit(FitKind.TRY, TRY_WAIT_S), self.prompt]
 
     def add(self, samples: Samples) -> list[Output | Finished]:
@@ -105,14 +93,27 @@ class Verify(PoseStep):
         self.checked = Checked((), None, not_shown)
         return [*outputs, Finished(not_shown.what)]
 
-    def tried(self, tried: Tried) -> list[Output | Finished]:
+    def answer(self, event: Learnt | Tried | Checked) -> list[Output | Finished]:
+        """Take the first calibration, or its comparison with the new orientations; the rotation's come too late."""
+        match event:
+            case Tried():
+                return self._tried(event)
+            case Checked():
+                return self._check(event)
+        return []
+
+    def enough(self) -> list[Finished]:
+        """See Step."""
+        return [self._refusal or Finished(f"{ENOUGH}: not verified")]
+
+    def _tried(self, tried: Tried) -> list[Output | Finished]:
         """Take the first calibration; one that is refused needs no verification."""
         if tried.verdict != REFUSED or tried.reason is None:
             return []
         self.checked = Checked((), False, tried.reason)
         return self._refused(Finished(f"not verified: {tried.reason.message}"), tried.reason)
 
-    def check(self, checked: Checked) -> list[Output | Finished]:
+    def _check(self, checked: Checked) -> list[Output | Finished]:
         """Take the comparison with the new orientations."""
         if checked.agrees is None and self._number >= self._aim.verify and self._more:
             # The fit has seen one of these orientations after all: another one replaces it.
@@ -126,13 +127,9 @@ class Verify(PoseStep):
             return [*checked.verifications, agreement]
         return [*checked.verifications, *self._refused(Finished(checked.reason.what), checked.reason)]
 
-    def enough(self) -> Finished:
-        """Return the end of the step, at the person's wish."""
-        return self._refusal or Finished("you chose to go on: not verified")
-
     def _refused(self, refusal: Finished, against: Reason) -> list[Output | Finished]:
         """Return the refusal, or offer to turn the board again, where that may help and somebody can answer."""
-        if not self._attended or not KINDS[against.code].turn_again:
+        if not self._plan.attended or not KINDS[against.code].turn_again:
             return [refusal]
         self._refusal, self._begun_s = refusal, None
         self.prompt = Prompt(
@@ -163,7 +160,7 @@ class Verify(PoseStep):
 
     def _classify_use(self, pause: Pause) -> Use:
         """Return SEEN if the fit already used this orientation, even when it was requested."""
-        if self._coverage.rested.near(pause.acc, BENT * unseen_rad(self._tilt_only)):
+        if self._coverage.rested.near(pause.acc, BENT * unseen_rad(self._plan.tilt_only)):
             return Use.SEEN
         return classify_use(pause.acc, self.prompt.down, new=True)
 
@@ -182,6 +179,6 @@ class Verify(PoseStep):
         if last is not None:
             candidates = candidates[candidates @ np.array(last.down) < math.cos(DISTINCT_RAD)]
         down = self._coverage.rested.farthest_down(candidates)
-        words = (describe_tilt if self._tilt_only else describe)(triple(down), self._board)
+        words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
         number = f"{self._number + 1} of {self._aim.verify}"
         return Prompt(PromptKind.VERIFY, f"Verification {number}: {words}, then hold it still.", triple(down))

@@ -35,6 +35,7 @@ from mpucal.session.events import (
     Written,
 )
 from mpucal.session.machine import Machine
+from mpucal.session.plan import Plan
 from mpucal.session.table import State
 
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
@@ -59,9 +60,9 @@ class Session:
     What it asks for is answered at once: with `overall` as far as is known (None: not at all), `tried` and `checked`.
     """
 
-    def __init__(self, **options):
+    def __init__(self, checking=False, **options):
         self.overall, self.tried, self.checked = None, Tried("good"), Checked((), agrees=True)
-        self.machine = Machine(**options)
+        self.machine = Machine(Plan(**options), checking)
         self.said = self.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0)))
 
     def feed(self, samples, poll=20):
@@ -230,7 +231,7 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
 )
 def test_prompts_speak_of_the_kind_of_board(board, options, sensor, lay, words):
     session = Session(**options)
-    session.machine = Machine(**options)
+    session.machine = Machine(Plan(**options))
     (first,) = session.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0, **sensor)))
     assert first.text.startswith(lay)
     assert session.feed(board.still(10.6)).of(Prompt)[-1].text.startswith(words)
