@@ -23,7 +23,7 @@ from ..report.noise import render, summary
 from ..result.clock import now
 from ..result.noise import Noise
 from ..session.lay_flat import put_down
-from ..session.ports import Source
+from ..session.ports import Source, polled
 from ..session.results import save
 from ..sources.opening import open_source
 from .arguments import PATH, json_option, output_option
@@ -104,8 +104,8 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> Noise:
 def _runs(source: Source) -> Iterator[Samples]:
     """Yield samples in runs of a second: the meter could not keep up with many small ones."""
     held: list[Samples] = []
-    while True:
-        held.append(source.poll())
+    for samples in polled(source):
+        held.append(samples)
         last = next((part for part in reversed(held) if len(part)), None)
         first = next((part for part in held if len(part)), None)
         if first is not None and last is not None and last.t[-1] - first.t[0] >= 1.0:

@@ -25,7 +25,7 @@ from ..recheck.watch import Contradiction, DriftMonitor
 from ..result.clock import now
 from ..result.correction import Correction, make_correction
 from ..session.events import Caution
-from ..session.ports import Source
+from ..session.ports import Source, polled
 from ..sources.opening import open_source
 from ..sources.table import source_title
 from ..terminal.keys import Keys
@@ -125,12 +125,8 @@ def _poll(source: Source, seconds: float | None) -> Iterator[Samples]:
     """Yield samples as they arrive; stop the source in the end."""
     with suppress(EndOfCapture):
         source.start()
-        begun_ns = source.now_ns()
         try:
-            while seconds is None or source.now_ns() - begun_ns < seconds * 1e9:
-                samples = source.poll()
-                if len(samples):
-                    yield samples
+            yield from filter(len, polled(source, seconds))
         finally:
             source.stop()
 

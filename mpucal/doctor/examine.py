@@ -6,6 +6,7 @@ correction that had been written there would be lost.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
@@ -27,6 +28,7 @@ from ..chip.self_test import run_self_test
 from ..chip.transfer_stats import REMEDY, TransferStats
 from ..data import Sensor
 from ..errors import ChipError, ChipReset, OddOffsets, SourceError
+from ..session.ports import polled
 from .bus_speed import examine_speed
 from .dead_axes import DEAD_AXIS, REPLACE, STUCK_BITS
 from .finding import Finding, Mark
@@ -109,9 +111,7 @@ def _examine_chip(
     if not part.fifo_bytes:
         yield Finding("FIFO", Mark.NOTE, NO_FIFO, f"take --rate {MOST_POLLED_HZ} or less, and a bus of 400 kHz")
     yield _factory_trim(port, family, olds)
-    end_ns = driver.now_ns() + round(seconds * 1e9)
-    while driver.now_ns() < end_ns:
-        driver.poll()
+    deque(polled(driver, seconds), maxlen=0)
     recording = driver.recording()
     if len(recording) > config.rate_hz:
         yield from examine_stream(recording, config.rate_hz, seconds, family)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -10,8 +11,8 @@ from ..chip.families import PARTS
 from ..errors import SourceError
 from ..iio.attributes import ACCEL, GYRO
 from ..iio.decode import ENABLE
-from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, TRIGGER
+from ..session.ports import polled
 from ..sources.iio import OpenedIio
 from .finding import Finding, Mark
 from .measure import examine_stream
@@ -35,9 +36,9 @@ def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
         ranges = f"±{sensor.accel_range_g or 0:g} g, ±{sensor.gyro_range_dps or 0:g} deg/s"
         yield Finding("ranges", Mark.OK, ranges if sensor.accel_range_g else "unknown: the driver does not state them")
         try:
-            _poll_for(driver, SETTLED_S)
+            deque(polled(driver, SETTLED_S), maxlen=0)
             driver.forget()
-            _poll_for(driver, seconds)
+            deque(polled(driver, seconds), maxlen=0)
         except SourceError as error:
             yield Finding.failed("stream", error)
             return
@@ -57,12 +58,6 @@ def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
     else:
         what = f"{len(recording)} samples in {seconds:g} s"
         yield Finding("stream", Mark.BAD, what, "look in `dmesg` for the driver and its interrupts")
-
-
-def _poll_for(driver: IioDriver, seconds: float) -> None:
-    end_ns = driver.now_ns() + round(seconds * 1e9)
-    while driver.now_ns() < end_ns:
-        driver.poll()
 
 
 def _device(device: str, texts: dict[str, str], trigger: str | None) -> Iterator[Finding]:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import secrets
 import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -15,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OutputError
+from ..session.beside import end_beside, start_beside
 from ..session.boards import BOARD
 from ..session.events import Key, Output
 from ..terminal.view import View
@@ -48,17 +47,7 @@ class Feed:
     """
 
     def __init__(self, where: Address, about: Mapping[str, Any], keys: bool = False) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "mpucal.page.process"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            # The process imports from the same places as this program.
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-            # Ctrl-C reaches the session alone, which ends this process.
-            process_group=0,
-        )
+        self._process = start_beside("mpucal.page.process", text=True)
         token = secrets.token_urlsafe(TOKEN_BYTES)
         # The token is no argument of the process, because every user of the computer could read it there.
         self._send({"host": where.host, "port": where.port, "name": where.name, "token": token, "keys": keys})
@@ -122,12 +111,7 @@ class Feed:
 
     def close(self) -> None:
         """End the process at once."""
-        self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
+        end_beside(self._process)
 
     @property
     def _stdin(self) -> Any:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 from ..chip.records import KEY, SessionEvent
@@ -36,6 +37,18 @@ class Source(Protocol):
     def stop(self) -> None:
         """Stop measuring, and put the sensor to rest."""
         ...
+
+
+def polled(source: Source, seconds: float | None = None) -> Iterator[Samples]:
+    """Poll a started source for `seconds` of its time, or without an end; yield the samples of each poll.
+
+    Raises
+    ------
+    EndOfCapture : no more will come.
+    """
+    end_ns = math.inf if seconds is None else source.now_ns() + seconds * 1e9
+    while source.now_ns() < end_ns:
+        yield source.poll()
 
 
 class Operator(Protocol):

@@ -18,7 +18,7 @@ from .live.scheduler import FitScheduler, InlineWorker, Worker
 from .live.verification import add_verification
 from .machine import Machine
 from .plan import Plan
-from .ports import Note, Operator, Source
+from .ports import Note, Operator, Source, polled
 from .results import result_files, save
 from .table import State
 
@@ -143,10 +143,11 @@ class Runner:
         """Record as `record` does, without prompts: there is no session of the accelerometer alone."""
         with suppress(EndOfCapture):
             self.sensor = self._source.start()
-            end_ns = math.inf if seconds is None else self._source.now_ns() + seconds * 1e9
-            while self._source.now_ns() < end_ns and not self._operator.pressed():
-                self._samples += len(self._source.poll())
+            for samples in polled(self._source, seconds):
+                self._samples += len(samples)
                 self._source.forget()
+                if self._operator.pressed():
+                    break
             self._end_recording()
             self._source.stop()
         return self._samples

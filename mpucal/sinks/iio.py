@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import replace
@@ -32,6 +33,7 @@ from ..rests.stillness import is_untouched
 from ..result.calibration import Calibration
 from ..result.journal import Journal
 from ..session.lay_flat import put_down
+from ..session.ports import polled
 from ..sources.iio import OpenedIio
 from .chip import SHIFT_G, SHIFT_SHARE
 from .kind import Device
@@ -40,7 +42,7 @@ from .sink import Applied
 from .table import IIO_STATE, KERNEL
 
 FORMAT, WORDS, RULE = "mpucal.iio_state", "calibbias", "rule"
-REST_NS, TRIES, FEWEST = 1_000_000_000, 20, 10
+REST_S, TRIES, FEWEST = 1.0, 20, 10
 CALIBBIAS = [f"{ACCEL}_{axis}_calibbias" for axis in AXES]
 
 
@@ -162,9 +164,7 @@ class KernelSink:
         try:
             for _ in range(TRIES):
                 driver.forget()
-                end_ns = driver.now_ns() + REST_NS
-                while driver.now_ns() < end_ns:
-                    driver.poll()
+                deque(polled(driver, REST_S), maxlen=0)
                 acc = driver.recording().acc
                 if len(acc) > FEWEST and is_untouched(acc):
                     return np.asarray(acc.mean(axis=0), np.float64)

@@ -1,14 +1,12 @@
 """Worker process for the fits of a session: the loop that reads the FIFO shares no interpreter with them.
 
-The process reads pickled tasks from its stdin and writes pickled answers to its stdout. It ends with the program,
-however that ends, because its stdin is closed then.
+The process reads pickled tasks from its stdin and writes pickled answers to its stdout.
 """
 
 from __future__ import annotations
 
 import os
 import pickle
-import subprocess
 import sys
 import traceback
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,9 +15,9 @@ from typing import IO
 
 from ...data import Sensor
 from ...errors import Abandoned
+from ..beside import end_beside, start_beside
 from ..events import Event
 from ..plan import Plan
-from ..threads import ONE_THREAD
 from .fits import Fits, Task
 
 # The reading loop is scheduled before the fits.
@@ -35,16 +33,7 @@ class ProcessWorker:
     """
 
     def __init__(self, plan: Plan, sensor: Sensor) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", __name__],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            # The process imports from the same places as this program.
-            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)},
-            # Ctrl-C reaches the session alone, which ends this process.
-            process_group=0,
-        )
+        self._process = start_beside(__name__)
         self.pid = self._process.pid
         # This thread waits for answers, so that the loop does not.
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="fits")
@@ -61,11 +50,7 @@ class ProcessWorker:
         """Kill the process, and drop the tasks that are not done."""
         self._process.kill()
         self._thread.shutdown(wait=True, cancel_futures=True)
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
+        end_beside(self._process)
 
     def _request(self, task: Task) -> Event | None:
         try:

@@ -1,0 +1,41 @@
+"""Process beside a session: a module of mpucal that reads its stdin and answers on its stdout."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from typing import Any
+
+from .threads import ONE_THREAD
+
+
+def start_beside(module: str, text: bool = False) -> subprocess.Popen[Any]:
+    """Start the process; it ends with this program, however that ends, because its stdin is closed then.
+
+    Parameters
+    ----------
+    module : its name, for `python -m`. text : the pipes carry text instead of bytes.
+    """
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", module],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=text,
+        # The process imports from the same places as this program.
+        env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)},
+        # Ctrl-C reaches the session alone, which ends this process.
+        process_group=0,
+    )
+
+
+def end_beside(process: subprocess.Popen[Any]) -> None:
+    """Kill the process, and close its pipes."""
+    process.kill()
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with suppress(OSError):
+                pipe.close()
