@@ -90,7 +90,8 @@ class Child:
                 limit_cpu(cpu_s)
                 become(folder, said)
                 code = call()
-                sys.stdout.flush()
+                if sys.stdout is not None:
+                    sys.stdout.flush()
             except BaseException:
                 traceback.print_exc()
             finally:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +24,15 @@ class RowJournal:
         self._settings = settings
         # path -> offset of its line, and digest of its file
         self._known: dict[str, tuple[int, str | None]] = {}
-        try:
+        with _writing(file):
             mode_of_existing(file)
             self._file = file.open("a+b")
             self._read()
-        except OSError as error:
-            raise OutputError(f"cannot write {file} ({error.strerror or error})", "choose another -o") from error
 
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """Close the file; a row that could not be written is given up."""
+        with suppress(OSError):
+            self._file.close()
 
     def __len__(self) -> int:
         return len(self._known)
@@ -43,10 +43,11 @@ class RowJournal:
 
     def add(self, row: dict[str, Any]) -> None:
         """Append a row and flush it."""
-        self._file.seek(0, 2)
-        self._known[row["path"]] = (self._file.tell(), row.get("digest"))
-        self._file.write(json.dumps({"settings": self._settings, "row": row}).encode() + b"\n")
-        self._file.flush()
+        with _writing(Path(self._file.name)):
+            self._file.seek(0, 2)
+            self._known[row["path"]] = (self._file.tell(), row.get("digest"))
+            self._file.write(json.dumps({"settings": self._settings, "row": row}).encode() + b"\n")
+            self._file.flush()
 
     def rows(self, paths: Sequence[str]) -> Iterator[dict[str, Any]]:
         """Yield the existing rows of paths, in the order of paths."""
@@ -71,3 +72,15 @@ class RowJournal:
         self._file.seek(0, 2)
         if at and not line.endswith(b"\n"):
             self._file.write(b"\n")
+
+
+@contextmanager
+def _writing(file: Path) -> Iterator[None]:
+    """Convert an OSError of the block."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(
+            f"cannot write {file} ({error.strerror or error})",
+            "free space there, or choose another -o; finished rows are kept",
+        ) from error

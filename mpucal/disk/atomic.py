@@ -108,7 +108,7 @@ def atomic_file(path: Path) -> Iterator[IO[bytes]]:
             raise
         raise OutputError(
             f"cannot write {path} ({error.strerror or error})",
-            "choose a folder with permission to write with -o",
+            "choose a folder with space and permission to write with -o",
         ) from error
 
 

@@ -202,7 +202,7 @@ def _runs(path: Path) -> Iterator[Samples]:
 @contextmanager
 def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
     """Open an uncompressed archive with all metadata; see open_writer."""
-    with ExitStack() as stack, atomic_file(path) as file:
+    with atomic_file(path) as file, ExitStack() as stack:
         columns = {field.name: stack.enter_context(TemporaryFile(dir=path.parent)) for field in fields(Samples)}
         count = 0
 

@@ -29,7 +29,7 @@ from mpucal.batch.many import local_client, run_batch
 from mpucal.batch.page import make_page
 from mpucal.batch.row import COLUMNS, Settings, make_row
 from mpucal.batch.table import escape_cell, make_table, write_tables
-from mpucal.errors import SourceError
+from mpucal.errors import OutputError, SourceError
 from mpucal.result.calibration import Calibration
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -124,6 +124,15 @@ def captures(tmp_path):
     (folder / "junk.mcap").write_bytes(b"\x89MCAP0\r\n" + bytes(range(256)))
     (folder / "cut.mcap").write_bytes((FIXTURES / "sessions" / "mpu6050.mcap").read_bytes()[:50_000])
     return [*map(str, sorted(folder.rglob("*.mcap"))), str(folder / "none.mcap")]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_row_for_which_there_is_no_space_ends_in_a_sentence(tmp_path):
+    journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
+    os.dup2(os.open("/dev/full", os.O_WRONLY), journal._file.fileno())
+    with pytest.raises(OutputError, match=r"rows\.jsonl \(No space left on device\): free space there"):
+        journal.add({"path": "a.mcap"})
+    journal.close()
 
 
 def test_a_worker_is_killed_and_then_the_scheduler(started, cluster, captures, tmp_path):

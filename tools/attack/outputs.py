@@ -179,8 +179,9 @@ def _run(words: tuple[str, ...], here: Path, place: Path, longest: int | None = 
 
 def _odd(done: Ended, place: Path) -> str:
     """Return what no command may do, in words."""
-    left = [path.name for path in place.rglob(".*")]
-    return "; ".join([*([] if done.code == 2 else done.wrong(CODES)), *(f"{name} is left" for name in left)])
+    odd = [] if done.code == 2 else done.wrong(CODES)
+    odd += ["the standard output is blamed"] if "the output cannot be written" in done.last else []
+    return "; ".join([*odd, *(f"{path.name} is left" for path in place.rglob(".*"))])
 
 
 def main() -> int:

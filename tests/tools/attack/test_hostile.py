@@ -82,7 +82,7 @@ def test_each_option_that_names_an_output_is_tried():
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs fork and pipes")
 def test_an_output_that_cannot_be_written_is_left_as_it_is(holds):
-    holds("attack", "outputs", "export", "firmware")
+    holds("attack", "outputs", "export", "apply .npz", "firmware")
 
 
 @pytest.mark.slow
