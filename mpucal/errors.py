@@ -126,6 +126,10 @@ class ChipError(SourceError):
     """The chip answers, but not as in its register map."""
 
 
+class BoardMoved(ChipError):  # noqa: N818 - reads as the sentence it is
+    """The board moved while it had to lie still."""
+
+
 class OddOffsets(ChipError):  # noqa: N818 - reads as the sentence it is
     """The accelerometer's offset registers are not at a known place."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
-from ..errors import ChipError, OddOffsets
+from ..errors import BoardMoved, OddOffsets
 from .offsets import PLACES, OffsetRegisters, Place, restoring, shift_words, word_difference
 from .port import Port
 from .quick_measure import TemporaryMeasurement
@@ -62,7 +62,7 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
             continue
         after = measurement.rest()
         if (np.abs(after - before) > MOTION_G).any():
-            raise ChipError(
+            raise BoardMoved(
                 "the board moved while its offset registers were tried", "put it on a firm surface and let go of it"
             )
         shift = during - (before + after) / 2

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..errors import BusError, ChipError, ChipReset
+from ..errors import BoardMoved, BusError, ChipReset
 from ..rests.stillness import is_untouched
 from . import registers as reg
 from .port import Port
@@ -82,7 +82,7 @@ class TemporaryMeasurement:
                 self._sensitivity = self._sensitivity or sensitivity
                 return np.asarray(acc_g.mean(0))
         moves_mg = 1000 * acc_g.std(0).max()
-        raise ChipError(f"the board moves (by {moves_mg:.0f} mg)", "put it on a firm surface and let go of it")
+        raise BoardMoved(f"the board moves (by {moves_mg:.0f} mg)", "put it on a firm surface and let go of it")
 
     def _restore(self) -> None:
         # In reverse order: the chip falls asleep last.

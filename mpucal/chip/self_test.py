@@ -22,6 +22,10 @@ SETTLE_NS = 250_000_000
 PACKED_AFS_SEL, AFS_SEL, FS_SEL = 2, 0, 0
 PACKED_SHARES, ACCEL_SHARES, GYRO_SHARES = (0.86, 1.14), (0.5, 1.5), (0.5, np.inf)
 
+# Number of attempts on a board that moves, and differences between the readings before and after that show it.
+ATTEMPTS = 2
+MOVED_G, MOVED_DPS = 0.02, 2.0
+
 
 @dataclass(frozen=True)
 class SelfTest:
@@ -31,11 +35,13 @@ class SelfTest:
     ----------
     accel_shares, gyro_shares : (3,) response divided by that of the factory's code; NaN without a code.
     passed : True if all are within the limits of the register map; False without codes.
+    moved : the board was moved meanwhile, in each attempt: the shares mean nothing.
     """
 
     accel_shares: Vector
     gyro_shares: Vector
     passed: bool
+    moved: bool
 
     @property
     def has_codes(self) -> bool:
@@ -55,8 +61,15 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
     kept = [(register, port.read(register, 1)) for register in (reg.CONFIG, reg.SMPLRT_DIV, reg.PWR_MGMT_1)]
     afs_sel = PACKED_AFS_SEL if family.packed_self_test else AFS_SEL
     try:
-        off = _mean_counts(port, 0, afs_sel)
-        on = _mean_counts(port, reg.SELF_TEST, afs_sel)
+        for _ in range(ATTEMPTS):
+            off, on, after = (_mean_counts(port, test, afs_sel) for test in (0, reg.SELF_TEST, 0))
+            change = np.abs(after - off)
+            moved = bool(
+                (change[:3] > MOVED_G * reg.ACCEL_LSB_PER_G[afs_sel]).any()
+                or (change[4:] > MOVED_DPS * reg.GYRO_LSB_PER_DPS[FS_SEL]).any()
+            )
+            if not moved:
+                break
     finally:
         port.write_block(reg.GYRO_CONFIG, ranges)
         port.sleep(SETTLE_NS)
@@ -69,7 +82,7 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
         shares = np.where(accel_g == 0, np.nan, accel / accel_g), np.where(gyro_dps == 0, np.nan, gyro / gyro_dps)
     limits = (PACKED_SHARES, PACKED_SHARES) if family.packed_self_test else (ACCEL_SHARES, GYRO_SHARES)
     passed = all(((low < share) & (share < high)).all() for share, (low, high) in zip(shares, limits, strict=True))
-    return SelfTest(*shares, passed=passed)
+    return SelfTest(*shares, passed, moved)
 
 
 def _mean_counts(port: Port, test: int, afs_sel: int) -> Vector:

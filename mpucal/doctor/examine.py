@@ -27,7 +27,7 @@ from ..chip.quick_measure import PATIENCE, TemporaryMeasurement
 from ..chip.self_test import run_self_test
 from ..chip.transfer_stats import REMEDY, TransferStats
 from ..data import Sensor
-from ..errors import ChipError, ChipReset, OddOffsets, SourceError
+from ..errors import BoardMoved, ChipError, ChipReset, OddOffsets, SourceError
 from ..session.ports import polled
 from .bus_speed import examine_speed
 from .dead_axes import DEAD_AXIS, REPLACE, STUCK_BITS
@@ -39,6 +39,7 @@ from .stuck_bits import examine_bits
 MANY, MOST = 0.05, 0.5
 # Share of the factory's response to the self test below which an axis is dead.
 UNMOVED = 0.05
+MOVED = "the board moved"
 # Attempts to measure at rest, after a board that was not put down in the first wait.
 IMPATIENCE = 3
 # Causes of gaps, and their remedies.
@@ -152,6 +153,8 @@ def _self_test(port: Port, part: Part) -> tuple[Finding, list[str]]:
     shares = {"accelerometer": test.accel_shares.tolist(), "gyroscope": test.gyro_shares.tolist()}
     accel, gyro = ([share if np.isfinite(share) else None for share in each] for each in shares.values())
     data = {"accel_shares": accel, "gyro_shares": gyro}
+    if test.moved:
+        return Finding("self test", Mark.UNKNOWN, MOVED, "put it on a firm surface and try again", data), [MOVED]
     if not test.has_codes:
         what = "the chip has no factory codes to compare with"
         return Finding("self test", Mark.NOTE, what, "", data), ["it has no self-test codes"]
@@ -184,7 +187,8 @@ def _offsets_and_bits(port: Port, part: Part, patience: int) -> Iterator[tuple[F
         raise
     except ChipError as error:
         # A board that moved tells nothing about the chip.
-        yield Finding("offset registers", Mark.NOTE, error.what, error.remedy), []
+        moved = [MOVED] if isinstance(error, BoardMoved) else []
+        yield Finding("offset registers", Mark.NOTE, error.what, error.remedy), moved
         return
     if odd is not None and axes in (0, 3):
         doubt = "its offset registers are unlike those of any genuine part"
@@ -207,6 +211,8 @@ def _verdict(sensor: Sensor, doubts: list[str]) -> Finding:
     for defect in (DEAD_AXIS, STUCK_BITS):
         if defect in doubts:
             return Finding("genuine?", Mark.UNKNOWN, f"undecided: {defect}", REPLACE)
+    if MOVED in doubts:
+        return Finding("genuine?", Mark.UNKNOWN, f"undecided: {MOVED}", "put it on a firm surface and try again")
     what = f"probably not genuine: {', '.join(doubts)}" if doubts else f"consistent with a genuine {sensor.chip}"
     remedy = "it can be used with mpucal; other software may misread it"
     return Finding.check("genuine?", not doubts, what, remedy, {"doubts": doubts})

@@ -10,10 +10,11 @@ import numpy as np
 
 from ..chip import registers as reg
 from ..chip.families import Part
-from ..chip.offset_response import OffsetResponse
+from ..chip.offset_response import MOTION_G, OffsetResponse
 from ..chip.offsets import OffsetRegisters, restoring, shift_words
 from ..chip.port import Port
 from ..chip.quick_measure import AFS_SEL, TemporaryMeasurement
+from ..errors import BoardMoved
 from .dead_axes import REPLACE, STUCK_BITS
 from .finding import Finding, Mark
 
@@ -48,6 +49,8 @@ def examine_bits(
             expected = lsb_per_g * response.g_per_lsb * np.subtract(words, old.words)
             miss = np.abs(shown - expected)
             missed.append(np.where(miss > TOLERANCE * np.abs(expected) + NOISE_COUNTS, miss, 0.0))
+    if (np.abs(measurement.rest() - before) > MOTION_G).any():
+        raise BoardMoved("the board moved while its bits were examined", "put it on a firm surface and let go of it")
     worst = np.array(missed).max(0)
     data = {"missed_counts": worst.tolist()}
     by_axis = zip("xyz", worst, strict=True)
