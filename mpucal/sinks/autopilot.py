@@ -19,7 +19,7 @@ from ..mavlink.horizon import Horizon
 from ..mavlink.link import Link, S
 from ..mavlink.parameters.client import ParameterClient
 from ..mavlink.parameters.document import adapt_to_write, select_imu
-from ..mavlink.parameters.level import Level, Leveller, trim_names, trim_of
+from ..mavlink.parameters.level import MOST_DEG, Level, Leveller, trim_names, trim_of
 from ..mavlink.parameters.plan import NOTHING, Change, plan_changes, refused_imus, select_improving, swap_slots
 from ..mavlink.parameters.slots import all_slots
 from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
@@ -334,7 +334,12 @@ def _level_clause(level: Level, words: str) -> str:
         return f"its level was never set ({trim_names(level.firmware)[0]} is 0) and stays that of its autopilot's axes"
     changes = zip(trim_names(level.firmware)[:2], level.held_deg, level.wanted_deg, strict=False)
     listed = " and ".join(f"{name} from {old:.2f} to {new:.2f} deg" for name, old, new in changes)
-    return f"{words} ({listed}, read back)"
+    doubt = ""
+    if np.abs(level.wanted_deg[:2]).max() > MOST_DEG:
+        doubt = (
+            ", more than a board is mounted askew: check what it calls level, and calibrate its level before it flies"
+        )
+    return f"{words} ({listed}, read back){doubt}"
 
 
 def _horizon_clause(error_deg: Vector | None) -> str:
