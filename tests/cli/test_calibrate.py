@@ -50,7 +50,7 @@ UNREADABLE = {
     "time runs back": (with_(t=backwards), "time does not increase at sample 100"),
     "one row too few": (with_(gyr=lambda gyr: gyr[1:]), "gyr has shape (3999, 3), not (4000, 3)"),
     "two columns": (with_(acc=lambda acc: acc[:, :2]), "acc has shape (4000, 2)"),
-    "no gyr": (lambda arrays: {key: arrays[key] for key in ("t", "acc")}, "gyr"),
+    "no acc": (lambda arrays: {key: arrays[key] for key in ("t", "gyr")}, "acc"),
 }
 
 

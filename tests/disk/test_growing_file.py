@@ -2,6 +2,7 @@
 
 import os
 import sys
+from functools import partial
 
 import pytest
 
@@ -15,9 +16,15 @@ from mpucal.mavlink.tlog import TlogWriter
 
 @pytest.mark.parametrize("kind", ["mcap", "tlog"])
 def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch, kind):
-    synced = []
-    sync = os.fdatasync
-    monkeypatch.setattr(os, "fdatasync", lambda handle: synced.append(os.fstat(handle).st_size) or sync(handle))
+    synced = {}
+
+    def watched(sync, handle):
+        status = os.fstat(handle)
+        synced[status.st_ino] = status.st_size
+        sync(handle)
+
+    for name in ("fdatasync", "fsync"):  # the second for a capture that is rewritten with its index
+        monkeypatch.setattr(os, name, partial(watched, getattr(os, name)))
     path = tmp_path / f"capture.{kind}"
     if kind == "mcap":
         with CaptureWriter(path) as writer:
@@ -26,7 +33,8 @@ def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch, kind)
     else:
         with TlogWriter(path) as writer:
             writer.packet(1_000_000, b"packet")
-    assert synced[-1] == path.stat().st_size > 0
+    status = path.stat()
+    assert synced[status.st_ino] == status.st_size > 0
 
 
 @pytest.mark.parametrize("make", [lambda path: path.write_bytes(b"other"), lambda path: path.symlink_to("nothing")])
