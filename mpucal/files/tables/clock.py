@@ -30,20 +30,16 @@ LAG, STRETCHES = 250, 4
 FOLLOWS_A_LINE = 0.2
 # shares of steps that are left out as pauses and delays, over LAG samples and over one
 OUTLIERS, SELDOM = 0.1, 0.02
-# s and least number of samples of a stretch: each holds a stamp that was hardly late
-STRETCH_S, STRETCH = 0.25, 16
+# s, and the least number of samples, of a stretch, which holds a stamp that was hardly late
+STRETCH_S, STRETCH = 0.25, 48
+# stretches within which delayed samples have arrived
+CATCHES_UP = 8
 # rounds after which the envelope's slope has settled
 ROUNDS = 4
 # the share of stamps, the earliest ones, to which the clock is fitted
 IN_TIME = 0.75
-# stretches within which delayed samples have arrived
-CATCHES_UP = 8
-# periods, and multiples of the envelope's usual move: a jump by more is a gap
-LOST, BY_CHANCE = 0.6, 6.0
-# multiples of the stamps' resolution: a jump by more may be a gap
-ROUNDED = 1.5
-# periods: the least step between two times, where a run seems to begin before the last one ends
-LEAST_STEP = 0.2
+# periods, and multiples of the envelope's usual move or of the stamps' resolution: a jump by more than all is a gap
+LOST, BY_CHANCE, ROUNDED = 0.6, 6.0, 1.5
 
 
 @dataclass(frozen=True)
@@ -94,7 +90,7 @@ def fit_even_clock(stamps: Vector) -> EvenClock | None:
     late = stamps - t
     rate_hz = clock.rate_hz
     return EvenClock(
-        make_increasing(t, LEAST_STEP / rate_hz), gap, rate_hz, float(np.sqrt(np.mean((late - late.mean()) ** 2)))
+        make_increasing(t, EVEN / rate_hz), gap, rate_hz, float(np.sqrt(np.mean((late - late.mean()) ** 2)))
     )
 
 
