@@ -108,10 +108,11 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
         return None
     T = recording.temperature_c
     known = bool(np.isfinite(T).any())
-    mended = remove_drift(recording, flat, found.bias_runs(runs))
+    has_rates = bool(np.isfinite(recording.gyr).all())
+    mended = remove_drift(recording, flat, found.bias_runs(runs)) if has_rates else recording
     rests = _Rests(mended, runs, calibration, float(np.nanmean(T)) if known else None)
     parts = [_Residuals.magnitude(rests, k, gravity) for k in range(len(runs))]
-    turns = (_Residuals.direction(rests, k, flat, calibration) for k in range(1, len(runs)))
+    turns = (_Residuals.direction(rests, k, flat, calibration) for k in range(1, len(runs) if has_rates else 1))
     parts += [turn for turn in turns if turn is not None]
     parts.append(_Residuals.rate(recording, runs[0].tolist(), flat, calibration, len(runs)))
     parts.append(_Residuals.noise(recording, flat, calibration, len(runs)))

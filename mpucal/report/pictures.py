@@ -109,7 +109,9 @@ def innovations(track: Track) -> str:
 
 
 def rates(track: Track) -> str:
-    """Draw the rates of turn and the gyroscope's range."""
+    """Draw the rates of turn and the gyroscope's range; empty without a gyroscope."""
+    if not np.isfinite(track.recording.gyr).all():
+        return ""
     gyr, limit = np.degrees(track.recording.gyr), track.calibration.sensor.gyro_range_dps
     most = 1.1 * max(float(np.abs(gyr).max()), limit or 0.0) + 1e-6
     axes = _over_time(track, (-most, most), "rate [deg/s]")

@@ -13,6 +13,7 @@ from scipy.io import savemat
 import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError
+from mpucal.report import render
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 HZ = 100.0
@@ -271,6 +272,19 @@ def test_files_of_a_folder_are_one_recording(even_walk, tmp_path):
     np.testing.assert_allclose(si(read), si(even_walk), atol=1e-9)
     assert np.flatnonzero(read.gap).tolist() == [700]
     assert "how the board turned between them is unknown: a.txt, b.txt." in read.taken
+
+
+def test_what_was_read_without_rates_is_used_for_what_needs_none(tmp_path):
+    whole = mpucal.load(FIXTURE, span=":40")
+    (tmp_path / "walk.csv").write_text("ax,ay,az,gx,gy,gz\n" + text(counts(whole), ","))
+    read = mpucal.load(tmp_path / "walk.csv")
+    assert np.isnan(read.gyr).all()
+    found = mpucal.calibrate(read)
+    assert (found.verdict, found.fit["model"]) == ("usable", "static")
+    assert 'id="accelerometer"' in render(found, read)
+    assert mpucal.check(mpucal.calibrate(whole), read).verdict == "still good"
+    with pytest.raises(RecordingError, match=r"was read without rates: .*--rate HZ"):
+        mpucal.noise(tmp_path / "walk.csv")
 
 
 def test_a_temperature_is_kept_everywhere(walk, tmp_path):
