@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..kernel import _kernel
-from ..rests.flat import Flat, flat_statistics, rounding_variance
+from ..rests.flat import UNAVERAGED, Flat, flat_statistics, rounding_variance
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.tremor import fit_lambda, level_rests, tremor_variance
@@ -113,7 +113,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     for (a, b), variance in zip(after.tolist(), statistics(acc[flat.last :], after)[1], strict=True):
         tremor = math.sqrt(tremor_variance(variance, float(loud[a:b].mean()) * flat.Sigma_a))
         reset[a], jerk[a:b] = tremor, jerk_density(tremor, lam)
-        pose[a:b] = (POSE_MPS2**2 + rounding_variance(recording.sensor, variance)) * (b - a)
+        pose[a:b] = (POSE_MPS2**2 + rounding_variance(recording.sensor, variance, UNAVERAGED)) * (b - a)
         if b < len(series):
             reset[b] = 0.0
     series = replace(series, rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)
