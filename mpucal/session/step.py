@@ -15,7 +15,7 @@ SAY_AGAIN_S = 5.0
 
 
 class Step:
-    """One step of a session.
+    """Step of a session.
 
     Attributes
     ----------
