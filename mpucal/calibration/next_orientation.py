@@ -41,6 +41,8 @@ def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector)
     s = trace(known.problem, known.theta).s[-1]
     angle = np.arccos(np.clip(directions @ (-s / np.linalg.norm(s)), -1.0, 1.0))
     there = np.flatnonzero(angle >= NEAR_RAD)
+    if not len(there):  # an estimate that diverged knows no directions
+        return 0
     seconds = np.maximum(MOVE_S, angle[there] / FAST_RAD_S)
     moves = _moves(known, s, directions[there], seconds.tolist())
     begin = replace(known.theta, u=s / np.linalg.norm(s))
