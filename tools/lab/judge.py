@@ -15,6 +15,7 @@ from mpucal.mavlink.parameters.compose import Correction
 from mpucal.mavlink.parameters.slots import Slot
 from mpucal.rests.flat import Flat
 from mpucal.result.calibration import GOOD, USABLE, Calibration
+from mpucal.result.error_model import sensor_axes
 from mpucal.simulated.sensor import SensorTruth
 
 # a verdict is false where the error is more than so many times what is claimed, or that of an element more than so many
@@ -67,9 +68,13 @@ class Judgement:
 def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: float | None = None) -> Judgement:
     """Compare a calibration with the truths (D, b_a) of its sensor, several where it changed.
 
+    One of the rests alone is in the sensor's own axes, and so are the truths then.
+
     gravity : that D is in units of [m/s^2]; None: what the calibration was told.
     """
     gravity = gravity or float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+    if calibration.fit.get("model") == "static":
+        truths = tuple((sensor_axes(D), b_a) for D, b_a in truths)
     true = np.array([np.append(D, b_a) for D, b_a in truths])
     found = np.append(calibration.D, calibration.b_a)
     std = np.append(calibration.D_std, calibration.b_a_std)
