@@ -177,14 +177,14 @@ def _unpacked(packages: list[Path], folder: Path) -> dict[str, Path]:
 def near():
     """near(guest) asserts that D and b_a of its session are the truth's within four standard deviations.
 
-    It returns the calibration. scale : of the source's samples, relative to the chip's nominal scale.
+    It returns the calibration.
     """
 
-    def judge(guest, scale=1.0):
+    def judge(guest):
         assert guest.said["session"]["code"] == 0, guest.said["session"]
         found = Calibration.load(guest.out / "session/calibration.json")
         for name in ("D", "b_a"):
-            truth = scale * np.array(guest.said["truth"][name])
+            truth = np.array(guest.said["truth"][name])
             assert (np.abs(getattr(found, name) - truth) < 4 * getattr(found, f"{name}_std")).all()
         return found
 
