@@ -29,12 +29,11 @@ class _Kind:
 
     Attributes
     ----------
-    noun : the thing itself. lay : the request to lay it flat. parts : its parts, by the axis that points there.
+    lay : the request to lay it flat. parts : its parts, by the axis that points there.
     flat : questions to confirm while it lies with -z and with +z down. picture : caption of the picture of how it
         should lie.
     """
 
-    noun: str
     lay: str
     parts: Mapping[str, str]
     flat: tuple[str, str]
@@ -44,21 +43,18 @@ class _Kind:
 _EDGES = {"+X": "right edge", "−X": "left edge", "+Y": "far edge", "+Z": "chip face", "−Z": "back"}
 _KINDS = {
     BOARD: _Kind(
-        "board",
         "Lay the board flat",
         {**_EDGES, "−Y": "pin edge"},
         ("Chip up, pins toward you", "Chip down, pins away from you"),
         "flat: the chip up, the pins toward you",
     ),
     PLAIN: _Kind(
-        "board",
         "Lay the board flat",
         {**_EDGES, "−Y": "near edge"},
         ("Chip up, +Y away from you", "Chip down, +Y toward you"),
         "flat: the chip up",
     ),
     VEHICLE: _Kind(
-        "vehicle",
         "Put the vehicle on its feet",
         {"+X": "nose", "−X": "tail", "+Y": "right side", "−Y": "left side", "+Z": "underside", "−Z": "top"},
         ("Upside down, nose to the right", "On its feet, nose to the right"),
@@ -76,7 +72,7 @@ def usual_board(origin: Origin) -> str:
 def flat_description(down: Direction, board: str) -> str:
     """Return the question to confirm for a `board` whose unit vector `down` points down."""
     if abs(down[2]) < LIES:
-        return f"The {_KINDS[board].noun} is tilted now."
+        return "It is tilted now."
     return f"{_KINDS[board].flat[down[2] > 0.0]}? Then leave it. If not, turn it."
 
 
@@ -88,11 +84,6 @@ def flat_caption(board: str) -> str:
 def lay_flat(board: str) -> str:
     """Return the request to lay a `board` flat, without the place."""
     return _KINDS[board].lay
-
-
-def name_board(board: str) -> str:
-    """Return the noun for a `board`."""
-    return _KINDS[board].noun
 
 
 def speak_of(output: T, board: str) -> T:

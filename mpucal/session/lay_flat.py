@@ -8,7 +8,7 @@ from ..data import Samples
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import Windows
-from .boards import BOARD, lay_flat, name_board
+from .boards import BOARD, lay_flat
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
 from .step import SAY_AGAIN_S, Step
 
@@ -50,7 +50,7 @@ class LayFlat(Step):
     """
 
     def __init__(self, patient: bool = False, board: str = BOARD) -> None:
-        self._patient, self._noun = patient, name_board(board)
+        self._patient = patient
         lay = lay_flat(board)
         text = f"{lay} on a firm surface, let go of it, and leave it still for {FLAT_S:.0f} s."
         self.prompt = Prompt(PromptKind.LAY_FLAT, text)
@@ -100,13 +100,13 @@ class LayFlat(Step):
         before, self._still = self._still, still
         if before is not None and still.run != before.run and before.seconds >= WORTH_SAYING_S:
             self._cautioned_s = t_s
-            what, remedy = f"the {self._noun} was moved: {self._motion}", "let go of it; the countdown starts again"
+            what, remedy = f"the board was moved: {self._motion}", "let go of it; the countdown starts again"
             outputs.append(Caution(t_s, "moved", what, remedy))
         return outputs + self._countdown(t_s, f"still for {still.seconds:.0f} of {FLAT_S:.0f} s", paused=False)
 
     def _moved(self, moved: Moved, t_s: float) -> list[Output]:
         self._motion = moved.what
-        outputs = self._countdown(t_s, f"waiting for the {self._noun} to be still", paused=True)
+        outputs = self._countdown(t_s, "waiting for the board to be still", paused=True)
         if moved.after_s >= WORTH_SAYING_S or t_s - self._cautioned_s >= SAY_AGAIN_S:
             self._cautioned_s = t_s
             remedy = LOST if moved.lost else "put it on a firm surface and let go of it"
@@ -119,7 +119,7 @@ class LayFlat(Step):
 
     def _never_still(self, moved: Moved) -> Stopped:
         return Stopped(
-            f"the {self._noun} was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
+            f"the board was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
             f"{LOST}, and start again"
             if moved.lost
             else "put it on a firm surface, away from vibration, and start again",

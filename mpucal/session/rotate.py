@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Samples, Vector
 from ..rests.windows import Windows
 from .aims import Aim, directions
-from .boards import describe, describe_tilt, name_board
+from .boards import describe, describe_tilt
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Checked,
@@ -233,5 +233,5 @@ class Rotate(PoseStep):
             text = "Turn the board through many different orientations, tilted ones too, and hold each for 2 s."
             return Prompt(PromptKind.ROTATE, text)
         words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
-        text = f"Turn the {name_board(self._plan.board)}: {words}, then hold it still."
+        text = f"Turn the board: {words}, then hold it still."
         return Prompt(PromptKind.ROTATE, text, triple(down))

@@ -55,4 +55,4 @@ def test_a_tilt_is_described_by_what_is_lower():
 
 
 def test_a_tilted_vehicle_is_no_board():
-    assert flat_description((0.7, 0.0, 0.7), VEHICLE) == "The vehicle is tilted now."
+    assert flat_description((0.7, 0.0, 0.7), VEHICLE) == "It is tilted now."

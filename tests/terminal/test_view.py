@@ -77,7 +77,7 @@ def test_the_way_is_short_in_large_letters(views, words, headline):
         ("gy-521", (0.0, 0.0, 1.0), "Chip down, pins away from you?"),
         ("plain", (0.0, 0.0, -1.0), "+Y away from you?"),
         ("vehicle", (0.0, 0.0, 1.0), "On its feet"),
-        ("gy-521", (0.0, 0.7, -0.7), "The board is tilted"),
+        ("gy-521", (0.0, 0.7, -0.7), "It is tilted"),
     ],
 )
 def test_the_flat_orientation_is_described(views, board, down, words):
