@@ -44,16 +44,15 @@ def test_every_sentence_is_used_and_every_use_fills_its_places():
             assert (row.refuse is None) == (arguments == 2 or "refuse" in given), key
 
 
-@pytest.mark.parametrize("code", KINDS)
-def test_a_row_is_whole(code):
-    kind = KINDS[code]
-    assert kind.meaning.endswith(".")
-    assert (kind.refuses == "depends") == bool(kind.refused_when)
-    for row in kind.sentences.values():
-        assert row.what
-        assert row.remedy
-        assert not row.what.endswith((".", ";"))
-        assert not row.remedy.endswith(".")
+def test_a_row_is_whole():
+    for code, kind in KINDS.items():
+        assert kind.meaning.endswith("."), code
+        assert (kind.refuses == "depends") == bool(kind.refused_when), code
+        for row in kind.sentences.values():
+            assert row.what, code
+            assert row.remedy, code
+            assert not row.what.endswith((".", ";"))
+            assert not row.remedy.endswith(".")
 
 
 def test_a_code_that_is_not_in_the_table_cannot_be_made():

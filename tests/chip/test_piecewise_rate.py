@@ -24,9 +24,9 @@ def clock_of(t_s, y):
     return clock, index, np.zeros_like(index)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_a_steady_clock_has_no_break(seed):
-    assert find_breaks(*counted([198.6], each_s=120.0, seed=seed, late_s=0.02)) == []
+def test_a_steady_clock_has_no_break():
+    for seed in range(20):
+        assert find_breaks(*counted([198.6], each_s=120.0, seed=seed, late_s=0.02)) == [], seed
 
 
 @pytest.mark.parametrize("step", [0.999, 1.002, 1.01, 0.97])

@@ -52,12 +52,12 @@ def closed(core):
 frames = st.builds(Frame, st.integers(0, 255), st.integers(0, 255), st.binary(max_size=MAX_PAYLOAD))
 
 
-@pytest.mark.parametrize("path", VECTORS, ids=lambda path: path.stem)
-def test_finds_the_frames_of_every_golden_vector(path, found):
-    wanted = json.loads(path.with_suffix(".json").read_text())["frames"]
-    assert found(path.read_bytes()) == [
-        Frame(frame["type"], frame["seq"], bytes.fromhex(frame["payload"])) for frame in wanted
-    ]
+def test_finds_the_frames_of_every_golden_vector(found):
+    for path in VECTORS:
+        wanted = json.loads(path.with_suffix(".json").read_text())["frames"]
+        assert found(path.read_bytes()) == [
+            Frame(frame["type"], frame["seq"], bytes.fromhex(frame["payload"])) for frame in wanted
+        ], path
 
 
 @given(frame=frames)
@@ -83,10 +83,10 @@ def test_finds_the_same_frames_as_python_in_whatever_comes(data, found):
     assert found(data) == list(Deframer().feed(data))
 
 
-@pytest.mark.parametrize("size", range(MAX_ENCODED - 1, 4 * MAX_ENCODED))
-def test_a_piece_of_any_length_leaves_it_ready_for_the_next_frame(size, found):
+def test_a_piece_of_any_length_leaves_it_ready_for_the_next_frame(found):
     frame = Frame(2, 7, b"\x75\x01")
-    assert found(b"\x01" * size + b"\0" + frame.encode())[-1:] == [frame]
+    for size in range(MAX_ENCODED - 1, 4 * MAX_ENCODED):
+        assert found(b"\x01" * size + b"\0" + frame.encode())[-1:] == [frame], size
 
 
 def test_accepts_no_more_random_frames_than_16_bits_let_through(core):

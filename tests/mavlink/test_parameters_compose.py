@@ -93,15 +93,15 @@ def test_the_stream_after_a_change_is_predicted():
     np.testing.assert_allclose(predicted, stream(C, bias, new, R, f), atol=1e-12)
 
 
-@pytest.mark.parametrize("number", ORIENTATIONS)
-def test_orientations_are_pymavlinks_euler_angles(number):
+def test_orientations_are_pymavlinks_euler_angles():
     rotmat = pytest.importorskip("pymavlink.rotmat")
-    words = dialect().enums["MAV_SENSOR_ORIENTATION"][number].name.removeprefix("MAV_SENSOR_ROTATION_").split("_")
-    angles = dict(zip(words[::2], map(float, words[1::2]), strict=False)) if len(words) > 1 else {}
-    expected = rotmat.Matrix3()
-    expected.from_euler(*(np.radians(angles.get(axis, 0.0)) for axis in ("ROLL", "PITCH", "YAW")))
-    rows = [[v.x, v.y, v.z] for v in (expected.a, expected.b, expected.c)]
-    np.testing.assert_allclose(orientation_matrix(number), rows, atol=1e-12)
+    for number in ORIENTATIONS:
+        words = dialect().enums["MAV_SENSOR_ORIENTATION"][number].name.removeprefix("MAV_SENSOR_ROTATION_").split("_")
+        angles = dict(zip(words[::2], map(float, words[1::2]), strict=False)) if len(words) > 1 else {}
+        expected = rotmat.Matrix3()
+        expected.from_euler(*(np.radians(angles.get(axis, 0.0)) for axis in ("ROLL", "PITCH", "YAW")))
+        rows = [[v.x, v.y, v.z] for v in (expected.a, expected.b, expected.c)]
+        np.testing.assert_allclose(orientation_matrix(number), rows, atol=1e-12, err_msg=words)
 
 
 def test_an_orientation_without_angles_is_unknown():
