@@ -52,8 +52,7 @@ def call(*words):
 
 def outcome(folder, *words):
     printed = io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed), redirect_stderr(io.StringIO()):
-        patch.setitem(sys.modules, "matplotlib", None)  # the pictures have tests of their own
+    with redirect_stdout(printed), redirect_stderr(io.StringIO()):
         code = run([*map(str, words), "-o", str(folder), "--json"])
     return Outcome(code, json.loads(printed.getvalue()), folder / "calibration.json")
 
@@ -67,7 +66,7 @@ def counts_of(archive, name, scales):
 
 
 def make_capture(file, capture, gravity, poll_s):
-    """Serve the recording's counts by a simulated chip, and keep what crosses its bus in a session as a capture."""
+    """Serve the recording's counts by a simulated chip, and record what crosses its bus."""
     with np.load(file) as archive:
         t = archive["t"]
         acc, accel = counts_of(archive, "acc", [reg.mps2_per_lsb(code) for code in range(4)])
@@ -78,7 +77,7 @@ def make_capture(file, capture, gravity, poll_s):
     error_ppm = 1e6 * (recorded_hz / rate_hz - 1)
     bus = open_recorded(acc, gyr, rate_hz, config.accel_range_g, config.gyro_range_dps, rate_error_ppm=error_ppm)
     with open_runner(OpenedChip(bus, Plan(config, gravity, until_end=True)), capture, console(quiet=True)) as runner:
-        runner.measure()
+        runner.record(None)
     return config
 
 
