@@ -35,11 +35,6 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
     STATE = tempfile.TemporaryDirectory(prefix="mpucal-state-")
     os.environ["XDG_STATE_HOME"] = STATE.name
 
-from mpucal.__main__ import run
-from mpucal.files import open_writer
-from mpucal.files.rows import Rows
-from tools.lab.scenarios.recordings import hand_scenario
-
 PROJECT = str(Path(__file__).parents[1])
 UNTRACKED = pytest.StashKey[set[str]]()
 LEFT = pytest.StashKey[list[str]]()
@@ -170,6 +165,8 @@ def chromium():
 @pytest.fixture(scope="session")
 def save():
     """Write a recording into a file, in the format of its suffix."""
+    from mpucal.files import open_writer
+    from mpucal.files.rows import Rows
 
     def call(recording, path):
         rows = Rows.of(recording)
@@ -204,6 +201,7 @@ def once(tmp_path_factory):
 @pytest.fixture
 def walk(once):
     """A capture of twenty seconds, which a session goes through to its end."""
+    from mpucal.__main__ import run
 
     def make(folder):
         words = ["record", "--bus", "sim", "--rate", "25", "--seconds", "20", "-o", str(folder / "walk.mcap")]
@@ -226,6 +224,8 @@ def program():
 @cache
 def by_hand(seed, motion, rate_hz=100, **how):
     """An MPU-6050 in a hand, simulated once, as finely as a hand's jerks of 60 ms and tremor of 10 Hz need it."""
+    from tools.lab.scenarios.recordings import hand_scenario
+
     return hand_scenario(seed, motion, rate_hz=rate_hz, truth_hz=400, **how)
 
 

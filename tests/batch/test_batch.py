@@ -14,11 +14,7 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import cloudpickle
-import dask
-import distributed
-import fsspec
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 import mpucal.batch
@@ -68,6 +64,14 @@ class Cluster:
 
     address: str
     workers: list[int]
+
+
+@pytest.fixture(scope="module")
+def distributed():
+    """Return dask's package, whose import takes longer than most tests."""
+    import distributed
+
+    return distributed
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +139,7 @@ def test_a_row_for_which_there_is_no_space_ends_in_a_sentence(tmp_path):
     journal.close()
 
 
-def test_a_worker_is_killed_and_then_the_scheduler(started, cluster, captures, tmp_path):
+def test_a_worker_is_killed_and_then_the_scheduler(distributed, started, cluster, captures, tmp_path):
     expected = make_table(make_row(path, SETTINGS) for path in captures)
     errors = [error for error in expected["error"].to_pylist() if error]
     assert len(errors) >= 2
@@ -166,7 +170,7 @@ def test_a_worker_is_killed_and_then_the_scheduler(started, cluster, captures, t
 
 # one run in eight of all tests lost the connection to the scheduler here, where the worker died amid an answer
 @pytest.mark.slow
-def test_the_one_that_workers_die_of_is_told_of_those_beside_it(started, tmp_path):
+def test_the_one_that_workers_die_of_is_told_of_those_beside_it(distributed, started, tmp_path):
     """Several recordings make a task; each is tried alone after that."""
     paths = [f"/none/{i}.mcap" for i in range(100)]
     paths[40] = "/none/deadly.mcap"
@@ -185,6 +189,8 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(started, tmp_pat
 
 def test_a_worker_that_comes_back_late_is_waited_for():
     """Wait longer than dask does by default, which is 0 s here."""
+    import dask
+
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
         (first,) = client.run(os.getpid).values()
         os.kill(first, signal.SIGKILL)
@@ -206,6 +212,8 @@ cloudpickle.register_pickle_by_value(sys.modules[__name__])
 
 
 def test_the_command_writes_a_table_and_a_page(cluster, captures, tmp_path, capsys, monkeypatch):
+    import pyarrow.parquet as pq
+
     monkeypatch.chdir(tmp_path)
     words = ["batch", str(tmp_path / "line-3" / "*.mcap"), "-o", "fleet", "--model", "accel", "--reports"]
     assert call([*words, "--scheduler", cluster.address]) == 0
@@ -228,6 +236,8 @@ def test_the_command_writes_a_table_and_a_page(cluster, captures, tmp_path, caps
 
 
 def test_urls_are_read_where_the_worker_is(captures):
+    import fsspec
+
     there = fsspec.filesystem("memory")
     path = next(path for path in captures if "mpu6050" in path)
     there.pipe("/line/mpu6050.mcap", Path(path).read_bytes())
@@ -283,7 +293,7 @@ def test_the_page_names_what_is_odd(tmp_path):
     assert 0.9 < float(rms) < 1.1
 
 
-def test_workers_that_are_ended_while_they_start_are_told(monkeypatch):
+def test_workers_that_are_ended_while_they_start_are_told(distributed, monkeypatch):
     def cluster(**_):
         raise RuntimeError("Nanny failed to start.")
 
@@ -300,7 +310,7 @@ def test_a_spreadsheet_only_shows_a_cell(value, shown):
     assert escape_cell(value) == shown
 
 
-def test_in_python(cluster, captures):
+def test_in_python(distributed, cluster, captures):
     with distributed.Client(cluster.address, set_as_default=False) as client:
         table = mpucal.batch.calibrate_many(captures[-3:], client, model="accel")
     assert table["path"].to_pylist() == captures[-3:]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import signal
+import scipy
 
 from mpucal.doctor.noise import is_trembling, noise_density, periodogram
 
@@ -18,7 +18,7 @@ def white(seed, unit_rthz=0.004, seconds=20):
 @pytest.mark.parametrize("n", [400, 401])
 def test_the_spectrum_is_that_of_scipy(n):
     values = white(0)[:n] + 9.81
-    hz, power = signal.periodogram(values, RATE_HZ, window="hann", axis=0)
+    hz, power = scipy.signal.periodogram(values, RATE_HZ, window="hann", axis=0)
     found_hz, found = periodogram(values, RATE_HZ)
     np.testing.assert_allclose(found_hz, hz)
     np.testing.assert_allclose(found[1:], power[1:], rtol=1e-9)

@@ -1,13 +1,10 @@
 """A session's samples, and writers of tables and bags, by which tests write them as other programs do."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
 
 import mpucal
 from mpucal.files import load
@@ -15,7 +12,6 @@ from mpucal.files.hints import NO_HINTS
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 EPOCH_NS = 1_403_636_579_758_555_392
-ROS2, ROS1 = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
 IMU = "sensor_msgs/msg/Imu"
 S = 1_000_000_000
 BOTH = (("/imu/data_raw", True, True),)
@@ -59,12 +55,21 @@ def load_table(tmp_path):
     return load_table
 
 
+@cache
+def typestores():
+    """Return the types of ROS 1 and of ROS 2, which take long to load."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+
+
 def encode_imu_message(store, t_ns, acc, gyr):
     """Serialise a sensor_msgs/Imu message of ROS 1 or 2."""
     kinds, zeros = store.types, np.zeros(9)
     vector = kinds["geometry_msgs/msg/Vector3"]
     stamp = kinds["builtin_interfaces/msg/Time"](sec=int(t_ns // S), nanosec=int(t_ns % S))
-    more = {"seq": 0} if store is ROS1 else {}
+    of_ros1 = store is typestores()[0]
+    more = {"seq": 0} if of_ros1 else {}
     message = kinds[IMU](
         header=kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="imu", **more),
         orientation=kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
@@ -74,12 +79,16 @@ def encode_imu_message(store, t_ns, acc, gyr):
         linear_acceleration=vector(*(float(v) for v in acc)),
         linear_acceleration_covariance=zeros,
     )
-    return bytes((store.serialize_ros1 if store is ROS1 else store.serialize_cdr)(message, IMU))
+    return bytes((store.serialize_ros1 if of_ros1 else store.serialize_cdr)(message, IMU))
 
 
 def write_bag_file(path, walk, t_ns, kind, topics=BOTH, stamped=True, gyro_late_ns=0):
     """Write a bag; each topic says whether it holds accelerations and rates."""
-    store = ROS1 if kind == "bag" else ROS2
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+
+    store = typestores()[kind != "bag"]
     plugin = StoragePlugin.SQLITE3 if kind == "db3" else StoragePlugin.MCAP
     with Writer1(path) if kind == "bag" else Writer2(path, version=9, storage_plugin=plugin) as writer:
         for topic, has_acc, has_gyr in topics:
@@ -107,4 +116,4 @@ def write_bag():
 @pytest.fixture(scope="session")
 def ros1():
     """Return the types of ROS 1."""
-    return ROS1
+    return typestores()[0]

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
 
 from mpucal.data import Recording
 from mpucal.files import open_writer
@@ -17,6 +16,8 @@ from mpucal.files.rows import Rows
     ],
 )
 def test_covariances_are_those_of_the_noise(tmp_path, noise):
+    from rosbags.highlevel import AnyReader
+
     noise = np.array(noise)
     rows = Rows.of(Recording.from_arrays([0.0, 0.5], np.ones((2, 3)), np.ones((2, 3))))
     with open_writer(tmp_path / "out.mcap", Rows(iter(()), noise=noise), "done") as write:

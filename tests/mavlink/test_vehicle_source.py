@@ -4,7 +4,7 @@ from itertools import chain
 
 import numpy as np
 import pytest
-from scipy.signal import butter, group_delay
+import scipy
 
 from mpucal.errors import EndOfCapture, LinkError, UsageError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
@@ -105,7 +105,10 @@ def test_the_filters_tell_by_how_much_both_sensors_are_apart(opened, words, cuto
     sensor = source.start()
     polled(source, 0.5)
     # of the filters as they are computed, at 400 Hz, for what is slow
-    delays = [group_delay(butter(2, f, fs=400.0), [0.1], fs=400.0)[1][0] / 400.0 if f else 0.0 for f in cutoffs_hz]
+    delays = [
+        scipy.signal.group_delay(scipy.signal.butter(2, f, fs=400.0), [0.1], fs=400.0)[1][0] / 400.0 if f else 0.0
+        for f in cutoffs_hz
+    ]
     for lag_s in (sensor.accel_lag_s, source.recording().sensor.accel_lag_s):
         assert lag_s == pytest.approx(delays[0] - delays[1], abs=2e-4)
 

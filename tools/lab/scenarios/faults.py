@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
 from mpucal.simulated.sensor import SensorTruth
@@ -112,7 +112,7 @@ def cross_clipped(readings: Readings, rng: Rng, mps2: float = 1.0) -> Readings:
     beyond = (np.abs(readings.acc) > readings.ranges[0]).any(axis=1).astype(float)
     step_s = float(np.median(np.diff(readings.t)))
     keep = np.exp(-step_s / 0.02)
-    lasting = np.minimum(lfilter([1.0], [1.0, -keep], beyond), 1.0)
+    lasting = np.minimum(scipy.signal.lfilter([1.0], [1.0, -keep], beyond), 1.0)
     return replace(readings, acc=readings.acc + mps2 * lasting[:, None] * rng.choice([-1.0, 1.0], 3))
 
 
@@ -121,7 +121,7 @@ def hobby(readings: Readings, rng: Rng, smooth: float = 1.0, dead_dps: float = 0
     below dead_dps, about the mean of the flat segment, for none.
     """
     acc, flat = readings.acc, readings.t < 0.3 * FLAT_S
-    acc = acc[:1] + lfilter([smooth], [1.0, smooth - 1.0], acc - acc[:1], axis=0)
+    acc = acc[:1] + scipy.signal.lfilter([smooth], [1.0, smooth - 1.0], acc - acc[:1], axis=0)
     zero = readings.gyr[flat].mean(axis=0)
     rates = readings.gyr - zero
     return replace(readings, acc=acc, gyr=zero + rates * (np.abs(rates) >= np.radians(dead_dps)))

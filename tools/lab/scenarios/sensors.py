@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from mpucal.chip.families import MPU6050
 from mpucal.data import STANDARD_GRAVITY_MPS2, Mask, Vector
@@ -169,13 +169,15 @@ class Sampling:
             mean = np.tile(np.eye(3) / self.per_sample, (self.per_sample, 1))
             return np.asarray(y.reshape(n, -1) @ mean + noise)
         noisy = y + rng.standard_normal(y.shape) * (density * np.sqrt(0.5 / self.step_s))
-        sos = butter(2, self.lowpass_hz, fs=1.0 / self.step_s, output="sos")
-        settled = sosfilt_zi(sos)[:, :, None] * y[0]
-        return np.asarray(sosfilt(sos, noisy, axis=0, zi=settled)[0][self.per_sample - 1 :: self.per_sample])
+        sos = scipy.signal.butter(2, self.lowpass_hz, fs=1.0 / self.step_s, output="sos")
+        settled = scipy.signal.sosfilt_zi(sos)[:, :, None] * y[0]
+        filtered = scipy.signal.sosfilt(sos, noisy, axis=0, zi=settled)[0]
+        return np.asarray(filtered[self.per_sample - 1 :: self.per_sample])
 
     def _mounted(self, y: Vector) -> Vector:
         """Filter by w^2 / (s^2 + w s / Q + w^2), by the bilinear transform."""
         k = 1.0 / np.tan(np.pi * self.mount_hz * self.step_s)
         a = np.array([k * k + k / self.mount_q + 1.0, 2.0 - 2.0 * k * k, k * k - k / self.mount_q + 1.0])
         sos = np.concatenate(([1.0, 2.0, 1.0], a))[None] / a[0]
-        return np.asarray(sosfilt(sos, y, axis=0, zi=sosfilt_zi(sos)[:, :, None] * y[0])[0])
+        settled = scipy.signal.sosfilt_zi(sos)[:, :, None] * y[0]
+        return np.asarray(scipy.signal.sosfilt(sos, y, axis=0, zi=settled)[0])
