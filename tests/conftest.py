@@ -13,6 +13,7 @@ import tempfile
 from collections import Counter
 from functools import cache
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -107,10 +108,11 @@ def missing_packages() -> list[str]:
     if shutil.which("dpkg-query") is None:
         return []
     lines = Path(PROJECT, "tools", "ci_packages.txt").read_text(encoding="utf-8").splitlines()
-    wanted = [name for line in lines if (name := line.partition("#")[0].strip())]
-    words = ("dpkg-query", "--show", "--showformat", "${Package} ${Status}\n", *wanted)
+    wanted = [names.split("|") for line in lines if (names := line.partition("#")[0].strip())]
+    words = ("dpkg-query", "--show", "--showformat", "${Package} ${Status}\n", *chain(*wanted))
     shown = subprocess.run(words, capture_output=True, text=True, check=False).stdout
-    return [name for name in wanted if f"{name} install ok installed" not in shown.splitlines()]
+    there = {line.partition(" ")[0] for line in shown.splitlines() if line.endswith(" install ok installed")}
+    return [names[0] for names in wanted if there.isdisjoint(names)]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
@@ -152,7 +154,9 @@ def elsewhere(tmp_path_factory):
 @pytest.fixture(scope="session")
 def chromium():
     """A browser; playwright runs once in a process."""
-    found = shutil.which("chromium") or shutil.which("google-chrome")
+    from tools.make import pictures
+
+    found = pictures.chromium()
     if found is None:
         pytest.skip("there is no Chromium here")
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
