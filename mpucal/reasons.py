@@ -543,15 +543,13 @@ KINDS: Mapping[str, Kind] = {
             ),
             "sides": Sentence(
                 "the orientations contradict each other, and a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma)"
-                " only: the sensor's mount slipped, or the sensor is damaged",
-                "fasten the sensor, and record again",
-                True,
+                " only: the sensor's mount gives way, or the sensor is not linear",
+                "fasten the sensor, hold the board more calmly, and record again",
             ),
             "slow": Sentence(
                 "the orientations contradict each other, and a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma)"
                 " only: {rate:.3g} Hz are too slow to follow turns by hand",
                 "sample at 50 Hz or more, and record again",
-                True,
             ),
             "knock": Sentence(
                 "something knocked the board (the accelerometer was at the end of its range), and {contradiction}",

@@ -13,10 +13,10 @@ from ..errors import WrongValue
 from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
-from .changes import SIGNIFICANT, Change, find_changes, remove_walk
 from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
+from .hypotheses import SURE, Explanation, explain, remove_walk, walk_of
 from .masks import find_reset, remove_spikes, with_masks
 from .model_selection import METHODS, ModelChoice, choose_model
 from .static import fit_static
@@ -97,32 +97,32 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     before = replace(before, recording=recording, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
-    choice, change = _fit(recording, flat, gravity, model)
-    claim = claim_uncertainty(choice.fit, gravity, change, choice.walked)
+    choice, explanations = _fit(recording, flat, gravity, model)
+    claim = claim_uncertainty(choice.fit, gravity, explanations, choice.walked)
     evidence = replace(before, fit=inflate(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 
 
-def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, Change | None]:
-    """Return the fit without the walk of the gyroscope's bias during the turning, and the change that is left."""
-    choice, changes = _fit_once(recording, flat, gravity, model)
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation]]:
+    """Return the fit without the walk of the gyroscope's bias during the turning, and what explains the rest."""
+    choice, found = _fit_once(recording, flat, gravity, model)
     for _ in range(MOST_WALKS):
-        if not changes or changes[0].what != "gyroscope" or not choice.fit.converged:
+        walk = walk_of(found)
+        if walk is None or not choice.fit.converged:
             break
-        walk = changes[0]
         without, left = _fit_once(remove_walk(choice.recording, flat, walk), flat, gravity, model)
-        if not without.fit.V < choice.fit.V - 0.5 * SIGNIFICANT:
+        # A walk whose removal explains nothing is none.
+        if not choice.fit.V - np.log(SURE) > without.fit.V:
             break
-        choice, changes = without._replace(walked=without.walked + choice.walked + walk.q), left
-    # A walk whose removal explains nothing is none.
-    return choice, next((change for change in changes if change.what != "gyroscope"), None)
+        choice, found = without._replace(walked=without.walked + choice.walked + walk.q), left
+    return choice, found
 
 
-def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Change]]:
+def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation]]:
     if model == "auto":
         choice = choose_model(recording, flat, gravity)
     else:
         choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
     fit = choice.fit
-    return choice, [] if fit.parts is None else find_changes(fit.parts, fit.D)
+    return choice, [] if fit.parts is None else explain(fit.parts, fit.D)

@@ -15,10 +15,10 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat, flat_statistics
-from .changes import find_changes, remove_walk
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import fit_hand
+from .hypotheses import explain, remove_walk, walk_of
 from .hypothesis_tests import WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
@@ -161,8 +161,8 @@ class InPlaceFits:
         for _ in range(MOST_WALKS):
             rough = steady._rough(IMU)
             parts = parts_of(steady._thin, rough, self._prior)
-            walk = next(iter(find_changes(parts, rough.theta.D) if parts else []), None)
-            if walk is None or walk.what != "gyroscope":
+            walk = walk_of(explain(parts, rough.theta.D)) if parts else None
+            if walk is None:
                 break
             recording, walked = remove_walk(steady.recording, self._flat, walk), steady.walked + walk.q
             steady = InPlaceFits(recording, self._flat, self._gravity, walked)

@@ -1,7 +1,7 @@
 """Parts of a series, with their scores at the estimate.
 
 Where the model holds, the parts differ by chance. Where it does not (drift, a nonlinear sensor, vibration), only the
-parts show it, and not the covariance of the estimate: see jackknife.py and changes.py.
+parts show it, and not the covariance of the estimate: see hypotheses.py.
 """
 
 from __future__ import annotations

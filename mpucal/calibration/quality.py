@@ -10,7 +10,6 @@ from ..result.calibration import GOOD, REFUSED, USABLE
 from ..result.keys import ErrorStd, Magnitude, Quality, Verdict
 from .checks import find_reasons
 from .evidence import Evidence
-from .jackknife import OF_SIDE, OF_TIME
 from .rotation import lengths
 
 
@@ -18,7 +17,7 @@ def judge(evidence: Evidence) -> Quality:
     """Return the `quality` of calibration.json: verdict, reasons, the magnitude before and after, and `error_std`.
 
     `error_std` is the error of a calibrated measurement over all directions, rms and magnitude [m/s^2] and direction
-    [deg], with the estimates that it is the largest of (uncertainty.py).
+    [deg], with its parts: the model's own, and what a change, or effects of time or side, may add (hypotheses.py).
     """
     reasons = [reason.about(evidence.recording.sensor.origin) for reason in find_reasons(evidence)]
     return {
@@ -37,8 +36,9 @@ def _error_std(evidence: Evidence) -> ErrorStd:
         "magnitude": np.nan if known is None else known.magnitude_mps2,
         "direction_deg": np.nan if known is None else float(np.rad2deg(known.direction_rad)),
         "model": np.nan if claim is None else claim.floored,
-        "without_a_time": np.nan if claim is None else OF_TIME * claim.left_out.time,
-        "without_a_side": np.nan if claim is None else OF_SIDE * claim.left_out.side,
+        "time": np.nan if claim is None else claim.error("time"),
+        "side": np.nan if claim is None else claim.error("side"),
+        "change": np.nan if claim is None else claim.error("change"),
         "decided_by": None if claim is None else claim.decided_by,
     }
 

@@ -1,11 +1,12 @@
 """Uncertainty of a calibrated measurement: predicted by a covariance, and claimed where parts of a recording disagree.
 
-The claim is the larger of two errors, the model's own and the jackknife's. Where the sensor changed midway, each
-element's standard deviation also holds what the element was and what it became.
+The claim is the model's own covariance, and by how much each element may be off by what happened besides
+(hypotheses.py). Where the sensor changed midway, it holds what the element was and what it became.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -13,9 +14,8 @@ from typing import Literal
 import numpy as np
 
 from ..data import Vector
-from .changes import SIGNIFICANT, Change, walked_covariance
 from .fit import Fit
-from .jackknife import TINY_MPS2, Jackknife, jackknife
+from .hypotheses import Explanation, Kind, walked_variance
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere
 
@@ -26,8 +26,7 @@ FLOOR_MPS2 = 5e-5
 MOST_NIS = 5.0  # NIS of a model that explains the data; 3 is expected
 # The model's uncertainty is multiplied by this where too few sides were down for a comparison of them.
 UNCOMPARED = 2.0
-# A change of more than so many times the jackknife's error is none: changes reach 10, turns with a pull 35 to 750.
-MOST_UNFELT = 20.0
+FEWEST_SIDES, TINY_MPS2 = 4, 1e-9
 
 
 @dataclass(frozen=True)
@@ -72,68 +71,79 @@ def propagate(D: Vector, covariance: Vector, gravity: float, unit: Vector | None
 
 @dataclass(frozen=True)
 class UncertaintyClaim:
-    """Claimed error of a calibration, rms over all directions, and the estimates that it is the largest of.
+    """Claimed uncertainty of a calibration, and what it is made of.
 
     Attributes
     ----------
-    model : m/s^2, by the covariance of the model.
+    covariance : (p, p) of the model. model : m/s^2, the error by it, rms over all directions.
     floored : m/s^2, `model` enlarged by what is left of a walk of the gyroscope's bias that was removed, and where too
         few sides were down for a comparison of them.
-    left_out : errors by leaving parts out.
-    change : change of the sensor while the board was turned; None where it stayed the same. change_error : m/s^2.
+    explanations : what may have happened besides, the likeliest first. errors : (n,) m/s^2, what each adds.
     """
 
+    covariance: Vector
     model: float
     floored: float
-    left_out: Jackknife
-    change: Change | None = None
-    change_error: float = 0.0
+    explanations: Sequence[Explanation] = ()
+    errors: Sequence[float] = ()
 
     @property
     def inflation(self) -> float:
         """Claimed uncertainty as a multiple of the model's, 1 or more."""
-        return max(self.floored, self.left_out.claim(), self.change_error) / self.model
+        return float(np.hypot(self.floored, max(self.errors, default=0.0))) / self.model
 
     @property
-    def decided_by(self) -> Literal["model", "time", "side", "change"]:
-        """Estimate that set the claimed uncertainty."""
-        if max(self.left_out.claim(), self.change_error) <= self.floored:
-            return "model"
-        return "change" if self.change_error > self.left_out.claim() else self.left_out.decided_by()
+    def worst(self) -> Explanation | None:
+        """Explanation that adds most to the uncertainty; None where all of them add less than the model has."""
+        most = max(self.errors, default=0.0)
+        return self.explanations[list(self.errors).index(most)] if most > self.floored else None
 
-    def widen(self, covariance: Vector) -> Vector:
-        """Return a covariance (p, p) of the model as it is claimed: it holds what a changed sensor was and became."""
-        same = (max(self.floored, self.left_out.claim()) / self.model) ** 2 * covariance
-        return same if self.change is None else same + np.diag(self.change.away**2)
+    @property
+    def decided_by(self) -> Kind | Literal["model"]:
+        """Kind of what sets the claimed uncertainty."""
+        return "model" if self.worst is None else self.worst.hypothesis.kind
+
+    @property
+    def change(self) -> Explanation | None:
+        """Change of the accelerometer that surely happened, or None."""
+        return next((each for each in self.explanations if each.is_sure), None)
+
+    def error(self, kind: Kind) -> float:
+        """Return the largest error [m/s^2] that an explanation of a kind adds."""
+        of = [error for each, error in zip(self.explanations, self.errors, strict=True) if each.hypothesis.kind == kind]
+        return max(of, default=0.0)
+
+    def widen(self) -> Vector:
+        """Return the covariance (p, p) as it is claimed: where several explanations are likely, the widest counts.
+
+        Those of one quantity exclude each other, and count by their weights.
+        """
+        wide = (self.floored / self.model) ** 2 * self.covariance
+        by_quantity = {each.hypothesis.what: np.zeros(len(wide)) for each in self.explanations}
+        for each in self.explanations:
+            by_quantity[each.hypothesis.what] += each.weight * each.away**2
+        return wide + np.diag(np.max([*by_quantity.values(), np.zeros(len(wide))], axis=0))
 
 
-def claim_uncertainty(fit: Fit, gravity: float, change: Change | None, walked: float) -> UncertaintyClaim | None:
+def claim_uncertainty(
+    fit: Fit, gravity: float, explanations: Sequence[Explanation], walked: float
+) -> UncertaintyClaim | None:
     """Return the claimed uncertainty of a fit; None where its parts are not known, or D or the covariance is unusable.
 
-    change : the most likely change that the fit's parts show. walked : (rad/s)^2 from part to part, of a walk of the
-        gyroscope's bias that was removed.
+    explanations : of the fit's parts. walked : (rad/s)^2 from part to part, of a walk of the gyroscope's bias that was
+        removed.
     """
     if fit.parts is None or not is_usable(fit):
         return None
     rms = partial(_rms, fit.D, gravity=gravity)
     model = floored = rms(fit.covariance)
     if walked:
-        wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(fit.parts.covariance))
-        floored = float(np.hypot(wider * model, FLOOR_MPS2))
-    left_out = jackknife(fit.parts, fit.D, gravity)
-    if not left_out.side:
+        wider = rms(np.diag(walked_variance(fit.parts, fit.D, walked))) / rms(np.diag(np.diag(fit.parts.covariance)))
+        floored = float(np.hypot(max(1.0, wider) * model, FLOOR_MPS2))
+    if len(np.unique(fit.parts.side)) < FEWEST_SIDES:
         floored *= UNCOMPARED
-    same = UncertaintyClaim(model, floored, left_out)
-    if change is None or not fit.converged:
-        return same
-    # A model that does not explain its innovations leaves the hand's motion in every part, which looks like a walk.
-    if (change.alone if fit.nis <= MOST_NIS else change.gain) < SIGNIFICANT:
-        return same
-    error = rms(np.diag(change.away**2))
-    # A sensor that changed moves the estimate when parts are left out; a steady pull on a moving hand does not.
-    return (
-        same if error > MOST_UNFELT * max(left_out.claim(), model) else replace(same, change=change, change_error=error)
-    )
+    errors = [each.weight**0.5 * rms(np.diag(each.away**2)) for each in explanations]
+    return UncertaintyClaim(fit.covariance, model, floored, explanations, errors)
 
 
 def is_usable(fit: Fit) -> bool:
@@ -145,7 +155,7 @@ def is_usable(fit: Fit) -> bool:
 
 def inflate(fit: Fit, claim: UncertaintyClaim | None) -> Fit:
     """Return the fit with the claimed covariance."""
-    return fit if claim is None else replace(fit, covariance=claim.widen(fit.covariance))
+    return fit if claim is None else replace(fit, covariance=claim.widen())
 
 
 def _rms(D: Vector, covariance: Vector, gravity: float) -> float:

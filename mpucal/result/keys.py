@@ -46,8 +46,9 @@ class ErrorStd(TypedDict):
     magnitude: ReadOnly[Number]
     direction_deg: ReadOnly[Number]
     model: ReadOnly[Number]
-    without_a_time: ReadOnly[Number]
-    without_a_side: ReadOnly[Number]
+    time: ReadOnly[Number]
+    side: ReadOnly[Number]
+    change: ReadOnly[Number]
     decided_by: ReadOnly[Literal["model", "time", "side", "change"] | None]
 
 

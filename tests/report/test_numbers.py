@@ -56,7 +56,7 @@ def test_scale_factor_errors_and_biases(result, accelerometer):
 def test_misalignments(result, accelerometer, i, j):
     D, D_std = accelerometer["D"], accelerometer["D_std"]
     angle = math.degrees(math.atan(D[i, j] / D[i, i]))
-    std = math.degrees(math.hypot(D_std[i, j], D_std[i, i] * D[i, j] / D[i, i]) / D[i, i])
+    std = math.degrees(math.hypot(D[i, i] * D_std[i, j], D_std[i, i] * D[i, j]) / math.hypot(D[i, i], D[i, j]) ** 2)
     cells = table(result.html, "accelerometer")[f"misalignment to {'xyz'[j]}, deg"]
     agree(cells[i : i + 1], [angle], [std])
     assert cells[j] == ""

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...reasons import Reason, reason
-from ..changes import Change
 from ..evidence import Evidence
+from ..hypotheses import Explanation
 from ..tilt import CONE_RAD
 from ..uncertainty import MOST_NIS
 
@@ -20,7 +20,7 @@ MOST_STDS = 5.0
 SLOW_HZ = 20.0  # at a lower sample rate, a hand turns too much from sample to sample
 # Errors of readings by a change of the bias or of the mount: smaller ones are not reported, larger ones refused.
 LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "scale": 0.004, "mount": 0.02}, 0.2
-# Inflation, and jackknife's error [m/s^2], above which parts of the recording contradict each other.
+# Inflation, and error [m/s^2], above which parts of the recording contradict each other.
 DISAGREE, DISAGREE_MPS2 = 4.0, 0.02
 
 
@@ -44,14 +44,7 @@ def _model_rms(e: Evidence) -> float | None:
     """Return the uncertainty [m/s^2] that more orientations would reduce; None where D is unusable."""
     if e.uncertainty is None:
         return None
-    if e.claim is None or e.claim.inflation < BY_CHANCE or (e.claim.decided_by == "side" and not _sides_contradict(e)):
-        return e.uncertainty.rms_mps2
-    return e.claim.floored
-
-
-def _sides_contradict(e: Evidence) -> bool:
-    """Return True if the orientations disagree so much that more of them would not help."""
-    return e.claim is not None and e.claim.decided_by == "side" and e.claim.inflation > DISAGREE and _is_useless(e)
+    return e.uncertainty.rms_mps2 if e.claim is None or e.claim.inflation < BY_CHANCE else e.claim.floored
 
 
 def tilted_only(e: Evidence) -> Reason | None:
@@ -92,12 +85,12 @@ def inconsistent(e: Evidence) -> Reason | None:
 
 
 def changed_midway(e: Evidence) -> Reason | None:
-    """Find a mount that slipped, where no other reason explains it."""
+    """Find a mount that slipped or scale factors that changed, where no other reason explains it."""
     change = _change_of(e, "mount") or _change_of(e, "scale")
     if change is None or e.claim is None:
         return None
-    begin, end = _since_the_start(e, change.steepest)
-    return reason("inconsistent", "change", e.claim.change_error > CHANGED_MPS2, begin=begin, end=end)
+    begin, end = _since_the_start(e, change.span)
+    return reason("inconsistent", "change", e.claim.error("change") > CHANGED_MPS2, begin=begin, end=end)
 
 
 def zero_moved(e: Evidence) -> Reason | None:
@@ -105,41 +98,39 @@ def zero_moved(e: Evidence) -> Reason | None:
     change = _change_of(e, "accelerometer")
     if change is None:
         return None
-    begin, end = _since_the_start(e, change.steepest)
+    begin, end = _since_the_start(e, change.span)
     size = 1e3 * change.size / STANDARD_GRAVITY_MPS2
     return reason("zero_moved", "walk", _is_useless(e), size=size, begin=begin, end=end)
 
 
-def _change_of(e: Evidence, what: str) -> Change | None:
+def _change_of(e: Evidence, what: str) -> Explanation | None:
     """Return the change of that kind, None where it is too small to report.
 
     Lost and clipped samples pull at an estimate, too, and have reasons of their own.
     """
-    if e.claim is None or e.claim.change is None or e.claim.change.what != what or _is_explained(e):
+    change = None if e.claim is None else e.claim.change
+    if e.claim is None or change is None or change.hypothesis.what != what or _is_explained(e):
         return None
     known = e.claim.floored <= USABLE_RMS_MPS2
-    return e.claim.change if known and e.claim.change_error > LEAST_CHANGE_MPS2[what] else None
+    return change if known and e.claim.error("change") > LEAST_CHANGE_MPS2[what] else None
 
 
 def parts_disagree(e: Evidence) -> Reason | None:
     """Find times or sides of the recording that contradict the others by more than the model's noise."""
-    claim = e.claim
-    if claim is None or e.uncertainty is None or inconsistent(e) is not None:
+    worst = None if e.claim is None else e.claim.worst
+    if e.claim is None or worst is None or e.uncertainty is None or inconsistent(e) is not None:
         return None
     if any(_change_of(e, what) for what in LEAST_CHANGE_MPS2) or (_is_explained(e) and not _is_useless(e)):
         return None
-    rms = e.uncertainty.rms_mps2
-    if _sides_contradict(e):
-        if e.recording.rate_hz < SLOW_HZ:
-            return reason("inconsistent", "slow", rms=rms, rate=e.recording.rate_hz)
-        return reason("inconsistent", "sides", rms=rms)
-    if claim.decided_by == "side":
-        return None  # more orientations help, and few_orientations says so
-    too_large = claim.inflation >= BY_CHANCE and rms > GOOD_RMS_MPS2 >= claim.floored
-    contradict = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
-    if not too_large and not (contradict and claim.decided_by == "time"):
+    rms, error = e.uncertainty.rms_mps2, e.claim.error(worst.hypothesis.kind)
+    too_large = rms > GOOD_RMS_MPS2 >= e.claim.floored
+    if not too_large and not (e.claim.inflation > DISAGREE and error > DISAGREE_MPS2):
         return None
-    begin, end = _since_the_start(e, claim.left_out.worst)
+    if worst.hypothesis.kind == "side":
+        if e.recording.rate_hz < SLOW_HZ:
+            return reason("inconsistent", "slow", _is_useless(e), rms=rms, rate=e.recording.rate_hz)
+        return reason("inconsistent", "sides", _is_useless(e), rms=rms)
+    begin, end = _since_the_start(e, worst.span)
     return reason("inconsistent", "part", _is_useless(e), begin=begin, end=end, rms=rms)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -148,7 +149,7 @@ def sensors_lag(e: Evidence) -> Reason | None:
     if e.fit is None or e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
         return None
     (of_prior,) = BY_NAME["tau"].sd
-    std = float(e.fit.std("tau")[0]) / e.claim.inflation
+    std = float(replace(e.fit, covariance=e.claim.covariance).std("tau")[0])
     # The prior draws the estimate towards the filters' delay: remove it, to have what the data alone say.
     data, filters_s = 1.0 - (std / of_prior) ** 2, e.recording.sensor.accel_lag_s
     lag_s = filters_s + (e.fit.delay_s - filters_s) / data if data > 0.0 else 0.0

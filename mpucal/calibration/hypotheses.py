@@ -1,0 +1,286 @@
+"""Hypotheses about what happened while the board was turned, each weighed by its evidence.
+
+Under a hypothesis, a quantity has three numbers delta_k beside theta in each group of the recording's parts: the
+accelerometer's bias, its scale factors, its mount, or the gyroscope's bias, by stretches of time or by the sides that
+were down. They are made of x ~ N(0, q):
+
+    step    one x, from some time on, or growing evenly
+    walk    an x for each stretch, and delta_k is the sum of those so far
+    pulse   one x, in one stretch: a knock, or the board taken up and put down
+    each    an x for each group: an effect that no model has, such as a pivot that swings, or a nonlinear sensor
+
+To second order the parts' scores are enough. With theta eliminated the quadratic form of x is S + I/q, and by the
+eigenvalues of S and the components c of the scores
+
+    2 log p(q)/p(0) = sum c^2 / (lambda + 1/q) - log(1 + q lambda)
+
+The evidence is the mean of p(q)/p(0) over the values of q, and over the times of a step. The hypotheses do not exclude
+each other, and each is compared with nothing alone: where several are likely, the one that leaves an element least
+certain counts.
+
+Source: Kass, Raftery, "Bayes factors" (1995); of random effects, Robinson, "That BLUP is a good thing" (1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ..data import Recording, Vector
+from ..rests.flat import Flat
+from .parameters import PLACES
+from .parts import Parts
+from .rotation import cross
+
+What = Literal["accelerometer", "scale", "mount", "gyroscope"]
+Kind = Literal["change", "time", "side"]
+SIDES = 0
+
+
+class Hypothesis(NamedTuple):
+    """Hypothesis: the quantity, how it is distributed, and over how many stretches of time, or SIDES."""
+
+    what: What
+    shape: Literal["step", "walk", "pulse", "each"]
+    groups: int
+
+    @property
+    def is_change(self) -> bool:
+        """True if the sensor is another one afterwards."""
+        return self.shape in ("step", "walk")
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the hypothesis, for messages."""
+        return "change" if self.is_change else "side" if self.groups == SIDES else "time"
+
+
+WALK = Hypothesis("gyroscope", "walk", 16)
+HYPOTHESES = (
+    Hypothesis("accelerometer", "step", 48),
+    Hypothesis("scale", "step", 48),
+    Hypothesis("mount", "step", 48),
+    Hypothesis("accelerometer", "walk", 16),
+    WALK,
+    Hypothesis("accelerometer", "pulse", 48),
+    Hypothesis("accelerometer", "each", 16),
+    Hypothesis("scale", "each", 16),
+    Hypothesis("mount", "each", 16),
+    Hypothesis("accelerometer", "each", SIDES),
+    Hypothesis("scale", "each", SIDES),
+)
+# Standard deviations of x are tried from a 10,000th of these up to them: m/s^2, 1, rad, rad/s.
+LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1, "gyroscope": 0.03}
+VARIANCES = 10.0 ** np.arange(-8.0, 0.1, 0.5)
+# Odds above which something is said to have happened, against nothing and against what else it may be.
+SURE = 100.0
+# Share of the largest eigenvalue, below which a direction of x is left out: the parts say next to nothing of it.
+UNSEEN = 3e-4
+PULSES = (1, 2, 3)  # groups that a pulse lasts
+
+
+class Explanation(NamedTuple):
+    """Explanation of a recording by a hypothesis.
+
+    Attributes
+    ----------
+    hypothesis : which one. evidence : log of its evidence as a multiple of that of nothing.
+    q : likeliest variance of x. delta : (k, 3) by group, m/s^2, 1, rad or rad/s, at the likeliest q and time.
+    start, end : (k,) s after the flat segment, of the groups; of sides, the first and last time that each was down.
+    away : (p,) rms distance of the estimate from the parameters, if it is true; of a change, from their mean over time.
+    farthest : (p,) largest distance of the parameters from the estimate, before the first group and in any.
+    weight : probability among the hypotheses of its quantity and nothing.
+    is_sure : True for a change of the accelerometer against which all else is unlikely; `away` is `farthest` then.
+    """
+
+    hypothesis: Hypothesis
+    evidence: float
+    q: float
+    delta: Vector
+    start: Vector
+    end: Vector
+    away: Vector
+    farthest: Vector
+    weight: float = 0.0
+    is_sure: bool = False
+
+    @property
+    def log_share(self) -> float:
+        """Log of its probability as a multiple of that of nothing; beforehand nothing is as likely as all together."""
+        return self.evidence - float(np.log(len(HYPOTHESES)))
+
+    @property
+    def size(self) -> float:
+        """Range of the quantity over the recording."""
+        return float(np.linalg.norm(np.ptp(self.delta, axis=0)))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Times [s after the flat segment] between which it changed most, or of the group that is farthest off."""
+        if not self.hypothesis.is_change:
+            at = int(np.linalg.norm(self.delta, axis=1).argmax())
+            return float(self.start[at]), float(self.end[at])
+        at = int(np.linalg.norm(np.diff(self.delta, axis=0), axis=1).argmax())
+        return self.middles[at], self.middles[at + 1]
+
+    @property
+    def middles(self) -> Vector:
+        """Middles of the groups (k,) [s after the flat segment]."""
+        return 0.5 * (self.start + self.end)
+
+    def at(self, t: Vector) -> Vector:
+        """Return (n, 3) values, interpolated linearly between the middles, from 0 where the turning begins."""
+        at, delta = np.concatenate([[0.0], self.middles]), np.vstack([np.zeros(3), self.delta])
+        return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
+
+
+def explain(parts: Parts, D: Vector) -> list[Explanation]:
+    """Return what each hypothesis says, the likeliest first; nothing where the fit failed."""
+    if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
+        return []
+    found = [each for hypothesis in HYPOTHESES if (each := _explain(hypothesis, parts, D)) is not None]
+    totals = {what: log_total([each for each in found if each.hypothesis.what == what]) for what in LARGEST}
+    found = [each._replace(weight=float(np.exp(each.log_share - totals[each.hypothesis.what]))) for each in found]
+    found.sort(key=lambda each: -each.evidence)
+    changes = [each for each in found if each.hypothesis.is_change and each.hypothesis != WALK]
+    others = [each for each in found if not each.hypothesis.is_change]
+    if changes and log_total(changes) - log_total(others) > np.log(SURE):
+        of_sure = changes[0]._replace(weight=1.0, away=changes[0].farthest, is_sure=True)
+        found = [of_sure if each is changes[0] else each for each in found]
+    return found
+
+
+def log_total(explanations: Iterable[Explanation]) -> float:
+    """Return the log of the shares of the explanations and of nothing, whose share is 1."""
+    return float(np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)]))
+
+
+def walk_of(explanations: Sequence[Explanation]) -> Explanation | None:
+    """Return the walk of the gyroscope's bias; None where nothing, or a change of the accelerometer, is likelier."""
+    first = next((each for each in explanations if each.hypothesis.is_change), None)
+    return first if first is not None and first.hypothesis == WALK and first.log_share > np.log(SURE) else None
+
+
+def remove_walk(recording: Recording, flat: Flat, walk: Explanation) -> Recording:
+    """Subtract a walk of the gyroscope's bias from the rates."""
+    return replace(recording, gyr=recording.gyr - walk.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0)))
+
+
+def walked_variance(parts: Parts, D: Vector, q: float) -> Vector:
+    """Return (p,) the variance of theta if the gyroscope's bias walks by q [(rad/s)^2] from group to group."""
+    groups = _Groups.of(parts, WALK)
+    _, follow, eigenvalues, _, V = _quadratic(WALK, parts, D, groups)
+    to_theta = V.transpose(0, 2, 1) @ follow
+    walked = np.einsum("md,mdp->p", 1.0 / (eigenvalues + 1.0 / q), to_theta**2)
+    return np.asarray(np.diag(parts.covariance) + walked)
+
+
+class _Groups(NamedTuple):
+    """Gradients (k, p) and Fisher matrices (k, p, p) of groups of parts, and their times [s after the flat segment]."""
+
+    gradient: Vector
+    fisher: Vector
+    start: Vector
+    end: Vector
+
+    @classmethod
+    def of(cls, parts: Parts, hypothesis: Hypothesis) -> _Groups:
+        """Group the parts as a hypothesis does."""
+        sides = hypothesis.groups == SIDES
+        group = parts.side if sides else parts.by_time(min(hypothesis.groups, len(parts)))
+        first = np.unique(group, return_index=True)[1]
+        last = len(group) - 1 - np.unique(group[::-1], return_index=True)[1]
+        return cls(*parts.grouped(group), parts.start[first], parts.end[last])
+
+
+def _quadratic(
+    hypothesis: Hypothesis, parts: Parts, D: Vector, groups: _Groups
+) -> tuple[Vector, Vector, Vector, Vector, Vector]:
+    """Return the log likelihood of x without theta, in m shapes of d numbers each.
+
+    The directions B (p, 3) of delta; (3 k, p), by which theta follows -delta; eigenvalues (m, d) of S and the scores
+    (m, d) along its eigenvectors; and these as delta, (m, 3 k, d).
+    """
+    k = len(groups.gradient)
+    B = _directions(hypothesis.what, D, len(parts.H))
+    to_theta = groups.fisher @ B  # (k, p, 3)
+    across = to_theta.transpose(1, 0, 2).reshape(-1, 3 * k)
+    follow = across.T @ parts.covariance
+    S = _block_diagonal(B.T @ to_theta) - follow @ across
+    scores = follow @ parts.left - (groups.gradient @ B).ravel()
+    W = _shapes(hypothesis.shape, 0.5 * (groups.start + groups.end))
+    eigenvalues, U = np.linalg.eigh(W.transpose(0, 2, 1) @ (S @ W))
+    # Where the parts say next to nothing, the likelihood is no parabola, and its scores are none of x.
+    U *= (eigenvalues > UNSEEN * eigenvalues.max())[:, None]
+    V = W @ U
+    return B, follow, np.maximum(eigenvalues, 0.0), scores @ V, V
+
+
+def _explain(hypothesis: Hypothesis, parts: Parts, D: Vector) -> Explanation | None:
+    groups = _Groups.of(parts, hypothesis)
+    if len(groups.start) < 2:
+        return None
+    B, follow, eigenvalues, c, V = _quadratic(hypothesis, parts, D, groups)
+    q = LARGEST[hypothesis.what] ** 2 * VARIANCES
+    # (m, q, d): by shape, by variance, by component
+    eigenvalues, c = eigenvalues[:, None], c[:, None]
+    variance = 1.0 / (eigenvalues + 1.0 / q[:, None])
+    log_p = 0.5 * np.sum(c**2 * variance - np.log1p(q[:, None] * eigenvalues), axis=2)
+    most = float(log_p.max())
+    p = np.exp(log_p - most)
+    evidence = most + float(np.log(p.mean()))
+    p /= p.sum()
+    m, best = (int(i) for i in np.unravel_index(int(log_p.argmax()), log_p.shape))
+    delta = V[m] @ (c[m, 0] * variance[m, best])
+    astray = -V.transpose(0, 2, 1) @ follow  # (m, d, p)
+    if hypothesis.is_change:
+        astray += (B @ V.reshape(len(V), -1, 3, V.shape[2]).mean(axis=1)).transpose(0, 2, 1)
+    away = np.einsum("mq,mqp->p", p, variance @ astray**2 + ((c * variance) @ astray) ** 2)
+    return Explanation(
+        hypothesis,
+        evidence,
+        float(q[best]),
+        delta.reshape(-1, 3),
+        groups.start,
+        groups.end,
+        np.sqrt(away),
+        np.abs(np.vstack([np.zeros(3), delta.reshape(-1, 3)]) @ B.T - delta @ follow).max(axis=0),
+    )
+
+
+def _directions(what: What, D: Vector, p: int) -> Vector:
+    """Return (p, 3), the derivatives of the parameters by the three numbers."""
+    B = np.zeros((p, 3))
+    if what == "mount":
+        B[PLACES["D"]] = (D @ cross(np.eye(3))).reshape(3, 9).T
+    elif what == "scale":
+        B[PLACES["D"]] = (np.eye(3)[:, :, None] * D).reshape(3, 9).T
+    else:
+        B[PLACES["b_omega" if what == "gyroscope" else "b_a"]] = np.eye(3)
+    return B
+
+
+def _block_diagonal(blocks: Vector) -> Vector:
+    """Return (3 k, 3 k) with the blocks (k, 3, 3) along its diagonal."""
+    k = len(blocks)
+    M, at = np.zeros((k, 3, k, 3)), np.arange(k)
+    M[at, :, at] = blocks
+    return M.reshape(3 * k, 3 * k)
+
+
+def _shapes(shape: str, middles: Vector) -> Vector:
+    """Return (m, 3 k, d) that map x (d,) to delta: a step between any two groups or an even drift each, or one map."""
+    k = len(middles)
+    if shape == "step":
+        weights = np.vstack([np.tri(k).T[1:], middles / middles[-1]])[:, :, None]
+    elif shape == "pulse":
+        # The flat segment comes before the first group: with it, theta is what all others have.
+        at = np.arange(k + 1)
+        within = np.vstack([(at >= at[:, None]) & (at < at[:, None] + width) for width in PULSES]).astype(np.float64)
+        weights = (within[:, 1:] - within[:, :1])[:, :, None]
+    else:
+        weights = (np.tri(k) if shape == "walk" else np.eye(k))[None]
+    return np.asarray(np.kron(weights, np.eye(3)))
