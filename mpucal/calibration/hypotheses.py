@@ -141,7 +141,8 @@ def explain(parts: Parts, D: Vector) -> list[Explanation]:
     """Return what each hypothesis says, the likeliest first; nothing where the fit failed."""
     if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
         return []
-    found = [each for hypothesis in HYPOTHESES if (each := _explain(hypothesis, parts, D)) is not None]
+    groups = {number: _Groups.of(parts, number) for number in {each.groups for each in HYPOTHESES}}
+    found = [_explain(each, groups[each.groups], parts, D) for each in HYPOTHESES if len(groups[each.groups].start) > 1]
     totals = {what: log_total([each for each in found if each.hypothesis.what == what]) for what in LARGEST}
     found = [each._replace(weight=float(np.exp(each.log_share - totals[each.hypothesis.what]))) for each in found]
     found.sort(key=lambda each: -each.evidence)
@@ -171,10 +172,8 @@ def remove_walk(recording: Recording, flat: Flat, walk: Explanation) -> Recordin
 
 def walked_variance(parts: Parts, D: Vector, q: float) -> Vector:
     """Return (p,) the variance of theta if the gyroscope's bias walks by q [(rad/s)^2] from group to group."""
-    groups = _Groups.of(parts, WALK)
-    _, follow, eigenvalues, _, V = _quadratic(WALK, parts, D, groups)
-    to_theta = V.transpose(0, 2, 1) @ follow
-    walked = np.einsum("md,mdp->p", 1.0 / (eigenvalues + 1.0 / q), to_theta**2)
+    likelihood = _Likelihood.of(WALK, _Groups.of(parts, WALK.groups), parts, D)
+    walked = np.einsum("md,mdp->p", 1.0 / (likelihood.eigenvalues + 1.0 / q), likelihood.follow**2)
     return np.asarray(np.diag(parts.covariance) + walked)
 
 
@@ -187,46 +186,68 @@ class _Groups(NamedTuple):
     end: Vector
 
     @classmethod
-    def of(cls, parts: Parts, hypothesis: Hypothesis) -> _Groups:
-        """Group the parts as a hypothesis does."""
-        sides = hypothesis.groups == SIDES
-        group = parts.side if sides else parts.by_time(min(hypothesis.groups, len(parts)))
+    def of(cls, parts: Parts, groups: int) -> _Groups:
+        """Group the parts by so many stretches of time, or by SIDES."""
+        group = parts.side if groups == SIDES else parts.by_time(min(groups, len(parts)))
         first = np.unique(group, return_index=True)[1]
         last = len(group) - 1 - np.unique(group[::-1], return_index=True)[1]
         return cls(*parts.grouped(group), parts.start[first], parts.end[last])
 
 
-def _quadratic(
-    hypothesis: Hypothesis, parts: Parts, D: Vector, groups: _Groups
-) -> tuple[Vector, Vector, Vector, Vector, Vector]:
-    """Return the log likelihood of x without theta, in m shapes of d numbers each.
+class _Likelihood(NamedTuple):
+    """Log likelihood of x without theta, in m shapes of d numbers each, along the eigenvectors of its quadratic form.
 
-    The directions B (p, 3) of delta; (3 k, p), by which theta follows -delta; eigenvalues (m, d) of S and the scores
-    (m, d) along its eigenvectors; and these as delta, (m, 3 k, d).
+    Attributes
+    ----------
+    eigenvalues, scores : (m, d). follow : (m, d, p), by which theta follows -x.
+    shapes : (m, k, r), which weighs r numbers of each axis in k groups. U : (m, 3 r, d) eigenvectors.
     """
-    k = len(groups.gradient)
-    B = _directions(hypothesis.what, D, len(parts.H))
-    to_theta = groups.fisher @ B  # (k, p, 3)
-    across = to_theta.transpose(1, 0, 2).reshape(-1, 3 * k)
-    follow = across.T @ parts.covariance
-    S = _block_diagonal(B.T @ to_theta) - follow @ across
-    scores = follow @ parts.left - (groups.gradient @ B).ravel()
-    W = _shapes(hypothesis.shape, 0.5 * (groups.start + groups.end))
-    eigenvalues, U = np.linalg.eigh(W.transpose(0, 2, 1) @ (S @ W))
-    # Where the parts say next to nothing, the likelihood is no parabola, and its scores are none of x.
-    U *= (eigenvalues > UNSEEN * eigenvalues.max())[:, None]
-    V = W @ U
-    return B, follow, np.maximum(eigenvalues, 0.0), scores @ V, V
+
+    eigenvalues: Vector
+    scores: Vector
+    follow: Vector
+    shapes: Vector
+    U: Vector
+
+    @classmethod
+    def of(cls, hypothesis: Hypothesis, groups: _Groups, parts: Parts, D: Vector) -> _Likelihood:
+        """Eliminate theta from the parts' scores."""
+        B = _directions(hypothesis.what, D, len(parts.H))
+        to_theta = groups.fisher @ B  # (k, p, 3)
+        k, p = to_theta.shape[:2]
+        across = to_theta.transpose(1, 0, 2).reshape(p, 3 * k)
+        follow = across.T @ parts.covariance
+        S = -(follow @ across).reshape(k, 3, k, 3)
+        S[np.arange(k), :, np.arange(k)] += B.T @ to_theta
+        scores = follow @ parts.left - (groups.gradient @ B).ravel()
+
+        shapes = _shapes(hypothesis.shape, 0.5 * (groups.start + groups.end))
+        m, _, r = shapes.shape
+        weights = shapes.transpose(0, 2, 1).reshape(m * r, k)
+        once = (weights @ S.reshape(k, 9 * k)).reshape(m, r, 3, k, 3).swapaxes(3, 4)
+        twice = (once.reshape(m, 9 * r, k) @ shapes).reshape(m, r, 3, 3, r).swapaxes(3, 4)
+        eigenvalues, U = np.linalg.eigh(twice.reshape(m, 3 * r, 3 * r))
+        U *= (eigenvalues > UNSEEN * eigenvalues.max())[:, None]
+        of_x = (weights @ np.column_stack([scores.reshape(k, 3), follow.reshape(k, 3 * p)])).reshape(m, r, -1)
+        scores, follow = of_x[:, :, :3].reshape(m, 1, 3 * r), of_x[:, :, 3:].reshape(m, 3 * r, p)
+        return cls(np.maximum(eigenvalues, 0.0), (scores @ U)[:, 0], U.swapaxes(1, 2) @ follow, shapes, U)
+
+    def delta(self, m: int, x: Vector) -> Vector:
+        """Return (k, 3) of a shape and x (d,)."""
+        return np.asarray(self.shapes[m] @ (self.U[m] @ x).reshape(-1, 3))
+
+    def mean(self) -> Vector:
+        """Return (m, d, 3), the mean of delta over the groups for each component of x."""
+        m, _, r = self.shapes.shape
+        of_x = self.U.reshape(m, r, 3, -1) * self.shapes.mean(axis=1)[:, :, None, None]
+        return np.asarray(of_x.sum(axis=1).swapaxes(1, 2))
 
 
-def _explain(hypothesis: Hypothesis, parts: Parts, D: Vector) -> Explanation | None:
-    groups = _Groups.of(parts, hypothesis)
-    if len(groups.start) < 2:
-        return None
-    B, follow, eigenvalues, c, V = _quadratic(hypothesis, parts, D, groups)
+def _explain(hypothesis: Hypothesis, groups: _Groups, parts: Parts, D: Vector) -> Explanation:
+    likelihood = _Likelihood.of(hypothesis, groups, parts, D)
     q = LARGEST[hypothesis.what] ** 2 * VARIANCES
     # (m, q, d): by shape, by variance, by component
-    eigenvalues, c = eigenvalues[:, None], c[:, None]
+    eigenvalues, c = likelihood.eigenvalues[:, None], likelihood.scores[:, None]
     variance = 1.0 / (eigenvalues + 1.0 / q[:, None])
     log_p = 0.5 * np.sum(c**2 * variance - np.log1p(q[:, None] * eigenvalues), axis=2)
     most = float(log_p.max())
@@ -234,21 +255,14 @@ def _explain(hypothesis: Hypothesis, parts: Parts, D: Vector) -> Explanation | N
     evidence = most + float(np.log(p.mean()))
     p /= p.sum()
     m, best = (int(i) for i in np.unravel_index(int(log_p.argmax()), log_p.shape))
-    delta = V[m] @ (c[m, 0] * variance[m, best])
-    astray = -V.transpose(0, 2, 1) @ follow  # (m, d, p)
+    x, B = c[m, 0] * variance[m, best], _directions(hypothesis.what, D, len(parts.H))
+    delta = likelihood.delta(m, x)
+    astray = -likelihood.follow
     if hypothesis.is_change:
-        astray += (B @ V.reshape(len(V), -1, 3, V.shape[2]).mean(axis=1)).transpose(0, 2, 1)
+        astray += likelihood.mean() @ B.T
     away = np.einsum("mq,mqp->p", p, variance @ astray**2 + ((c * variance) @ astray) ** 2)
-    return Explanation(
-        hypothesis,
-        evidence,
-        float(q[best]),
-        delta.reshape(-1, 3),
-        groups.start,
-        groups.end,
-        np.sqrt(away),
-        np.abs(np.vstack([np.zeros(3), delta.reshape(-1, 3)]) @ B.T - delta @ follow).max(axis=0),
-    )
+    farthest = np.abs(np.vstack([np.zeros(3), delta]) @ B.T - x @ likelihood.follow[m]).max(axis=0)
+    return Explanation(hypothesis, evidence, float(q[best]), delta, groups.start, groups.end, np.sqrt(away), farthest)
 
 
 def _directions(what: What, D: Vector, p: int) -> Vector:
@@ -263,24 +277,14 @@ def _directions(what: What, D: Vector, p: int) -> Vector:
     return B
 
 
-def _block_diagonal(blocks: Vector) -> Vector:
-    """Return (3 k, 3 k) with the blocks (k, 3, 3) along its diagonal."""
-    k = len(blocks)
-    M, at = np.zeros((k, 3, k, 3)), np.arange(k)
-    M[at, :, at] = blocks
-    return M.reshape(3 * k, 3 * k)
-
-
 def _shapes(shape: str, middles: Vector) -> Vector:
-    """Return (m, 3 k, d) that map x (d,) to delta: a step between any two groups or an even drift each, or one map."""
+    """Return (m, k, r) weights of r numbers in k groups; of steps and pulses, m of them with one number each."""
     k = len(middles)
     if shape == "step":
-        weights = np.vstack([np.tri(k).T[1:], middles / middles[-1]])[:, :, None]
-    elif shape == "pulse":
+        return np.vstack([np.tri(k).T[1:], middles / middles[-1]])[:, :, None]
+    if shape == "pulse":
         # The flat segment comes before the first group: with it, theta is what all others have.
         at = np.arange(k + 1)
         within = np.vstack([(at >= at[:, None]) & (at < at[:, None] + width) for width in PULSES]).astype(np.float64)
-        weights = (within[:, 1:] - within[:, :1])[:, :, None]
-    else:
-        weights = (np.tri(k) if shape == "walk" else np.eye(k))[None]
-    return np.asarray(np.kron(weights, np.eye(3)))
+        return np.asarray((within[:, 1:] - within[:, :1])[:, :, None])
+    return np.asarray((np.tri(k) if shape == "walk" else np.eye(k))[None])

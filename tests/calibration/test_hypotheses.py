@@ -15,6 +15,7 @@ from mpucal.calibration.hypotheses import (
     Explanation,
     Hypothesis,
     _explain,
+    _Groups,
     explain,
     walked_variance,
 )
@@ -110,7 +111,7 @@ def test_the_evidence_is_that_of_the_joint_gaussian(shape):
     A, y, parts = linear_parts()
     k, m, p = A.shape
     hypothesis = Hypothesis("accelerometer", shape, 5)
-    told = _explain(hypothesis, parts, np.eye(3))
+    told = _explain(hypothesis, _Groups.of(parts, 5), parts, np.eye(3))
     flat = np.zeros((1, k + 1))
     flat[0, 0] = 1.0
     windows = [[float(i <= j < i + width) for j in range(k + 1)] for width in (1, 2, 3) for i in range(k + 1)]
@@ -139,7 +140,7 @@ def test_the_estimate_is_as_far_away_as_the_other_posterior_says():
     """Compare with theta where each part has a bias of its own, by the joint normal equations."""
     A, y, parts = linear_parts()
     k, m, p = A.shape
-    told = _explain(Hypothesis("accelerometer", "each", 5), parts, np.eye(3))
+    told = _explain(Hypothesis("accelerometer", "each", 5), _Groups.of(parts, 5), parts, np.eye(3))
     design = A.reshape(k * m, p)
     of_x = np.einsum("ks,kmi->kmsi", np.eye(k), A[:, :, PLACES["b_a"]]).reshape(k * m, -1)
     both = np.hstack([design, of_x])
