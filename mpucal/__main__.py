@@ -8,12 +8,15 @@ import gc
 import io
 import os
 import shlex
+import signal
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from .errors import Abandoned, MpucalError, OutputError, SourceError, escape_controls
 from .session.threads import ONE_THREAD
+from .terminal.hangup import logging_after_hangup
 
 BUG = 1
 # errors of a full disk or quota behind stdout
@@ -33,7 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for variable, one in ONE_THREAD.items():
         os.environ.setdefault(variable, one)
     _keep_streams()
-    code = run(arguments)
+    # SIGTERM and SIGHUP end a command as Ctrl-C does
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with logging_after_hangup(lambda: Path(os.devnull), lambda: signal.default_int_handler(signal.SIGHUP, None)):
+        code = run(arguments)
     # without the last garbage collection, which takes longer than some commands
     gc.freeze()
     sys.exit(code)

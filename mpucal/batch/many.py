@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -154,6 +155,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
     """
     distributed = _import_distributed()
     import dask  # noqa: PLC0415
+    from distributed.deploy.spec import close_clusters  # noqa: PLC0415
 
     with (
         TemporaryDirectory(prefix="mpucal-") as scratch,
@@ -177,6 +179,10 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
                 f"the workers were ended while they started ({error})",
                 "free memory for them, or give fewer --workers, and run the batch again",
             ) from error
+        except KeyboardInterrupt:
+            # Workers that have not started end with this process; closing them at its exit would only print a trace.
+            atexit.unregister(close_clusters)
+            raise
         yield client
 
 
@@ -210,6 +216,6 @@ def _import_distributed() -> Any:
     except ImportError as error:
         raise UsageError(f"{error.name} is not installed", INSTALL) from error
     # run_batch reports lost workers in one sentence
-    for name in ("distributed.client", "tornado.application"):
+    for name in ("distributed.client", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     return distributed

@@ -16,7 +16,7 @@ import click
 from ..allan import NoiseMeter
 from ..data import Samples, Sensor
 from ..disk.output_folder import OutputFolder
-from ..errors import EndOfCapture
+from ..errors import EndOfCapture, RecordingError, SourceError
 from ..files import open_rows
 from ..files.rows import drop_incomplete
 from ..report.noise import render, summary
@@ -56,16 +56,20 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
     --noise` take noise.json.
     """
     check_input(file, options, "noise")
+    failure: SourceError | None = None
     if file is not None:
         noise = _measure_file(file, options)
     else:
         check_source(click.get_current_context())
-        noise = _measure_source(options, None if hours is None else 3600.0 * hours)
+        noise, failure = _measure_source(options, None if hours is None else 3600.0 * hours)
     click.echo(noise.json() if as_json else summary(noise), nl=not as_json)
     if folder is not None:
         with OutputFolder(folder) as into:
             save(into.path, {PAGE: render(noise).encode(), DOCUMENT: noise.json().encode()})
         click.echo(f"\nWritten to {folder}:\n  {DOCUMENT}, {PAGE}", err=as_json)
+    if failure is not None:
+        failure.what += f"; the noise is that of the {_duration(noise.seconds)} until then"
+        raise failure
 
 
 def _measure_file(file: Path, options: dict[str, Any]) -> Noise:
@@ -77,14 +81,15 @@ def _measure_file(file: Path, options: dict[str, Any]) -> Noise:
     return meter.result(now().isoformat())
 
 
-def _measure_source(options: dict[str, Any], seconds: float | None) -> Noise:
-    """Measure until the time is over, the source ends, or Ctrl-C is pressed."""
+def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noise, SourceError | None]:
+    """Measure until the time is over, the source ends or fails, or Ctrl-C is pressed; return the failure as well."""
     source = open_source(options, given_options(), until_end=True)
     check_gyroscope(source.plan.config)
     meter: NoiseMeter | None = None
+    failure: SourceError | None = None
     with source.measuring(Path(os.devnull), say, now().isoformat()) as measuring, _progress() as show_progress:
         # The result so far is kept, whatever ends the measurement.
-        with suppress(KeyboardInterrupt, EndOfCapture):
+        try:
             sensor = measuring.source.start()
             skipped = 0 if options["replay"] else PUT_DOWN_RUNS
             if skipped:
@@ -96,9 +101,16 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> Noise:
                 show_progress(meter, seconds)
                 if seconds is not None and meter.seconds >= seconds:
                     break
-        with suppress(EndOfCapture):
+        except (KeyboardInterrupt, EndOfCapture):
+            pass
+        except SourceError as error:
+            failure = error
+        with suppress(EndOfCapture, SourceError):
             measuring.source.stop()
-    return (meter or NoiseMeter(Sensor())).result(now().isoformat())
+    try:
+        return (meter or NoiseMeter(Sensor())).result(now().isoformat()), failure
+    except RecordingError as error:
+        raise failure or error from None
 
 
 def _runs(source: Source) -> Iterator[Samples]:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ..disk.location import check_free
-from ..errors import OutputError
+from ..errors import Abandoned, OutputError, SourceError
 from ..result.clock import stamp
 from ..sources.opening import open_source
 from ..terminal.console import console
@@ -43,6 +43,9 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
         with open_runner(source, file, person) as runner:
             try:
                 samples = runner.record(seconds)
+            except (SourceError, Abandoned) as error:
+                error.what += f"; {file} has the {runner.samples} samples until then" if runner.samples else ""
+                raise
             finally:
                 # A sensor that never answered leaves no file, so that the next attempt can use its name.
                 if runner.sensor is None:

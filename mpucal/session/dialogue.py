@@ -32,6 +32,7 @@ class Dialogue:
     Attributes
     ----------
     scheduler : of the live fits; None until the sensor is known. interrupted : somebody stopped the session.
+    decision : the latest.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class Dialogue:
         # Events that must not reach the machine before an answer that is late.
         self._arrived: deque[Event] = deque()
         self._forgotten: list[Forget] = []
-        self._decision = Decision("")
+        self.decision = Decision("")
 
     @property
     def state(self) -> State:
@@ -115,13 +116,13 @@ class Dialogue:
                 self._execute(output)
                 continue
             if isinstance(output, Decision):
-                self._decision = output
+                self.decision = output
             self._operator.hear(output)
             if isinstance(output, Prompt):
                 for listener in self._listeners:
                     listener(output)
         if self._machine.state is State.ABORTED:
-            raise Abandoned(self._decision.why, self._decision.remedy)
+            raise Abandoned(self.decision.why, self.decision.remedy)
 
     def without_forgotten(self, recording: Recording) -> Recording:
         """Return the recording without the samples that the machine had dropped."""

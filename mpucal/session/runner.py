@@ -10,7 +10,7 @@ from typing import Any
 
 from ..chip.records import KEY, RESUMED
 from ..data import Recording, Sensor
-from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture
+from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture, SourceError
 from ..result.calibration import Calibration
 from .dialogue import Dialogue
 from .events import Connected, Fitted, Key, Prompt, Resumed, SourceEnded, Written
@@ -58,7 +58,7 @@ class Runner:
         self._open_next_part, self._start_worker, self._checking = open_next_part, start_worker, checking
         self._machine = Machine(plan, checking)
         self._dialogue = Dialogue(self._machine, operator, listeners, note, source.now_ns, late)
-        self._ended, self._samples = False, 0
+        self._ended, self._recording, self.samples = False, False, 0
         self.sensor: Sensor | None = None
 
     def measure(self) -> Recording:
@@ -94,8 +94,9 @@ class Runner:
 
         Raises
         ------
-        SourceError : the source failed before the board was turned.
+        SourceError : the source failed, or sent no samples for seconds.
         """
+        self._recording = True
         if self._plan.config.accel_only:
             return self._record_accel_alone(seconds)
         self._connect()
@@ -107,8 +108,13 @@ class Runner:
                 break
             self._poll()
             self._source.forget()
+        else:
+            # A sensor ended it by its silence, or a replay by its end.
+            if not self._ended:
+                self._stop_source()
+                raise SourceError(self._dialogue.decision.why, "check the wiring, and record again")
         self._stop_source()
-        return self._samples
+        return self.samples
 
     def calibrate(self, recording: Recording, fit: Callable[[Recording], Calibration]) -> Calibration:
         """Fit, and add the result of the verification; Abandoned if the person stopped it meanwhile."""
@@ -144,13 +150,13 @@ class Runner:
         with suppress(EndOfCapture):
             self.sensor = self._source.start()
             for samples in polled(self._source, seconds):
-                self._samples += len(samples)
+                self.samples += len(samples)
                 self._source.forget()
                 if self._operator.pressed():
                     break
             self._end_recording()
             self._source.stop()
-        return self._samples
+        return self.samples
 
     def _end_recording(self) -> None:
         """Write a key into the capture, so that a replay calibrates, or aborts where there is too little."""
@@ -186,7 +192,7 @@ class Runner:
             # A CaptureError is not caught: a capture that does not replay is not calibrated.
             self._source_ended(SourceEnded(f"{error.what}: {error.remedy}"), error)
         else:
-            self._samples += len(samples)
+            self.samples += len(samples)
             self._dialogue.arrive(samples)
 
     def _source_ended(self, event: SourceEnded, error: BusError | ChipError | None = None) -> None:
@@ -198,7 +204,7 @@ class Runner:
         self._ended = True
         if enough:
             return
-        if error is not None and self._dialogue.state not in (State.ROTATE, State.VERIFY):
+        if error is not None and (self._recording or self._dialogue.state not in (State.ROTATE, State.VERIFY)):
             raise error
         self._dialogue.feed(event)
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 NAMES = ("SIGTERM", "SIGHUP")
+REPLACED = (signal.SIG_DFL, signal.default_int_handler)
 
 
 @contextmanager
@@ -25,11 +26,9 @@ def interrupting() -> Iterator[None]:
             ended = True
             raise KeyboardInterrupt
 
-    # Windows has no SIGHUP; a signal that has a handler keeps it
+    # Windows has no SIGHUP; a signal that has another handler keeps it
     numbers = [
-        number
-        for name in NAMES
-        if (number := getattr(signal, name, None)) and signal.getsignal(number) is signal.SIG_DFL
+        number for name in NAMES if (number := getattr(signal, name, None)) and signal.getsignal(number) in REPLACED
     ]
     before = {number: signal.signal(number, interrupt) for number in numbers}
     try:

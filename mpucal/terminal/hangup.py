@@ -1,4 +1,4 @@
-"""Redirection of a session's output to a log when its terminal is closed (SIGHUP)."""
+"""Redirection of a command's output to a log when its terminal is closed (SIGHUP)."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def logging_after_hangup(log: Callable[[], Path], hung_up: Callable[[], None]) -
     def handle(_number: int, _frame: FrameType | None) -> None:
         # The shell and the kernel may both send the signal.
         signal.signal(number, signal.SIG_IGN)
-        hung_up()
         _redirect(on_terminal, log())
+        hung_up()
 
     before = signal.signal(number, handle)
     try:

@@ -25,7 +25,7 @@ from mpucal.batch.many import local_client, run_batch
 from mpucal.batch.page import make_page
 from mpucal.batch.row import COLUMNS, Settings, make_row
 from mpucal.batch.table import escape_cell, make_table, write_tables
-from mpucal.errors import OutputError, SourceError
+from mpucal.errors import OutputError
 from mpucal.result.calibration import Calibration
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -293,13 +293,28 @@ def test_the_page_names_what_is_odd(tmp_path):
     assert 0.9 < float(rms) < 1.1
 
 
-def test_workers_that_are_ended_while_they_start_are_told(distributed, monkeypatch):
-    def cluster(**_):
-        raise RuntimeError("Nanny failed to start.")
+def test_workers_that_are_killed_while_they_start_are_told(tmp_path, capfd):
+    import dask
 
-    monkeypatch.setattr(distributed, "LocalCluster", cluster)
-    with pytest.raises(SourceError, match="ended while they started"), local_client(1):
-        pass
+    (deadly := tmp_path / "deadly.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n")
+    words = ["batch", str(FIXTURES / "sessions" / "mpu6050.mcap"), "-o", str(tmp_path / "fleet"), "--workers", "1"]
+    with dask.config.set({"distributed.worker.preload": [str(deadly)]}):
+        assert call(words) == 3
+    assert re.fullmatch(
+        r"mpucal: the workers were ended while they started \(.*\): free memory .*\n", capfd.readouterr().err
+    )
+
+
+def test_a_batch_that_is_ended_while_its_workers_start_leaves_no_trace(tmp_path):
+    (deadly := tmp_path / "deadly.py").write_text(
+        "import os, signal, time\nos.kill(os.getppid(), signal.SIGTERM)\ntime.sleep(99)\n"
+    )
+    words = [sys.executable, "-m", "mpucal", "batch", str(FIXTURES / "sessions" / "mpu6050.mcap"), "--workers", "1"]
+    preload = {"DASK_DISTRIBUTED__WORKER__PRELOAD": json.dumps([str(deadly)])}
+    done = subprocess.run(
+        [*words, "-o", "fleet"], cwd=tmp_path, env=os.environ | preload, stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert (done.returncode, done.stderr.strip()) == (4, "mpucal: interrupted.")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The command line of a session that stops at a step until it may go on, so that what happens there happens in no race.
+"""The command line of a measurement that stops at a step until it may go on, so that what happens there is no race.
 
     held.py STEP CALL WORDS...
 
@@ -11,11 +11,12 @@ import time
 from itertools import count
 from pathlib import Path
 
-from mpucal.__main__ import run
+from mpucal.__main__ import main
+from mpucal.allan import NoiseMeter
 from mpucal.session.lay_flat import LayFlat
 from mpucal.session.rotate import Rotate
 
-STEPS = {"flat": LayFlat, "rotate": Rotate}
+STEPS = {"flat": LayFlat, "rotate": Rotate, "noise": NoiseMeter}
 ASK_EVERY_S = 0.01
 
 
@@ -34,4 +35,4 @@ def hold(step, call):
 
 if __name__ == "__main__":
     hold(STEPS[sys.argv[1]], int(sys.argv[2]))
-    sys.exit(run(sys.argv[3:]))
+    main(sys.argv[3:])

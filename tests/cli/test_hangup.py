@@ -1,5 +1,6 @@
-"""A terminal that goes away in the middle of a session, as a dropped ssh connection makes it."""
+"""A terminal that goes away in the middle of a session or measurement, as a dropped ssh connection makes it."""
 
+import json
 import os
 import pty
 import select
@@ -13,23 +14,23 @@ import pytest
 from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 
+SESSION = ("session", "--rate", "25", "--target", "quick", "-o", "board")
 HELD = str(Path(__file__).with_name("held.py"))
 # Time that a busy machine may need for a step of a second or two.
 PATIENCE_S = 300.0
 
 
 class OnATerminal:
-    """A session as the foreground of a terminal of its own, held at a step, or run as it is."""
+    """A command as the foreground of a terminal of its own, held at a step, or run as it is."""
 
-    def __init__(self, folder, *options, held=None):
+    def __init__(self, folder, *options, held=None, command=SESSION):
         self._folder = folder
         self.pid, self.terminal = pty.fork()
         if not self.pid:
             os.chdir(folder)
             os.environ["TERM"] = "xterm"
             program = ["-m", "mpucal"] if held is None else [HELD, *map(str, held)]
-            words = ["session", "--rate", "25", "--target", "quick", "-o", "board", *options]
-            os.execv(sys.executable, [sys.executable, *program, *words])
+            os.execv(sys.executable, [sys.executable, *program, *command, *options])
         self._until = time.monotonic() + PATIENCE_S
         self._seen = b""
         self.code = None
@@ -61,8 +62,8 @@ class OnATerminal:
 def on_a_terminal(tmp_path):
     begun = []
 
-    def call(*options, held=None):
-        begun.append(OnATerminal(tmp_path, *options, held=held))
+    def call(*options, **more):
+        begun.append(OnATerminal(tmp_path, *options, **more))
         return begun[-1]
 
     yield call
@@ -108,3 +109,12 @@ def test_a_session_whose_terminal_is_closed_while_it_waits_for_its_page_goes_on(
     os.close(session.terminal)
     assert session.exit_code() == 0
     assert "The calibration is good." in (tmp_path / "board" / "session.log").read_text()
+
+
+def test_a_measurement_of_noise_keeps_its_result(on_a_terminal, tmp_path):
+    measurement = on_a_terminal("--bus", "sim:hand=still", held=("noise", 5), command=("noise", "-o", "noise"))
+    measurement.read_until_held()
+    os.close(measurement.terminal)
+    measurement.let_go()
+    assert measurement.exit_code() == 0
+    assert json.loads((tmp_path / "noise" / "noise.json").read_text())["seconds"] > 3.0

@@ -55,7 +55,8 @@ extern EEPROMClass EEPROM;
 """
 # as avr-libc has them for an ATmega4809
 AVR = {
-    "avr/io.h": "#pragma once\n#define E2END 0xFF\nstruct { unsigned char CTRLA; } WDT;\n"
+    "avr/io.h": "#pragma once\n#define EEPROM_START (0x1400)\n#define E2END (EEPROM_START + 0xFF)\n"
+    "struct { unsigned char CTRLA; } WDT;\n"
     "#define WDT_PERIOD_2KCLK_gc 9\n#define _PROTECTED_WRITE(reg, value) ((reg) = (value))\n",
     "avr/wdt.h": "#pragma once\n#include <avr/io.h>\n#define wdt_reset()\n",
 }

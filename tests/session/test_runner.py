@@ -10,7 +10,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.chip.records import SessionEvent
 from mpucal.data import Recording, Samples, Sensor
-from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture, NoAnswer, OutputError
+from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture, NoAnswer, OutputError, SourceError
 from mpucal.result.calibration import Calibration
 from mpucal.session import runner as module
 from mpucal.session.events import Decision, Key, Prompt, PromptKind
@@ -63,6 +63,18 @@ class Source:
 
     def stop(self):
         self.stops += 1
+
+
+class Silent(Source):
+    """Sends no samples from the poll `first` on."""
+
+    def __init__(self, first):
+        super().__init__({300: EndOfCapture()})
+        self._first = first
+
+    def poll(self):
+        samples = super().poll()
+        return samples if self.polls < self._first else Samples.empty()
 
 
 class Person:
@@ -296,6 +308,21 @@ def test_recording_ends_when_asked_and_leaves_the_key_that_replays_it(person, se
 def test_recording_ends_with_the_source():
     source = Source({300: EndOfCapture()})
     assert runner_of(source, plan=Plan(until_end=True)).record(None) == 299 * POLL
+
+
+@pytest.mark.parametrize("first", [20, 150], ids=["flat", "rotating"])
+def test_recording_of_a_source_that_falls_silent_is_an_error(first):
+    runner = runner_of(Silent(first), plan=Plan(until_end=True))
+    with pytest.raises((SourceError, Abandoned), match="the sensor sent no samples for 5 s"):
+        runner.record(None)
+    assert runner.samples == (first - 1) * POLL
+
+
+def test_recording_of_a_source_that_fails_is_an_error():
+    runner = runner_of(Source({150: NOT_THERE}), plan=Plan(until_end=True))
+    with pytest.raises(NoAnswer):
+        runner.record(None)
+    assert runner.samples == 149 * POLL
 
 
 def test_poses_of_the_turning_shown_again_verify_nothing():

@@ -11,11 +11,13 @@ from datetime import UTC, datetime, time
 from decimal import Decimal, InvalidOperation
 from io import StringIO
 from itertools import pairwise, zip_longest
+from pathlib import Path
 
 import numpy as np
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
+from ..budget import check_size
 from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
 from .units import find_unit
 
@@ -30,6 +32,9 @@ MOST_NUL = 0.1
 COMMENT = ("#", "%", "//")
 # the share of lines that may be damaged
 MOST_BAD = 0.01
+# Bytes that a line takes at least while it is read, in CPython on 64 bits: a list (56), its reference and line number
+# (16 and 32), a Decimal of its time (104 and 8). A cell takes a reference and a float64.
+LINE, CELL = 216, 16
 # exponents of numbers beyond this would take all memory as integers
 MOST_DIGITS = 40
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -263,6 +268,7 @@ def _is_number(cell: str) -> bool:
 
 def _read(text: str, name: str, header: list[str], first: int, separator: str | None) -> TextTable:
     """Return the table below the first `first` lines."""
+    check_size(Path(name), text.count("\n") * (LINE + CELL * len(header)))
     rows, lines = [], []
     source = StringIO(text, newline="")
     for _ in range(first):

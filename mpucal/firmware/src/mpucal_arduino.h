@@ -19,7 +19,12 @@
 
 #if defined(__AVR__)
 #include <avr/io.h>
-#if E2END + 1 >= MPUCAL_EEPROM_AT + MPUCAL_SLOTS_BYTES
+#ifdef EEPROM_START /* of an EEPROM in the data space, as an ATmega4809 has; E2END is an address there, too */
+#define MPUCAL_E2START EEPROM_START
+#else
+#define MPUCAL_E2START 0
+#endif
+#if E2END + 1 - MPUCAL_E2START >= MPUCAL_EEPROM_AT + MPUCAL_SLOTS_BYTES
 #define MPUCAL_IN_EEPROM
 #endif
 #elif defined(ESP32) || defined(ESP8266) || (defined(ARDUINO_ARCH_RP2040) && !defined(ARDUINO_ARCH_MBED))
