@@ -18,6 +18,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 
 # Programs of tools/ are tested, too. The folder comes last: the sources of mpucal in it have no kernel.
 if str(Path(__file__).parents[1]) in sys.path:
@@ -52,6 +53,10 @@ PATIENT = {"deadline": None, "database": None, "suppress_health_check": QUIET}
 settings.register_profile("gate", derandomize=True, **PATIENT)
 settings.register_profile("search", print_blob=True, **PATIENT)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))
+if settings.get_current_profile_name() == "gate":
+    # Hypothesis draws numbers and texts of the project's modules, too: of those loaded so far, and which these are
+    # depends on the tests that a worker ran before.
+    providers._get_local_constants = lambda: providers._local_constants
 
 # some of what tests import; a slice of them needs less
 NEEDED = ("jsonschema", "matplotlib", "mypy", "polars", "pyarrow", "pymavlink", "rosbags", "yaml")
