@@ -16,6 +16,7 @@ from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from tools.lab import campaign_worlds as worlds
+from tools.processes import quick
 
 DAY_NS = 86_400 * 10**9
 
@@ -34,7 +35,7 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
         world.moments.add(at_s, lambda stopped_s=stopped_s: pass_by(world, stopped_s))
     days = iter(range(1, 1_000_000))
     words = ["--mavlink", "sim:seed=3,imus=1", "--rate", "50", "--target", "quick", "--no-write"]
-    with world.opened(), patch("time.time_ns", lambda: time_ns() + (-1) ** next(days) * DAY_NS):
+    with world.opened(), quick(), patch("time.time_ns", lambda: time_ns() + (-1) ** next(days) * DAY_NS):
         code = run(["session", *words, "-o", str(tmp_path / "board"), "--yes"])
     said = capsys.readouterr().err
     assert code == 0, said
@@ -51,21 +52,9 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
 def test_a_chip_is_turned_on_after_a_stop(tmp_path, capsys, kind, stopped_s):
     world = worlds.World(getattr(worlds, kind))
     world.moments.add(30.0, lambda: world.bus._clock.spend(round(stopped_s * 1e9)))
-    with world.opened():
-        code = run(
-            [
-                "session",
-                "--bus",
-                "sim:seed=3",
-                "--rate",
-                "25",
-                "--target",
-                "quick",
-                "-o",
-                str(tmp_path / "board"),
-                "--yes",
-            ]
-        )
+    with world.opened(), quick():
+        words = ["--bus", "sim:seed=3", "--rate", "25", "--target", "quick", "--yes"]
+        code = run(["session", *words, "-o", str(tmp_path / "board")])
     said = capsys.readouterr().err
     assert code == 0, said
     assert "no samples" not in said

@@ -10,8 +10,8 @@ from tools import programs
 
 TOOLS = Path(programs.__file__).parent
 FOLDERS = ("attack", "bench", "lab", "make")
-# they load what an extra of their own brings, or replace the compiled modules
-APART = {"__main__", "sanitized", "fuzz_kernel", "syscalls", "syscalls_commands"}
+# they load what an extra of their own brings, replace the compiled modules, or are loaded by mkdocs in test_site.py
+APART = {"__main__", "sanitized", "fuzz_kernel", "syscalls", "syscalls_commands", "site_hooks"}
 
 
 def test_every_program_loads_and_says_what_it_is():
