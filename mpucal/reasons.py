@@ -525,12 +525,6 @@ KINDS: Mapping[str, Kind] = {
                 " acceleration or the gyroscope's scale factors",
                 "use --model hand, turn slowly, and hold the board still often",
             ),
-            "pauses": Sentence(
-                "the orientations in which the board was still contradict each other: |a| differs from gravity by"
-                " {magnitude:.2g} m/s^2, and gravity carried by the gyroscope misses by {degrees:.1f} deg",
-                "check that the sensor is firmly fixed to the board, hold the board still when you pause, and turn more"
-                " slowly",
-            ),
             "change": Sentence(
                 "the sensor was not the same before {begin:.0f} s and after {end:.0f} s: what parts of the recording"
                 " say of it differs by more than noise",

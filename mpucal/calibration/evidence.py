@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
-from ..rests.intervals import RestFinder, cut_runs, statistics
+from ..rests.intervals import RestFinder, statistics
 from ..rests.windows import WINDOW_S
 from .fit import Fit
 from .parameters import ACCELEROMETER
@@ -28,19 +28,7 @@ CLEARLY = 3.0  # ratio of misses above which another unit or range is the right 
 DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
-# Fewer rests cannot contradict each other; pieces of so many seconds are compared instead.
-FEWEST_RESTS, PIECE_S = 3, 3.0
-
-
-class Agreement(NamedTuple):
-    """Agreement of the calibrated rests with gravity and, by the gyroscope, with each other.
-
-    magnitude_rms : m/s^2, of |a| - g.
-    miss : rad, median angle from gravity as carried from the rest before; NaN where no two are near enough in time.
-    """
-
-    magnitude_rms: float
-    miss: float
+FEWEST_RESTS = 3  # fewer cannot contradict each other
 
 
 @dataclass(frozen=True)
@@ -153,32 +141,6 @@ class Evidence:
         r = self.recording
         dt = r.t[first:last] - r.t[first - 1 : last - 1]
         return _Turn(before, dt[:, None] * (r.gyr[first:last] - flat.b_omega), after)
-
-    @cached_property
-    def agreement(self) -> Agreement | None:
-        """Agreement of the rests under the fit, or of pieces of them where they are few; None of less than three."""
-        fit, flat, r = self.fit, self.flat, self.recording
-        if fit is None or flat is None or self.calibrated is None:
-            return None
-        runs = RestFinder(r, flat).typical()
-        if len(runs) < FEWEST_RESTS:
-            runs = cut_runs(runs, round(PIECE_S * r.rate_hz))
-        if len(runs) < FEWEST_RESTS:
-            return None
-        rests, bias = statistics(self.calibrated, runs)[0], statistics(r.gyr, runs)[0]
-        misses = []
-        for k in range(len(runs) - 1):
-            a, b = runs[k][1] - 1, runs[k + 1][0]
-            if r.t[b] - r.t[a] > LONGEST_TURN_S or self.model == "static":
-                continue
-            dt, there = np.diff(r.t[a : b + 1])[:, None], _units(rests[k + 1][None])[0]
-            # The two rests' own rates know a drift; but a turn about the vertical looks like rest to them, and then the
-            # estimated bias is right.
-            rates = [r.gyr[a:b] - b_omega for b_omega in (0.5 * (bias[k] + bias[k + 1]), fit.b_omega)]
-            carried = [turned(-dt * (rate @ fit.K.T)) @ rests[k] for rate in rates]
-            misses.append(float(np.arccos(np.clip(_units(np.array(carried)) @ there, -1.0, 1.0)).min()))
-        magnitude = np.linalg.norm(rests, axis=1) - self.gravity
-        return Agreement(float(np.sqrt(np.mean(magnitude**2))), float(np.median(misses)) if misses else np.nan)
 
 
 class _Turn(NamedTuple):

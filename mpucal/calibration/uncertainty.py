@@ -88,11 +88,6 @@ class UncertaintyClaim:
     errors: Sequence[float] = ()
 
     @property
-    def inflation(self) -> float:
-        """Claimed uncertainty as a multiple of the model's, 1 or more."""
-        return float(np.hypot(self.floored, max(self.errors, default=0.0))) / self.model
-
-    @property
     def worst(self) -> Explanation | None:
         """Explanation that adds most to the uncertainty; None where all of them add less than the model has."""
         most = max(self.errors, default=0.0)

@@ -129,12 +129,6 @@ def statistics(values: Vector, runs: Intervals) -> tuple[Vector, Vector]:
     return _kernel.statistics(np.ascontiguousarray(values), np.ascontiguousarray(runs, np.int64))
 
 
-def cut_runs(runs: Intervals, n: int) -> Intervals:
-    """Cut the runs into pieces (m, 2) of n samples each, without an incomplete last one."""
-    pieces = [(at, at + n) for first, last in runs.tolist() for at in range(first, last - n + 1, n)]
-    return np.array(pieces, np.intp).reshape(-1, 2)
-
-
 def _windows(recording: Recording, n: int) -> Spreads | None:
     if len(recording) < n:
         return None

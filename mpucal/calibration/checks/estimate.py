@@ -13,15 +13,9 @@ from ..uncertainty import MOST_NIS
 
 # Claimed uncertainty, 1 sigma, of a good and of a usable calibration: errors above 0.1 m/s^2 are then rare.
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
-BY_CHANCE = 1.5  # inflation of the model's uncertainty up to which parts differ by chance
-RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)  # disagreement of rests that any recording may show
-# Rests disagree beyond so many predicted standard deviations, and by far beyond as many times RESTS_*.
-MOST_STDS = 5.0
 SLOW_HZ = 20.0  # at a lower sample rate, a hand turns too much from sample to sample
 # Errors of readings by a change of the bias or of the mount: smaller ones are not reported, larger ones refused.
 LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "scale": 0.004, "mount": 0.02}, 0.2
-# Inflation, and error [m/s^2], above which parts of the recording contradict each other.
-DISAGREE, DISAGREE_MPS2 = 4.0, 0.02
 
 
 def few_orientations(e: Evidence) -> Reason | None:
@@ -44,7 +38,7 @@ def _model_rms(e: Evidence) -> float | None:
     """Return the uncertainty [m/s^2] that more orientations would reduce; None where D is unusable."""
     if e.uncertainty is None:
         return None
-    return e.uncertainty.rms_mps2 if e.claim is None or e.claim.inflation < BY_CHANCE else e.claim.floored
+    return e.uncertainty.rms_mps2 if e.claim is None or e.claim.worst is None else e.claim.floored
 
 
 def tilted_only(e: Evidence) -> Reason | None:
@@ -64,24 +58,15 @@ def not_converged(e: Evidence) -> Reason | None:
 
 
 def inconsistent(e: Evidence) -> Reason | None:
-    """Find data that the model does not explain: innovations beyond white noise, rests that contradict the estimate."""
+    """Find data that the model does not explain: innovations beyond white noise."""
     if e.fit is None or e.uncertainty is None:
         return None
-    # A robust model leaves outliers in its innovations: only the others are judged by them.
-    if e.model != "hand" and e.fit.nis > MOST_NIS:
-        after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
-        refuse = _is_useless(e) or not abs(after / e.gravity - 1.0) < 0.05
-        return reason("inconsistent", "innovations", refuse, nis=e.fit.nis)
-    # Where every sample is explained, so are the rests.
-    if e.model in ("accel", "imu") or e.agreement is None:
+    # A robust model leaves outliers in its innovations: its parts judge it.
+    if e.model == "hand" or not e.fit.nis > MOST_NIS:
         return None
-    magnitude, miss = e.agreement.magnitude_rms, e.agreement.miss
-    too_long = magnitude > max(RESTS_MPS2, MOST_STDS * e.uncertainty.magnitude_mps2)
-    too_far = miss > max(RESTS_RAD, MOST_STDS * e.uncertainty.direction_rad)
-    if not (too_long or too_far):
-        return None
-    by_far = magnitude > MOST_STDS * RESTS_MPS2 or miss > MOST_STDS * RESTS_RAD
-    return reason("inconsistent", "pauses", by_far, magnitude=magnitude, degrees=np.rad2deg(miss))
+    after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
+    refuse = _is_useless(e) or not abs(after / e.gravity - 1.0) < 0.05
+    return reason("inconsistent", "innovations", refuse, nis=e.fit.nis)
 
 
 def changed_midway(e: Evidence) -> Reason | None:
@@ -122,9 +107,8 @@ def parts_disagree(e: Evidence) -> Reason | None:
         return None
     if any(_change_of(e, what) for what in LEAST_CHANGE_MPS2) or (_is_explained(e) and not _is_useless(e)):
         return None
-    rms, error = e.uncertainty.rms_mps2, e.claim.error(worst.hypothesis.kind)
-    too_large = rms > GOOD_RMS_MPS2 >= e.claim.floored
-    if not too_large and not (e.claim.inflation > DISAGREE and error > DISAGREE_MPS2):
+    rms = e.uncertainty.rms_mps2
+    if not rms > GOOD_RMS_MPS2 >= e.claim.floored:
         return None
     if worst.hypothesis.kind == "side":
         if e.recording.rate_hz < SLOW_HZ:
