@@ -160,10 +160,8 @@ class Runner:
 
     def _end_recording(self) -> None:
         """Write a key into the capture, so that a replay calibrates, or aborts where there is too little."""
-        if self._dialogue.state is State.ROTATE:
-            self._dialogue.press(Key.ENOUGH)
-        else:
-            self._note(KEY, self._source.now_ns(), {KEY: Key.ABORT.value})
+        key = Key.ENOUGH if self._dialogue.state is State.ROTATE else Key.ABORT
+        self._note(KEY, self._source.now_ns(), {KEY: key.value})
 
     def _connect(self) -> None:
         try:
