@@ -1,4 +1,4 @@
-"""`mpucal doctor`: examine a chip and its bus, and print the findings on one page."""
+"""`mpucal doctor`: examine a chip and its bus, or a vehicle, and print the findings on one page."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from .. import __version__
 from ..doctor.finding import Finding, Mark
 from ..doctor.page import document, text
 from ..errors import SourceError, UsageError
-from ..session.lay_flat import put_down
+from ..origin import Origin
+from ..session.lay_flat import PUT_DOWN, STAND, put_down
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
+from .destination import interrupted_writes
 from .options import Finite, check_gyroscope, check_source, source_options
 from .person import say
 
@@ -31,8 +33,9 @@ EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus si
 def command(as_json: bool, seconds: float, conformance: bool, **options: Any) -> int:
     """Examine what is on a bus, which chip it really is and whether it works as specified; for a bug report.
 
-    Keep the board still. The chip is reset; its offset registers are restored afterwards. Exit code 3: a fault was
-    found.
+    Keep the board still. The chip is reset; its offset registers are restored afterwards. Of a vehicle (--mavlink), the
+    link, the streams, its state and what a write would change are examined, and nothing is written. Exit code 3: a
+    fault was found.
     """
     kind = check_source(click.get_current_context())
     value = options[kind.option.name]
@@ -69,6 +72,8 @@ def _conformance(options: Mapping[str, Any]) -> Iterator[Finding]:
 
 
 def _examine(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:
+    for left in interrupted_writes(kind, options):
+        yield Finding("earlier write", Mark.NOTE, left)
     if kind.host:
         yield from resolve_name(kind.host)(options[kind.option.name])
     try:
@@ -77,5 +82,7 @@ def _examine(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> It
         yield Finding.failed("bus", error)
         return
     check_gyroscope(source.plan.config)
-    put_down(source.listeners, say)
+    # A vehicle is told over its link, once that is locked.
+    of_vehicle = source.origin is Origin.VEHICLE
+    put_down(() if of_vehicle else source.listeners, say, STAND if of_vehicle else PUT_DOWN)
     yield from resolve_name(kind.doctor)(source, seconds)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..chip.clock import RATE_TOLERANCE
 from ..chip.families import Family
-from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from .dead_axes import dead_axes, live_axes
 from .finding import Finding, Mark
 from .noise import is_trembling, noise_density
@@ -29,7 +29,7 @@ USUAL_C = (-10.0, 70.0)
 def examine_stream(recording: Recording, nominal_hz: float, seconds: float, family: Family | None) -> Iterator[Finding]:
     """Examine `seconds` of samples at rest; family : None if the data sheet is not known."""
     if recording.sensor.clock_ppm is not None:
-        yield _clock(recording.sensor.clock_ppm, float(recording.sensor.clock_std or np.nan))
+        yield examine_clock("bridge's clock", recording.sensor.clock_ppm, float(recording.sensor.clock_std or np.nan))
     yield _rate(recording, nominal_hz)
     yield _losses(recording, seconds)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
@@ -47,20 +47,21 @@ def examine_stream(recording: Recording, nominal_hz: float, seconds: float, fami
         noise_dps = noise_density(gyr[:, gyr_lives], hz)
         yield _noise("gyroscope noise", noise_dps, family.gyro_noise_dps, "dps_rthz", "deg/s/√Hz")
     if acc_lives.all():
-        yield _gravity(recording)
+        yield examine_gravity("at rest", recording.acc.mean(0))
     if family is not None:
         yield _zero_rate(gyr.mean(0).tolist(), family.zero_rate_dps)
     if np.isfinite(recording.temperature_c).any():
         yield _temperature(float(np.nanmean(recording.temperature_c)))
 
 
-def _clock(ppm: float, std: float) -> Finding:
+def examine_clock(topic: str, ppm: float, std: float) -> Finding:
+    """Examine the rate error of a clock that is not this computer's, and its relative standard deviation."""
     what = f"{ppm:+.0f} ppm against this computer's (1 sigma {std * 1e6:.0f})"
     data = {"ppm": ppm, "std_ppm": std * 1e6}
     remedy = "nothing has to be done: times are corrected for that"
     if std * 1e6 > OFF_PPM:
         remedy = "observe for longer (--seconds 30): its rate is not known yet"
-    return Finding.check("bridge's clock", max(abs(ppm), std * 1e6) <= OFF_PPM, what, remedy, data)
+    return Finding.check(topic, max(abs(ppm), std * 1e6) <= OFF_PPM, what, remedy, data)
 
 
 def _rate(recording: Recording, nominal_hz: float) -> Finding:
@@ -114,10 +115,11 @@ def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str
     return Finding.check(topic, share <= NOISY, what, remedy, data, Mark.NOTE if share <= BROKEN else Mark.BAD)
 
 
-def _gravity(recording: Recording) -> Finding:
-    g = float(np.linalg.norm(recording.acc.mean(0))) / STANDARD_GRAVITY_MPS2
+def examine_gravity(topic: str, mean: Vector, more: str = "") -> Finding:
+    """Examine the mean (3,) [m/s^2] of an accelerometer at rest; `more` is said after it."""
+    g = float(np.linalg.norm(mean)) / STANDARD_GRAVITY_MPS2
     remedy = "outside the data sheet's scale factor and bias; a calibration corrects it if it is constant"
-    return Finding.check("at rest", abs(g - 1) <= FAR_FROM_G, f"|a| is {g:.3f} g", remedy, {"g": g})
+    return Finding.check(topic, abs(g - 1) <= FAR_FROM_G, f"|a| is {g:.3f} g{more}", remedy, {"g": g})
 
 
 def _zero_rate(dps: list[float], limit_dps: float) -> Finding:

@@ -207,6 +207,7 @@ SOURCES = [
         origin=Origin.VEHICLE,
         options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
+        doctor="mpucal.doctor.vehicle:examine_vehicle",
         found="mpucal.sources.bridge.port_errors:autopilots",
     ),
     SourceKind(
@@ -219,6 +220,7 @@ SOURCES = [
         options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
         title="simulated vehicle",
+        doctor="mpucal.doctor.vehicle:examine_vehicle",
     ),
     SourceKind(
         what="the replay of a capture",

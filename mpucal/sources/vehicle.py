@@ -13,7 +13,7 @@ from ..chip.config import RateOnlyConfig
 from ..chip.records import LATE, SessionEvent
 from ..data import Recording
 from ..errors import CaptureError, EndOfCapture, LinkError, UsageError
-from ..mavlink.link import OWN_SYSTEM, Link
+from ..mavlink.link import OWN_SYSTEM, Link, Recorder
 from ..mavlink.log import read_log
 from ..mavlink.prompts import encode_prompt
 from ..mavlink.recorded_source import RecordedSource
@@ -104,8 +104,8 @@ class OpenedVehicle:
                 notes.keep(END, 0, {})
 
     @contextmanager
-    def connected(self, say: Say) -> Iterator[Link]:
-        """Lock a link to the vehicle, without recording it.
+    def connected(self, say: Say, record: Recorder = lambda _t_ns, _packet: None) -> Iterator[Link]:
+        """Lock a link to the vehicle, whose packets only `record` gets.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class OpenedVehicle:
         if self.replay is not None:
             raise UsageError("a .tlog is not a vehicle that can be written to", "give the vehicle's --mavlink URL")
         with closing(self.transport):
-            link = self.link = Link(self.transport, lambda _t_ns, _packet: None, self.key, self.own_system)
+            link = self.link = Link(self.transport, record, self.key, self.own_system)
             lock_to_vehicle(link, self.system, say)
             yield link
 

@@ -22,6 +22,8 @@ LSB = np.array([[ACC_LSB_MPS2], [GYRO_LSB_RAD_S]])
 SCALED_IMUS = tuple(MESSAGE_ID[name] for name in SCALED)
 RAW_IMU, HIGHRES_IMU = MESSAGE_ID[RAW], MESSAGE_ID[HIGHRES]
 ACCELEROMETER = 2
+# 4.7.0, a development version
+VERSION, COMMIT = 0x04_07_00_00, b"5117ed00"
 ATTITUDE = 30
 # An estimator learns nothing of a sensor that reads less than LEAST_MPS2, as without a scale.
 LEARN_S, LARGEST_BIAS_MPS2, LEAST_MPS2 = 15.0, 0.4, 1.0
@@ -172,6 +174,10 @@ class Firmware(ABC):
         acc, gyr = self.corrected[0]
         values = [*(acc - bias).tolist(), *(gyr - gyro_bias).tolist(), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.temperature_c]
         return dialect().MAVLink_highres_imu_message(t_us, *values, 0x103F, 0)
+
+    def version(self) -> Message:
+        """Return AUTOPILOT_VERSION."""
+        return dialect().MAVLink_autopilot_version_message(0, *[VERSION] * 3, 0, COMMIT, COMMIT, COMMIT, 0, 0, 0)
 
     def sys_status(self) -> Message:
         """Return SYS_STATUS, whose health holds the result of the pre-arm check."""

@@ -12,6 +12,7 @@ from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
 from ...mavlink.ftp import Payload
+from ...mavlink.link import OWN_COMPONENT
 from ...mavlink.parameters.encoding import from_wire, name_bytes, to_wire
 from ...mavlink.prearm import ARMED
 from ...mavlink.prompts import ReceivedPrompt, decode_prompt
@@ -38,7 +39,7 @@ TYPES = {"plane": 1, "copter": 2, "rover": 10}
 REBOOT_US = 2 * S_US
 # param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 REBOOT = 1
-SECOND_STATION_HZ = 4
+SECOND_STATION, SECOND_STATION_HZ = 255, 4
 
 
 class Sent(NamedTuple):
@@ -235,6 +236,9 @@ class SimulatedVehicle:
         return result
 
     def _request_message(self, message: Message) -> int:
+        if int(message.param1) == dialect().MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            self._send(self.firmware.version())
+            return int(dialect().MAV_RESULT_ACCEPTED)
         wanted = self._message(int(message.param1))
         if wanted is None:
             return int(dialect().MAV_RESULT_FAILED)
@@ -287,7 +291,10 @@ class SimulatedVehicle:
         self._silent_until_us = math.inf
 
     def obey_second_station(self) -> None:
-        """Set the rates that another ground station requests by default."""
+        """Set the rates that another ground station requests by default, and pass its HEARTBEAT on."""
+        m = dialect()
+        station = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3)
+        self._out.append(Sent(self._now_us, bytes(station.pack(m.MAVLink(None, SECOND_STATION, OWN_COMPONENT)))))
         self._set_intervals(self.firmware.group(SECOND_STATION_HZ))
 
     def _file_transfer_protocol(self, message: Message) -> None:
