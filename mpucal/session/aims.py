@@ -30,12 +30,14 @@ class Aim:
     ----------
     target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
     longest_s : time limit of the turning [s]. verify : number of new orientations for the verification.
+    sides : orientations that are enough for a vehicle that is put down in each, in place of `least`; 0: they are not.
     """
 
     target: Target
     least: int
     longest_s: float
     verify: int
+    sides: int = 0
 
 
 AIMS: Mapping[str, Aim] = MappingProxyType(
@@ -48,13 +50,17 @@ AIMS: Mapping[str, Aim] = MappingProxyType(
 NORMAL = "normal"
 # A vehicle's samples are filtered, rounded, or taken at other times than they say: they need more orientations.
 LEAST_OF_VEHICLE = 14
+# Directions that point down on the six sides of a vehicle, as a pilot takes them: level, left, right, nose down, nose
+# up, back. One that rests on things needs no more, as no hand moves it, and one new orientation for its verification.
+SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1)], np.float64)
+VERIFY_PLACED = 1
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     """Return the aim of a target, one of AIMS; a vehicle's IMU needs more orientations for the normal one."""
     aim = AIMS[target]
     if target == NORMAL and sensor is not None and sensor.origin is Origin.VEHICLE:
-        return replace(aim, least=LEAST_OF_VEHICLE)
+        return replace(aim, least=LEAST_OF_VEHICLE, sides=len(SIDES))
     return aim
 
 

@@ -129,9 +129,9 @@ def _stand(axes: list[str], parts: Mapping[str, str]) -> str:
         case ["+Z"]:
             return "on its feet"
         case ["−Z"]:
-            return "upside down"
+            return "on its back"
         case ["+X" | "−X"]:
-            return f"{sides[0]} down"
+            return "nose down" if axes == ["+X"] else "nose up"
         case ["+Y" | "−Y"]:
             return f"on its {sides[0]}"
         case [*_, "+Z"]:

@@ -65,7 +65,14 @@ class Directions:
 
 
 class Coverage:
-    """Orientations that the board has paused in, passed, and rested in, long or short."""
+    """Orientations that the board has paused in, passed, and rested in, long or short.
+
+    Attributes
+    ----------
+    placed : True if nobody touched it in the pauses so far: it is put down in each orientation.
+    """
+
+    placed = False
 
     def __init__(self) -> None:
         self.paused, self.passed, self.rested = Directions(), Directions(), Directions(SAME_RAD)

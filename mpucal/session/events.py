@@ -412,11 +412,13 @@ class RequestFit:
     """Command to the session's owner: compute this fit of all samples so far; answer after `wait_s` of samples more.
 
     The answer always comes after the same number of samples, and is waited for if necessary, so that a replay equals
-    its session. KNOW and ADVISE are answered by Learnt, TRY by Tried, CHECK by Checked of the samples after the TRY.
+    its session. KNOW and ADVISE are answered by Learnt, TRY by Tried, CHECK by Checked of the samples after the TRY, in
+    which `of` new orientations are needed.
     """
 
     kind: FitKind
     wait_s: float
+    of: int = 0
 
 
 @dataclass(frozen=True)

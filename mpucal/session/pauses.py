@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..data import Samples, Vector
-from ..rests.limits import HAND
+from ..rests.limits import HAND, UNTOUCHED
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
 from .events import Caution, Countdown, Direction, Held, Output, Rested, Use, down_of
@@ -18,6 +19,9 @@ from .step import Step
 WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
+# A vehicle that is put down is left there for longer: no tremor moves its readings over the steps of its streams. The
+# newest windows show that nobody touches it.
+PLACED_S, NEWEST = 4.0, 2
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0
 # A check and a verification end after this time without a new orientation.
@@ -37,13 +41,15 @@ class Pause:
 
     Attributes
     ----------
-    acc : (3,) mean acceleration [m/s^2]. countdown : to the end of the hold; None once that is past.
+    acc : (3,) mean acceleration [m/s^2]. hold_s : time for which it is to be held, longer where nobody touches it.
+    countdown : to the end of the hold; None once that is past.
     """
 
     t_s: float
     seconds: float
     acc: Vector
     run: int
+    hold_s: float = HOLD_S
     countdown: Countdown | None = None
 
 
@@ -79,11 +85,11 @@ class PoseStep(Step):
 
     Parameters
     ----------
-    flat : the flat rest. hold_s : time for which each orientation is to be held.
+    flat : the flat rest. hold_s, placed_s : see PauseDetector.
     """
 
-    def __init__(self, flat: Rested, hold_s: float = HOLD_S) -> None:
-        self._pauses = PauseDetector(flat, hold_s)
+    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+        self._pauses = PauseDetector(flat, hold_s, placed_s)
         self._begun_s: float | None = None
         self._prompted_s = 0.0
         self._number = 0
@@ -108,10 +114,14 @@ class PauseDetector:
     Parameters
     ----------
     flat : the flat rest, which gives the gyroscope's bias. hold_s : time for which each orientation is to be held.
+    placed_s : the same where nobody touches the board; None: `hold_s`.
     """
 
-    def __init__(self, flat: Rested, hold_s: float = HOLD_S) -> None:
-        self._hold_s = hold_s
+    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+        self._hold_s, self._placed_s = hold_s, placed_s or hold_s
+        silent = np.zeros(3)
+        self._hands = Detector(UNTOUCHED, (silent, silent), bias=np.array(flat.gyr))
+        self._touched: deque[bool] = deque(maxlen=NEWEST)
         self._windows = Windows(WINDOW_S)
         self._stillness = Detector(HAND, bias=np.array(flat.gyr), learns=True)
         self._last_run: int | None = None
@@ -129,13 +139,14 @@ class PauseDetector:
         pauses: list[Pause] = []
         for window in self._windows.add(samples):
             sight = self._stillness.add(window)
+            self._touched.append(float(self._hands.shares(window).level) > 1.0)
             if self._last_run is None:
                 self._last_run = sight.run if isinstance(sight, Still) else -1
             if not isinstance(sight, Still) or sight.run <= self._last_run:
                 continue
-            remaining = None
-            if sight.seconds < self._hold_s + WINDOW_S - 1e-6:
-                remaining_s = max(self._hold_s - sight.seconds, 0.0)
-                remaining = Countdown(window.end_s, remaining_s, self._hold_s, paused=False)
-            pauses.append(Pause(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run, remaining))
+            hold_s, remaining = self._hold_s if any(self._touched) else self._placed_s, None
+            if sight.seconds < hold_s + WINDOW_S - 1e-6:
+                remaining = Countdown(window.end_s, max(hold_s - sight.seconds, 0.0), hold_s, paused=False)
+            acc = np.asarray(sight.acc)
+            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, hold_s, remaining))
         return pauses

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Samples, Vector
 from ..rests.windows import Windows
-from .aims import Aim, directions
+from .aims import SIDES, VERIFY_PLACED, Aim, directions
 from .boards import describe, describe_tilt
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
@@ -32,7 +32,7 @@ from .events import (
     down_of,
     triple,
 )
-from .pauses import HOLD_S, Pause, PoseStep, classify_use, countdown, held
+from .pauses import HOLD_S, PLACED_S, Pause, PoseStep, classify_use, countdown, held
 from .plan import Plan
 from .step import ENOUGH, End
 
@@ -70,9 +70,9 @@ class Rotate(PoseStep):
     """
 
     def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
-        super().__init__(flat)
+        asks = not (plan.tilt_only or plan.until_end)
+        super().__init__(flat, placed_s=PLACED_S if asks and aim.sides else None)
         self._aim, self._plan, self._coverage = aim, plan, coverage
-        self._least = TILTS if plan.tilt_only else aim.least
         self._passes = Windows(PASS_WINDOW_S, spread=False)
         acc = np.array(flat.acc)
         self._coverage.paused.add(acc)
@@ -124,15 +124,31 @@ class Rotate(PoseStep):
             return [*outputs, Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._prompted_s = knowledge.t_s
+            side = self._next_side()
             # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
             # even if the estimate takes up for down, as for a sensor whose axes are mirrored.
             down = np.array(knowledge.down)
-            if self._plan.tilt_only or knowledge.down == self.prompt.down:
+            if side is not None:
+                down = side
+            elif self._plan.tilt_only or knowledge.down == self.prompt.down:
                 others = self._directions @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)
                 down = self._coverage.paused.farthest_down(self._directions[others])
             self.prompt = self._prompt_for(down)
             outputs.append(self.prompt)
         return outputs
+
+    def _next_side(self) -> Vector | None:
+        """Return the next side to put a vehicle down on; None if no other is left, or if it is held in a hand."""
+        if not self._coverage.placed:
+            return None
+        left = (side for side in SIDES if not self._coverage.paused.near(-side))
+        return next((side for side in left if triple(side) != self.prompt.down), None)
+
+    @property
+    def _least(self) -> int:
+        if self._coverage.placed:
+            return self._aim.sides
+        return TILTS if self._plan.tilt_only else self._aim.least
 
     @property
     def wanted(self) -> Direction | None:
@@ -161,7 +177,9 @@ class Rotate(PoseStep):
             outputs.append(Seen(pause.t_s, len(self._coverage.paused), down_of(pause.acc), paused=True))
         if self._plan.until_end or self._requested or advised:
             return outputs
-        if pause.seconds >= HOLD_S - WAIT_S - 1e-6:
+        if pause.seconds >= pause.hold_s - WAIT_S - 1e-6:
+            first = len(self._coverage.paused) <= 2  # the flat rest, and this one
+            self._coverage.placed = pause.hold_s > HOLD_S and (self._coverage.placed or first)
             self._requested, self._advised_run, self._known_s = True, pause.run, pause.t_s
             outputs.append(RequestFit(FitKind.ADVISE, WAIT_S))
         return outputs
@@ -207,15 +225,19 @@ class Rotate(PoseStep):
                 return None
             left = max(left, math.ceil(taken * (1.0 - known) / known))
         # The orientation that is being turned to has begun when the last new one was found.
+        verify = VERIFY_PLACED if self._coverage.placed else self._aim.verify
         pace_s, since_s = (self._new_s - self._begun_s) / taken, t_s - self._new_s
         if since_s > LATE * pace_s:
             return None
-        return max((left + self._aim.verify) * pace_s - since_s, self._aim.verify * pace_s)
+        return max((left + verify) * pace_s - since_s, verify * pace_s)
 
     def _is_certain(self) -> bool:
         return self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _is_enough(self) -> bool:
+        if self._coverage.placed:
+            # Sides are not varied: they leave the angles between the axes to the gyroscope.
+            return len(self._coverage.paused) >= self._least and self._is_certain()
         if self._coverage.number < self._least or self._plan.tilt_only:
             return self._coverage.number >= self._least
         return self._coverage.varied and self._is_certain()

@@ -9,7 +9,7 @@ import numpy as np
 from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
-from .aims import Aim, directions, unseen_rad
+from .aims import VERIFY_PLACED, Aim, directions, unseen_rad
 from .boards import describe, describe_tilt
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
@@ -48,7 +48,7 @@ MOST_MORE = 2
 
 
 class Verify(PoseStep):
-    """Step that asks for `aim.verify` new orientations and compares the first calibration with them.
+    """Step that asks for `aim.verify` new orientations, or VERIFY_PLACED, and compares the first calibration with them.
 
     Parameters
     ----------
@@ -58,7 +58,8 @@ class Verify(PoseStep):
 
     def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         super().__init__(flat)
-        self._aim, self._plan, self._coverage = aim, plan, coverage
+        self._plan, self._coverage = plan, coverage
+        self._of = VERIFY_PLACED if coverage.placed else aim.verify
         self._directions = directions(down_of(np.array(flat.acc)), plan.tilt_only)
         self._refusal: Finished | None = None
         self._requested, self._more = False, MOST_MORE
@@ -88,7 +89,7 @@ class Verify(PoseStep):
             return outputs
         if self._number:
             self._requested = True
-            return [*outputs, RequestFit(FitKind.CHECK, CHECK_WAIT_S)]
+            return [*outputs, RequestFit(FitKind.CHECK, CHECK_WAIT_S, self._of)]
         not_shown = reason("verification_failed", "not_shown")
         self.checked = Checked((), None, not_shown)
         return [*outputs, Finished(not_shown.what)]
@@ -115,10 +116,10 @@ class Verify(PoseStep):
 
     def _check(self, checked: Checked) -> list[Output | Finished]:
         """Take the comparison with the new orientations."""
-        if checked.agrees is None and self._number >= self._aim.verify and self._more:
+        if checked.agrees is None and self._number >= self._of and self._more:
             # The fit has seen one of these orientations after all: another one replaces it.
             self._more, self._requested, self._begun_s = self._more - 1, False, None
-            self._number = self._aim.verify - 1
+            self._number = self._of - 1
             self.prompt = self._next(self.prompt)
             return [self.prompt]
         self.checked = checked
@@ -147,14 +148,14 @@ class Verify(PoseStep):
         self._coverage.paused.add(pause.acc)
         self._coverage.rested.add(pause.acc)
         self._number += 1
-        left_s = (self._aim.verify - self._number) * (pause.t_s - (self._begun_s or pause.t_s))
+        left_s = (self._of - self._number) * (pause.t_s - (self._begun_s or pause.t_s))
         self._begun_s = pause.t_s
         useful = "" if use is Use.TAKEN else ": not the one asked for, but useful"
-        text = f"held {self._number} of {self._aim.verify}{useful}"
-        progress = Progress(pause.t_s, self._number, self._aim.verify, text, left_s or None)
-        if self._number == self._aim.verify:
+        text = f"held {self._number} of {self._of}{useful}"
+        progress = Progress(pause.t_s, self._number, self._of, text, left_s or None)
+        if self._number == self._of:
             self._requested = True
-            return [held(pause, use), progress, RequestFit(FitKind.CHECK, CHECK_WAIT_S)]
+            return [held(pause, use), progress, RequestFit(FitKind.CHECK, CHECK_WAIT_S, self._of)]
         self.prompt = self._next(self.prompt)
         return [held(pause, use), progress, self.prompt]
 
@@ -180,5 +181,5 @@ class Verify(PoseStep):
             candidates = candidates[candidates @ np.array(last.down) < math.cos(DISTINCT_RAD)]
         down = self._coverage.rested.farthest_down(candidates)
         words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
-        number = f"{self._number + 1} of {self._aim.verify}"
+        number = f"{self._number + 1} of {self._of}"
         return Prompt(PromptKind.VERIFY, f"Verification {number}: {words}, then hold it still.", triple(down))

@@ -11,9 +11,9 @@ from mpucal.session.boards import BOARD, BOARDS, PLAIN, VEHICLE, describe, descr
     ("down", "words"),
     [
         ((0, 0, 1), {BOARD: "chip face down", VEHICLE: "on its feet"}),
-        ((0, 0, -1), {BOARD: "chip face up", VEHICLE: "upside down"}),
+        ((0, 0, -1), {BOARD: "chip face up", VEHICLE: "on its back"}),
         ((1, 0, 0), {BOARD: "on its right edge", VEHICLE: "nose down"}),
-        ((-1, 0, 0), {BOARD: "on its left edge", VEHICLE: "tail down"}),
+        ((-1, 0, 0), {BOARD: "on its left edge", VEHICLE: "nose up"}),
         ((0, -1, 0), {BOARD: "on its pin edge", PLAIN: "on its near edge", VEHICLE: "on its left side"}),
         ((0, -1, 1), {BOARD: "on its pin edge, chip tilted down", VEHICLE: "tilted onto its left side"}),
         ((1, 0, -1), {BOARD: "on its right edge, chip tilted up", VEHICLE: "upside down, tilted onto its nose"}),

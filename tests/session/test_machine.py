@@ -237,6 +237,39 @@ def test_prompts_speak_of_the_kind_of_board(board, options, sensor, lay, words):
     assert session.feed(board.still(10.6)).of(Prompt)[-1].text.startswith(words)
 
 
+def placed(make_board, tremor):
+    """A vehicle is put on its sides as it is asked for, by somebody who lets go of it (no tremor) or does not."""
+    board, session = make_board(), Session()
+    board.up = np.array([0.0, 0.0, -1.0])
+    session.machine = Machine(Plan())
+    session.said = session.machine.handle(Connected(Sensor(message="RAW_IMU")))
+    session.feed(board.still(10.6))
+    session.overall = 1.0
+    held = []
+    while session.state is State.ROTATE and len(held) < 6:
+        held.append(session.of(Prompt)[-1].text.split(": ")[1].split(" (")[0])
+        session.feed(board.turn_to(-np.array(session.of(Prompt)[-1].down)))
+        session.feed(board.shaken(4.6, tremor) if tremor else board.still(4.6))
+    return session, held
+
+
+def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board):
+    session, held = placed(make_board, 0.0)
+    assert held == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
+    assert session.state is State.VERIFY
+    assert "Verification 1 of 1" in session.of(Prompt)[-1].text
+    # Each side is left alone for four seconds before the next is asked for.
+    asked_s = [output.t_s for output in session.said if type(output).__name__ == "Held"]
+    assert all(after - before == pytest.approx(1.6 + 4.6, abs=0.3) for before, after in pairwise(asked_s))
+
+
+def test_a_vehicle_in_a_hand_is_turned_to_more_orientations(make_board):
+    session, held = placed(make_board, 0.15)
+    assert len(held) == 6 and session.state is State.ROTATE
+    assert held[1] != "on its left side"
+    assert session.of(Progress)[-1].of == 14
+
+
 def test_uncertainties_are_requested_every_second(board, rotating):
     rotating.overall = 0.1
     rotating.feed(board.turn((1, 0, 0), 3.0, 6.0))

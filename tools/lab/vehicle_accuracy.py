@@ -2,9 +2,11 @@
 
     python -m tools.lab vehicle_accuracy                # 20 of ArduPilot, 10 of PX4, fresh and used in turn
     python -m tools.lab vehicle_accuracy --seeds 0:4    # of the first four seeds, and half as many of PX4
+    python -m tools.lab vehicle_accuracy --hand placing # put down on its sides instead of held
 
-Each runs `mpucal session --mavlink sim:... --yes --no-write` as fast as it can. `offset` [m/s^2] and `scale` are how
-far the new parameters are from the sensors' truth, at worst over axes and IMUs; `z` is the rms over D and b_a of all
+Each runs `mpucal session --mavlink sim:... --yes --no-write` as fast as it can. `took` [s] is
+the time of its samples; `offset` [m/s^2] and `scale` are how far the new parameters are from the sensors' truth, at
+worst over axes and IMUs; `z` is the rms over D and b_a of all
 IMUs of (estimate - truth) / standard uncertainty. The exit code is 1 where one that is good is more than OFFSET_MPS2 or
 SCALE off, or the z of all of them is not within Z.
 """
@@ -16,10 +18,11 @@ from dataclasses import dataclass
 
 from mpucal.mavlink.parameters.slots import slot_of
 from mpucal.result.calibration import GOOD
+from mpucal.simulated.hands import HANDS
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 from .judge import needed, off, rms, z_of
-from .runner import Asked, Program
+from .runner import Asked, Program, option
 from .sessions import by_command
 from .table import grouped, known, over, show, table
 
@@ -49,6 +52,7 @@ class Outcome:
     verdict: str = "none"
     offset: float = math.nan
     scale: float = math.nan
+    took: float = math.nan
     z: tuple[float, ...] = ()
 
     @property
@@ -66,7 +70,7 @@ def items(asked: Asked) -> list[str]:
     ]
 
 
-COLUMNS = {"offset": over("offset"), "scale": over("scale"), "z": over("z", rms)}
+COLUMNS = {"took": over("took"), "offset": over("offset"), "scale": over("scale"), "z": over("z", rms)}
 
 
 def report(outcomes: list[Outcome], asked: Asked) -> int:
@@ -85,8 +89,9 @@ def words_of(firmware: str, n: int) -> str:
     return f"firmware={firmware},seed={FIRST_SEED + n}{more}"
 
 
-def of_vehicle(words: str) -> Outcome:
-    """Run a session with a vehicle, and compare."""
+def of_vehicle(words: str, hand: str) -> Outcome:
+    """Run a session with a vehicle in this hand, and compare."""
+    words += f",hand={hand}"
     done, document = by_command("--mavlink", f"sim:{words}", "--no-write")
     if done.calibration is None:
         return Outcome(words, done.code)
@@ -99,7 +104,10 @@ def of_vehicle(words: str) -> Outcome:
         where = slot_of(autopilot["firmware"], autopilot["imu"], autopilot["params_new"])
         far.append(off(where, autopilot["params_new"], needed(truth)))
     offset, scale = map(max, zip(*far, strict=True))
-    return Outcome(words, done.code, done.calibration.verdict, offset, scale, tuple(z))
+    return Outcome(
+        words, done.code, done.calibration.verdict, offset, scale, float(document["fit"]["seconds"]), tuple(z)
+    )
 
 
-main = Program(__doc__, of_vehicle, items, report)
+HAND = option("--hand", choices=HANDS, default="guided", help="that turns the vehicle")
+main = Program(__doc__, of_vehicle, items, report, (HAND,))

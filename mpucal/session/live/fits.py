@@ -32,12 +32,13 @@ class Task(NamedTuple):
     Attributes
     ----------
     samples : those that arrived since the last task. kind : the fit of all samples so far; None: no fit.
-    forget : drop the samples from this number on, and every fit of them; None: keep all.
+    forget : drop the samples from this number on, and every fit of them; None: keep all. of : see RequestFit.
     """
 
     samples: Samples
     kind: FitKind | None = None
     forget: int | None = None
+    of: int = 0
 
 
 class Fits:
@@ -68,7 +69,7 @@ class Fits:
             case FitKind.TRY:
                 return self._try()
             case FitKind.CHECK:
-                return self._check()
+                return self._check(task.of)
         return None
 
     def _learnt(self, advice: bool) -> Event | None:
@@ -96,8 +97,7 @@ class Fits:
         told = verdict(reasons) if evidence.gyroscope is None else REFUSED
         return Tried(told, _most_specific_reason(reasons, evidence.recording))
 
-    def _check(self) -> Event:
-        of = AIMS[self._plan.target].verify
+    def _check(self, of: int) -> Event:
         evidence = self._tried
         if evidence is None or evidence.fit is None or evidence.flat is None:
             return Checked((), False, reason("verification_failed", "nothing"))

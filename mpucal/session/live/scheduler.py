@@ -77,7 +77,9 @@ class FitScheduler:
     def request(self, request: RequestFit) -> None:
         """Submit a fit of all samples so far."""
         due_at = self._count + round(request.wait_s * self._rate_hz)
-        self._pending.append(_Pending(due_at, self._worker.submit(Task(self._take_unsent(), request.kind))))
+        self._pending.append(
+            _Pending(due_at, self._worker.submit(Task(self._take_unsent(), request.kind, of=request.of)))
+        )
 
     @property
     def due(self) -> bool:

@@ -71,7 +71,7 @@ def test_a_try_and_its_check_agree_on_good_data(fits, poses):
     tried = fits.do(Task(part(poses, 0, 32), FitKind.TRY))
     assert isinstance(tried, Tried)
     assert tried.verdict in ("good", "usable")
-    checked = fits.do(Task(part(poses, 32), FitKind.CHECK))
+    checked = fits.do(Task(part(poses, 32), FitKind.CHECK, of=3))
     assert isinstance(checked, Checked)
     assert checked.agrees, checked
     assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.verifications)
@@ -79,7 +79,7 @@ def test_a_try_and_its_check_agree_on_good_data(fits, poses):
 
 def test_orientations_that_the_fit_has_seen_verify_nothing(fits, poses):
     fits.do(Task(part(poses, 0, 44), FitKind.TRY))
-    checked = fits.do(Task(after(part(poses, 18, 44), 26.0 + 1 / 200), FitKind.CHECK))
+    checked = fits.do(Task(after(part(poses, 18, 44), 26.0 + 1 / 200), FitKind.CHECK, of=3))
     assert (checked.verifications, checked.agrees) == ((), None)
     assert checked.reason.what.startswith("the board was held still in 0 of 3 orientations that the calibration has")
     assert not checked.reason.refuse
@@ -88,7 +88,7 @@ def test_orientations_that_the_fit_has_seen_verify_nothing(fits, poses):
 def test_orientations_that_the_fit_has_seen_may_refute_it(fits, poses):
     fits.do(Task(part(poses, 0, 44), FitKind.TRY))
     again = after(part(poses, 18, 44), 26.0 + 1 / 200)
-    checked = fits.do(Task(replace(again, acc=1.03 * again.acc), FitKind.CHECK))
+    checked = fits.do(Task(replace(again, acc=1.03 * again.acc), FitKind.CHECK, of=3))
     assert checked.agrees is False
     assert "|a| is +0.3" in checked.reason.what
 
