@@ -307,7 +307,7 @@ KINDS: Mapping[str, Kind] = {
         {
             "times": Sentence(
                 "the samples are {step:.4g} s apart, too far to follow a turn: their times seem to be in {unit}seconds",
-                "convert them to seconds, or say --units t=UNIT",
+                "convert them to seconds, or say --units t={said}",
                 True,
             ),
             "slow": Sentence(
@@ -318,7 +318,7 @@ KINDS: Mapping[str, Kind] = {
             "accelerometer": Sentence(
                 "the accelerometer's median magnitude is {magnitude:.4g}, not near {gravity:.4g} m/s^2: it seems to be"
                 " in {unit}",
-                "convert it to m/s^2, or say --units acc=UNIT",
+                "convert it to m/s^2, or say --units acc={said}",
                 True,
             ),
             "scale_factors": Sentence(
@@ -336,7 +336,7 @@ KINDS: Mapping[str, Kind] = {
             "gyroscope": Sentence(
                 "the gyroscope reads up to {rate:.4g}, which as rad/s is {degrees:.0f} deg/s and does not fit how"
                 " gravity turned: it seems to be in {unit}",
-                "convert it to rad/s, or say --units gyr=UNIT",
+                "convert it to rad/s, or say --units gyr={said}",
                 True,
             ),
         },

@@ -17,7 +17,8 @@ import click
 from ..data import Samples
 from ..disk.location import check_free
 from ..errors import EndOfCapture
-from ..files.csv import NS, CsvText
+from ..files.csv import CsvText
+from ..files.tables.units import NS
 from ..page.address import Address
 from ..page.live import live_page
 from ..recheck import days_since

@@ -23,7 +23,7 @@ from ..chip.records import FORGET, UTC, SessionEvent
 from ..data import Recording, Samples
 from ..errors import CaptureError, RecordingError
 from ..iio.decode import decode as decode_iio
-from .mcap import CaptureReader
+from .mcap import CaptureReader, one_by_one
 from .rows import ROWS, Rows
 from .tables.times import plausible_utc_ns
 
@@ -37,7 +37,7 @@ def load_capture(*paths: Path) -> Recording:
     """
     session = _SessionAccesses(paths)
     recording = (
-        decode_iio(session.one_by_one(), session.name) if _is_from_kernel(paths) else decode(session, session.name)
+        decode_iio(one_by_one(session), session.name) if _is_from_kernel(paths) else decode(session, session.name)
     )
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
@@ -105,19 +105,11 @@ class _SessionAccesses:
                 "give a capture that mpucal recorded",
             ) from error
 
-    def one_by_one(self) -> Generator[Transaction]:
-        """Yield the accesses one by one."""
-        for each in self:
-            if isinstance(each, Accesses):
-                yield from each
-            else:
-                yield each
-
 
 def _is_from_kernel(paths: Sequence[Path]) -> bool:
     """Return True if a driver of the Linux kernel was read, whose samples have their final times at once."""
-    with closing(_SessionAccesses(paths).one_by_one()) as accesses:
-        first = next(accesses, None)
+    with closing(iter(_SessionAccesses(paths))) as accesses:
+        first = next(one_by_one(accesses), None)
     return first is not None and isinstance(first.register, str)
 
 

@@ -25,11 +25,11 @@ from .reading import reading
 from .rows import Rows, Write, check_runs
 from .tables.names import COLDEST_C, WARMEST_C, ignored_sensors, parse_header
 from .tables.times import plausible_utc_ns
+from .tables.units import NS
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 TEMPERATURE, UTC = "temperature_c", "utc_s"
 ALL = (*COLUMNS, TEMPERATURE)
-NS = 10**9
 # bytes that are parsed at once, some 16000 lines
 BLOCK = 1 << 21
 _REMEDY = (

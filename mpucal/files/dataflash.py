@@ -10,6 +10,8 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..arguments import LARGEST
 from ..data import Recording
 from ..errors import RecordingError
@@ -17,6 +19,7 @@ from ..mavlink.dialect import import_pymavlink
 from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.imu import DATAFLASH, Reading, Stream
 from ..mavlink.log import Log
+from .hints import ROLES
 from .reading import first_bytes
 
 MAGIC = b"\xa3\x95"
@@ -24,6 +27,9 @@ PARAMETER = "PARM"
 # before ArduPilot 4.0 each IMU had its own message; since then `I` numbers them from 0
 IMUS = {"IMU": 1, "IMU2": 2, "IMU3": 3}
 US = 1_000
+# of an unknown file: bytes to look at, the longest packet, how much more often than others its bytes repeat, and how
+# nearly as often as its multiples'
+SNIFFED, LONGEST_PACKET, REPEATS, NEARLY = 1 << 16, 512, 1.2, 0.95
 
 
 def is_dataflash(path: Path) -> bool:
@@ -39,7 +45,10 @@ def load_dataflash(path: Path) -> Recording:
     RecordingError : it is not a dataflash log, or holds no IMU messages.
     """
     if not is_dataflash(path):
-        raise RecordingError(f"{path} is not a dataflash log", "give a .bin that ArduPilot wrote")
+        raise RecordingError(
+            f"{path} is not a dataflash log of ArduPilot, and mpucal knows no other .bin{_packets(path)}",
+            f"have the program that wrote it write a table with the columns {','.join(ROLES)}, and give that",
+        )
     log = Log(ARDUPILOT)
     # the reader prints its complaints
     with redirect_stderr(StringIO()), redirect_stdout(StringIO()):
@@ -50,6 +59,17 @@ def load_dataflash(path: Path) -> Recording:
             "have LOG_BITMASK log the IMU (IMU or IMU_FAST) also while disarmed, and turn it again",
         )
     return log.recording(path.name)
+
+
+def _packets(path: Path) -> str:
+    """Return what the bytes of an unknown file repeat, in words; empty if they repeat nothing."""
+    data = np.frombuffer(first_bytes(path, SNIFFED), np.uint8)
+    alike = [np.mean(data[length:] == data[:-length]) for length in range(1, min(LONGEST_PACKET, len(data) // 4))]
+    most = max(alike, default=0.0)
+    # the shortest of its multiples, which repeat nearly as often
+    length = next((i for i, share in enumerate(alike, 1) if share > NEARLY * most), 1)
+    repeats = length > 1 and most > REPEATS * np.median(alike)
+    return f" (it seems to be packets of {length} bytes)" if repeats else ""
 
 
 def _fill(log: Log, path: Path) -> None:

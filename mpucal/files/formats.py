@@ -6,7 +6,7 @@ recognises, so that its error message says what is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,12 +82,28 @@ class Format:
 
 
 _HERE = "mpucal.files"
-_TABLES = f"{_HERE}.tables"
-_TABLE = "another program's table"
-_BAG = (f"{_HERE}.ros:load_bag", f"{_HERE}.ros:bag_rows")
-_PHONE = f"{_TABLES}.phone"
+
+
+def _others(
+    suffixes: str, what: str, load: str, recognises: str = "", rows: str = "", *, only: bool = True
+) -> Iterator[Format]:
+    """Yield the rows of a format of other programs, which takes hints; `only`: see Format.only_recognised."""
+    load, rows, recognises = (name and f"{_HERE}.{name}" for name in (load, rows, recognises))
+    for suffix in suffixes.split():
+        yield Format(suffix, what, load, rows, recognises=recognises, hinted=True, only_recognised=only)
+
+
+_TEXTS = ".csv .txt .log .tsv"
+_TABLE = ("another program's table", "tables.table:load_table", "tables.table:is_table")
+_RAW = ("MPU6050_raw's output", "serial_log:load_serial_log", "serial_log:is_serial_log")
+_TWO = ("a phone's tables", "tables.phone:load_two_tables", "tables.phone:is_one_of_two_tables")
+_ARCHIVE = ("a phone's tables", "tables.phone:load_archive_of_tables", "tables.phone:is_archive_of_tables")
+_PHONE = ("the folder of a phone's tables", "tables.phone:load_folder_of_tables", "tables.phone:is_folder_of_tables")
+_FOLDER = "recording_folder:load_folder_of_recordings", "recording_folder:is_folder_of_recordings"
+_BAG, _BAG_ROWS = "ros:load_bag", "ros:bag_rows"
+_ARRAYS = "arrays:load_arrays"
 FORMATS = (
-    Format(".mcap", "a bag of ROS 2", *_BAG, recognises=f"{_HERE}.ros:is_mcap_of_ros", hinted=True),
+    *_others(".mcap", "a bag of ROS 2", _BAG, "ros:is_mcap_of_ros", _BAG_ROWS, only=False),
     Format(".mcap", "a capture", f"{_HERE}.capture:load_capture", f"{_HERE}.capture:capture_rows", session=CAPTURE),
     Format(".tlog", "a MAVLink log", f"{_HERE}.tlog:load_tlog", session=CAPTURE_OF_VEHICLE),
     Format(
@@ -96,70 +112,23 @@ FORMATS = (
         f"{_HERE}.dataflash:load_dataflash",
         recognises=f"{_HERE}.dataflash:is_dataflash",
     ),
-    Format(".ulg", "a log of PX4", f"{_HERE}.ulog:load_ulog", hinted=True),
-    Format(".db3", "a bag of ROS 2", *_BAG, hinted=True),
-    Format(".bag", "a bag of ROS 1", *_BAG, hinted=True),
-    *(
-        Format(
-            suffix,
-            "a phone's tables",
-            f"{_PHONE}:load_two_tables",
-            recognises=f"{_PHONE}:is_one_of_two_tables",
-            hinted=True,
-            only_recognised=True,
-        )
-        for suffix in (".csv", ".txt", ".log", ".tsv", ".mat")
-    ),
-    *(
-        Format(suffix, what, f"{_HERE}.arrays:load_arrays", recognises=recognises, hinted=True, only_recognised=True)
-        for suffix, what, recognises in (
-            (".npz", "another program's archive of NumPy", f"{_HERE}.arrays:is_of_others"),
-            (".npy", "an array of NumPy", ""),
-            (".mat", "a file of MATLAB", ""),
-        )
-    ),
+    *_others(".ulg", "a log of PX4", "ulog:load_ulog", only=False),
+    *_others(".db3", "a bag of ROS 2", _BAG, rows=_BAG_ROWS, only=False),
+    *_others(".bag", "a bag of ROS 1", _BAG, rows=_BAG_ROWS, only=False),
+    *_others(f"{_TEXTS} .mat", *_TWO),
+    *_others(".npz", "another program's archive of NumPy", _ARRAYS, "arrays:is_of_others"),
+    *_others(".npy", "an array of NumPy", _ARRAYS),
+    *_others(".mat", "a file of MATLAB", _ARRAYS),
     Format(".npz", "a NumPy archive", f"{_HERE}.npz:load_npz", f"{_HERE}.npz:npz_rows", f"{_HERE}.npz:npz_file"),
-    Format(".parquet", "a Parquet file", f"{_HERE}.parquet:load_parquet", hinted=True),
-    *(
-        Format(
-            suffix,
-            what,
-            f"{_HERE}.{load}",
-            recognises=f"{_HERE}.{recognises}",
-            hinted=True,
-            only_recognised=what != _TABLE,
-        )
-        for suffix in (".csv", ".txt", ".log", ".tsv")
-        for what, load, recognises in (
-            ("MPU6050_raw's output", "serial_log:load_serial_log", "serial_log:is_serial_log"),
-            (_TABLE, "tables.table:load_table", "tables.table:is_table"),
-        )
-    ),
+    *_others(".parquet", "a Parquet file", "parquet:load_parquet", only=False),
+    *_others(_TEXTS, *_RAW),
+    *_others(_TEXTS, *_TABLE, only=False),
     Format(".csv", "a table", rows=f"{_HERE}.csv:csv_rows", writer=f"{_HERE}.csv:csv_file"),
-    Format(
-        ".zip",
-        "a phone's tables",
-        f"{_PHONE}:load_archive_of_tables",
-        recognises=f"{_PHONE}:is_archive_of_tables",
-        hinted=True,
-        only_recognised=True,
-    ),
+    *_others(".zip", *_ARCHIVE),
     Format(".mcap", "sensor_msgs/Imu for ROS 2 and Foxglove", writer=f"{_HERE}.imu:imu_file"),
-    Format(FOLDER, "the folder of a bag", *_BAG, recognises=f"{_HERE}.ros:is_folder_of_ros", hinted=True),
-    Format(
-        FOLDER,
-        "the folder of a phone's tables",
-        f"{_PHONE}:load_folder_of_tables",
-        recognises=f"{_PHONE}:is_folder_of_tables",
-        hinted=True,
-    ),
-    Format(
-        FOLDER,
-        "a folder of recordings of one sensor",
-        f"{_HERE}.recording_folder:load_folder_of_recordings",
-        recognises=f"{_HERE}.recording_folder:is_folder_of_recordings",
-        hinted=True,
-    ),
+    *_others(FOLDER, "the folder of a bag", _BAG, "ros:is_folder_of_ros", _BAG_ROWS, only=False),
+    *_others(FOLDER, *_PHONE, only=False),
+    *_others(FOLDER, "a folder of recordings of one sensor", *_FOLDER, only=False),
     Format(FOLDER, "the folder of a session", f"{_HERE}.folder:load_folder", f"{_HERE}.folder:folder_rows"),
 )
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +38,8 @@ from .messages import BUS, SESSION, accesses_schema, decode_message, encode_acce
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
 # the name of the metadata in a file of calibrated samples, which is not a capture
 CALIBRATED = "mpucal.imu"
+
+_REMEDY = "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu"
 
 # half of the second that a killed program may lose; the other half may pass between two records
 CHUNK_NS = 500_000_000
@@ -259,11 +261,7 @@ class CaptureReader:
         self._count = self._first_ns = self._last_ns = 0
 
     def __iter__(self) -> Iterator[Record]:
-        for block in self.blocks():
-            if isinstance(block, Accesses):
-                yield from block
-            else:
-                yield block
+        return one_by_one(self.blocks())
 
     def blocks(self) -> Iterator[Accesses | Record]:
         """Yield the records, register accesses by the block as in the file."""
@@ -310,7 +308,7 @@ class CaptureReader:
         if meta is None:
             raise CaptureError(
                 f"{self._path} lacks the metadata of a capture",
-                "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
+                _REMEDY,
             )
         self.meta = meta
         self.recovered = None if finished else self._recovery_sentence(size - whole)
@@ -323,7 +321,7 @@ class CaptureReader:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise CaptureError(
                 f"{self._path} holds an invalid message on {channel.topic} ({error})",
-                "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
+                _REMEDY,
             ) from error
 
     def _check(self, magic: bytes) -> None:
@@ -332,7 +330,7 @@ class CaptureReader:
         if magic != MCAP0_MAGIC:
             raise CaptureError(
                 f"{self._path} is not an MCAP file",
-                "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
+                _REMEDY,
             )
 
     def _count_block(self, block: Accesses | Record) -> None:
@@ -348,6 +346,12 @@ class CaptureReader:
         if lost:
             return f"{self.name} is cut short or damaged: {held}, the {lost} bytes after them are lost."
         return f"{self.name} was never closed: its {held}, what may have followed is lost."
+
+
+def one_by_one(blocks: Iterable[Accesses | Record]) -> Iterator[Any]:
+    """Yield the records of blocks, each register access by itself."""
+    for block in blocks:
+        yield from block if isinstance(block, Accesses) else (block,)
 
 
 def _records(reader: StreamReader) -> Iterator[McapRecord]:

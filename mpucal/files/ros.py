@@ -26,12 +26,11 @@ from .rows import Rows
 from .tables.streams import join_streams
 from .tables.table import complete_lines
 from .tables.times import Stream
-from .tables.units import COUNTS, acceleration_unit
+from .tables.units import COUNTS, NS, acceleration_unit
 
 IMU, IMU_OF_ROS1, ROS1 = "sensor_msgs/msg/Imu", "sensor_msgs/Imu", b"ros1"
 SNIFFED = 1 << 16
 _HEADER = struct.Struct("<8xBQI")
-S = 1_000_000_000
 # sensor_msgs/Imu: a first covariance of -1 means no such measurement
 NOT_MEASURED = -1.0
 REMEDY = "give a bag with sensor_msgs/Imu"
@@ -161,7 +160,7 @@ class _Messages:
 
     def add(self, message: Any, t_ns: int) -> None:
         stamp, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
-        self.stamps.append(stamp.sec * S + stamp.nanosec)
+        self.stamps.append(stamp.sec * NS + stamp.nanosec)
         self.received.append(t_ns)
         self.acc.append((a.x, a.y, a.z))
         self.gyr.append((w.x, w.y, w.z))

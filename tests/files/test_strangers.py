@@ -1,7 +1,9 @@
 """Files as people keep them who never heard of mpucal: in the forms of public sources, and read at the first try."""
 
 import json
+import struct
 import sys
+import zlib
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -89,6 +91,13 @@ def a_rocket(walk):
     return ",".join(names) + "\n" + "".join(f"S,{line}\n" for line in text(rows, ",").splitlines())
 
 
+def a_racebox(walk):
+    names = "Record,Time,Latitude,Altitude,GForceX,GForceY,GForceZ,Lap,GyroX,GyroY,GyroZ\n"
+    n, none = np.arange(len(walk)), np.zeros(len(walk))
+    acc, rates = walk.acc / G, np.degrees(walk.gyr)
+    return names + text(np.column_stack([n, walk.t, none + 53.3, none + 133.0, acc, none, rates]), ",")
+
+
 FORMS = {
     "poses.txt": poses,
     "two lines of names.csv": two_lines_of_names,
@@ -98,6 +107,7 @@ FORMS = {
     "without a sign.txt": without_a_sign,
     "from the lowest on.txt": from_the_lowest_on,
     "a rocket.csv": a_rocket,
+    "a racebox.csv": a_racebox,
 }
 
 
@@ -255,8 +265,123 @@ def test_a_rate_that_nothing_says_is_found_by_how_gravity_turns(even_walk, tmp_p
     np.testing.assert_allclose(si(read), si(even_walk), atol=1e-9)
 
 
-def test_a_rate_above_the_names_of_columns_is_read(even_walk, tmp_path):
-    head = "Fs,100\nLogging Type,1\nWaiting time,3\nax,ay,az,gx,gy,gz\n"
+def element(kind, data):
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8 if kind != 15 else 0)
+
+
+def matrix(of, shape, name, *parts):
+    """Return a matrix of the class `of`; see MAT-File Format."""
+    said = element(6, struct.pack("<II", of, 0)) + element(5, struct.pack(f"<{len(shape)}i", *shape))
+    return element(14, said + element(1, name) + b"".join(parts))
+
+
+def numbers(values):
+    return matrix(6, (len(values), 1), b"", element(9, np.asarray(values, float).tobytes()))
+
+
+def cells(*parts):
+    return matrix(1, (len(parts), 1), b"", *parts)
+
+
+def fields(**values):
+    names = b"".join(name.encode().ljust(16, b"\0") for name in values)
+    head = element(5, struct.pack("<i", 16)) + element(1, names)
+    return matrix(2, (1, 1), b"", head, *values.values())
+
+
+def thing(name, kind, value):
+    said = element(6, struct.pack("<II", 17, 0)) + b"".join(element(1, word) for word in (name, b"MCOS", kind))
+    return element(14, said + value)
+
+
+def as_timetables(path, **sensors):
+    """Write tables {X, Y, Z} with their times in ms as MATLAB Mobile saves a phone's sensors."""
+    contents = [numbers([])]
+    for t_ms, values in sensors.values():
+        names = [matrix(4, (1, 1), b"", element(16, axis)) for axis in (b"X", b"Y", b"Z")]
+        columns = [numbers(column) for column in values.T]
+        contents += [numbers(t_ms), fields(data=cells(*columns), varNames=cells(*names))]
+    inner = b"\0\1IM\0\0\0\0" + fields(MCOS=thing(b"", b"FileWrapper__", cells(*contents)))
+    named = [thing(name.encode(), b"timetable", numbers([1.0, 2.0])) for name in sensors]
+    last = matrix(9, (1, len(inner)), b"", element(2, inner))
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM"
+    path.write_bytes(head + b"".join(element(15, zlib.compress(each)) for each in (*named, last)))
+
+
+def test_timetables_of_matlab_mobile_are_read(even_walk, tmp_path):
+    t_ms = even_walk.t * 1000 + 1.6e12
+    later = slice(7, None)
+    as_timetables(
+        tmp_path / "sensorlog.mat",
+        Acceleration=(t_ms, even_walk.acc),
+        Orientation=(t_ms, even_walk.acc * 10),
+        AngularVelocity=(t_ms[later], even_walk.gyr[later]),
+    )
+    read = mpucal.load(tmp_path / "sensorlog.mat")
+    assert "from Acceleration and AngularVelocity" in read.taken
+    np.testing.assert_allclose(si(read), si(even_walk)[later], atol=1e-6)
+    assert read.utc_ns is not None
+
+
+def test_objects_of_matlab_are_named(tmp_path):
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM"
+    (tmp_path / "log.mat").write_bytes(head + thing(b"log", b"table", numbers([1.0, 2.0])))
+    with pytest.raises(RecordingError, match=r"objects of MATLAB \(table\)"):
+        mpucal.load(tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize("name", ["AccTest.txt", "acc.csv", "2021-acceldata.txt"])
+def test_three_columns_are_an_accelerometers_if_the_file_is_called_so(name, even_walk, tmp_path):
+    (tmp_path / name).write_text(text(even_walk.acc / G, ","))
+    read = mpucal.load(tmp_path / name)
+    np.testing.assert_allclose(read.acc, even_walk.acc)
+    assert np.isnan(read.gyr).all()
+
+
+def test_three_columns_of_an_unknown_sensor_name_the_command(even_walk, tmp_path):
+    (tmp_path / "field.txt").write_text(text(even_walk.acc, ","))
+    with pytest.raises(RecordingError, match="three columns of numbers") as error:
+        mpucal.load(tmp_path / "field.txt")
+    read = mpucal.load(tmp_path / "field.txt", columns=error.value.options.split()[1])
+    np.testing.assert_allclose(read.acc, even_walk.acc)
+
+
+def test_a_unit_that_shaking_hides_is_asked_for(even_walk, tmp_path):
+    shaken = replace(even_walk, acc=even_walk.acc / G * np.random.default_rng(4).uniform(0.2, 3, (len(even_walk), 1)))
+    (tmp_path / "walk.csv").write_text(without_times(shaken))
+    with pytest.raises(RecordingError, match="would be gravity in g") as error:
+        mpucal.load(tmp_path / "walk.csv")
+    assert error.value.options == "--units acc=g"
+
+
+def test_accelerations_without_gravity_are_named(even_walk, tmp_path):
+    names = "PacketCounter,SampleTimeFine,Euler_X,Euler_Y,Euler_Z,FreeAcc_X,FreeAcc_Y,FreeAcc_Z\n"
+    ticks = np.rint(even_walk.t * 1e4)
+    rows = np.column_stack([np.arange(len(ticks)), ticks, np.random.default_rng(6).normal(size=(len(ticks), 6))])
+    (tmp_path / "dot.csv").write_text(names + text(rows, ","))
+    with pytest.raises(RecordingError, match=r"without gravity \(FreeAcc_X, FreeAcc_Y, FreeAcc_Z\)"):
+        mpucal.load(tmp_path / "dot.csv")
+
+
+def test_packets_of_an_unknown_program_are_called_so(tmp_path):
+    packets = np.random.default_rng(5).integers(0, 256, (900, 106), np.uint8)
+    packets[:, :60] = np.arange(60)
+    (tmp_path / "data.bin").write_bytes(packets.tobytes())
+    with pytest.raises(RecordingError, match="packets of 106 bytes"):
+        mpucal.load(tmp_path / "data.bin")
+
+
+HEADS = [
+    "Fs,100",
+    "# Config: data_rate = 100.0 Hz, filter = 488 Hz, acc_range = 4 g",
+    "OutputRate:,100Hz,,,",
+    "Sample rate (Hz): 100",
+]
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_a_rate_above_the_names_of_columns_is_read(head, even_walk, tmp_path):
+    head = f"{head}\nLogging Type,1\nWaiting time,3\nax,ay,az,gx,gy,gz\n"
     (tmp_path / "walk.csv").write_text(head + text(counts(even_walk), ","))
     read = mpucal.load(tmp_path / "walk.csv")
     assert "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|) and rates in counts of ±500 deg/s" in read.taken

@@ -39,8 +39,9 @@ def time_unit(e: Evidence) -> Reason | None:
         return None
     if step < LONGEST_STEP_S:
         return reason("units_suspect", "slow", step=step, rate=1.0 / step)
-    unit = "nano" if step > STEP_OF_NANOSECONDS else "micro" if step > STEP_OF_MICROSECONDS else "milli"
-    return reason("units_suspect", "times", step=step, unit=unit)
+    said = "ns" if step > STEP_OF_NANOSECONDS else "us" if step > STEP_OF_MICROSECONDS else "ms"
+    unit = {"ns": "nano", "us": "micro", "ms": "milli"}[said]
+    return reason("units_suspect", "times", step=step, unit=unit, said=said)
 
 
 def accelerometer_unit(e: Evidence) -> Reason | None:
@@ -51,7 +52,9 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
     if acc < LEAST_G:
         return reason("not_raw", "no_gravity", magnitude=acc)
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
-    return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=guess)
+    return reason(
+        "units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=guess, said=guess.removeprefix("raw ")
+    )
 
 
 def _magnitude(e: Evidence) -> float:
@@ -77,7 +80,9 @@ def gyroscope_unit(e: Evidence) -> Reason | None:
         return None
     rate = float(np.quantile(rates, 1.0 - SELDOM))
     guess = "deg/s" if rate <= FASTEST_GYRO_DPS else "raw counts"
-    return reason("units_suspect", "gyroscope", rate=rate, degrees=np.rad2deg(rate), unit=guess)
+    return reason(
+        "units_suspect", "gyroscope", rate=rate, degrees=np.rad2deg(rate), unit=guess, said=guess.removeprefix("raw ")
+    )
 
 
 def never_still(e: Evidence) -> Reason | None:

@@ -14,7 +14,8 @@ from decimal import Decimal
 from pathlib import PurePath
 
 from ...errors import RecordingError
-from .text import NS, decode_text
+from .text import decode_text
+from .units import NS
 
 METADATA, TIME = "metadata.csv", "meta/time.csv"
 FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ...chip.clock import SampleClock, make_increasing
 from ...data import Mask, Vector
+from .units import NS
 
-NS = 1_000_000_000
 FEWEST = 100
 # periods: steps that vary by less are a clock's own
 EVEN = 0.1

@@ -33,7 +33,7 @@ def _stems(words: str) -> dict[str, str]:
 # a unit stands only where the program that uses the stem always writes that one
 ACC_STEMS = _stems(
     "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
-    " acce acc accs ac a arss:m/s^2 alpha:m/s^2 gf:g accsmooth linearacceleration"
+    " acce acc accs ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
 )
 GYR_STEMS = _stems(
     "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w:rad/s"
@@ -224,6 +224,20 @@ def parse_axis_name(name: str) -> tuple[int, str] | None:
 def parse_header(header: list[str]) -> list[Column]:
     """Return the columns of a header whose names are known."""
     return [column for place, name in enumerate(header) if (column := parse_column_name(name, place)) is not None]
+
+
+def axes_of(name: str) -> list[str]:
+    """Return names for the columns x, y, z of a matrix or file that is called after a sensor; else an empty list."""
+    last = name.rpartition(".")[2]
+    words = [last, *re.split(r"[^A-Za-z]+", last)]
+    # MobileAccData, acceldata
+    words += [word for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", last) if len(word) > len("ac")]
+    words += re.findall(r"accel|gyro", last.lower())
+    for word in filter(None, words):
+        found = parse_column_name(f"{word}_x", 0)
+        if found is not None and found.quantity in (ACC, GYR):
+            return [f"{word}_{axis}" for axis in "xyz"]
+    return []
 
 
 def axis_triples(columns: Sequence[Column], quantity: str) -> list[tuple[Column, ...]]:

@@ -12,7 +12,7 @@ import lzma
 import re
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,12 +21,12 @@ import numpy as np
 from ...data import Recording, Vector
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
-from ..arrays import ArrayTable, columns_of_arrays
 from ..budget import HELD, check_size
 from ..hints import NO_HINTS, Hints
 from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import first_bytes, reading
 from .app_metadata import is_app_metadata, read_app_metadata
+from .array_table import ArrayTable, columns_of_arrays
 from .names import ACC, GYR, Column, Table, first_triple, parse_axis_name, parse_header
 from .streams import join_streams
 from .table import SNIFFED, columns_by_hint, sensor_stream
@@ -35,27 +35,18 @@ from .times import Stream
 from .units import QUANTITIES, acceleration_unit, are_counts, to_signed
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
-NAMES = {
-    ACC: (
-        "accelerometeruncalibrated",
-        "accelerometer",
-        "acceleration",
-        "totalacceleration",
-        "acc",
-        "accel",
-        "acce",
-        "accm",
-        "alpha",
-    ),
-    GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "gyrm", "rotationrate", "omega"),
-}
+_OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
+_OF_GYR = "gyroscopeuncalibrated gyroscope gyro gyr gyrm rotationrate angularvelocity omega"
+NAMES = {ACC: _OF_ACC.split(), GYR: _OF_GYR.split()}
 # the unit of tables that name none
 UNITS = {ACC: "", GYR: "rad/s"}
 # imu_tk names tables of text .mat, too
 SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat")
+# of a table within a file
+OF_FILE = ".table"
 # MATLAB's spelling of a hyphen in a name
 HYPHEN = "0x2d"
-# the columns of a table without names, as data sets have them
+# the columns of a table without names, as data sets have them; the time may be missing
 UNNAMED = ["time", "x", "y", "z"]
 # whole numbers that are all smaller are not counts
 FEWEST_COUNTS = 200
@@ -131,10 +122,29 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
 
 
+def is_pair(tables: Mapping[str, ArrayTable]) -> bool:
+    """Return True if two of the tables are called as an accelerometer's and a gyroscope's."""
+    return bool(_pairs(map(_as_file, tables)))
+
+
+def recording_of_tables(name: str, tables: Mapping[str, ArrayTable], hints: Hints) -> Recording:
+    """Return the recording in a pair of tables in a file."""
+    found = {_as_file(of): table for of, table in tables.items()}
+    return _recording(name, found, found.__getitem__, "", hints)
+
+
+def _as_file(table: str) -> str:
+    return f"{table}{OF_FILE}"
+
+
+def _called(member: str) -> str:
+    return Path(member).name.removesuffix(OF_FILE)
+
+
 def _parse(name: str) -> tuple[str, int, str] | None:
     """Return the sensor of a table's name, the rank of its word in NAMES, and the name without it; None for others."""
     path = Path(name)
-    if path.suffix.lower() not in SUFFIXES or "meta" in path.parts[:-1] or path.name.startswith("."):
+    if path.suffix.lower() not in (*SUFFIXES, OF_FILE) or "meta" in path.parts[:-1] or path.name.startswith("."):
         return None
     stem = path.stem.lower().replace(HYPHEN, "-")
     words = [word for word in re.split(r"[^a-z]+", stem) if word]
@@ -157,11 +167,14 @@ def _pairs(names: Iterable[str]) -> list[dict[str, tuple[str, int]]]:
     return both[:-1] or both
 
 
-def _recording(name: str, names: Iterable[str], read: Callable[[str], bytes], wanted: str, hints: Hints) -> Recording:
+def _recording(
+    name: str, names: Iterable[str], read: Callable[[str], bytes | ArrayTable], wanted: str, hints: Hints
+) -> Recording:
     """Return the recording in the pair of tables that holds `wanted`, or in the first."""
     pairs = _pairs(names)
     pair = next((pair for pair in pairs if wanted in pair), pairs[0])
-    metadata = read_app_metadata({member: read(member) for member in names if is_app_metadata(member)})
+    beside = {member: read(member) for member in names if is_app_metadata(member)}
+    metadata = read_app_metadata({member: data for member, data in beside.items() if isinstance(data, bytes)})
     found: dict[str, tuple[str, Stream]] = {}
     for member, (quantity, _) in sorted(pair.items(), key=lambda item: (item[1][1], item[0])):
         if quantity in found and (quantity == GYR or _holds_gravity(found[ACC][1].values)):
@@ -171,7 +184,7 @@ def _recording(name: str, names: Iterable[str], read: Callable[[str], bytes], wa
             found[quantity] = member, stream
     (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
     acc = replace(acc, values=-acc.values if metadata.sign_flipped else acc.values, zero_ns=metadata.zero_ns)
-    of = f"from {Path(of_acc).name} and {Path(of_gyr).name}"
+    of = f"from {_called(of_acc)} and {_called(of_gyr)}"
     more = f"of {len(pairs)} pairs of tables, it is the first; give one file of another pair to read that"
     remarks = [of, more if len(pairs) > 1 and not wanted else "", *metadata.remarks]
     return join_streams(acc, gyr, hints, name, remarks=remarks)
@@ -185,9 +198,13 @@ def _are_counts(values: Vector) -> bool:
     return len(values) > 0 and are_counts(to_signed(values)) and bool(np.abs(values).max() > FEWEST_COUNTS)
 
 
-def _stream(name: str, data: bytes, quantity: str, hints: Hints) -> Stream:
+def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) -> Stream:
     hinted = _hinted_columns(hints, quantity)
-    table = _array_table(data, name) if data.startswith(MATLAB) else _text_table(data, name, list(hinted.values()))
+    table: Table | None
+    if isinstance(data, ArrayTable):
+        table = data
+    else:
+        table = _array_table(data, name) if data.startswith(MATLAB) else _text_table(data, name, list(hinted.values()))
     if table is None:
         raise RecordingError(
             f"{name} names no columns x, y and z",
@@ -217,9 +234,10 @@ def _text_table(data: bytes, name: str, wanted: Sequence[str | int]) -> Table | 
     text = decode_text(data, name)
     table = find_table(text, name, wanted)
     if table is None and not wanted:
-        table = find_table(text, name, bare=True) or find_table(text, name, range(len(UNNAMED)))
+        table = find_table(text, name, bare=True) or find_table(text, name, range(len(UNNAMED) - 1))
         if table and not table.header:
-            table = replace(table, header=UNNAMED) if all(len(row) == len(UNNAMED) for row in table.rows) else None
+            widths = {len(row) for row in table.rows}
+            table = replace(table, header=UNNAMED[-max(widths) :]) if widths in ({3}, {4}) else None
     return table if table and table.rows else None
 
 

@@ -147,6 +147,13 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     seen = units.acceleration_unit(values)
     if said == COUNTS or (not said and units.are_counts(values) and (not seen or hints.accel_range_g)):
         return _scale_counts(values, hints, name, size)
+    near = "" if seen or said else units.unit_of_gravity(size)
+    if near:
+        raise RecordingError(
+            f"{name}: |a| varies too much to show its unit; its median of {size:.3g} would be gravity in {near}",
+            f"name the unit with --units acc={near}",
+            f"--units acc={near}",
+        )
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
         raise RecordingError(
             f"{name}: the median |a| is only {size:.3g}, so gravity is not in it",
@@ -191,8 +198,9 @@ def _rates(
         scale, of = np.radians(range_dps) / GYRO_COUNTS, f"counts of ±{range_dps:g} deg/s"
         factor = units.rate_factor(t, a, values * scale)
         if factor and is_wrong_full_scale(abs(factor)) and "gyr" not in hints.units:
+            fits = f"--gyro-range {_gyro_range_dps(factor * scale):g}"
             remedy = "the --gyro-range that the sensor had (if it was this one: --units gyr=counts)"
-            raise _wrong_rates(name, factor, of, hints, remedy)
+            raise _wrong_rates(name, factor, of, hints, remedy, fits)
         by = "" if hints.gyro_range_dps else " (by how gravity turns)"
         return values * scale, f"rates in {of}{by}{_sign_remark(factor)}", _is_clipped(values)
     factor = units.rate_factor(t, a, values)
@@ -202,7 +210,9 @@ def _rates(
     if factor and not seen:
         known = [unit for unit in QUANTITIES["gyr"] if unit != COUNTS]
         of = said or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))
-        raise _wrong_rates(name, factor / QUANTITIES["gyr"][of], of, hints, "their unit with --units gyr=UNIT")
+        units_known = " or ".join(f"gyr={unit}" for unit in known)
+        factor /= QUANTITIES["gyr"][of]
+        raise _wrong_rates(name, factor, of, hints, f"their unit with --units {units_known}", f"--units gyr={of}")
     unit = resolve_unit(name, "gyr", said, seen, "the turning of gravity")
     return values * QUANTITIES["gyr"][unit], f"rates in {unit}{_sign_remark(factor)}", np.zeros(len(values), bool)
 
@@ -216,12 +226,12 @@ def _gyro_range_dps(factor: float | None) -> float | None:
     return nearest if abs(math.log2(dps / nearest)) < SURE_RANGE else round(dps)
 
 
-def _wrong_rates(name: str, factor: float, of: str, hints: Hints, remedy: str) -> RecordingError:
-    of_times = "--rate HZ" if hints.rate_hz else "--units t=UNIT"
+def _wrong_rates(name: str, factor: float, of: str, hints: Hints, remedy: str, options: str) -> RecordingError:
+    of_times = f"--rate {hints.rate_hz / abs(factor):.3g}" if hints.rate_hz else "--units t=UNIT"
     return RecordingError(
         f"{name}: gravity turns {abs(factor):.2g} times as fast as rates in {of}",
         f"give {remedy}, or for the times {of_times}",
-        f"--units gyr={of}" if of in QUANTITIES["gyr"] else "",
+        options,
     )
 
 

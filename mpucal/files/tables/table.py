@@ -27,6 +27,7 @@ from .names import (
     Column,
     Table,
     Times,
+    axes_of,
     axis_triples,
     first_triple,
     ignored_sensors,
@@ -45,13 +46,16 @@ ANOTHERS = 0.1
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
 PREAMBLE_CHARACTERS = 4096
-# a line above a table without times, as `Fs,100` or `Sample rate: 52 Hz`
+# above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
 RATE = re.compile(
-    r"^\W{0,3}(?:fs|sampl(?:e|ing)[ _](?:rate|freq\w{0,6}))[^\d\n]{1,12}([1-9]\d{0,4}(?:\.\d{1,6})?)(?:[ ,]*Hz)?\W*$",
+    r"(?<![a-z])(?:fs|(?:sampl(?:e|ing)|data|output)[ _]?(?:rate|freq\w{0,6}))[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
+    r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
     re.IGNORECASE | re.MULTILINE,
 )
 # m/s^2: whole numbers that are larger are counts
 LARGEST_OF_SI = 300.0
+# accelerations from which a program has taken gravity
+WITHOUT_GRAVITY = re.compile(r"\s*(?:free|user|linear)[ _]?acc", re.IGNORECASE)
 # stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
 IN_G_ON_IOS, EITHER_SIGN = "accelerometeruncalibrated_", "totalacceleration_"
 
@@ -70,7 +74,20 @@ def is_table(path: Path) -> bool:
 
 def _find(text: str, name: str) -> TextTable | None:
     """Return the table of named columns, or else of numbers."""
-    return labelled_table(text, name) or find_table(text, name) or find_numeric_table(text, name, FEWEST_COLUMNS)
+    found = labelled_table(text, name) or find_table(text, name) or find_numeric_table(text, name, FEWEST_COLUMNS)
+    return found or _accelerometer_alone(text, name)
+
+
+def _accelerometer_alone(text: str, name: str) -> TextTable | None:
+    """Return the table of three unnamed columns in a file that is called after an accelerometer; None for another."""
+    table = _three_columns(text, name)
+    found = replace(table, header=axes_of(Path(name).stem)) if table else None
+    return found if found and first_triple(found.columns, ACC) else None
+
+
+def _three_columns(text: str, name: str) -> TextTable | None:
+    table = find_numeric_table(text, name, 3)
+    return table if table and not table.header and len(table.rows[0]) == 3 else None
 
 
 def _may_be_si(table: TextTable) -> bool:
@@ -94,6 +111,12 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
         check_size(path, HELD * path.stat().st_size)
         text = decode_text(path.read_bytes(), path.name)
     table = find_table(text, path.name, list(hints.columns.values())) if hints.columns else _find(text, path.name)
+    if table is None and not hints.columns and _three_columns(text, path.name):
+        raise RecordingError(
+            f"{path.name} holds three columns of numbers, and nothing says of which sensor",
+            "if they are an accelerometer's, name them with --columns ax,ay,az",
+            "--columns ax,ay,az",
+        )
     if table is None:
         raise RecordingError(
             f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
@@ -163,6 +186,11 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
 
 
 def _missing_sensors(table: Table, columns: list[Column]) -> RecordingError:
+    if without := [name.strip() for name in table.header if WITHOUT_GRAVITY.match(name)]:
+        return RecordingError(
+            f"{table.name} holds accelerations without gravity ({', '.join(without)}), and no others",
+            "export the accelerometer's own values and the rates of the gyroscope",
+        )
     if first_triple(columns, GYR):
         return RecordingError(
             f"{table.name} holds no columns of an accelerometer; its columns are {_list_names(table.header)}",

@@ -19,13 +19,12 @@ from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..budget import check_size
 from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
-from .units import find_unit
+from .units import NS, find_unit
 
 # separator -> its name for messages; None: any blanks
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 # lines that may precede the header: a sketch's greeting, `sep=;`, the settings that Betaflight's Explorer writes
 PREAMBLE = 200
-NS = 1_000_000_000
 # a file with a larger share of NUL bytes is binary
 MOST_NUL = 0.1
 # a header may begin with such a mark; any other line that does is a comment

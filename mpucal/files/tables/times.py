@@ -16,11 +16,10 @@ from ..hints import Hints
 from . import units
 from .clock import fit_even_clock, sample_period
 from .names import Times
-from .units import QUANTITIES, resolve_unit
+from .units import NS, QUANTITIES, resolve_unit
 
 # periods: over a longer pause of the rates nothing is interpolated
 LOST_PERIODS = 3.5
-NS_OF = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "0.1ms": 10**5}
 # ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
 UTC_NS = (10**18, 41 * 10**17)
 
@@ -74,7 +73,7 @@ def utc_ns(stream: Stream, of_t: str) -> int | None:
     unit = of_t.removeprefix("times in ")
     if stream.times is None or unit not in QUANTITIES["t"]:
         return None
-    first = round(Decimal(str(stream.times[0])) * NS_OF[unit]) + (stream.zero_ns or 0)
+    first = round(Decimal(str(stream.times[0])) * round(QUANTITIES["t"][unit] * NS)) + (stream.zero_ns or 0)
     return plausible_utc_ns(first)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...errors import RecordingError
 
+NS = 1_000_000_000
 COUNTS = "counts"
 FULL_SCALE = 32768
 # quantity -> unit -> SI
@@ -88,6 +89,11 @@ def acceleration_unit(acc: Vector) -> str:
     low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
     if high - low > SCATTER * size:
         return ""
+    return unit_of_gravity(size)
+
+
+def unit_of_gravity(size: float) -> str:
+    """Return the unit in which a magnitude is gravity; empty if there is none."""
     units = QUANTITIES["acc"].items()
     return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
 
@@ -181,10 +187,10 @@ def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str) 
             f"--units {quantity}={seen}",
         )
     if not said and not seen:
-        known = ", ".join(unit for unit in QUANTITIES[quantity])
+        known = ", ".join(unit for unit in QUANTITIES[quantity] if unit != LIKELY[quantity])
         raise RecordingError(
             f"{name}: the unit of {quantity} is not known, and {evidence} fits none",
-            f"name it with --units {quantity}=UNIT, one of {known}",
+            f"name it with --units {quantity}={LIKELY[quantity]}, or another of {known}",
             f"--units {quantity}={LIKELY[quantity]}",
         )
     return said or seen
