@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import polar
-from scipy.optimize import least_squares
+import scipy
 
 from mpucal import Recording, calibrate, check
 from mpucal.errors import UsageError
@@ -21,7 +20,7 @@ FACES = np.vstack([np.eye(3), -np.eye(3)])
 
 def sigmas(calibration, D, b_a):
     """Return (12,) errors in units of their standard deviations; D is known up to a rotation."""
-    symmetric = polar(D, "left")[1]
+    symmetric = scipy.linalg.polar(D, "left")[1]
     return np.append((calibration.D - symmetric) / calibration.D_std, (calibration.b_a - b_a) / calibration.b_a_std)
 
 
@@ -45,7 +44,7 @@ def test_it_is_an_ellipsoid_through_the_rests(hand):
         D = np.array([[x[0], x[1], x[2]], [x[1], x[3], x[4]], [x[2], x[4], x[5]]])
         return np.linalg.norm((means - x[6:]) @ np.linalg.inv(D), axis=1) - G
 
-    x = least_squares(residuals, [1, 0, 0, 1, 0, 1, 0, 0, 0]).x
+    x = scipy.optimize.least_squares(residuals, [1, 0, 0, 1, 0, 1, 0, 0, 0]).x
     away = np.append(calibration.D[np.triu_indices(3)] - x[:6], calibration.b_a - x[6:])
     std = np.append(calibration.D_std[np.triu_indices(3)], calibration.b_a_std)
     assert np.abs(away / std).max() < 1.0

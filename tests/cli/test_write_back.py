@@ -9,6 +9,7 @@ from mpucal.cli import person
 from mpucal.errors import WriteBackError
 from mpucal.files import load
 from mpucal.result.calibration import Calibration
+from tools.processes import quick
 
 
 @pytest.mark.parametrize("answer", ["y\n", "n\n", None], ids=["yes", "no", "no terminal"])
@@ -27,7 +28,8 @@ def test_a_question_is_asked_on_a_terminal_only(monkeypatch, answer):
 
 def test_a_session_writes_to_the_chip_and_says_so(mpucal):
     source = ("--bus", "sim", "--seed", "3", "--rate", "50", "--target", "quick")
-    result = mpucal("session", *source, "--to", "chip", "-o", "board", "--json", "--yes")
+    with quick():
+        result = mpucal("session", *source, "--to", "chip", "-o", "board", "--json", "--yes")
     assert result.code == 0, result.err
     made = Calibration.load("board/calibration.json")
     assert result.out == made.json()

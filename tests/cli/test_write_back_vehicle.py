@@ -17,6 +17,7 @@ from mpucal.sinks.record import session_recorder
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import write_to_all
 from mpucal.sources.table import matching_kinds
+from tools.processes import quick
 
 SOURCE = {
     "bus": None,
@@ -44,7 +45,11 @@ def flown(once):
 
     def make(folder):
         words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder / "flown"), "--json"]
-        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        with (
+            contextlib.redirect_stdout(io.StringIO()) as out,
+            contextlib.redirect_stderr(io.StringIO()) as err,
+            quick(),
+        ):
             code = run(["session", *words, "--yes"])
         (folder / "result.json").write_text(json.dumps({"code": code, "out": out.getvalue(), "err": err.getvalue()}))
 

@@ -3,7 +3,6 @@
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from mpucal.calibration.verification import LEAST_REST_S
 from mpucal.data import Recording
@@ -11,9 +10,9 @@ from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
 from mpucal.session.pauses import HOLD_S, PauseDetector
+from tools.lab.scenarios.recordings import attitude
 
-RATE_HZ, FLAT_S, MOVE_S = 100.0, 6.0, 1.0
-GRAVITY = np.array([0.0, 0.0, 9.81])
+RATE_HZ, FLAT_S, MOVE_S, GRAVITY_MPS2 = 100.0, 6.0, 1.0, 9.81
 
 
 def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
@@ -31,11 +30,8 @@ def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
         omega.append(np.sqrt(2.0) * tremor_rad_s * np.sin(2.0 * np.pi * hertz * t[:, None] + phase))
     omega.append(omega[1])
     rates = np.concatenate(omega)
-    attitude, acc = Rotation.identity(), []
-    for rate in rates:
-        acc.append(attitude.inv().apply(GRAVITY))
-        attitude = attitude * Rotation.from_rotvec(rate / RATE_HZ)
-    acc = np.array(acc) + 0.02 * rng.standard_normal((len(acc), 3))
+    up = attitude(rates, 1.0 / RATE_HZ)[:-1, :, 2]
+    acc = GRAVITY_MPS2 * up + 0.02 * rng.standard_normal(up.shape)
     gyr = rates + 0.002 * rng.standard_normal(rates.shape)
     t = np.arange(len(acc)) / RATE_HZ
     return Recording.from_arrays(t, acc, gyr, flat=(0, int((FLAT_S - 1.0) * RATE_HZ))), starts

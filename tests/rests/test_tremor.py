@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.linalg import expm, solve_continuous_lyapunov
+import scipy
 from scipy.spatial.transform import Rotation
 
 from mpucal.data import Recording
@@ -22,14 +21,14 @@ def test_the_variance_of_a_mean_is_the_integral_of_the_autocovariance(x):
     def integrand(u):
         return 2.0 / x**2 * (x - u) * np.exp(-u) * (1.0 - 5.0 * u / 3.0 + u * u / 3.0)
 
-    assert mean_variance(np.array([x]))[0] == pytest.approx(quad(integrand, 0.0, x)[0], rel=1e-6)
+    assert mean_variance(np.array([x]))[0] == pytest.approx(scipy.integrate.quad(integrand, 0.0, x)[0], rel=1e-6)
 
 
 def travel(lam, sigma, n, rng):
     """(n, 3) m/s^2 of a position with three poles at lam, exactly discretised, from its steady state on."""
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(lam**3), -3.0 * lam**2, -3.0 * lam]])
-    steady = solve_continuous_lyapunov(A, -np.diag([0.0, 0.0, 16.0 * lam / 3.0 * sigma**2]))
-    F = expm(A / RATE_HZ)
+    steady = scipy.linalg.solve_continuous_lyapunov(A, -np.diag([0.0, 0.0, 16.0 * lam / 3.0 * sigma**2]))
+    F = scipy.linalg.expm(A / RATE_HZ)
     noise = np.linalg.cholesky(steady - F @ steady @ F.T + 1e-18 * np.eye(3))
     state = np.linalg.cholesky(steady + 1e-24 * np.eye(3)) @ rng.standard_normal((3, 3))
     acc = np.empty((n, 3))

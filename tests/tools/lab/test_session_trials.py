@@ -25,6 +25,7 @@ from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.sources.tap import Tap
 from tools.lab import session_trials as trials
 from tools.lab.sessions import NOTHING, Ear, Session, by_command, ended_of
+from tools.processes import quick
 
 FAULTS = tuple(fault_kinds(*OF_CHIP))
 CHIPS = ("mpu6050", "mpu6500", "clone98")
@@ -57,11 +58,11 @@ def recorded(words):
 def judged(faults, seed, record=False):
     """Run a session by the command, or record, on a chip that suffers the faults; the verdict is true, or none."""
     words = f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}"
-    done = (
-        recorded(words)
-        if record
-        else by_command("--bus", words, "--rate", "25", "--target", "quick", "--model", "accel")[0]
-    )
+    if record:
+        done = recorded(words)
+    else:
+        with quick():
+            done, _ = by_command("--bus", words, "--rate", "25", "--target", "quick", "--model", "accel")
     ended = ended_of("", seed, done, "" if done.code in CODES else f"exit code {done.code}")
     assert not ended.wrong, (faults, seed, ended)
     assert ended.verdict != GOOD or max(map(abs, ended.z)) <= FARTHEST_Z, (faults, seed, ended)
