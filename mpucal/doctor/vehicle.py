@@ -92,7 +92,7 @@ def _version(link: Link) -> Finding:
     request = encode_command(link, m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
     version = ask(link, request, lambda heard: heard if heard.get_type() == "AUTOPILOT_VERSION" else None)
     if version is None:
-        return Finding("firmware", Mark.UNKNOWN, f"{link.vehicle.firmware}, which does not tell its version")
+        return Finding("firmware", Mark.UNKNOWN, f"{link.vehicle.firmware} of an unknown version")
     words, commit = _words(version), bytes(version.flight_custom_version).rstrip(b"\0")
     # ArduPilot sends the characters of its commit, PX4 its bytes in reverse.
     built = commit.decode() if commit.isalnum() else commit[::-1].hex()
@@ -203,7 +203,7 @@ def _write(topic: str, firmware: str, slot: Slot, values: Values) -> Finding:
     sensor_id = values.get(slot.sensor_id)
     data = {**held, slot.sensor_id: sensor_id}
     if len(held) < len(slot.names):
-        what = f"the vehicle does not tell {', '.join(name for name in slot.names if name not in held)}"
+        what = f"the vehicle did not send {', '.join(name for name in slot.names if name not in held)}"
         return Finding(topic, Mark.BAD, what, "check that the link goes both ways", data)
     if mounting(firmware, slot, values) is None:
         name = BOARD_ROTATION if firmware == PX4 else ORIENTATION
@@ -226,7 +226,7 @@ def _filters(values: Values) -> Iterator[Finding]:
 def _level(firmware: str, values: Values) -> Finding:
     names = trim_names(firmware)
     if not set(names) <= set(values):
-        return Finding("level", Mark.UNKNOWN, f"the vehicle does not tell {names[0]} and the like")
+        return Finding("level", Mark.UNKNOWN, f"the vehicle did not send {names[0]} and the like")
     roll, pitch, _ = trim_of(firmware, values).tolist()
     if not (roll or pitch):
         what = f"never set ({names[0]} and {names[1]} are 0): a write leaves it, unless you say that it stands level"
