@@ -16,7 +16,7 @@ import pytest
 
 from .__main__ import run
 from .result.calibration import Calibration
-from .result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
+from .result.session_files import DOCUMENT
 
 Replay = Callable[..., Calibration]
 
@@ -38,13 +38,11 @@ def mpucal_replay(tmp_path: Path) -> Replay:
     def replay(folder: str | PathLike[str], tolerance: float = 1e-9) -> Calibration:
         folder, into = Path(folder), tmp_path / f"replay of {Path(folder).name}"
         then = Calibration.load(folder / DOCUMENT.name)
-        of_vehicle = folder / CAPTURE_OF_VEHICLE.name
-        capture = of_vehicle if of_vehicle.exists() else folder / CAPTURE.name
         messages = io.StringIO()
         with contextlib.redirect_stderr(messages), contextlib.redirect_stdout(io.StringIO()):
-            run(["session", "--replay", str(capture), "--yes", "--no-write", "-o", str(into)])
+            run(["session", "--replay", str(folder), "--yes", "--no-write", "-o", str(into)])
         if not (into / DOCUMENT.name).exists():
-            pytest.fail(f"{capture} does not replay: {messages.getvalue().splitlines()[-1]}", pytrace=False)
+            pytest.fail(f"{folder} does not replay: {messages.getvalue().splitlines()[-1]}", pytrace=False)
         now = Calibration.load(into / DOCUMENT.name)
         for name in ("D", "b_a"):
             changed = f"{folder}: {name} has changed"

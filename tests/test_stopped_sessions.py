@@ -9,12 +9,12 @@ import pytest
 import mpucal
 from mpucal.__main__ import run
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.tlog import Record, Tlog
-from mpucal.mavlink.tlog_replay import TlogReplay
+from mpucal.mavlink.tlog import RawPacket
 from mpucal.mavlink.transport import SteadyClock
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
+from mpucal.sources.packet_replay import PacketReplay
 from tools.lab import campaign_worlds as worlds
 from tools.processes import quick
 
@@ -80,7 +80,7 @@ def test_the_time_of_a_link_never_follows_who_sets_the_clock():
 def test_a_program_that_stood_still_is_told_from_a_vehicle_that_was_silent():
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still"))
     transport, record, said = SimulatedTransport(vehicle), [], []
-    link = Link(transport, lambda t_ns, data: record.append(Record(t_ns, data)))
+    link = Link(transport, lambda t_ns, data: record.append(RawPacket(t_ns, data)))
     source = VehicleSource(link, 100.0, None, said.append, "test")
     first = [source.start(), *(source.poll().t.tolist() for _ in range(20))]
     vehicle._now_us += 300_000_000
@@ -88,6 +88,6 @@ def test_a_program_that_stood_still_is_told_from_a_vehicle_that_was_silent():
     assert [text for text in said if "Reading paused for 300 s" in text]
     assert not [text for text in said if "has sent nothing" in text]
     assert source.recording().gap.sum() == 1
-    link = Link(TlogReplay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    link = Link(PacketReplay(record, "capture.mcap"), lambda t_ns, data: None)
     again = VehicleSource(link, 100.0, None, lambda text: None, "test")
     assert [again.start(), *(again.poll().t.tolist() for _ in range(59))] == first[:-1]

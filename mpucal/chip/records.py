@@ -11,6 +11,8 @@ from .access import Transaction
 # Names of session events. KEY holds the key under its own name; LATE: an answer was late; FORGET: samples
 # first..last-1 are not used; RESUMED: the session was resumed; UTC: the time of day, ns since 1970.
 KEY, LATE, FORGET, RESUMED, UTC = "key", "late", "forget", "resumed", "utc"
+# Of a vehicle: the link was opened; what it sends counts from here on; nothing came until this time.
+OPENED, BEGUN, END = "session", "begun", "end"
 ABORT = "abort"  # the key that ends a session
 
 
@@ -26,9 +28,6 @@ class SessionEvent:
     name: str
     t_ns: int
     data: Mapping[str, Any] = field(default_factory=dict)
-
-
-Record = Transaction | SessionEvent
 
 
 class Recorder(Protocol):

@@ -18,6 +18,7 @@ from .arguments import output_option
 from .options import ABOVE_ZERO, check_source, fit_options, given_options, source_options
 from .running import open_runner
 
+MCAP = ".mcap"
 EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60`"
 
 
@@ -33,10 +34,9 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     """
     check_source(click.get_current_context())
     source = open_source(options, given_options(), until_end=True)
-    suffix = Path(source.capture_name).suffix
-    file = file or Path(f"record-{stamp()}{suffix}")
-    if file.suffix.lower() != suffix:
-        raise OutputError(f"{file} does not end with {suffix}, by which other commands know a capture", f"add {suffix}")
+    file = file or Path(f"record-{stamp()}{MCAP}")
+    if file.suffix.lower() != MCAP:
+        raise OutputError(f"{file} does not end with {MCAP}, by which other commands know a capture", f"add {MCAP}")
     check_free(file)
     person = console(quiet=False)
     with logging_after_hangup(lambda: file.with_suffix(".log"), partial(person.hung_up, stop=True)):

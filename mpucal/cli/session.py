@@ -146,7 +146,7 @@ def _open(
     check_resume_options(given_options())
     check_unfinished(resume)
     source = open_resumed(resume)
-    options = {**options, **source.live.words}
+    options = {**options, **source.words}
     return source, choose_sinks(sinks, no_write, matching_kinds(options)[0]), options
 
 

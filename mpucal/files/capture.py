@@ -1,7 +1,8 @@
 """Captures decoded into samples, whole or a run at a time, without the samples that the session discarded.
 
-The time of a capture's first sample depends on its last poll of the FIFO: for runs, the frames therefore wait in a
-temporary file, 14 bytes a sample. The polls stay in memory, 16 bytes each or 1.4 MB an hour.
+A capture of a vehicle or of a driver of the kernel is always read whole. The time of a chip's first sample depends on
+the last poll of its FIFO: for runs, the frames therefore wait in a temporary file, 14 bytes a sample. The polls stay in
+memory, 16 bytes each or 1.4 MB an hour.
 """
 
 from __future__ import annotations
@@ -19,10 +20,13 @@ from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
-from ..chip.records import FORGET, UTC, SessionEvent
+from ..chip.records import BEGUN, FORGET, OPENED, RESUMED, UTC, SessionEvent
 from ..data import Recording, Samples
 from ..errors import CaptureError, RecordingError
 from ..iio.decode import decode as decode_iio
+from ..mavlink.log import read_log
+from ..mavlink.tlog import RawPacket
+from ..origin import Origin
 from .mcap import CaptureReader, one_by_one
 from .rows import ROWS, Rows
 from .tables.times import plausible_utc_ns
@@ -35,10 +39,14 @@ def load_capture(*paths: Path) -> Recording:
     ------
     CaptureError, RecordingError, ChipError : see load.
     """
-    session = _SessionAccesses(paths)
-    recording = (
-        decode_iio(one_by_one(session), session.name) if _is_from_kernel(paths) else decode(session, session.name)
-    )
+    session = _SessionRecords(paths)
+    origin, guided = _origin(paths)
+    if origin is Origin.VEHICLE:
+        recording = read_log(_Packets(session), session.name, over_reboots=guided)
+    elif origin is Origin.DEVICE:
+        recording = decode_iio(one_by_one(session.accesses()), session.name)
+    else:
+        recording = decode(session.accesses(), session.name)
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
     if len(recording) < 2:
@@ -53,11 +61,11 @@ def capture_rows(*paths: Path) -> Rows:
     ------
     CaptureError, RecordingError, ChipError : see load.
     """
-    if _is_from_kernel(paths):
+    if _origin(paths)[0] is not Origin.CHIP:
         return Rows.of(load_capture(*paths))
-    session = _SessionAccesses(paths)
+    session = _SessionRecords(paths)
     decoder, spool = Decoder(session.name), Spool()
-    for access in session:
+    for access in session.accesses():
         decoder.feed(access)
         spool.add(decoder.release())
     spool.add(decoder.release(last=True))
@@ -68,13 +76,13 @@ def capture_rows(*paths: Path) -> Rows:
     return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name, utc_ns=session.utc_ns)
 
 
-class _SessionAccesses:
-    """Iterator over the register accesses in the captures of one session, once.
+class _SessionRecords:
+    """Register accesses or packets in the captures of one session.
 
     Attributes
     ----------
     name : of the first capture. forgotten : first -> last + 1 samples that the session discarded.
-    recovered, utc_ns : see Recording. These and `forgotten` are complete when all accesses are read.
+    recovered, utc_ns : see Recording. These and `forgotten` are complete when all records are read.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
@@ -84,7 +92,20 @@ class _SessionAccesses:
         self.recovered: str | None = None
         self.utc_ns: int | None = None
 
-    def __iter__(self) -> Generator[Transaction | Accesses]:
+    def accesses(self) -> Generator[Transaction | Accesses]:
+        """Yield the accesses, by the block where they are stored so."""
+        for record in self._records():
+            if not isinstance(record, RawPacket):
+                yield record
+
+    def packets(self) -> Generator[RawPacket]:
+        """Yield the packets that count."""
+        for record in self._records():
+            if isinstance(record, RawPacket) and self._counts:
+                yield record
+
+    def _records(self) -> Generator[Transaction | Accesses | RawPacket]:
+        self._counts = True
         for reader in map(CaptureReader, self._paths):
             for record in reader.blocks():
                 if not isinstance(record, SessionEvent):
@@ -94,6 +115,8 @@ class _SessionAccesses:
                 elif record.name == FORGET:
                     first, last = (self._number(record, key) for key in ("first", "last"))
                     self.forgotten[first] = last
+                elif record.name in (OPENED, RESUMED, BEGUN):
+                    self._counts = record.name == BEGUN
             self.recovered = reader.recovered or self.recovered
 
     def _number(self, event: SessionEvent, key: str) -> int:
@@ -106,11 +129,29 @@ class _SessionAccesses:
             ) from error
 
 
-def _is_from_kernel(paths: Sequence[Path]) -> bool:
-    """Return True if a driver of the Linux kernel was read, whose samples have their final times at once."""
-    with closing(iter(_SessionAccesses(paths))) as accesses:
-        first = next(one_by_one(accesses), None)
-    return first is not None and isinstance(first.register, str)
+@dataclass
+class _Packets:
+    """The packets of a session, which can be read more than once."""
+
+    session: _SessionRecords
+
+    def __iter__(self) -> Iterator[RawPacket]:
+        return self.session.packets()
+
+
+def _origin(paths: Sequence[Path]) -> tuple[Origin, bool]:
+    """Return where the records of captures come from, and whether events of a session come before them."""
+    events = False
+    for reader in map(CaptureReader, paths):
+        with closing(reader.blocks()) as records:
+            for record in records:
+                if isinstance(record, RawPacket):
+                    return Origin.VEHICLE, events
+                if not isinstance(record, SessionEvent):
+                    access = next(iter(record)) if isinstance(record, Accesses) else record
+                    return Origin.DEVICE if isinstance(access.register, str) else Origin.CHIP, events
+                events = True
+    return Origin.CHIP, events
 
 
 @dataclass

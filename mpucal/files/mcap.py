@@ -1,4 +1,4 @@
-"""Captures as MCAP files: every register access and session event in order.
+"""Captures as MCAP files: every register access, or packet of a vehicle, and session event in order.
 
 While a capture is written, a chunk with one message of register accesses holds half a second. A closed capture is
 rewritten with longer chunks, which take half the space and are read several times as fast: each is a tenth of the part
@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,19 +27,34 @@ from zstandard import ZstdError, frame_content_size
 from ..arguments import check_regular
 from ..chip.access import Transaction
 from ..chip.accesses import Accesses
-from ..chip.records import Record, SessionEvent
+from ..chip.records import SessionEvent
 from ..disk.atomic import atomic_file
 from ..disk.growing_file import GrowingFile
 from ..errors import CaptureError, OutputError
+from ..mavlink.tlog import RawPacket
 from ..strict_json import parse_own_json
 from .budget import LONGEST_CHUNK
-from .messages import BUS, SESSION, accesses_schema, decode_message, encode_accesses, encode_event, event_schema
+from .messages import (
+    BUS,
+    PACKETS,
+    SESSION,
+    accesses_schema,
+    decode_message,
+    encode_accesses,
+    encode_event,
+    event_schema,
+)
+
+Record = Transaction | RawPacket | SessionEvent
 
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
 # the name of the metadata in a file of calibrated samples, which is not a capture
 CALIBRATED = "mpucal.imu"
 
 _REMEDY = "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu"
+
+# of a channel, in MCAP's specification
+NO_SCHEMA = 0
 
 # half of the second that a killed program may lose; the other half may pass between two records
 CHUNK_NS = 500_000_000
@@ -69,15 +84,20 @@ class CaptureWriter:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self._meta: Mapping[str, Any] = {}
+        self._head: tuple[Mapping[str, Any], str] = ({}, BUS)
         self._file = GrowingFile(Path(path))
         self._stream = _Stream(cast("IO[bytes]", self._file), CHUNK_NS, IndexType.METADATA, self._file.kept)
 
-    def start(self, meta: Mapping[str, Any]) -> None:
-        """Write the metadata: source, program and settings, values of JSON types."""
-        self._meta = dict(meta)
+    def start(self, meta: Mapping[str, Any], topic: str = BUS) -> None:
+        """Write the metadata: source, program and settings, values of JSON types; `topic` is BUS or PACKETS."""
+        self._head = (meta, topic)
         with self._writing():
-            self._stream.start(meta)
+            self._stream.start(meta, topic)
+
+    def packet(self, t_ns: int, data: bytes) -> None:
+        """Write a packet of MAVLink; the time is the host's clock."""
+        with self._writing():
+            self._stream.add(RawPacket(t_ns, data))
 
     def transaction(self, transaction: Transaction) -> None:
         """Write a register access; the message's publish time is the host's clock."""
@@ -114,7 +134,7 @@ class CaptureWriter:
     def _with_longer_chunks(self, path: Path) -> None:
         with atomic_file(path) as file:
             stream, written = _Stream(file, CLOSED_CHUNK_NS), CaptureReader(path)
-            stream.start(self._meta)
+            stream.start(*self._head)
             for block in written.blocks():
                 stream.add(block)
             stream.finish()
@@ -155,16 +175,16 @@ class _Stream:
     def is_started(self) -> bool:
         return bool(self._channels)
 
-    def start(self, meta: Mapping[str, Any]) -> None:
+    def start(self, meta: Mapping[str, Any], topic: str) -> None:
         self._writer.start(profile="", library=FORMAT)
         texts = {key: json.dumps(value) for key, value in {**meta, VERSION_KEY: VERSION}.items()}
         self._writer.add_metadata(FORMAT, texts)
-        for topic, name, schema, encoding, content in (
-            (BUS, "mpucal.Accesses", SchemaEncoding.Protobuf, MessageEncoding.Protobuf, accesses_schema()),
-            (SESSION, "mpucal.SessionEvent", SchemaEncoding.JSONSchema, MessageEncoding.JSON, event_schema()),
-        ):
-            id_ = self._writer.register_schema(name, schema, content)
-            self._channels[topic] = self._writer.register_channel(topic, encoding, id_)
+        if topic == PACKETS:
+            self._channels[PACKETS] = self._writer.register_channel(PACKETS, "mavlink", NO_SCHEMA)
+        else:
+            self._register(BUS, MessageEncoding.Protobuf, "mpucal.Accesses", SchemaEncoding.Protobuf, accesses_schema())
+        event = ("mpucal.SessionEvent", SchemaEncoding.JSONSchema, event_schema())
+        self._register(SESSION, MessageEncoding.JSON, *event)
         self._writer.flush()
 
     def add(self, record: Record | Accesses) -> None:
@@ -173,6 +193,8 @@ class _Stream:
         if isinstance(record, SessionEvent):
             self._put_waiting()
             self._put(SESSION, t_ns, encode_event(record.name, record.data))
+        elif isinstance(record, RawPacket):
+            self._put(PACKETS, t_ns, record.data)
         elif isinstance(record, Accesses):
             if self._waiting or (self._blocks and not self._blocks[-1].can_join(record)):
                 self._put_waiting()
@@ -193,6 +215,10 @@ class _Stream:
                 # the library keeps what it does not write: 8 MB an hour
                 vars(self._writer).get("_Writer__chunk_indices", []).clear()
             self._chunk_began_ns = None
+
+    def _register(self, topic: str, encoding: str, name: str, schema_encoding: str, schema: bytes) -> None:
+        id_ = self._writer.register_schema(name, schema_encoding, schema)
+        self._channels[topic] = self._writer.register_channel(topic, encoding, id_)
 
     def finish(self) -> None:
         if self.is_started:
@@ -263,7 +289,7 @@ class CaptureReader:
     def __iter__(self) -> Iterator[Record]:
         return one_by_one(self.blocks())
 
-    def blocks(self) -> Iterator[Accesses | Record]:
+    def blocks(self) -> Generator[Accesses | Record]:
         """Yield the records, register accesses by the block as in the file."""
         try:
             with check_regular(self._path).open("rb") as file:

@@ -1,5 +1,7 @@
 """Messages of a capture: register accesses on BUS, many to a message, and session events on SESSION.
 
+A vehicle's capture has PACKETS in place of BUS: a message is one packet of MAVLink as it was received or sent.
+
 A message of accesses has columns with one entry per access, in Protocol Buffers' encoding. The file holds the schema:
 
     kind         a sum of WRITE, HEARD and FRAMED
@@ -29,10 +31,12 @@ from mcap.well_known import MessageEncoding
 from ..chip.access import Failure, Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import SessionEvent
+from ..mavlink.dialect import is_packet
+from ..mavlink.tlog import RawPacket
 from ..strict_json import parse_own_json
 from . import protobuf
 
-BUS, SESSION = "/bus", "/session"
+BUS, PACKETS, SESSION = "/bus", "/mavlink", "/session"
 WRITE, HEARD, FRAMED = 1, 2, 4
 
 # name, type, repeated; numbered from 1
@@ -150,7 +154,7 @@ def encode_event(name: str, data: Mapping[str, Any]) -> bytes:
 
 def decode_message(
     topic: str, encoding: str, t_ns: int, message: bytes
-) -> Accesses | Transaction | SessionEvent | None:
+) -> Accesses | Transaction | RawPacket | SessionEvent | None:
     """Decode a message; None for the topic of a newer mpucal.
 
     Raises
@@ -159,6 +163,10 @@ def decode_message(
     """
     if topic == BUS:
         return decode_accesses(message) if encoding == MessageEncoding.Protobuf else _transaction(t_ns, message)
+    if topic == PACKETS:
+        if not is_packet(message):
+            raise ValueError(f"{len(message)} bytes are no packet")
+        return RawPacket(t_ns, message)
     if topic == SESSION:
         content = parse_own_json(message)
         return SessionEvent(content["name"], t_ns, content["data"])

@@ -1,14 +1,22 @@
-"""MAVLink .tlog files as recordings."""
+"""MAVLink .tlog files as recordings, and as captures."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 
+from ..chip.records import OPENED, SessionEvent
 from ..data import Recording
+from ..errors import RecordingError
+from ..mavlink.dialect import Parser, dialect
 from ..mavlink.log import read_log
-from ..mavlink.tlog import TlogFile
+from ..mavlink.session_events import NoteReader, is_own
+from ..mavlink.tlog import RawPacket, TlogFile, encode_tlog
 from .budget import check_size
+from .folder import captures_in
+from .mcap import Capture, CaptureReader, Record
+
+TLOG = ".tlog"
 
 
 def load_tlog(path: Path) -> Recording:
@@ -23,3 +31,41 @@ def load_tlog(path: Path) -> Recording:
     file = TlogFile(path)
     recording = read_log(file, file.name)
     return replace(recording, recovered=file.recovered)
+
+
+def read_tlog(path: Path) -> Capture:
+    """Return a .tlog as a capture, with the events and the head of a session that an earlier mpucal recorded so.
+
+    Raises
+    ------
+    CaptureError : it cannot be read, or holds no packet.
+    """
+    file, parser, notes = TlogFile(path), Parser(dialect().MAVLink(None)), NoteReader()
+    records: list[Record] = []
+    for record in file:
+        records.append(record)
+        for packet in parser.datagram(record.data) if is_own(record.data) else ():
+            note = notes.add(packet.message)
+            if note is not None:
+                records.append(SessionEvent(note.name, record.t_ns, note.data))
+    head = next((dict(each.data) for each in records if isinstance(each, SessionEvent) and each.name == OPENED), {})
+    meta = {**head, "driver": f"mavlink {head.pop('source', None)}"} if head else {}
+    return Capture(meta, tuple(records), file.recovered, file.name)
+
+
+def tlog_of(place: Path) -> bytes:
+    """Return the packets in a vehicle's capture, or in the captures of its session's folder, as a .tlog.
+
+    Raises
+    ------
+    CaptureError : not a capture. RecordingError : it holds no packets.
+    """
+    packets = [
+        record
+        for path in captures_in(place) or [place]
+        for record in CaptureReader(path)
+        if isinstance(record, RawPacket)
+    ]
+    if not packets:
+        raise RecordingError(f"{place} holds no packets of a vehicle", "give the capture of a session with --mavlink")
+    return encode_tlog(packets)

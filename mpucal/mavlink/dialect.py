@@ -67,6 +67,11 @@ def packet_length(data: bytes | bytearray) -> int | None:
     return HEADER[data[0]] + data[1] + CHECKSUM + signature
 
 
+def is_packet(data: bytes) -> bool:
+    """Return True if `data` has the length of the one packet that it begins with; its checksum is not verified."""
+    return data[:1] in MAGIC and packet_length(data) == len(data)
+
+
 def read_header(packet: bytes) -> tuple[int, tuple[int, int]]:
     """Return message id and (system, component) of the sender of a whole packet; its checksum is not verified."""
     at = HEADER[packet[0]]

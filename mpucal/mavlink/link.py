@@ -183,11 +183,14 @@ class Link:
                 listener(message)
             yield message
 
-    def note(self, message: Message) -> None:
-        """Record a message, with the sender id by which a replay knows it, without sending it."""
-        own, self._mav.srcSystem = self._mav.srcSystem, OWN_SYSTEM
-        self._keep(self._pack(message))
-        self._mav.srcSystem = own
+    def restart(self) -> None:
+        """Forget the vehicle and what was heard: the transport goes on with another part of a session."""
+        self._parsers.clear()
+        self._queue.clear()
+        self._before_lock.clear()
+        self._listeners.clear()
+        self._vehicle, self._seeking, self._sequence = None, False, None
+        self._now_ns = self._next_heartbeat_ns = max(self._now_ns, self._transport.now_ns())
 
     def close(self) -> None:
         """Close the transport."""

@@ -22,7 +22,7 @@ from .imu import MESSAGE_ID, Reading, decode_reading
 from .parameters.encoding import decode_parameter
 from .segments import ALTERING, SETTLED_US, Segment, find_recorrection, join_segments
 from .stream_buffers import Row, StreamBuffers
-from .tlog import Record
+from .tlog import RawPacket
 from .transport import US
 from .vehicle import Vehicle, vehicle_of
 
@@ -131,12 +131,15 @@ class Log:
         return replace(first, others=tuple(others))
 
 
-def read_log(records: Iterable[Record], name: str, system: int | None = None) -> Recording:
-    """Return the recording in a .tlog.
+def read_log(
+    records: Iterable[RawPacket], name: str, system: int | None = None, over_reboots: bool = False
+) -> Recording:
+    """Return the recording in the log of one vehicle.
 
     Parameters
     ----------
-    records : of the .tlog, read twice. name : of the recording. system : id of one of several vehicles in it.
+    records : read twice. name : of the recording. system : id of one of several vehicles in it.
+    over_reboots : see Log.
 
     Raises
     ------
@@ -148,14 +151,14 @@ def read_log(records: Iterable[Record], name: str, system: int | None = None) ->
     if len(vehicles) != 1:
         raise _not_one(name, vehicles)
     ((ids, vehicle),) = vehicles.items()
-    log = Log(vehicle.family)
+    log = Log(vehicle.family, over_reboots)
     for t_ns, message in _messages(records):
         if _sender(message) == ids:
             log.add(message, t_ns)
     return log.recording(name)
 
 
-def _messages(records: Iterable[Record]) -> Iterator[tuple[int, Message]]:
+def _messages(records: Iterable[RawPacket]) -> Iterator[tuple[int, Message]]:
     parser = Parser(dialect().MAVLink(None))
     for record in records:
         for packet in parser.datagram(record.data):
@@ -166,12 +169,12 @@ def _sender(message: Message) -> tuple[int, int]:
     return message.get_srcSystem(), message.get_srcComponent()
 
 
-def _vehicles(records: Iterable[Record]) -> dict[tuple[int, int], Vehicle]:
+def _vehicles(records: Iterable[RawPacket]) -> dict[tuple[int, int], Vehicle]:
     """Return the vehicles by (system, component): those that sent IMU messages or, if none did, all."""
     vehicles: dict[tuple[int, int], Vehicle] = {}
     imu: set[tuple[int, int]] = set()
 
-    def is_identifying(record: Record) -> bool:
+    def is_identifying(record: RawPacket) -> bool:
         message_id, ids = read_header(record.data)
         return message_id == dialect().MAVLINK_MSG_ID_HEARTBEAT or (ids not in imu and message_id in IMU_MESSAGES)
 

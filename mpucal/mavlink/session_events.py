@@ -1,4 +1,4 @@
-"""A session's events as STATUSTEXT messages with ids of their own, so that any tool opens the .tlog.
+"""Events of a session in a .tlog of an earlier mpucal: STATUSTEXT messages with ids of their own.
 
 The text is `mpucal ` and a JSON object; STATUSTEXT (253) holds 50 characters, and chunks of one `id` hold what is
 longer. A chunk of less than 50 characters is the last one.
@@ -6,17 +6,15 @@ longer. A chunk of less than 50 characters is the last one.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ..strict_json import parse_own_json
-from .dialect import Message, dialect
+from .dialect import Message, read_header
 from .link import OWN_COMPONENT, OWN_SYSTEM
 
 PREFIX = b"mpucal "
 CHUNK = 50
-MOST_CHUNKS = 256
 
 
 class Note(NamedTuple):
@@ -24,25 +22,6 @@ class Note(NamedTuple):
 
     name: str
     data: Mapping[str, Any]
-
-
-def encode_note(note: Note, id_: int) -> list[Message]:
-    """Return the messages that hold `note`.
-
-    Parameters
-    ----------
-    id_ : 1 to 65535, another one than that of the note before.
-
-    Raises
-    ------
-    ValueError : it holds more than STATUSTEXT can chunk.
-    """
-    m = dialect()
-    text = PREFIX + json.dumps({"name": note.name, "data": dict(note.data)}, separators=(",", ":")).encode()
-    chunks = [text[at : at + CHUNK] for at in range(0, len(text) + 1, CHUNK)]
-    if len(chunks) > MOST_CHUNKS:
-        raise ValueError(f"a note of {len(text)} bytes is too long for STATUSTEXT")
-    return [m.MAVLink_statustext_message(m.MAV_SEVERITY_DEBUG, chunk, id_, k) for k, chunk in enumerate(chunks)]
 
 
 class NoteReader:
@@ -54,7 +33,7 @@ class NoteReader:
 
     def add(self, message: Message) -> Note | None:
         """Return the note that `message` completes, None if it completes none."""
-        if message.get_type() != "STATUSTEXT" or not is_own(message):
+        if message.get_type() != "STATUSTEXT":
             return None
         text = message.text if isinstance(message.text, bytes) else message.text.encode()
         if message.chunk_seq == 0:
@@ -66,9 +45,9 @@ class NoteReader:
         return _decode(b"".join(self._chunks)) if len(text) < CHUNK else None
 
 
-def is_own(message: Message) -> bool:
-    """Return True if the sender's ids are mpucal's."""
-    return bool((message.get_srcSystem(), message.get_srcComponent()) == (OWN_SYSTEM, OWN_COMPONENT))
+def is_own(packet: bytes) -> bool:
+    """Return True if the ids of a packet's sender are mpucal's."""
+    return read_header(packet)[1] == (OWN_SYSTEM, OWN_COMPONENT)
 
 
 def _decode(text: bytes) -> Note | None:

@@ -4,100 +4,39 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
-from ..disk.growing_file import GrowingFile
-from ..errors import CaptureError, OutputError
+from ..errors import CaptureError
 from .dialect import BEGINNING, HEADER, LONGEST, packet_length
 from .transport import US
 
 STAMP = struct.Struct(">Q")
 # No clock is later, and nearly all bytes that are not a time are.
 LATEST_US = 1 << 52
-FLUSH_NS = 500_000_000
 
 
-class Record(NamedTuple):
+class RawPacket(NamedTuple):
     """A packet, and when it was received or sent [ns since 1970, whole us]."""
 
     t_ns: int
     data: bytes
 
 
-class TlogWriter:
-    """Writer of packets as they come; a killed program loses the last second at most.
-
-    Raises
-    ------
-    OutputError : the file cannot be created or written.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._flushed_ns = 0
-        self._file = GrowingFile(path)
-
-    def packet(self, t_ns: int, data: bytes) -> None:
-        """Write a packet."""
-        try:
-            self._file.write(STAMP.pack(t_ns // US) + data)
-            if t_ns - self._flushed_ns >= FLUSH_NS:
-                self._file.flush()
-                self._flushed_ns = t_ns
-        except OSError as error:
-            raise self._file.failed(error) from error
-
-    def close(self) -> None:
-        """Write what is left, and close the file."""
-        try:
-            self._file.close()
-        except OSError as error:
-            raise self._file.failed(error) from error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        # An error that already ends the program is not hidden by one of closing.
-        with suppress(*(() if kind is None else (OutputError,))):
-            self.close()
-
-
-class Tlog(NamedTuple):
-    """Content of a .tlog.
-
-    Attributes
-    ----------
-    records : in their order. name : of the file.
-    recovered : None, or the sentence that says how much of it is damaged.
-    """
-
-    records: tuple[Record, ...]
-    name: str
-    recovered: str | None
-
-
-def read_tlog(path: Path) -> Tlog:
-    """Read a .tlog; damaged parts are skipped.
-
-    Raises
-    ------
-    CaptureError : it cannot be read, or holds no packet.
-    """
-    file = TlogFile(path)
-    records = tuple(file)
-    return Tlog(records, file.name, file.recovered)
+def encode_tlog(packets: Iterable[RawPacket]) -> bytes:
+    """Return the content of a .tlog with these packets."""
+    return b"".join(STAMP.pack(packet.t_ns // US) + packet.data for packet in packets)
 
 
 class TlogFile:
-    """The records of a .tlog, read from the file at each iteration; damaged parts are skipped.
+    """The packets of a .tlog, read from the file at each iteration; damaged parts are skipped.
 
     Attributes
     ----------
-    name, recovered : see Tlog; `recovered` is set by the end of an iteration.
+    name : of the file.
+    recovered : None, or the sentence that says how much of it is damaged; set by the end of an iteration.
 
     Raises
     ------
@@ -109,7 +48,7 @@ class TlogFile:
         self.name = path.name
         self.recovered: str | None = None
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[RawPacket]:
         whole = size = 0
         try:
             with self._path.open("rb") as file:
@@ -130,7 +69,7 @@ class TlogFile:
             self.recovered = f"{self.name} is cut short or damaged: {lost} of its {size} bytes are no packets."
 
 
-def _records(data: mmap) -> Iterator[Record]:
+def _records(data: mmap) -> Iterator[RawPacket]:
     at = 0
     while at + STAMP.size < len(data):
         (stamp_us,) = STAMP.unpack_from(data, at)
@@ -139,7 +78,7 @@ def _records(data: mmap) -> Iterator[Record]:
         if stamp_us >= LATEST_US or length is None or begin + length > len(data):
             at = _next_beginning(data, begin + 1) - STAMP.size
             continue
-        yield Record(stamp_us * US, data[begin : begin + length])
+        yield RawPacket(stamp_us * US, data[begin : begin + length])
         at = begin + length
 
 

@@ -1,6 +1,6 @@
 """The transport protocol: a transport moves a link's bytes and has its clock.
 
-UDP, TCP, a serial line, a .tlog that is replayed and a simulated vehicle are transports.
+UDP, TCP, a serial line, a capture that is replayed and a simulated vehicle are transports.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError, WriteBackError
 from .clock import Jump
 from .dialect import Message
-from .firmwares import ARDUPILOT, PX4
+from .firmwares import PX4
 from .imu import Stream
 from .link import Link, S
 from .log import Log
@@ -42,7 +42,7 @@ class VehicleSource:
     link : not locked yet. rate_hz : to request. system : id of the vehicle to lock to, if there are several.
     say : shows the operator a sentence. name : of the recording.
     writes : the result will be written to the vehicle: then its parameters must name its sensors.
-    prepare : prepare a PX4; see Preparation.
+    prepare : prepare a PX4; see Preparation. begun : called when the first message is heard that counts.
     """
 
     def __init__(
@@ -54,6 +54,7 @@ class VehicleSource:
         name: str,
         writes: bool = False,
         prepare: bool = False,
+        begun: Callable[[], None] = lambda: None,
     ) -> None:
         self._link = link
         self._rate_hz = rate_hz
@@ -62,8 +63,8 @@ class VehicleSource:
         self._name = name
         self._writes = writes
         self._preparation = Preparation(link, say) if prepare else None
-        self._firmware = ARDUPILOT
-        self._log = Log(ARDUPILOT)
+        self._begun = begun
+        self._log = Log("")
         self._streams: Streams | None = None
         self._stream: Stream | None = None
         self._rows: list[Row] = []
@@ -78,23 +79,32 @@ class VehicleSource:
     def start(self) -> Sensor:
         """Listen, lock to one vehicle and say so, read its parameters, and request its streams.
 
+        The samples of another part of a session join those of before.
+
         Raises
         ------
         NoAnswer : no vehicle. UsageError : several. LinkError : it sends no accelerations, or the link broke.
         """
-        firmware = self._firmware = lock_to_vehicle(self._link, self._system, self._say).family
+        vehicle = lock_to_vehicle(self._link, self._system, self._say)
+        self._system, firmware = vehicle.system, vehicle.family
+        if first := not self._log.firmware:
+            self._log = Log(firmware, over_reboots=True)
+        elif firmware != self._log.firmware:
+            raise UsageError(f"{vehicle} is another one: the session began with {self._log.firmware}", "start again")
         if self._preparation is not None:
             if firmware == PX4:
                 self._preparation.prepare()
             else:
                 self._say("--prepare is for a PX4 only: nothing was prepared.")
-        self._log = Log(firmware, over_reboots=True)
+        self._begun()
         self._link.subscribe(self._on_message)
         parameters = read_stream_parameters(self._link, firmware)
         self._check_ids(parameters)
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
         self._stream = self._streams.start()
         self._rows = []
+        # What was rebooted between two parts is back.
+        self._rebooted &= first
         self._lost_before = self._link.lost
         self._heard_ns = self._sampled_ns = self._link.now_ns()
         return sensor_of(self._stream, firmware, parameters, self._rate_hz)
@@ -190,12 +200,14 @@ class VehicleSource:
         if not names:
             return
         self._changes_reported = len(self._log.changed)
-        by = f" (PX4 does that itself while {AUTOCAL} is 1; --prepare sets it to 0)" if self._firmware == PX4 else ""
+        by = (
+            f" (PX4 does that itself while {AUTOCAL} is 1; --prepare sets it to 0)" if self._log.firmware == PX4 else ""
+        )
         self._say(f"{names[0]} was changed while it was measured{by}: earlier samples are corrected where possible.")
 
     def _check_ids(self, parameters: Mapping[str, float]) -> None:
         """Check before the vehicle is turned that a PX4 names a sensor: otherwise no slot can hold the result."""
-        if self._firmware != PX4 or not parameters or find_slot(PX4, 1, parameters) is not None:
+        if self._log.firmware != PX4 or not parameters or find_slot(PX4, 1, parameters) is not None:
             return
         what = f"{self._link.vehicle} names none of its accelerometers (all CAL_ACCn_ID are 0)"
         if self._writes:
@@ -217,7 +229,7 @@ class VehicleSource:
                     f"{self._link.vehicle} {self._fault()}",
                     "check its power and the link, and that no other ground station stops its IMU messages",
                 )
-        read_stream_parameters(self._link, self._firmware)
+        read_stream_parameters(self._link, self._log.firmware)
         self._rebooted = False
         self._say(f"{self._link.vehicle} is back, its parameters are read again: go on.")
 

@@ -45,12 +45,11 @@ class SessionFile:
 
 CAPTURE = SessionFile(
     "capture.mcap",
-    "every register access and key press with its time, written as it happens; a killed program loses a second at most",
+    "every register access, or packet of a vehicle, and key press with its time, written as it happens; a killed"
+    " program loses a second at most",
 )
-CAPTURE_OF_VEHICLE = SessionFile(
-    "capture.tlog",
-    "with `--mavlink`, instead of `capture.mcap`: every packet with its time, as ground stations record it",
-)
+# of an earlier mpucal's session with a vehicle
+CAPTURE_OF_VEHICLE = SessionFile("capture.tlog", "")
 DOCUMENT = SessionFile(
     "calibration.json",
     "D, b_a and the gyroscope's K, b_omega with standard deviations, the fit, the verdict and its reasons",
@@ -70,4 +69,4 @@ TRUTH = SessionFile("truth.json", "true parameters of a simulated chip", "mpucal
 
 LOG = SessionFile("session.log", "messages of a session after its terminal went away")
 
-SESSION_FILES = (CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT, BLOB, REPORT, TRUTH, LOG)
+SESSION_FILES = (CAPTURE, DOCUMENT, BLOB, REPORT, TRUTH, LOG)

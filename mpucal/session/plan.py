@@ -12,12 +12,17 @@ from ..chip.driver import DRIVER_VERSION
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
 from ..iio import IIO_VERSION
+from ..mavlink import MAVLINK_VERSION
 from .aims import AIMS, NORMAL
 from .boards import BOARDS
 
 DRIVER, PLAN = "driver", "plan"
 # The class of a capture's sensor settings, by the version of the driver that recorded it.
-CONFIGS: Mapping[Any, type[Config]] = {DRIVER_VERSION: Config, IIO_VERSION: RateOnlyConfig}
+CONFIGS: Mapping[Any, type[Config]] = {
+    DRIVER_VERSION: Config,
+    IIO_VERSION: RateOnlyConfig,
+    MAVLINK_VERSION: RateOnlyConfig,
+}
 
 
 @dataclass(frozen=True)

@@ -70,19 +70,30 @@ class ReplayedOperator:
     ----------
     listener : gets the outputs, and may abort.
     pending : returns the session events of a name recorded since the last access, each once.
+    resumed : of a session that is resumed: returns True once the replay is over. The listener then presses the keys,
+        and it gets the outputs from there on.
     """
 
-    def __init__(self, listener: Operator, pending: Callable[[str], Sequence[SessionEvent]]) -> None:
-        self._listener, self._pending = listener, pending
+    def __init__(
+        self,
+        listener: Operator,
+        pending: Callable[[str], Sequence[SessionEvent]],
+        resumed: Callable[[], bool] | None = None,
+    ) -> None:
+        self._listener, self._pending, self._resumed = listener, pending, resumed
 
     def hear(self, output: Output) -> None:
         """Pass an output to the listener."""
-        self._listener.hear(output)
+        if self._resumed is None or self._resumed():
+            self._listener.hear(output)
 
     def pressed(self) -> Sequence[Key]:
         """Return the recorded keys, and the listener's abort."""
+        pressed = self._listener.pressed()
+        if self._resumed is not None and self._resumed():
+            return pressed
         recorded = [Key(event.data[KEY]) for event in self._pending(KEY)]
-        return [*recorded, *(key for key in self._listener.pressed() if key is Key.ABORT)]
+        return [*recorded, *(key for key in pressed if key is Key.ABORT)]
 
 
 # Writes a session event into the capture: name, time [ns], data.

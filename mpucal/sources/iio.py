@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from contextlib import closing, suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ SHOWN_PREFIXES = ("name", "in_", "sampling", "trigger/")
 NO_DEVICES = Devices("", "")
 
 
-@dataclass(frozen=True)
+@dataclass
 class OpenedIio(OpenedChip):
     """Open IIO devices, one or two; see OpenedSource.
 
@@ -79,8 +79,8 @@ class OpenedIio(OpenedChip):
         return IioDriver(bus, self.devices, self.plan.config, name, say, self.trigger)
 
 
-def iio_replay(replay: OpenedChip, capture: Capture) -> OpenedIio:
-    """Convert the replay of a chip to one of IIO devices; see OpenedIio.source_meta.
+def devices_in(capture: Capture) -> dict[str, Any]:
+    """Return the `devices` and the `trigger` of the OpenedIio that recorded a capture.
 
     Raises
     ------
@@ -92,8 +92,7 @@ def iio_replay(replay: OpenedChip, capture: Capture) -> OpenedIio:
         raise CaptureError(
             f"the head of {capture.name} does not name the IIO devices", "use `mpucal calibrate`"
         ) from error
-    held = {field.name: getattr(replay, field.name) for field in fields(OpenedChip)}
-    return OpenedIio(**held, devices=Devices(str(accel), str(gyro)), trigger=trigger)
+    return {"devices": Devices(str(accel), str(gyro)), "trigger": trigger}
 
 
 def open_source(request: Request) -> OpenedIio:

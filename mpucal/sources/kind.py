@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..origin import Origin
@@ -123,5 +124,6 @@ class Request:
     def words(self) -> dict[str, Any]:
         """Options that open the same source again, in JSON's types, and the board's name if it has one."""
         names = (self.kind.option.name, *(option.name for option in self.kind.options))
+        words = {name: self.values.get(name) for name in names}
         board = {NAME: self.values[NAME]} if self.values.get(NAME) else {}
-        return {name: self.values.get(name) for name in names} | board
+        return {key: str(word.absolute()) if isinstance(word, Path) else word for key, word in words.items()} | board

@@ -1,18 +1,32 @@
-"""Interface of an open source of any kind."""
+"""Open source of any kind: it is measured and recorded, replayed from its capture, or resumed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
+from .. import __version__
+from ..chip.access import Transaction
+from ..chip.records import LATE
+from ..errors import CaptureError
+from ..files.mcap import CaptureWriter
+from ..files.messages import BUS
 from ..origin import Origin
+from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
-from ..session.ports import Note, Operator, Source
+from ..session.ports import Note, Operator, ReplayedOperator, Source
+from .chain import Chain
+
+# Key of a capture's head: the source, to resume the session.
+SOURCE = "source"
 
 Say = Callable[[str], None]
+Listener = Callable[[Prompt], None]
 
 
 class ActiveSource(NamedTuple):
@@ -30,47 +44,89 @@ class ActiveSource(NamedTuple):
     late: Callable[[bool], bool] = bool
 
 
-class OpenedSource(Protocol):
+class NewRecords:
+    """Recorder of a session; of a resumed one, without what is replayed."""
+
+    def __init__(self, writer: CaptureWriter, parts: Chain[Any] | None) -> None:
+        self._writer, self._parts = writer, parts
+
+    @property
+    def _is_new(self) -> bool:
+        return self._parts is None or not (self._parts.resumes and self._parts.replaying)
+
+    def transaction(self, transaction: Transaction) -> None:
+        """Record a register access."""
+        if self._is_new:
+            self._writer.transaction(transaction)
+
+    def packet(self, t_ns: int, data: bytes) -> None:
+        """Record a packet of MAVLink."""
+        if self._is_new:
+            self._writer.packet(t_ns, data)
+
+    def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
+        """Record a session event."""
+        if self._is_new:
+            self._writer.event(name, t_ns, data)
+
+
+@dataclass
+class OpenedSource(ABC):
     """Open source, with the properties of its kind.
 
     Attributes
     ----------
-    plan : of the session. origin : of its samples. listeners : receive the prompts besides the operator.
-    truth : true parameters of a simulated sensor. recovered : description of a damaged capture's readable part.
-    capture_name : name of its capture's file.
+    line : open bus or transport; a Chain in a replay and in a resumed session. plan : of the session.
+    hands : receive the prompts besides the operator. read_truth : returns the true parameters of a simulated sensor.
+    recovered : description of a damaged capture's readable part. capture_name : name of its capture's file.
+    words : options that open it again; see Request.words. A session can be resumed only with them.
     real_time : True if its time passes by itself, False if it waits for the program.
-    resumable : True if a session on it can be resumed from its capture.
     """
 
-    @property
-    def plan(self) -> Plan: ...  # noqa: D102 - see above
+    line: Any
+    plan: Plan
+    hands: Sequence[Listener] = ()
+    read_truth: Callable[[], Mapping[str, Any] | None] = lambda: None
+    recovered: str | None = None
+    capture_name: str = CAPTURE.name
+    words: Mapping[str, Any] = field(default_factory=dict)
+    real_time: bool = True
+    origin: ClassVar[Origin]
+    topic: ClassVar[str] = BUS
 
     @property
-    def origin(self) -> Origin: ...  # noqa: D102
+    def parts(self) -> Chain[Any] | None:
+        """Recorded parts of the session, followed by the sensor itself if it is resumed; None without them."""
+        return self.line if isinstance(self.line, Chain) else None
 
     @property
-    def listeners(self) -> Sequence[Callable[[Prompt], None]]: ...  # noqa: D102
+    def resumable(self) -> bool:
+        """True if a session on it can be resumed from its capture."""
+        return bool(self.words)
 
     @property
-    def truth(self) -> Mapping[str, Any] | None: ...  # noqa: D102
+    def truth(self) -> Mapping[str, Any] | None:
+        """True parameters of a simulated sensor."""
+        return self.read_truth()
 
     @property
-    def recovered(self) -> str | None: ...  # noqa: D102
+    def listeners(self) -> Sequence[Listener]:
+        """Receivers of the prompts besides the operator, without those that they received before."""
+        return [self._only_new(hand) for hand in self.hands]
 
-    @property
-    def capture_name(self) -> str: ...  # noqa: D102
-
-    @property
-    def real_time(self) -> bool: ...  # noqa: D102
-
-    @property
-    def resumable(self) -> bool: ...  # noqa: D102
+    def source_meta(self) -> dict[str, Any]:
+        """Return the entries for the head of a capture."""
+        return {SOURCE: dict(self.words)} if self.words else {}
 
     def talk(self, person: Operator) -> Operator:
         """Return the operator who presses the keys: the given one, or the one in the capture."""
-        ...
+        parts = self.parts
+        if parts is None:
+            return person
+        return ReplayedOperator(person, parts.pending_events, (lambda: not parts.replaying) if parts.resumes else None)
 
-    def measuring(self, capture: Path, say: Say, recorded: str) -> AbstractContextManager[ActiveSource]:
+    @contextmanager
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[ActiveSource]:
         """Record the source into `capture` during a `with` block; both are closed at its end.
 
         Parameters
@@ -81,4 +137,29 @@ class OpenedSource(Protocol):
         ------
         CaptureError : a replay ended before its capture did.
         """
-        ...
+        with closing(self.line), CaptureWriter(capture) as writer:
+            head = {"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()}
+            writer.start(head, self.topic)
+            with self.recorded(NewRecords(writer, self.parts), capture.name, say) as active:
+                yield active
+        if self.parts is not None and self.parts.unread():
+            raise CaptureError(
+                f"the replay ended before the last {self.parts.unread()} accesses of its capture",
+                "replay it with the mpucal that recorded it, or use `mpucal calibrate`",
+            )
+
+    @abstractmethod
+    def recorded(self, recorder: NewRecords, name: str, say: Say) -> AbstractContextManager[ActiveSource]:
+        """Measure during a `with` block, and record it; `name` is that of the recording."""
+
+    def go_on(self) -> bool:
+        """Begin the next part; return False if there is none."""
+        return self.parts is not None and self.parts.go_on()
+
+    def is_late(self, late: bool) -> bool:
+        """Return True if an answer is late now; in a replay, if it was."""
+        parts = self.parts
+        return bool(parts.pending_events(LATE)) if parts is not None and parts.replaying else late
+
+    def _only_new(self, listener: Listener) -> Listener:
+        return lambda prompt: None if self.parts is not None and self.parts.replaying else listener(prompt)

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..chip.access import Reply, Transaction
-from ..chip.records import Record, SessionEvent
+from ..chip.records import SessionEvent
 from ..errors import BusError, BusHeld, CaptureError, EndOfCapture, LateRead, LinkError, NoAnswer
+from ..files.mcap import Record
 
 _RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld, LateRead, LinkError)}
 _RAISES["LinkLost"] = LinkError
@@ -32,7 +33,7 @@ class ReplayBus:
         for record in records:
             if isinstance(record, SessionEvent):
                 self._events[-1].append(record)
-            else:
+            elif isinstance(record, Transaction):
                 self._accesses.append(record)
                 self._events.append([])
         self._next = 0

@@ -1,53 +1,78 @@
-"""Replay of a capture as a source: the accesses of a bus (.mcap) or the packets of a vehicle (.tlog)."""
+"""Replay of a capture as a source: the accesses of a bus or the packets of a vehicle."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from ..files.folder import captures_in
-from ..files.mcap import read_capture
+from ..files.folder import all_captures_in
+from ..files.mcap import Capture, read_capture
+from ..files.tlog import TLOG, read_tlog
 from ..iio import IIO_VERSION
+from ..mavlink import MAVLINK_VERSION
 from ..session.plan import DRIVER, Plan
-from .chained_bus import ChainedBus, split_at_resumes
+from .chain import Chain, ChainedBus, ChainedTransport, ShiftedClockBus, split_at_resumes
 from .chip import OpenedChip
-from .iio import iio_replay
+from .iio import OpenedIio, devices_in
 from .kind import Request
 from .opened_source import OpenedSource
 from .opening import refuse_fixed_options
+from .packet_replay import PacketReplay
 from .replay import ReplayBus
-
-TLOG = ".tlog"
 
 
 def open_source(request: Request) -> OpenedSource:
-    """Open a capture, or all captures in the folder of a resumed session.
+    """Open a capture, or all captures in the folder of a session.
 
     Raises
     ------
     UsageError : options that the capture fixes. CaptureError : not a capture, or one of another driver.
-    RecordingError : a .tlog without an IMU.
+    RecordingError : a log without an IMU.
     """
-    file: Path = request.value
-    if file.suffix.lower() != TLOG:
+    if request.value.suffix.lower() != TLOG:
         refuse_fixed_options(request)
-        return _open_mcap(file, request.plan.board)
-    # pymavlink loads slowly, and a chip on a bus does not need it.
-    from .vehicle import OpenedVehicle, open_tlog  # noqa: PLC0415
-
-    source = open_tlog(file, replace(request.plan, until_end=True), request.values.get("system"))
-    if isinstance(source, OpenedVehicle):
-        # A .tlog of another ground station fixes no options.
+    captures = read_captures(request.value)
+    first = captures[0]
+    how: dict[str, Any] = {"recovered": last_recovered(captures), "real_time": False}
+    # The log of another ground station has no head, and fixes no options.
+    plan, driver = replace(request.plan, until_end=True), MAVLINK_VERSION
+    if first.meta:
         refuse_fixed_options(request)
-    return source
+        plan, driver = Plan.of_capture(first.meta, first.name), first.meta[DRIVER]
+        plan = replace(plan, board=request.plan.board or plan.board)
+    if driver == MAVLINK_VERSION:
+        # pymavlink loads slowly, and a chip on a bus does not need it.
+        from .vehicle import replayed_vehicle  # noqa: PLC0415
+
+        return replayed_vehicle(first, chained(captures), plan, request.values.get("system"), **how)
+    if driver == IIO_VERSION:
+        return OpenedIio(chained(captures), plan, **how, **devices_in(first))
+    return OpenedChip(chained(captures), plan, **how)
 
 
-def _open_mcap(file: Path, board: str) -> OpenedChip:
-    captures = [read_capture(path) for path in (captures_in(file) or [file])]
+def read_captures(place: Path) -> list[Capture]:
+    """Read a capture, or all captures in the folder of a session.
+
+    Raises
+    ------
+    CaptureError : not a capture.
+    """
+    files = all_captures_in(place) or [place]
+    return [read_tlog(file) if file.suffix.lower() == TLOG else read_capture(file) for file in files]
+
+
+def last_recovered(captures: Sequence[Capture]) -> str | None:
+    """Return the sentence on the last damaged capture, None if all are whole."""
+    return next((capture.recovered for capture in reversed(captures) if capture.recovered), None)
+
+
+def chained(captures: Sequence[Capture], live: Any = None) -> Chain[Any]:
+    """Return the recorded parts of a session, followed by its `live` bus or transport, as one."""
+    parts = split_at_resumes((capture.records for capture in captures), more=live is not None)
     name = captures[0].name
-    bus = ChainedBus([ReplayBus(part, name) for part in split_at_resumes(capture.records for capture in captures)])
-    recovered = [capture.recovered for capture in captures if capture.recovered]
-    plan = Plan.of_capture(captures[0].meta, name)
-    plan = replace(plan, board=board or plan.board)
-    opened = OpenedChip(bus, plan, replay=bus, recovered=recovered[-1] if recovered else None, real_time=False)
-    return iio_replay(opened, captures[0]) if captures[0].meta[DRIVER] == IIO_VERSION else opened
+    if captures[0].meta.get(DRIVER, MAVLINK_VERSION) == MAVLINK_VERSION:
+        return ChainedTransport([*(PacketReplay(part, name) for part in parts), *([live] if live else [])])
+    last_ns = max((record.t_ns for part in parts for record in part), default=0)
+    return ChainedBus([*(ReplayBus(part, name) for part in parts), *([ShiftedClockBus(live, last_ns)] if live else [])])

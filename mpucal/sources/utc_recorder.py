@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 from ..chip.access import Transaction
-from ..chip.records import UTC, Recorder, SessionEvent
+from ..chip.records import UTC, Recorder
+from .chain import Chain
 
 
 class _Capture(Recorder, Protocol):
@@ -19,17 +20,16 @@ class UtcRecorder:
 
     Parameters
     ----------
-    capture : receives the records. pending : for a replay, which keeps its recorded time: returns the session events of
-        a name since the last access.
+    capture : receives the records. parts : recorded ones, which keep their recorded time.
     """
 
-    def __init__(self, capture: _Capture, pending: Callable[[str], Sequence[SessionEvent]] | None = None) -> None:
-        self._capture, self._pending, self._has_time = capture, pending, False
+    def __init__(self, capture: _Capture, parts: Chain[Any] | None = None) -> None:
+        self._capture, self._parts, self._has_time = capture, parts, False
 
     def transaction(self, transaction: Transaction) -> None:
         """See Recorder."""
-        if self._pending is not None:
-            for event in self._pending(UTC):
+        if self._parts is not None and self._parts.replaying:
+            for event in self._parts.pending_events(UTC):
                 self._capture.event(UTC, event.t_ns, event.data)
         elif not self._has_time and transaction.error is None:
             self._has_time = True

@@ -1,107 +1,96 @@
-"""Open vehicle over MAVLink, or its .tlog: every packet is recorded in a .tlog."""
+"""Open vehicle over MAVLink, and the replay of another ground station's log: every packet is recorded."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
-from dataclasses import KW_ONLY, asdict, dataclass, replace
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any, TypedDict
 
-from .. import __version__
-from ..chip.config import RateOnlyConfig
-from ..chip.records import LATE, SessionEvent
+from ..chip.records import BEGUN, END, OPENED
 from ..data import Recording
-from ..errors import CaptureError, EndOfCapture, LinkError, UsageError
+from ..errors import EndOfCapture, LinkError
+from ..files.mcap import Capture
+from ..files.messages import PACKETS
+from ..mavlink import MAVLINK_VERSION
 from ..mavlink.link import OWN_SYSTEM, Link, Recorder
 from ..mavlink.log import read_log
 from ..mavlink.prompts import encode_prompt
 from ..mavlink.recorded_source import RecordedSource
-from ..mavlink.session_events import Note, encode_note
 from ..mavlink.signing import read_key
 from ..mavlink.stream_parameters import read_stream_parameters
-from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
-from ..mavlink.tlog_replay import TlogReplay
-from ..mavlink.transport import Transport
+from ..mavlink.tlog import RawPacket
 from ..mavlink.transports import open_transport
 from ..mavlink.url import parse_url
 from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
 from ..origin import Origin
-from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
-from ..session.plan import Plan
-from ..session.ports import Operator, ReplayedOperator
+from ..session.plan import DRIVER, Plan
+from .chain import Chain
 from .kind import Request
-from .opened_source import ActiveSource, Say
+from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
+from .packet_replay import PacketReplay
 
-SESSION, END = "session", "end"
-MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM, PREPARE = "mpucal", "recorded", "source", "plan", "system", "prepare"
-# Counts up with every change of what the source sends and accepts.
-SOURCE_VERSION = 4
-NOTE_IDS = 65535
+SYSTEM, PREPARE = "system", "prepare"
 
 
 @dataclass
-class OpenedVehicle:
-    """Vehicle behind a transport; see OpenedSource.
+class OpenedVehicle(OpenedSource):
+    """Vehicle behind a transport, which is its `line`; only the rate of its plan's config applies. See OpenedSource.
 
     Attributes
     ----------
-    transport : open. plan : of the session; only the rate of its `config` applies. system : number of the vehicle.
-    key : signing key, or None. own_system : MAVLink id of mpucal.
-    listeners : receive the prompts; the vehicle itself is the first of them.
-    read_truth : returns the true parameters of a simulated vehicle's streams.
-    replay : the same transport if it is a replay. writes : True if the result will be written to the vehicle.
-    prepare : True to prepare a PX4; see Preparation. link : to the vehicle, while it measures.
+    system : number of the vehicle. key : signing key, or None. own_system : MAVLink id of mpucal.
+    writes : True if the result will be written to the vehicle. prepare : True to prepare a PX4; see Preparation.
+    link : to the vehicle, while it measures.
     """
 
-    transport: Transport
-    plan: Plan
+    _: KW_ONLY
     system: int | None = None
     key: bytes | None = None
-    _: KW_ONLY
-    listeners: Sequence[Callable[[Prompt], None]] = ()
-    read_truth: Callable[[], Mapping[str, Any] | None] = lambda: None
-    replay: TlogReplay | None = None
-    recovered: str | None = None
-    real_time: bool = True
     own_system: int = OWN_SYSTEM
     writes: bool = False
     prepare: bool = False
     link: Link | None = None
-    capture_name: str = CAPTURE_OF_VEHICLE.name
     origin = Origin.VEHICLE
-    resumable: bool = False
-
-    def __post_init__(self) -> None:
-        self.listeners = (self._send_prompt, *self.listeners)
+    topic = PACKETS
 
     @property
-    def truth(self) -> Mapping[str, Any] | None:
-        """True parameters of the streams, under the vehicle's present parameters."""
-        return self.read_truth()
+    def listeners(self) -> Sequence[Callable[[Prompt], None]]:
+        """The vehicle itself, whose log then contains the prompts, and those of OpenedSource."""
+        return (self._send_prompt, *super().listeners)
 
-    def talk(self, person: Operator) -> Operator:
-        """See OpenedSource."""
-        return person if self.replay is None else ReplayedOperator(person, self._pending)
+    def source_meta(self) -> dict[str, Any]:
+        """Return the entries for the head of a capture."""
+        return {**super().source_meta(), DRIVER: MAVLINK_VERSION, SYSTEM: self.system, PREPARE: self.prepare}
 
     @contextmanager
-    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[ActiveSource]:
+    def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
         """See OpenedSource."""
-        with closing(self.transport), TlogWriter(capture) as writer:
-            link = self.link = Link(self.transport, writer.packet, self.key, self.own_system)
-            notes = _NoteRecorder(link)
-            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self.system, PREPARE: self.prepare}
-            notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
-            rate_hz = self.plan.config.rate_hz
-            source = VehicleSource(link, rate_hz, self.system, say, capture.name, self.writes, self.prepare)
-            try:
-                yield ActiveSource(source, notes.keep, late=self._was_late)
-            finally:
-                with suppress(EndOfCapture):
-                    source.stop()
-                # Nothing came after this time, so that a replay ends its last poll here.
-                notes.keep(END, 0, {})
+        link = self.link = Link(self.line, recorder.packet, self.key, self.own_system)
+
+        def note(event: str, _t_ns: int = 0, data: Mapping[str, Any] | None = None) -> None:
+            recorder.event(event, link.now_ns(), data)
+
+        def go_on() -> bool:
+            if self.parts is None or self.parts.is_last:
+                return False
+            note(END)
+            self.parts.go_on()
+            link.restart()
+            return True
+
+        rate_hz, begun = self.plan.config.rate_hz, lambda: note(BEGUN)
+        source = VehicleSource(link, rate_hz, self.system, say, name, self.writes, self.prepare, begun)
+        note(OPENED)
+        try:
+            yield ActiveSource(source, note, go_on, self.is_late)
+        finally:
+            with suppress(EndOfCapture):
+                source.stop()
+            # Nothing came after this time, so that a replay ends its last poll here.
+            note(END)
 
     @contextmanager
     def connected(self, say: Say, record: Recorder = lambda _t_ns, _packet: None) -> Iterator[Link]:
@@ -109,12 +98,10 @@ class OpenedVehicle:
 
         Raises
         ------
-        UsageError : a .tlog, or several vehicles. NoAnswer, LinkError : see Link.
+        UsageError : several vehicles. NoAnswer, LinkError : see Link.
         """
-        if self.replay is not None:
-            raise UsageError("a .tlog is not a vehicle that can be written to", "give the vehicle's --mavlink URL")
-        with closing(self.transport):
-            link = self.link = Link(self.transport, record, self.key, self.own_system)
+        with closing(self.line):
+            link = self.link = Link(self.line, record, self.key, self.own_system)
             lock_to_vehicle(link, self.system, say)
             yield link
 
@@ -135,59 +122,46 @@ class OpenedVehicle:
             with suppress(LinkError):
                 self.link.send(encode_prompt(prompt))
 
-    def _was_late(self, late: bool) -> bool:
-        return late if self.replay is None else bool(self._pending(LATE))
 
-    def _pending(self, name: str) -> Sequence[SessionEvent]:
-        if self.replay is None:
-            return []
-        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self.replay.pending(name)]
+@dataclass
+class OpenedLog(OpenedVehicle):
+    """Log of another ground station; see OpenedSource.
 
+    Attributes
+    ----------
+    packets : of the log. measured : its recording.
+    """
 
-@dataclass(frozen=True)
-class OpenedLog:
-    """Open .tlog of another ground station; see OpenedSource."""
-
-    tlog: Tlog
+    _: KW_ONLY
+    packets: Sequence[RawPacket]
     measured: Recording
-    plan: Plan
-    listeners: Sequence[Callable[[Prompt], None]] = ()
-    truth: Mapping[str, Any] | None = None
-    capture_name: str = CAPTURE_OF_VEHICLE.name
-    origin = Origin.VEHICLE
-    resumable: bool = False
-    real_time: bool = False
-
-    @property
-    def recovered(self) -> str | None:
-        """See OpenedSource."""
-        return self.tlog.recovered
-
-    def talk(self, person: Operator) -> Operator:
-        """See OpenedSource."""
-        return person
 
     @contextmanager
-    def measuring(self, capture: Path, _say: Say, _recorded: str) -> Iterator[ActiveSource]:
+    def recorded(self, recorder: NewRecords, _name: str, _say: Say) -> Iterator[ActiveSource]:
         """Copy the log as the capture; see OpenedSource."""
-        with TlogWriter(capture) as writer:
-            for record in self.tlog.records:
-                writer.packet(record.t_ns, record.data)
-            yield ActiveSource(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
+        for packet in self.packets:
+            recorder.packet(*packet)
+        yield ActiveSource(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
 
 
-class _NoteRecorder:
-    """Recorder of session events among a link's packets."""
+def replayed_vehicle(capture: Capture, line: Chain[Any], plan: Plan, system: int | None, **how: Any) -> OpenedVehicle:
+    """Open the replay of a vehicle: a session of mpucal as it was, any other log until its end.
 
-    def __init__(self, link: Link) -> None:
-        self._link = link
-        self._notes = 0
+    Parameters
+    ----------
+    capture : the first one. line : all that is replayed. system : id of one of several vehicles in a log. how : further
+        attributes of OpenedSource.
 
-    def keep(self, name: str, _t_ns: int, data: Mapping[str, Any]) -> None:
-        """Record an event at the link's time."""
-        for message in encode_note(Note(name, data), 1 + self._notes % NOTE_IDS):
-            self._link.note(message)
-        self._notes += 1
+    Raises
+    ------
+    RecordingError : the log has no IMU.
+    """
+    how[SYSTEM], how[PREPARE] = capture.meta.get(SYSTEM, system), bool(capture.meta.get(PREPARE))
+    packets = [record for record in capture.records if isinstance(record, RawPacket)]
+    if len(packets) < len(capture.records):
+        return OpenedVehicle(line, plan, **how)
+    measured = read_log(packets, capture.name, how[SYSTEM])
+    return OpenedLog(PacketReplay((), capture.name), plan, **how, packets=packets, measured=measured)
 
 
 def open_source(request: Request) -> OpenedVehicle:
@@ -199,12 +173,13 @@ def open_source(request: Request) -> OpenedVehicle:
     """
     key = signing_key(request)
     transport = open_transport(parse_url(request.value))
-    return OpenedVehicle(transport, request.plan, request.values.get("system"), key, **link_identity(request))
+    return OpenedVehicle(transport, request.plan, words=request.words, key=key, **link_identity(request))
 
 
 class LinkIdentity(TypedDict):
-    """MAVLink id of mpucal, and its intention to write the result and to prepare the vehicle."""
+    """MAVLink ids of the vehicle and of mpucal, and its intention to write the result and to prepare the vehicle."""
 
+    system: int | None
     own_system: int
     writes: bool
     prepare: bool
@@ -214,6 +189,7 @@ def link_identity(request: Request) -> LinkIdentity:
     """Return the LinkIdentity that the options select."""
     own = request.values.get("source_system")
     return {
+        "system": request.values.get("system"),
         "own_system": OWN_SYSTEM if own is None else int(own),
         "writes": bool(request.values.get("writes")),
         "prepare": request.values.get("prepare") == "yes",
@@ -228,44 +204,4 @@ def signing_key(request: Request) -> bytes | None:
     UsageError : the key cannot be read.
     """
     path = request.values.get("signing_key")
-    return None if path is None else read_key(path)
-
-
-def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | OpenedLog:
-    """Open a .tlog for a replay: a session of mpucal as it was, any other log until its end.
-
-    Parameters
-    ----------
-    asked : plan for the log of another ground station.
-
-    Raises
-    ------
-    CaptureError : it cannot be read, or another version of mpucal recorded it. RecordingError : it has no IMU.
-    """
-    tlog = read_tlog(file)
-    replay = TlogReplay(tlog)
-    head = next((noted.note for noted in replay.pending(SESSION)), None)
-    if head is None:
-        return OpenedLog(tlog, read_log(tlog.records, tlog.name, system), asked)
-    if head.data.get(SOURCE) != SOURCE_VERSION:
-        raise CaptureError(
-            f"{tlog.name} was recorded by version {head.data.get(SOURCE)} of the source, and this is {SOURCE_VERSION}",
-            "use `mpucal calibrate` on it, which reads a .tlog of every version",
-        )
-    try:
-        plan = dict(head.data[PLAN])
-        made = Plan(**{**plan, "config": RateOnlyConfig(**plan["config"])})
-        made = replace(made, board=asked.board or made.board)
-        return OpenedVehicle(
-            replay,
-            made,
-            head.data[SYSTEM],
-            replay=replay,
-            recovered=tlog.recovered,
-            real_time=False,
-            prepare=bool(head.data.get(PREPARE)),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise CaptureError(
-            f"the head of {tlog.name} does not describe its session ({error})", "use `mpucal calibrate` on it"
-        ) from error
+    return None if path is None else read_key(Path(path))

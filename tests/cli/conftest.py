@@ -14,6 +14,9 @@ import pytest
 from mpucal.__main__ import run
 from mpucal.chip.records import SessionEvent
 from mpucal.files.mcap import CaptureWriter
+from mpucal.files.messages import BUS, PACKETS
+from mpucal.mavlink import MAVLINK_VERSION
+from mpucal.mavlink.tlog import RawPacket
 
 
 @dataclass(frozen=True)
@@ -56,10 +59,12 @@ def write_capture():
 
     def call(path, meta, records):
         with CaptureWriter(path) as writer:
-            writer.start(meta)
+            writer.start(meta, PACKETS if meta.get("driver") == MAVLINK_VERSION else BUS)
             for record in records:
                 if isinstance(record, SessionEvent):
                     writer.event(record.name, record.t_ns, record.data)
+                elif isinstance(record, RawPacket):
+                    writer.packet(*record)
                 else:
                     writer.transaction(record)
         return path

@@ -14,6 +14,7 @@ from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 
 STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
+OLD_VEHICLE = Path(__file__).parents[1] / "mavlink" / "data" / "px4_turned.tlog"
 WORDS = ("session", "--json-events", "--yes")
 
 
@@ -93,11 +94,47 @@ def test_errors_of_resume_name_the_problem(mpucal, words, sentence):
     assert sentence in result.err
 
 
-def test_a_vehicle_cannot_be_resumed(mpucal, tmp_path):
-    (tmp_path / "capture.tlog").touch()
+@pytest.mark.parametrize(("firmware", "cut_s"), [("ardupilot", 25.0), ("px4", 6.0)], ids=["rotating", "flat"])
+def test_a_vehicle_is_resumed_after_a_reboot(mpucal, write_capture, tmp_path, firmware, cut_s):
+    """The simulated vehicle stands where it was switched on, and its clock begins again."""
+    source = f"sim:firmware={firmware},imus=2,seed=3"
+    words = ("--mavlink", source, "--rate", "50", "--target", "quick", "--no-write", "--prepare=yes")
+    assert mpucal(*WORDS, *words, "-o", "whole").code == 0
+    whole = read_capture(tmp_path / "whole" / "capture.mcap")
+    until_ns = whole.records[0].t_ns + cut_s * 1e9
+    (tmp_path / "cut").mkdir()
+    kept = [record for record in whole.records if record.t_ns < until_ns]
+    write_capture(tmp_path / "cut" / "capture.mcap", whole.meta, kept)
+
+    resumed = mpucal(*WORDS, "--no-write", "--resume", "cut")
+    assert resumed.code == 0, resumed.err
+    assert "the session resumes where it stopped" in resumed.err
+    prompts = [event["kind"] for event in events(resumed.err) if event["event"] == "prompt"]
+    assert prompts[0] == ("rotate" if cut_s > 20.0 else "lay_flat")
+    assert prompts[-1] == "rest"
+    recording = load(tmp_path / "cut")
+    assert recording.gap.sum() == 1
+    first = load(tmp_path / "cut" / "capture.mcap")
+    assert np.array_equal(first.acc, recording.acc[: len(first)])
+    assert np.array_equal(first.others[0].gyr, recording.others[0].gyr[: len(first.others[0])])
+
+    found = Calibration.load(tmp_path / "cut" / "calibration.json")
+    again = mpucal(*WORDS, "--replay", "cut", "-o", "again")
+    assert again.code == 0, again.err
+    replayed = Calibration.load(tmp_path / "again" / "calibration.json")
+    for other in (calibrate(recording), replayed, calibrate(load(tmp_path / "again"))):
+        assert np.array_equal(other.D, found.D)
+        assert np.array_equal(other.b_a, found.b_a)
+    assert replayed.quality["verification"] == found.quality["verification"]
+    checked = mpucal("check", "whole/calibration.json", "--replay", "whole", "--yes")
+    assert checked.code == 0, checked.err
+
+
+def test_a_vehicles_session_of_an_earlier_version_cannot_be_resumed(mpucal, tmp_path):
+    (tmp_path / "capture.tlog").write_bytes(OLD_VEHICLE.read_bytes())
     result = mpucal("session", "--resume", str(tmp_path))
     assert result.code == 2
-    assert "is one with a vehicle, which cannot be resumed" in result.err
+    assert "does not name its source" in result.err
 
 
 def test_a_capture_without_a_source_cannot_be_resumed(mpucal, write_capture, tmp_path):

@@ -20,7 +20,7 @@ def run(*words):
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A few seconds of the simulated vehicle, recorded by mpucal."""
-    path = tmp_path_factory.mktemp("recorded") / "capture.tlog"
+    path = tmp_path_factory.mktemp("recorded") / "capture.mcap"
     result = run("record", "--mavlink", "sim:imus=1", "--seconds", 6, "-o", path, "--gravity", 9.81)
     assert result.exception is None, result.output
     return path
@@ -57,11 +57,11 @@ def test_a_capture_of_mpucal_fixes_its_options(recorded, tmp_path):
 
 
 def test_a_vehicle_takes_rates_that_a_chip_does_not(tmp_path):
-    path = tmp_path / "capture.tlog"
+    path = tmp_path / "capture.mcap"
     result = run("record", "--mavlink", "sim:imus=1", "--rate", 300, "--seconds", 4, "-o", path)
     assert result.exception is None, result.output
     assert float(re.search(r"at ([\d.]+) Hz", run("show", path).output).group(1)) > 299
-    result = run("record", "--mavlink", "sim:imus=1", "--rate", 5000, "--seconds", 4, "-o", tmp_path / "x.tlog")
+    result = run("record", "--mavlink", "sim:imus=1", "--rate", 5000, "--seconds", 4, "-o", tmp_path / "x.mcap")
     assert isinstance(result.exception, UsageError)
 
 

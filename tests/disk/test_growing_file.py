@@ -11,11 +11,9 @@ from mpucal.disk.growing_file import GrowingFile
 from mpucal.disk.location import check_free
 from mpucal.errors import OutputError
 from mpucal.files.mcap import CaptureWriter
-from mpucal.mavlink.tlog import TlogWriter
 
 
-@pytest.mark.parametrize("kind", ["mcap", "tlog"])
-def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch, kind):
+def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch):
     synced = {}
 
     def watched(sync, handle):
@@ -25,14 +23,10 @@ def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch, kind)
 
     for name in ("fdatasync", "fsync"):  # the second for a capture that is rewritten with its index
         monkeypatch.setattr(os, name, partial(watched, getattr(os, name)))
-    path = tmp_path / f"capture.{kind}"
-    if kind == "mcap":
-        with CaptureWriter(path) as writer:
-            writer.start({})
-            writer.transaction(Transaction("read", 0x75, 1, b"\x68", 5))
-    else:
-        with TlogWriter(path) as writer:
-            writer.packet(1_000_000, b"packet")
+    path = tmp_path / "capture.mcap"
+    with CaptureWriter(path) as writer:
+        writer.start({})
+        writer.transaction(Transaction("read", 0x75, 1, b"\x68", 5))
     status = path.stat()
     assert synced[status.st_ino] == status.st_size > 0
 

@@ -10,7 +10,7 @@ import pytest
 
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.tlog import Record
+from mpucal.mavlink.tlog import RawPacket
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
@@ -109,8 +109,8 @@ def simulated():
 
     def make(words: str = "", lock: bool = True, **options):
         vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:{words}" if words else "sim"))
-        record: list[Record] = []
-        link = Link(SimulatedTransport(vehicle), lambda t_ns, data: record.append(Record(t_ns, data)), **options)
+        record: list[RawPacket] = []
+        link = Link(SimulatedTransport(vehicle), lambda t_ns, data: record.append(RawPacket(t_ns, data)), **options)
         if lock:
             link.lock(link.listen()[0])
         return SimpleNamespace(vehicle=vehicle, link=link, record=record)

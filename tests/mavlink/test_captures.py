@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 import mpucal
 from mpucal.cli import commands
+from mpucal.files.tlog import tlog_of
 from mpucal.result.calibration import REFUSED, Calibration
 
 AXES = "XYZ"
@@ -49,9 +50,9 @@ def test_both_imus_meet_their_truth_and_keep_the_logs_parameters(captures, repla
     assert np.abs(D - np.diag(np.diag(D))).max() < 1.5e-3
 
 
-def test_the_replayed_capture_is_the_log_itself(captures, replayed):
+def test_the_replayed_capture_holds_the_log_itself(captures, replayed):
     _, folder = replayed(captures / "ardupilot_two_imus.tlog")
-    assert (folder / "capture.tlog").read_bytes() == (captures / "ardupilot_two_imus.tlog").read_bytes()
+    assert tlog_of(folder) == (captures / "ardupilot_two_imus.tlog").read_bytes()
 
 
 def test_calibrate_and_replay_give_the_same(captures, replayed):

@@ -5,14 +5,20 @@ import subprocess
 import sys
 import tracemalloc
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mpucal
-from mpucal.errors import CaptureError, OutputError, RecordingError
+from mpucal.__main__ import run
+from mpucal.data import Samples
+from mpucal.errors import CaptureError, RecordingError
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.messages import PACKETS
+from mpucal.files.tlog import tlog_of
 from mpucal.mavlink.log import Log, read_log
-from mpucal.mavlink.tlog import Record, TlogWriter, read_tlog
+from mpucal.mavlink.tlog import RawPacket, TlogFile, encode_tlog
 
 START_NS = 1_700_000_000_000_000_000
 
@@ -23,10 +29,7 @@ def made(tmp_path):
 
     def make(packets):
         path = tmp_path / "made.tlog"
-        path.unlink(missing_ok=True)
-        with TlogWriter(path) as writer:
-            for t_s, data in packets:
-                writer.packet(START_NS + round(t_s * 1e9), data)
+        path.write_bytes(encode_tlog(RawPacket(START_NS + round(t_s * 1e9), data) for t_s, data in packets))
         return path
 
     return make
@@ -42,14 +45,75 @@ def written(station, made):
     """A .tlog of two seconds, and its records."""
     vehicle = station()
     packets = [(0.0, vehicle.heartbeat()), *turned(vehicle, 1)]
-    return made(packets), [Record(START_NS + round(t_s * 1e9), data) for t_s, data in packets]
+    return made(packets), [RawPacket(START_NS + round(t_s * 1e9), data) for t_s, data in packets]
 
 
 def test_a_log_is_read_as_it_was_written(written):
     path, records = written
-    tlog = read_tlog(path)
-    assert tlog.records == tuple(records)
+    tlog = TlogFile(path)
+    assert list(tlog) == records
     assert tlog.recovered is None
+
+
+@pytest.fixture
+def captured(written, tmp_path):
+    """A capture of these packets."""
+    path = tmp_path / "capture.mcap"
+    with CaptureWriter(path) as writer:
+        writer.start({}, PACKETS)
+        for packet in written[1]:
+            writer.packet(*packet)
+    return path
+
+
+def test_a_capture_of_the_same_packets_exports_to_the_same_log(written, captured):
+    out = captured.with_name("out.tlog")
+    assert run(["export", str(captured), "--to", "tlog", "-o", str(out)]) == 0
+    assert out.read_bytes() == written[0].read_bytes()
+    of_log, of_capture = mpucal.load(written[0]), mpucal.load(captured)
+    for name in Samples.__dataclass_fields__:
+        assert np.array_equal(getattr(of_log, name), getattr(of_capture, name), equal_nan=True)
+
+
+def test_a_capture_of_a_chip_exports_to_no_log(tmp_path):
+    with CaptureWriter(tmp_path / "capture.mcap") as writer:
+        writer.start({})
+    with pytest.raises(RecordingError, match="holds no packets of a vehicle"):
+        tlog_of(tmp_path)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_damaged_capture_gives_the_packets_before_the_damage(written, captured, share):
+    data = bytearray(captured.read_bytes())
+    data[int(share * len(data))] ^= 0xFF
+    captured.write_bytes(data)
+    try:
+        read = read_capture(captured)
+    except CaptureError:
+        assert share < 0.5
+    else:
+        assert list(read.records) == written[1][: len(read.records)]
+        assert read.recovered or len(read.records) == len(written[1])
+
+
+def test_a_message_that_is_no_packet_is_refused(captured):
+    with CaptureWriter(path := captured.with_name("other.mcap")) as writer:
+        writer.start({}, PACKETS)
+        writer.packet(5, b"no packet")
+    with pytest.raises(CaptureError, match=r"invalid message on /mavlink \(9 bytes are no packet\)"):
+        read_capture(path)
+
+
+def test_packets_are_on_the_disk_before_a_capture_is_closed(written, tmp_path):
+    writer = CaptureWriter(tmp_path / "capture.mcap")
+    writer.start({}, PACKETS)
+    for packet in written[1]:
+        writer.packet(*packet)
+    read = read_capture(tmp_path / "capture.mcap")
+    assert "was never closed" in read.recovered
+    assert list(read.records) == written[1][: len(read.records)]
+    assert written[1][-1].t_ns - read.records[-1].t_ns < 1e9
+    writer.close()
 
 
 def test_pymavlink_reads_it(written, monkeypatch):
@@ -82,24 +146,20 @@ def test_a_damaged_log_gives_its_whole_packets(written, cut, junk):
     path, records = written
     whole = b"".join((record.t_ns // 1000).to_bytes(8, "big") + record.data for record in records)
     path.write_bytes(whole[:-cut] + junk)
-    tlog = read_tlog(path)
+    tlog = TlogFile(path)
+    read = list(tlog)
     least = next(
         k for k in range(len(records), -1, -1) if sum(8 + len(r.data) for r in records[:k]) <= len(whole) - cut
     )
-    assert tlog.records[:least] == tuple(records[:least])
-    if len(whole) - cut + len(junk) != sum(8 + len(r.data) for r in tlog.records):
+    assert read[:least] == records[:least]
+    if len(whole) - cut + len(junk) != sum(8 + len(r.data) for r in read):
         assert "are no packets" in tlog.recovered
 
 
 def test_no_packets_at_all(tmp_path):
     (tmp_path / "x.tlog").write_bytes(b"hello, this is no log of packets")
     with pytest.raises(CaptureError, match="holds no MAVLink packet"):
-        read_tlog(tmp_path / "x.tlog")
-
-
-def test_a_place_that_cannot_be_written_to(tmp_path):
-    with pytest.raises(OutputError, match="cannot write the capture"):
-        TlogWriter(tmp_path / "missing" / "capture.tlog")
+        list(TlogFile(tmp_path / "x.tlog"))
 
 
 def test_a_reboot_splits_a_log_and_the_longest_part_is_taken(station, made):
@@ -147,7 +207,7 @@ def test_several_vehicles_are_listed_and_one_can_be_chosen(station, made):
     path = made(sorted(packets, key=lambda packet: packet[0]))
     with pytest.raises(RecordingError, match=r"several vehicles: system 1 \(ArduPilot\), system 7"):
         mpucal.load(path)
-    assert len(read_log(read_tlog(path).records, path.name, system=7)) == 49
+    assert len(read_log(TlogFile(path), path.name, system=7)) == 49
 
 
 def test_px4_highres_is_believed_only_without_the_estimators_biases(station, made):

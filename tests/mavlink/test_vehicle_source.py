@@ -13,12 +13,11 @@ from mpucal.mavlink.parameters.client import ParameterClient
 from mpucal.mavlink.parameters.mounting import mounting
 from mpucal.mavlink.parameters.slots import ardupilot_slot
 from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_parameter_names
-from mpucal.mavlink.tlog import Tlog
-from mpucal.mavlink.tlog_replay import TlogReplay
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.session.plan import Plan
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
+from mpucal.sources.packet_replay import PacketReplay
 from mpucal.sources.vehicle import OpenedVehicle
 
 
@@ -47,7 +46,7 @@ def polled(source, seconds):
 
 def replay_of(to, **options):
     """Return a source on what the link recorded."""
-    link = Link(TlogReplay(Tlog(tuple(to.record), "capture.tlog", None)), lambda t_ns, data: None)
+    link = Link(PacketReplay(to.record, "capture.mcap"), lambda t_ns, data: None)
     return VehicleSource(link, 100.0, None, lambda text: None, "test", **options)
 
 
@@ -249,7 +248,7 @@ def test_the_truth_after_a_preparation_is_that_of_the_recording(tmp_path):
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,CAL_ACC0_ID=0"))
     opened = OpenedVehicle(SimulatedTransport(vehicle), Plan(), read_truth=vehicle.truth_document, prepare=True)
     fresh = opened.truth
-    with opened.measuring(tmp_path / "capture.tlog", lambda text: None, "") as measuring:
+    with opened.measuring(tmp_path / "capture.mcap", lambda text: None, "") as measuring:
         measuring.source.start()
         polled(measuring.source, 3)
         recording = measuring.source.recording()

@@ -135,7 +135,7 @@ def flooded(command: str, line: str, option: str, folder: Path, after_s: float |
     """Run a command, interrupt it after so long, and return the seconds to its end from there on."""
     words = list(WORDS[command])
     if command == "record":
-        words += ["-o", "out.mcap" if line == "serial" else "out.tlog"]
+        words += ["-o", "out.mcap"]
     if command == "write":
         words.insert(2, "chip" if line == "serial" else "autopilot")
     with (folder / "said").open("wb") as said:

@@ -43,7 +43,7 @@ from mpucal.sinks.chip import REGISTERS, saved_blocks
 from mpucal.sinks.record import is_calibration
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.frame import Frame
-from mpucal.sources.chained_bus import split_at_resumes
+from mpucal.sources.chain import split_at_resumes
 from mpucal.sources.table import SOURCES
 
 from ..lab.dialects import dialects, walk

@@ -35,8 +35,9 @@ import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.errors import MpucalError
+from mpucal.files.mcap import read_capture
 from mpucal.mavlink.parameters.write import DETOUR
-from mpucal.mavlink.tlog import read_tlog
+from mpucal.mavlink.tlog import RawPacket
 from mpucal.result.calibration import Calibration
 from tools.lab.campaign_judge import false, partial_files
 from tools.lab.judge import judged
@@ -182,7 +183,9 @@ def campaign(asked: argparse.Namespace, place: Path, kind: str, attacker: str) -
     """Run attacks until enough packets of a kind were heard; return how many were wrong."""
     firmwares = asked.firmware or FIRMWARES
     clean = {firmware: undisturbed(place, attacker, firmware) for firmware in firmwares}
-    heard = {f: tuple(r.data for r in read_tlog(clean[f] / "capture.tlog").records[-MOST_HEARD // 2 :]) for f in clean}
+    captures = {firmware: read_capture(clean[firmware] / "capture.mcap") for firmware in firmwares}
+    packets = {f: [r.data for r in captures[f].records if isinstance(r, RawPacket)] for f in firmwares}
+    heard = {firmware: tuple(packets[firmware][-MOST_HEARD // 2 :]) for firmware in firmwares}
     done: list[dict[str, Any]] = []
     for seed in range(MOST_RUNS):
         if seed >= asked.runs and sum(outcome["sent"] for outcome in done) >= asked.packets:

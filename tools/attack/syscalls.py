@@ -62,7 +62,7 @@ DATE = re.compile(
     rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?([.]\d+)?([+-]\d\d:\d\d|Z| UTC)?"
 )
 TEMPORARY = re.compile(r"(^|/)[.](.+)[.]\w{8}$")
-CAPTURES = (".mcap", ".tlog")
+CAPTURES = (".mcap",)
 COPY = "bridge/"
 # some of whose loops use a buffer that they did not get
 NUMPY = "_multiarray_umath"

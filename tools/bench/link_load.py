@@ -16,8 +16,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from mpucal.files.mcap import CaptureWriter
+from mpucal.files.messages import PACKETS
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.tlog import TlogWriter
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.mavlink.vehicle_source import VehicleSource
@@ -38,8 +39,9 @@ def main() -> None:
     with (
         subprocess.Popen(words, stdout=subprocess.DEVNULL, cwd=ROOT) as vehicle,
         tempfile.TemporaryDirectory() as folder,
-        TlogWriter(Path(folder) / "capture.tlog") as writer,
+        CaptureWriter(Path(folder) / "capture.mcap") as writer,
     ):
+        writer.start({}, PACKETS)
         link = Link(open_transport(parse_url(URL)), writer.packet)
         source = VehicleSource(link, asked.rate, None, lambda text: None, "load")
         try:

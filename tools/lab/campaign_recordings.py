@@ -20,6 +20,7 @@ from mpucal import Recording
 from mpucal.__main__ import run
 from mpucal.files import load, open_writer
 from mpucal.files.rows import Rows
+from mpucal.files.tlog import tlog_of
 from tools.processes import Died, Ended, Task, Tell, forked
 
 from .campaign_judge import FOLDER, Outcome, judged
@@ -133,8 +134,11 @@ def originals(place: Path) -> dict[str, tuple[Path, SimpleNamespace]]:
             run(["session", *source, "-o", str(folder), "--yes", "--no-write"])
         truth = json.loads((folder / "truth.json").read_text())
         true = [(np.array(truth["D"]), np.array(truth["b_a"]))]
-        path = next(path for path in folder.iterdir() if path.name.startswith("capture"))
-        if suffix not in path.name:
+        path = folder / "capture.mcap"
+        if suffix == "tlog":
+            (folder / "capture.tlog").write_bytes(tlog_of(path))
+            path = folder / "capture.tlog"
+        elif suffix != "mcap":
             path = _written(load(path), folder / f"recording.{suffix}")
         found[suffix] = path, SimpleNamespace(kind=suffix, truths=lambda *_, true=true: true)
     return found

@@ -22,7 +22,7 @@ def open_source(request: Request) -> OpenedIio:
         files,
         request.plan,
         (bus.hear,),
-        bus.truth_document(),
+        bus.truth_document,
         words=request.words,
         real_time=bus.real_time,
         devices=Devices(DEVICE, DEVICE),

@@ -17,12 +17,11 @@ def open_source(request: Request) -> OpenedVehicle:
     vehicle = SimulatedVehicle(VehicleOptions.parse(request.value), request.plan.gravity, key)
     vehicle.switch_on(request.values.get("kept", {}).setdefault(request.value, vehicle.firmware.store))
     transport = SimulatedTransport(vehicle)
-    system = request.values.get("system")
     return OpenedVehicle(
         transport,
         request.plan,
-        system,
-        key,
+        words=request.words,
+        key=key,
         read_truth=vehicle.truth_document,
         real_time=transport.real_time,
         **link_identity(request),

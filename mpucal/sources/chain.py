@@ -1,0 +1,203 @@
+"""Parts of a session that act as one: recorded ones, then perhaps the sensor or vehicle itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+
+from ..chip.access import Bus, Files, Reply
+from ..chip.records import ABORT, KEY, RESUMED, SessionEvent
+from ..files.mcap import Record
+from ..mavlink.transport import ReceivedBytes, Transport
+
+# Time between two parts whose clocks do not tell it.
+PAUSE_NS = 1_000_000_000
+
+
+class _Closable(Protocol):
+    def close(self) -> None: ...
+
+
+Part = TypeVar("Part", bound=_Closable)
+
+
+@runtime_checkable
+class Recorded(Protocol):
+    """A recorded part."""
+
+    def pending_events(self, name: str) -> list[SessionEvent]:
+        """Return the events of that name that are due, each once."""
+        ...
+
+    def unread(self) -> int:
+        """Return the number of unread accesses."""
+        ...
+
+
+class Chain(Generic[Part]):
+    """Parts of a session: each ends with EndOfCapture, and `go_on` begins the next.
+
+    Parameters
+    ----------
+    parts : in order; only the last one may be another than a recorded one.
+    """
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        self._parts = list(parts)
+        self._recorded = [isinstance(part, Recorded) for part in parts]
+        self._at = 0
+
+    @property
+    def replaying(self) -> bool:
+        """True if the present part is a recorded one."""
+        return self._recorded[self._at]
+
+    @property
+    def resumes(self) -> bool:
+        """True if the last part is not a recorded one."""
+        return not self._recorded[-1]
+
+    @property
+    def is_last(self) -> bool:
+        """True if no part follows."""
+        return self._at + 1 == len(self._parts)
+
+    def go_on(self) -> bool:
+        """Begin the next part; return False if there is none."""
+        if self.is_last:
+            return False
+        self._at += 1
+        return True
+
+    def close(self) -> None:
+        """Close all parts."""
+        for part in self._parts:
+            part.close()
+
+    def pending_events(self, name: str) -> list[SessionEvent]:
+        """Return the events as a recorded part does; none from another."""
+        part: Any = self._part
+        return part.pending_events(name) if self.replaying else []
+
+    def unread(self) -> int:
+        """Return the number of unread accesses in the last part."""
+        last = self._parts[-1]
+        return last.unread() if isinstance(last, Recorded) else 0
+
+    @property
+    def _part(self) -> Part:
+        return self._parts[self._at]
+
+
+class ChainedBus(Chain[Bus | Files]):
+    """Parts of a session with a chip or a driver of the kernel."""
+
+    def read(self, register: Any, count: int) -> Reply:
+        """See Bus."""
+        return self._part.read(register, count)
+
+    def write(self, register: Any, data: bytes) -> int:
+        """See Bus."""
+        return self._part.write(register, data)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """See Bus."""
+        self._part.sleep_until(t_ns)
+
+
+class ChainedTransport(Chain[Transport]):
+    """Parts of a session with a vehicle; the clock of the live link continues that of the recorded ones."""
+
+    def __init__(self, parts: Sequence[Transport]) -> None:
+        super().__init__(parts)
+        self._shift_ns = 0
+        self._take_properties()
+
+    def go_on(self) -> bool:
+        """See Chain."""
+        before_ns = self.now_ns()
+        if not super().go_on():
+            return False
+        self._take_properties()
+        if not self.replaying:
+            self._shift_ns = max(before_ns + PAUSE_NS - self._part.now_ns(), 0)
+        return True
+
+    def now_ns(self) -> int:
+        """See Transport."""
+        return self._part.now_ns() + self._shift_ns
+
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
+        """See Transport."""
+        received = self._part.receive(until_ns - self._shift_ns)
+        return None if received is None else received._replace(t_ns=received.t_ns + self._shift_ns)
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """See Transport."""
+        self._part.send(data, address)
+
+    def restrict(self, address: str | None) -> None:
+        """See Transport."""
+        self._part.restrict(address)
+
+    def _take_properties(self) -> None:
+        self.name, self.datagrams, self.outward = self._part.name, self._part.datagrams, self._part.outward
+
+
+class ShiftedClockBus:
+    """Bus whose clock continues an earlier one.
+
+    Parameters
+    ----------
+    bus : its first access gets a time one second after `last_ns`, unless its own clock shows more.
+    """
+
+    def __init__(self, bus: Bus | Files, last_ns: int) -> None:
+        self._bus, self._last_ns = bus, last_ns
+        self._shift_ns: int | None = None
+
+    def read(self, register: Any, count: int) -> Reply:
+        """See Bus."""
+        reply = self._bus.read(register, count)
+        return reply._replace(t_ns=self._shifted(reply.t_ns))
+
+    def write(self, register: Any, data: bytes) -> int:
+        """See Bus."""
+        return self._shifted(self._bus.write(register, data))
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Sleep as Bus does; at once before the first access, when the shift is unknown."""
+        if self._shift_ns is not None:
+            self._bus.sleep_until(t_ns - self._shift_ns)
+
+    def close(self) -> None:
+        """See Bus."""
+        self._bus.close()
+
+    def _shifted(self, t_ns: int) -> int:
+        if self._shift_ns is None:
+            self._shift_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
+        return t_ns + self._shift_ns
+
+
+def split_at_resumes(captures: Iterable[Sequence[Record]], more: bool = False) -> list[list[Record]]:
+    """Split the records of one or several captures where a session was resumed; `more`: another part will follow.
+
+    If a part was stopped by its user and another follows, the records after that are left out, which hold no samples.
+    """
+    parts: list[list[Record]] = []
+    for records in captures:
+        parts.append([])
+        for record in records:
+            if isinstance(record, SessionEvent) and record.name == RESUMED and parts[-1]:
+                parts.append([])
+            parts[-1].append(record)
+    last = len(parts) if more else len(parts) - 1
+    return [*(_until_stopped(part) for part in parts[:last]), *parts[last:]]
+
+
+def _until_stopped(part: list[Record]) -> list[Record]:
+    for i, record in enumerate(part):
+        if isinstance(record, SessionEvent) and record.name == KEY and record.data.get(KEY) == ABORT:
+            return part[:i]
+    return part
