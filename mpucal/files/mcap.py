@@ -63,16 +63,8 @@ CLOSED_CHUNK_NS, CLOSED_CHUNK_PART = 10_000_000_000, 10
 
 # errors of writing; ZstdError: out of memory. Of reading, the last two: a length that exceeds all memory
 _FAILED = (OSError, ZstdError)
-_DAMAGE = (
-    McapError,
-    CRCValidationError,
-    ZstdError,
-    struct.error,
-    UnicodeDecodeError,
-    EOFError,
-    OverflowError,
-    MemoryError,
-)
+_DAMAGED_BYTES = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, EOFError)
+_DAMAGE = (*_DAMAGED_BYTES, OverflowError, MemoryError)
 
 
 class CaptureWriter:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..data import Recording, Vector
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
+from .npz import DAMAGED
 from .reading import import_extra, reading
 from .tables.streams import join_streams
 from .tables.times import Stream
@@ -32,17 +33,7 @@ COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
 INVALID = 0x7FFFFFFF
 # size and type of a message; bytes that are checked for zeros
 NO_MESSAGE, PAGE = bytes(3), 4096
-_DAMAGE = (
-    ValueError,
-    TypeError,
-    KeyError,
-    IndexError,
-    AttributeError,
-    struct.error,
-    EOFError,
-    MemoryError,
-    OverflowError,
-)
+_DAMAGE = (*DAMAGED, struct.error)
 
 
 class _PastTheEnd(BufferedReader):

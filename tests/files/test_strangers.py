@@ -338,6 +338,14 @@ def test_three_columns_are_an_accelerometers_if_the_file_is_called_so(name, even
     assert np.isnan(read.gyr).all()
 
 
+def test_lines_without_times_that_repeat_a_sample_are_left_out(even_walk, tmp_path):
+    (tmp_path / "acc.txt").write_text(text(np.repeat(even_walk.acc, 5, axis=0)))
+    read = mpucal.load(tmp_path / "acc.txt")
+    np.testing.assert_allclose(read.acc, even_walk.acc)
+    np.testing.assert_allclose(read.t, even_walk.t * 5, atol=1e-9)
+    assert f"{4 * len(even_walk)} repeated samples were left out" in read.taken
+
+
 def test_three_columns_of_an_unknown_sensor_name_the_command(even_walk, tmp_path):
     (tmp_path / "field.txt").write_text(text(even_walk.acc, ","))
     with pytest.raises(RecordingError, match="three columns of numbers") as error:

@@ -31,6 +31,8 @@ SURE_RANGE = 0.35
 OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
+# share of lines that are new samples, beyond which no line is a repeated one
+FEWEST_NEW = 0.5
 # counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
 FEWEST_PER_G, MOST_PER_G = 8, 14
 
@@ -72,14 +74,6 @@ def join_streams(
                 f"{name}: the {what} of sample {int(read.argmin())} are not a sensor's", "leave that sample out"
             )
     acc, gyr = (replace(s, values=units.to_signed(s.values)) if s.unit in ("", COUNTS) else s for s in (acc, gyr))
-    is_new = acc.is_new
-    temperature_c = None if temperature_c is None else temperature_c[is_new]
-    repeated = int((~is_new).sum())
-    lost = [(acc.lost, "accelerations"), (gyr.lost, "rates")]
-    acc, gyr = acc.part(is_new), gyr.part(gyr.is_new)
-    for stream, what in ((acc, "accelerations"), (gyr, "rates")):
-        if len(stream.values) < 2:
-            raise RecordingError(f"{name} repeats one sample of {what} at one time", "record it again")
     rate_remark = ""
     if hints.rate_hz is None and (acc.times is None or gyr.times is None):
         hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints))
@@ -87,6 +81,14 @@ def join_streams(
         if hints.rate_hz is None:
             rate_remark = "this sample rate is assumed, as nothing shows it (--rate HZ)"
             left_out = left_out or "without rates"
+    is_new, gyr_is_new = _are_new(acc, gyr)
+    temperature_c = None if temperature_c is None else temperature_c[is_new]
+    repeated = int((~is_new).sum())
+    lost = [(acc.lost, "accelerations"), (gyr.lost, "rates")]
+    acc, gyr = acc.part(is_new), gyr.part(gyr_is_new)
+    for stream, what in ((acc, "accelerations"), (gyr, "rates")):
+        if len(stream.values) < 2:
+            raise RecordingError(f"{name} repeats one sample of {what} at one time", "record it again")
     (t, gap, of_t, clock), (t_gyr, gap_gyr, of_t_gyr, clock_gyr) = (
         times.to_seconds(stream, acc, hints, name) for stream in (acc, gyr)
     )
@@ -124,6 +126,19 @@ def join_streams(
         taken="; ".join(filter(None, said)) + ".",
     )
     return replace(recording, gyr=w, utc_ns=times.utc_ns(acc, of_t))
+
+
+def _are_new(acc: Stream, gyr: Stream) -> tuple[Mask, Mask]:
+    """Return (n,) False where a sample repeats the one before; see Stream.is_new.
+
+    Without times, most lines have to repeat the one before: a sensor at rest may read the same twice.
+    """
+    if acc.times is not None or gyr.times is not None or len(acc.values) != len(gyr.values):
+        return acc.is_new, gyr.is_new
+    values = np.hstack([acc.values, gyr.values])
+    new = np.append(True, (values[1:] != values[:-1]).any(axis=1))
+    new |= not 1 < np.count_nonzero(new) <= FEWEST_NEW * len(new)
+    return new, new
 
 
 def _rate_hz(acc: Stream, gyr: Stream, hints: Hints) -> float | None:

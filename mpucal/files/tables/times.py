@@ -52,7 +52,9 @@ class Stream:
         if times is not None:
             times = times[mask] if isinstance(times, np.ndarray) else list(compress(times, mask))
         gap = None if self.gap is None else self.gap[mask]
-        return replace(self, times=times, values=self.values[mask], gap=gap)
+        kept = np.ones(len(mask), bool) if self.kept is ... else np.array(self.kept)
+        kept[kept] = mask
+        return replace(self, times=times, values=self.values[mask], gap=gap, kept=kept)
 
     @property
     def is_new(self) -> Mask:
