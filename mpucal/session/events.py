@@ -81,9 +81,7 @@ class Redo:
 
 @dataclass(frozen=True)
 class Resumed:
-    """The source resumed after `gap_s`; the board's motion in between is unknown."""
-
-    gap_s: float
+    """The source resumed; the board's motion in between is unknown."""
 
 
 @dataclass(frozen=True)

@@ -215,8 +215,7 @@ class Runner:
                 sensor = self._source.start()
             except EndOfCapture:
                 continue
-            gap_s = (self._source.now_ns() - ended_ns) * 1e-9
-            self._dialogue.feed(Connected(sensor) if self.sensor is None else Resumed(gap_s))
+            self._dialogue.feed(Connected(sensor) if self.sensor is None else Resumed())
             self.sensor = sensor
             return True
         return False

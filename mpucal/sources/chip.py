@@ -14,7 +14,6 @@ from ..origin import Origin
 from ..session.ports import Source
 from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
 from .tap import Tap
-from .utc_recorder import UtcRecorder
 
 
 @dataclass
@@ -46,6 +45,5 @@ class OpenedChip(OpenedSource):
     @contextmanager
     def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
         """See OpenedSource."""
-        tap = Tap(self.bus, UtcRecorder(recorder, self.parts))
-        driver = self.driver(tap, name, lambda text: say(f"  {text}."))
+        driver = self.driver(Tap(self.bus, recorder), name, lambda text: say(f"  {text}."))
         yield ActiveSource(driver, recorder.event, self.go_on, self.is_late)

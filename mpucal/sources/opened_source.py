@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
@@ -11,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from .. import __version__
 from ..chip.access import Transaction
-from ..chip.records import LATE
+from ..chip.records import LATE, UTC
 from ..errors import CaptureError
 from ..files.mcap import CaptureWriter
 from ..files.messages import BUS
@@ -45,10 +46,14 @@ class ActiveSource(NamedTuple):
 
 
 class NewRecords:
-    """Recorder of a session; of a resumed one, without what is replayed."""
+    """Recorder of a session; of a resumed one, without what is replayed.
 
-    def __init__(self, writer: CaptureWriter, parts: Chain[Any] | None) -> None:
-        self._writer, self._parts = writer, parts
+    The time of day stands before the first successful access, so that the samples can be merged with other recordings;
+    a replay keeps the recorded one.
+    """
+
+    def __init__(self, writer: CaptureWriter, parts: Chain[Any] | None = None) -> None:
+        self._writer, self._parts, self._has_time = writer, parts, False
 
     @property
     def _is_new(self) -> bool:
@@ -56,6 +61,12 @@ class NewRecords:
 
     def transaction(self, transaction: Transaction) -> None:
         """Record a register access."""
+        if self._parts is not None and self._parts.replaying:
+            for event in self._parts.pending_events(UTC):
+                self.event(UTC, event.t_ns, event.data)
+        elif not self._has_time and transaction.error is None:
+            self._has_time = True
+            self.event(UTC, transaction.t_ns, {UTC: time.time_ns()})
         if self._is_new:
             self._writer.transaction(transaction)
 

@@ -535,7 +535,7 @@ def test_a_resumed_session_repeats_its_prompt(board, rotating):
     rotating.overall = 0.1
     rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(2.0))
     wanted = rotating.of(Prompt)[-1]
-    rotating.give(Resumed(20.0))
+    rotating.give(Resumed())
     assert rotating.state is State.ROTATE
     assert rotating.of(Prompt)[-1] == wanted
     board.silence(20.0)
@@ -543,7 +543,7 @@ def test_a_resumed_session_repeats_its_prompt(board, rotating):
 
 
 def test_a_resumed_rest_begins_anew(board):
-    session = Session().feed(board.still(6.0)).give(Resumed(1.0)).feed(board.still(6.0))
+    session = Session().feed(board.still(6.0)).give(Resumed()).feed(board.still(6.0))
     assert session.state is State.LAY_FLAT
     assert session.feed(board.still(5.0)).state is State.ROTATE
 

@@ -16,9 +16,9 @@ from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge.bus import BridgeBus
+from mpucal.sources.opened_source import NewRecords
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
-from mpucal.sources.utc_recorder import UtcRecorder
 
 MS = 1_000_000
 
@@ -59,7 +59,7 @@ def recorded(tmp_path):
         bus = BridgeBus(line)
         with CaptureWriter(path) as writer:
             writer.start({})
-            driver = Driver(Tap(bus, UtcRecorder(writer)), Config())
+            driver = Driver(Tap(bus, NewRecords(writer)), Config())
             driver.start()
             while clock.now() < seconds * 1e9:
                 if reset_s is not None and clock.now() > reset_s * 1e9:
