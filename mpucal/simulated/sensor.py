@@ -119,24 +119,25 @@ class SensorTruth:
 
     @classmethod
     def draw(cls, seed: int, chip: str = "mpu6050", gravity: float = STANDARD_GRAVITY_MPS2) -> Self:
-        """Draw a plausible sensor: uniform within the data sheets' tolerances.
+        """Draw a sensor within its data sheet: each parameter uniform within the tolerance that its family has.
 
-        Gains +-3 %, cross-axis +-0.02 rad, misalignment +-2 deg, bias +-80 mg; gyro bias +-20 deg/s, its
-        matrix +-3 % on and +-2 % off the diagonal; sample clock +-0.8 %.
+        D and K are drawn in the frame in which K is symmetric; sample clock +-0.8 %.
         """
         rng = np.random.default_rng([seed, 1])
-        skew = non_orthogonality(*rng.uniform(-0.02, 0.02, 3))
-        gains = np.diag(rng.uniform(0.97, 1.03, 3))
-        D = gains @ skew @ euler_rotation(np.radians(rng.uniform(-2, 2, 3)))
-        gyro = rng.uniform(-0.02, 0.02, (3, 3))
-        np.fill_diagonal(gyro, rng.uniform(0.97, 1.03, 3))
-        D, K, _ = to_symmetric_frame(D, np.linalg.inv(gyro))
         family = MPU6050 if chip.startswith("mpu6050") else MPU6500
+        scale, cross = 0.01 * family.scale_percent, 0.01 * family.cross_axis_percent
+        below, gains, above = (rng.uniform(-most, most, 3) for most in (cross, scale, cross))
+        D = np.eye(3)
+        D[np.tril_indices(3, -1)], D[np.triu_indices(3, 1)] = below, above
+        D *= 1.0 + gains[:, None]
+        gyro = rng.uniform(-cross, cross, (3, 3))
+        np.fill_diagonal(gyro, rng.uniform(1.0 - scale, 1.0 + scale, 3))
+        D, K, _ = to_symmetric_frame(D, np.linalg.inv((gyro + gyro.T) / 2))
         return cls(
             D=D,
-            b_a=rng.uniform(-0.08, 0.08, 3) * STANDARD_GRAVITY_MPS2,
+            b_a=rng.uniform(-1e-3, 1e-3, 3) * family.zero_g_mg * STANDARD_GRAVITY_MPS2,
             K=K,
-            b_omega=np.radians(rng.uniform(-20, 20, 3)),
+            b_omega=np.radians(family.zero_rate_dps * rng.uniform(-1, 1, 3)),
             gravity=gravity,
             accel_noise_density=family.accel_noise_ug * 1e-6 * STANDARD_GRAVITY_MPS2,
             gyro_noise_density=float(np.radians(family.gyro_noise_dps)),
