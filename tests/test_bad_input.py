@@ -85,8 +85,8 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
     [
         (["session", "--bus", "sim", "--gravity", "-9.81"], "'-9.81' is not a local gravity"),
         (["session", "--bus", "sim", "--gravity", "nan"], "'nan' is not a local gravity"),
-        (["session", "--bus", "sim", "--gravity", "981"], "981 m/s² (9.76 to 9.84). In cm/s² it is --gravity 9.81."),
-        (["session", "--bus", "sim", "--gravity", "1"], "In g it is --gravity 9.8066. To use"),
+        (["session", "--bus", "sim", "--gravity", "981"], "In cm/s² it is `mpucal session --bus sim --gravity 9.81`."),
+        (["session", "--bus", "sim", "--gravity", "1"], "`mpucal session --bus sim --gravity 9.80665`. To use"),
         (["calibrate", "walk.npz", "--gravity", "much"], "'much' is not a local gravity"),
         (["session", "--bus", "sim", "--address", "0x68"], "--bus sim does not take --address"),
         (["session", "--bus", "sim", "--rate", "3"], "use 3.90625 Hz"),

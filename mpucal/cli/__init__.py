@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 
 import click
@@ -30,6 +31,19 @@ COMMANDS = {
 HELP = "help"
 # Key of the words of the command line in the context.
 TYPED = "mpucal.typed"
+
+
+def typed_words() -> list[str]:
+    """Return the words of the command line as they were typed, without the program's name."""
+    context = click.get_current_context()
+    return list(context.find_root().meta.get(TYPED, [str(context.command.name)]))
+
+
+def with_option(words: Sequence[str], option: str, value: str) -> list[str]:
+    """Return the words of a command line with another value of an option."""
+    words = [word for word in words if not word.startswith(f"{option}=")]
+    at = words.index(option) if option in words else len(words)
+    return [*words[:at], option, value, *words[at + 2 :]]
 
 
 class Commands(click.Group):

@@ -68,10 +68,11 @@ def command(
         click.echo(calibration.json(), nl=False)
     else:
         click.echo(summary(calibration))
+        again = command_again(calibration, folder, recording)
         if paths:
-            click.echo("\n" + files_written(paths, command_again(folder), of_vehicle=AUTOPILOT in calibration.extra))
+            click.echo("\n" + files_written(paths, again, of_vehicle=AUTOPILOT in calibration.extra))
         elif calibration.verdict == REFUSED:
-            click.echo("\n" + next_after_refusal(command_again(folder)))
+            click.echo("\n" + next_after_refusal(again))
     if calibration.verdict != REFUSED:
         return 0
     if folder is not None and (folder / BLOB.name).exists():

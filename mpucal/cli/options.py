@@ -20,7 +20,7 @@ from ..session.aims import AIMS, NORMAL
 from ..sources import opening
 from ..sources.kind import Option, SourceKind
 from ..sources.table import SOURCES, kinds_for, matching_kinds, unique
-from . import TYPED
+from . import typed_words, with_option
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -81,7 +81,7 @@ def check_gravity(gravity: float, anyway: bool) -> None:
         return
     units = {"cm/s²": 0.01, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1e3, "ft/s²": 0.3048}
     suggestions = [
-        f" In {unit} it is --gravity {gravity * factor:.5g}."
+        f" In {unit} it is `mpucal {shlex.join(with_option(typed_words(), '--gravity', f'{gravity * factor:.6g}'))}`."
         for unit, factor in units.items()
         if LEAST_ON_EARTH_MPS2 <= gravity * factor <= MOST_ON_EARTH_MPS2
     ]
@@ -182,11 +182,6 @@ def check_gyroscope(config: Config) -> None:
         )
 
 
-def typed_words(context: click.Context) -> str:
-    """Return the command line as it was typed, without the program's name, ready for a shell."""
-    return shlex.join(context.find_root().meta.get(TYPED, [str(context.command.name)]))
-
-
 def given_options() -> dict[str, str]:
     """Return the options that the command line holds: name to spelling."""
     context = click.get_current_context()
@@ -221,7 +216,7 @@ def check_source(context: click.Context) -> SourceKind:
     """
     command = str(context.command.name)
     if not matching_kinds(context.params) and not context.params.get("json_events"):
-        _list_sources(command, typed_words(context))
+        _list_sources(command, shlex.join(typed_words()))
     return opening.check_source(context.params, given_options(), command)
 
 

@@ -116,7 +116,7 @@ def command(
             of_vehicle = AUTOPILOT in calibration.extra
             if not json_events:
                 click.echo(err=True)
-            steps = files_written(files, command_again(into.path), calibration.verdict, of_vehicle)
+            steps = files_written(files, command_again(calibration, into.path), calibration.verdict, of_vehicle)
             click.echo(f"{summary(calibration)}\n\n{steps}")
         record = session_recorder(into.path, calibration, recording, source.truth)
         device = {**options, "gravity": source.plan.gravity, "model": source.plan.model}

@@ -6,20 +6,26 @@ import math
 import shlex
 import textwrap
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
-import click
-
+from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import free_name
+from ..origin import Origin
 from ..page.result import Result
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
-from . import TYPED
+from . import typed_words, with_option
 
 OUTPUT, NOT_AGAIN = "-o", frozenset({"--replay", "--resume"})
+# A chip's range by the code of the reason that a larger one prevents.
+RANGES = {
+    "gyro_clipped": ("--gyro-range", "gyro_range_dps", GYRO_RANGES_DPS),
+    "accel_clipped": ("--accel-range", "accel_range_g", ACCEL_RANGES_G),
+}
 
 # For a terminal of 80 columns.
 WIDTH, LABEL, COLUMN = 79, 23, 18
@@ -55,26 +61,42 @@ def page_result(calibration: Calibration) -> Result:
     )
 
 
-def command_again(folder: Path | None) -> str:
-    """Return the command line that was typed, for another measurement, with a free name for the results.
+def command_again(calibration: Calibration, folder: Path | None, recording: Path | None = None) -> str:
+    """Return the command line that was typed, as it is for another measurement; empty if it is the same.
 
-    A replay and a resumed session cannot be measured again: a new session can.
+    The results get a free name, and so does `recording`. A range at whose end the chip was is replaced by the next
+    larger one. A replay and a resumed session cannot be measured again: a new session can.
     """
-    words = list(click.get_current_context().find_root().meta.get(TYPED, ()))
-    if NOT_AGAIN.intersection(words) or not words:
+    typed = typed_words()
+    if NOT_AGAIN.intersection(typed):
         return "mpucal session"
+    words = list(typed)
+    if recording is not None:
+        words = [str(_free_file(recording)) if Path(word) == recording else word for word in words]
+    elif calibration.sensor.origin is Origin.CHIP:
+        codes = {reason["code"] for reason in calibration.quality.get("reasons", ())}
+        for option, key, ranges in (row for code, row in RANGES.items() if code in codes):
+            larger = [each for each in ranges if each > (getattr(calibration.sensor, key) or math.inf)]
+            words = with_option(words, option, str(larger[0])) if larger else words
     if OUTPUT in words and folder is not None:
-        words[words.index(OUTPUT) + 1] = str(free_name(folder))
-    return f"mpucal {shlex.join(words)}"
+        words = with_option(words, OUTPUT, str(free_name(folder)))
+    return "" if words == typed else f"mpucal {shlex.join(words)}"
+
+
+def _free_file(path: Path) -> Path:
+    """Return `path` with the first free number before its suffix."""
+    names = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
+    return next(name for name in names if not name.exists())
 
 
 def next_after_refusal(again: str) -> str:
-    """Return what to do after a refusal, with the whole command."""
-    return f"Next: follow the remedy above, measure again, and run\n  {again}"
+    """Return what to do after a refusal, with the whole command if it is another one."""
+    how = f"measure again, and run\n  {again}" if again else "and give the same command again."
+    return f"Next: follow the remedy above, {how}"
 
 
 def files_written(paths: Sequence[Path], again: str, verdict: str = GOOD, of_vehicle: bool = False) -> str:
-    """Return the list of files, and the next steps; `again` is the command that measures and calibrates again."""
+    """Return the list of files, and the next steps; `again` is the command for another measurement, see above."""
     folder = paths[0].parent
     lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
     if any(path.name == BLOB.name for path in paths):
@@ -84,7 +106,11 @@ def files_written(paths: Sequence[Path], again: str, verdict: str = GOOD, of_veh
             f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT.name}").apply(acc)',
             # an autopilot takes parameters
             *([] if of_vehicle else [f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)"]),
-            *([f"  better       follow the remedies above, and run {again}"] if verdict == USABLE else []),
+            *(
+                [f"  better       follow the remedies above, and run {again or 'it again'}"]
+                if verdict == USABLE
+                else []
+            ),
         ]
     else:
         lines += [f"Look at {folder / REPORT.name}.", "", next_after_refusal(again)]

@@ -16,7 +16,8 @@ from .location import current_path
 class OutputFolder:
     """Folder that is created if needed, and locked against other processes of mpucal until it is closed.
 
-    There is no lock if the system or the disk does not support locks.
+    There is no lock if the system or the disk does not support locks. A folder that was created for nothing, because it
+    is empty when it is closed, is removed.
 
     Parameters
     ----------
@@ -29,6 +30,7 @@ class OutputFolder:
 
     def __init__(self, path: Path, new: bool = False) -> None:
         self._path = _create(str(path)) if new else path
+        self._created = new or not path.exists()
         try:
             make_folders(self._path)
         except OSError as error:
@@ -65,6 +67,9 @@ class OutputFolder:
 
     def close(self) -> None:
         """Release the lock."""
+        if self._created:
+            with suppress(OSError, OutputError):
+                self.path.rmdir()
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None

@@ -57,25 +57,20 @@ class SessionFolder(OutputFolder):
         return None
 
     def _check_space(self) -> None:
-        """Raise OutputError if the session may fill the disk; a folder that was created for it is removed."""
+        """Raise OutputError if the session may fill the disk."""
         free = shutil.disk_usage(self.path).free
-        if free >= LEAST_FREE_BYTES:
-            return
-        path = self.path
-        self.close()
-        with suppress(OSError):
-            path.rmdir()
-        raise OutputError(
-            f"only {free / 1e6:.1f} MB are free for {path}, and a session takes up to {LEAST_FREE_BYTES / 1e6:.0f} MB",
-            "free some space, or choose another folder with -o",
-        )
+        if free < LEAST_FREE_BYTES:
+            self.close()
+            raise OutputError(
+                f"only {free / 1e6:.1f} MB are free for {self.path}, and a session takes up to"
+                f" {LEAST_FREE_BYTES / 1e6:.0f} MB",
+                "free some space, or choose another folder with -o",
+            )
 
     def settle(self, sensor: Sensor | None) -> None:
-        """Rename a folder without a given name after its chip; delete the capture, and it, if no chip answered."""
+        """Rename a folder without a given name after its chip; delete the capture if no chip answered."""
         if sensor is None:
             self.capture.unlink(missing_ok=True)
-            if not self._given:
-                self.path.rmdir()
         elif sensor.chip and not self._given:
             self.rename(f"{sensor.chip.lower()}-{self._stamp}")
 

@@ -100,12 +100,14 @@ def open_source(request: Request) -> OpenedIio:
 
     Raises
     ------
-    UsageError : no names of devices. BusError : there are no such devices.
+    UsageError : no names of devices. BusError : there are no such devices, or they cannot be written to.
     """
     devices = Devices.parse(request.value)
     files = IioFiles()
     for device in devices.each:
         files.check(device)
+    if request.values.get("writes"):
+        files.check_writable(devices.accel)
     bus: Any = files
     return OpenedIio(
         bus, request.plan, words=request.words, devices=devices, trigger=request.values.get("trigger"), rules=RULES
@@ -143,6 +145,15 @@ class IioFiles(HostBus):
                 f"use one of {', '.join(there)}" if there else "load the driver of the sensor, which needs its overlay"
             )
             raise BusError(f"there is no {device}", remedy)
+
+    def check_writable(self, device: str) -> None:
+        """Raise BusError if this user may not write calibbias or udev's rules, to which a session writes at its end."""
+        for path in (*sorted((self._sysfs / device).glob(f"*{PERSISTENT_SUFFIX}")), RULES):
+            if not os.access(path, os.W_OK):
+                raise BusError(
+                    f"{path} cannot be written, and this session is to write to it",
+                    "run it as root (sudo), or leave out --to kernel",
+                )
 
     def read(self, register: str, count: int) -> Reply:
         """Read a file as Files has it; TRIGGERS gives the names of all triggers."""

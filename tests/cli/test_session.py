@@ -116,9 +116,13 @@ def test_without_a_source_it_lists_those_there_are_with_the_whole_command(mpucal
     assert json.loads(events[0])["exit_code"] == 2
 
 
-def test_no_folder_is_left_if_nothing_answered(mpucal, tmp_path):
+def test_no_folder_is_left_if_nothing_answered_or_the_page_is_refused(mpucal, tmp_path):
     mpucal("session", "--bus", "/dev/i2c-99")
     mpucal("session", "--bus", "sim:who_am_i=0xff")
+    mpucal("session", "--bus", "sim:who_am_i=0xff", "-o", "board")
+    # an address for documentation (RFC 5737), which no computer has
+    refused = mpucal("session", "--bus", "sim", "-o", "board", "--yes", "--page=192.0.2.1:8000")
+    assert (refused.code, "no page can be served" in refused.err) == (3, True)
     assert list(tmp_path.iterdir()) == []
 
 

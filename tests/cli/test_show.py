@@ -2,11 +2,15 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
-from mpucal.cli.summary import files_written, formula, summary
+from mpucal.cli import TYPED
+from mpucal.cli.summary import command_again, files_written, formula, next_after_refusal, summary
+from mpucal.data import Sensor
 from mpucal.result.calibration import Calibration
 
 
@@ -80,6 +84,39 @@ def test_the_next_steps_follow_from_the_files(tmp_path):
     refused = files_written([tmp_path / "calibration.json", tmp_path / "report.html"], "mpucal session --bus 1")
     assert "firmware" not in refused
     assert refused.endswith("measure again, and run\n  mpucal session --bus 1")
+
+
+BUS = "session --bus 1"
+AGAIN = {
+    "the same": (BUS, (), ""),
+    "a folder": (f"{BUS} -o seven", (), f"{BUS} -o seven-2"),
+    "rates": (BUS, ("gyro_clipped",), f"{BUS} --gyro-range 1000"),
+    "a range given": ("session --gyro-range 500 --bus 1", ("gyro_clipped",), "session --gyro-range 1000 --bus 1"),
+    "a range joined": ("session --gyro-range=500 --bus 1", ("gyro_clipped",), f"{BUS} --gyro-range 1000"),
+    "the largest": (BUS, ("accel_clipped",), ""),
+    "both": (f"{BUS} -o seven", ("accel_clipped", "gyro_clipped"), f"{BUS} -o seven-2 --gyro-range 1000"),
+    "a replay": ("session --replay a.mcap", ("gyro_clipped",), "session"),
+    "a resumed one": ("session --resume seven", (), "session"),
+    "a file": (
+        "calibrate walk.csv --model hand -o seven",
+        ("gyro_clipped",),
+        "calibrate walk-2.csv --model hand -o seven-2",
+    ),
+}
+
+
+@pytest.mark.parametrize(("typed", "codes", "again"), AGAIN.values(), ids=AGAIN.keys())
+def test_the_command_for_another_measurement_is_never_the_same_one(tmp_path, monkeypatch, typed, codes, again):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "seven").mkdir()
+    quality = {"verdict": "refused", "reasons": [{"code": code, "message": "it was"} for code in codes]}
+    sensor = Sensor("MPU-6050", 0x68, accel_range_g=16.0, gyro_range_dps=500.0)
+    with click.Context(click.Command("mpucal")) as context:
+        context.meta[TYPED] = typed.split()
+        file = Path("walk.csv") if "walk.csv" in typed else None
+        found = command_again(calibration(quality=quality, sensor=sensor), Path("seven"), file)
+    assert found == (f"mpucal {again}" if again else "")
+    assert next_after_refusal(found).endswith(f"run\n  mpucal {again}" if again else "give the same command again.")
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,15 @@ def test_one_that_is_renamed_is_followed_and_one_that_is_replaced_is_not_written
             _ = folder.path
 
 
+def test_one_that_was_made_for_nothing_is_removed(tmp_path):
+    (tmp_path / "there").mkdir()
+    for name in ("there", "made", "filled"):
+        with OutputFolder(tmp_path / name) as folder:
+            if name == "filled":
+                (folder.path / "capture").touch()
+    assert {path.name for path in tmp_path.iterdir()} == {"there", "filled"}
+
+
 def test_a_file_in_its_place_is_an_output_error(tmp_path):
     (tmp_path / "board").touch()
     with pytest.raises(OutputError, match="cannot make the folder"):

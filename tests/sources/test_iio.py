@@ -308,6 +308,21 @@ def test_a_device_that_is_not_there_names_those_that_are(tree):
         open_source({"iio": "3"})
 
 
+def test_a_session_that_is_to_write_is_refused_where_it_may_not(tree, tmp_path, monkeypatch):
+    """Try it without the folder of udev, and with an attribute that is read-only."""
+    rules, bias = tmp_path / "rules.d", tree / "in_accel_y_calibbias"
+    monkeypatch.setattr(iio, "RULES", rules)
+    open_source({"iio": "0"})
+    with pytest.raises(BusError, match=rf"{rules} cannot be written, .*: run it as root \(sudo\), or leave out --to"):
+        open_source({"iio": "0", "writes": True})
+    rules.mkdir()
+    bias.write_text("0\n")
+    open_source({"iio": "0", "writes": True})
+    monkeypatch.setattr(os, "access", lambda path, mode: (path, mode) != (bias, os.W_OK))
+    with pytest.raises(BusError, match=rf"{bias} cannot be written"):
+        open_source({"iio": "0", "writes": True})
+
+
 @pytest.mark.parametrize("text", ["iio:device0", "device0", "0"])
 def test_devices_by_their_names(text):
     assert Devices.parse(text) == BOTH
