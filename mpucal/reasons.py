@@ -195,7 +195,7 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
         },
-        "mpucal session --bus sim:hand=hasty --gyro-range 250 --seed 1",
+        "mpucal session --bus sim:hand=hasty --gyro-range 250 --seed 2",
         "more than 20 % of the samples are clipped, or the new orientations cannot be verified because of it",
         turn_again=True,
     ),
