@@ -22,7 +22,8 @@ TURN_WORDS = (
 ROUND_DEG = 5.0
 # A heading is kept as long as it leads this near to the wanted orientation.
 KEPT_RAD = math.radians(10.0)
-# The words are kept as long as the heading differs from theirs by no more than this.
+# The words are kept as long as the heading differs from theirs by no more than this; up to a right angle, the shortest
+# one: a turn of 25 deg by words that are 60 deg off would leave 25 deg.
 WORDS_KEPT_RAD = math.radians(30.0)
 # From one call to the next the wanted attitude turns about the vertical by no more than this.
 SLEW_RAD = math.radians(15.0)
@@ -80,8 +81,9 @@ class TurnGuide:
         reach = math.sin(KEPT_RAD) / max(math.sin(missing), 1e-9)
         most = math.asin(reach) if reach < 1.0 else math.pi
         self._heading = shortest + min(max(aside, -most), most)
-        if new or abs(_wrapped(self._heading - _angle(self._word_index))) > WORDS_KEPT_RAD:
-            self._word_index = _nearest(self._heading)
+        told = self._heading if missing > math.pi / 2.0 else shortest
+        if new or abs(_wrapped(told - _angle(self._word_index))) > WORDS_KEPT_RAD:
+            self._word_index = _nearest(told)
 
 
 def _nearest(heading: float) -> int:

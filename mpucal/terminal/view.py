@@ -24,12 +24,13 @@ from ..session.events import (
     Verification,
 )
 
-# Time for which the headline shows the use of the last orientation.
-USE_SHOWN_S = 1.2
+# Time for which the headline shows the use of the last orientation in place of the next turn. At 240 words a minute a
+# word is read in 0.25 s; this one comes with a tone and a tick that stays.
+USE_SHOWN_S = {Use.TAKEN: 0.5, Use.USEFUL: 1.2, Use.SEEN: 1.2}
 USE_HEADLINES = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
-# Angle from the wanted orientation below which the headline asks to hold still, also once it is held; unless the board
-# passes by.
-NEAR_DEG, NEAR_HELD_DEG, PASSES_DPS = 15.0, 20.0, 70.0
+# Angle from the wanted orientation below which the headline asks to hold still, also where the board comes to rest: it
+# turns by less than their difference from one meter to the next (0.25 s). A board that passes by is not held.
+NEAR_DEG, NEAR_HELD_DEG, RESTS_DPS, PASSES_DPS = 15.0, 20.0, 20.0, 70.0
 # A countdown that is not renewed for this time has ended; for the second one, if the board moves.
 COUNTDOWN_HOLDS_S, BUMP_S = 1.0, 0.4
 # Time for which a useful orientation is held before the headline asks to hold it instead of the wanted one.
@@ -145,10 +146,20 @@ class View:
 
     @property
     def line(self) -> tuple[int, int]:
-        """Finish line of this step: the number of orientations that are taken, and how many there are to be."""
+        """Finish line of this step: the number of orientations that are taken, and how many there are to be.
+
+        The progress counts an orientation from the moment at which the board is still there.
+        """
         p = self.progress
-        turning = p is not None and self.prompt is not None and self.prompt.kind in TURNING
-        return (int(p.done), int(p.of)) if p is not None and turning else (0, 0)
+        if p is None or self.prompt is None or self.prompt.kind not in TURNING:
+            return 0, 0
+        done = int(p.done)
+        if self.prompt.kind is PromptKind.ROTATE:
+            held = self.waiting
+            held_s = math.inf if held is None else held.t_s + held.remaining_s - held.of_s
+            # the first one is flat
+            done = min(done, 1 + sum(seen.paused and seen.t_s < held_s for seen in self.seen))
+        return done, int(p.of)
 
     @property
     def confirming(self) -> str:
@@ -179,11 +190,11 @@ class View:
             word = "NEW: HOLD" if waiting.elsewhere else "HOLD"
             word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else word
             return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s) or ''}".rstrip()
-        if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < USE_SHOWN_S:
+        if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < USE_SHOWN_S[self.held.use]:
             return Moment.DECIDED, USE_HEADLINES[self.held.use]
         if self.wanted is None or self.meter is None or self.meter.missing_deg is None:
             return Moment.STEP, HEADLINES[self.prompt.kind]
-        near_deg = NEAR_DEG if waiting is None else NEAR_HELD_DEG
+        near_deg = NEAR_HELD_DEG if self.meter.turning_dps < RESTS_DPS else NEAR_DEG
         if not self.meter.turn or (self.meter.missing_deg <= near_deg and self.meter.turning_dps < PASSES_DPS):
             return Moment.NEAR, "HOLD STILL"
         return Moment.TURN, _turn_headline(self.meter.turn)
@@ -201,7 +212,10 @@ class View:
         return replace(view, countdown=None, progress=None, caution=None, held=held, verified=())
 
     def _at(self, t_s: float) -> View:
-        return replace(self, now_s=t_s, begun_s=t_s if self.begun_s is None else self.begun_s)
+        if self.begun_s is None or self.now_s is None:
+            return replace(self, now_s=t_s, begun_s=t_s)
+        # what was computed of earlier samples comes later
+        return replace(self, now_s=max(t_s, self.now_s))
 
 
 def _turn_headline(turn: str) -> str:

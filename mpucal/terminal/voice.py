@@ -114,9 +114,11 @@ class Voice:
                 self._told is not Moment.TURN or self._quiet_s >= SETTLED_S
             ):
                 self._say(view.confirming or in_words(view), Tone.HOLD)
-            case Moment.TURN if view.meter is not None and view.meter.turn:
+            case Moment.TURN if view.meter is not None and view.meter.turn and view.waiting is None:
                 due = self._told is not Moment.TURN or view.prompt is not self._prompt or self._quiet_s >= REPEAT_S
-                first = self._told not in (Moment.COUNTING, Moment.NEAR, Moment.TURN)
+                # The use of the last orientation is said to its end.
+                first = self._told is Moment.DECIDED and self._quiet_s >= SETTLED_S
+                first = first or self._told in (Moment.CONNECTING, Moment.STEP)
                 if due and (first or self._is_settled):
                     self._prompt = view.prompt
                     self._say(view.meter.turn.replace(" deg ", " degrees "), tone)

@@ -1,11 +1,12 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from mpucal.session.aims import ALL_AROUND
-from mpucal.session.turn_guide import TurnGuide
+from mpucal.session.turn_guide import TURN_WORDS, TurnGuide
 
 STRAIGHT = (1.0, 0.0, 0.0, 0.0)
 
@@ -49,3 +50,22 @@ def test_the_turn_of_a_board_upside_down_does_not_change_with_tremor(tremor_deg)
     assert len({turn.words.partition(", ")[2] for turn in turns}) == 1
     wanted = Rotation.from_quat([turn.attitude for turn in turns], scalar_first=True)
     assert np.degrees((wanted[1:] * wanted[:-1].inv()).magnitude()).max() < 20.0
+
+
+def test_who_turns_by_the_words_comes_nearer():
+    """Turn by the angle and the words alone, from 200 random attitudes: at most 0.6 of it is left."""
+    rng = np.random.default_rng(1)
+    words = [f"deg more, {each}" for each in TURN_WORDS]
+    for down in rng.normal(size=(200, 3)):
+        guide, attitude = TurnGuide(), Rotation.random(random_state=rng)
+        toward = tuple(down / np.linalg.norm(down))
+        left = [180.0]
+        while left[-1] > 15.0:
+            turn = guide.turn_to(toward, attitude.as_quat(scalar_first=True).tolist())
+            left.append(turn.missing_deg)
+            if not turn.words:
+                break
+            heading = words.index(turn.words.partition(" ")[2]) * math.pi / 4.0
+            axis = math.radians(turn.missing_deg) * np.array([-math.sin(heading), math.cos(heading), 0.0])
+            attitude = Rotation.from_rotvec(axis) * attitude
+        assert all(after < 0.6 * before for before, after in pairwise(left[1:])), left

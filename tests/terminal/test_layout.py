@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Caution, Progress, Prompt, PromptKind
+from mpucal.session.events import Caution, Progress, Prompt, PromptKind, Seen
 from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.terminal.glyphs import ASCII, UNICODE
 from mpucal.terminal.layout import lines
@@ -114,7 +114,8 @@ def test_nothing_shows_where_to_turn_once_no_orientation_is_asked_for(views, kin
     ids=["count", "reason", "long"],
 )
 def test_the_finish_line_has_a_mark_for_each_orientation(views, progress, shown):
-    drawn = text_of(replace(views["turned"], progress=progress), glyphs=ASCII)
+    seen = tuple(Seen(float(number), number, (1.0, 0.0, 0.0), True) for number in range(2, 13))
+    drawn = text_of(replace(views["turned"], progress=progress, seen=seen), glyphs=ASCII)
     assert drawn[8].strip().startswith(shown)
     assert not any(
         "xxxx" in line for line in text_of(views["turned"].after(Prompt(PromptKind.REST, "Done.")), glyphs=ASCII)

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Countdown, Held, Prompt, PromptKind, Seen, Use
+from mpucal.session.events import Countdown, Held, Progress, Prompt, PromptKind, Seen, Use
 from mpucal.terminal.view import View
 
 
@@ -108,6 +108,22 @@ def test_orientations_are_counted_anew_when_the_board_is_turned_anew(views):
     assert [s.number for s in again.seen if not s.paused] == [1]
 
 
+def test_an_orientation_is_ticked_as_it_is_taken(views):
+    """Follow a hold as a session does: the progress counts it at its beginning, and it is seen before its end."""
+    view = replace(views["turned"], seen=(), countdown=None)
+    ticked = []
+    for output in (
+        Progress(30.0, 2.0, 10.0, "orientation 2 of 10"),
+        Countdown(30.5, 1.5, 2.0, False),
+        Seen(31.0, 2, (1.0, 0.0, 0.0), True),
+        Countdown(31.5, 0.5, 2.0, False),
+        Held(32.0, Use.TAKEN, (1.0, 0.0, 0.0), "taken"),
+    ):
+        view = view.after(output)
+        ticked.append(view.line)
+    assert ticked == [(1, 10)] * 4 + [(2, 10)]
+
+
 def test_another_step_forgets_the_warnings_of_the_last(views):
     assert views["turned"].caution is not None
     assert views["checked"].caution is None
@@ -120,6 +136,7 @@ def test_the_use_of_an_orientation_is_the_headline_for_a_moment(views, use, head
     held = Held(26.0, use, (1.0, 0.0, 0.0), "")
     view = views["turned"].after(held)
     assert view.headline == headline
+    assert (replace(view, now_s=26.6).headline == headline) == (use is not Use.TAKEN)
     assert replace(view, now_s=28.0).headline == "ROLL LEFT 60"
 
 

@@ -66,8 +66,8 @@ def test_a_bump_in_a_hold_is_not_called_wrong_and_an_abandoned_hold_is():
     begun = [SIDE, left(1.0), meter(2.1, 20.0, still=True), Countdown(2.3, 0.75, 1.25, False, elsewhere=True)]
     bump = [*begun, left(2.8, 20), replace(left(3.0, 20), still=True), Countdown(3.0, 0.5, 1.25, False, elsewhere=True)]
     assert spoken(*bump)[2:] == [(2.3, Tone.HOLD, "New: hold still")]
-    away = [*begun, left(2.8, 20), left(3.3, 40), left(3.9, 40)]
-    assert spoken(*away)[3:] == [(3.9, Tone.WRONG, "40 degrees more, roll it to the left")]
+    away = [*begun, left(2.8, 20), left(3.3, 40), left(4.4, 40)]
+    assert spoken(*away)[3:] == [(4.4, Tone.WRONG, "40 degrees more, roll it to the left")]
 
 
 def test_the_turn_is_repeated_after_a_while_and_at_once_for_another_orientation():

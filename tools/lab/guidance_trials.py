@@ -3,14 +3,15 @@
 python -m tools.lab guidance_trials --seeds 20
 python -m tools.lab guidance_trials --seeds 20 --hand wandering
 
-Counted over whole sessions on the simulated chip, as the page shows them: pictures that jump by more than 20 deg
-beyond what gravity and the gyroscope turned meanwhile (the board's, and where the wanted one is drawn), a HOLD
-farther from the wanted orientation than 15 deg that is not said to be useful, an orientation asked for in place of
-another without a word on what was held, and counts above their total. In the transcript of what is said, played and
-shown large: "hold" and "turn" that contradict each other within a second, a tone for wrong before a hold that is taken,
-words said twice within five seconds, and words while the board is held. Then the time to the verdict of the hand that
-is given the wanted orientation is compared with that of one that turns the board as the page says in words, by so many
-degrees, and looks again.
+Counted over whole sessions on the simulated chip, as the page shows them: pictures that jump by more than 20 deg beyond
+what gravity and the gyroscope turned meanwhile (the board's, and where the wanted one is drawn), a HOLD farther from
+the wanted orientation than 15 deg that is not said to be useful, an orientation asked for in place of another without a
+word on what was held, and counts above their total. In the transcript of what is said, played and shown large: "hold"
+and "turn" that contradict each other within a second, a tone for wrong before a hold that is taken, words said twice
+within five seconds, words while the board is held, and a headline that is taken back within a second although the hand,
+which may do as it likes, has not turned the board meanwhile. Then the time to the verdict of the hand that is given the
+wanted orientation is compared with that of one that turns the board as the page says in words, by so many degrees, and
+looks again.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ from .sessions import session
 from .table import Column, count, grouped, known, show, table
 
 BEYOND_DEG = 20.0
+# More than a hand trembles, and misses by.
+TURNED_DEG = 10.0
 COUNT = re.compile(r"(\d+) of (\d+)")
 BY_WORDS = "by words"
 LOOKS_S = 0.25
@@ -50,14 +53,17 @@ SLOWEST = 1.2
 
 
 class ByWords(Guided):
-    """Turns the board as it is told in words, seen from where it laid the board flat, and looks again."""
+    """Turns the board as it is told in words, seen from where it laid the board flat, and looks again.
 
-    HEADLINE, DEGREES = "", 0.0
+    Its motion is computed some time ahead: it reacts to words from when they were shown (`SINCE_S`).
+    """
+
+    HEADLINE, DEGREES, SINCE_S = "", 0.0, 0.0
 
     def __init__(self, rng: np.random.Generator) -> None:
         super().__init__(rng)
         self._room: Vector | None = None
-        self._words, self._due_s = "", math.inf
+        self._words, self._due_s, self._turned_s = "", math.inf, 0.0
 
     def rotate(self, now: Stance) -> Leg:
         """Turn by what is said, a reaction time after it was said; hold still where nothing is."""
@@ -67,10 +73,12 @@ class ByWords(Guided):
         t_s = now.step * STEP_S
         if way not in TURN_WORDS:
             self._words = ""
-        elif way != self._words:
-            self._words, self._due_s = way, t_s + self._rng.uniform(*REACTION_S)
-        if not self._words or t_s < self._due_s:
             return self.pause(now, LOOKS_S)
+        if way != self._words:
+            said_s = self.SINCE_S if self._turned_s < self.SINCE_S else t_s
+            self._words, self._due_s = way, said_s + self._rng.uniform(*REACTION_S)
+        if t_s + STEP_S < self._due_s:
+            return self.pause(now, min(LOOKS_S, self._due_s - t_s))
         self._words = ""
         toward = TURN_WORDS.index(way) * math.pi / 4.0
         axis = np.array([0.0, -math.sin(toward), math.cos(toward), 0.0])
@@ -78,7 +86,9 @@ class ByWords(Guided):
             axis = quaternions.product(quaternions.product(q, axis), quaternions.conjugate(q))
         miss = self._rng.normal(size=3)
         miss *= MISS_RAD * math.sqrt(self._rng.uniform()) / np.linalg.norm(miss)
-        return self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, self.GRIP)
+        leg = self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, self.GRIP)
+        self._turned_s = leg.last * STEP_S
+        return leg
 
 
 HANDS[BY_WORDS] = ByWords
@@ -92,24 +102,24 @@ class Transcript:
 
     Attributes
     ----------
-    said : announcements, with the moment of each. shown : senses of the headline and the times from which they are
+    said : announcements, with the moment of each. shown : senses of the headline and the views from which they are
         shown; empty where it neither asks for a turn nor for a hold.
     """
 
     said: list[tuple[Said, Moment]] = field(default_factory=list)
-    shown: list[tuple[float, str, Prompt | None]] = field(default_factory=lambda: [(0.0, "", None)])
+    shown: list[tuple[str, View]] = field(default_factory=lambda: [("", View())])
     wrong: Counter[str] = field(default_factory=Counter)
     voice: Voice = field(default_factory=Voice)
 
     def hear(self, view: View) -> None:
         """Follow a change of the view."""
         self.voice.hear(view)
-        t_s, sense = view.now_s or 0.0, SENSES.get(view.moment, "")
-        if sense != self.shown[-1][1]:
-            self.shown.append((t_s, sense, view.prompt))
-            (_, one, prompt), (since_s, other, _) = self.shown[-3:-1] if len(self.shown) > 2 else [self.shown[0]] * 2
-            there_and_back = sense == one and {one, other} == {STAY, GO} and prompt is view.prompt
-            self.wrong["shown for less than a second"] += there_and_back and t_s - since_s < SETTLED_S
+        sense = SENSES.get(view.moment, "")
+        if sense != self.shown[-1][0]:
+            self.shown.append((sense, view))
+            (one, first), (other, then) = self.shown[-3:-1] if len(self.shown) > 2 else [self.shown[0]] * 2
+            if sense == one and {one, other} == {STAY, GO} and first.prompt is view.prompt:
+                self.wrong["shown for less than a second"] += is_taken_back(then, view)
         now = self.voice.said
         if now is None or (self.said and now is self.said[-1][0]):
             return
@@ -127,6 +137,12 @@ class Transcript:
         turning = view.prompt is not None and view.prompt.kind is not PromptKind.LAY_FLAT
         holding = turning and moment is view.moment is Moment.COUNTING
         self.wrong["said while holding"] += holding and view.held is None
+
+
+def is_taken_back(then: View, now: View) -> bool:
+    """Return True if less than a second lies between two views, and the board was not turned in it."""
+    assert then.meter and now.meter and then.now_s is not None and now.now_s is not None
+    return now.now_s - then.now_s < SETTLED_S and angle(then.meter.attitude, now.meter.attitude) < TURNED_DEG
 
 
 @dataclass
@@ -149,7 +165,9 @@ class Watcher:
             self._since_counted = shown["moment"]
         match output:
             case Meter():
-                ByWords.HEADLINE, ByWords.DEGREES = shown["headline"], 5.0 * round((output.missing_deg or 0.0) / 5.0)
+                if shown["headline"] != ByWords.HEADLINE:
+                    ByWords.HEADLINE, ByWords.SINCE_S = shown["headline"], output.t_s
+                ByWords.DEGREES = 5.0 * round((output.missing_deg or 0.0) / 5.0)
                 self._jumps(before, output)
                 self._hold(shown["headline"], output)
             case Prompt(kind=kind):
@@ -209,7 +227,7 @@ class Trial:
     verdict: str
     finished_s: float
     holds: int
-    wrong: Counter[str]
+    wrong: dict[str, int]
 
 
 def of_hand(item: tuple[str, int]) -> Trial:
@@ -217,7 +235,7 @@ def of_hand(item: tuple[str, int]) -> Trial:
     hand, seed = item
     watcher = Watcher()
     verdict = session(f"sim:hand={hand}", Plan(), seed, watcher).judged().verdict
-    return Trial(hand, verdict, watcher.finished_s, watcher.holds, watcher.wrong + watcher.transcript.wrong)
+    return Trial(hand, verdict, watcher.finished_s, watcher.holds, dict(watcher.wrong + watcher.transcript.wrong))
 
 
 def typical_s(trials: Sequence[Trial]) -> float:
@@ -227,7 +245,7 @@ def typical_s(trials: Sequence[Trial]) -> float:
 
 def total_wrong(trials: Sequence[Trial]) -> Counter[str]:
     """Return what was wrong, and how often."""
-    return sum((trial.wrong for trial in trials), Counter())
+    return sum((Counter(trial.wrong) for trial in trials), Counter())
 
 
 COLUMNS: dict[str, Column] = {

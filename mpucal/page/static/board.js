@@ -42,8 +42,9 @@ export function pointing(down, from) {
   return times([sine < 1e-6 && angle > 1 ? 0 : Math.cos(angle / 2), x, y, z], from);
 }
 
-// The viewer's eye: in front, above and a little to one side; it moves so that no board is seen edge-on.
-const TURNS = [-28, 28, 0, -48, 48], TILTS = [32, 52, 16, 68], LEAST_FACE = 0.5, KEEPS_FACE = 0.38;
+// The viewer's eye: in front, above and a little to one side, so that left, right and away are those of the person; it
+// moves so that no board is seen edge-on.
+const TURNS = [-14, 14, -28, 28, -48, 48], TILTS = [32, 52, 16, 68], LEAST_FACE = 0.5, KEEPS_FACE = 0.38;
 
 export function eye({ turn, tilt }) {
   const t = radians(turn), e = radians(tilt), away = [Math.sin(t), Math.cos(t), 0];
@@ -197,6 +198,7 @@ export function drawBoard(picture, kind, attitude, view, way = null, small = fal
   const room = (point) => rotate(attitude, point);
   const at = (point) => picture.seen(room(point));
   shadow(picture, model, room);
+  if (way) arc(picture, way);
   const normal = room([0, 0, 1]), top = dot(normal, picture.eye.toward) > 0.05;
   const [far, near] = top ? [model.below, model.above] : [model.above, model.below];
   boxes(picture, far, room);
@@ -212,7 +214,7 @@ export function drawBoard(picture, kind, attitude, view, way = null, small = fal
   if (top && model.dot) spot(picture, at, [...model.dot, z + 0.1], 0.025, "#ddd");
   rotors(picture, model, at);
   if (!small) axis(picture, AXES[2], at, model, top ? 1 : -1);
-  if (way) arc(picture, way);
+  if (way) arc(picture, way, true);
 }
 
 function shadow(picture, model, room) {
@@ -318,19 +320,28 @@ function head(picture, from, to, colour, size) {
   picture.fill([[to[0] + u, to[1] + v], [to[0] - v * 0.8, to[1] + u * 0.8], [to[0] + v * 0.8, to[1] - u * 0.8]], colour, false);
 }
 
-// Draws an arc over the board, along the missing turn of its top.
-function arc(picture, way) {
+// Draws an arc along the missing turn of the board's top, thicker where it is nearer; `over`: only what lies before the
+// board, and a trace of the rest.
+function arc(picture, way, over = false) {
   const angle = Math.hypot(...way);
   if (angle < radians(12)) return;
-  const axis = way.map((v) => v / angle), points = [];
+  const axis = way.map((v) => v / angle), points = [], near = [], { pen } = picture;
   for (let k = 0; k <= 24; k++) {
-    const half = angle * k / 48, s = Math.sin(half);
-    points.push(picture.seen(rotate([Math.cos(half), axis[0] * s, axis[1] * s, axis[2] * s], [0, 0, 1.3])));
+    const half = angle * k / 48, s = Math.sin(half), point = rotate([Math.cos(half), axis[0] * s, axis[1] * s, axis[2] * s], [0, 0, 1.3]);
+    points.push(picture.seen(point));
+    near.push(dot(picture.eye.toward, point));
   }
-  const colour = picture.ink("--goal");
-  stroke(picture, points, picture.ink("--paper"), 0.15);
-  stroke(picture, points, colour, 0.085);
-  head(picture, points[21], points[24], colour, 0.2);
+  const colour = picture.ink("--goal"), size = (k) => 1 + 0.45 * near[k], shown = (k) => !over || near[k] >= 0;
+  if (over) {
+    pen.globalAlpha = 0.35;
+    stroke(picture, points, colour, 0.035);
+    if (!shown(24)) head(picture, points[21], points[24], colour, 0.2 * size(24));
+    pen.globalAlpha = 1;
+  }
+  for (const [ink, width] of [[picture.ink("--paper"), 0.15], [colour, 0.085]]) {
+    for (let k = 0; k < 24; k++) if (shown(k + 1)) stroke(picture, points.slice(k, k + 2), ink, width * size(k));
+  }
+  if (shown(24)) head(picture, points[21], points[24], colour, 0.2 * size(24));
 }
 
 // The sphere of directions that can point down, fixed to the board and seen from a little below: the direction that

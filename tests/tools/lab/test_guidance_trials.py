@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ from tools.lab import guidance_trials as trials
 def test_what_a_person_is_shown_is_right(hand):
     """A hand that has nothing but the words comes to a good end, and one that does as it likes is told so."""
     trial = trials.of_hand((hand, 1))
-    assert (trial.verdict, +trial.wrong) == ("good", {})
+    assert (trial.verdict, trial.wrong) == ("good", {})
     assert trial.holds >= 10
 
 
@@ -65,3 +66,12 @@ def test_contradictions_in_a_transcript_are_counted():
         "said twice": 1,
         "shown for less than a second": 1,
     }
+
+
+@pytest.mark.parametrize(
+    ("t_s", "turned_rad", "taken_back"), [(1.5, 0.1, True), (2.1, 0.1, False), (1.5, 0.3, False)], ids=str
+)
+def test_a_headline_may_follow_the_hand_but_not_turn_back_by_itself(t_s, turned_rad, taken_back):
+    meter = Meter(1.0, 0.5, False, "", (0.0, 0.0, -1.0), 5.0, 200.0, None, (1.0, 0.0, 0.0, 0.0), 9.0, "10 deg more")
+    turned = replace(meter, attitude=(math.cos(turned_rad / 2), math.sin(turned_rad / 2), 0.0, 0.0))
+    assert trials.is_taken_back(View(meter=meter, now_s=1.0), View(meter=turned, now_s=t_s)) == taken_back
