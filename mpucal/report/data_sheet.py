@@ -77,12 +77,10 @@ def unusual_parameters(c: Calibration) -> str:
         for axis, words in _by_axis(row, sheet).items():
             of = " of" if " to " in row.name else ""
             named.setdefault(words, []).append(f"{row.name}{of} {axis}")
-    sentences = []
-    if OUTSIDE in named:
-        sentences.append(f"Outside the data sheet: {', '.join(named[OUTSIDE])}.")
-        sentences += [] if c.verdict == REFUSED else ["This calibration corrects them."]
-    if UNUSUAL in named:
-        sentences.append(f"Unusual: {', '.join(named[UNUSUAL])}.")
+    heads = {OUTSIDE: "Outside the data sheet", UNUSUAL: "Unusual, but within the data sheet"}
+    sentences = [f"{head}: {', '.join(named[words])}." for words, head in heads.items() if words in named]
+    if sentences and c.verdict != REFUSED:
+        sentences.append("This calibration corrects them.")
     return paragraph(" ".join(sentences) or "All parameters are usual by the data sheet.", "compared")
 
 

@@ -104,8 +104,8 @@ def on_post_page(output: str, page: Any, config: Any) -> str:
 
 
 def on_post_template(output_content: str, template_name: str, config: Any) -> str:
-    """Have the page of what is not found do so, too."""
-    return output_content.replace(SHIM, WORKER)
+    """Leave out the theme's page of what is not found: its links begin at a server's root, which no folder has."""
+    return "" if template_name == "404.html" else output_content
 
 
 SECTION = re.compile(r"^ *(Parameters|Attributes|Raises)\n *-+\n(.*?)(?=\n\n|\Z)", re.MULTILINE | re.DOTALL)

@@ -62,6 +62,12 @@ def test_the_search_finds(site, page):
     assert from_elsewhere(page) == []
 
 
+def test_no_link_begins_at_the_root_of_a_server(site):
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > len(PAGES)
+    assert [page.name for page in pages if 'href="/' in page.read_text(encoding="utf-8")] == []
+
+
 def test_every_command_has_its_section(site):
     text = (site / "reference" / "commands.html").read_text(encoding="utf-8")
     assert [name for name in commands.list_commands(None) if f'id="mpucal-{name}"' not in text] == []
