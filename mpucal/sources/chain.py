@@ -106,21 +106,25 @@ class ChainedBus(Chain[Bus | Files]):
 
 
 class ChainedTransport(Chain[Transport]):
-    """Parts of a session with a vehicle; the clock of the live link continues that of the recorded ones."""
+    """Parts of a session with a vehicle.
 
-    def __init__(self, parts: Sequence[Transport]) -> None:
+    Parameters
+    ----------
+    last_ns : time of the last record, which the clock of the live link continues.
+    """
+
+    def __init__(self, parts: Sequence[Transport], last_ns: int) -> None:
         super().__init__(parts)
-        self._shift_ns = 0
+        self._last_ns, self._shift_ns = last_ns, 0
         self._take_properties()
 
     def go_on(self) -> bool:
         """See Chain."""
-        before_ns = self.now_ns()
         if not super().go_on():
             return False
         self._take_properties()
         if not self.replaying:
-            self._shift_ns = max(before_ns + PAUSE_NS - self._part.now_ns(), 0)
+            self._shift_ns = max(self._last_ns + PAUSE_NS - self._part.now_ns(), 0)
         return True
 
     def now_ns(self) -> int:

@@ -72,7 +72,7 @@ def chained(captures: Sequence[Capture], live: Any = None) -> Chain[Any]:
     """Return the recorded parts of a session, followed by its `live` bus or transport, as one."""
     parts = split_at_resumes((capture.records for capture in captures), more=live is not None)
     name = captures[0].name
-    if captures[0].meta.get(DRIVER, MAVLINK_VERSION) == MAVLINK_VERSION:
-        return ChainedTransport([*(PacketReplay(part, name) for part in parts), *([live] if live else [])])
     last_ns = max((record.t_ns for part in parts for record in part), default=0)
+    if captures[0].meta.get(DRIVER, MAVLINK_VERSION) == MAVLINK_VERSION:
+        return ChainedTransport([*(PacketReplay(part, name) for part in parts), *([live] if live else [])], last_ns)
     return ChainedBus([*(ReplayBus(part, name) for part in parts), *([ShiftedClockBus(live, last_ns)] if live else [])])
