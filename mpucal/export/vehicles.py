@@ -66,8 +66,7 @@ def _head(calibration: Calibration, firmware: str) -> str:
 
 def _losses(calibration: Calibration, firmware: str) -> tuple[str, ...]:
     notes = [
-        f"IMU {change.imu}: parameters have no cross-axis terms, which leaves an error of |a| of up to"
-        f" {change.residual_mps2:.3f} m/s^2."
+        f"IMU {change.imu}: parameters have no cross-axis terms, which leaves errors of up to {change.residual}."
         for change in plan_changes(calibration, firmware)
     ]
     named = _ids(calibration, firmware)

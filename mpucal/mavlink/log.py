@@ -6,6 +6,7 @@ Of parts that cannot be joined the longest is taken.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -18,7 +19,7 @@ from ..rests.flat import find_flat
 from .clock import Jump
 from .dialect import Message, Parser, dialect, read_header
 from .firmwares import PX4, preferred_messages
-from .imu import MESSAGE_ID, Reading, decode_reading
+from .imu import HIGHRES, MESSAGE_ID, RAW, Reading, Stream, decode_reading
 from .parameters.encoding import decode_parameter
 from .segments import ALTERING, SETTLED_US, Segment, find_recorrection, join_segments
 from .stream_buffers import Row, StreamBuffers
@@ -51,6 +52,7 @@ class Log:
         self.changed: list[str] = []
         self._changed_ns: int | None = None
         self._now_ns = 0
+        self._own_c = math.nan
 
     def add(self, message: Message, received_ns: int) -> tuple[Row | None, Jump]:
         """Add a message, which is ignored if it holds neither a parameter nor a reading; see `add_reading`."""
@@ -82,6 +84,7 @@ class Log:
         and the clock's jump before it.
         """
         self._now_ns = received_ns
+        content = self._with_own_temperature(content)
         now = self.segments[-1]
         buffer = now.buffers.of(content.stream)
         t_us, jump = buffer.clock.unwrap(content.time, received_ns)
@@ -94,6 +97,14 @@ class Log:
             t_us = t_us if self._over_reboots else buffer.clock.unwrap(content.time, received_ns)[0]
         row = buffer.add(t_us, content)
         return (None if row is None else self._under_first(row)), jump
+
+    def _with_own_temperature(self, content: Reading) -> Reading:
+        """Return a reading of IMU 1 with its own temperature: ArduPilot's HIGHRES_IMU has the barometer's."""
+        if content.stream == Stream(RAW, 1):
+            self._own_c = content.temperature_c
+        elif content.stream == Stream(HIGHRES, 1) and self.firmware != PX4:
+            return replace(content, temperature_c=self._own_c)
+        return content
 
     def _under_first(self, row: Row) -> Row | None:
         if self._changed_ns is None:

@@ -18,6 +18,7 @@ LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
 # Over a slow radio the first messages come late.
 ARRIVE_NS, ENOUGH, RATE_NS = 3 * S, 3, S
 ACK_S, ACK_TRIES = 0.7, 4
+TEMPERATURE_US = 500_000
 OTHER_IMUS = ("SCALED_IMU2", "SCALED_IMU3")
 
 # HIGHRES_IMU is in no stream group, and PX4 has no groups: a station that lowers it requests it by name.
@@ -53,6 +54,7 @@ class Streams:
         self._requested_hz: dict[str, float] = {}
         self._best_hz: dict[Stream, float] = {}
         self._fallen: list[Stream] = []
+        self._takes_temperature = False
         self._window_ns = self._quiet_until_ns = 0
         link.subscribe(self._on_message)
 
@@ -66,6 +68,8 @@ class Streams:
         first = self._start_first()
         for name in OTHER_IMUS:
             self._request_and_wait(name)
+        self._takes_temperature = first.name == HIGHRES and not self._is_px4
+        self._request_temperature()
         if self._measure_hz(first) < MOST * self._rate_hz and self._is_px4:
             # PX4 omits samples that come before the interval is over: it sends 125 Hz of 250 if 200 are requested.
             for name in self._requested_hz:
@@ -100,9 +104,16 @@ class Streams:
         """Request all streams of a vehicle that was away, without waiting for answers."""
         for name in self._requested_hz:
             self._request(name)
+        self._request_temperature()
         # A vehicle that was away was not slowed by another station.
         self._fallen = []
         self._restart_window()
+
+    def _request_temperature(self) -> None:
+        """Request RAW_IMU for IMU 1's own temperature, which ArduPilot's HIGHRES_IMU lacks; nothing depends on it."""
+        if self._takes_temperature:
+            command = dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[RAW], TEMPERATURE_US
+            self._link.send(encode_command(self._link, *command))
 
     def _restart_window(self) -> None:
         self._times.clear()

@@ -214,10 +214,10 @@ class AutopilotSink:
         with self._storing(now, planned) as paths:
             writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
         imus = " and ".join(str(change.imu) for change in planned)
-        residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
+        residuals = ", ".join(change.residual for change in planned)
         clauses = [
             f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams; they have no"
-            f" cross-axis terms, which leaves an error of |a| of up to {residuals} m/s^2",
+            f" cross-axis terms, which leaves errors of up to {residuals}",
             _level_clause(level, of_level),
             *self._finish(before, first, level),
             *_unchanged_clauses(possible, planned, refused_imus(calibration)),
@@ -257,10 +257,14 @@ class AutopilotSink:
             yield f"you interrupted what follows the write; {NOT_REBOOTED}"
 
     def _await_ready(self, before: PrearmState) -> PrearmState:
-        """Return the pre-arm state after a reboot, once it is ready or complains of nothing but what it did before."""
+        """Return the pre-arm state after a reboot, once it is ready or complains of nothing but what it did before.
+
+        Accelerometers that were inconsistent before should agree now.
+        """
         end_ns = self._link.now_ns() + READY_NS
+        stays = {complaint for complaint in before.complaints if not INCONSISTENT.search(complaint)}
         now = self._await_prearm()
-        while not now.ready and not set(now.complaints) <= set(before.complaints) and self._link.now_ns() < end_ns:
+        while not now.ready and not set(now.complaints) <= stays and self._link.now_ns() < end_ns:
             now = check_prearm(self._link)
         return now
 

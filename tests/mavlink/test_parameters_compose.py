@@ -57,6 +57,16 @@ def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
 
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
+def test_the_direction_that_is_left_is_that_of_the_worst_attitude(seed, number):
+    C, bias, R, composed = composed_at_random(seed, number, cross=0.003)
+    f = sphere(3000, STANDARD_GRAVITY_MPS2)
+    a = stream(C, bias, composed.correction, R, f) - np.cross(composed.turn_rad, f)
+    angles = np.linalg.norm(np.cross(f, a), axis=1) / STANDARD_GRAVITY_MPS2**2
+    assert angles.max() == pytest.approx(composed.residual_rad_of(composed.correction), rel=0.03, abs=5e-5)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
 def test_the_offset_is_exact_and_the_residual_that_of_the_worst_attitude(seed, number):
     C, bias, R, composed = composed_at_random(seed, number, cross=0.02)
     new = composed.correction

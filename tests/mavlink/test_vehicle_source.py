@@ -71,6 +71,8 @@ def test_all_imus_are_recorded_by_their_truest_streams(opened, words, messages):
     assert [r.autopilot.imu for r in recordings] == list(range(1, len(messages) + 1))
     assert [r.t[-1] for r in recordings] == pytest.approx([t[-1]] * len(messages), abs=0.02)
     assert set(t) <= set(recording.t)
+    # That of IMU 1 is its own, and not the barometer's of HIGHRES_IMU.
+    assert [r.temperature_c[-1] for r in recordings] == pytest.approx([26.2] * len(messages), abs=0.5)
 
 
 def test_the_parameters_that_shape_the_stream_are_read_first(opened):

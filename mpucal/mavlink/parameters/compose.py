@@ -60,6 +60,16 @@ class Composed:
         shape = STANDARD_GRAVITY_MPS2 * np.abs(singular - 1).max()
         return float(shape + np.linalg.norm(held.scale * (self.correction.offset - held.offset)))
 
+    def residual_rad_of(self, held: Correction) -> float:
+        """Return the greatest error of the direction of a [rad] over all attitudes, beside `turn_rad`.
+
+        To first order, the symmetric part S of diag(scale) inv(M) - I moves the unit vector u by S u, of which half the
+        difference of S's extreme eigenvalues is the most that is at right angles to u.
+        """
+        left = self._deviation(held)
+        values = np.linalg.eigvalsh((left + left.T) / 2)
+        return float(values[-1] - values[0]) / 2
+
     @property
     def turn_rad(self) -> Vector:
         """Rotation (3,) of the sensor against the gyroscope, in the vehicle's axes, which parameters do not hold.

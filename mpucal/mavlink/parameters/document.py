@@ -17,7 +17,7 @@ from .slots import find_slot, slot_of
 
 AUTOPILOT, OTHERS = "autopilot", "others"
 OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
-RESIDUAL_OLD, UNCERTAIN = "residual_old_mps2", "uncertainty_mps2"
+RESIDUAL_OLD, UNCERTAIN, RESIDUAL_DEG = "residual_old_mps2", "uncertainty_mps2", "residual_deg"
 
 
 def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[str, Any]:
@@ -25,6 +25,7 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
 
     Its keys: firmware, imu (from 1), message (the stream it was fitted to), params_old and params_new by name,
     residual_mps2 (greatest error of |a| that is left), residual_old_mps2 (the same with the old parameters),
+    residual_deg (greatest error of the direction that is left, beside turn_deg),
     uncertainty_mps2 (standard uncertainty of |a| by the calibration), turn_deg (the rotation that parameters do not
     hold), and mounting (R_b by row). If the vehicle did not tell what is needed, params_new is empty, and `why` says
     what is missing.
@@ -57,6 +58,7 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
         NEW: slot.values(new),
         RESIDUAL: composed.residual_of(new),
         RESIDUAL_OLD: composed.residual_of(old),
+        RESIDUAL_DEG: float(np.degrees(composed.residual_rad_of(new))),
         UNCERTAIN: calibration.magnitude_std,
         "turn_deg": np.degrees(composed.turn_rad).tolist(),
         "mounting": R_b.tolist(),

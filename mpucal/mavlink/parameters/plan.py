@@ -14,7 +14,7 @@ from ...result.calibration import REFUSED, Calibration
 from ...result.comparison import is_better
 from ..imu import MESSAGE_ID, SCALED, Stream
 from .compose import Correction
-from .document import AUTOPILOT, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_OLD, UNCERTAIN
+from .document import AUTOPILOT, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_DEG, RESIDUAL_OLD, UNCERTAIN
 from .slots import Slot, slot_of
 
 NOTHING = "nothing was written"
@@ -31,6 +31,7 @@ class Change:
     sensor_id : of the sensor that was calibrated; None if the vehicle did not say.
     residual_mps2 : greatest error of |a| that is left. residual_old_mps2 : the same with the old parameters; None if
         the calibration does not say. uncertainty_mps2 : standard uncertainty of |a| by the calibration.
+    residual_deg : greatest error of the direction of a that is left; None if the calibration does not say.
     """
 
     slot: Slot
@@ -42,11 +43,18 @@ class Change:
     residual_mps2: float
     residual_old_mps2: float | None = None
     uncertainty_mps2: float = 0.0
+    residual_deg: float | None = None
 
     @property
     def imu(self) -> int:
         """Number of the IMU, counted from 1."""
         return self.slot.imu
+
+    @property
+    def residual(self) -> str:
+        """What the parameters leave, as words: "0.004 m/s^2 in |a| and 0.02 deg in direction"."""
+        direction = "" if self.residual_deg is None else f" and {self.residual_deg:.2f} deg in direction"
+        return f"{self.residual_mps2:.3f} m/s^2 in |a|{direction}"
 
     @property
     def improves(self) -> bool:
@@ -162,4 +170,5 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
         float(autopilot[RESIDUAL]),
         autopilot.get(RESIDUAL_OLD),
         float(autopilot.get(UNCERTAIN) or 0.0),
+        None if autopilot.get(RESIDUAL_DEG) is None else float(autopilot[RESIDUAL_DEG]),
     )

@@ -29,6 +29,7 @@ SLOTS = all_slots(ARDUPILOT)
 OFFSET, SCALE = 0.001, 1.001
 # Greatest difference of the accelerometers from the first, where z counts half, and the time that they must agree.
 INCONSISTENT_MPS2, AGREED_S = np.array([0.75, 0.75, 2.25]), 10
+BAROMETER_C = 41.0
 # Bit of MAV_OPTIONS
 ONLY_ITS_OWN = 1
 # param5 of MAV_CMD_PREFLIGHT_CALIBRATION
@@ -98,7 +99,9 @@ class ArduPilot(Firmware):
             centi = round(self.temperature_c * 100)
             return dialect().MAVLink_raw_imu_message(t_us, *self.milli(0), 0, 0, 0, 0, centi)
         if message_id == HIGHRES_IMU and self.options.highres:
-            return self.highres_imu(t_us, np.zeros(3), np.zeros(3))
+            message = self.highres_imu(t_us, np.zeros(3), np.zeros(3))
+            message.temperature = BAROMETER_C
+            return message
         if message_id in SCALED_IMUS:
             imu = SCALED_IMUS.index(message_id)
             if imu < self.options.imus:
