@@ -52,7 +52,7 @@ class Change:
 
     @property
     def residual(self) -> str:
-        """What the parameters leave, as words: "0.004 m/s^2 in |a| and 0.02 deg in direction"."""
+        """Errors that the parameters leave, in words: "0.004 m/s^2 in |a| and 0.02 deg in direction"."""
         direction = "" if self.residual_deg is None else f" and {self.residual_deg:.2f} deg in direction"
         return f"{self.residual_mps2:.3f} m/s^2 in |a|{direction}"
 
