@@ -1,5 +1,6 @@
 """The words of the command line that name vehicles, and what contradicts them."""
 
+import json
 import re
 from pathlib import Path
 
@@ -10,7 +11,8 @@ from mpucal.cli import commands
 from mpucal.cli.page import choose_board
 from mpucal.errors import UsageError
 from mpucal.origin import Origin
-from mpucal.sources.opening import open_source
+from mpucal.sources.opened_source import SOURCE
+from mpucal.sources.opening import open_source, reopen_source
 
 
 def run(*words):
@@ -77,3 +79,13 @@ def test_a_source_says_what_it_is_and_the_drawn_board_follows_from_it(recorded):
         assert (source.origin, choose_board(None, source)) == (origin, drawn)
         assert choose_board("plain", source) == "plain"
     assert choose_board(None, open_source({"replay": chip, "board": "plain"})) == "plain"
+
+
+def test_a_resumed_session_reads_its_signing_key_again_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("key").write_bytes(bytes(range(32)))
+    source = open_source({"mavlink": "sim:imus=1", "signing_key": Path("key"), "system": 1})
+    words = json.loads(json.dumps(source.source_meta()))[SOURCE]
+    monkeypatch.chdir("/")
+    again = reopen_source(words, source.plan)
+    assert (again.key, again.system) == (bytes(range(32)), 1)
