@@ -31,6 +31,8 @@ SURE_RANGE = 0.35
 OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
+# samples over which shaking averages out: a few of its periods at the rates of most loggers
+SHAKEN = 100
 # share of lines that are new samples, beyond which no line is a repeated one
 FEWEST_NEW = 0.5
 # counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
@@ -162,10 +164,10 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     seen = units.acceleration_unit(values)
     if said == COUNTS or (not said and units.are_counts(values) and (not seen or hints.accel_range_g)):
         return _scale_counts(values, hints, name, size)
-    near = "" if seen or said else units.unit_of_gravity(size)
+    near = "" if seen or said else units.acceleration_unit(_averaged(values))
     if near:
         raise RecordingError(
-            f"{name}: |a| varies too much to show its unit; its median of {size:.3g} would be gravity in {near}",
+            f"{name}: |a| varies too much to show its unit; on average it would be gravity in {near}",
             f"name the unit with --units acc={near}",
             f"--units acc={near}",
         )
@@ -179,6 +181,12 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     seen = hints.units.get("acc", (seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
     return values * QUANTITIES["acc"][unit], f"in {unit}", np.zeros(len(values), bool)
+
+
+def _averaged(values: Vector) -> Vector:
+    """Return means of adjacent samples (n, 3): shaking averages out, and gravity does not."""
+    width = min(SHAKEN, len(values) // 2)
+    return np.column_stack([np.convolve(axis, np.full(width, 1 / width), "valid") for axis in values.T])
 
 
 def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:

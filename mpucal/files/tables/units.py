@@ -89,11 +89,6 @@ def acceleration_unit(acc: Vector) -> str:
     low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
     if high - low > SCATTER * size:
         return ""
-    return unit_of_gravity(size)
-
-
-def unit_of_gravity(size: float) -> str:
-    """Return the unit in which a magnitude is gravity; empty if there is none."""
     units = QUANTITIES["acc"].items()
     return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
 
