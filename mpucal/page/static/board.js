@@ -331,15 +331,16 @@ function arc(picture, way, over = false) {
     points.push(picture.seen(point));
     near.push(dot(picture.eye.toward, point));
   }
-  const colour = picture.ink("--goal"), size = (k) => 1 + 0.45 * near[k], shown = (k) => !over || near[k] >= 0;
+  const colour = picture.ink("--goal"), size = (k) => 1 + 0.45 * near[k], shown = (k, least = 0) => !over || near[k] >= least;
   if (over) {
     pen.globalAlpha = 0.35;
     stroke(picture, points, colour, 0.035);
     if (!shown(24)) head(picture, points[21], points[24], colour, 0.2 * size(24));
     pen.globalAlpha = 1;
   }
-  for (const [ink, width] of [[picture.ink("--paper"), 0.15], [colour, 0.085]]) {
-    for (let k = 0; k < 24; k++) if (shown(k + 1)) stroke(picture, points.slice(k, k + 2), ink, width * size(k));
+  // The end of the rim is drawn over.
+  for (const [ink, width, least] of [[picture.ink("--paper"), 0.15, 0], [colour, 0.085, -0.2]]) {
+    for (let k = 0; k < 24; k++) if (shown(k + 1, least)) stroke(picture, points.slice(k, k + 2), ink, width * size(k));
   }
   if (shown(24)) head(picture, points[21], points[24], colour, 0.2 * size(24));
 }
