@@ -40,7 +40,7 @@ def test_its_capture_replays_to_the_same_bits(guided):
 
 def test_its_bias_goes_into_the_chip_and_out_again(guided):
     mocked, _ = guided
-    mocked.tell(prompt={"kind": "lay_flat", "down": None})
+    mocked.tell(prompt={"kind": "lay_flat", "down": None}, pass_s=5.0)
     before = mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out
     written = mocked.mpucal("write", "board/calibration.json", "chip", "--bus", NODE, "--json")
     assert written.code == 0, written.err

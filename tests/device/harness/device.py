@@ -5,7 +5,8 @@
 `still` in place of `sim` is the chip of the contract that all buses keep: the same counts again and again.
 
 On stdout, a line of JSON with the environment in which programs find it. On stdin, lines of JSON: {"prompt": ...}
-lets the hand hear it, {"adapter": {...}} changes the adapter, {"registers": {...}} writes to the chip, {"seen": FILE}
+lets the hand hear it, {"pass_s": S} lets time pass, {"adapter": {...}} changes the adapter, {"registers": {...}} writes
+to the chip, {"seen": FILE}
 writes the messages on SPI to a file; each is answered by an empty line. CLOCK_FILE holds the time, see clock.c.
 """
 
@@ -116,6 +117,8 @@ def main(text: str, clock: str) -> None:
         for what, value in json.loads(line).items():
             if what == "prompt":
                 bus.hear(SimpleNamespace(**value))
+            elif what == "pass_s":
+                SharedClock(Path(clock)).spend(round(1e9 * value))
             elif what == "adapter":
                 for name, setting in value.items():
                     setattr(adapter, name, frozenset(setting) if name == "bound" else setting)
