@@ -6,8 +6,8 @@
 
 On stdout, a line of JSON with the environment in which programs find it. On stdin, lines of JSON: {"prompt": ...}
 lets the hand hear it, {"pass_s": S} lets time pass, {"adapter": {...}} changes the adapter, {"registers": {...}} writes
-to the chip, {"seen": FILE}
-writes the messages on SPI to a file; each is answered by an empty line. CLOCK_FILE holds the time, see clock.c.
+to the chip, {"seen": FILE} writes the messages on SPI to a file; each is answered by an empty line. CLOCK_FILE holds
+the time, see clock.c.
 """
 
 from __future__ import annotations

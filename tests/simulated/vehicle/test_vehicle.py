@@ -2,11 +2,12 @@
 
 import subprocess
 from collections import Counter
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
-from mpucal.errors import UsageError
+from mpucal.errors import NoAnswer, UsageError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.imu import MESSAGE_ID
 from mpucal.mavlink.link import Link
@@ -249,7 +250,10 @@ def test_the_tool_puts_it_on_a_real_port(program, port, firmware):
             url = running.stdout.readline().strip()
             transport = open_transport(parse_url(url))
             link = Link(transport, lambda t_ns, packet: None)
-            (vehicle,) = link.listen()
+            for _ in range(10):  # the vehicle's process may wait for a processor
+                with suppress(NoAnswer):
+                    (vehicle,) = link.listen()
+                    break
             assert vehicle.family.lower() == firmware
             link.close()
         finally:
