@@ -182,6 +182,7 @@ def main() -> int:
     parser.add_argument("--port", type=int, default=9002, help="where the SITL looks for its JSON model")
     parser.add_argument("--hand", choices=HANDS, default="guided")
     parser.add_argument("--seed", type=int, default=0, help="of the hand")
+    parser.add_argument("--killed-at", type=int, metavar="N", help="prompt at which it is killed, and then resumed")
     parser.add_argument("-o", "--folder", type=Path, help="of the session's files")
     parser.add_argument("words", nargs="*", help="for mpucal session")
     arguments = parser.parse_args()
@@ -192,20 +193,30 @@ def main() -> int:
         body.mounting = R_b
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.folder or Path(temporary) / "session"
-        code = session(body, ["--mavlink", arguments.mavlink, "-o", str(folder), *arguments.words])
+        code = session(body, ["--mavlink", arguments.mavlink, "-o", str(folder), *arguments.words], arguments.killed_at)
+        if arguments.killed_at:
+            code = session(body, ["--resume", str(folder), *arguments.words])
         file = folder / "calibration.json"
         document = json.loads(file.read_text()) if file.exists() else None
     print(line(code, before, held(arguments.parameters), document))
     return code
 
 
-def session(body: Body, words: list[str]) -> int:
-    """Run `mpucal session`, have the hand hear its prompts, and say what it says; its exit code."""
+def session(body: Body, words: list[str], killed_at: int | None = None) -> int:
+    """Run `mpucal session`, have the hand hear its prompts, and say what it says; its exit code.
+
+    killed_at : number of the prompt at which the session is killed.
+    """
+    heard = 0
     command = [str(MPUCAL), "session", "--json-events", *words]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
         for text in process.stderr or ():
             event: dict[str, Any] = json.loads(text) if text.startswith("{") else {"event": "error", "text": text}
             if event["event"] == "prompt":
+                heard += 1
+                if heard == killed_at:
+                    process.kill()
+                    continue
                 body.hear(event["kind"], event["down"])
             said = [str(event[key]).strip() for key in ("text", "why", "what", "do") if event.get(key)]
             if said and event["event"] in SAID:
