@@ -54,8 +54,10 @@ class Hypothesis(NamedTuple):
 
     @property
     def kind(self) -> Kind:
-        """Kind of the hypothesis, for messages."""
-        return "change" if self.is_change else "side" if self.groups == SIDES else "time"
+        """Kind of the hypothesis, for messages: a change is one of the accelerometer."""
+        if self.groups == SIDES:
+            return "side"
+        return "change" if self.is_change and self.what != "gyroscope" else "time"
 
 
 WALK = Hypothesis("gyroscope", "walk", 16)
@@ -146,7 +148,7 @@ def explain(parts: Parts, D: Vector) -> list[Explanation]:
     totals = {what: log_total([each for each in found if each.hypothesis.what == what]) for what in LARGEST}
     found = [each._replace(weight=float(np.exp(each.log_share - totals[each.hypothesis.what]))) for each in found]
     found.sort(key=lambda each: -each.evidence)
-    changes = [each for each in found if each.hypothesis.is_change and each.hypothesis != WALK]
+    changes = [each for each in found if each.hypothesis.kind == "change"]
     others = [each for each in found if not each.hypothesis.is_change]
     if changes and log_total(changes) - log_total(others) > np.log(SURE):
         of_sure = changes[0]._replace(weight=1.0, away=changes[0].farthest, is_sure=True)

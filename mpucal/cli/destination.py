@@ -11,7 +11,6 @@ import click
 
 from ..errors import UsageError
 from ..result.calibration import Calibration
-from ..result.journal import AT, Journal
 from ..sinks.choose import FILE, check_behind, default_sinks
 from ..sinks.kind import Device, Say, SinkKind
 from ..sinks.record import Recorder
@@ -51,17 +50,6 @@ def make_device(options: Mapping[str, Any], yes: bool, say: Say = say) -> Device
     given = frozenset(name for name in flags if options.get(name))
     opener, answer = partial(open_source, options), partial(confirm, yes=yes)
     return Device(kind, str(options[kind.option.name]), opener, say, given, answer, options)
-
-
-def interrupted_writes(kind: SourceKind, options: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a sentence for each sink of a source where a write was interrupted, as by a power cut."""
-    for sink in SINKS.values():
-        left = Journal.of(sink.name, options[kind.option.name]).interrupted() if sink.behind(kind) else None
-        if left is not None:
-            yield (
-                f"a write to {sink.where} was cut off at {left[AT]}: it may hold old and new values;"
-                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.flag} ...` first restores the old"
-            )
 
 
 def check_sink(kind: SinkKind, source: SourceKind, options: Mapping[str, Any]) -> None:

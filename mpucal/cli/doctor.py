@@ -14,9 +14,9 @@ from ..doctor.page import document, text
 from ..errors import SourceError, UsageError
 from ..origin import Origin
 from ..session.lay_flat import PUT_DOWN, STAND, put_down
+from ..sinks.interrupted import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
-from .destination import interrupted_writes
 from .options import Finite, check_gyroscope, check_source, source_options
 from .person import say
 

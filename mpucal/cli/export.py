@@ -10,7 +10,6 @@ import click
 from ..disk.atomic import check_not_input, write_atomically
 from ..errors import UsageError
 from ..export.forms import FORMS, form
-from ..files.tlog import tlog_of
 from ..result.noise import Noise, with_noise
 from ..result.session_files import DOCUMENT
 from .arguments import calibration_argument, json_option, noise_option, output_option
@@ -46,6 +45,8 @@ def command(calibration: Path, name: str, file: Path | None, noise: Path | None,
     if name == TLOG:
         if file is None or noise is not None or as_json:
             raise UsageError("--to tlog writes packets", "name the file with -o, and leave out --noise and --json")
+        from ..files.tlog import tlog_of  # noqa: PLC0415 - no other form reads a capture
+
         write_atomically(file, tlog_of(calibration.parent if calibration.name == DOCUMENT.name else calibration))
         click.echo(f"Written to {file}.")
         return

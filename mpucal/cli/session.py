@@ -20,6 +20,7 @@ from ..result.clock import warn_unset
 from ..result.session_files import DOCUMENT, LOG
 from ..session.folder import SessionFolder, check_unfinished
 from ..sinks.choose import announce_sinks, choose_sinks
+from ..sinks.interrupted import interrupted_writes
 from ..sinks.kind import SinkKind
 from ..sinks.record import session_recorder
 from ..sources.kind import NAME
@@ -30,7 +31,7 @@ from ..sources.table import matching_kinds, source_title
 from ..terminal.console import Console, console
 from ..terminal.hangup import logging_after_hangup
 from .arguments import PATH, json_option, output_option, yes_option
-from .destination import interrupted_writes, session_sink_options, write_back
+from .destination import session_sink_options, write_back
 from .options import (
     aim_options,
     check_gravity,

@@ -19,11 +19,11 @@ from ..files.hints import Hints
 from ..rests.flat import find_flat
 from ..result.blob import Blob
 from ..result.calibration import Calibration
+from ..sinks.interrupted import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_for, matching_kinds
 from .arguments import PATH, json_option
-from .destination import interrupted_writes
 from .loading import load_calibration
 from .options import check_source, given_options, source_options
 from .person import say

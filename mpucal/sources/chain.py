@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from ..chip.access import Bus, Files, Reply
 from ..chip.records import ABORT, KEY, RESUMED, SessionEvent
-from ..files.mcap import Record
 from ..mavlink.transport import ReceivedBytes, Transport
+
+if TYPE_CHECKING:
+    from ..files.mcap import Record
 
 # Time between two parts whose clocks do not tell it.
 PAUSE_NS = 1_000_000_000

@@ -10,6 +10,7 @@ from typing import Any
 from ..chip.access import Bus
 from ..chip.contents import chip_contents
 from ..chip.driver import Driver
+from ..files.messages import BUS
 from ..origin import Origin
 from ..session.ports import Source
 from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
@@ -21,6 +22,7 @@ class OpenedChip(OpenedSource):
     """Chip on a bus, which is its `line`; see OpenedSource."""
 
     origin = Origin.CHIP
+    topic = BUS
 
     @property
     def bus(self) -> Bus:

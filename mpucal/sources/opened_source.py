@@ -8,20 +8,21 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from .. import __version__
 from ..chip.access import Transaction
 from ..chip.records import LATE, UTC
 from ..errors import CaptureError
-from ..files.mcap import CaptureWriter
-from ..files.messages import BUS
 from ..origin import Origin
 from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Note, Operator, ReplayedOperator, Source
 from .chain import Chain
+
+if TYPE_CHECKING:
+    from ..files.mcap import CaptureWriter
 
 # Key of a capture's head: the source, to resume the session.
 SOURCE = "source"
@@ -103,7 +104,7 @@ class OpenedSource(ABC):
     words: Mapping[str, Any] = field(default_factory=dict)
     real_time: bool = True
     origin: ClassVar[Origin]
-    topic: ClassVar[str] = BUS
+    topic: ClassVar[str]
 
     @property
     def parts(self) -> Chain[Any] | None:
@@ -148,6 +149,8 @@ class OpenedSource(ABC):
         ------
         CaptureError : a replay ended before its capture did.
         """
+        from ..files.mcap import CaptureWriter  # noqa: PLC0415 - --help records nothing
+
         with closing(self.line), CaptureWriter(capture) as writer:
             head = {"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()}
             writer.start(head, self.topic)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from mpucal.__main__ import run
-from mpucal.cli.destination import interrupted_writes, make_device
+from mpucal.cli.destination import make_device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
+from mpucal.sinks.interrupted import interrupted_writes
 from mpucal.sinks.record import session_recorder
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import write_to_all
