@@ -184,6 +184,11 @@ KINDS: Mapping[str, Kind] = {
                 "the gyroscope was at the end of its range in {count} samples ({share:.1%})",
                 "turn more slowly, or choose a larger range",
             ),
+            "contradicts": Sentence(
+                "after turns beyond the gyroscope's range, gravity ends {degrees:.0f} degrees from where they lead it",
+                f"{_SLOWER}, and measure again",
+                True,
+            ),
             "every_turn": Sentence(
                 "every turn went beyond the gyroscope's range, so nothing says where gravity went",
                 f"{_SLOWER}, and measure again",

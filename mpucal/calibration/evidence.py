@@ -121,9 +121,9 @@ class Evidence:
         """Power of two with which rates explain how gravity turned, from rest to rest or, of few, by half seconds."""
         if self.flat is None:
             return 1.0
-        turns = self._turns_of_rests(self.flat)
+        turns = _measured(self._turns_of_rests(self.flat))
         if len(turns) < FEWEST_RESTS:
-            turns = self._turns_of_half_seconds(self.flat)
+            turns = _measured(self._turns_of_half_seconds(self.flat))
         if len(turns) < FEWEST_RESTS:
             return 1.0
         factor = min((1.0, *OTHER_RANGES), key=lambda factor: _miss(turns, factor))
@@ -131,24 +131,33 @@ class Evidence:
         return factor if miss < MOST_MISS_RAD and _miss(turns, 1.0) > CLEARLY * miss else 1.0
 
     @cached_property
-    def gyro_miss(self) -> float:
-        """Median angle [rad] from gravity as the rates carry it to gravity at the next rest; 0 of too few rests."""
+    def gyro_miss(self) -> tuple[float, float]:
+        """Median angles [rad] from gravity as the rates carry it to gravity at the next rest; 0 of too few rests.
+
+        The first is that of the turns within the gyroscope's range, the second that of all turns.
+        """
         turns = [] if self.flat is None else self._turns_of_rests(self.flat, np.inf)
-        return _miss(turns, 1.0) if len(turns) >= FEWEST_RESTS else 0.0
+        within, of_all = (_miss(t, 1.0) if len(t) >= FEWEST_RESTS else 0.0 for t in (_measured(turns), turns))
+        return within, of_all
 
     def _turn(self, flat: Flat, before: Vector, after: Vector, first: int, last: int) -> _Turn:
         """Return the turn whose steps end with the samples first to last - 1."""
         r = self.recording
         dt = r.t[first:last] - r.t[first - 1 : last - 1]
-        return _Turn(before, dt[:, None] * (r.gyr[first:last] - flat.b_omega), after)
+        steps = dt[:, None] * (r.gyr[first:last] - flat.b_omega)
+        return _Turn(before, steps, after, bool(r.gyr_clipped[first:last].any()))
 
 
 class _Turn(NamedTuple):
-    """Gravity's direction before (3,) and after (3,) a turn, and the gyroscope's steps (m, 3) [rad] between them."""
+    """Gravity's direction before (3,) and after (3,) a turn, and the gyroscope's steps (m, 3) [rad] between them.
+
+    clipped : it went beyond the gyroscope's range, so that its rates say nothing about the gyroscope.
+    """
 
     before: Vector
     steps: Vector
     after: Vector
+    clipped: bool
 
     @property
     def angle(self) -> float:
@@ -159,6 +168,10 @@ class _Turn(NamedTuple):
     def path(self) -> float:
         """Sum of the steps' angles [rad]."""
         return float(lengths(self.steps).sum())
+
+
+def _measured(turns: list[_Turn]) -> list[_Turn]:
+    return [turn for turn in turns if not turn.clipped]
 
 
 def _miss(turns: list[_Turn], factor: float) -> float:

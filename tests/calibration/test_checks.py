@@ -293,6 +293,16 @@ def test_a_clipped_gyroscope_is_named(hand, degrees_a_second):
     assert "turn more slowly" in result.reasons["gyro_clipped"]
 
 
+def test_turns_beyond_the_range_do_not_blame_the_gyroscope(hand):
+    recording = hand(3, "pose12").recording
+    limit = np.deg2rad(60)
+    result = judged(replace(recording, gyr=np.clip(recording.gyr, -limit, limit)))
+    assert result.verdict == "usable"
+    assert list(result.reasons) == ["gyro_clipped"]
+    assert "estimated from the rests alone" in result.reasons["gyro_clipped"]
+    assert "choose a larger --gyro-range" in result.reasons["gyro_clipped"]
+
+
 def test_a_clipped_accelerometer_is_named(good):
     acc = good.acc.copy()
     acc[[700, 901, 1102], 0] = 2 * 9.80665  # knocks

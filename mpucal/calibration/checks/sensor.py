@@ -106,7 +106,7 @@ _SIGNED_PERMUTATIONS = [
 
 def gyro_range(e: Evidence) -> Reason | None:
     """Find rates that are all a power of two too small or too large for how gravity turned from rest to rest."""
-    if e.fit is None or e.gyro_factor == 1.0 or (is_trustworthy(e) and gyro_off(e) is None):
+    if e.fit is None or e.gyro_factor == 1.0 or (is_trustworthy(e) and _is_within_tolerance(e.fit.K)):
         return None
     assumed = e.recording.sensor.gyro_range_dps
     ranges = "" if assumed is None else f": ±{e.gyro_factor * assumed:g} deg/s, read as ±{assumed:g}"
@@ -114,22 +114,33 @@ def gyro_range(e: Evidence) -> Reason | None:
 
 
 def gyro_contradicts(e: Evidence) -> Reason | None:
-    """Find rates that carry gravity far away from where it is at the next rest."""
-    if e.fit is None or is_trustworthy(e) or not e.gyro_miss > MOST_MISS_RAD:
+    """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest."""
+    if e.fit is None or is_trustworthy(e):
         return None
-    return reason("gyro_off", "contradicts", degrees=np.rad2deg(e.gyro_miss))
+    within, of_all = e.gyro_miss
+    if within > MOST_MISS_RAD:
+        return reason("gyro_off", "contradicts", degrees=np.rad2deg(within))
+    return reason("gyro_clipped", "contradicts", degrees=np.rad2deg(of_all)) if of_all > MOST_MISS_RAD else None
 
 
 def gyro_off(e: Evidence) -> Reason | None:
-    """Find a gyroscope outside the tolerances of its data sheet."""
-    if e.fit is None or not is_trustworthy(e):
+    """Find a gyroscope outside the tolerances of its data sheet; rates beyond its range pull at K, too."""
+    if e.fit is None or e.recording.gyr_clipped.any() or not is_trustworthy(e) or _is_within_tolerance(e.fit.K):
         return None
-    off = e.fit.K - np.eye(3)
-    scale, cross = np.abs(np.diag(off)), np.abs(off - np.diag(np.diag(off)))
-    if scale.max() <= GYRO_SCALE_OFF and cross.max() <= GYRO_CROSS_OFF:
-        return None
+    scale, cross = _gyro_errors(e.fit.K)
     axis = int(np.argmax(scale))
-    return reason("gyro_off", "scale", axis="xyz"[axis], scale=scale[axis], cross=cross.max())
+    return reason("gyro_off", "scale", axis="xyz"[axis], scale=scale[axis], cross=cross)
+
+
+def _is_within_tolerance(K: Vector) -> bool:
+    scale, cross = _gyro_errors(K)
+    return bool(scale.max() <= GYRO_SCALE_OFF and cross <= GYRO_CROSS_OFF)
+
+
+def _gyro_errors(K: Vector) -> tuple[Vector, float]:
+    """Return the sizes of the scale factor errors (3,), and of the largest cross-axis sensitivity."""
+    off = np.abs(K - np.eye(3))
+    return np.diag(off), float((off - np.diag(np.diag(off))).max())
 
 
 def clock_off(e: Evidence) -> Reason | None:
