@@ -66,7 +66,7 @@ def test_a_stored_session_replays(session, name):
 
 @pytest.mark.parametrize(
     ("chip", "model", "name"),
-    [("mpu6500", "hand", "MPU-6500"), ("clone98", "accel", "ICM-20689")],
+    [("mpu6500", "hand", "MPU-6500"), pytest.param("clone98", "accel", "ICM-20689", marks=pytest.mark.slow)],
     ids=["mpu6500-hand", "clone98-accel"],
 )
 def test_a_replay_equals_its_session_to_the_last_bit(session, chip, model, name):

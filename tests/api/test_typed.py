@@ -38,7 +38,9 @@ def test_each_public_name_is_used():
     assert [name for name in mpucal.__all__ if not re.search(rf"\b{name}\b", text)] == []
 
 
-@pytest.mark.parametrize(("name", "checker"), [("mypy", by_mypy), ("basedpyright", by_pyright)])
+@pytest.mark.parametrize(
+    ("name", "checker"), [("mypy", by_mypy), pytest.param("basedpyright", by_pyright, marks=pytest.mark.slow)]
+)
 def test_the_api_is_typed_and_each_wrong_line_is_told(name, checker, tmp_path):
     for needed in (name, "matplotlib", "polars"):
         pytest.importorskip(needed)

@@ -94,7 +94,11 @@ def test_errors_of_resume_name_the_problem(mpucal, words, sentence):
     assert sentence in result.err
 
 
-@pytest.mark.parametrize(("firmware", "cut_s"), [("ardupilot", 25.0), ("px4", 6.0)], ids=["rotating", "flat"])
+@pytest.mark.parametrize(
+    ("firmware", "cut_s"),
+    [("ardupilot", 25.0), pytest.param("px4", 6.0, marks=pytest.mark.slow)],
+    ids=["rotating", "flat"],
+)
 def test_a_vehicle_is_resumed_after_a_reboot(mpucal, write_capture, tmp_path, firmware, cut_s):
     """The simulated vehicle stands where it was switched on, and its clock begins again."""
     source = f"sim:firmware={firmware},imus=2,seed=3"

@@ -174,7 +174,9 @@ class Gone(Exception):  # noqa: N818 - stands for a plug that was pulled
     """Failure of the power."""
 
 
-@pytest.mark.parametrize("torn", [0x00, 0xFF, 0xA5], ids=hex)
+@pytest.mark.parametrize(
+    "torn", [0xA5, *(pytest.param(each, marks=pytest.mark.slow) for each in (0x00, 0xFF))], ids=hex
+)
 def test_power_loss_at_any_cycle_of_a_blob_write_leaves_the_old_blob_or_the_new(torn, switch_on, open_store, tmp_path):
     eeprom = tmp_path / "eeprom.bin"
     board, port = switch_on()

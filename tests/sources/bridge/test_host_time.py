@@ -80,7 +80,7 @@ def test_the_doctor_says_how_far_it_is_off(recorded):
         assert told["sample rate"].data["rate_hz"] == pytest.approx(true_hz, rel=60e-6)
 
 
-@pytest.mark.parametrize(("ppm", "drift", "burst_ms"), [(5000, 0, 1), (-10000, 50, 4), (10000, -50, 16)])
+@pytest.mark.parametrize(("ppm", "drift", "burst_ms"), [(-10000, 50, 4), (10000, -50, 16)])
 def test_the_rate_is_known_and_corrected(recorded, ppm, drift, burst_ms):
     recording, _ = recorded(40, ppm, drift, burst_ms)
     sensor = recording.sensor

@@ -10,7 +10,7 @@ from mpucal.terminal.voice import Said, Tone
 from tools.lab import guidance_trials as trials
 
 
-@pytest.mark.parametrize("hand", ["by words", "wandering"])
+@pytest.mark.parametrize("hand", ["by words", pytest.param("wandering", marks=pytest.mark.slow)])
 def test_what_a_person_is_shown_is_right(hand):
     """A hand that has nothing but the words comes to a good end, and one that does as it likes is told so."""
     trial = trials.of_hand((hand, 1))
