@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Literal
 
 from .allan import noise_of
 from .arguments import check_number, check_path
@@ -17,9 +16,9 @@ from .recheck import check as _check
 from .recheck.outcome import CheckResult as CheckResult  # noqa: PLC0414 - exported by mpucal
 from .result.calibration import Calibration
 from .result.clock import now
+from .result.keys import Model
 from .result.noise import Noise as Noise  # noqa: PLC0414
 
-ModelName = Literal["auto", "hand", "imu", "accel", "paper", "tilt", "static"]
 UNITS = {"accel_range": "the full scale in g", "gyro_range": "the full scale in deg/s", "rate": "the sample rate in Hz"}
 
 
@@ -70,7 +69,7 @@ def load(
 
 def calibrate(
     recording: Recording | str | PathLike[str],
-    model: ModelName = "auto",
+    model: Model = "auto",
     gravity: float = STANDARD_GRAVITY_MPS2,
     gravity_anyway: bool = False,
 ) -> Calibration:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from operator import attrgetter
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,32 +41,21 @@ MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")
 
 @dataclass(frozen=True)
 class Sensor:
-    """Properties of the sensor of a recording; None if unknown.
+    """Properties of the sensor of a recording; None if unknown. The meanings are also those of calibration.json."""
 
-    Attributes
-    ----------
-    accel_offsets : words of its accelerometer's offset registers x, y, z during the recording.
-    message : for an IMU of a vehicle, the MAVLink message of its samples.
-    steps : m/s^2, rad/s: resolution of the samples if their noise at rest may be smaller; else 0.
-    clock_ppm, clock_std : for a bus with its own clock: its rate error, which was corrected, and the remaining relative
-        standard deviation of the scale of all times; None: times are the host's.
-    least_noise : m/s^2, rad/s: least standard deviations of a sample, even if the samples show less.
-    accel_lag_s : delay of the accelerometer after the gyroscope by the chip's filters, from the data sheet.
-    """
-
-    chip: str | None = None
-    who_am_i: int | None = None
+    chip: Annotated[str | None, "name"] = None
+    who_am_i: Annotated[int | None, "WHO_AM_I"] = None
     accel_range_g: float | None = None
     gyro_range_dps: float | None = None
     rate_hz: float | None = None
     temperature_c: float | None = None
-    accel_offsets: tuple[int, int, int] | None = None
-    message: str | None = None
-    least_noise: tuple[float, float] = (0.0, 0.0)
-    steps: tuple[float, float] = (0.0, 0.0)
-    clock_ppm: float | None = None
-    clock_std: float | None = None
-    accel_lag_s: float = 0.0
+    accel_offsets: Annotated[tuple[int, int, int] | None, "words of the offset registers x, y, z meanwhile"] = None
+    message: Annotated[str | None, "MAVLink message of the samples, for an IMU of a vehicle"] = None
+    least_noise: Annotated[tuple[float, float], "least noise of a sample, m/s^2 and rad/s (1 sigma)"] = (0.0, 0.0)
+    steps: Annotated[tuple[float, float], "resolution, if coarser than the noise, m/s^2 and rad/s"] = (0.0, 0.0)
+    clock_ppm: Annotated[float | None, "rate error of the bus's own clock, which was corrected"] = None
+    clock_std: Annotated[float | None, "remaining relative standard deviation of the scale of times"] = None
+    accel_lag_s: Annotated[float, "delay of the accelerometer after the gyroscope by the filters"] = 0.0
 
     @property
     def origin(self) -> Origin:

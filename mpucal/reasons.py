@@ -9,20 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, Required, TypedDict
 
 from .origin import Origin, name_thing
 
 if TYPE_CHECKING:
-    from typing_extensions import ReadOnly
+    # part of every type checker; result/keys.py takes it from here
+    from typing_extensions import ReadOnly as ReadOnly  # noqa: PLC0414
+else:
+
+    class ReadOnly:
+        """Stand-in for typing.ReadOnly of Python 3.13: the type itself."""
+
+        def __class_getitem__(cls, kind: Any) -> Any:
+            return kind
 
 
-class ReasonFound(TypedDict):
-    """Entry of quality.reasons in calibration.json: code, finding and remedy."""
+class ReasonFound(TypedDict, total=False):
+    """Entry of quality.reasons in calibration.json."""
 
-    code: ReadOnly[str]
-    message: ReadOnly[str]
-    remedy: ReadOnly[str]
+    code: Required[ReadOnly[Annotated[str, {"pattern": "^[a-z0-9_]{1,64}$"}]]]
+    message: Required[ReadOnly[Annotated[str, "what is wrong, and what to do"]]]
+    remedy: ReadOnly[Annotated[str, "what to do"]]
 
 
 @dataclass(frozen=True)

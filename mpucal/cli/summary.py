@@ -16,7 +16,7 @@ from ..origin import Origin
 from ..page.result import Result
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
-from ..result.document import ACCELEROMETER_FORMULA
+from ..result.keys import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
 from . import typed_words, with_option
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..chip.families import family_of
 from ..result.calibration import REFUSED, USABLE, Calibration
-from ..result.document import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
+from ..result.keys import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
 from .data_sheet import CAPTION, about, accelerometer_table, unusual_parameters
 from .elements import as_float, code, escape, heading, number, pair, paragraph, quantity, section, table

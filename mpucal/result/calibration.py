@@ -22,27 +22,14 @@ from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parse_json
 from .blob import NO_RANGE, Blob, BlobError
 from .correlation import UNCORRELATED
-from .document import (
-    ACCELEROMETER,
-    DIGEST,
-    GYROSCOPE,
-    HARDWARE,
-    TEMPERATURE,
-    check,
-    digest,
-    digest_warning,
-    drop_unserialisable,
-    from_document,
-    to_document,
-)
+from .document import DIGEST, check, digest, digest_warning, drop_unserialisable, from_document, to_document
 from .error_model import bias_mg, scale_factor_error
-from .keys import Fit, FrozenDict, Quality, Verdict
+from .keys import ARRAYS, Fit, FrozenDict, Quality, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHAPES = {name: shape for _, name, shape in ACCELEROMETER + TEMPERATURE + GYROSCOPE + HARDWARE}
-SHAPES["correlation"] = UNCORRELATED.shape
+SHAPES = {row.attribute: row.shape for row in ARRAYS} | {"correlation": UNCORRELATED.shape}
 F = TypeVar("F", bound=frames.Frame)
 GOOD: Verdict = "good"
 USABLE: Verdict = "usable"

@@ -1,4 +1,4 @@
-"""calibration.json: written and read by one table of keys, checked, and protected by a digest.
+"""calibration.json: written, read and checked by the table of its keys (keys.py), and protected by a digest.
 
 The digest is "sha256:" and the hexadecimal SHA-256 of the document without `digest` and `created`, as JSON with sorted
 keys, without blanks, in ASCII, and with every number as Python's repr of the double: the shortest decimal digits that
@@ -12,7 +12,7 @@ import json
 import math
 import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from typing import Any
@@ -22,59 +22,33 @@ import numpy as np
 from ..arguments import LARGEST, LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import Sensor, Vector
 from .correlation import KEY, LOWER, from_lower
+from .keys import ACCELEROMETER_FORMULA, ARRAYS, FORMAT, GYROSCOPE_FORMULA, VERSION, Extra
 from .schema import check_document
 
-FORMAT, VERSION = "mpucal.calibration", 1
-# (key, attribute of a Calibration, shape) of each object
-ACCELEROMETER = (
-    ("D", "D", (3, 3)),
-    ("b_a", "b_a", (3,)),
-    ("D_std", "D_std", (3, 3)),
-    ("b_a_std", "b_a_std", (3,)),
-    ("noise_std", "noise_std", (3,)),
-)
 # written if b_a(T) is known
-TEMPERATURE = (
-    ("b_a_slope", "b_a_slope", (3,)),
-    ("b_a_slope_std", "b_a_slope_std", (3,)),
-    ("temperature_range_c", "temperature_range_c", (2,)),
-)
-GYROSCOPE = (
-    ("K", "K", (3, 3)),
-    ("b_omega", "b_omega", (3,)),
-    ("K_std", "K_std", (3, 3)),
-    ("b_omega_std", "b_omega_std", (3,)),
-    ("noise_std", "gyro_noise_std", (3,)),
-)
-HARDWARE = (("b_a", "applied_in_hardware", (3,)),)
-_NUMBERS = ACCELEROMETER + GYROSCOPE
+TEMPERATURE = ("b_a_slope", "b_a_slope_std", "temperature_range_c")
 # the largest condition number of a matrix near the identity
 WORST_CONDITION = 1e9
-ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
-GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
 # fromisoformat would accept any character between date and time
 DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}([T ][0-9:]{5,8}([.,][0-9]{1,9})?(Z|[+-][0-9:]{2,8})?)?")
-DIGEST, CREATED = "digest", "created"
+DIGEST, CREATED, HARDWARE = "digest", "created", "applied_in_hardware"
 # top-level keys that are kept unchanged
-EXTRA = ("name", "autopilot", "others", "written", "merged", "updated_from", "noise")
+EXTRA = tuple(Extra.__annotations__)
 
 
 def to_document(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, Any]:
     """Return the content of calibration.json from a Calibration's fields by name; NaN becomes None."""
+    left_out = () if follows_temperature else TEMPERATURE
     values = {
         "format": FORMAT,
         "version": VERSION,
         "created": fields["created"],
-        "accelerometer": {
-            **_select(fields, ACCELEROMETER),
-            "formula": ACCELEROMETER_FORMULA,
-            **_select(fields, TEMPERATURE if follows_temperature else ()),
-        },
-        "gyroscope": {**_select(fields, GYROSCOPE), "formula": GYROSCOPE_FORMULA},
+        "accelerometer": {**_written(fields, "accelerometer", left_out), "formula": ACCELEROMETER_FORMULA},
+        "gyroscope": {**_written(fields, "gyroscope"), "formula": GYROSCOPE_FORMULA},
         "fit": fields["fit"],
         "quality": fields["quality"],
         "sensor": asdict(fields["sensor"]),
-        "applied_in_hardware": {"b_a": fields["applied_in_hardware"]},
+        "applied_in_hardware": _written(fields, "applied_in_hardware"),
         **({KEY: below} if (below := fields[KEY][LOWER]).any() else {}),
         **fields["extra"],
     }
@@ -97,16 +71,13 @@ def from_document(document: Mapping[str, Any]) -> dict[str, Any]:
     ValueError, KeyError, TypeError, AttributeError : it is not such a document.
     """
     _check_format(document)
-    acc = document["accelerometer"]
     for key in ("D", "b_a"):
-        if key not in acc:
+        if key not in document["accelerometer"]:
             raise KeyError(key)
     return {
         "D": np.full((3, 3), np.nan),
         "b_a": np.full(3, np.nan),
-        **_read(acc, ACCELEROMETER + TEMPERATURE),
-        **_read(document.get("gyroscope", {}), GYROSCOPE),
-        **_read(document.get("applied_in_hardware", {}), HARDWARE),
+        **_arrays(document),
         **({KEY: from_lower(_array(document[KEY], LOWER[0].shape))} if KEY in document else {}),
         "fit": dict(document.get("fit", {})),
         "quality": dict(document.get("quality", {})),
@@ -161,7 +132,11 @@ def _doubles(value: Any) -> Any:
 
 def drop_unserialisable(fields: Mapping[str, Any]) -> dict[str, Vector]:
     """Return a Calibration's arrays by name, with NaN for numbers and matrices that `check` refuses."""
-    arrays = {name: np.where(np.abs(fields[name]) <= LARGEST, fields[name], np.nan) for _, name, _ in _NUMBERS}
+    arrays = {
+        name: np.where(np.abs(fields[name]) <= LARGEST, fields[name], np.nan)
+        for part, _, name, _ in ARRAYS
+        if part != HARDWARE and name not in TEMPERATURE
+    }
     return {name: array if _is_usable(name, array) else np.full_like(array, np.nan) for name, array in arrays.items()}
 
 
@@ -175,52 +150,40 @@ def _is_usable(name: str, array: Vector) -> bool:
 def _check_numbers(document: Mapping[str, Any]) -> None:
     if np.nanmax(np.abs(np.array(document.get(KEY, ()), float)), initial=0.0) > 1.0:
         raise ValueError(f"{KEY} holds a number beyond 1")
-    for key, rows in (
-        ("accelerometer", ACCELEROMETER + TEMPERATURE),
-        ("gyroscope", GYROSCOPE),
-        ("applied_in_hardware", HARDWARE),
-    ):
-        values = _read(document.get(key, {}), rows)
+    arrays = _arrays(document)
+    for name, array in arrays.items():
         # no sensor has larger numbers, and products of these are finite
-        if any(np.nanmax(np.abs(array), initial=0.0) > LARGEST for array in values.values()):
-            raise ValueError(f"{key} holds a number beyond {LARGEST:g}")
-        if any(
-            np.nanmin(values[name], initial=0.0) < 0.0
-            for _, name, _ in rows
-            if name.endswith("_std") and name in values
-        ):
-            raise ValueError(f"{key} holds a standard deviation below 0")
-        for name, array in values.items():
-            if not _is_usable(name, array):
-                raise ValueError(f"{name} cannot be inverted")
-        if np.isnan(values.get("applied_in_hardware", 0.0)).any():
-            raise ValueError("applied_in_hardware holds null")
+        if np.nanmax(np.abs(array), initial=0.0) > LARGEST:
+            raise ValueError(f"{name} holds a number beyond {LARGEST:g}")
+        if name.endswith("_std") and np.nanmin(array, initial=0.0) < 0.0:
+            raise ValueError(f"{name} holds a standard deviation below 0")
+        if not _is_usable(name, array):
+            raise ValueError(f"{name} cannot be inverted")
+    if np.isnan(arrays.get(HARDWARE, 0.0)).any():
+        raise ValueError(f"{HARDWARE} holds null")
     gravity = document.get("fit", {}).get("gravity")
     if gravity is not None and not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise ValueError(f"fit.gravity is {gravity:g} m/s^2")
-    _check_slope(document)
+    # b_a(T) is a line through b_a at a sensor temperature within its range
+    if np.any(slope := arrays.get("b_a_slope", 0.0)):
+        T = document.get("sensor", {}).get("temperature_c")
+        low, high = arrays.get("temperature_range_c", (np.nan, np.nan))
+        if T is None or not (low <= T <= high and np.isfinite(slope).all()):
+            raise ValueError("b_a_slope is given without its temperatures")
 
 
-def _check_slope(document: Mapping[str, Any]) -> None:
-    """Check that b_a(T), if given, is a line through b_a at a sensor temperature within its range."""
-    of = _read(document.get("accelerometer", {}), TEMPERATURE)
-    if not np.any(of.get("b_a_slope", 0.0)):
-        return
-    T = document.get("sensor", {}).get("temperature_c")
-    low, high = of.get("temperature_range_c", (np.nan, np.nan))
-    if T is None or not (low <= T <= high and np.isfinite(of["b_a_slope"]).all()):
-        raise ValueError("b_a_slope is given without its temperatures")
+def _written(fields: Mapping[str, Any], part: str, left_out: Sequence[str] = ()) -> dict[str, Vector]:
+    """Return the arrays of an object of the document from a Calibration's fields by name."""
+    return {row.key: fields[row.attribute] for row in ARRAYS if row.part == part and row.key not in left_out}
 
 
-Rows = tuple[tuple[str, str, tuple[int, ...]], ...]
-
-
-def _select(fields: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
-    return {key: fields[attribute] for key, attribute, _ in rows}
-
-
-def _read(values: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
-    return {attribute: _array(values[key], shape) for key, attribute, shape in rows if values.get(key) is not None}
+def _arrays(document: Mapping[str, Any]) -> dict[str, Vector]:
+    """Return the arrays that a document holds, by their names in a Calibration."""
+    return {
+        attribute: _array(document[part][key], shape)
+        for part, key, attribute, shape in ARRAYS
+        if document.get(part, {}).get(key) is not None
+    }
 
 
 def _date(text: Any) -> str:

@@ -1,6 +1,6 @@
 """Validator of calibration.json by its published schema (calibration.schema.json), for the keywords used there.
 
-These are $ref within the file, type, const, enum, pattern, required, properties, additionalProperties, items, minItems
+These are type, const, enum, pattern, required, properties, additionalProperties, items, minItems
 and maxItems of JSON Schema 2020-12; unknown keys of a document are accepted.
 """
 
@@ -33,9 +33,9 @@ def check_document(document: Any) -> None:
     ValueError : the first violation, with its path.
     """
     schema = _schema()
-    _check(document, schema, schema, "it")
+    _check(document, schema, "it")
     for number, other in enumerate(document.get("others", ())):
-        _check(other, schema, schema, f"others[{number}]")
+        _check(other, schema, f"others[{number}]")
 
 
 @cache
@@ -43,9 +43,7 @@ def _schema() -> Any:
     return json.loads(files(__package__).joinpath("calibration.schema.json").read_bytes())
 
 
-def _check(value: Any, schema: Mapping[str, Any], root: Mapping[str, Any], where: str) -> None:
-    if "$ref" in schema:
-        _check(value, root["$defs"][schema["$ref"].rpartition("/")[2]], root, where)
+def _check(value: Any, schema: Mapping[str, Any], where: str) -> None:
     kinds = schema.get("type", ())
     kinds = [kinds] if isinstance(kinds, str) else kinds
     if kinds and not any(_IS[kind](value) for kind in kinds):
@@ -53,19 +51,19 @@ def _check(value: Any, schema: Mapping[str, Any], root: Mapping[str, Any], where
     if "const" in schema and value != schema["const"]:
         raise _wrong(where, value, f"not {schema['const']!r}")
     if value not in schema.get("enum", [value]):
-        raise _wrong(where, value, f"not one of {', '.join(schema['enum'])}")
+        raise _wrong(where, value, f"not one of {', '.join(map(str, schema['enum']))}")
     if isinstance(value, str) and not re.search(schema.get("pattern", ""), value):
         raise _wrong(where, value, f"not of the form {schema['pattern']}")
     if isinstance(value, Mapping):
-        _check_object(value, schema, root, where)
+        _check_object(value, schema, where)
     elif isinstance(value, list):
         if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)):
             raise _wrong(where, value, f"{len(value)} values long, not {schema['minItems']}")
         for at, item in enumerate(value):
-            _check(item, schema.get("items", {}), root, f"{where}[{at}]")
+            _check(item, schema.get("items", {}), f"{where}[{at}]")
 
 
-def _check_object(value: Mapping[str, Any], schema: Mapping[str, Any], root: Mapping[str, Any], where: str) -> None:
+def _check_object(value: Mapping[str, Any], schema: Mapping[str, Any], where: str) -> None:
     known = schema.get("properties", {})
     for key in schema.get("required", ()):
         if key not in value:
@@ -74,7 +72,6 @@ def _check_object(value: Mapping[str, Any], schema: Mapping[str, Any], root: Map
         _check(
             item,
             known.get(key, schema.get("additionalProperties", {})),
-            root,
             key if where == "it" else f"{where}.{key}",
         )
 

@@ -11,7 +11,7 @@ from ..arguments import read_limited
 from ..data import Recording
 from ..errors import RecordingError
 from ..result.calibration import Calibration
-from ..result.document import FORMAT
+from ..result.keys import FORMAT
 from ..result.session_files import DOCUMENT
 from ..session.results import result_files, save
 from ..strict_json import MOST_BYTES, parse_json

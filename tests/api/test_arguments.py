@@ -9,8 +9,8 @@ import pytest
 
 import mpucal
 from mpucal import Calibration, MpucalError, Recording
-from mpucal.api import ModelName
 from mpucal.calibration import MODELS
+from mpucal.result.keys import Model
 
 CAPTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6500.mcap"
 N = 40
@@ -116,4 +116,4 @@ def test_dates_are_seconds_since_the_first(unit):
 
 
 def test_the_names_of_models_that_a_type_checker_knows_are_all():
-    assert set(get_args(ModelName)) == set(MODELS)
+    assert set(get_args(Model)) == set(MODELS)

@@ -2,14 +2,20 @@
 
 import json
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
 import mpucal
-from mpucal import calibration, result
-from mpucal.result.document import ACCELEROMETER, EXTRA, GYROSCOPE, TEMPERATURE
+from mpucal import result
+from mpucal.data import Autopilot, Sensor
+from mpucal.mavlink.parameters.document import autopilot_document
+from mpucal.result.calibration import Calibration
+from mpucal.result.merge import merge
+from mpucal.result.noise import COEFFICIENTS, Noise, with_noise
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 SCHEMA = json.loads((Path(result.__file__).parent / "calibration.schema.json").read_text())
@@ -21,21 +27,51 @@ def document():
     return json.loads(mpucal.calibrate(FIXTURES / "sessions" / "mpu6500.mcap", "accel").json())
 
 
-def test_it_is_a_schema_and_knows_every_key_that_is_written():
-    Draft202012Validator.check_schema(SCHEMA)
-    known = SCHEMA["properties"]
-    for key, rows in (("accelerometer", ACCELEROMETER + TEMPERATURE), ("gyroscope", GYROSCOPE)):
-        assert {name for name, _, _ in rows} <= set(known[key]["properties"])
-    assert set(EXTRA) <= set(known)
-    assert set(known["fit"]["properties"]["model"]["enum"]) == set(calibration.MODELS)
+def unknown_keys(document, schema, path=""):
+    """Return the keys of a document that its schema does not describe, by their paths."""
+    if isinstance(document, list):
+        return [key for item in document for key in unknown_keys(item, schema.get("items", {}), f"{path}[]")]
+    if not isinstance(document, dict) or "properties" not in schema:
+        return []
+    known = schema["properties"]
+    inner = [key for name in known.keys() & document.keys() for key in unknown_keys(document[name], known[name], name)]
+    return [f"{path}.{key}" for key in document.keys() - known.keys()] + inner
 
 
 def test_a_calibration_satisfies_it_and_so_does_a_refused_one(document):
+    Draft202012Validator.check_schema(SCHEMA)
     VALIDATOR.validate(document)
+    assert not unknown_keys(document, SCHEMA)
     recording = mpucal.load(FIXTURES / "sessions" / "mpu6500.mcap")
     refused = mpucal.calibrate(recording.part(0, 50))
     assert refused.verdict == "refused"
-    VALIDATOR.validate(json.loads(refused.json()))
+    document = json.loads(refused.json())
+    VALIDATOR.validate(document)
+    assert not unknown_keys(document, SCHEMA)
+
+
+def test_it_describes_the_entries_of_merges_vehicles_and_noise():
+    one, other = (
+        Calibration(
+            np.eye(3) * 1.01,
+            np.full(3, T / 100),
+            *(np.full(shape, 1e-3) for shape in ((3, 3), 3, 3)),
+            fit={"gravity": 9.81, "recording_digest": f"{T}"},
+            sensor=Sensor(temperature_c=T),
+        )
+        for T in (20.0, 40.0)
+    )
+    values = {"CAL_ACC1_ID": 1310988.0, "SENS_BOARD_ROT": 0.0} | {
+        f"CAL_ACC1_{axis}{kind}": value for kind, value in (("OFF", 0.0), ("SCALE", 1.0)) for axis in "XYZ"
+    }
+    six = {name: np.ones(6) for name in COEFFICIENTS}
+    noise = Noise(six, six, six, np.ones(1), np.ones((1, 6)), np.ones(1), 100, 10.0, 10.0)
+    merged = with_noise(merge([one, other]).calibration, noise)
+    for row in (values, {}):
+        entry = autopilot_document(Autopilot("PX4", 1, "HIGHRES_IMU", row), one)
+        document = json.loads(replace(merged, extra={**merged.extra, "autopilot": entry}).json())
+        VALIDATOR.validate(document)
+        assert not unknown_keys(document, SCHEMA)
 
 
 @pytest.mark.parametrize(

@@ -22,9 +22,11 @@ from mpucal.session.table import TRANSITIONS, State
 from mpucal.sources.kind import Option, SourceKind
 from mpucal.sources.table import SOURCES, unique
 
+from . import keys
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = "mpucal"
-ROOMS = re.compile(r"(?<=<!-- made by python -m tools.make pages -->\n).*?(?=<!-- end -->)", re.DOTALL)
+MADE = re.compile(r"(?<=<!-- made by python -m tools.make pages -->\n).*?(?=<!-- end -->)", re.DOTALL)
 STATES = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
 REASONS = """# The reasons against a calibration
 
@@ -187,19 +189,21 @@ def _row(*cells: str) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-# of each page what makes it of what it was
+# of each page or file what makes it of what it was
 PAGES: dict[str, Callable[[str], str]] = {
-    "architecture.md": lambda old: ROOMS.sub(lambda _: rooms(arrows()), old),
-    "session.md": lambda old: STATES.sub(lambda _: diagram(), old),
-    "reasons.md": lambda _: reasons(),
-    "sources.md": lambda _: sources(),
+    "docs/architecture.md": lambda old: MADE.sub(lambda _: rooms(arrows()), old),
+    "docs/session.md": lambda old: STATES.sub(lambda _: diagram(), old),
+    "docs/reasons.md": lambda _: reasons(),
+    "docs/sources.md": lambda _: sources(),
+    "docs/reference/calibration.md": lambda old: MADE.sub(lambda _: keys.table(), old),
+    "mpucal/result/calibration.schema.json": lambda _: keys.text(),
 }
 
 
 def outdated() -> Iterator[tuple[Path, str]]:
     """Yield the pages that are not what they should be, and what they should be."""
     for name, page in PAGES.items():
-        path = ROOT / "docs" / name
+        path = ROOT / name
         old = path.read_text(encoding="utf-8")
         if (new := page(old)) != old:
             yield path, new
