@@ -116,7 +116,7 @@ function vehicle() {
 const MODELS = { "gy-521": gy521(), plain: plainBoard(), vehicle: vehicle() };
 const AXES = [["X", [1, 0, 0], "--x"], ["Y", [0, 1, 0], "--y"], ["Z", [0, 0, 1], "--z"]];
 const LIGHT = [-0.35, 0.5, 0.79];  // across, up, toward the eye
-const DISTANCE = 8, REACH = 1.6, FLOOR = -1.3;
+const DISTANCE = 8, REACH = 1.6, FLOOR = -1.3, TABLE = { half: 0.75, lines: [-0.75, -0.375, 0, 0.375, 0.75] };
 
 export class Picture {
   constructor(canvas) {
@@ -197,6 +197,7 @@ export function drawBoard(picture, kind, attitude, view, way = null, small = fal
   const model = MODELS[kind] ?? MODELS.plain;
   const room = (point) => rotate(attitude, point);
   const at = (point) => picture.seen(room(point));
+  if (!small) table(picture);
   shadow(picture, model, room);
   if (way) arc(picture, way);
   const normal = room([0, 0, 1]), top = dot(normal, picture.eye.toward) > 0.05;
@@ -215,6 +216,17 @@ export function drawBoard(picture, kind, attitude, view, way = null, small = fal
   rotors(picture, model, at);
   if (!small) axis(picture, AXES[2], at, model, top ? 1 : -1);
   if (way) arc(picture, way, true);
+}
+
+// Draws the table below the board, whose near edge is the person's: it shows from where the picture is seen.
+function table(picture) {
+  const at = ([x, y]) => picture.seen([x, y, FLOOR]), { half, lines } = TABLE, line = picture.ink("--line");
+  for (const k of lines) {
+    stroke(picture, [at([k, -half]), at([k, half])], line, 0.02);
+    stroke(picture, [at([-half, k]), at([half, k])], line, 0.02);
+  }
+  stroke(picture, [at([-half, -half]), at([half, -half])], picture.ink("--faint"), 0.05);
+  label(picture, at, "you", [0, -0.75 * half], [1, 0], [0, 1], 0.2, picture.ink("--faint"));
 }
 
 function shadow(picture, model, room) {
@@ -269,11 +281,11 @@ function print(picture, model, at, top) {
 }
 
 // Draws words that lie on the board, along one of its directions.
-function label(picture, at, text, where, along, upward, size) {
+function label(picture, at, text, where, along, upward, size, colour = "rgba(255, 255, 255, .95)") {
   const { pen } = picture, o = at(where), a = at(plus(where, along, 0.1)), b = at(plus(where, upward, 0.1));
   pen.save();
   pen.transform((a[0] - o[0]) / 10, (a[1] - o[1]) / 10, (o[0] - b[0]) / 10, (o[1] - b[1]) / 10, o[0], o[1]);
-  picture.text(text, [0, 0], "rgba(255, 255, 255, .95)", size * 100);
+  picture.text(text, [0, 0], colour, size * 100);
   pen.restore();
 }
 
