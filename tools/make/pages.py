@@ -35,7 +35,7 @@ The verdict of a calibration is *good* if there is no reason against it. Otherwi
 do). A reason that refuses the calibration makes the verdict *refused*, the others make it *usable*. Codes never change
 their meaning, but new codes may be added.
 
-`python -m tools.make pages` makes this page from the table in `mpucal/reasons.py`; … stands for a number or a name.
+`python -m tools.make pages` makes this page from the table in `mpucal/reasons.toml`; … stands for a number or a name.
 You can see every reason without a board: in a session on the simulated chip, or by changing a good recording:
 
     from dataclasses import replace
