@@ -14,6 +14,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..result import keys
 from ..result.calibration import Calibration, unknown
 from ..result.correlation import correlation_of, standard_deviations
+from .common_motion import beside_first
 from .estimation import MODELS, estimate
 from .evidence import Evidence
 from .fit import Fit
@@ -21,7 +22,7 @@ from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
 from .theta import from_elements
 
-__all__ = ["MODELS", "calibrate", "estimate", "recording_digest"]
+__all__ = ["MODELS", "calibrate", "calibrate_all", "estimate", "recording_digest"]
 
 # Step of a digest [m/s^2, rad/s], far below a count of any sensor and far above what a text file rounds away, and the
 # largest value that it distinguishes, which no sensor measures.
@@ -46,6 +47,19 @@ def calibrate(
     WrongValue : the model does not exist, or the gravity is impossible.
     """
     return _calibration(*estimate(recording, model, gravity, gravity_anyway))
+
+
+def calibrate_all(
+    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2, gravity_anyway: bool = False
+) -> list[Calibration]:
+    """Calibrate all accelerometers of a board: the first like `calibrate`, and the recording's `others` beside it.
+
+    Raises
+    ------
+    WrongValue : see calibrate.
+    """
+    first, *others = [estimate(each, model, gravity, gravity_anyway) for each in (recording, *recording.others)]
+    return [_calibration(*first), *(_calibration(beside_first(first[0], other), chosen) for other, chosen in others)]
 
 
 def recording_digest(recording: Recording) -> str:

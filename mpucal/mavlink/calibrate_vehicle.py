@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..calibration import calibrate
+from ..calibration import calibrate_all
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..result.calibration import Calibration
 from .parameters.document import AUTOPILOT, OTHERS, autopilot_document
@@ -19,11 +19,15 @@ def calibrate_vehicle(
     ------
     UsageError : see calibrate.
     """
-    calibration = calibrate(recording, model, gravity, gravity_anyway)
-    extra = dict(calibration.extra)
-    if recording.autopilot is not None:
-        extra[AUTOPILOT] = autopilot_document(recording.autopilot, calibration)
-    if recording.others:
-        others = [calibrate_vehicle(other, model, gravity, gravity_anyway) for other in recording.others]
-        extra[OTHERS] = [other.document() for other in others]
+    recordings = (recording, *recording.others)
+    first, *others = map(_with_parameters, calibrate_all(recording, model, gravity, gravity_anyway), recordings)
+    if not others:
+        return first
+    return replace(first, extra={**first.extra, OTHERS: [other.document() for other in others]})
+
+
+def _with_parameters(calibration: Calibration, recording: Recording) -> Calibration:
+    if recording.autopilot is None:
+        return calibration
+    extra = {**calibration.extra, AUTOPILOT: autopilot_document(recording.autopilot, calibration)}
     return replace(calibration, extra=extra)

@@ -1,0 +1,159 @@
+"""Comparison of another accelerometer of the board with the first one, sample by sample: both feel the same motion.
+
+Readings in coarse steps determine a rest to a step's rounding, however long it is. While the board is turned they cross
+hundreds of steps, and the first accelerometer, once calibrated, says what they should be, gravity and the hand's own
+acceleration alike:
+
+    y = D (s + L r - tau ds/dt) + b_a + e                                         (19)
+
+with s of the first accelerometer, and lever arm r and delay tau from it to the other one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, polar
+
+from ..data import Vector
+from ..rests.flat import QUIETEST_ACC_MPS2
+from .evidence import Evidence
+from .fit import Fit
+from .parameters import ACCELEROMETER, MODELS
+from .preprocessing import smoothed_rates
+from .rotation import cross
+from .uncertainty import UncertaintyClaim
+
+APART_S = 0.05  # samples of the first one farther apart than this do not say what was in between
+PRIOR_SD = (0.05, 0.05, 0.05, 0.005)  # of r [m] and tau [s]: two chips on one board, whose filters differ
+ROUNDS = 5  # of the weights, which depend on the residuals
+TAIL = 4.0  # d^2 from which residuals lose weight, as in (14)
+FEWEST = 1000  # samples in common
+COMMON_S = 1.0  # errors of samples nearer than this may have one cause
+DISAGREE = 32.9  # quantile 0.999 of chi-square of twelve degrees of freedom
+
+
+def beside_first(first: Evidence, other: Evidence) -> Evidence:
+    """Return the evidence of the other accelerometer, with D and b_a by the first one where that is better.
+
+    It is where the first one has finer readings, or is more certain. The other's own estimate stays where either has a
+    fault or a change, and where the two disagree.
+    """
+    if first.fit is None or other.fit is None or not (_is_plain(first) and _is_plain(other)):
+        return other
+    own, compared = other.fit, _compare(first, first.fit, other, other.fit)
+    if compared is None:
+        return other
+    away = np.append(own.D - compared.D, own.b_a - compared.b_a)
+    spread = (own.covariance + compared.covariance)[ACCELEROMETER, ACCELEROMETER]
+    beside = replace(other, fit=compared, claim=None)
+    before, now = other.uncertainty, beside.uncertainty
+    if before is None or now is None:
+        return other
+    finer = first.recording.sensor.steps[0] < other.recording.sensor.steps[0]
+    if not finer and now.magnitude_mps2 > before.magnitude_mps2:
+        return other
+    if away @ np.linalg.solve(spread, away) > DISAGREE:
+        return other
+    return replace(beside, claim=UncertaintyClaim(compared.covariance, now.rms_mps2, now.rms_mps2))
+
+
+def _is_plain(evidence: Evidence) -> bool:
+    """Return True for an estimate by a good gyroscope, in which the sensor did not change."""
+    unchanged = evidence.claim is None or evidence.claim.change is None
+    return unchanged and evidence.model in MODELS and evidence.gyroscope is None and evidence.uncertainty is not None
+
+
+def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
+    """Return the fit of the other accelerometer by the first one's; None where they have too few samples in common."""
+    there, here = first.recording, other.recording
+    after = np.clip(np.searchsorted(there.t, here.t), 1, len(there) - 1)
+    near = (there.t[after] - there.t[after - 1] < APART_S) & (here.t >= there.t[0]) & (here.t <= there.t[-1])
+    if first.flat is None or near.sum() < FEWEST:
+        return None
+    inverse = np.linalg.inv(by.D)
+    felt = (there.acc - by.b_a) @ inverse.T
+    rate, alpha = smoothed_rates(there, replace(first.flat, last=0, b_omega=by.b_omega))
+    columns = np.hstack([felt, np.gradient(felt, there.t, axis=0), rate, alpha, there.gyr - by.b_omega])
+    t = here.t[near]
+    s, change, rate, alpha, rates = np.hsplit(np.stack([np.interp(t, there.t, c) for c in columns.T], axis=1), 5)
+    L = cross(alpha) + cross(rate) @ cross(rate)
+    more = own.D @ np.concatenate([L, -change[:, :, None]], axis=2)
+    theta, covariance = _solve([_axis(k, t, here.acc[near], s, more, here.sensor.steps[0]) for k in range(3)])
+    # D is in the axes of its own gyroscope, whatever their scale factors.
+    own_rates = here.gyr[near] - own.b_omega
+    Q = polar(np.linalg.solve(rates.T @ rates + np.eye(3), rates.T @ own_rates + np.eye(3)))[0]
+    D = theta[:9].reshape(3, 3)
+    # The errors of the first one's D and b_a are errors of s.
+    by_first = block_diag(np.kron(D @ inverse, np.eye(3)), D @ inverse)
+    covariance += by_first @ by.covariance[ACCELEROMETER, ACCELEROMETER] @ by_first.T
+    in_own_axes = block_diag(np.kron(np.eye(3), Q.T), np.eye(3))
+    whole = own.covariance.copy()
+    whole[ACCELEROMETER], whole[:, ACCELEROMETER] = 0.0, 0.0
+    whole[ACCELEROMETER, ACCELEROMETER] = in_own_axes @ covariance @ in_own_axes.T
+    return replace(own, D=D @ Q, b_a=theta[9:12], covariance=whole)
+
+
+class _Measurements(NamedTuple):
+    """Measurements y (m,) = A (m, 16) @ theta, at times t (m,); jitter (m,) is the square of ds/dt, as times err."""
+
+    A: Vector
+    y: Vector
+    t: Vector
+    jitter: Vector
+
+
+def _axis(axis: int, t: Vector, y: Vector, s: Vector, more: Vector, step: float) -> _Measurements:
+    """Return the measurements of an axis: means over readings that stay on two steps, whose rounding is common.
+
+    more : (n, 3, 4) derivatives by r and tau.
+    """
+    starts = _groups(y[:, axis], step)
+    size = np.diff(np.append(starts, len(y)))
+    columns = np.column_stack([s, more[:, axis], y[:, axis], t, more[:, axis, 3] ** 2])
+    means = np.add.reduceat(columns, starts, axis=0) / size[:, None]
+    A = np.zeros((len(starts), 16))
+    A[:, 3 * axis : 3 * axis + 3], A[:, 9 + axis], A[:, 12:] = means[:, :3], 1.0, means[:, 3:7]
+    return _Measurements(A, *means[:, 7:].T)
+
+
+def _groups(values: Vector, step: float) -> NDArray[np.int64]:
+    """Return the first samples of the longest runs that stay on two steps; all samples where there are no steps."""
+    if not step:
+        return np.arange(len(values))
+    starts, low, high = [], -np.inf, np.inf
+    for k, value in enumerate(values.tolist()):
+        low, high = min(low, value), max(high, value)
+        if high - low > 1.5 * step:
+            starts.append(k)
+            low = high = value
+    return np.array(starts)
+
+
+def _solve(axes: Sequence[_Measurements]) -> tuple[Vector, Vector]:
+    """Return theta (16,) of (19), D row-major, b_a, r and tau, and the covariance (12, 12) of the first twelve.
+
+    The variance of a measurement is that of rounding and noise, and by jitter; both are estimated from the residuals.
+    """
+    A, y, t, jitter = map(np.concatenate, zip(*axes, strict=True))
+    prior = np.diag(np.concatenate([np.zeros(12), 1.0 / np.square(PRIOR_SD)]))
+    kinds = np.column_stack([np.ones_like(y), jitter])
+    variance, weight = np.ones_like(y), np.ones_like(y)
+    for _ in range(ROUNDS):
+        W = (weight / variance)[:, None]
+        H = A.T @ (W * A) + prior
+        theta = np.linalg.solve(H, A.T @ (W[:, 0] * y))
+        e = y - A @ theta
+        V = (weight / variance**2)[:, None] * kinds
+        variance = kinds @ np.maximum(np.linalg.solve(kinds.T @ V, V.T @ e**2), (QUIETEST_ACC_MPS2**2, 0.0))
+        weight = np.minimum(1.0, TAIL / np.maximum(e**2 / variance, TAIL))
+    # Neighbours' errors have common causes: their gradients add up before they are squared.
+    _, together = np.unique(t // COMMON_S, return_inverse=True)
+    gradients = np.zeros((together.max() + 1, 16))
+    np.add.at(gradients, together, W * A * e[:, None])
+    root = np.linalg.solve(H, gradients.T)[ACCELEROMETER]
+    return theta, root @ root.T

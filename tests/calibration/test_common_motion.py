@@ -1,0 +1,65 @@
+"""A second accelerometer of the same board, whose readings come in whole milli-g, against its truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate_all
+from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
+
+D = np.array([[1.01, 0.002, -0.003], [0.001, 0.985, 0.002], [-0.002, 0.003, 1.02]])
+B_A = np.array([0.31, -0.22, 0.17])
+G = 9.82
+STEP_MPS2 = STANDARD_GRAVITY_MPS2 / 1000.0
+SENSOR = Sensor(chip="second", steps=(STEP_MPS2, 1e-3))
+
+
+def second(run, seed=0):
+    """Return the recording of a second accelerometer that feels what the first one does."""
+    first, truth = run.recording, run.truth
+    felt = (first.acc - truth.b_a) @ np.linalg.inv(truth.D).T
+    noise = np.random.default_rng(seed).normal(0.0, 0.1 * STEP_MPS2, felt.shape)
+    acc = STEP_MPS2 * np.rint((felt @ D.T + B_A + noise) / STEP_MPS2)
+    return replace(first, acc=acc, sensor=SENSOR, name="second")
+
+
+def together(run, other):
+    return calibrate_all(replace(run.recording, others=(other,)), gravity=G)
+
+
+def z_scores(calibration):
+    off, std = np.append(calibration.D - D, calibration.b_a - B_A), np.append(calibration.D_std, calibration.b_a_std)
+    return off / std
+
+
+@pytest.fixture(scope="module")
+def runs(hand):
+    return [hand(seed, "pose12") for seed in range(3)]
+
+
+def test_it_is_as_well_known_as_the_first_one(runs):
+    pairs = [together(run, second(run)) for run in runs]
+    for first, other in pairs:
+        assert other.verdict == "good"
+        assert other.magnitude_std < 1.02 * first.magnitude_std
+    z = [z_scores(other) for _, other in pairs]
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+def test_one_that_slipped_keeps_its_own_estimate_and_its_reason(runs):
+    other = second(runs[0])
+    half = len(other) // 2
+    acc = other.acc.copy()
+    acc[half:] += 0.2
+    slipped = replace(other, acc=acc)
+    alone, beside = calibrate_all(slipped, gravity=G)[0], together(runs[0], slipped)[1]
+    assert beside.quality == alone.quality
+    assert np.array_equal(beside.b_a, alone.b_a)
+
+
+def test_one_that_was_recorded_at_another_time_keeps_its_own_estimate(runs):
+    other = second(runs[0])
+    later = replace(other, t=other.t + 1000.0)
+    alone, beside = calibrate_all(later, gravity=G)[0], together(runs[0], later)[1]
+    assert np.array_equal(beside.D, alone.D)
