@@ -1,41 +1,45 @@
 """Check of the bits of the readings: an axis whose low or high bits never change.
 
 The counts are recovered where the range is known, or where all values are whole counts of one of the chip's ranges (16
-bits, as the MPU-6050 and its successors have). Where that fails, the steps of an axis are compared with those of the
-others. A sensor that is coarse on all axes is no fault.
+bits, as the MPU-6050 and its successors have). From one sample to the next a bit may change where a higher one does: a
+sound bit then changes half of the time or more, and a stuck one but for errors of the bus. The odds between the two
+decide. Where the counts are not known, the steps of an axis are compared with those of the others. A sensor that is
+coarse on all axes is no fault.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data import ACCEL_COUNTS, ACCEL_RANGES_G, GYRO_COUNTS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Vector
+from ...data import ACCEL_COUNTS, ACCEL_RANGES_G, GYRO_COUNTS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Vector
 from ...reasons import Reason, reason
 from ..evidence import Evidence
 from .unusable import dead_accelerometer, dead_gyroscope
 
-# Low bits are dead if so many more never change on an axis than on all axes; if so many never change on all axes, it is
-# no coarse sensor.
-DEAD_BITS, DEAD_BITS_OF_ALL = 3, 7
-# Dead bits are looked for in pieces, as they may die midway; some of the changes in a piece may be errors of a bus.
-MOST_PIECES, SHORTEST_PIECE_S, FEWEST_CHANGES, SHARE_OF_ERRORS = 64, 2.0, 12, 0.1
-# A stuck bit removes values from the middle of the range that is passed; a low one does so in many places.
-SIGN, OF_ALL_VALUES, FEWEST_PLACES = 15, 0.9, 16
-LOW_BITS, HIGH_BITS = range(1, 8), range(8, SIGN + 1)
-# A bit that died midway on a bus with errors: share of errors, leaps over the bit, share of samples on either side.
-MOST_ERRORS, FEWEST_LEAPS, STAYS = 0.005, 3, 0.05
-# Where the range is not known: how many steps of another axis make a step that is odd, and how exactly.
-ODD_STEPS, EXACTLY, FEWEST_VALUES, MOST_SAMPLES = 8.0, 0.02, 6, 20_000
-# A smaller step [m/s^2, rad/s] may be that of a float32, which is coarser the larger a value is.
-LEAST_ODD_STEP = 1e-3
+# Share of the changes in which a stuck bit changes, by errors, and least and most share of a sound one.
+ERRORS, LEAST_SOUND, MOST_SOUND = 0.1, 0.4, 0.98
+# Odds at which a bit is called stuck
+ODDS = 1e6
+# Bits may die midway: they are counted in so many pieces.
+PIECES = 64
+# Fewer dead low bits do not matter; so many on all axes are a byte that was not read, and no coarse sensor.
+DEAD_BITS, LOST_BYTE = 3, 7
+BITS = 16
+# Values are whole counts, or whole steps, within this share.
+EXACTLY = 0.02
+# Where the counts are not known: so many steps of the other axes make a step that is odd. A smaller one [m/s^2, rad/s]
+# may be that of a float32, which is coarser the larger a value is.
+ODD_STEPS, LEAST_ODD_STEP = 8.0, 1e-3
 # The rounding of an axis refuses a calibration beyond so many claimed uncertainties, or these limits.
 HONEST_STD, MOST_MPS2, USABLE_RAD_S = 2.0, 0.1, np.deg2rad(0.5)
 
-Counts = NDArray[np.int64]
+Words = NDArray[np.uint16]
+Counts = NDArray[np.int_]
 
 
 class Low(NamedTuple):
@@ -61,15 +65,18 @@ def bits_stuck(e: Evidence) -> Reason | None:
 
 
 def _stuck(e: Evidence, values: Vector, lsbs: Iterable[float], sensor: str, unit: str, most: float) -> Reason | None:
-    lsb, counts = next(((lsb, whole) for lsb in lsbs if (whole := _counts(values, lsb)) is not None), (0.0, None))
-    if counts is None:
-        low = _odd_steps(values)
+    for lsb in lsbs:
+        if (words := _words(values, lsb)) is not None:
+            stuck, first = _stuck_bits(words, e.recording.gap)
+            low = _low_bits(stuck, first, lsb)
+            # a single bit is told from one that lacks, among the low ones, all below it
+            one = np.argwhere(stuck & ~np.logical_and.accumulate(stuck, axis=0))
+            if low is None and len(one):
+                bit, axis = map(int, one[-1])
+                return reason("bits_stuck", "high", sensor=sensor, axis="xyz"[axis], bit=bit)
+            break
     else:
-        one, low = _stuck_bit(counts, e.recording.gap, HIGH_BITS), _stuck_low(counts, lsb, e.recording.rate_hz)
-        one = one or (_stuck_bit(counts, e.recording.gap, LOW_BITS) if low is None else None)
-        if one is not None:
-            axis, bit = one
-            return reason("bits_stuck", "high", sensor=sensor, axis="xyz"[axis], bit=bit)
+        low = _odd_steps(values)
     if low is None:
         return None
     seconds = float(e.recording.t[low.first] - e.recording.t[0])
@@ -86,101 +93,71 @@ def _stuck(e: Evidence, values: Vector, lsbs: Iterable[float], sensor: str, unit
     )
 
 
-def _counts(values: Vector, lsb: float) -> Counts | None:
-    """Return `values` (n, 3) as counts of `lsb`; None where those are not integers of 16 bits."""
+def _words(values: Vector, lsb: float) -> Words | None:
+    """Return `values` (n, 3) as words of two's complement; None where those are not whole counts of 16 bits."""
     scaled = values / lsb
     counts = np.rint(scaled)
     # Rates that were not measured are NaN, and fail the comparison.
     if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= ACCEL_COUNTS):
         return None
-    return counts.astype(np.int64)
+    return counts.astype(np.int64).astype(np.uint16)
 
 
-def _stuck_low(counts: Counts, lsb: float, rate_hz: float) -> Low | None:
-    """Return the axis with the most low bits that never change."""
-    changed = counts[1:] ^ counts[:-1]
-    # The lowest bit that changes; 63, which is none of a word, where nothing changes.
-    lowest = np.where(changed == 0, 63, np.log2(np.maximum(changed & -changed, 1))).astype(int)
-    size = max(round(SHORTEST_PIECE_S * rate_hz), len(lowest) // MOST_PIECES, 1)
-    pieces = [lowest[first : first + size] for first in range(0, len(lowest), size)]
-    dead = np.array([[_dead_bits(piece[:, axis]) for axis in range(3)] for piece in pieces])
-    known = dead >= 0
-    if not known.any():
-        return None
-    common = int(dead[known].min())
-    least = 0 if common >= DEAD_BITS_OF_ALL else common
-    stuck = known & (dead >= least + DEAD_BITS)
-    if not stuck.any():
-        return None
-    axis = int(np.where(stuck, dead, -1).max(0).argmax())
-    first, bits = int(stuck[:, axis].argmax()), int(dead[stuck[:, axis], axis].min())
-    # The pieces before the first one with dead bits may have too few changes to tell.
-    first = 0 if not known[:first, axis].any() else first
-    return Low(axis, bits, first * size, lsb * 2.0**bits)
+def _stuck_bits(words: Words, gap: Mask) -> tuple[Mask, Counts]:
+    """Return the bits that never change from some sample on (16, 3), and that sample (16, 3).
 
-
-def _dead_bits(lowest: NDArray[np.int_]) -> int:
-    """Return the number of low bits that never change in a piece, but for errors; -1 of too few changes."""
-    moved = np.sort(lowest[lowest < 63])
-    return int(moved[int(SHARE_OF_ERRORS * len(moved))]) if len(moved) >= FEWEST_CHANGES else -1
-
-
-def _stuck_bit(counts: Counts, gap: NDArray[np.bool_], bits: range) -> tuple[int, int] | None:
-    """Return (axis, bit) of a bit that is constant though lower ones change and values on both sides are passed."""
-    halves = [part for part in (counts[: len(counts) // 2], counts[len(counts) // 2 :]) if not gap.any() and len(part)]
-    for part in (counts, *halves):
-        moved = np.bitwise_or.reduce(part ^ part[0], axis=0)
-        # across a gap, as between files of single faces, no value is passed
-        pieces = np.split(part, np.flatnonzero(gap)) if part is counts else [part]
-        passed = np.max([np.ptp(piece, axis=0) for piece in pieces if len(piece)], axis=0)
-        for axis in range(3):
-            for bit in bits:
-                enough = 2 ** (bit + 1) if bit < SIGN else OF_ALL_VALUES * 2**SIGN
-                lower = moved[axis] & (1 << bit) - 1
-                if moved[axis] >> bit & 1 or not lower or passed[axis] < enough:
-                    continue
-                if bit in HIGH_BITS or len(np.unique(part[:, axis] >> (bit + 1))) >= FEWEST_PLACES:
-                    return axis, bit
-    last = len(counts) // 2
-    places = ((axis, bit) for axis in range(3) for bit in bits if bit in HIGH_BITS and bit < SIGN)
-    return next((at for at in places if _leaps(counts[last:, at[0]], gap[last:], at[1])), None)
-
-
-def _leaps(counts: Counts, gap: NDArray[np.bool_], bit: int) -> bool:
-    """Return True if values (n,) leap again and again over those with another value of a bit, and stay on both sides.
-
-    Leaps across a gap do not count, and a few samples may be errors of a bus.
+    Across a gap, as between files of single faces, nothing changes. A sound bit changes as often as on the axis where
+    it does so most, and half of the time where the value jumps by more than two steps of the bit.
     """
-    with_it = int(np.count_nonzero(counts >> bit & 1))
-    errors = min(with_it, len(counts) - with_it)
-    if errors > MOST_ERRORS * len(counts):
-        return False
-    side = counts >> (bit + 1)
-    leaps = int(np.count_nonzero((side[1:] != side[:-1]) & ~gap[1:]))
-    _, stays = np.unique(side, return_counts=True)
-    return leaps > max(FEWEST_LEAPS, 10 * errors) and int(np.count_nonzero(stays > STAYS * len(counts))) > 1
+    changed = words[1:] ^ words[:-1]
+    changed[gap[1:]] = 0
+    jumps = np.abs(np.diff(words.astype(np.int16).astype(int), axis=0))
+    # without its sign a value that passes zero leaps from one end of the range to the other
+    leaps = (np.abs(np.diff((words & 0x7FFF).astype(int), axis=0)) > 2**14) & ~gap[1:, None]
+    edges = np.unique(np.linspace(0, len(changed), PIECES, endpoint=False).astype(int))
+    counts = []
+    for bit in range(BITS):
+        may = changed >= 2 << bit if bit < BITS - 1 else leaps
+        does, far = may & (changed & 1 << bit > 0), jumps >= 2 << bit
+        counts.append(
+            [np.add.reduceat(each, edges, dtype=int) for each in (does, may & ~does & ~far, may & ~does & far)]
+        )
+    does, near, far = np.moveaxis(np.array(counts), 1, 0)
+    shares = (does.sum(1) + 1.0) / ((does + near + far).sum(1) + 2.0)
+    sound = np.clip(shares.max(1), LEAST_SOUND, MOST_SOUND)[:, None, None]
+    evidence = does * np.log(ERRORS / sound) + near * np.log((1.0 - ERRORS) / (1.0 - sound))
+    evidence += far * math.log((1.0 - ERRORS) / (1.0 - LEAST_SOUND))
+    # of all pieces from one on
+    after = np.cumsum(evidence[:, ::-1], axis=1)[:, ::-1]
+    first = edges[after.argmax(1)]
+    stuck = after.max(1) > math.log(ODDS)
+    # what swings by whole steps of a bit leaves it unchanged from one sample to the next, and not for long
+    for bit, axis in np.argwhere(stuck):
+        ones = float(np.mean(words[first[bit, axis] + 1 :, axis] >> bit & 1))
+        stuck[bit, axis] = min(ones, 1.0 - ones) < ERRORS
+    return stuck, first
+
+
+def _low_bits(stuck: Mask, first: Counts, lsb: float) -> Low | None:
+    """Return the axis with the most low bits that never change."""
+    dead = np.logical_and.accumulate(stuck, axis=0).sum(0)
+    axis, common = int(dead.argmax()), int(dead.min())
+    bits = int(dead[axis])
+    if bits < DEAD_BITS + (0 if common >= LOST_BYTE else common):
+        return None
+    return Low(axis, bits, int(first[:bits, axis].max()), lsb * 2.0**bits)
 
 
 def _odd_steps(values: Vector) -> Low | None:
-    """Return the axis whose every value is a multiple of a step that is many times the step of another axis."""
-    part = values[:: max(len(values) // MOST_SAMPLES, 1)]
-    if all(_is_fine(column) for column in part.T):
-        return None  # nearly every recording ends here, without sorting its values
-    unique = [np.unique(column) for column in part.T]
-    if min(map(len, unique)) < FEWEST_VALUES:
+    """Return the axis that changes in multiples of a step that is many times the step of the other axes."""
+    changes = np.abs(np.diff(values, axis=0))
+    steps = np.min(changes, axis=0, initial=np.inf, where=changes > 0.0)
+    axis, finest = int(steps.argmax()), float(np.median(steps))
+    step = float(steps[axis])
+    if not max(ODD_STEPS * finest, LEAST_ODD_STEP) <= step < np.inf:
         return None
-    steps = np.array([float(np.diff(u).min()) for u in unique])
-    axis = int(steps.argmax())
-    finest = float(np.median(steps))
-    places = (unique[axis] - unique[axis][0]) / steps[axis]
-    if steps[axis] < max(ODD_STEPS * finest, LEAST_ODD_STEP) or np.abs(places - np.rint(places)).max() > EXACTLY:
+    places = changes[:, axis] / step
+    if np.abs(places - np.rint(places)).max() > EXACTLY:
         return None
     # Other axes may be as fine as a float, but a word has 16 bits.
-    bits = min(round(float(np.log2(steps[axis]) - np.log2(finest))), SIGN)
-    return Low(axis, bits, 0, steps[axis])
-
-
-def _is_fine(column: Vector) -> bool:
-    """Return True if some value differs from the one before it by less than an odd step."""
-    change = np.abs(np.diff(column))
-    return bool(np.any((change > 0.0) & (change < LEAST_ODD_STEP)))
+    return Low(axis, min(round(math.log2(step) - math.log2(finest)), BITS - 1), 0, step)
