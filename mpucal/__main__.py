@@ -109,7 +109,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     import click  # noqa: PLC0415
 
-    from .cli import commands  # noqa: PLC0415
+    from .cli import amended, commands  # noqa: PLC0415
 
     try:
         return int(commands.main(args=arguments, prog_name="mpucal", standalone_mode=False) or 0)
@@ -124,9 +124,10 @@ def _run(arguments: Sequence[str] | None) -> int:
         if EVENTS in _words(arguments):
             return _event(error.exit_code, error.what, error.remedy)
         click.echo(f"mpucal: {error}", err=True)
-        if error.options:
+        if error.options or error.without:
             # the whole command, to be copied
-            click.echo(f"mpucal: try `mpucal {shlex.join(_words(arguments))} {error.options}`", err=True)
+            again = amended(_words(arguments), error.options, error.without)
+            click.echo(f"mpucal: try `mpucal {shlex.join(again)}`", err=True)
         return error.exit_code
     except SystemExit:
         # click exits so if the reader of stdout has gone, which is not an error

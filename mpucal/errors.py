@@ -51,14 +51,15 @@ class MpucalError(Exception):
     ----------
     what : one clause, no full stop: what happened, on what.
     remedy : one clause, no full stop: what the person can do next.
-    options : command-line options that would make the same command work; empty if that is not enough.
+    options, without : command-line options that would make the same command work, and one that must be left out;
+        empty if that is not enough.
     """
 
     exit_code = 1
 
-    def __init__(self, what: str, remedy: str, options: str = "") -> None:
+    def __init__(self, what: str, remedy: str, options: str = "", without: str = "") -> None:
         super().__init__(what, remedy)
-        self.options = options
+        self.options, self.without = options, without
         self.what = escape_line(what)
         self.remedy = escape_line(remedy)
 

@@ -135,5 +135,6 @@ def sample_rate_divider(rate_hz: float, dlpf_cfg: int) -> int:
             f"the chip has no sample rate of {rate_hz:g} Hz with its low-pass filter at {dlpf_cfg}",
             f"use {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz, or"
             f" {ACCEL_ONLY_HZ:g} Hz for the accelerometer of an MPU-6500 alone",
+            f"--rate {nearest:g}",
         )
     return int(divider)

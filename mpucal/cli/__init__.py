@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -29,6 +30,8 @@ COMMANDS = {
     "show": "Show a calibration, a config blob, a recording or a device.",
 }
 HELP = "help"
+# Option whose values add up.
+UNITS = "--units"
 # Key of the words of the command line in the context.
 TYPED = "mpucal.typed"
 
@@ -44,6 +47,27 @@ def with_option(words: Sequence[str], option: str, value: str) -> list[str]:
     words = [word for word in words if not word.startswith(f"{option}=")]
     at = words.index(option) if option in words else len(words)
     return [*words[:at], option, value, *words[at + 2 :]]
+
+
+def amended(words: Sequence[str], options: str, without: str) -> list[str]:
+    """Return the words of a command line with other `options`, and without an option, which may name its value."""
+    option, _, value = without.partition(" ")
+    for i, word in enumerate(words):
+        name, joined, given = word.partition("=")
+        parted = not joined and option not in _flags(words[0]) and not "".join(words[i + 1 : i + 2]).startswith("-")
+        if name == option and value in ("", given, *words[i + 1 : i + 2]):
+            words = [*words[:i], *words[i + 1 + parted :]]
+            break
+    changes = shlex.split(options)
+    for option, value in zip(changes[::2], changes[1::2], strict=True):
+        words = [*words, option, value] if option == UNITS else with_option(words, option, value)
+    return list(words)
+
+
+def _flags(name: str) -> set[str]:
+    """Return the options of a command that take no value."""
+    options = getattr(commands.get_command(click.Context(commands), name), "params", ())
+    return {text for option in options if getattr(option, "is_flag", False) for text in option.opts}
 
 
 class Commands(click.Group):

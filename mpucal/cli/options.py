@@ -179,6 +179,7 @@ def check_gyroscope(config: Config) -> None:
         raise UsageError(
             f"at {config.rate_hz:g} Hz a chip measures with its accelerometer alone, and this needs the gyroscope",
             f"take --rate 1000 or less; `mpucal record` and `mpucal stream` accept --rate {config.rate_hz:g}",
+            "--rate 1000",
         )
 
 

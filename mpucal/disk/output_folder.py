@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
@@ -104,7 +105,17 @@ def _create(name: str) -> Path:
 
 
 def _creation_error(path: Path, error: OSError) -> OutputError:
-    return OutputError(f"cannot make the folder {path} ({error.strerror})", "choose another one with -o")
+    here = path.parent == Path()
+    return OutputError(
+        f"cannot make the folder {path} ({error.strerror})",
+        "choose another one with -o",
+        _other(Path.home() / path.name if here else Path(path.name)),
+    )
+
+
+def _other(path: Path) -> str:
+    """Return the option that names another folder, `path` or a free name like it."""
+    return f"-o {shlex.quote(str(free_name(path)))}"
 
 
 def _lock(path: Path) -> int | None:
@@ -121,7 +132,9 @@ def _lock(path: Path) -> int | None:
         holder = _holder(handle)
         os.close(handle)
         raise OutputError(
-            f"another mpucal{holder} writes to {path}", "wait until it ends, or choose another folder with -o"
+            f"another mpucal{holder} writes to {path}",
+            "wait until it ends, or choose another folder with -o",
+            _other(path),
         ) from error
     except OSError:
         # A network disk may not support locks.

@@ -57,6 +57,7 @@ class Feed:
             raise OutputError(
                 f"no page can be served at {where.host}:{where.port} ({rest or 'its process ended'})",
                 "choose another address with --page=HOST:PORT, or leave --page out",
+                without="--page",
             )
         self.url = f"http://{where.name}:{rest}/{token}/"
         self.visited = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 from contextlib import suppress
 from pathlib import Path
@@ -40,7 +41,9 @@ class SessionFolder(OutputFolder):
         if there := next((file.name for file in held if file.exists()), None):
             self.close()
             raise OutputError(
-                f"{given} holds {there} already, which is not overwritten", "choose another folder with -o"
+                f"{given} holds {there} already, which is not overwritten",
+                "choose another folder with -o",
+                f"-o {shlex.quote(str(free_name(self.path)))}",
             )
         self._check_space()
 

@@ -28,10 +28,10 @@ def choose_sinks(asked: Sequence[str], no_write: bool, source: SourceKind) -> tu
     UsageError : the source does not have such a sink, or --to is given with --no-write.
     """
     if no_write and asked:
-        raise UsageError("--to and --no-write exclude each other", "leave one of them out")
+        raise UsageError("--to and --no-write exclude each other", "leave one of them out", without="--no-write")
     for name in asked:
         if name != FILE:
-            check_behind(SINKS[name], source, f"--to {name} was given", ", or leave it out")
+            check_behind(SINKS[name], source, f"--to {name} was given", f"--to {name}")
     if no_write:
         return ()
     return tuple(
@@ -39,12 +39,12 @@ def choose_sinks(asked: Sequence[str], no_write: bool, source: SourceKind) -> tu
     )
 
 
-def check_behind(kind: SinkKind, source: SourceKind, given: str, otherwise: str = "") -> None:
+def check_behind(kind: SinkKind, source: SourceKind, given: str, without: str = "") -> None:
     """Check that the source has such a sink.
 
     Parameters
     ----------
-    given, otherwise : the beginning of the message and the end of its remedy.
+    given : the beginning of the message. without : the option that may be left out.
 
     Raises
     ------
@@ -52,7 +52,8 @@ def check_behind(kind: SinkKind, source: SourceKind, given: str, otherwise: str 
     """
     if not kind.behind(source):
         has = "has no sensor to write to" if source.origin is Origin.FILE else f"has no {kind.name}"
-        raise UsageError(f"{given}, but {source.flag} {has}", f"{one_of(filter(kind.behind, SOURCES))}{otherwise}")
+        remedy = one_of(filter(kind.behind, SOURCES)) + (", or leave it out" if without else "")
+        raise UsageError(f"{given}, but {source.flag} {has}", remedy, without=without)
 
 
 def announce_sinks(kinds: Sequence[SinkKind], no_write: bool) -> str:

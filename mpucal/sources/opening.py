@@ -45,7 +45,8 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
     if kind.origin is not Origin.FILE:
         for option in _dependent_options(SOURCES):
             if option.name in given and option not in _dependent_options([kind]):
-                raise UsageError(f"{kind.flag} does not take {given[option.name]}", "remove it")
+                written = given[option.name]
+                raise UsageError(f"{kind.flag} does not take {written}", "remove it", without=written)
     return kind
 
 
@@ -72,7 +73,9 @@ def check_resume_options(given: Mapping[str, str]) -> None:
     for name in (*(kind.option.name for kind in SOURCES), *_fixed_by_capture(), OUTPUT_FOLDER):
         if name in given:
             raise UsageError(
-                f"--resume does not take {given[name]}: a session keeps its settings and folder", "remove it"
+                f"--resume does not take {given[name]}: a session keeps its settings and folder",
+                "remove it",
+                without=given[name],
             )
 
 
@@ -88,6 +91,7 @@ def refuse_fixed_options(request: Request) -> None:
             raise UsageError(
                 f"{request.kind.flag} does not take {request.given[name]}, which the capture fixes",
                 "remove it, or use `mpucal calibrate` to fit the capture with other options",
+                without=request.given[name],
             )
 
 
@@ -174,7 +178,7 @@ def _plan(values: Mapping[str, Any], until_end: bool, kind: SourceKind) -> Plan:
     if values.get("tilt_only"):
         if model not in ("auto", "tilt"):
             what = f"--tilt-only does not take --model {model}, which tilts alone do not determine"
-            raise UsageError(what, "remove it: tilts are fitted by the model tilt")
+            raise UsageError(what, "remove it: tilts are fitted by the model tilt", without="--model")
         model = "tilt"
     aim = {name: values[name] for name in ("target", "tilt_only", "attended", "gravity_anyway") if name in values}
     board = values.get("board") or usual.board

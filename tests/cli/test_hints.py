@@ -82,12 +82,36 @@ def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording, sav
     refused = mpucal("apply", "c.json", "in.npz", "-o", "out.npz")
     assert refused.code == 3
     command = refused.err.splitlines()[-1].removeprefix("mpucal: try `").removesuffix("`")
-    assert command == "mpucal apply c.json in.npz -o out.npz --units acc=m/s^2,gyr=deg/s"
+    assert command == "mpucal apply c.json in.npz -o out.npz --units 'acc=m/s^2,gyr=deg/s'"
     assert mpucal(*shlex.split(command)[1:]).code == 0
     names = "time,accX,accY,accZ,gyroX (rad/s),gyroY (rad/s),gyroZ (rad/s)"
     rows = np.column_stack([recording.t, recording.acc, np.degrees(recording.gyr)])
     np.savetxt("in.csv", rows, delimiter=",", header=names, comments="")
     assert mpucal("show", "in.csv").err.endswith("mpucal: try `mpucal show in.csv --units gyr=deg/s`\n")
+
+
+TAKEN, HAS_NONE = "x/y/board", "192.0.2.1:9"  # a folder that cannot be made, and an address of no computer
+INSTEAD = {
+    f"session --bus sim -o {TAKEN}": "session --bus sim -o board",
+    f"session --page={HAS_NONE} --bus sim --yes": "session --bus sim --yes",
+    f"session --page {HAS_NONE} --bus sim --yes": "session --bus sim --yes",
+    "session --bus sim --rate 5000": "session --bus sim --rate 1000",
+    "session --rate=4000 --bus sim": "session --bus sim --rate 1000",
+    "session --bus sim --to file --to kernel -o r": "session --bus sim --to file -o r",
+    "session --bus sim --to=bridge": "session --bus sim",
+    "session --no-write --to chip --bus sim": "session --to chip --bus sim",
+    "session --mavlink sim --dlpf 2 --yes": "session --mavlink sim --yes",
+    "session --resume board --bus sim": "session --resume board",
+    "session --bus sim --model hand --tilt-only": "session --bus sim --tilt-only",
+}
+
+
+@pytest.mark.parametrize("refused", INSTEAD)
+def test_a_refused_session_ends_with_the_whole_command_before_a_board_is_lifted(refused, mpucal):
+    Path("x").write_text("no folder")
+    found = mpucal(*refused.split())
+    assert found.err.endswith(f"mpucal: try `mpucal {INSTEAD[refused]}`\n")
+    assert "Lay the board" not in found.err
 
 
 def test_a_part_of_any_recording_is_read(recording):
