@@ -17,7 +17,7 @@ from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
 from .hypotheses import SURE, Explanation, explain, remove_walk, walk_of
-from .masks import find_reset, remove_spikes, with_masks
+from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, choose_model
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
@@ -43,7 +43,7 @@ def estimate(
         raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
-    before = Evidence(recording, gravity, None, None, model, gravity_anyway=gravity_anyway)
+    before = Evidence(with_masks(recording), gravity, None, None, model, gravity_anyway=gravity_anyway)
     whole = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
     if model != "auto":
         return whole
@@ -72,14 +72,14 @@ def _before_clipping(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] |
 
 def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str, str]] | None:
     """Return the estimate from the rests alone; None where they do not suffice."""
-    recording = with_masks(before.recording)
+    recording = before.recording
     segment = recording.flat or find_flat(recording)
     if segment is None or not is_long_enough(recording, segment):
         return None
     flat = flat_statistics(recording, segment)
     fit = fit_static(recording, flat, before.gravity)
     usable = replace(at_fault, what=at_fault.what + OF_RESTS, refuse=False)
-    evidence = replace(before, recording=recording, flat=flat, fit=fit, model="static", gyroscope=usable)
+    evidence = replace(before, flat=flat, fit=fit, model="static", gyroscope=usable)
     if any(reason.refuse for reason in find_reasons(evidence)):
         return None
     return evidence, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
@@ -87,8 +87,6 @@ def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str
 
 def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     recording, gravity, model = before.recording, before.gravity, before.model
-    # A spike of the acceleration may be a knock, which the fit weighs itself: only the rates are repaired.
-    recording = replace(with_masks(recording), gyr=remove_spikes(recording).gyr)
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
     end = None if flat is None else find_reset(recording, flat)

@@ -40,14 +40,13 @@ AROUND = np.array([step for step in range(-NEIGHBOURS, NEIGHBOURS + 1) if step])
 # A spike exceeds so much [m/s^2, rad/s], and so many times the departures of its neighbours from theirs; its
 # neighbours differ by less than this share of it.
 LEAST_SPIKE, SPIKES, RETURNS = np.repeat((0.3, 0.15), 3), 8.0, 0.25
-SPIKE_MARGIN = 4  # samples on either side of a word that decide whether it is a spike
 
 
-def remove_spikes(recording: Recording) -> Recording:
-    """Replace each spike, a single word that jumps and is back with the next sample, by the mean of its neighbours.
+def _without_spikes(recording: Recording) -> Vector:
+    """Return the rates, each spike of a single word that is back with the next sample replaced by its neighbours' mean.
 
-    Spikes come from bits that a transfer flipped (chip/bit_flips.py repairs the last frame of a poll only with the next
-    poll), and from whatever else spoils a word in a file. No board moves like that.
+    Whatever spoils a word of a file leaves a spike; no board moves like that. A chip's decoder repairs its own
+    (chip/bit_flips.py). A spike of the acceleration stays: it may be a knock, which the fit weighs itself.
     """
     words = np.hstack((recording.acc, recording.gyr))
     before, after = words[:-2], words[2:]
@@ -58,15 +57,17 @@ def remove_spikes(recording: Recording) -> Recording:
     off = off[3:-3]
     jumps = off > np.maximum(LEAST_SPIKE, SPIKES * usual)
     alone = jumps & (np.abs(after - before) < RETURNS * off) & (jumps.sum(axis=1, keepdims=True) == 1)
-    if not alone.any():
-        return recording
+    if not alone[:, 3:].any():
+        return recording.gyr
     words[1:-1][alone] = mean[alone]
-    acc, gyr = np.hsplit(words, 2)
-    return replace(recording, acc=acc, gyr=gyr)
+    return words[:, 3:].copy()
 
 
 def with_masks(recording: Recording) -> Recording:
-    """Return the recording with its gaps and clipped samples marked, where its source did not already."""
+    """Return the recording without spikes of its rates, and with its gaps and clipped samples marked.
+
+    This is the first step of every use of a recording; the marks of its source stay.
+    """
     dt = np.diff(recording.t, prepend=recording.t[0])
     # An autopilot's stream comes by radio, and its source says which pauses are more than single lost packets. It is
     # rounded, too, and of a range that no hand reaches: values repeat without being clipped.
@@ -80,6 +81,7 @@ def with_masks(recording: Recording) -> Recording:
     stuck = of_a_chip & _stuck(recording.gyr, gyr_clipped)
     return replace(
         recording,
+        gyr=_without_spikes(recording),
         gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t) | stuck,
         acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
         gyr_clipped=gyr_clipped,

@@ -6,6 +6,9 @@ T or more from the mean of its neighbours, these agree within R or a quarter of 
 jumps, and inverting one bit brings it within R of that mean. R is six times the running median of such differences, and
 T six times R: smaller flips are left, since they are within noise and motion. `flips.cpp` finds the jumps and follows
 the median.
+
+The last frame of a poll has no frame after it yet. It waits for the next poll if it may be flipped, so that nobody sees
+a flipped word.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data import Vector
 from ._flips import until_jumps
 
 Counts = NDArray[np.int16]
@@ -21,6 +25,8 @@ Counts = NDArray[np.int16]
 NEAR_MEDIANS, NEAR_COUNTS = 6.0, 8.0
 # Median difference [counts] of consecutive samples of a sensor in the hand.
 INITIAL_MEDIAN = 30.0
+# A word that jumps by T or more and returns has made a step of at least 7/8 T: T is 6 R or more.
+LEAST_STEP = 5.25
 BITS = (1 << np.arange(16)).astype(np.uint16)
 
 
@@ -41,11 +47,16 @@ class BitFlipFilter:
         """Forget the last frames: the next ones do not follow on them."""
         self._before = self._before[:0]
 
-    def repair(self, frames: Counts, last: Counts) -> Counts:
+    @property
+    def is_open(self) -> bool:
+        """True if the last frame may be flipped: it must wait for the next one."""
+        steps = np.abs(np.diff(self._before.astype(np.float64), axis=0))
+        return bool((steps >= LEAST_STEP * self._near).any())
+
+    def repair(self, frames: Counts, waiting: Counts) -> Counts:
         """Return `frames` with the flipped words repaired that have a neighbour on both sides.
 
-        The last frame has its second neighbour only in the next call, which repairs it in `last`: the stored frames
-        that end with it.
+        The frame before them, the last one that is `waiting`, is repaired in its place.
         """
         n = len(self._before)
         run = np.concatenate((self._before, frames))
@@ -53,8 +64,8 @@ class BitFlipFilter:
             _, jumps = until_jumps(run, np.array([len(run)]), self._median)
             for at, word in jumps:
                 run[at, word] = self._repaired_word(run, at, word)
-                if at == n - 1 and len(last):
-                    last[-1, word] = run[at, word]
+                if at == n - 1:
+                    waiting[-1, word] = run[at, word]
         self._before = run[-2:].copy()
         return run[n:]
 
@@ -80,7 +91,12 @@ class BitFlipFilter:
         mean = (float(run[at - 1, word]) + float(run[at + 1, word])) / 2
         each = (run[at, word].astype(np.uint16) ^ BITS).astype(np.int16)
         best = each[np.argmin(np.abs(each - mean))]
-        if abs(best - mean) > NEAR_MEDIANS * self._median[word] + NEAR_COUNTS:
+        if abs(best - mean) > self._near[word]:
             return np.int16(run[at, word])
         self.repaired += 1
         return np.int16(best)
+
+    @property
+    def _near(self) -> Vector:
+        """Limits R (words,)."""
+        return NEAR_MEDIANS * self._median + NEAR_COUNTS

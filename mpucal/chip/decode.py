@@ -148,9 +148,9 @@ class Decoder:
         """Return the samples since the last `take`, with provisional times."""
         return self._fifo.take() if self._fifo is not None else Samples.empty()
 
-    def release(self, last: bool = False) -> list[Run]:
+    def release(self) -> list[Run]:
         """Hand over the frames since the last call; see FifoDecoder.release."""
-        return self._fifo.release(last) if self._fifo is not None else []
+        return self._fifo.release() if self._fifo is not None else []
 
     def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
         """Yield the samples of released runs, in the same order, with final times."""

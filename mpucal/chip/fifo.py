@@ -82,7 +82,7 @@ class FifoDecoder:
         self._pending = bytearray()
         self._last_t_s: float | None = None
         self._stuck_frames = max(STUCK_FRAMES, math.ceil(STUCK_S * settings.nominal_rate_hz))
-        self._equal_tail = np.zeros((0, settings.frame_words), np.int16)
+        self._waiting = np.zeros((0, settings.frame_words), np.int16)
         self._flips = BitFlipFilter(settings.frame_words)
 
     @property
@@ -111,7 +111,8 @@ class FifoDecoder:
     def finish_poll(self, overflow: bool, lost: bool = False) -> FifoFault | None:
         """Accept what the poll read, or return why not; then only a reset helps.
 
-        Equal frames at the end wait until a different one follows them. `lost`: the chip was reset meanwhile.
+        Equal frames at the end wait until a different one follows them, and one that may be flipped for the next.
+        `lost`: the chip was reset meanwhile.
         """
         data, look = bytes(self._pending), self._look
         self._pending.clear()
@@ -125,13 +126,11 @@ class FifoDecoder:
         if look is not None and isinstance(self._clock, PolledClock) and self._clock.is_late(look[0]):
             return FifoFault.LATE
         frames = np.frombuffer(data, ">i2").reshape(-1, self.settings.frame_words).astype(np.int16)
-        # Frames that wait are all equal, so that none of them holds a flipped bit.
-        last = self._runs[-1].frames if self._runs and not len(self._equal_tail) else self._equal_tail
-        kept = self._flips.repair(frames[max(DROPPED_FRAMES - self._read, 0) :], last)
+        kept = self._flips.repair(frames[max(DROPPED_FRAMES - self._read, 0) :], self._waiting)
         if not self._is_aligned(kept):
             return FifoFault.MISALIGNED
         self._read += len(frames)
-        kept = np.concatenate((self._equal_tail, kept))
+        kept = np.concatenate((self._waiting, kept))
         if self._is_stuck(kept):
             return FifoFault.STUCK
         if look is not None:
@@ -149,7 +148,7 @@ class FifoDecoder:
         looks_ns : (k,) when each poll counted the FIFO. lengths : (k,) frames of each, one at least.
         frames : (n, words) of all of them.
         """
-        if self._read <= DROPPED_FRAMES or len(self._equal_tail) or self._odd_bytes:
+        if self._read <= DROPPED_FRAMES or len(self._waiting) or self._odd_bytes:
             return 0
         ends = np.cumsum(lengths)
         odd = (frames[1:] == frames[:-1]).all(axis=1)
@@ -163,18 +162,18 @@ class FifoDecoder:
             return 0
         kept = frames[: ends[plain - 1]]
         self._clock.add(looks_ns[:plain], self._read + ends[:plain])
-        self._append(kept, self._read, gap=False)
         self._read += len(kept)
+        self._accept(kept)
         if not self.settings.accel_only:
             self._temperature = int(temperature[len(kept) - 1])
         return plain
 
     def _accept(self, kept: Counts) -> None:
-        """Keep all frames except the equal ones at the end, which the next poll decides on."""
+        """Keep all frames except those at the end that the next poll decides on."""
         differ = np.flatnonzero((kept[1:] != kept[:-1]).any(axis=1))
         equal = len(kept) - (int(differ[-1]) + 1 if len(differ) else 0)
-        accepted = len(kept) - equal if equal > 1 else len(kept)
-        self._equal_tail = kept[accepted:]
+        accepted = len(kept) - (equal if equal > 1 else min(int(self._flips.is_open), len(kept)))
+        self._waiting = kept[accepted:].copy()
         if accepted:
             first = self._read - len(kept)
             self._append(kept[:accepted], first, gap=first == DROPPED_FRAMES and self._begun)
@@ -198,7 +197,7 @@ class FifoDecoder:
         """Discard what was in the FIFO, which was emptied: a frame begins at the next byte."""
         self._pending.clear()
         self._look = None
-        self._equal_tail = self._equal_tail[:0]
+        self._waiting = self._waiting[:0]
         self._flips.reset()
         self._clock.begin_segment()
         self._read = self._odd_bytes = 0
@@ -212,13 +211,10 @@ class FifoDecoder:
         self._last_t_s = float(samples.t[-1])
         return samples
 
-    def release(self, last: bool = False) -> list[Run]:
-        """Hand over the frames since the last call; `final` makes samples of them once there are no more.
-
-        The `last` run is included only on request, since the next poll may repair its end.
-        """
-        runs, self._runs, self._taken = self._runs, [] if last else self._runs[-1:], 0
-        return runs if last else runs[:-1]
+    def release(self) -> list[Run]:
+        """Hand over the frames since the last call; `final` makes samples of them once there are no more."""
+        runs, self._runs, self._taken = self._runs, [], 0
+        return runs
 
     def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
         """Yield the samples of released runs, in the same order, with final times."""

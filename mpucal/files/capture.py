@@ -68,7 +68,6 @@ def capture_rows(*paths: Path) -> Rows:
     for access in session.accesses():
         decoder.feed(access)
         spool.add(decoder.release())
-    spool.add(decoder.release(last=True))
     if spool.frames < 2:
         raise RecordingError(f"{session.name} holds {spool.frames} samples", "record for longer")
     runs = decoder.final(spool.runs())

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..chip.access import Transaction
+from ..chip.bit_flips import BitFlipFilter
 from ..chip.families import MPU6050
 from ..data import Recording, Samples, Sensor, Vector
 from ..errors import ChipError, RecordingError
@@ -18,6 +19,7 @@ from .attributes import (
     GYRO,
     TEMP,
     TIMESTAMP,
+    USUAL_BITS,
     SensorScale,
     bits_of,
     chip_name,
@@ -35,6 +37,8 @@ NS = 1e-9
 GAP_INTERVALS = 1.5
 # A buffer with another clock than the host's monotonic one is off by more.
 OTHER_CLOCK_NS = 5_000_000_000
+# A row of both sensors: three counts and a mark of each.
+ROW = 8
 LISTING = "/"
 ENABLE, FREQUENCY = "buffer/enable", "sampling_frequency"
 
@@ -68,6 +72,8 @@ class IioDecoder:
         self._scales: dict[str, tuple[str, SensorScale]] = {}
         self._streams: dict[str, int] = {}
         self._aligned: StreamAligner | None = None
+        self._flips = BitFlipFilter(ROW)
+        self._waiting: tuple[Times, Vector] = np.zeros(0, np.int64), np.zeros((0, ROW))
         self._gyro_to_accel: Vector | None = None
         self._temperature = np.nan
         self._last_ns: int | None = None
@@ -194,6 +200,8 @@ class IioDecoder:
         self._sensor = self._describe_sensor()
         self._streams = {name: i for i, name in enumerate(widths)}
         self._aligned = StreamAligner(list(widths.values()))
+        self._flips = BitFlipFilter(ROW)
+        self._waiting = np.zeros(0, np.int64), np.zeros((0, ROW))
         accel, gyro = (mount_matrix(self.texts(self.scale(kind)[0]), kind) for kind in (ACCEL, GYRO))
         self._gyro_to_accel = (
             None if np.array_equal(accel, gyro) else np.asarray(np.linalg.solve(accel, gyro), np.float64)
@@ -242,15 +250,16 @@ class IioDecoder:
         if self._aligned is None:
             return
         t_ns, values = self._aligned.take()
-        if len(t_ns) == 0:
-            return
-        if values.shape[1] == 12:
+        if values.shape[1] > ROW:
             # Polled channels have a count and a mark each.
             counts, marks = values[:, ::2], values[:, 1::2]
             values = np.column_stack((counts[:, :3], marks[:, :3].max(1), counts[:, 3:], marks[:, 3:].max(1)))
         accel, gyro = self.scale(ACCEL)[1], self.scale(GYRO)[1]
         # Interpolated counts are rounded too, for the checks of single bits.
-        counts = np.round(values)
+        values[:, 3::4] = np.ceil(values[:, 3::4])
+        t_ns, counts = self._repaired(t_ns, np.round(values))
+        if not len(t_ns):
+            return
         rates = (counts[:, 4:7] + gyro.offset) * gyro.scale
         samples = Samples(
             np.asarray(t_ns * NS, np.float64),
@@ -258,13 +267,24 @@ class IioDecoder:
             rates if self._gyro_to_accel is None else rates @ self._gyro_to_accel.T,
             np.full(len(t_ns), self._temperature),
             self._gaps(t_ns),
-            values[:, 3] > 0,
-            values[:, 7] > 0,
+            counts[:, 3] > 0,
+            counts[:, 7] > 0,
         )
         self._last_ns = int(t_ns[-1])
         self.gaps += int(samples.gap.sum())
         self._samples.append(samples)
         self._new.append(samples)
+
+    def _repaired(self, t_ns: Times, rows: Vector) -> tuple[Times, Vector]:
+        """Return times (n,) and rows (n, ROW) without flipped bits; the last row waits while it may hold one."""
+        if max(self.scale(kind)[1].bits or 0 for kind in (ACCEL, GYRO)) > USUAL_BITS:
+            return t_ns, rows
+        before, waiting = self._waiting[0], self._waiting[1].astype(np.int16)
+        repaired = self._flips.repair(rows.astype(np.int16), waiting)
+        t_ns, rows = np.concatenate((before, t_ns)), np.concatenate((waiting, repaired)).astype(np.float64)
+        ready = len(rows) - self._flips.is_open
+        self._waiting = t_ns[ready:], rows[ready:]
+        return t_ns[:ready], rows[:ready]
 
     def _gaps(self, t_ns: Times) -> np.ndarray:
         """Return (n,) True where the buffer dropped samples; polling has no fixed interval."""

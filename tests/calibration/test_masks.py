@@ -36,6 +36,19 @@ def test_marks_of_the_source_stay():
         np.testing.assert_array_equal(getattr(marked, name), marks)
 
 
+def test_a_spike_of_one_rate_is_removed_and_a_blow_is_kept():
+    """A word of a file that jumps and returns was spoilt: a turn by some degrees. A blow moves more than one word."""
+    t = 0.01 * np.arange(1000)
+    acc = [0.0, 0.0, 9.8] + 0.02 * np.sin(7.0 * t)[:, None] * np.ones(3)
+    gyr = np.stack([np.sin(t), np.cos(t), 0.1 * t], axis=1)
+    spoilt, blow = gyr.copy(), acc.copy()
+    spoilt[400, 1] += 8.7
+    blow[500] += 3.0
+    found = with_masks(Recording.from_arrays(t, blow, spoilt))
+    np.testing.assert_allclose(found.gyr, gyr, atol=1e-4)
+    np.testing.assert_array_equal(found.acc, blow)
+
+
 @pytest.mark.parametrize("jitter", [0.0, 0.4], ids=["even", "jittered"])
 def test_a_gap_is_where_time_jumps(pick, jitter):
     recording = noise()

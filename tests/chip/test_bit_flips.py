@@ -19,11 +19,14 @@ def stream(rng, n=400):
 
 
 def filtered(frames, length):
-    """Pass the frames in polls of `length`: (frames, number repaired)."""
-    flips, kept = BitFlipFilter(7), []
+    """Pass the frames in polls of `length`: (frames, number repaired). A frame that is passed is never changed."""
+    flips, passed, waiting = BitFlipFilter(7), [], NONE
     for first in range(0, len(frames), length):
-        kept.append(flips.repair(frames[first : first + length].copy(), kept[-1] if kept else NONE))
-    return np.concatenate(kept), flips.repaired
+        repaired = flips.repair(frames[first : first + length].copy(), waiting)
+        run = np.concatenate((waiting, repaired))
+        ready = len(run) - flips.is_open
+        passed, waiting = [*passed, run[:ready]], run[ready:]
+    return np.concatenate((*passed, waiting)), flips.repaired
 
 
 @pytest.mark.parametrize("length", [1, 2, 8])

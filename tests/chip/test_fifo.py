@@ -50,6 +50,8 @@ def test_values_are_counts_times_nominal_scale(frames):
     decoder = fresh()
     frames = [frame for frame, _ in itertools.groupby(frames)]
     assert poll(decoder, packed(*frames), 1) is None
+    # the last frame may be flipped, and waits
+    assert poll(decoder, packed(*calm(2)), 2) is None
     assume(not decoder.repaired)
     samples = decoder.take()
     for i, (ax, ay, az, temperature, gx, gy, gz) in enumerate(frames):
@@ -63,10 +65,24 @@ def test_values_are_counts_times_nominal_scale(frames):
 @pytest.mark.parametrize("count", [32767, -32767, -32768])
 def test_a_count_at_either_end_is_clipped(count):
     decoder = fresh()
-    poll(decoder, packed((count, 0, 0, *QUIET[3:]), (*QUIET[:6], count), QUIET), 1)
+    poll(decoder, packed((count, 0, 0, *QUIET[3:]), (*QUIET[:6], count), QUIET, (*QUIET[:6], 9)), 1)
     samples = decoder.take()
-    assert samples.acc_clipped.tolist() == [True, False, False]
-    assert samples.gyr_clipped.tolist() == [False, True, False]
+    assert samples.acc_clipped.tolist() == [True, False, False, False]
+    assert samples.gyr_clipped.tolist() == [False, True, False, False]
+
+
+def test_a_frame_that_may_be_flipped_waits_for_the_next():
+    """Repair of a flipped word before anybody sees it; a blow is passed on as it is, one poll later."""
+    flipped, blow = (*QUIET[:6], 7 ^ 1 << 13), (8000, *QUIET[1:])
+    decoder = fresh()
+    poll(decoder, packed(*calm(4), flipped), 1)
+    assert len(decoder.take()) == 4
+    poll(decoder, packed(*calm(2), blow), 2)
+    assert decoder.repaired == 1
+    assert np.abs(decoder.take().gyr).max() < 0.01
+    poll(decoder, packed((*blow[:6], 8), *calm(2)), 3)
+    assert decoder.repaired == 1
+    np.testing.assert_array_equal(decoder.take().acc[:2, 0], 8000 / 8192 * 9.80665)
 
 
 @given(st.lists(st.integers(0, 6), min_size=1, max_size=20))

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ...calibration.masks import SPIKE_MARGIN, remove_spikes
 from ...data import Mask, Recording, Samples, Sensor, Vector
 
 # Faster samples are averaged to this rate: no motion of a hand is lost.
@@ -26,9 +25,6 @@ class SampleStore:
         self._sensor = sensor
         rate_hz = sensor.rate_hz or MOST_HZ
         self._size = max(int(rate_hz / MOST_HZ * (1.0 + 1e-6)), 1)
-        # `_done` is filtered for good. `_open` is the unfiltered rest, preceded by the last `_lead` samples of `_done`,
-        # which the filter needs as neighbours.
-        self._done, self._open, self._lead = Samples.empty(), Samples.empty(), 0
         self._parts: list[Samples] = []
         self._rest = Samples.empty()
         self._gap_next = False
@@ -47,24 +43,17 @@ class SampleStore:
 
     def forget(self, first: int) -> None:
         """Drop the added samples from number `first` on, and mark a gap before the next one."""
-        kept = _cut(self._filtered(), 0, first // self._size)
-        self._done, self._open, self._lead = kept, Samples.empty(), 0
+        self._parts = [_cut(self.samples(), 0, first // self._size)]
         self._rest, self._gap_next = Samples.empty(), True
 
     def recording(self) -> Recording:
-        """Return all samples, without the bit flips that the decoder recognised too late."""
-        return Recording(**vars(self._filtered()), sensor=self._sensor)
+        """Return all samples."""
+        return Recording(**vars(self.samples()), sensor=self._sensor)
 
-    def _filtered(self) -> Samples:
-        """Return all samples filtered by `remove_spikes`, which is applied to those since the last call alone."""
-        begin = len(self._done) - self._lead
-        self._open, self._parts = Samples.joined([self._open, *self._parts]), []
-        filtered = remove_spikes(Recording(**vars(self._open), sensor=self._sensor))
-        whole = Samples.joined([self._done, _cut(filtered, self._lead, len(filtered))])
-        settled = max(len(whole) - SPIKE_MARGIN, len(self._done))
-        self._done, self._lead = _cut(whole, 0, settled), min(SPIKE_MARGIN, settled - begin)
-        self._open = _cut(self._open, settled - self._lead - begin, len(self._open))
-        return whole
+    def samples(self) -> Samples:
+        """Return all samples."""
+        self._parts = [Samples.joined(self._parts)]
+        return self._parts[0]
 
 
 def _cut(samples: Samples, first: int, last: int) -> Samples:

@@ -1,7 +1,6 @@
 """Live fits: right about what is known, and the same for the same samples."""
 
 from dataclasses import fields, replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -120,37 +119,3 @@ def test_faster_samples_are_averaged(rate_hz, size):
     assert len(recording) == n // size
     np.testing.assert_allclose(recording.acc[:, 0], recording.t)
     assert np.flatnonzero(recording.gap).tolist() == [501 // size]
-
-
-def test_a_late_bit_flip_is_removed_and_a_blow_is_kept(poses):
-    """A flipped sign bit of the gyroscope would be a turn by some degrees; a blow moves more than one word."""
-    at = len(poses) - 100
-    flipped, blow = poses.gyr.copy(), poses.acc.copy()
-    flipped[at, 1] += 8.7
-    blow[at] += 3.0
-    store = SampleStore(SENSOR)
-    store.add(part(replace(poses, gyr=flipped), 0))
-    found = store.recording()
-    np.testing.assert_allclose(found.gyr[at], poses.gyr[at], atol=0.05)
-    flipped[at], found.gyr[at] = 0.0, 0.0
-    np.testing.assert_array_equal(found.gyr, flipped)
-    np.testing.assert_array_equal(found.acc, poses.acc)
-    store = SampleStore(SENSOR)
-    store.add(part(replace(poses, acc=blow), 0))
-    np.testing.assert_array_equal(store.recording().acc, blow)
-
-
-def test_flips_are_taken_away_however_often_somebody_looks(poses):
-    """A flip in the last samples is taken away once the samples after it have arrived."""
-    gyr = poses.gyr[:600].copy()
-    gyr[np.arange(50, 600, 43), 2] += 5.0
-    samples = part(replace(poses, gyr=np.concatenate((gyr, poses.gyr[600:]))), 0, 3.0)
-    once, often = SampleStore(SENSOR), SampleStore(SENSOR)
-    once.add(samples)
-    ends = [0, 1, 3, 4, 51, 52, 93, 94, 95, 97, 181, 300, 301, 525, 600]
-    for first, last in pairwise(ends):
-        often.add(Samples(*(array[first:last] for array in vars(samples).values())))
-        assert len(often.recording()) == last
-    found = once.recording()
-    assert found == often.recording()
-    assert np.abs(found.gyr - poses.gyr[:600]).max() < 1.0
