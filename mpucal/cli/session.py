@@ -26,7 +26,6 @@ from ..sinks.record import session_recorder
 from ..sources.kind import NAME
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import check_resume_options, open_source
-from ..sources.resumed import open_resumed
 from ..sources.table import matching_kinds, source_title
 from ..terminal.console import Console, console
 from ..terminal.hangup import logging_after_hangup
@@ -146,6 +145,8 @@ def _open(
         return open_source(opening, given_options()), kinds, options
     check_resume_options(given_options())
     check_unfinished(resume)
+    from ..sources.resumed import open_resumed  # noqa: PLC0415 - it loads all that reads captures
+
     source = open_resumed(resume)
     options = {**options, **source.words}
     return source, choose_sinks(sinks, no_write, matching_kinds(options)[0]), options

@@ -22,6 +22,17 @@ def test_help_loads_nothing_heavy():
     assert all(name in done.stdout for name in COMMANDS)
 
 
+def test_the_help_of_no_command_loads_what_reads_captures_or_devices():
+    heavy = ("mcap", "pymavlink", "smbus2", "serial", "scipy", "matplotlib", "mpucal.iio.driver", "mpucal.mavlink.link")
+    program = (
+        "import sys; from mpucal.__main__ import run; from mpucal.cli import COMMANDS;"
+        "[run([name, '--help']) for name in COMMANDS];"
+        f"print([name for name in {heavy!r} if name in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_help_of_each_command_has_an_example(mpucal, name):
     result = mpucal(name, "--help")
