@@ -1,4 +1,4 @@
-"""Golden talks of firmware_protocol.md, held with three bridges."""
+"""Golden talks of firmware_protocol.md, and others, held with both bridges."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import re
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mpucal.chip.access import Reply
 from mpucal.doctor.conformance import examine_conformance
 from mpucal.doctor.finding import Mark
-from mpucal.simulated.bridge import EmulatedBridge
-from mpucal.simulated.bridge.storage import Memory
 from mpucal.sources.bridge import board
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.conformance import find_difference, talks
@@ -26,7 +26,7 @@ FIFO = {(0x72, 2): b"\x01\xf8"}
 
 
 class Chip:
-    """Chip with 504 bytes in its FIFO, for the buses of two bridges."""
+    """Chip with 504 bytes in its FIFO, for the buses of both bridges."""
 
     def read(self, register, count):
         return Reply(FIFO.get((register, count), bytes(count)), 0)
@@ -38,6 +38,9 @@ class Chip:
 
     def readfrom_mem(self, _address, register, count):
         return self.read(register, count).data
+
+    def writeto_mem(self, _address, register, data):
+        pass
 
 
 def _core(request, _folder, content=b"\xff" * 1024):
@@ -55,12 +58,6 @@ def _core(request, _folder, content=b"\xff" * 1024):
     return host.HostBridge(request.getfixturevalue("core"), eeprom, read, asked).receive, eeprom.content
 
 
-def _emulated(_request, _folder, content=b"\xff" * 1024):
-    memory = Memory()
-    memory.data[:] = content
-    return _working(EmulatedBridge(Chip(), lambda: 0, memory)), memory.data
-
-
 def _micropython(_request, folder):
     return _working(board.Bridge([Chip()], lambda: 0, f"{folder}/")), None
 
@@ -73,7 +70,7 @@ def _working(bridge):
     return said
 
 
-@pytest.mark.parametrize("made", [_core, _emulated, _micropython], ids=["the core", "the emulated", "MicroPython's"])
+@pytest.mark.parametrize("made", [_core, _micropython], ids=["the core", "MicroPython's"])
 def test_answers_as_the_golden_talks_say(made, request, tmp_path):
     for name, talk in talks().items():
         folder = tmp_path / name
@@ -84,10 +81,48 @@ def test_answers_as_the_golden_talks_say(made, request, tmp_path):
             assert find_difference(each, Deframer().feed(said(bytes.fromhex(each["host"])))) == "", name
 
 
-@pytest.mark.parametrize("made", [_core, _emulated], ids=["the core", "the emulated"])
-def test_other_data_are_given_up_only_by_an_erase(made, request, tmp_path):
+BLOB = (VECTORS / "blob_measured.bin").read_bytes()
+requests = st.lists(
+    st.one_of(
+        st.builds(Frame, st.sampled_from([*wire.REQUESTS, 0x33]), st.integers(0, 255), st.binary(max_size=66)),
+        st.builds(lambda at: Frame(0x13, 1, wire.BlobData(at, BLOB[at : at + 32]).payload()), st.integers(0, 187)),
+        st.sampled_from(
+            [
+                Frame(0x12, 2, wire.BlobBegin(188).payload()),
+                Frame(0x14, 3, wire.BlobCommit(188, int.from_bytes(BLOB[-4:], "little")).payload()),
+                Frame(0x10, 4),
+                Frame(0x05, 5, wire.Stream(14, 2).payload()),
+                *(Frame(0x13, 6, wire.BlobData(at, BLOB[at : at + 32]).payload()) for at in range(0, 188, 32)),
+            ]
+        ),
+    ),
+    max_size=25,
+)
+
+
+@settings(max_examples=60)
+@given(told=requests)
+def test_both_bridges_answer_alike(told, request, tmp_path_factory):
+    """Comparison but for what HELLO says, LEAVE of a pasted program alone, and the time of a look at the FIFO."""
+    (one, _), other = _core(request, None), _micropython(request, tmp_path_factory.mktemp("flash"))[0]
+    for frame in [Frame(1, 0, wire.Hello().payload()), *told]:
+        if frame.type == wire.Leave.TYPE:
+            continue
+        ours, theirs = (
+            [each for each in Deframer().feed(said(frame.encode())) if each.type != wire.Frames.TYPE]
+            for said in (one, other)
+        )
+        assert [(each.type, each.seq) for each in ours] == [(each.type, each.seq) for each in theirs]
+        for our, their in zip(ours, theirs, strict=True):
+            assert our.payload[0] == their.payload[0]
+            # a failed request's reply may be longer
+            if our.payload[0] == Status.OK and frame.type != wire.Hello.TYPE:
+                assert our.payload == their.payload
+
+
+def test_other_data_are_given_up_only_by_an_erase(request, tmp_path):
     others = bytes(range(256)) * 4
-    said, memory = made(request, tmp_path, others)
+    said, memory = _core(request, tmp_path, others)
 
     def ask(message):
         (frame,) = Deframer().feed(said(Frame(message.TYPE, 1, message.payload()).encode()))

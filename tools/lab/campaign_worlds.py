@@ -22,7 +22,7 @@ from unittest.mock import patch
 import numpy as np
 
 from mpucal.result.error_model import MG_PER_MPS2
-from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine, Memory
+from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.bridge.line_faults import LineFaults
 from mpucal.simulated.chip import SimulatedBus, open_simulated
 from mpucal.simulated.chip.fault_injector import FaultInjector
@@ -192,7 +192,7 @@ class Bridged(BridgeBus):
 
     def __init__(self, chip: SimulatedBus, world: World) -> None:
         clock = chip._clock
-        world.line = EmulatedLine(EmulatedBridge(chip, clock.now, Memory()), clock)
+        world.line = EmulatedLine(EmulatedBridge(chip, clock.now), clock)
         self._chip_bus = chip
         super().__init__(world.line)
 

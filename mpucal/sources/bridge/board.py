@@ -144,13 +144,22 @@ class BlobFiles:
         self.paths = [folder + name for name in SLOTS]
         self.begun = None
 
-    def slot(self, number):
-        """Read a slot's generation and blob; None if it is not valid."""
+    def load(self, number):
+        """Read a slot's bytes; none if there is no file."""
         try:
             with open(self.paths[number], "rb") as file:
-                data = file.read()
+                return file.read()
         except OSError:
-            return None
+            return b""
+
+    def keep(self, number, data):
+        """Write a slot's bytes."""
+        with open(self.paths[number], "wb") as file:
+            file.write(data)
+
+    def slot(self, number):
+        """Return a slot's generation and blob; None if it is not valid."""
+        data = self.load(number)
         if len(data) < 8:
             return None
         generation, check = struct.unpack("<II", data[:8])
@@ -180,8 +189,7 @@ class BlobFiles:
         generation = generation + 1 & 0xFFFFFFFF or 1
         blob, free, self.begun = bytes(self.begun), 1 - used, None
         try:
-            with open(self.paths[free], "wb") as file:
-                file.write(struct.pack("<II", generation, generation ^ 0xFFFFFFFF) + blob)
+            self.keep(free, struct.pack("<II", generation, generation ^ 0xFFFFFFFF) + blob)
         except OSError:
             raise Failed(STORAGE_FAILED)
         if self.slot(free) != (generation, blob):
@@ -192,8 +200,10 @@ class BlobFiles:
 class Bridge:
     """Bridge; `ticks_us` is its clock of 30 bits or more, which must be read once in nine minutes.
 
-    `left` : True after the host has sent LEAVE.
+    `left` : True after the host has sent LEAVE. `features`, `window`, `name` : what HELLO_REPLY says of it.
     """
+
+    features, window, name = STREAM | BLOB | LEAVE, 2, NAME
 
     def __init__(self, buses, ticks_us, folder=""):
         self.chip, self.files = Chip(buses), BlobFiles(folder)
@@ -276,8 +286,8 @@ class Bridge:
             address = rest[0]
             self.greeted, self.frame_bytes, self.drops, self.files.begun = True, 0, 0, None
             self.chip.find((address,) if address else ADDRESSES)
-        here = struct.pack("<BBBBBH", 1, 0, self.chip.address, STREAM | BLOB | LEAVE, 2, MAX_BLOB)
-        return self.reply(OK if major == 1 else BAD_VERSION, b"MPUB" + here + NAME)
+        here = struct.pack("<BBBBBH", 1, 0, self.chip.address, self.features, self.window, MAX_BLOB)
+        return self.reply(OK if major == 1 else BAD_VERSION, b"MPUB" + here + self.name)
 
     def leave(self):
         """Note that the program is to end."""

@@ -75,7 +75,7 @@ def test_into_the_memory_and_back(board, mpucal, tmp_path):
     assert f"the bridge on {board.name} stores no calibration: store one: mpucal write" in nothing.err
     made = Calibration.load(BLOB)
     made.save("calibration.json")
-    board.memory.write(0, b"another sketch's")
+    board.memory.slots[0] = b"another sketch's"
     stored = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "--yes")
     assert stored.code == 0, stored.err
     assert "holds other data, perhaps another sketch's or file system's, which a write overwrites" in stored.err
@@ -95,7 +95,7 @@ def test_into_the_memory_and_back(board, mpucal, tmp_path):
 
 
 def test_a_blob_of_before_says_that_its_unit_is_known(board, mpucal):
-    board.memory.write(0, struct.pack("<II", 1, 0xFFFFFFFE) + BLOB.read_bytes())
+    board.memory.slots[0] = struct.pack("<II", 1, 0xFFFFFFFE) + BLOB.read_bytes()
     shown = mpucal("show", "--serial", board.name)
     assert shown.code == 0, shown.err
     assert "does not state the unit of K: 131 counts to 1 deg/s" in shown.err
@@ -120,12 +120,12 @@ def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
     assert {finding["topic"]: finding["mark"] for finding in json.loads(told.out)["findings"]} == dict.fromkeys(
         talks(), "ok"
     )
-    board.memory.write(0, b"another sketch's")
-    held = bytes(board.memory.data)
+    board.memory.slots[0] = b"another sketch's"
+    held = list(board.memory.slots)
     told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
     tried = {finding["topic"]: finding["what"] for finding in json.loads(told.out)["findings"]}
     assert "not tried, as its memory holds other data" in tried["begin_of_0"]
-    assert board.memory.data == held
+    assert board.memory.slots == held
     assert "for the firmware of a bridge" in mpucal("doctor", "--bus", "sim", "--conformance").err
 
 

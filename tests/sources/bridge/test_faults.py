@@ -230,17 +230,15 @@ def test_noise_before_the_hello_does_no_harm(rig, noise):
 
 
 class Shaky(Memory):
-    """Memory whose supply fails after some bytes."""
+    """Memory whose supply fails after some bytes of a slot."""
 
-    def __init__(self, data, left):
-        self.data, self.left = data, left
+    def __init__(self, slots, left):
+        self.slots, self.left, self.begun = slots, left, None
 
-    def write(self, at, data):
-        for offset, byte in enumerate(data):
-            if self.left == 0:
-                raise PowerFailure
-            self.left -= 1
-            self.data[at + offset] = byte
+    def keep(self, number, data):
+        super().keep(number, data[: self.left])
+        if self.left < len(data):
+            raise PowerFailure
 
 
 class PowerFailure(Exception):  # noqa: N818
@@ -292,7 +290,7 @@ def test_power_that_fails_at_any_byte_leaves_the_old_blob_or_the_new_one(rig, wr
         made.line.device = made.new_bridge(memory=memory)
         store_on(made.line).write(blob(float(n)))
     old, new = (blob(float(writes - 1)) if writes else None), blob(100.0)
-    made.line.device = Mortal(made.new_bridge(memory=Shaky(memory.data, bytes_left)))
+    made.line.device = Mortal(made.new_bridge(memory=Shaky(memory.slots, bytes_left)))
     store = store_on(made.line)
     done = succeeds(store, new)
     made.line.device = made.new_bridge(memory=memory)
@@ -338,7 +336,7 @@ def test_the_sink_reports_the_stored_calibration_truly(rig, held_before, bytes_l
     made.line.device = made.new_bridge(memory=memory)
     if old is not None:
         store_on(made.line).write(old)
-    shaky = made.new_bridge(memory=Shaky(memory.data, bytes_left))
+    shaky = made.new_bridge(memory=Shaky(memory.slots, bytes_left))
     made.line.device = Reset(shaky, lambda: made.new_bridge(memory=memory))
     sink = BridgeSink(store_on(made.line))
     spoil(made.line, to_host, to_device, shorter=(16, 10))
