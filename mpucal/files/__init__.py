@@ -13,7 +13,7 @@ from ..errors import RecordingError
 from .budget import limit_memory
 from .formats import find_format, written_format
 from .hints import NO_HINTS, Hints
-from .rows import Rows, Write, check_units, cut_span
+from .rows import Rows, Write, cut_span, describe, drop_incomplete, shown_units, to_si
 
 
 def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
@@ -31,23 +31,35 @@ def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
     ChipError : a capture of an unknown chip.
     """
     with limit_memory(Path(path)):
-        recording = find_format(Path(path), hints).read(Path(path), hints=hints)
+        read = find_format(Path(path), hints).read(Path(path), hints=hints)
+    recording = drop_incomplete(read)
+    if len(recording) < 2:
+        raise RecordingError(f"{read.name} lacks a number in nearly every sample", "record it again")
+    if len(recording) < len(read):
+        lack = f"{read.name}: {len(read) - len(recording)} samples that lack a number were left out."
+        recording = replace(recording, taken=" ".join(filter(None, (read.taken, lack))))
     return recording if hints.span is None else _cut(recording, hints.span)
 
 
 def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     """Return the samples of any recording that `load` reads, a run at a time.
 
-    Tables and archives are read while the runs are consumed. A capture is decoded before, since the times of its first
-    samples depend on its last. A vehicle's log is decoded whole. A missing number of a table or archive is NaN.
+    Tables and archives are read while the runs are consumed, and before that until their units are known. A capture is
+    decoded before, since the times of its first samples depend on its last. A vehicle's log is decoded whole. A missing
+    number is NaN.
 
     Raises
     ------
     RecordingError, CaptureError, ChipError : see load; of a bad line or sample only when its run is read.
     """
     with limit_memory(path):
-        rows = find_format(path, hints).read_rows(path, hints=hints)
-    rows = replace(rows, runs=check_units(rows.runs, path)) if rows.plain else rows
+        found = find_format(path, hints)
+        rows = found.read_rows(path, hints=hints)
+    if rows.plain:
+        # read twice: its last samples may show the units of its first
+        units = shown_units(found.read_rows(path, hints=hints).runs, rows.sensor)
+        taken = " ".join(filter(None, (rows.taken, describe(rows.name, units)))) or None
+        rows = replace(rows, runs=(to_si(samples, units) for samples in rows.runs), taken=taken)
     return rows if hints.span is None else replace(rows, runs=cut_span(rows.runs, hints.span, rows.name))
 
 

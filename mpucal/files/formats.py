@@ -119,7 +119,7 @@ FORMATS = (
     *_others(".npz", "another program's archive of NumPy", _ARRAYS, "arrays:is_of_others"),
     *_others(".npy", "an array of NumPy", _ARRAYS),
     *_others(".mat", "a file of MATLAB", _ARRAYS),
-    Format(".npz", "a NumPy archive", f"{_HERE}.npz:load_npz", f"{_HERE}.npz:npz_rows", f"{_HERE}.npz:npz_file"),
+    Format(".npz", "a NumPy archive", rows=f"{_HERE}.npz:npz_rows", writer=f"{_HERE}.npz:npz_file"),
     *_others(".parquet", "a Parquet file", "parquet:load_parquet", only=False),
     *_others(_TEXTS, *_RAW),
     *_others(_TEXTS, *_TABLE, only=False),

@@ -17,7 +17,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, fields
 from pathlib import Path
 from shutil import copyfileobj
 from tempfile import TemporaryFile
@@ -27,13 +27,13 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ..data import Recording, Samples, Sensor
+from ..data import Samples, Sensor
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ..strict_json import parse_json
 from .budget import check_size
 from .reading import reading
-from .rows import ROWS, Rows, Write, check_runs, normalise
+from .rows import ROWS, Rows, Write, check_runs, make_recording
 from .tables.times import plausible_utc_ns
 
 NEEDED = ("t", "acc", "gyr")
@@ -51,43 +51,38 @@ DAMAGED = (
 _REMEDY = "give an .npz with t [s] (n,), acc [m/s^2] (n, 3) and gyr [rad/s] (n, 3)"
 
 
-def load_npz(path: Path) -> Recording:
-    """Return the recording in an archive.
-
-    Raises
-    ------
-    RecordingError : the file cannot be read, or holds no recording.
-    """
-    # no pickles: a recording must not run code
-    with _open_archive(path) as file, np.load(file, allow_pickle=False) as archive:
-        there = archive.files
-        arrays = _arrays(archive, path, (*NEEDED, *TEMPERATURES, *MASKS, *SMALL))
-    missing = [key for key in NEEDED if key not in arrays]
-    if missing:
-        raise RecordingError(f"{path} has no {', '.join(missing)}; it has {', '.join(there) or 'nothing'}", _REMEDY)
-    sensor = _sensor(arrays, path)
-    known = {key: arrays.get(key) for key in (*NEEDED, *MASKS)}
-    known["temperature_c"] = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
-    made, taken = normalise({**known, "flat": _flat(arrays, path)}, path.name, sensor)
-    recording = Recording.from_arrays(**made, sensor=sensor, name=path.name, taken=taken)
-    return replace(recording, utc_ns=_utc_ns(arrays))
-
-
 def npz_rows(path: Path) -> Rows:
-    """Return the samples of an archive, a run at a time.
+    """Return the samples of an archive, a run at a time if it is stored by rows.
 
     Raises
     ------
     RecordingError : it cannot be read, or holds no recording.
     """
+    # no pickles: a recording must not run code
     with _open_archive(path) as file, np.load(file, allow_pickle=False) as archive:
-        small = _arrays(archive, path, SMALL)
-        by_rows = _by_rows(archive.zip)
-    done = str(small.get(DONE, ""))
-    if not by_rows:
-        return Rows.of(load_npz(path), done)
-    runs, sensor, flat = check_runs(_runs(path), path.name), _sensor(small, path), _flat(small, path)
-    return Rows(runs, sensor, flat, name=path.name, done=done, utc_ns=_utc_ns(small), plain=True)
+        missing = [key for key in NEEDED if key not in archive.files]
+        if missing:
+            has = ", ".join(archive.files) or "nothing"
+            raise RecordingError(f"{path} has no {', '.join(missing)}; it has {has}", _REMEDY)
+        small, large = _arrays(archive, path, SMALL), (*NEEDED, *TEMPERATURES, *MASKS)
+        arrays = {} if _by_rows(archive.zip) else _arrays(archive, path, large)
+        size = _size(archive, large)
+    sensor, flat = _sensor(small, path), _flat(small, path)
+    runs = _runs(path)
+    if arrays:
+        warm = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
+        known = {key: arrays.get(key) for key in (*NEEDED, *MASKS)}
+        runs = Rows.of(make_recording(**known, temperature_c=warm, name=path.name)).runs
+    return Rows(
+        check_runs(runs, path.name),
+        sensor,
+        flat,
+        name=path.name,
+        done=str(small.get(DONE, "")),
+        utc_ns=_utc_ns(small),
+        plain=True,
+        size=size,
+    )
 
 
 def _utc_ns(arrays: Mapping[str, Any]) -> int | None:
@@ -97,11 +92,12 @@ def _utc_ns(arrays: Mapping[str, Any]) -> int | None:
 
 def _arrays(archive: Any, path: Path, keys: Sequence[str]) -> dict[str, Any]:
     """Return those arrays of `keys` that an archive holds, if they fit the memory."""
-    found = [key for key in keys if key in archive.files]
-    check_size(
-        path, sum(each.file_size for each in archive.zip.infolist() if each.filename.removesuffix(".npy") in found)
-    )
-    return {key: archive[key] for key in found}
+    check_size(path, _size(archive, keys))
+    return {key: archive[key] for key in keys if key in archive.files}
+
+
+def _size(archive: Any, keys: Sequence[str]) -> int:
+    return sum(each.file_size for each in archive.zip.infolist() if each.filename.removesuffix(".npy") in keys)
 
 
 @contextmanager
@@ -161,7 +157,7 @@ class _Column:
 
 
 def _by_rows(archive: zipfile.ZipFile) -> bool:
-    """Return True if all arrays are stored by rows in the right shapes, as nearly always; else load_npz reads them."""
+    """Return True if all arrays are stored by rows in the right shapes, as nearly always."""
     shapes = {}
     for key in (*NEEDED, *TEMPERATURES, *MASKS):
         if f"{key}.npy" not in archive.namelist():

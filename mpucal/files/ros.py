@@ -24,7 +24,6 @@ from .mcap import CALIBRATED, FORMAT
 from .reading import first_bytes, import_extra
 from .rows import Rows
 from .tables.streams import join_streams
-from .tables.table import complete_lines
 from .tables.times import Stream
 from .tables.units import COUNTS, NS, acceleration_unit
 
@@ -177,6 +176,7 @@ class _Messages:
         if times and max(times) >> 63:
             raise RecordingError(f"{name} holds impossible times", "give the bag as it was recorded")
         values = np.array(getattr(self, quantity), float).reshape(-1, 3)
+        values[~np.isfinite(values)] = np.nan
         if not self.measured[quantity]:
             raise RecordingError(
                 f"{name}: by their covariances, the messages hold no {_NAMES[quantity]}",
@@ -184,10 +184,10 @@ class _Messages:
             )
         unit = "rad/s"
         if quantity == "acc":
-            seen = acceleration_unit(values) if len(values) else ""
+            whole = values[np.isfinite(values).all(axis=1)]
+            seen = acceleration_unit(whole) if len(whole) else ""
             unit = seen if seen and seen != COUNTS else "m/s^2"
-        kept, lost = complete_lines(values)
-        return Stream(np.array(times, np.int64)[kept], values[kept], "ns", unit, lost=lost)
+        return Stream(np.array(times, np.int64), values, "ns", unit)
 
 
 _NAMES = {"acc": "acceleration", "gyr": "rate"}

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,18 +13,20 @@ from ..arguments import is_plausible
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from ..origin import Origin
-from .tables.clock import FEWEST, fit_even_clock
+from .budget import check_size
+from .tables.clock import FEWEST, Clock, are_gaps, fit_clock
 from .tables.units import QUANTITIES, acceleration_unit, gyro_unit, rate_factor
 
 # 16 Ki samples take 1 MB, which fits a cache; for larger products BLAS starts threads, which takes longer
 ROWS = 1 << 14
-SI = ("m/s^2", "rad/s")
+SI = {"acc": "m/s^2", "gyr": "rad/s"}
 SAMPLE_FIELDS = tuple(f.name for f in fields(Samples))
+S = TypeVar("S", bound=Samples)
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A recording as runs of samples.
+    """A recording as runs of samples; numbers may be missing (NaN).
 
     Attributes
     ----------
@@ -33,7 +35,7 @@ class Rows:
     others : number of further IMUs in the file.
     done : the processing of samples that are calibrated already; empty if they are not.
     noise : (2, 3) standard deviations of a sample's acc [m/s^2] and gyr [rad/s]; NaN: unknown.
-    plain : units are known only by convention, and numbers may be missing (NaN).
+    plain : units are known only by convention. size : bytes of memory of the whole, if it is known before.
     """
 
     runs: Iterator[Samples]
@@ -48,6 +50,7 @@ class Rows:
     utc_ns: int | None = None
     taken: str | None = None
     plain: bool = False
+    size: int = 0
 
     @classmethod
     def of(cls, recording: Recording, done: str = "") -> Rows:
@@ -66,56 +69,60 @@ class Rows:
         )
 
     def recording(self) -> Recording:
-        """Return the whole recording, checked; see Recording.from_arrays."""
-        arrays: dict[str, Any] = {**vars(Samples.joined(list(self.runs))), "flat": self.flat}
-        arrays, made = normalise(arrays, self.name, self.sensor) if self.plain else (arrays, None)
-        taken = " ".join(filter(None, (self.taken, made))) or None
-        recording = Recording.from_arrays(**arrays, sensor=self.sensor, name=self.name, taken=taken)
-        return replace(recording, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns)
+        """Return the whole recording, checked; a plain one has even times and SI units."""
+        check_size(Path(self.name), self.size)
+        samples, remarks = Samples.joined(list(self.runs)), [self.taken]
+        if self.plain and len(samples):
+            clock = _clock(samples, self.sensor)
+            samples = replace(samples, t=clock.t, gap=samples.gap | clock.gap)
+            found = shown_units([samples], self.sensor)
+            samples = to_si(samples, found)
+            remarks += [describe(self.name, found, clock.remark)]
+        taken = " ".join(filter(None, remarks)) or None
+        whole = make_recording(**vars(samples), flat=self.flat, sensor=self.sensor, name=self.name, taken=taken)
+        return replace(whole, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns)
 
 
 Write = Callable[[Samples], None]
 
 
-def normalise(arrays: Mapping[str, Any], name: str, sensor: Sensor) -> tuple[dict[str, Any], str | None]:
-    """Return arguments of Recording.from_arrays without missing numbers, in SI units, with even times, and a remark.
-
-    Arrays that are not a recording are returned unchanged, and from_arrays refuses them.
-    """
-    made = dict(arrays)
-    t, acc, gyr = (np.asarray(arrays[key]) for key in ("t", "acc", "gyr"))
-    shapes = (*t.shape, 3), acc.shape, gyr.shape
-    if any(each.dtype.kind not in "fiu" for each in (t, acc, gyr)) or len(set(shapes)) > 1 or not len(t):
-        return made, None
-    remarks = []
-    complete = _is_complete(acc, gyr)
-    if not complete.all() and np.count_nonzero(complete) > 1:
-        by_sample = {key for key, value in arrays.items() if value is not None and np.shape(value)[:1] == t.shape}
-        made |= {key: np.asarray(arrays[key])[complete] for key in by_sample - {"flat"}}
-        # a gap precedes the sample after those that were left out
-        made["gap"] = _add_gaps(made.get("gap"), np.append(False, ~complete[:-1])[complete])
-        kept, flat = np.append(0, np.cumsum(complete)), made.get("flat")
-        made["flat"] = flat and (int(kept[flat[0]]), int(kept[flat[1]]))
-        remarks.append(f"{len(t) - len(made['t'])} samples that lack a number were left out")
-    with np.errstate(over="ignore", invalid="ignore"):
-        t, acc, gyr = (np.asarray(made[key], float) for key in ("t", "acc", "gyr"))
-    if len(t) < FEWEST or not np.isfinite(t).all() or (np.diff(t) < 0).any() or not _is_complete(acc, gyr).all():
-        return made, None
-    clock = None if sensor.origin is Origin.VEHICLE else fit_even_clock(t)
-    if clock is not None:
-        t = clock.t
-        made |= {"t": clock.t, "gap": _add_gaps(made.get("gap"), clock.gap)}
-        remarks.append(clock.description)
-    units = (acceleration_unit(acc), gyro_unit(rate_factor(t, acc, gyr)))
-    for key, unit, si in (("acc", units[0], SI[0]), ("gyr", units[1], SI[1])):
-        if unit not in ("", si):
-            made[key] = np.asarray(made[key], float) * QUANTITIES[key][unit]
-            remarks.append(f"{key} was read in {unit}, which its values suggest")
-    return made, f"{name}: {'; '.join(remarks)}." if remarks else None
+def make_recording(*, acc: Any, gyr: Any, **others: Any) -> Recording:
+    """Return Recording.from_arrays of arrays in which numbers may be missing (NaN)."""
+    recording = Recording.from_arrays(acc=np.nan_to_num(acc), gyr=np.nan_to_num(gyr), **others)
+    return replace(recording, acc=np.asarray(acc, float), gyr=np.asarray(gyr, float))
 
 
-def _add_gaps(gap: Any, more: Mask) -> Mask:
-    return more if gap is None else np.asarray(gap, bool) | more
+def describe(name: str, units: Mapping[str, str], clock: str = "") -> str:
+    """Return a sentence on units that are not SI, and on the clock; empty if there is nothing to say."""
+    others = [f"{key} was read in {unit}, which its values suggest" for key, unit in units.items() if unit]
+    said = "; ".join(filter(None, (clock, *others)))
+    return f"{name}: {said}." if said else ""
+
+
+def _clock(samples: Samples, sensor: Sensor) -> Clock:
+    """Return the clock of the samples; an autopilot's times are its own."""
+    if sensor.origin is Origin.VEHICLE or len(samples) < FEWEST:
+        return Clock(samples.t, np.zeros(len(samples), bool), 0.0)
+    return fit_clock(samples.t)
+
+
+def shown_units(runs: Iterable[Samples], sensor: Sensor) -> dict[str, str]:
+    """Return the units of `acc` and `gyr` in the first of the runs that shows them; empty if SI, or if none does."""
+    seen = dict.fromkeys(SI, "")
+    for samples in runs:
+        kept = drop_incomplete(samples)
+        if len(kept) >= FEWEST:
+            t = _clock(kept, sensor).t
+            seen["acc"] = seen["acc"] or acceleration_unit(kept.acc)
+            seen["gyr"] = seen["gyr"] or gyro_unit(rate_factor(t, kept.acc, kept.gyr))
+        if all(seen.values()):
+            break
+    return {key: unit for key, unit in seen.items() if unit != SI[key]}
+
+
+def to_si(samples: Samples, units: Mapping[str, str]) -> Samples:
+    """Return samples in SI units that were in `units`."""
+    return replace(samples, **{key: getattr(samples, key) * QUANTITIES[key][of] for key, of in units.items() if of})
 
 
 def _is_complete(acc: Vector, gyr: Vector) -> Mask:
@@ -124,14 +131,19 @@ def _is_complete(acc: Vector, gyr: Vector) -> Mask:
     return np.asarray(is_plausible(acc).all(axis=1) & (rates | ~rates.any()))
 
 
-def drop_incomplete(samples: Samples) -> Samples:
-    """Return the samples that have all their numbers, with gaps in place of the others."""
+def drop_incomplete(samples: S) -> S:
+    """Return the samples that have all their numbers; where more than one in a row has not, is a gap."""
     complete = _is_complete(samples.acc, samples.gyr)
     if complete.all():
         return samples
-    gap = samples.gap | np.append(False, ~complete[:-1])
-    kept = {key: getattr(samples, key)[complete] for key in SAMPLE_FIELDS}
-    return Samples(**kept | {"gap": gap[complete]})
+    at = np.flatnonzero(complete)
+    # a gap before a sample that is left out is one before the next
+    gaps = np.cumsum(samples.gap)[at]
+    gap = (np.diff(gaps, prepend=0) > 0) | are_gaps(at)
+    kept: dict[str, Any] = {key: getattr(samples, key)[at] for key in SAMPLE_FIELDS} | {"gap": gap}
+    if isinstance(samples, Recording) and samples.flat is not None:
+        kept["flat"] = tuple(np.searchsorted(at, samples.flat).tolist())
+    return replace(samples, **kept)
 
 
 def check_runs(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
@@ -164,30 +176,6 @@ def check_runs(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
     if not any_complete:
         what = "holds no samples" if at == 0 else "lacks a number in every sample"
         raise RecordingError(f"{name} {what}", "record it again")
-
-
-def check_units(runs: Iterator[Samples], path: Path) -> Iterator[Samples]:
-    """Yield the runs, whose units are SI as far as the samples show it.
-
-    Raises
-    ------
-    RecordingError : accelerations or rates show another unit.
-    """
-    seen = dict.fromkeys(("acc", "gyr"), "")
-    for samples in runs:
-        kept = drop_incomplete(samples)
-        if len(kept) >= FEWEST and not all(seen.values()):
-            seen["acc"] = seen["acc"] or acceleration_unit(kept.acc)
-            seen["gyr"] = seen["gyr"] or gyro_unit(rate_factor(kept.t, kept.acc, kept.gyr))
-            if any(seen[key] not in ("", si) for key, si in zip(seen, SI, strict=True)):
-                units = ",".join(f"{key}={seen[key] or si}" for key, si in zip(seen, SI, strict=True))
-                what = " and ".join(f"{key} in {unit}" for key, unit in seen.items() if unit not in ("", *SI))
-                raise RecordingError(
-                    f"{path.name} should be in {' and '.join(SI)}, but its values suggest {what}",
-                    f"give its units with --units {units}",
-                    f"--units {units}",
-                )
-        yield samples
 
 
 def cut_span(runs: Iterator[Samples], span: tuple[float, float], name: str) -> Iterator[Samples]:

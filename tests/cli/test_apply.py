@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.files import load
@@ -94,17 +95,66 @@ def test_a_table_in_g_and_degrees_comes_out_as_the_one_in_si(mpucal, save, sessi
     np.testing.assert_allclose(load("out.npz").gyr, formula(recording)[1], atol=1e-9)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".npz"])
-def test_rates_in_degrees_are_not_applied_as_radians(mpucal, save, session, calibration, ending):
+def test_units_are_those_that_calibrate_sees(mpucal, save, session, calibration):
+    """The board lies still for longer than the first run of samples lasts, which shows no unit of rates."""
     recording = load(session.folder)
-    save(replace(recording, gyr=np.degrees(recording.gyr)), f"in{ending}")
-    done = mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz")
-    assert done.code == 3
-    assert "suggest gyr in deg/s" in done.err
-    assert "give its units with --units acc=m/s^2,gyr=deg/s" in done.err
-    assert not Path("out.npz").exists()
-    assert mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz", "--units", "acc=m/s^2,gyr=deg/s").code == 0
-    np.testing.assert_allclose(load("out.npz").gyr, formula(recording)[1], atol=1e-9)
+    still = replace(recording.part(0, 100), flat=None)
+    dt = recording.t[1] - recording.t[0]
+    parts = {
+        name: np.concatenate([np.tile(getattr(still, name), (300, 1)), getattr(recording, name)])
+        for name in ("acc", "gyr")
+    }
+    long = type(recording).from_arrays(np.arange(len(parts["acc"])) * dt, **parts)
+    save(replace(long, acc=long.acc / STANDARD_GRAVITY_MPS2, gyr=np.degrees(long.gyr)), "in.npz")
+    done = mpucal("apply", "c.json", "in.npz", "-o", "out.npz")
+    assert done.code == 0, done.err
+    assert "acc was read in g, which its values suggest; gyr was read in deg/s" in done.err
+    np.testing.assert_allclose(load("out.npz").acc, formula(long)[0], atol=1e-9)
+    np.testing.assert_allclose(load("out.npz").gyr, formula(long)[1], atol=1e-9)
+    np.testing.assert_allclose(load("in.npz").gyr, long.gyr, atol=1e-9)
+
+
+def as_text(rows, path):
+    names = "time,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z"
+    np.savetxt(path, rows, delimiter=",", header=names, comments="")
+
+
+def as_arrays(rows, path):
+    np.savez(path, time=rows[:, 0], accel=rows[:, 1:4], gyro=rows[:, 4:])
+
+
+def as_own(rows, path):
+    np.savez(path, t=rows[:, 0], acc=rows[:, 1:4], gyr=rows[:, 4:])
+
+
+def as_matlab(rows, path):
+    savemat(path, {"time": rows[:, 0], "accel": rows[:, 1:4], "gyro": rows[:, 4:]})
+
+
+FORMS = {".csv": as_text, "o.npz": as_arrays, ".npz": as_own, ".npy": np.save, ".mat": as_matlab}
+
+
+@pytest.mark.parametrize("ending", FORMS)
+def test_what_is_missing_stays_missing_in_every_form(mpucal, session, calibration, ending):
+    """Leave out one number, one sample and two seconds of a recording in g and deg/s."""
+    recording = load(session.folder)
+    rows = np.column_stack([recording.t, recording.acc / STANDARD_GRAVITY_MPS2, np.degrees(recording.gyr)])
+    rows = np.delete(rows, slice(3000, 3200), axis=0)
+    rows[1207, 2] = rows[1300, 1:] = np.nan
+    path = Path(f"in{ending}")
+    FORMS[ending](*((path, rows) if ending == ".npy" else (rows, path)))
+    done = mpucal("apply", "c.json", path, "-o", "out.npz")
+    assert done.code == 0, done.err
+    assert f"{len(rows)} samples, 2 of which lack a number" in done.out
+    with np.load("out.npz") as out:
+        assert np.flatnonzero(np.isnan(out["acc"]).any(1)).tolist() == [1207, 1300]
+        whole = np.isfinite(out["acc"]).all(1)
+        wanted = np.delete(formula(recording)[0], slice(3000, 3200), axis=0)
+        np.testing.assert_allclose(out["acc"][whole], wanted[whole], atol=1e-9)
+        np.testing.assert_allclose(np.diff(out["t"]), np.diff(rows[:, 0]), atol=1e-7)
+    read = load(path)
+    assert len(read) == len(rows) - 2
+    assert np.flatnonzero(read.gap).tolist() == [2998]
 
 
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".mcap"])

@@ -46,7 +46,7 @@ def backwards(t):
 
 
 UNREADABLE = {
-    "only NaN": (with_(acc=lambda acc: acc * np.nan), "acc is not a finite number in 4000 of 4000 samples, first in"),
+    "only NaN": (with_(acc=lambda acc: acc * np.nan), "lacks a number in every sample"),
     "time runs back": (with_(t=backwards), "time does not increase at sample 100"),
     "one row too few": (with_(gyr=lambda gyr: gyr[1:]), "gyr has shape (3999, 3), not (4000, 3)"),
     "two columns": (with_(acc=lambda acc: acc[:, :2]), "acc has shape (4000, 2)"),

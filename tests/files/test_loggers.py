@@ -119,16 +119,17 @@ def test_lines_that_name_each_number(ending, walk, assert_same, tmp_path):
 
 @pytest.mark.parametrize("timed", [True, False])
 def test_lines_that_lack_a_number_are_said(timed, walk, tmp_path):
-    """Count the lines left out, which are gaps where the samples have no times of their own."""
+    """Count the samples left out, whose time passes all the same; where several in a row are missing, is a gap."""
     line = LINES[".txt"] if timed else LINES[".txt"].partition(",t:")[0]
     lines = [line.format(*a, *w, t) for a, w, t in zip(walk.acc, walk.gyr, walk.t, strict=True)]
     # below a line that measures nothing; one has not a number, one is torn
-    lines[60], lines[80] = line.format("nan", *range(6)), lines[80][:30]
+    lines[60], lines[80:83] = line.format("nan", *range(6)), [torn[:30] for torn in lines[80:83]]
     (tmp_path / "walk.txt").write_text("\n".join([*lines[:40], "Temperature: 25.1 degC", *lines[40:]]))
     found = load(tmp_path / "walk.txt", NO_HINTS if timed else Hints(rate_hz=walk.rate_hz))
-    assert "2 lines that lack a number were left out" in found.taken
-    assert len(found) == len(walk) - 2
-    assert np.flatnonzero(found.gap).tolist() == ([] if timed else [60, 79])
+    assert f"4 {'lines' if timed else 'samples'} that lack a number were left out" in found.taken
+    assert len(found) == len(walk) - 4
+    assert np.flatnonzero(found.gap).tolist() == [79]
+    np.testing.assert_allclose(found.t - found.t[0], np.delete(walk.t - walk.t[0], [60, 80, 81, 82]), atol=1e-9)
 
 
 @pytest.mark.parametrize("text", ["a" * 30_000, "a_" * 15_000, "ab " * 10_000, "ax:" * 10_000, "ax:1 " * 6_000])
@@ -222,7 +223,7 @@ def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, load_table, t
     rows.iloc[100, 2] = odd
     read = load_table(rows)
     np.testing.assert_allclose(read.acc, np.delete(walk.acc, 100, axis=0), atol=1e-9)
-    assert "1 samples whose accelerations lack a number were left out" in read.taken
+    assert "1 samples that lack a number were left out" in read.taken
     (tmp_path / "b.csv").write_text(rows.drop(columns="time").to_csv(index=False) + "1.0,2.0")
     read = load(tmp_path / "b.csv", Hints(rate_hz=100.0))
     assert read.t[100] - read.t[99] == pytest.approx(0.02), "its time passed all the same"

@@ -114,7 +114,7 @@ def test_a_bag_without_usable_messages(received_ns, says, ros1, encode_imu, tmp_
         ({"flat": [1j, 3]}, "give flat as"),
         ({"t": np.where(np.arange(N) == 0, -1.7e308, np.arange(N) + 1.7e308)}, "time does not increase|t has steps of"),
         ({"t": np.array([-1.7e308, 1.7e308])}, "t has steps of"),
-        ({"acc": np.full((N, 3), np.longdouble("1e400"))}, "acc is not a finite number"),
+        ({"acc": np.full((N, 3), np.longdouble("1e400"))}, "lacks a number in every sample"),
     ],
 )
 def test_an_archive_with_what_no_number_holds(tmp_path, more, says):

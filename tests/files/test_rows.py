@@ -119,7 +119,8 @@ def test_a_sample_that_lacks_a_number_passes_through_and_is_no_part_of_a_recordi
         np.testing.assert_array_equal(out["t"], before.t)
     read, kept = load(tmp_path / f"in{kind}"), np.arange(N) != ROWS + 100
     np.testing.assert_array_equal(getattr(read, key), getattr(before, key)[kept])
-    assert np.flatnonzero(read.gap).tolist() == [ROWS + 100]
+    # one step of two intervals is no gap
+    assert not read.gap.any()
     assert read.taken == f"in{kind}: 1 samples that lack a number were left out."
 
 
@@ -222,9 +223,8 @@ def test_a_bad_line_is_named(line, tmp_path, monkeypatch):
     rows[line - 2][3] = "nonsense"
     with (tmp_path / "bad.csv").open("w", newline="") as file:
         csv.writer(file).writerows([["t", "ax", "ay", "az", "gx", "gy", "gz"], *rows])
-    runs = open_rows(tmp_path / "bad.csv").runs
     with pytest.raises(RecordingError, match=f"line {line}: az is 'nonsense'"):
-        list(runs)
+        list(open_rows(tmp_path / "bad.csv").runs)
 
 
 def cdr(data):

@@ -39,6 +39,10 @@ class ArrayTable(Table):
         """See Table."""
         return [place for place, name in enumerate(self.header) if self.arrays[name].dtype.kind in "iuf"]
 
+    def has(self, column: Column) -> Mask:
+        """See Table."""
+        return np.ones(len(self.arrays[self.header[column.place]]), bool)
+
     def clocks(self, columns: Sequence[Column]) -> list[Column]:
         """See Table; an index of pandas may have no name, and is a clock if it holds dates."""
         kinds = [self.arrays[name].dtype.kind for name in self.header]

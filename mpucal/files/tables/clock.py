@@ -1,24 +1,28 @@
-"""The sensor's own clock, estimated from arrival stamps over USB, radio, or of a busy computer.
+"""The sensor's own clock, fitted to the stamps of its samples: what is late, rounded, repeated or missing.
 
-A sensor measures evenly, and its samples arrive late by the delay of the transport. So within a run without a missing
-sample one line, with the sample period as its slope, lies below all stamps; after missing samples, or a logger's pause,
-the line lies higher. A jump of that lower envelope is therefore a gap, while a stamp that is merely late is not. With
-the gaps known, the clock is fitted as a chip's is by polls of its FIFO (chip/clock.py).
+A sensor measures evenly. Over USB, radio or a busy computer its samples arrive late by the delay of the transport: so
+within a run without a missing sample one line, with the sample period as its slope, lies below all stamps; after
+missing samples, or a logger's pause, the line lies higher. A jump of that lower envelope is therefore a gap, while a
+stamp that is merely late is not. With the gaps known, the clock is fitted as a chip's is by polls of its FIFO
+(chip/clock.py).
 
-Stamps that follow no such line are of a program that measured when it could: they are the samples' times.
+Stamps that are even, or that follow no such line as of a program that measured when it could, are the samples' times;
+a longer step between them is a gap as it is to the estimate (calibration/masks.py).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ...chip.clock import SampleClock, make_increasing
+from ...calibration.masks import GAP_INTERVALS
+from ...chip.clock import NS, SampleClock, make_increasing
 from ...data import Mask, Vector
-from .units import NS
 
 FEWEST = 100
 # periods: steps that vary by less are a clock's own
@@ -40,20 +44,32 @@ ROUNDS = 4
 IN_TIME = 0.75
 # periods, and multiples of the envelope's usual move or of the stamps' resolution: a jump by more than all is a gap
 LOST, BY_CHANCE, ROUNDED = 0.6, 6.0, 1.5
+# without stamps, samples are repeated ones if at most this share differs from the one before
+FEWEST_NEW = 0.5
+
+Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class EvenClock:
-    """Times by the sensor's clock: t (n,) s; gap (n,) where samples are missing before; rms jitter of the stamps."""
+class Clock:
+    """Times of samples by the sensor's clock.
+
+    Attributes
+    ----------
+    t : (n,) s. gap : (n,) True where samples before are missing. rate_hz : of the sensor.
+    jitter_s : rms of the stamps about the clock; 0 if the stamps are the samples' times.
+    """
 
     t: Vector
     gap: Mask
     rate_hz: float
-    jitter_s: float
+    jitter_s: float = 0.0
 
-    @property
-    def description(self) -> str:
-        """Return a remark for the user on how the times were replaced."""
+    @cached_property
+    def remark(self) -> str:
+        """Return a clause for the user on how the stamps were replaced; empty if they were not."""
+        if not self.jitter_s:
+            return ""
         lost = int(self.gap.sum())
         gaps = f"with {lost} gap{'s' if lost > 1 else ''}" if lost else "without gaps"
         return (
@@ -62,36 +78,64 @@ class EvenClock:
         )
 
 
-def sample_period(stamps: Vector) -> float:
+def are_new(at_once: Mask | None, values: Vector) -> Mask:
+    """Return (n,) False where a sample (n, k) repeats the one before, as loggers do beside a faster sensor.
+
+    If many different samples share a stamp, stamps are rounded, and equal samples may be two measurements. Without
+    stamps, most samples have to repeat the one before: a sensor at rest may read the same twice.
+
+    Parameters
+    ----------
+    at_once : (n - 1,) True where a stamp is that of the sample before; None without stamps.
+    """
+    alike = (values[1:] == values[:-1]).all(axis=1)
+    if at_once is None:
+        new = len(values) - np.count_nonzero(alike)
+        again = alike & (1 < new <= FEWEST_NEW * len(values))
+    else:
+        again = at_once & alike & (np.count_nonzero(at_once & ~alike) <= np.count_nonzero(at_once & alike))
+    return np.append(True, ~again)[: len(values)]
+
+
+def are_gaps(number: Numbers) -> Mask:
+    """Return (n,) True where more than one sample is missing before a sample, by their increasing numbers (n,)."""
+    return np.append(False, np.diff(number) > GAP_INTERVALS)[: len(number)]
+
+
+def sample_period(stamps: Vector, number: Numbers | None = None) -> float:
     """Return the sample period of (n,) stamps that may come in bursts, repeat or be late, in their unit."""
     lag = min(LAG, max((len(stamps) - 1) // STRETCHES, 1))
-    return float(np.median(stamps[lag:] - stamps[:-lag])) / lag if len(stamps) > 1 else 0.0
+    apart = lag if number is None else number[lag:] - number[:-lag]
+    return float(np.median((stamps[lag:] - stamps[:-lag]) / apart)) if len(stamps) > 1 else 0.0
 
 
-def fit_even_clock(stamps: Vector) -> EvenClock | None:
-    """Return the clock behind (n,) stamps [s] that do not decrease; None if the stamps are the samples' times."""
-    if len(stamps) < FEWEST or not (period := sample_period(stamps)) > 0.0:
-        return None
-    off = np.diff(stamps) - period
-    if np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period:
-        return None
-    gap, late = _gaps(stamps, period)
-    lag = min(LAG, len(stamps) // STRETCHES)
+def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
+    """Return the clock behind (n,) stamps [s] that do not decrease.
+
+    Parameters
+    ----------
+    number : (n,) of the samples in the order of measurement, with holes where some are known to be missing.
+    """
+    n = len(stamps)
+    number = np.arange(n) if number is None else number
+    period, steps = sample_period(stamps, number), np.diff(stamps)
+    gap = np.append(False, steps > GAP_INTERVALS * np.median(steps))[:n] if n > 1 else np.zeros(n, bool)
+    own = Clock(stamps, gap, 1.0 / period if period else 0.0)
+    off = steps - period * np.diff(number)
+    if n < FEWEST or not period > 0.0 or (np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period):
+        return own
+    gap, late = _gaps(stamps, number, period)
+    lag = min(LAG, n // STRETCHES)
     if _square(late[lag:] - late[:-lag], OUTLIERS) > FOLLOWS_A_LINE * lag * _square(off, SELDOM):
-        return None
-    clock, segment, index = SampleClock(1.0 / period), np.cumsum(gap), np.empty(len(stamps), np.int64)
-    begins: NDArray[np.intp] = np.flatnonzero(np.append(True, gap[1:]))
-    for first, last in zip(begins, np.append(begins[1:], len(stamps)), strict=True):
-        index[first:last] = np.arange(last - first)
+        return own
+    clock, segment = SampleClock(1.0 / period), np.cumsum(gap)
+    index = number - number[np.maximum.accumulate(np.where(gap, np.arange(n), 0))]
+    for first, last in pairwise((0, *np.flatnonzero(gap).tolist(), n)):
         in_time = first + np.flatnonzero(late[first:last] <= np.quantile(late[first:last], IN_TIME))
         clock.begin_segment()
-        clock.add(np.rint(stamps[in_time] * NS).astype(np.int64), index[in_time] + 1)
-    t = clock.times_s(segment.astype(np.int64), index)
-    late = stamps - t
-    rate_hz = clock.rate_hz
-    return EvenClock(
-        make_increasing(t, EVEN / rate_hz), gap, rate_hz, float(np.sqrt(np.mean((late - late.mean()) ** 2)))
-    )
+        clock.add(np.rint(stamps[in_time] / NS).astype(np.int64), index[in_time] + 1)
+    t, rate_hz = clock.times_s(segment.astype(np.int64), index), clock.rate_hz
+    return Clock(make_increasing(t, EVEN / rate_hz), gap | are_gaps(number), rate_hz, float(np.std(stamps - t)))
 
 
 def _square(values: Vector, left_out: float) -> float:
@@ -100,14 +144,14 @@ def _square(values: Vector, left_out: float) -> float:
     return float(squares[: len(squares) - max(round(left_out * len(squares)), 1)].mean())
 
 
-def _gaps(stamps: Vector, period: float) -> tuple[Mask, Vector]:
+def _gaps(stamps: Vector, number: Numbers, period: float) -> tuple[Mask, Vector]:
     """Return (n,) where samples are missing, by jumps of the lower envelope, and the delay (n,) of each stamp."""
     n = len(stamps)
     width = max(round(STRETCH_S / period), STRETCH)
     edges = np.arange(0, n - width // 2, width)
-    late = stamps - period * np.arange(n)
+    late = stamps - period * number
     for _ in range(ROUNDS):
-        late -= float(np.median(np.diff(np.minimum.reduceat(late, edges)))) / width * np.arange(n)
+        late -= float(np.median(np.diff(np.minimum.reduceat(late, edges)))) / width * number
     least = np.minimum.reduceat(late, edges)
     chance = float(np.median(np.abs(np.diff(least))))
     # after a mere delay the next samples are soon in time again

@@ -35,14 +35,13 @@ def labelled_table(text: str, name: str) -> TextTable | None:
         if first_triple(columns, ACC) and first_triple(columns, GYR):
             measured = [header[c.place] for c in columns if c.quantity in (ACC, GYR)]
             part = re.compile(rf"(?<!\w)({'|'.join(map(re.escape, measured))})\s?[:=]")
-            found, lost = [], []
+            rows, lines = [], []
             for i, row in enumerate(text.split("\n"), 1):
-                if _names(row) == header:
-                    found.append((i, _PAIR.findall(row)))
-                elif part.search(row):
-                    lost.append(i)
-            rows, lines = [[n for _, n in row] for _, row in found], [i for i, _ in found]
-            return TextTable(name, header, rows, lines, ":", lost)
+                whole = _names(row) == header
+                if whole or part.search(row):
+                    rows.append([number for _, number in _PAIR.findall(row)] if whole else [])
+                    lines.append(i)
+            return TextTable(name, header, rows, lines, ":")
     return None
 
 

@@ -136,10 +136,9 @@ class Table(ABC):
         RecordingError : one is not a time.
         """
 
-    @property
-    def after_lost(self) -> Mask | None:
-        """Return (n,) True where rows before a row are missing; None if no row is missing."""
-        return None
+    @abstractmethod
+    def has(self, column: Column) -> Mask:
+        """Return (n,) True where a row has a cell in a column."""
 
 
 def parse_column_name(name: str, place: int) -> Column | None:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...data import Recording, Vector
+from ...data import Recording
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..budget import HELD, check_size
@@ -177,10 +177,10 @@ def _recording(
     metadata = read_app_metadata({member: data for member, data in beside.items() if isinstance(data, bytes)})
     found: dict[str, tuple[str, Stream]] = {}
     for member, (quantity, _) in sorted(pair.items(), key=lambda item: (item[1][1], item[0])):
-        if quantity in found and (quantity == GYR or _holds_gravity(found[ACC][1].values)):
+        if quantity in found and (quantity == GYR or _holds_gravity(found[ACC][1])):
             continue
         stream = _stream(f"{name}/{Path(member).name}" if member != name else name, read(member), quantity, hints)
-        if quantity not in found or _holds_gravity(stream.values):
+        if quantity not in found or _holds_gravity(stream):
             found[quantity] = member, stream
     (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
     acc = replace(acc, values=-acc.values if metadata.sign_flipped else acc.values, zero_ns=metadata.zero_ns)
@@ -190,11 +190,12 @@ def _recording(
     return join_streams(acc, gyr, hints, name, remarks=remarks)
 
 
-def _holds_gravity(values: Vector) -> bool:
-    return bool(acceleration_unit(values)) or _are_counts(values)
+def _holds_gravity(stream: Stream) -> bool:
+    return _are_counts(stream) or bool(acceleration_unit(stream.values[stream.complete]))
 
 
-def _are_counts(values: Vector) -> bool:
+def _are_counts(stream: Stream) -> bool:
+    values = stream.values[stream.complete]
     return len(values) > 0 and are_counts(to_signed(values)) and bool(np.abs(values).max() > FEWEST_COUNTS)
 
 
@@ -218,7 +219,7 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
         )
     stream = sensor_stream(table, columns, of)
     # the unit was assumed, as of a phone's
-    doubtful = of[0].unit == UNITS[quantity] and (isinstance(table, ArrayTable) or _are_counts(stream.values))
+    doubtful = of[0].unit == UNITS[quantity] and (isinstance(table, ArrayTable) or _are_counts(stream))
     return replace(stream, unit="") if doubtful else stream
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...data import (
     ACCEL_COUNTS,
@@ -20,7 +22,9 @@ from ...data import (
 )
 from ...errors import RecordingError
 from ..hints import Hints
+from ..rows import make_recording
 from . import times, units
+from .clock import are_new
 from .times import Stream
 from .units import COUNTS, FULL_SCALE, QUANTITIES, resolve_unit
 
@@ -33,15 +37,14 @@ OF_COUNTS = "in counts of"
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # samples over which shaking averages out: a few of its periods at the rates of most loggers
 SHAKEN = 100
-# share of lines that are new samples, beyond which no line is a repeated one
-FEWEST_NEW = 0.5
 # counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
 FEWEST_PER_G, MOST_PER_G = 8, 14
 
 
 def index_with_gravity(streams: Sequence[Stream]) -> int:
     """Return the index of the first accelerometer that measures gravity; 0 if none does."""
-    return next((i for i, s in enumerate(streams) if len(s.values) and units.acceleration_unit(s.values)), 0)
+    whole = (s.values[s.complete] for s in streams)
+    return next((i for i, values in enumerate(whole) if len(values) and units.acceleration_unit(values)), 0)
 
 
 def join_streams(
@@ -49,108 +52,116 @@ def join_streams(
     gyr: Stream | None,
     hints: Hints,
     name: str,
-    temperature_c: Vector | None = None,
     remarks: Sequence[str] = (),
 ) -> Recording:
-    """Return the recording of an accelerometer's and a gyroscope's stream.
+    """Return the recording of an accelerometer's and a gyroscope's stream, with NaN where a sample lacks a number.
 
     Rates whose range, unit or times neither the file nor the turning of gravity shows are left out (NaN).
 
     Parameters
     ----------
     gyr : None if there is no gyroscope.
-    temperature_c : (n,) at the accelerometer's times. remarks : further clauses on how the file was read.
+    remarks : further clauses on how the file was read.
 
     Raises
     ------
     RecordingError : units are not known or do not fit, times do not overlap, or there are too few samples.
     """
     left_out = "without rates" if gyr is None else ""
-    gyr = replace(acc, values=np.zeros_like(acc.values), unit="rad/s", lost=0) if gyr is None else gyr
+    gyr = replace(acc, values=np.zeros_like(acc.values), unit="rad/s") if gyr is None else gyr
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
-        if len(stream.values) < 2:
-            raise RecordingError(f"{name} holds {len(stream.values)} {what}", "record for longer")
-        read = np.abs(stream.values).max(axis=1) < units.BEYOND
-        if not read.all():
+        if np.count_nonzero(stream.complete) < 2:
+            raise RecordingError(f"{name} holds {np.count_nonzero(stream.complete)} {what}", "record for longer")
+        beyond = (np.abs(stream.values) >= units.BEYOND).any(axis=1)
+        if beyond.any():
             raise RecordingError(
-                f"{name}: the {what} of sample {int(read.argmin())} are not a sensor's", "leave that sample out"
+                f"{name}: the {what} of sample {int(beyond.argmax())} are not a sensor's", "leave that sample out"
             )
-    acc, gyr = (replace(s, values=units.to_signed(s.values)) if s.unit in ("", COUNTS) else s for s in (acc, gyr))
-    rate_remark = ""
-    if hints.rate_hz is None and (acc.times is None or gyr.times is None):
-        hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints))
+    acc, gyr = (
+        replace(s, values=_among(s.complete, units.to_signed(s.values[s.complete]), np.nan))
+        if s.unit in ("", COUNTS)
+        else s
+        for s in (acc, gyr)
+    )
+    rate_remark, untimed = "", acc.times is None or gyr.times is None
+    alike = len(acc.values) == len(gyr.values) and np.array_equal(acc.number, gyr.number)
+    if hints.rate_hz is None and untimed:
+        hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints) if alike else None)
         rate_remark = "this sample rate is that at which its rates turn gravity"
         if hints.rate_hz is None:
             rate_remark = "this sample rate is assumed, as nothing shows it (--rate HZ)"
             left_out = left_out or "without rates"
-    is_new, gyr_is_new = _are_new(acc, gyr)
-    temperature_c = None if temperature_c is None else temperature_c[is_new]
-    repeated = int((~is_new).sum())
-    lost = [(acc.lost, "accelerations"), (gyr.lost, "rates")]
-    acc, gyr = acc.part(is_new), gyr.part(gyr_is_new)
+    new = [are_new(stream.at_once, stream.values) for stream in (acc, gyr)]
+    if untimed and alike:
+        new = [are_new(None, np.hstack([acc.values, gyr.values]))] * 2
+    acc, gyr = acc.part(new[0]), gyr.part(new[1])
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
-        if len(stream.values) < 2:
+        if np.count_nonzero(stream.complete) < 2:
             raise RecordingError(f"{name} repeats one sample of {what} at one time", "record it again")
-    (t, gap, of_t, clock), (t_gyr, gap_gyr, of_t_gyr, clock_gyr) = (
-        times.to_seconds(stream, acc, hints, name) for stream in (acc, gyr)
-    )
-    a, of_a, a_clipped = _accelerations(acc, hints, name)
-    joined, values = "", gyr.values
-    if not np.array_equal(t, t_gyr):
-        kept, values, lost_rates, joined = times.interpolate_rates(t, t_gyr, gyr.values, gap_gyr, name)
-        t, a, a_clipped, gap = t[kept], a[kept], a_clipped[kept], gap[kept] | lost_rates
-        temperature_c = None if temperature_c is None else temperature_c[kept]
-    if left_out:
-        w, of_w, w_clipped = _left_out(t, left_out)
+    (clock, of_t), (clock_gyr, of_t_gyr) = (times.to_seconds(stream, acc, hints, name) for stream in (acc, gyr))
+    complete, joined, gap, kept = acc.complete, "", clock.gap, slice(0, len(clock.t))
+    if np.array_equal(clock.t, clock_gyr.t):
+        complete = complete & gyr.complete
+        if np.count_nonzero(complete) < 2:
+            raise RecordingError(f"{name} lacks a number in nearly every sample", "record it again")
+        values = gyr.values[complete]
     else:
-        w, of_w, w_clipped = _rates(t, a, values, gyr.unit, hints, name, of_counts=of_a.startswith(OF_COUNTS))
+        t = clock.t[complete]
+        part, values, lost_rates, joined = times.interpolate_rates(t, clock_gyr, gyr.values, gyr.complete, name)
+        inside = np.flatnonzero(complete)[part]
+        kept, gap = slice(int(inside[0]), int(inside[-1]) + 1), gap.copy()
+        gap[inside] |= lost_rates
+    complete = complete[kept]
+    t = clock.t[kept]
+    a, of_a, a_clipped = _accelerations(replace(acc, values=acc.values[kept][complete]), hints, name)
+    if left_out:
+        w, of_w, w_clipped = _left_out(t[complete], left_out)
+    else:
+        of_counts = of_a.startswith(OF_COUNTS)
+        w, of_w, w_clipped = _rates(t[complete], a, values, gyr.unit, hints, name, of_counts=of_counts)
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
+    repeated, lost = int((~new[0]).sum()), max(acc.lost, gyr.lost)
     said = [
         f"{name} was read with {of_times}, accelerations {of_a} and {of_w}",
         rate_remark,
         *remarks,
         f"{repeated} repeated samples were left out" if repeated else "",
-        *(f"{count} samples whose {what} lack a number were left out" for count, what in lost if count),
-        clock,
-        f"of the rates {clock_gyr}" if clock_gyr not in ("", clock) else "",
+        f"{lost} lines that lack a number were left out" if lost else "",
+        clock.remark,
+        f"of the rates {clock_gyr.remark}" if clock_gyr.remark not in ("", clock.remark) else "",
         joined,
     ]
-    recording = Recording.from_arrays(
-        t,
-        a,
-        np.nan_to_num(w),
-        temperature_c=temperature_c,
-        gap=gap,
-        acc_clipped=a_clipped,
-        gyr_clipped=w_clipped,
+    recording = make_recording(
+        t=t,
+        acc=_among(complete, a, np.nan),
+        gyr=_among(complete, w, np.nan),
+        temperature_c=None if acc.temperature_c is None else acc.temperature_c[kept],
+        gap=gap[kept],
+        acc_clipped=_among(complete, a_clipped, False),
+        gyr_clipped=_among(complete, w_clipped, False),
         sensor=Sensor(accel_range_g=hints.accel_range_g, gyro_range_dps=hints.gyro_range_dps),
         name=name,
         taken="; ".join(filter(None, said)) + ".",
     )
-    return replace(recording, gyr=w, utc_ns=times.utc_ns(acc, of_t))
+    return replace(recording, utc_ns=times.utc_ns(acc, of_t))
 
 
-def _are_new(acc: Stream, gyr: Stream) -> tuple[Mask, Mask]:
-    """Return (n,) False where a sample repeats the one before; see Stream.is_new.
-
-    Without times, most lines have to repeat the one before: a sensor at rest may read the same twice.
-    """
-    if acc.times is not None or gyr.times is not None or len(acc.values) != len(gyr.values):
-        return acc.is_new, gyr.is_new
-    values = np.hstack([acc.values, gyr.values])
-    new = np.append(True, (values[1:] != values[:-1]).any(axis=1))
-    new |= not 1 < np.count_nonzero(new) <= FEWEST_NEW * len(new)
-    return new, new
+def _among(complete: Mask, values: NDArray[Any], missing: float) -> NDArray[Any]:
+    """Return values of all samples: those of the complete ones (n,), and `missing` for the others."""
+    found = np.full((len(complete), *values.shape[1:]), missing, values.dtype)
+    found[complete] = values
+    return found
 
 
 def _rate_hz(acc: Stream, gyr: Stream, hints: Hints) -> float | None:
     """Return the rate of samples without times at which the rates turn gravity; None if it is not determined."""
-    values, unit = gyr.values, hints.units.get("gyr", gyr.unit)
+    complete = acc.complete & gyr.complete
+    values, unit = gyr.values[complete], hints.units.get("gyr", gyr.unit)
     if unit == COUNTS or (not unit and units.are_counts(values)):
         if not hints.gyro_range_dps:
             return None
         values, unit = values * np.radians(hints.gyro_range_dps) / GYRO_COUNTS, "rad/s"
-    return units.likely_rate_hz(acc.values, values, unit)
+    return units.likely_rate_hz(acc.values[complete], values, unit)
 
 
 def _left_out(t: Vector, why: str) -> tuple[Vector, str, Mask]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...data import Mask, Recording, Vector
+from ...data import Recording
 from ...errors import RecordingError
 from ..budget import HELD, check_size
 from ..csv import COLUMNS
@@ -26,7 +26,6 @@ from .names import (
     TIME,
     Column,
     Table,
-    Times,
     axes_of,
     axis_triples,
     first_triple,
@@ -93,7 +92,7 @@ def _three_columns(text: str, name: str) -> TextTable | None:
 def _may_be_si(table: TextTable) -> bool:
     """Return True unless the accelerations show a unit other than m/s^2."""
     values = table.numbers(first_triple(table.columns, ACC))
-    values = values[complete_lines(values)[0]]
+    values = values[np.isfinite(values).all(axis=1)]
     if len(values) < FEWEST:
         return True
     counts = are_counts(values) and float(np.median(np.abs(values).max(axis=1))) > LARGEST_OF_SI
@@ -144,11 +143,10 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     accelerometers, gyr = axis_triples(columns, ACC), first_triple(columns, GYR)
     if not accelerometers:
         raise _missing_sensors(table, columns)
-    streams = [sensor_stream(table, columns, of) for of in accelerometers]
+    warm = [column for column in columns if column.quantity == TEMPERATURE]
+    streams = [sensor_stream(table, columns, of, warm) for of in accelerometers]
     chosen = index_with_gravity(streams)
     acc, a, w = accelerometers[chosen], streams[chosen], sensor_stream(table, columns, gyr) if gyr else None
-    warm = [column for column in columns if column.quantity == TEMPERATURE]
-    temperature_c = plausible_celsius(table.numbers(warm[:1])[a.kept, 0]) if warm else None
     a, ios_remarks = _undo_ios_sign(a, acc)
     several = len(accelerometers) > 1
     remarks = [
@@ -159,7 +157,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
         guess_remark,
         "" if hints.columns else ignored_sensors(table.header, columns),
     ]
-    return join_streams(a, w, hints, table.name, temperature_c, remarks)
+    return join_streams(a, w, hints, table.name, remarks)
 
 
 def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Column], str]:
@@ -212,34 +210,39 @@ def _list_names(header: Sequence[str]) -> str:
 def _undo_ios_sign(stream: Stream, acc: Sequence[Column]) -> tuple[Stream, list[str]]:
     """Return the accelerations of Sensor Logger's one table with Android's sign, and remarks on it."""
     name = acc[0].name.strip().lower()
-    if name.startswith(IN_G_ON_IOS) and acceleration_unit(stream.values) == "g":
+    if name.startswith(IN_G_ON_IOS) and acceleration_unit(stream.values[stream.complete]) == "g":
         return replace(stream, values=-stream.values), [FLIPPED]
     unknown = "the sign of the accelerations was kept; if an iPhone recorded them, it is the opposite one, also of b_a"
     return stream, [unknown] if name.startswith(EITHER_SIGN) else []
 
 
-def sensor_stream(table: Table, columns: Sequence[Column], axes: Sequence[Column]) -> Stream:
-    """Return the samples in one sensor's three columns, without the lines that lack a number."""
+def sensor_stream(
+    table: Table, columns: Sequence[Column], axes: Sequence[Column], warm: Sequence[Column] = ()
+) -> Stream:
+    """Return the samples in one sensor's three columns, and the temperatures beside them; see Stream.
+
+    Many lines without any number are those of another sensor.
+    """
     values = table.numbers(axes)
     values = -values if axes[0].sign_flipped else values
-    kept, lost = complete_lines(values)
+    values[~np.isfinite(values)] = np.nan
+    empty = np.isnan(values).all(axis=1)
     clocks = [c for c in table.clocks(columns) if c.clock_of in ("", axes[0].quantity)]
     clock = min(clocks, key=lambda c: (not c.clock_of, c.rank), default=None)
+    others = np.count_nonzero(empty) > ANOTHERS * len(values)
+    timed = np.ones(len(values), bool) if clock is None else table.has(clock)
+    kept = np.asarray(~empty if others else ~empty | timed)
     unit = axes[0].unit if len({column.unit for column in axes}) == 1 else ""
-    times: tuple[Times | None, str] = (None, "") if clock is None else table.times(clock, kept)
-    gap = None if table.after_lost is None else table.after_lost[kept]
-    return Stream(times[0], values[kept], times[1], unit, kept=kept, lost=lost, gap=gap)
-
-
-def complete_lines(values: Vector) -> tuple[Mask, int]:
-    """Return (n,) True where a line of (n, 3) has all numbers, and how many lines are lost.
-
-    Many empty lines belong to another sensor and are not lost.
-    """
-    complete = np.asarray(np.isfinite(values).all(axis=1))
-    empty = np.isnan(values).all(axis=1)
-    others = int(empty.sum()) > ANOTHERS * len(values)
-    return complete, int((~complete & ~empty).sum()) if others else int((~complete).sum())
+    times, time_unit = (None, "") if clock is None else table.times(clock, kept)
+    return Stream(
+        times,
+        values[kept],
+        time_unit,
+        unit,
+        places=None if others and clock else np.flatnonzero(kept),
+        temperature_c=plausible_celsius(table.numbers(warm[:1])[kept, 0]) if warm else None,
+        lost=0 if others else int((~kept).sum()),
+    )
 
 
 def columns_by_hint(header: Sequence[str], hints: Hints) -> list[Column]:

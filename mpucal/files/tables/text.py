@@ -48,31 +48,23 @@ class TextTable(Table):
 
     Attributes
     ----------
-    rows : the cells of each line that is not empty. lines : the line number of each row, from 1.
-    separator : one of SEPARATORS, or `:` of labelled numbers. lost : numbers of incomplete lines, which are left out.
+    rows : the cells of each line that is not empty; none of a line that was torn. lines : the line number of each row.
+    separator : one of SEPARATORS, or `:` of labelled numbers.
     """
 
     rows: list[list[str]]
     lines: list[int]
     separator: str | None = ","
-    lost: Sequence[int] = ()
 
     @property
     def remarks(self) -> list[str]:
         """See Table."""
         called = SEPARATORS.get(self.separator, "names")
-        separated = [] if self.separator == "," else [f"its cells are separated by {called}"]
-        return [*separated, *([f"{len(self.lost)} lines that lack a number were left out"] if self.lost else [])]
+        return [] if self.separator == "," else [f"its cells are separated by {called}"]
 
-    @property
-    def after_lost(self) -> Mask | None:
+    def has(self, column: Column) -> Mask:
         """See Table."""
-        if not self.lost:
-            return None
-        found = np.zeros(len(self.rows), bool)
-        places = np.searchsorted(self.lines, np.array(self.lost, int))
-        found[places[(places > 0) & (places < len(found))]] = True
-        return found
+        return np.array([column.place < len(row) and bool(row[column.place].strip()) for row in self.rows])
 
     def numeric_places(self) -> list[int]:
         """See Table; the first row decides, and a date counts as a number."""
@@ -285,16 +277,15 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
                 lines.append(line)
     except csv.Error as error:
         raise RecordingError(f"{name} is not a table ({error})", "give a table as text") from error
-    torn = [lines[-1]] if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]) else []
-    if torn:
+    if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]):
         # the logger was switched off
-        rows, lines = rows[:-1], lines[:-1]
+        rows[-1] = []
     if rows and _are_units(rows[0]):
         header = [
             f"{of} ({unit.strip()})" if unit.strip() else of for of, unit in zip_longest(header, rows[0], fillvalue="")
         ]
         rows, lines = rows[1:], lines[1:]
-    return TextTable(name, header, rows, lines, separator, torn)
+    return TextTable(name, header, rows, lines, separator)
 
 
 def _are_units(cells: list[str]) -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from functools import cached_property
 from itertools import compress, pairwise
-from types import EllipsisType
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,10 @@ from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import units
-from .clock import fit_even_clock, sample_period
+from .clock import Clock, Numbers, are_gaps, fit_clock, sample_period
 from .names import Times
 from .units import NS, QUANTITIES, resolve_unit
 
-# periods: over a longer pause of the rates nothing is interpolated
-LOST_PERIODS = 3.5
 # ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
 UTC_NS = (10**18, 41 * 10**17)
 
@@ -31,10 +29,10 @@ class Stream:
     Attributes
     ----------
     times : (n,) exact: decimals, integers or floats; None if the file has none.
-    values : (n, 3). time_unit, unit : as the file names them; empty if it does not.
+    values : (n, 3), NaN where a number is missing. time_unit, unit : as the file names them; empty if it does not.
     zero_ns : the time of day at time 0, in ns since 1970, if another file tells it.
-    kept : mask of the file's lines that are its samples. lost : number of the other lines that are a loss.
-    gap : (n,) True where lines before a sample are missing that only the file shows; None if none is.
+    places : (n,) of the samples in the order of measurement, with holes where lines without a sample are between.
+    temperature_c : (n,), if the file has it. lost : number of lines that hold no sample and no time.
     """
 
     times: Times | None
@@ -42,32 +40,35 @@ class Stream:
     time_unit: str = ""
     unit: str = ""
     zero_ns: int | None = None
-    kept: Mask | EllipsisType = ...
+    places: Numbers | None = None
+    temperature_c: Vector | None = None
     lost: int = 0
-    gap: Mask | None = None
+
+    @cached_property
+    def number(self) -> Numbers:
+        """Return `places`, or else numbers without holes."""
+        return np.arange(len(self.values)) if self.places is None else self.places
+
+    @cached_property
+    def complete(self) -> Mask:
+        """Return (n,) True where a sample has all its numbers."""
+        return np.asarray(np.isfinite(self.values).all(axis=1))
 
     def part(self, mask: Mask) -> Stream:
-        """Return the samples where `mask` (n,) is True."""
-        times = self.times
+        """Return the samples where `mask` (n,) is True; with times, the others are repeated ones, and take no time."""
+        if mask.all():
+            return self
+        times, number, warm = self.times, self.number, self.temperature_c
         if times is not None:
             times = times[mask] if isinstance(times, np.ndarray) else list(compress(times, mask))
-        gap = None if self.gap is None else self.gap[mask]
-        kept = np.ones(len(mask), bool) if self.kept is ... else np.array(self.kept)
-        kept[kept] = mask
-        return replace(self, times=times, values=self.values[mask], gap=gap, kept=kept)
+            number = number - np.cumsum(~mask)
+        warm = None if warm is None else warm[mask]
+        return replace(self, times=times, values=self.values[mask], places=number[mask], temperature_c=warm)
 
     @property
-    def is_new(self) -> Mask:
-        """Return (n,) False where a sample repeats the one before, as loggers do beside a faster sensor.
-
-        If many different samples share a time, times are rounded, and equal samples may be two measurements.
-        """
-        again = np.zeros(len(self.values), bool)
-        if self.times is not None and len(again):
-            at_once = np.array([b == a for a, b in pairwise(self.times)], bool)
-            alike = (self.values[1:] == self.values[:-1]).all(axis=1)
-            again[1:] = at_once & alike & (np.count_nonzero(at_once & ~alike) <= np.count_nonzero(at_once & alike))
-        return ~again
+    def at_once(self) -> Mask | None:
+        """Return (n - 1,) True where a sample has the time of the one before; None without times."""
+        return None if self.times is None else np.array([b == a for a, b in pairwise(self.times)], bool)
 
 
 def utc_ns(stream: Stream, of_t: str) -> int | None:
@@ -84,19 +85,16 @@ def plausible_utc_ns(ns: int) -> int | None:
     return ns if UTC_NS[0] < ns < UTC_NS[1] else None
 
 
-def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, Mask, str, str]:
-    """Return times (n,) [s] since those of `first` begin, gaps (n,), how they were read, and a remark on the clock.
+def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Clock, str]:
+    """Return the clock [s] since the times of `first` begin, and how they were read.
 
     Raises
     ------
     RecordingError : the unit is not known, or times are not finite or decrease.
     """
-    none = np.zeros(len(stream.values), bool)
     if stream.times is None or first.times is None:
         rate_hz = hints.rate_hz or units.ANY_HZ
-        places = np.flatnonzero(np.ones(len(stream.values), bool) if stream.kept is ... else stream.kept)
-        # without times, only the lines show where samples are missing
-        return places / rate_hz, none if stream.gap is None else stream.gap, f"a rate of {rate_hz:g} Hz", ""
+        return Clock(stream.number / rate_hz, are_gaps(stream.number), rate_hz), f"a rate of {rate_hz:g} Hz"
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
@@ -113,10 +111,7 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
-    clock = fit_even_clock(t)
-    if clock is not None:
-        return clock.t, clock.gap, f"times in {unit}", clock.description
-    return t, none, f"times in {unit}", ""
+    return fit_clock(t, stream.number), f"times in {unit}"
 
 
 def _since(times: Times, origin: Any) -> Vector:
@@ -128,17 +123,20 @@ def _since(times: Times, origin: Any) -> Vector:
     return np.array([float(time - origin) for time in times])
 
 
-def interpolate_rates(t: Vector, t_gyr: Vector, rates: Vector, gap: Mask, name: str) -> tuple[slice, Vector, Mask, str]:
+def interpolate_rates(
+    t: Vector, clock: Clock, rates: Vector, complete: Mask, name: str
+) -> tuple[slice, Vector, Mask, str]:
     """Return the accelerations within the rates' time, the rates at their times, gaps there, and a remark.
 
     Parameters
     ----------
-    t, t_gyr : times of accelerations and rates [s]. rates : (n, 3). gap : (n,) True where rates before are missing.
+    t : times of accelerations [s]. clock : of the rates (n, 3), of which `complete` (n,) have all numbers.
 
     Raises
     ------
     RecordingError : the two do not overlap in time.
     """
+    t_gyr, rates = clock.t[complete], rates[complete]
     first, last = np.searchsorted(t, t_gyr[0], "left"), np.searchsorted(t, t_gyr[-1], "right")
     if last - first < 2:
         raise RecordingError(
@@ -150,12 +148,11 @@ def interpolate_rates(t: Vector, t_gyr: Vector, rates: Vector, gap: Mask, name: 
     at = t[kept]
     values = np.column_stack([np.interp(at, t_gyr, axis) for axis in rates.T])
     after = np.clip(np.searchsorted(t_gyr, at), 1, len(t_gyr) - 1)
-    apart = t_gyr[after] - t_gyr[after - 1]
-    lost = (apart > LOST_PERIODS * float(np.median(np.diff(t_gyr)))) | gap[after]
+    gap = are_gaps(np.flatnonzero(complete)) | clock.gap[complete]
     nearest = np.minimum(np.abs(at - t_gyr[after - 1]), np.abs(t_gyr[after] - at))
     said = (
         f"the rates were interpolated to the times of the accelerations, from which their own lie"
         f" {1e3 * float(np.median(nearest)):.2f} ms apart in the median (the gyroscope begins"
         f" {1e3 * (t_gyr[0] - t[0]):+.2f} ms after the accelerometer)"
     )
-    return kept, values, lost, said
+    return kept, values, gap[after], said

@@ -142,8 +142,6 @@ def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
 
 def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
     """Return the sample rate at which (n, 3) rates in `unit`, or in the only likely one, turn gravity; else None."""
-    if len(acc) != len(gyr):
-        return None
     fastest = float(np.percentile(np.abs(gyr), 99))
     known = QUANTITIES["gyr"].items()
     units = [si for name, si in known if name == unit or (not unit and fastest * si < FASTEST_RAD_S)]
