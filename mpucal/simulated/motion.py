@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
-from .disturbance import JERK_MPS2, JERK_S, SWAY_HZ, TREMOR_HZ, TYPICAL_TREMOR, HandDisturbance, point_acceleration
+from .disturbance import HELD_HZ, JERK_MPS2, JERK_S, SWAY_HZ, TYPICAL_TREMOR, HandDisturbance, point_acceleration
 from .hand import REACTION_S, Hand, HandPrompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 from .mishaps import Mishap
@@ -47,6 +47,11 @@ class BandNoise:
         """Return (n, 3) the integral over time, without its mean, at the steps from `first` on."""
         angle = self._pulsation * (first * STEP_S) + self._phase
         return self._sum(-np.cos(angle) / self._pulsation, np.sin(angle) / self._pulsation, n)
+
+    def second_derivative(self, first: int, n: int) -> Vector:
+        """Return (n, 3) the second derivative by time at the steps from `first` on."""
+        angle = self._pulsation * (first * STEP_S) + self._phase
+        return self._sum(-(self._pulsation**2) * np.sin(angle), -(self._pulsation**2) * np.cos(angle), n)
 
     def _sum(self, cosines: Vector, sines: Vector, n: int) -> Vector:
         weights = np.concatenate((cosines, sines), axis=1) * self._amplitude
@@ -109,10 +114,12 @@ class Motion:
         self._gravity, self._disturbance = gravity, disturbance
         lever = rng.normal(size=3)
         self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(*disturbance.lever_m)
-        self._tremor_force = BandNoise(rng, TREMOR_HZ, disturbance.tremor_mps2 * rng.uniform(0.5, 1.0))
-        self._tremor_rate = BandNoise(rng, TREMOR_HZ, disturbance.tremor_rad_s)
+        self._tremor_force = BandNoise(rng, disturbance.tremor_hz, disturbance.tremor_mps2 * rng.uniform(0.5, 1.0))
+        self._tremor_rate = BandNoise(rng, disturbance.tremor_hz, disturbance.tremor_rad_s)
         self._sway = BandNoise(rng, SWAY_HZ, disturbance.sway_mps2)
-        self._jerk_rng = rng.spawn(1)[0]
+        self._jerk_rng, of_place, of_angle = rng.spawn(3)
+        self._held_place = BandNoise(of_place, HELD_HZ, disturbance.held_m)
+        self._held_angle = BandNoise(of_angle, HELD_HZ, disturbance.held_rad)
         self._stance = hand.first_stance()
         self._rate = np.zeros(3)
         self._jerks: list[Jerk] = []
@@ -208,10 +215,13 @@ class Motion:
         return np.hstack((force * STEP_S, rotation.between(attitudes))), attitudes[1:]
 
     def _shaken(self, planned: Vector, first: int, grip: Vector) -> Vector:
-        """Return the planned attitudes (n, 4) with the hand's tremor."""
+        """Return the planned attitudes (n, 4) with the hand's tremor and sway."""
         if not grip.any():
             return planned
-        return rotation.product(planned, rotation.exp(self._tremor_rate.integral(first, len(grip)) * grip[:, None]))
+        turned = self._tremor_rate.integral(first, len(grip))
+        if self._disturbance.held_rad:
+            turned += self._held_angle.at(first, len(grip))
+        return rotation.product(planned, rotation.exp(turned * grip[:, None]))
 
     def _lever_force(self, rates: Vector) -> Vector:
         """Return the acceleration (n, 3) on the lever r at (n, 3) rad/s: alpha x r + w x (w x r)."""
@@ -222,12 +232,15 @@ class Motion:
         return point_acceleration(alpha, rates, self._lever_m)
 
     def _shaking(self, leg: Leg, nodes: Vector, grip: Vector) -> Vector:
-        """Return the hand's own acceleration (n, 3) in each step: tremor, sway, jerks."""
+        """Return the hand's own acceleration (n, 3) in each step: tremor, sway and jerks."""
         first, t_s = int(nodes[0]), nodes[1:] * STEP_S
         effort = leg.effort(nodes)[1:, None]
         push = np.zeros((len(t_s), 3))
         if grip.any():
-            push += self._tremor_force.at(first, len(t_s)) * grip[1:, None]
+            shaken = self._tremor_force.at(first, len(t_s))
+            if self._disturbance.held_m:
+                shaken += self._held_place.second_derivative(first, len(t_s))
+            push += shaken * grip[1:, None]
         if effort.any():
             push += self._sway.at(first, len(t_s)) * effort
             for _ in range(self._jerk_rng.poisson(self._disturbance.jerks_per_s * len(t_s) * STEP_S)):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mpucal.simulated.disturbance import ARMS
 from mpucal.simulated.hands import HANDS
 from mpucal.simulated.motion import AHEAD_S, BandNoise, Motion
 
@@ -196,7 +197,7 @@ def test_the_still_hand_does_not_turn_and_the_restless_hand_never_lies_still():
         assert run.rate[i : i + 200].std(axis=0).max() > 0.03
 
 
-def test_a_wobble_has_its_strength_and_its_integral():
+def test_a_wobble_has_its_strength_its_integral_and_its_derivative():
     wobble = BandNoise(np.random.default_rng(5), (2.0, 10.0), 0.3)
     n, step = 400, 1 / 2000
     blocks = [(wobble.at(first, n), wobble.integral(first, n)) for first in range(0, 40000, n)]
@@ -204,9 +205,31 @@ def test_a_wobble_has_its_strength_and_its_integral():
     np.testing.assert_allclose(values.std(axis=0), 0.3, rtol=0.1)
     slope = np.gradient(integral, step, axis=0)
     np.testing.assert_allclose(slope[1:-1], values[1:-1], atol=2e-3)
+    bent = np.diff(wobble.at(0, n), n=2, axis=0) / step**2
+    np.testing.assert_allclose(wobble.second_derivative(0, n)[1:-1], bent, atol=1e-3 * np.abs(bent).max())
     spectrum = np.abs(np.fft.rfft(values, axis=0)) ** 2
     frequency = np.fft.rfftfreq(len(values), step)
     assert spectrum[(frequency > 1.5) & (frequency < 10.5)].sum() > 0.99 * spectrum.sum()
+
+
+def test_an_arm_sways_and_trembles_as_much_as_it_says():
+    """Slow turns in a pose move gravity, and the rates hold the tremor of 8 to 12 Hz."""
+    arm = ARMS["raised"]
+    hand, motion = np.random.default_rng(4).spawn(2)
+    held = Motion(HANDS["still"](hand), motion, GRAVITY, disturbance=arm)
+    held.hear(prompt("hold_still"), 0.0)
+    force, rate = held.means(np.arange(12000) * PERIOD_S)
+    still = slice(600, None)
+    slowly = force[still][: 11200 // 40 * 40].reshape(-1, 40, 3).mean(1)
+    tilt = (slowly - slowly.mean(0))[:, :2] / GRAVITY
+    assert arm.held_rad < np.sqrt((tilt**2).mean()) < 1.2 * (arm.held_rad + arm.held_m / GRAVITY * (2 * np.pi) ** 2)
+    spectrum = np.abs(np.fft.rfft(rate[still], axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(rate[still]), PERIOD_S)
+    fast = frequency > 5.0
+    band = (frequency > 7.9) & (frequency < 12.1)
+    assert spectrum[band].sum() > 0.98 * spectrum[fast].sum()
+    of_band = np.sqrt(2.0 * spectrum[band].sum() / 3.0) / len(rate[still])
+    assert of_band == pytest.approx(arm.tremor_rad_s, rel=0.1)
 
 
 @pytest.mark.parametrize("late_s", [0.001, -0.001])

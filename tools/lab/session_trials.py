@@ -29,6 +29,7 @@ from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.session.events import Decision, PromptKind, Verification
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.disturbance import ARMS
 from mpucal.simulated.hands import HANDS
 from mpucal.simulated.mishaps import ZeroStep
 
@@ -40,6 +41,7 @@ from .table import Column, count, frequencies, grouped, known, over, show, table
 RATE_HZ = 50.0
 # of a part: its temperature, which is to be known so well, as each element of D is
 TEMPERATURE_C, NEAR_C, NEAR = 27.0, 0.3, 2e-3
+HELD = (*HANDS, *(f"guided,arm={arm}" for arm in ARMS))
 DAMAGES = {"zero": None, "byte": "low_byte", "bits": "bit_errors", "none": None}
 DAMAGED_S, STEP_MG = (12.0, 75.0), (3.0, 30.0)
 
@@ -104,7 +106,7 @@ def of_damage(name: str, seed: int) -> Ended:
 
 # by name: the things to try, the function that tries one, and the seeds unless told otherwise
 TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], Ended], str]] = {
-    "hands": (tuple(HANDS), of_hand, "50"),
+    "hands": (HELD, of_hand, "50"),
     "parts": (tuple(parts()), of_part, "4:5"),
     "damage": (tuple(DAMAGES), of_damage, "40"),
 }

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...data import STANDARD_GRAVITY_MPS2
+from ..disturbance import ARMS
 from ..faults import begin_mishaps
 from ..hands import HANDS
 from ..mishaps import Mishap
@@ -38,7 +39,7 @@ def open_simulated(
 
     Parameters
     ----------
-    text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, fault, rate_error_ppm, D, b_a, K,
+    text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, arm, pace, fault, rate_error_ppm, D, b_a, K,
         b_omega, noise, temperature_c, khz. gravity : m/s^2 at the board. seed : of its own option.
     mishaps : of the sensor, besides the faults of the text.
     clock : in place of that of `pace`.
@@ -50,7 +51,8 @@ def open_simulated(
     options = ChipOptions.parse(text, seed)
     truth = _truth(options, gravity)
     of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
-    motion = Motion(HANDS[options.hand](of_hand), of_motion, gravity, (*begin_mishaps(options.fault), *mishaps))
+    mishaps = (*begin_mishaps(options.fault), *mishaps)
+    motion = Motion(HANDS[options.hand](of_hand), of_motion, gravity, mishaps, ARMS[options.arm])
     model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
     if options.who_am_i is not None:
         model = replace(model, who_am_i=options.who_am_i)

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from ...data import Vector
+from ..disturbance import ARMS
 from ..faults import OF_CHIP, Fault, Where
 from ..hands import HANDS
 from ..option_text import FAULT, Parser, at_least, faults, number, one_of, parse_options, whole
@@ -22,7 +23,7 @@ class ChipOptions:
 
     Attributes
     ----------
-    chip, hand, pace : a name each. who_am_i : another identity than the chip's own.
+    chip, hand, arm, pace : a name each. who_am_i : another identity than the chip's own.
     offsets : scale of the accelerometer offsets in LSB/g, or readonly.
     seed : of the sensor, its noise and the hand. rate_error_ppm : of the sample clock.
     D, K : (3, 3). b_a [m/s^2], b_omega [rad/s] : (3,).
@@ -35,6 +36,7 @@ class ChipOptions:
     offsets: str = "2048"
     seed: int = 0
     hand: str = "guided"
+    arm: str = "steady"
     pace: str = "fast"
     rate_error_ppm: float | None = None
     D: Vector | None = None
@@ -90,6 +92,7 @@ PARSERS: dict[str, Parser] = {
     "offsets": one_of(OFFSETS),
     "seed": whole(0),
     "hand": one_of(HANDS),
+    "arm": one_of(ARMS),
     "pace": one_of(CLOCKS),
     FAULT: faults(*OF_CHIP, Where.DEFECT, Where.HAND),
     "rate_error_ppm": (number, "a number"),

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...data import Vector
 from ...mavlink.prompts import Direction, ReceivedPrompt
+from ..disturbance import ARMS
 from ..faults import begin_mishaps
 from ..hand import HandPrompt
 from ..hands import HANDS
@@ -36,7 +37,8 @@ class Imus:
 
     def __init__(self, options: VehicleOptions, rotation: Vector, rate_hz: float, gravity: float) -> None:
         of_hand, of_motion, self._rng = np.random.default_rng([options.seed, 3]).spawn(3)
-        self._motion = Motion(HANDS[options.hand](of_hand), of_motion, gravity, begin_mishaps(options.fault))
+        hand, mishaps = HANDS[options.hand](of_hand), begin_mishaps(options.fault)
+        self._motion = Motion(hand, of_motion, gravity, mishaps, ARMS[options.arm])
         self._rotation, self._rate_hz = rotation, rate_hz
         self.truths = tuple(_truth(options.seed, number, gravity) for number in range(options.imus))
         self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES
+from ..disturbance import ARMS
 from ..faults import OF_VEHICLE, Fault, Where
 from ..hands import HANDS
 from ..option_text import FAULT, Parser, at_least, faults, one_of, parse_options, whole
@@ -26,7 +27,7 @@ class VehicleOptions:
     ----------
     firmware : ardupilot or px4. type : copter, plane or rover. imus : their number. system : its MAVLink id.
     rotation : MAV_SENSOR_ORIENTATION of its board. highres : an ArduPilot of 4.6 or later, with HIGHRES_IMU.
-    seed : of its sensors, their noise and the hand. hand : its kind. pace : fast or real, of `--mavlink sim`.
+    seed : of its sensors, their noise and the hand. hand, arm : its kind, and how it is held. pace : fast or real.
     rotate_at : s after which the hand begins to turn it without a prompt; None: it waits for one.
     fault : faults with their times. refuse : the parameter that it refuses to set.
     parameters : values at the start.
@@ -40,6 +41,7 @@ class VehicleOptions:
     highres: bool = True
     seed: int = 0
     hand: str = "guided"
+    arm: str = "steady"
     pace: str = "fast"
     rotate_at: float | None = None
     fault: tuple[Fault, ...] = ()
@@ -81,6 +83,7 @@ PARSERS: dict[str, Parser] = {
     "highres": (lambda text: {"yes": True, "no": False}[text], "yes or no"),
     "seed": whole(0),
     "hand": one_of(HANDS),
+    "arm": one_of(ARMS),
     "pace": one_of(PACES),
     "rotate_at": at_least(0),
     FAULT: faults(*OF_VEHICLE, Where.HAND),
