@@ -81,52 +81,50 @@ class _Unfailing(io.FileIO):
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run a command, and return its exit code."""
+    words = sys.argv[1:] if arguments is None else arguments
     try:
-        return _run(arguments)
+        return _run(words)
     except KeyboardInterrupt:
         # CPython would end by SIGINT if the interrupt came inside exec, as in a dataclass; another exec prevents that
         exec("")
-        words = _words(arguments)
         kept = "; the recording until then is kept" if words and words[0] in RECORDING else ""
-        if EVENTS in words:
-            return _event(Abandoned.exit_code, f"interrupted{kept}", "")
-        print(f"mpucal: interrupted{kept}.", file=sys.stderr)
-        return Abandoned.exit_code
+        return _report(words, Abandoned.exit_code, f"interrupted{kept}")
     except OSError as error:
         if error.errno not in DENIED:
-            return _bug(arguments)
+            return _report_bug(words)
         if error.errno in NO_ROOM and error.filename is None:
             # flushing at exit would fail again
             sys.stdout = None
             print(f"mpucal: the output cannot be written ({error.strerror}): free space there.", file=sys.stderr)
             return OutputError.exit_code
-        what = error.filename or "a file or device"
-        return _report(arguments, f"cannot use {what} ({error.strerror})", "check its permissions, and the disk")
+        what = f"cannot use {error.filename or 'a file or device'} ({error.strerror})"
+        return _report(words, SourceError.exit_code, what, "check its permissions, and the disk")
     except MemoryError:
-        return _report(arguments, "there is not enough memory", "end other programs, or give a shorter recording")
+        remedy = "end other programs, or give a shorter recording"
+        return _report(words, SourceError.exit_code, "there is not enough memory", remedy)
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _run(words: Sequence[str]) -> int:
     import click  # noqa: PLC0415
 
     from .cli import amended, commands  # noqa: PLC0415
 
     try:
-        return int(commands.main(args=arguments, prog_name="mpucal", standalone_mode=False) or 0)
+        return int(commands.main(args=words, prog_name="mpucal", standalone_mode=False) or 0)
     except click.ClickException as error:
-        if EVENTS not in _words(arguments):
-            error.show()
-            return error.exit_code
-        return _event(error.exit_code, error.format_message(), f"see `mpucal {_words(arguments)[0]} --help`")
+        if EVENTS in words:
+            return _report(words, error.exit_code, error.format_message(), f"see `mpucal {words[0]} --help`")
+        error.show()
+        return error.exit_code
     except click.Abort:
         raise KeyboardInterrupt from None
     except MpucalError as error:
-        if EVENTS in _words(arguments):
-            return _event(error.exit_code, error.what, error.remedy)
+        if EVENTS in words:
+            return _report(words, error.exit_code, error.what, error.remedy)
         click.echo(f"mpucal: {error}", err=True)
         if error.options or error.without:
             # the whole command, to be copied
-            again = amended(_words(arguments), error.options, error.without)
+            again = amended(words, error.options, error.without)
             click.echo(f"mpucal: try `mpucal {shlex.join(again)}`", err=True)
         return error.exit_code
     except SystemExit:
@@ -138,38 +136,25 @@ def _run(arguments: Sequence[str] | None) -> int:
     except Exception as error:
         if isinstance(error, ImportError) and UNMAPPED in str(error):
             raise MemoryError from error
-        return _bug(arguments)
+        return _report_bug(words)
 
 
-def _words(arguments: Sequence[str] | None) -> Sequence[str]:
-    return sys.argv[1:] if arguments is None else arguments
+def _report(words: Sequence[str], exit_code: int, what: str, remedy: str = "") -> int:
+    """Print an error as a sentence, or as an event if the command line asks for events; return its exit code."""
+    if EVENTS in words:
+        import json  # noqa: PLC0415
 
-
-def _report(arguments: Sequence[str] | None, what: str, do: str) -> int:
-    """Report a missing resource of the computer as a sentence or event; return the exit code."""
-    if EVENTS in _words(arguments):
-        return _event(SourceError.exit_code, what, do)
-    print(f"mpucal: {what}: {do}.", file=sys.stderr)
-    return SourceError.exit_code
-
-
-def _event(exit_code: int, what: str, remedy: str) -> int:
-    """Print an error as an event; return its exit code."""
-    import json  # noqa: PLC0415
-
-    event = {"event": "error", "exit_code": exit_code, "what": what, "remedy": remedy}
-    print(json.dumps(event), file=sys.stderr)
+        print(json.dumps({"event": "error", "exit_code": exit_code, "what": what, "remedy": remedy}), file=sys.stderr)
+    else:
+        print(f"mpucal: {what}{': ' if remedy else ''}{remedy}.", file=sys.stderr)
     return exit_code
 
 
-def _bug(arguments: Sequence[str] | None) -> int:
+def _report_bug(words: Sequence[str]) -> int:
     import traceback  # noqa: PLC0415
 
     traceback.print_exc()
-    if EVENTS in _words(arguments):
-        return _event(BUG, "this is a bug in mpucal", "please report it with the lines above")
-    print("mpucal: this is a bug in mpucal: please report it with the lines above.", file=sys.stderr)
-    return BUG
+    return _report(words, BUG, "this is a bug in mpucal", "please report it with the lines above")
 
 
 if __name__ == "__main__":

@@ -111,10 +111,7 @@ def check_vectors(values: ArrayLike, name: str, unit: str) -> Vector:
     ------
     WrongType : they are not numbers. WrongValue : the last axis is not x, y, z.
     """
-    try:
-        array = _real(np.asarray(values))
-    except (TypeError, ValueError) as error:
-        raise WrongType(f"{name} is not an array of numbers ({error})", f"give (..., 3) {unit}") from error
+    array = _numbers(values, name, f"give (..., 3) {unit}")
     if array.ndim == 0 or array.shape[-1] != 3:
         turned = f"{name}.T" if array.ndim == 2 and len(array) == 3 else "one row of x, y, z per sample"
         raise WrongValue(f"{name} has shape {array.shape}, not (..., 3)", f"give {turned}, in {unit}")
@@ -156,13 +153,18 @@ def check_shape(values: ArrayLike, name: str, *shapes: tuple[int, ...]) -> Vecto
     ------
     WrongType : they are not numbers. WrongValue : another shape.
     """
-    try:
-        array = _real(np.asarray(values))
-    except (TypeError, ValueError) as error:
-        raise WrongType(f"{name} is not an array of numbers ({error})", f"give numbers of shape {shapes[0]}") from error
+    remedy = f"give numbers of shape {shapes[0]}"
+    array = _numbers(values, name, remedy)
     if array.shape not in shapes:
-        raise WrongValue(f"{name} has shape {array.shape}", f"give numbers of shape {shapes[0]}")
+        raise WrongValue(f"{name} has shape {array.shape}", remedy)
     return array
+
+
+def _numbers(values: ArrayLike, name: str, remedy: str) -> Vector:
+    try:
+        return _real(np.asarray(values))
+    except (TypeError, ValueError) as error:
+        raise WrongType(f"{name} is not an array of numbers ({error})", remedy) from error
 
 
 def check_regular(path: Path) -> Path:

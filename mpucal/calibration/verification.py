@@ -15,8 +15,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..origin import Origin
 from ..rests.flat import Flat
-from ..rests.gyro_drift import remove_drift
-from ..rests.intervals import RestFinder
+from ..rests.intervals import RestFinder, remove_drift
 from .fit import Fit
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import turned

@@ -28,8 +28,8 @@ from ..result.session_files import BLOB, DOCUMENT
 from ..session.folder import SessionFolder
 from ..session.results import check_owner, save
 from ..sinks.choose import choose_sinks
-from ..sinks.record import file_recorder
 from ..sinks.table import SINKS
+from ..sinks.write_back import file_recorder
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import open_source
 from ..sources.table import source_title

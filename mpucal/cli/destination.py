@@ -12,11 +12,9 @@ import click
 from ..errors import UsageError
 from ..result.calibration import Calibration
 from ..sinks.choose import FILE, check_behind, default_sinks
-from ..sinks.kind import Device, Say, SinkKind
-from ..sinks.record import Recorder
-from ..sinks.sink import Applied
+from ..sinks.kind import Applied, Device, Say, SinkKind
 from ..sinks.table import SINKS
-from ..sinks.write_back import write_to_all
+from ..sinks.write_back import Recorder, write_to_all
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from ..sources.table import matching_kinds

@@ -9,8 +9,7 @@ from typing import Any
 import click
 
 from .. import __version__
-from ..doctor.finding import Finding, Mark
-from ..doctor.page import document, text
+from ..doctor.finding import Finding, Mark, document, text
 from ..errors import SourceError, UsageError
 from ..origin import Origin
 from ..session.lay_flat import PUT_DOWN, STAND, put_down
@@ -61,7 +60,7 @@ def _with_spinner(findings: Iterator[Finding]) -> Iterator[Finding]:
 
 
 def _conformance(options: Mapping[str, Any]) -> Iterator[Finding]:
-    from ..doctor.conformance import examine_conformance  # noqa: PLC0415 - loads the link, which only this needs
+    from ..doctor.bridge import examine_conformance  # noqa: PLC0415 - loads the link, which only this needs
     from ..sources.bridge import open_link  # noqa: PLC0415
 
     try:

@@ -46,5 +46,4 @@ def load_trusted(path: Path, force: bool) -> Calibration:
 
 def at_gravity_of(calibration: Calibration | None, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return a source's options with the gravity of a calibration: a simulated chip is examined where it was made."""
-    known = None if calibration is None else calibration.fit.get("gravity")
-    return {**options, "gravity": known or STANDARD_GRAVITY_MPS2}
+    return {**options, "gravity": STANDARD_GRAVITY_MPS2 if calibration is None else calibration.gravity}

@@ -154,6 +154,7 @@ def fit_options(command: F) -> F:
 
 def aim_options(command: F) -> F:
     """Add --target and --tilt-only."""
+    std = AIMS[NORMAL].target
     return decorated(
         command,
         click.option(
@@ -161,8 +162,8 @@ def aim_options(command: F) -> F:
             type=click.Choice(tuple(AIMS)),
             default=NORMAL,
             show_default=True,
-            help="Required accuracy (1 sigma): normal is 1 mg of bias, 0.1 % of scale factor error, 0.05 deg of "
-            "misalignment.",
+            help=f"Required accuracy (1 sigma): {NORMAL} is {std.bias_mg:g} mg of bias, {std.gain_pct:g} % of scale"
+            f" factor error, {std.misalignment_deg:g} deg of misalignment.",
         ),
         click.option(
             "--tilt-only",

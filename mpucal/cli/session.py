@@ -22,7 +22,7 @@ from ..session.folder import SessionFolder, check_unfinished
 from ..sinks.choose import announce_sinks, choose_sinks
 from ..sinks.interrupted import interrupted_writes
 from ..sinks.kind import SinkKind
-from ..sinks.record import session_recorder
+from ..sinks.write_back import session_recorder
 from ..sources.kind import NAME
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import check_resume_options, open_source

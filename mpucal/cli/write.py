@@ -8,9 +8,8 @@ from typing import Any
 import click
 
 from ..disk.output_folder import OutputFolder
-from ..sinks.record import file_recorder, is_calibration
 from ..sinks.table import SINKS
-from ..sinks.write_back import put_back, write_objection, write_to
+from ..sinks.write_back import file_recorder, is_calibration, put_back, write_objection, write_to
 from .arguments import calibration_argument, json_option, output_option, yes_option
 from .destination import check_sink, make_device, sink_flags
 from .loading import at_gravity_of, force_option, load_trusted

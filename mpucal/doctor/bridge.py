@@ -1,4 +1,4 @@
-"""Examination of a serial bridge: its HELLO, and the time that a read takes."""
+"""Examination of a serial bridge: HELLO, the time of a read, and its conformance to firmware_protocol.md."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from typing import Any
 
 from ..chip.access import Bus
 from ..sources.bridge import BridgeBus
-from ..sources.bridge.messages import Feature
+from ..sources.bridge.conformance import Talk, run_talk, talks
+from ..sources.bridge.link import REPLY_NS, STORE_NS, Link
+from ..sources.bridge.messages import BlobErase, BlobState, Feature, Status
 from .bus_speed import LONG_BYTES, median_ms
-from .finding import Finding
+from .finding import Finding, Mark
 
 # Twice the time of a read with the 16 ms latency timer of an FTDI adapter.
 SLOW_MS = 35.0
+
+REMEDY = "firmware_protocol.md has the rule; `python -m tools.make vectors` writes the talks"
 
 
 def examine_bridge(bus: Bus) -> Iterator[Finding]:
@@ -44,3 +48,39 @@ def examine_bridge(bus: Bus) -> Iterator[Finding]:
     remedy = "connect it directly, without a hub or a network"
     data = {f"read_{LONG_BYTES}_bytes_ms": read_ms}
     yield Finding.check("serial line", read_ms <= SLOW_MS, what, remedy, data)
+
+
+def examine_conformance(link: Link) -> Iterator[Finding]:
+    """Run each talk that this bridge can hold, over an open link; a stored calibration is not overwritten.
+
+    Raises
+    ------
+    BusError : it does not answer any more.
+    """
+    hello = link.bridge
+    has = {"chip": bool(hello.address), "stream": bool(hello.features & Feature.STREAM), "blob": False}
+    why = {"chip": "no chip answers", "stream": "it pushes no samples", "blob": "it stores no calibration"}
+    if hello.features & Feature.OCCUPIED:
+        why["blob"] = "its memory holds other data, which is kept"
+    elif hello.features & Feature.BLOB:
+        # The talks about storing would overwrite a stored calibration.
+        has["blob"] = link.ask(BlobState())[0][-1].reply.status == Status.NO_BLOB
+        why["blob"] = "it stores a calibration, which is kept"
+    for name, talk in talks().items():
+        lacks = [why[need] for need in talk["needs"] if not has[need]]
+        if lacks:
+            yield Finding(name, Mark.UNKNOWN, f"not tried, as {lacks[0]}: {talk['settled']}")
+        else:
+            yield _run_talk(link, name, talk)
+
+
+def _run_talk(link: Link, name: str, talk: Talk) -> Finding:
+    stores = "blob" in talk["needs"]
+    # A talk before may have left another address.
+    link.greet()
+    differs = run_talk(link.port, talk, (STORE_NS if stores else REPLY_NS) + link.latency.most_ns)
+    link.greet()
+    if stores:
+        link.ask(BlobErase())
+    what = f"{differs}; the rule is: {talk['settled']}" if differs else talk["settled"]
+    return Finding.check(name, not differs, what, REMEDY, {}, Mark.BAD)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import numpy as np
 
@@ -29,11 +29,12 @@ from ..chip.transfer_stats import REMEDY, TransferStats
 from ..data import Sensor
 from ..errors import BoardMoved, ChipError, ChipReset, OddOffsets, SourceError
 from ..session.ports import polled
+from ..sources.chip import OpenedChip
+from .bridge import examine_bridge
 from .bus_speed import examine_speed
-from .dead_axes import DEAD_AXIS, REPLACE, STUCK_BITS
+from .dead_axes import DEAD_AXIS, REPLACE, STUCK_BITS, examine_bits
 from .finding import Finding, Mark
 from .measure import examine_stream
-from .stuck_bits import examine_bits
 
 # Shares of failed transfers: above the first a session is in danger, above the second nothing works.
 MANY, MOST = 0.05, 0.5
@@ -216,3 +217,21 @@ def _verdict(sensor: Sensor, doubts: list[str]) -> Finding:
     what = f"probably not genuine: {', '.join(doubts)}" if doubts else f"consistent with a genuine {sensor.chip}"
     remedy = "it can be used with mpucal; other software may misread it"
     return Finding.check("genuine?", not doubts, what, remedy, {"doubts": doubts})
+
+
+def examine_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
+    """Examine a chip and its I2C bus."""
+    with closing(source.bus):
+        yield from examine(source.bus, source.plan.config, seconds)
+
+
+def examine_chip_alone(source: OpenedChip, seconds: float) -> Iterator[Finding]:
+    """Examine a chip on an SPI bus or a USB adapter, where times of replies do not show the bus's speed."""
+    with closing(source.bus):
+        yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
+
+
+def examine_bridge_and_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
+    """Examine a bridge's firmware, its serial line, and the chip behind it."""
+    with closing(source.bus):
+        yield from examine(source.bus, source.plan.config, seconds, examine_bridge)

@@ -1,14 +1,20 @@
-"""Finding of the doctor: one line of its page."""
+"""Findings of the doctor, and their page: text for a bug report, or JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+import platform
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Any, Self
 
 from ..errors import SourceError
+
+FORMAT, VERSION = "mpucal.doctor", 1
+TOPIC, WIDTH = 24, 100
 
 
 class Mark(StrEnum):
@@ -18,6 +24,9 @@ class Mark(StrEnum):
     NOTE = "note"
     BAD = "bad"
     UNKNOWN = "unknown"
+
+
+SIGNS = {Mark.OK: "  ", Mark.NOTE: "* ", Mark.BAD: "! ", Mark.UNKNOWN: "? "}
 
 
 @dataclass(frozen=True)
@@ -52,3 +61,39 @@ class Finding:
     def document(self) -> dict[str, Any]:
         """Return the finding in JSON's own types."""
         return {**vars(self), "data": dict(self.data)}
+
+
+def text(source: str, version: str, findings: Sequence[Finding]) -> str:
+    """Return the page; findings that need attention begin with !, * or ?."""
+    head = f"mpucal {version} doctor on {source} ({platform.machine()}, {platform.system()} {platform.release()})"
+    lines = [head, ""]
+    for finding in findings:
+        lines += _wrapped(SIGNS[finding.mark] + finding.topic, finding.what)
+        if finding.remedy:
+            lines += _wrapped("", f"-> {finding.remedy}")
+    worst = sum(finding.mark is Mark.BAD for finding in findings)
+    notes = sum(finding.mark in (Mark.NOTE, Mark.UNKNOWN) for finding in findings)
+    lines += ["", f"{_many(worst, 'fault')} (!), {_many(notes, 'note')} (* or ?)."]
+    return "\n".join(lines)
+
+
+def document(source: str, version: str, findings: Sequence[Finding]) -> str:
+    """Return the findings as JSON."""
+    fields = {
+        "format": FORMAT,
+        "version": VERSION,
+        "mpucal": version,
+        "source": source,
+        "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",
+        "findings": [finding.document() for finding in findings],
+    }
+    return json.dumps(fields, indent=2, allow_nan=False)
+
+
+def _wrapped(topic: str, words: str) -> list[str]:
+    indent = " " * TOPIC
+    return textwrap.wrap(words, WIDTH, initial_indent=topic.ljust(TOPIC), subsequent_indent=indent) or [topic]
+
+
+def _many(number: int, noun: str) -> str:
+    return f"{number or 'no'} {noun}{'' if number == 1 else 's'}"

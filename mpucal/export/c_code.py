@@ -1,12 +1,14 @@
-"""C functions that apply a calibration: to m/s^2 and rad/s, with b_a(T), and to the chip's counts."""
+"""C header, and C functions that apply a calibration: to m/s^2 and rad/s, with b_a(T), and to the chip's counts."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
-from .losses import temperature_range
+from .losses import heading, temperature_range
 
 INCLUDES = "#include <stdint.h>\n#include <string.h>\n"
 
@@ -130,3 +132,25 @@ def _about(result: str, unit: str, full_scale: float | None, of: str, per_count:
 
 def _row(values: Vector) -> str:
     return ", ".join(f"{value:.8e}f" for value in values)
+
+
+def text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """Return the header's text (C99 or C++11), with `notes` in its heading."""
+    remarks = "\n".join(heading(calibration, notes, " * "))
+    return f"""/*
+{remarks}
+ */
+#ifndef MPUCAL_CALIBRATION_H
+#define MPUCAL_CALIBRATION_H
+
+{INCLUDES}
+/* y = D s + b_a, with the specific force s; for information: the functions use its inverse. */
+static const float MPUCAL_D[3][3] = {{
+{c_matrix(calibration.D)}
+}};
+
+{c_functions(calibration)}
+{c_temperature_function(calibration)}
+{c_count_functions(calibration)}
+#endif
+"""

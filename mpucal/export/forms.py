@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..result.calibration import Calibration
-from . import arduino, c_header, esphome, i2cdevlib, linux_iio, micropython, python, ros, vehicles, vio
+from . import arduino, c_code, esphome, i2cdevlib, linux_iio, micropython, python, ros, vehicles, vio
 from .losses import (
     Loss,
     check_usable,
@@ -61,7 +61,7 @@ FORMS = (
         ".h",
         "C99, C++11",
         "`mpucal_correct_at(y, temperature_c, a)`, `mpucal_correct_gyro(y, w)`; of counts, with a check of the range",
-        c_header.text,
+        c_code.text,
         (float_rounding, scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(

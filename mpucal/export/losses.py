@@ -11,7 +11,7 @@ from ..chip.families import PARTS
 from ..chip.registers import GYRO_RANGES_DPS
 from ..data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..errors import RefusedError
-from ..result.calibration import REFUSED, Calibration
+from ..result.calibration import Calibration
 
 # calibration -> sentences on the parts of it that a form cannot hold
 Loss = Callable[[Calibration], tuple[str, ...]]
@@ -29,13 +29,9 @@ def check_usable(calibration: Calibration) -> None:
     ------
     RefusedError : it was refused, or D or b_a is unknown, or D cannot be inverted.
     """
-    if calibration.quality.get("verdict") == REFUSED:
-        raise RefusedError(
-            "nothing was exported: the calibration was refused", "calibrate again, and follow its remedies"
-        )
-    known = np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()
-    if not known or np.linalg.matrix_rank(calibration.D) < 3:
-        raise RefusedError("nothing was exported: D or b_a is not known, or D has no inverse", "calibrate again")
+    if calibration.objection:
+        remedy = "calibrate again, and follow the remedies of its reasons"
+        raise RefusedError(f"nothing was exported: {calibration.objection}", remedy)
 
 
 def heading(calibration: Calibration, notes: Sequence[str], prefix: str, units: str = "m/s^2") -> list[str]:

@@ -23,10 +23,9 @@ import numpy as np
 from ..calibration.masks import with_masks
 from ..calibration.rotation import cross, turned
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S
-from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
-from ..rests.gyro_drift import remove_drift
-from ..rests.intervals import Intervals, RestFinder
+from ..rests.intervals import Intervals, RestFinder, remove_drift
 from ..result.calibration import Calibration
 
 E, BETA, G, DELTA, NOISE = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21), slice(21, 23)
@@ -95,7 +94,7 @@ def apply_errors(calibration: Calibration, theta: Vector) -> Calibration:
 
 def observe(recording: Recording, calibration: Calibration) -> Observations | None:
     """Return the observations of a recording; None if the board never rests."""
-    gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+    gravity = calibration.gravity
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
     if segment is None or not is_long_enough(recording, segment):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.verification import BIAS_RAD_S, FLOOR_MPS2
-from ..data import STANDARD_GRAVITY_MPS2, Samples, Vector
+from ..data import Samples, Vector
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Window, Windows
@@ -68,7 +68,7 @@ class DriftMonitor:
 
     def __init__(self, calibration: Calibration, days: float) -> None:
         self._calibration, self._days = calibration, days
-        self._gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+        self._gravity = calibration.gravity
         self._first_s: float | None = None
         self._t_s, self._temperature_c = 0.0, math.nan
         self._windows, self._stillness, self._run = Windows(BLOCK_S), Detector(QUIET), 0

@@ -7,6 +7,8 @@ import struct
 import zlib
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import islice
+from typing import Any
 
 MAGIC = b"MPUC"
 MAJOR = 1
@@ -15,6 +17,11 @@ FORMULA = "a = inv(D) @ (y - b_a + applied_b_a)"
 
 # firmware_protocol.md, "Layout": fields of minor version 0, those appended by 1 and by 2, and the checksum
 FIELDS = struct.Struct("<4s B B H 40s B 3x f f 9f 3f f Q f 3f 9f 3f")
+# the numbers of FIELDS behind the formula, in their order
+LAYOUT = (
+    *(("who_am_i", 1), ("accel_range_g", 1), ("gyro_range_dps", 1), ("D", 9), ("b_a", 3), ("gravity", 1)),
+    *(("created", 1), ("temperature_c", 1), ("applied_b_a", 3), ("K", 9), ("b_omega", 3)),
+)
 SLOPE = struct.Struct("<3f 2f")
 COUNTS = struct.Struct("<f")
 CHECKSUM = struct.Struct("<I")
@@ -81,26 +88,11 @@ class Blob:
         BlobError : D, b_a or applied_b_a is not finite, or a value does not fit its field.
         """
         _check_usable(self)
+        values = {**vars(self), "created": _unix_seconds(self.created)}
+        numbers = [each for name, count in LAYOUT for each in (values[name] if count > 1 else (values[name],))]
         try:
             minor, appended = self._encode_appended()
-            body = FIELDS.pack(
-                MAGIC,
-                MAJOR,
-                minor,
-                LENGTH + len(appended),
-                FORMULA.encode(),
-                self.who_am_i,
-                self.accel_range_g,
-                self.gyro_range_dps,
-                *self.D,
-                *self.b_a,
-                self.gravity,
-                _unix_seconds(self.created),
-                self.temperature_c,
-                *self.applied_b_a,
-                *self.K,
-                *self.b_omega,
-            )
+            body = FIELDS.pack(MAGIC, MAJOR, minor, LENGTH + len(appended), FORMULA.encode(), *numbers)
         except (struct.error, OverflowError) as error:
             raise BlobError(f"a value does not fit its field ({error})") from error
         body += appended
@@ -122,24 +114,13 @@ class Blob:
         BlobError : too short, another magic, major version or length, damaged, or not usable.
         """
         _check_whole(data)
-        values = FIELDS.unpack_from(data)[5:]
-        slope, range_c = _slope(data, values[17])
-        blob = cls(
-            who_am_i=values[0],
-            accel_range_g=values[1],
-            gyro_range_dps=values[2],
-            D=values[3:12],
-            b_a=values[12:15],
-            gravity=values[15],
-            created=_iso_8601(values[16]),
-            temperature_c=values[17],
-            applied_b_a=values[18:21],
-            K=values[21:30],
-            b_omega=values[30:33],
-            b_a_slope=slope,
-            temperature_range_c=range_c,
-            gyro_counts=_gyro_counts(data),
-        )
+        numbers = iter(FIELDS.unpack_from(data)[5:])
+        values: dict[str, Any] = {
+            name: tuple(islice(numbers, count)) if count > 1 else next(numbers) for name, count in LAYOUT
+        }
+        values["created"] = _iso_8601(values["created"])
+        slope, range_c = _slope(data, values["temperature_c"])
+        blob = cls(**values, b_a_slope=slope, temperature_range_c=range_c, gyro_counts=_gyro_counts(data))
         _check_usable(blob)
         return blob
 
@@ -179,7 +160,9 @@ def _gyro_counts(data: bytes) -> float | None:
 
 
 def _check_usable(blob: Blob) -> None:
-    for name, count in (("D", 9), ("b_a", 3), ("applied_b_a", 3), ("K", 9), ("b_omega", 3), *APPENDED):
+    for name, count in (*LAYOUT, *APPENDED):
+        if count == 1:
+            continue
         values = getattr(blob, name)
         if len(values) != count:
             raise BlobError(f"{name} has {len(values)} numbers, not {count}")

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from .. import frames
 from ..arguments import check_path, check_shape, check_vectors, read_limited
-from ..data import GYRO_COUNTS, Recording, Sensor, Vector
+from ..data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parse_json
@@ -146,6 +146,20 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     def verdict(self) -> Verdict:
         """Return good, usable or refused; refused if the calibration was not judged."""
         return self.quality.get("verdict", REFUSED)
+
+    @property
+    def objection(self) -> str:
+        """Return why the calibration must not be used, as a clause; empty if it may be."""
+        # a config blob has no verdict, and a refused calibration has no blob
+        if self.quality.get("verdict") == REFUSED:
+            return "the calibration was refused"
+        usable = np.isfinite(self.D).all() and np.isfinite(self.b_a).all() and np.linalg.matrix_rank(self.D) == 3
+        return "" if usable else "the calibration lacks D or b_a, or D has no inverse"
+
+    @property
+    def gravity(self) -> float:
+        """Return the local gravity [m/s^2], to which the scale factors refer; standard gravity if it is not known."""
+        return float(self.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
 
     @property
     def magnitude_std(self) -> float:

@@ -8,7 +8,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import Vector
 from . import error_model
 from .calibration import GOOD, Calibration
 from .error_model import AXES
@@ -218,7 +218,7 @@ def worst_magnitude_error(true: Calibration, D: Vector, b_a: Vector) -> float:
 
     a = inv(D) (D_true s + b_true - b_a): the singular values of inv(D) D_true bound the effect of the scale on |a|.
     """
-    gravity = float(true.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+    gravity = true.gravity
     singular = np.linalg.svd(np.linalg.solve(D, true.D), compute_uv=False)
     bias = np.linalg.norm(np.linalg.solve(D, true.b_a - b_a))
     return float(gravity * np.abs(singular - 1.0).max() + (bias if math.isfinite(bias) else math.inf))

@@ -9,7 +9,7 @@ import numpy as np
 from ..data import Autopilot, Samples, Sensor
 from ..errors import UsageError
 from ..origin import Origin
-from .calibration import REFUSED, Calibration
+from .calibration import Calibration
 
 # an offset register's bit 0 does nothing
 RESERVED = 1
@@ -42,10 +42,10 @@ def make_correction(calibration: Calibration, sensor: Sensor, autopilot: Autopil
     ------
     UsageError : the calibration was refused, or is of another chip or of other registers or parameters.
     """
-    if calibration.quality.get("verdict") == REFUSED:
-        raise UsageError("the calibration was refused", "calibrate again, and follow the remedies of its reasons")
-    if not all(np.isfinite(array).all() for array in (calibration.D, calibration.b_a, calibration.K)):
-        raise UsageError("the calibration lacks D, b_a or K", "give one that has them")
+    if calibration.objection:
+        raise UsageError(calibration.objection, "calibrate again, and follow the remedies of its reasons")
+    if not np.isfinite(calibration.K).all():
+        raise UsageError("the calibration lacks K", "give one that has it")
     of = calibration.sensor
     if None not in (of.who_am_i, sensor.who_am_i) and of.who_am_i != sensor.who_am_i:
         raise UsageError(

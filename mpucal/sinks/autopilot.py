@@ -33,10 +33,8 @@ from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.lay_flat import STAND, put_down
 from ..sources.vehicle import OpenedVehicle
-from .kind import Confirm, Device, Say, nobody
-from .old_state import nothing_written
-from .signals import interrupting
-from .sink import Applied
+from .kind import Applied, Confirm, Device, Say, nobody
+from .old_state import interrupting, nothing_written
 from .table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 
 FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}

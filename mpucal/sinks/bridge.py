@@ -13,9 +13,8 @@ from ..result.blob import Blob, BlobError
 from ..result.calibration import Calibration
 from ..result.comparison import is_better, worst_magnitude_error
 from ..sources.bridge.store import BlobStore, StoredBlob
-from .kind import Device
+from .kind import Applied, Device
 from .old_state import check_accepted, nothing_written
-from .sink import Applied
 from .table import BRIDGE_BLOB
 
 

@@ -29,9 +29,8 @@ from ..result.comparison import is_better
 from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.chip import OpenedChip
-from .kind import Device
+from .kind import Applied, Device
 from .old_state import check_accepted, load_state, not_a_state, nothing_written, restore_on_failure, save_state
-from .sink import Applied
 from .table import CHIP, CHIP_OFFSETS
 
 FORMAT, REGISTERS = "mpucal.chip_offsets", "registers"
@@ -214,7 +213,7 @@ class ChipSink:
 
 def _check_gravity(calibration: Calibration, mean_g: Vector, applied_mps2: Vector) -> None:
     """Check that the calibration gives gravity for the mean (3,) at rest, with what the registers subtract (3,)."""
-    gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+    gravity = calibration.gravity
     a = replace(calibration, applied_in_hardware=applied_mps2).apply(mean_g * STANDARD_GRAVITY_MPS2)
     if not abs(np.linalg.norm(a) - gravity) < GRAVITY_MPS2:
         raise ChipError(

@@ -36,9 +36,8 @@ from ..session.lay_flat import put_down
 from ..session.ports import polled
 from ..sources.iio import OpenedIio
 from .chip import SHIFT_G, SHIFT_SHARE
-from .kind import Device
+from .kind import Applied, Device
 from .old_state import check_accepted, load_state, not_a_state, nothing_written, restore_on_failure, save_state
-from .sink import Applied
 from .table import IIO_STATE, KERNEL
 
 FORMAT, WORDS, RULE = "mpucal.iio_state", "calibbias", "rule"

@@ -1,4 +1,4 @@
-"""Kinds of sinks: the name, the sources that have one, the function that opens it, and the effect of a write."""
+"""Kinds of sinks, and the interface of a sink: save its state, write a calibration, and perhaps restore the state."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..result.session_files import DOCUMENT, SessionFile
 
 if TYPE_CHECKING:
+    from ..result.calibration import Calibration
     from ..sources.kind import SourceKind
-    from .sink import Sink
 
 Say = Callable[[str], None]
 # asks the user a question, and returns the answer; True or False as the second argument says with --yes
@@ -106,3 +106,75 @@ class SinkKind:
             return self.kept
         name = self.after_write(Path(DOCUMENT.name).stem)
         return (*self.kept, SessionFile(name, f"the calibration that applies after a write to {self.where}"))
+
+
+@dataclass(frozen=True)
+class Applied:
+    """Result of a write.
+
+    Attributes
+    ----------
+    calibration : the written one, with the parts that the device applies from now on.
+    what : a clause for the user: what was written where, and how it was checked.
+    """
+
+    calibration: Calibration
+    what: str
+
+
+class Sink(Protocol):
+    """A place that keeps a calibration: a chip's offset registers, a bridge's EEPROM, an autopilot's parameters.
+
+    Attributes
+    ----------
+    where : the device, for messages.
+    """
+
+    @property
+    def where(self) -> str: ...  # noqa: D102 - see above
+
+    def keep(self, folder: Path) -> tuple[Path, ...]:
+        """Save the state of the device to files in `folder` before anything is changed; no file if it is empty.
+
+        Raises
+        ------
+        SourceError : it cannot be read. OutputError : it cannot be saved.
+        """
+        ...
+
+    def write(self, calibration: Calibration) -> Applied:
+        """Write, read back, compare, and verify the effect if the device can show it.
+
+        Raises
+        ------
+        WriteBackError : refused (nothing was written), or failed (the old state is restored); `what` says which.
+        """
+        ...
+
+
+@runtime_checkable
+class Restorable(Sink, Protocol):
+    """Sink that can restore a saved state."""
+
+    def put_back(self, kept: Path) -> str:
+        """Restore the state that `keep` saved to `kept`; return a clause on it for the user.
+
+        Raises
+        ------
+        RecordingError : `kept` is not a state of this sink. WriteBackError : see Sink.
+        """
+        ...
+
+
+@runtime_checkable
+class ComparableSink(Sink, Protocol):
+    """Sink that can predict whether a calibration is better than the one that it holds."""
+
+    def reason_to_keep(self, calibration: Calibration) -> str | None:
+        """Return why the held calibration is predicted to be as good, as a clause; None if the new one is better.
+
+        Raises
+        ------
+        SourceError : it cannot be read.
+        """
+        ...

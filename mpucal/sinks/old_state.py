@@ -1,22 +1,27 @@
-"""The state of a sink before a write: saved as a JSON file, and restored if the write fails."""
+"""The state of a sink before a write: saved as a JSON file, and restored if the write fails or is interrupted."""
 
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import Any
-
-import numpy as np
 
 from ..arguments import read_limited
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, SourceError, WriteBackError
-from ..result.calibration import REFUSED, Calibration
+from ..result.calibration import Calibration
 from ..result.journal import Journal
 from ..result.session_files import SessionFile
 from ..strict_json import MOST_BYTES, parse_json
+
+# signals that are handled as Ctrl-C during a write, and the handlers that they may have
+NAMES = ("SIGTERM", "SIGHUP")
+REPLACED = (signal.SIG_DFL, signal.default_int_handler)
 
 
 def save_state(file: SessionFile, folder: Path, form: str, where: str, state: Mapping[str, Any]) -> tuple[Path, ...]:
@@ -55,11 +60,9 @@ def check_accepted(calibration: Calibration) -> None:
     ------
     WriteBackError : it was refused, or D or b_a is not known.
     """
-    remedy = "repeat the session, and follow the remedies it gives"
-    if calibration.quality.get("verdict") == REFUSED:
-        raise WriteBackError("nothing was written: the calibration was refused", remedy)
-    if not (np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()):
-        raise WriteBackError("nothing was written: the calibration lacks D or b_a", remedy)
+    if calibration.objection:
+        remedy = "repeat the session, and follow the remedies it gives"
+        raise WriteBackError(f"nothing was written: {calibration.objection}", remedy)
 
 
 @contextmanager
@@ -99,3 +102,29 @@ def restore_on_failure(
             raise WriteBackError(f"{error.what}; the old state of {where} is restored", error.remedy) from error
         raise
     journal.end()
+
+
+@contextmanager
+def interrupting() -> Iterator[None]:
+    """Raise KeyboardInterrupt in the block at the first of these signals; later ones do not disturb the restoring."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    ended = False
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        nonlocal ended
+        if not ended:
+            ended = True
+            raise KeyboardInterrupt
+
+    # Windows has no SIGHUP; a signal that has another handler keeps it
+    numbers = [
+        number for name in NAMES if (number := getattr(signal, name, None)) and signal.getsignal(number) in REPLACED
+    ]
+    before = {number: signal.signal(number, interrupt) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

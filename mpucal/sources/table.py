@@ -114,7 +114,7 @@ SOURCES = [
         origin=Origin.CHIP,
         options=(ADDRESS,),
         settings=CHIP_SETTINGS,
-        doctor="mpucal.doctor.sources:examine_chip",
+        doctor="mpucal.doctor.examine:examine_chip",
         host="mpucal.doctor.host:examine_host",
         found="mpucal.sources.i2c:found_chips",
     ),
@@ -128,7 +128,7 @@ SOURCES = [
         options=(SEED,),
         settings=CHIP_SETTINGS,
         title="simulated chip",
-        doctor="mpucal.doctor.sources:examine_chip",
+        doctor="mpucal.doctor.examine:examine_chip",
     ),
     SourceKind(
         what="a chip on a USB adapter",
@@ -139,7 +139,7 @@ SOURCES = [
         origin=Origin.CHIP,
         options=(ADDRESS,),
         settings=CHIP_SETTINGS,
-        doctor="mpucal.doctor.sources:examine_chip_alone",
+        doctor="mpucal.doctor.examine:examine_chip_alone",
         host="mpucal.doctor.host:examine_adapters",
         found="mpucal.sources.usb_i2c:adapters",
     ),
@@ -152,7 +152,7 @@ SOURCES = [
         origin=Origin.CHIP,
         options=(ADDRESS,),
         settings=CHIP_SETTINGS,
-        doctor="mpucal.doctor.sources:examine_chip_alone",
+        doctor="mpucal.doctor.examine:examine_chip_alone",
         host="mpucal.doctor.host:examine_adapters",
     ),
     SourceKind(
@@ -164,7 +164,7 @@ SOURCES = [
         options=(ADDRESS, MICROPYTHON),
         settings=CHIP_SETTINGS,
         store="mpucal.sources.bridge:open_store",
-        doctor="mpucal.doctor.sources:examine_bridge_and_chip",
+        doctor="mpucal.doctor.examine:examine_bridge_and_chip",
         found="mpucal.sources.bridge.port_errors:boards",
     ),
     SourceKind(
@@ -174,7 +174,7 @@ SOURCES = [
         opener="mpucal.sources.spi:open_source",
         origin=Origin.CHIP,
         settings=CHIP_SETTINGS,
-        doctor="mpucal.doctor.sources:examine_chip_alone",
+        doctor="mpucal.doctor.examine:examine_chip_alone",
     ),
     SourceKind(
         what="a sensor with a Linux kernel (IIO) driver",

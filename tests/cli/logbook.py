@@ -13,8 +13,7 @@ import numpy as np
 from mpucal.__main__ import run
 from mpucal.errors import RecordingError
 from mpucal.result.session_files import SessionFile
-from mpucal.sinks.kind import Effect, Flag, SinkKind
-from mpucal.sinks.sink import Applied
+from mpucal.sinks.kind import Applied, Effect, Flag, SinkKind
 from mpucal.sinks.table import SINKS
 from mpucal.sources.table import BUS
 

@@ -14,9 +14,8 @@ from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
 from mpucal.sinks.interrupted import interrupted_writes
-from mpucal.sinks.record import session_recorder
 from mpucal.sinks.table import SINKS
-from mpucal.sinks.write_back import write_to_all
+from mpucal.sinks.write_back import session_recorder, write_to_all
 from mpucal.sources.table import matching_kinds
 from tools.processes import quick
 

@@ -30,7 +30,7 @@ ROW = SourceKind(
     options=(Option("arm_length", "How far out the chip is [m].", "M", float),),
     settings=CHIP_SETTINGS,
     title="turntable {}",
-    doctor="mpucal.doctor.sources:examine_chip",
+    doctor="mpucal.doctor.examine:examine_chip",
 )
 
 

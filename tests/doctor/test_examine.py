@@ -11,8 +11,7 @@ from mpucal.chip.quick_measure import PATIENCE, READS
 from mpucal.data import Recording, Sensor
 from mpucal.doctor.dead_axes import dead_axes, live_axes
 from mpucal.doctor.examine import examine
-from mpucal.doctor.finding import Finding, Mark
-from mpucal.doctor.page import document, text
+from mpucal.doctor.finding import Finding, Mark, document, text
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from mpucal.doctor.noise import is_trembling, noise_density, periodogram
+from mpucal.doctor.measure import is_trembling, noise_density, periodogram
 
 RATE_HZ = 200.0
 

@@ -355,15 +355,6 @@ def test_each_says_what_temperature_and_registers_leave(calibration, name):
     assert all(note in text.replace("\n * ", " ") for note in notes)
 
 
-def test_the_pages_have_the_same_rows():
-    page = (ROOT / "docs" / "use.md").read_text(encoding="utf-8")
-    rows = re.search(r"\| form \| read by .*?\n\|[-|]+\n(.*?)\n\n", page, re.DOTALL)[1]
-    assert rows.splitlines() == [f"| `{row.name}` | {row.read_by} | {row.applied} |" for row in FORMS]
-    *others, last = (row.name for row in FORMS)
-    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    assert f"Formats to export to: {', '.join(others)} and {last};" in readme
-
-
 # a form that is made up, then commands
 MADE_UP = """
 import io

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.chip.access import Reply
-from mpucal.doctor.conformance import examine_conformance
+from mpucal.doctor.bridge import examine_conformance
 from mpucal.doctor.finding import Mark
 from mpucal.sources.bridge import board
 from mpucal.sources.bridge import messages as wire

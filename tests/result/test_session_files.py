@@ -1,23 +1,10 @@
-"""The table of a session's files: their numbered names, and its copy in docs/session.md."""
-
-import re
-from pathlib import Path
+"""Names of a session's files: numbered, and known again."""
 
 import pytest
 
 from mpucal.errors import OutputError
-from mpucal.result.session_files import CAPTURE, SESSION_FILES
+from mpucal.result.session_files import CAPTURE
 from mpucal.session.results import save
-from mpucal.sinks.table import SINKS
-
-PAGE = Path(__file__).parents[2] / "docs" / "session.md"
-
-
-def test_the_page_has_the_same_rows():
-    section = re.search(r"## What a session leaves\n(.*)", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
-    rows = re.findall(r"^\| `(.+?)` \| (.+) \|$", section, re.MULTILINE)
-    left = [*SESSION_FILES, *(file for kind in SINKS.values() for file in kind.session_files)]
-    assert rows == [(file.name, file.what.replace("](firm", "](../firm")) for file in left]
 
 
 def test_each_one_is_free_until_it_is_there(tmp_path):

@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from mpucal.cli.person import ask_in_doubt
 from mpucal.errors import BusError, KeepsNothing, OutputError, WriteBackError
 from mpucal.result.calibration import Calibration
-from mpucal.sinks.kind import Device, SinkKind
-from mpucal.sinks.record import session_recorder
-from mpucal.sinks.sink import Applied
+from mpucal.sinks.kind import Applied, Device, SinkKind
 from mpucal.sinks.table import SINKS
-from mpucal.sinks.write_back import put_back, write_objection, write_to, write_to_all
+from mpucal.sinks.write_back import put_back, session_recorder, write_objection, write_to, write_to_all
 
 BIAS = np.array([0.3, -0.2, 1.0])
 GOOD = {"verdict": "good", "reasons": []}

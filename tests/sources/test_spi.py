@@ -14,8 +14,8 @@ from mpucal.__main__ import run
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
+from mpucal.doctor.examine import examine_chip_alone
 from mpucal.doctor.finding import Mark
-from mpucal.doctor.sources import examine_chip_alone
 from mpucal.errors import BusError, UsageError
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated

@@ -1,7 +1,7 @@
-"""Targets of tools/attack/fuzz.py: each reader and decoder by name, with the bytes that mutation begins with.
+"""Targets of tools/attack/fuzz.py: readers and decoders by name, each with its first corpus.
 
-Where check sums would turn nearly all mutated bytes away, the bytes are the content, and the sums are made here: of
-archives and captures, and in fuzz_peers.py of frames and packets.
+Mutated bytes would nearly always fail checksums, so the mutated bytes are the content, and the checksums are computed:
+of archives and captures here, of frames and packets in fuzz_peers.py.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from mpucal.simulated.chip.options import ChipOptions
 from mpucal.simulated.vehicle.options import VehicleOptions
 from mpucal.sinks.chip import FORMAT as KEPT
 from mpucal.sinks.chip import REGISTERS, saved_blocks
-from mpucal.sinks.record import is_calibration
+from mpucal.sinks.write_back import is_calibration
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.frame import Frame
 from mpucal.sources.chain import split_at_resumes
@@ -53,7 +53,7 @@ from .fuzz_peers import joined, pieces, tlog
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "fixtures"
 Run = Callable[[bytes], object]
-# topic, step of the time [ns], length; of topic 2, the file's head
+# topic, time step [ns], length; topic 2 is the metadata of the file
 PIECE_OF_CAPTURE = struct.Struct("<BqH")
 TOPICS = ("/bus", "/session")
 MEMBER = b"\x93NUMPY"
@@ -83,7 +83,7 @@ WORDS = (
 
 
 def command(*words: str) -> None:
-    """Run a command; a trace is raised again."""
+    """Run a command; raise AssertionError if it printed a traceback."""
     with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as err:
         code = run(words)
     if code == 1:
@@ -91,7 +91,7 @@ def command(*words: str) -> None:
 
 
 def calibration(path: Path) -> None:
-    """Read a calibration, and do with it what mpucal does."""
+    """Read a calibration, and use it as the commands do."""
     command("show", str(path))
     command("diff", str(path), str(path))
     made = Calibration.load(path)
@@ -102,7 +102,7 @@ def calibration(path: Path) -> None:
 
 
 def archive(path: Path) -> None:
-    """Load an archive of its members' bytes."""
+    """Load the archive whose members have these bytes."""
     data = path.read_bytes()
     with zipfile.ZipFile(path, "w") as file:
         for name, member in zip(("t", "acc", "gyr", "sensor"), data.split(MEMBER)[1:], strict=False):
@@ -111,7 +111,7 @@ def archive(path: Path) -> None:
 
 
 def capture(path: Path) -> None:
-    """Load a capture of its messages' bytes."""
+    """Load the capture whose messages have these bytes."""
     t_ns, messages, meta = 0, [], {}
     for which, step_ns, message in pieces(path.read_bytes(), PIECE_OF_CAPTURE):
         t_ns = (t_ns + step_ns) % (1 << 64)
@@ -138,7 +138,7 @@ def capture(path: Path) -> None:
 
 
 def taken_apart(path: Path) -> bytes:
-    """Return a capture as `capture` takes it."""
+    """Return the pieces of a capture, the inverse of `capture`."""
     with path.open("rb") as file:
         reader = make_reader(file)
         rows: list[tuple[int, int, bytes]] = []
@@ -152,7 +152,7 @@ def taken_apart(path: Path) -> bytes:
 
 
 def texts(data: bytes) -> None:
-    """Parse what a person gives on the command line."""
+    """Parse values of options."""
     text = data.decode(errors="surrogateescape")
     for parse in TEXTS:
         with suppress(UsageError, ValueError):
@@ -160,7 +160,7 @@ def texts(data: bytes) -> None:
 
 
 def notes(path: Path) -> None:
-    """Read what is kept of a write, and of a session."""
+    """Read the files that a write leaves."""
     with suppress(MpucalError):
         saved_blocks(path)
     is_calibration(path)
@@ -168,7 +168,7 @@ def notes(path: Path) -> None:
 
 
 def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:
-    """Return by name what is run, and its corpus."""
+    """Return the targets by name: the function that is run, and its corpus."""
     rows, npz, csv = table(), io.BytesIO(), io.BytesIO()
     np.savez(npz, t=rows[:, 0], acc=rows[:, 1:4], gyr=rows[:, 4:])
     np.savetxt(csv, rows, delimiter=",", header="t,ax,ay,az,gx,gy,gz", comments="")
@@ -214,7 +214,7 @@ def table() -> np.ndarray:
 
 
 def of_file(read: Callable[..., object], place: Path, name: str, *more: object) -> Run:
-    """Return a reader of bytes as a file of that name."""
+    """Return a function that writes bytes to a file of that name and reads it."""
     path = place / name
 
     def run(data: bytes) -> object:
@@ -239,7 +239,7 @@ def flight() -> bytes:
 
 
 def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
-    """Return by name a file of some 60 samples; of what is a folder, an archive, or the bag's file."""
+    """Return a file of some 60 samples of each dialect by name; an archive of a folder, and the data file of a bag."""
     found, short = {}, walk().part(2000, 2060)
     ns = np.rint(short.t * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
     for number, (name, (_, write, hints)) in enumerate(dialects().items()):

@@ -63,7 +63,7 @@ def _of_shape(schema: Schema, shape: tuple[int, ...]) -> Schema:
 def table() -> str:
     """Return the table of the keys in Markdown."""
     rows = (f"| {' | '.join(row)} |" for row in _rows(schema_of(Document), ""))
-    return "\n".join(["| key | type | meaning |", "|---|---|---|", *rows, "", ""])
+    return "\n".join(["| key | type | meaning |", "|---|---|---|", *rows])
 
 
 def _rows(schema: Schema, path: str) -> Iterator[tuple[str, str, str]]:

@@ -1,4 +1,4 @@
-"""Write what docs/ shows of tables and imports: drawings and pages; with --check, exit 1 where it shows something else.
+"""Write the parts of docs/ that are made from tables and imports; with --check, exit 1 if one is outdated.
 
 python -m tools.make pages [--check]
 """
@@ -16,9 +16,14 @@ from pathlib import Path
 
 import grimp
 
+from mpucal.export.forms import FORMS
 from mpucal.reasons import KINDS, Kind
+from mpucal.result.session_files import SESSION_FILES
+from mpucal.session.aims import AIMS
 from mpucal.session.events import Abort
 from mpucal.session.table import TRANSITIONS, State
+from mpucal.sinks.choose import source_flags
+from mpucal.sinks.table import SINKS
 from mpucal.sources.kind import Option, SourceKind
 from mpucal.sources.table import SOURCES, unique
 
@@ -26,8 +31,7 @@ from . import keys
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = "mpucal"
-MADE = re.compile(r"(?<=<!-- made by python -m tools.make pages -->\n).*?(?=<!-- end -->)", re.DOTALL)
-STATES = re.compile(r"(?<=```mermaid\n).*?(?=```)", re.DOTALL)
+MADE = re.compile(r"(?<=<!-- python -m tools.make pages: )(\w+)( -->\n).*?(?=<!-- end -->)", re.DOTALL)
 REASONS = """# The reasons against a calibration
 
 The verdict of a calibration is *good* if there is no reason against it. Otherwise `quality.reasons` in
@@ -52,7 +56,7 @@ Arrows = dict[str, set[str]]
 
 
 def arrows() -> Arrows:
-    """Return by room the rooms that it imports."""
+    """Return the rooms that each room imports."""
     graph = grimp.build_graph(PACKAGE, cache_dir=None)
     children = graph.find_children(PACKAGE)
     found: Arrows = {_name(room): set() for room in children}
@@ -81,7 +85,7 @@ def floors(imports: Arrows) -> list[str]:
 
 
 def reduced(imports: Arrows) -> Arrows:
-    """Return the arrows that no longer way implies."""
+    """Return the arrows that no longer path implies."""
     reach: Arrows = {}
     for room in floors(imports):
         reach[room] = imports[room].union(*(reach[lower] for lower in imports[room]))
@@ -102,7 +106,7 @@ def rooms(imports: Arrows) -> str:
         for lower in sorted(least[room], key=order.index)
     ]
     rows = [f"| `{_path(room).relative_to(ROOT).as_posix()}` | {sentence(_path(room))} |" for room in order]
-    return "\n".join([*lines, "```", "", "| room | what it holds |", "|---|---|", *rows]) + "\n\n"
+    return "\n".join([*lines, "```", "", "| room | what it holds |", "|---|---|", *rows])
 
 
 def sentence(path: Path) -> str:
@@ -123,7 +127,7 @@ def _name(module: str) -> str:
 
 def diagram() -> str:
     """Return the table of the session as a Mermaid state diagram; events that change nothing are left out."""
-    lines = ["stateDiagram-v2", f"    [*] --> {State.CONNECT.name.lower()}"]
+    lines = ["```mermaid", "stateDiagram-v2", f"    [*] --> {State.CONNECT.name.lower()}"]
     lines += [f"    {state.name.lower()}: {state}" for state in State]
     for state, row in TRANSITIONS.items():
         events = defaultdict(list)
@@ -133,7 +137,7 @@ def diagram() -> str:
         lines += [f"    {state.name.lower()} --> {to.name.lower()}: {', '.join(names)}" for to, names in events.items()]
         if Abort not in row:  # an end
             lines.append(f"    {state.name.lower()} --> [*]")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, "```"])
 
 
 def reasons() -> str:
@@ -147,7 +151,7 @@ def reasons() -> str:
 
 def _section(code: str, kind: Kind) -> list[str]:
     refuses = f"It refuses the calibration if {kind.refused_when}." if kind.refused_when else REFUSES[kind.refuses]
-    # a | would end the cell, and a number or name stands where braces are
+    # a | would end the cell; numbers and names replace the braces
     cells = [
         [re.sub(r"\{[^}]*\}", "…", text).replace("|", "\\|") for text in (s.what, s.remedy)]
         for s in kind.sentences.values()
@@ -181,6 +185,39 @@ def _option(option: Option) -> str:
     return _row(f"`{option.flag} {value}`", option.help, default, _listed(kinds))
 
 
+def sinks() -> str:
+    """Return the table of the sinks."""
+    rows = (
+        _row(f"`{kind.name}`", _listed(source_flags(kind)), "yes" if kind.default else "no", kind.where, kind.holds)
+        for kind in SINKS.values()
+    )
+    return "\n".join(["| `--to` | of | by default | where | what it holds |", "|---|---|---|---|---|", *rows])
+
+
+def forms() -> str:
+    """Return the table of the export forms."""
+    rows = (_row(f"`{form.name}`", form.read_by, form.applied) for form in FORMS)
+    return "\n".join(["| form | read by | applied as |", "|---|---|---|", *rows])
+
+
+def files() -> str:
+    """Return the table of the files that a session may leave."""
+    left = (*SESSION_FILES, *(file for kind in SINKS.values() for file in kind.session_files))
+    rows = (_row(f"`{file.name}`", file.what.replace("](firm", "](../firm")) for file in left)
+    return "\n".join(["| file | what |", "|---|---|", *rows])
+
+
+def targets() -> str:
+    """Return the table of the targets of a session."""
+    head = "bias", "scale factor error", "misalignment", "orientations at least", "turning at most", "verified by"
+    rows = []
+    for name, aim in AIMS.items():
+        std = aim.target
+        uncertainties = f"{std.bias_mg:g} mg", f"{std.gain_pct:g} %", f"{std.misalignment_deg:g} deg"
+        rows.append(_row(f"`{name}`", *uncertainties, str(aim.least), f"{aim.longest_s:g} s", str(aim.verify)))
+    return "\n".join([_row("`--target` (1 sigma)", *head), f"|{'---|' * 7}", *rows])
+
+
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
@@ -189,28 +226,38 @@ def _row(*cells: str) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-# of each page or file what makes it of what it was
-PAGES: dict[str, Callable[[str], str]] = {
-    "docs/architecture.md": lambda old: MADE.sub(lambda _: rooms(arrows()), old),
-    "docs/session.md": lambda old: STATES.sub(lambda _: diagram(), old),
-    "docs/reasons.md": lambda _: reasons(),
-    "docs/sources.md": lambda _: sources(),
-    "docs/reference/calibration.md": lambda old: MADE.sub(lambda _: keys.table(), old),
-    "mpucal/result/calibration.schema.json": lambda _: keys.text(),
+# files that are made whole, and parts of pages between `<!-- python -m tools.make pages: NAME -->` and
+# `<!-- end -->`
+WHOLE: dict[str, Callable[[], str]] = {
+    "docs/reasons.md": reasons,
+    "docs/sources.md": sources,
+    "mpucal/result/calibration.schema.json": keys.text,
+}
+PARTS: dict[str, Callable[[], str]] = {
+    "rooms": lambda: rooms(arrows()),
+    "states": diagram,
+    "targets": targets,
+    "files": files,
+    "sinks": sinks,
+    "forms": forms,
+    "keys": keys.table,
 }
 
 
 def outdated() -> Iterator[tuple[Path, str]]:
-    """Yield the pages that are not what they should be, and what they should be."""
-    for name, page in PAGES.items():
-        path = ROOT / name
-        old = path.read_text(encoding="utf-8")
-        if (new := page(old)) != old:
+    """Yield the files that are not what they should be, and what they should be."""
+    pages = {path: path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}
+    made = {
+        path: MADE.sub(lambda part: f"{part[1]}{part[2]}{PARTS[part[1]]()}\n\n", old) for path, old in pages.items()
+    }
+    made |= {ROOT / name: make() for name, make in WHOLE.items()}
+    for path, new in made.items():
+        if new != path.read_text(encoding="utf-8"):
             yield path, new
 
 
 def main() -> int:
-    """Write or check; the exit code."""
+    """Write or check; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing")
     check, found = parser.parse_args().check, list(outdated())

@@ -144,7 +144,7 @@ def test_the_doctor_lists_adapters_and_examines_the_chip(name, plugged, capsys, 
     def examine(bus, *_):
         yield Finding("chip", Mark.OK, f"0x{bus.read(reg.WHO_AM_I, 1).data.hex()}", "", {})
 
-    monkeypatch.setattr("mpucal.doctor.sources.examine", examine)
+    monkeypatch.setattr("mpucal.doctor.examine.examine", examine)
     assert run(["doctor", "--bus", SPELLED[name]]) == 0
     said = capsys.readouterr().out
     assert all(text in said for text in ("--bus ftdi://ftdi:ft232h:FT232H/1", "--bus mcp2221", "0x68"))

@@ -8,7 +8,7 @@ import pytest
 
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.doctor.conformance import examine_conformance
+from mpucal.doctor.bridge import examine_conformance
 from mpucal.doctor.finding import Mark
 from mpucal.errors import NoAnswer
 from mpucal.sources.bridge.bus import BridgeBus
