@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import ACCEL_RANGES_G, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..data import ACCEL_RANGES_G, GAP_INTERVALS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
 from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.intervals import true_runs
@@ -29,8 +29,6 @@ LINE_TOLERANCE = 1e-6
 
 # A rate may repeat as often as chance makes it with this probability, while the board turns by so much [rad/s].
 BY_CHANCE, TURNING = 1e-6, 0.3
-
-GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
 
 # A board is reset if gravity turns within a step by so much more than the gyroscope says, the neighbouring steps miss
 # by less than this share of it, and gravity is then this near to the flat segment's.

@@ -6,11 +6,8 @@ from array import array
 
 import numpy as np
 
-from ..data import Vector
+from ..data import GAP_INTERVALS, Vector
 from .clock import NS, Times, Whole
-
-# A sample this many intervals after the one before has missed others.
-LATE_INTERVALS = 2.5
 
 
 class PolledClock:
@@ -53,7 +50,7 @@ class PolledClock:
     def is_late(self, t_ns: int) -> bool:
         """Return True if samples were missed before one that is read at `t_ns`; two samples are needed for the rate."""
         within = len(self._t_ns) > self._begins[-1]
-        return bool(within and self._steps) and t_ns - self._t_ns[-1] > LATE_INTERVALS / self.rate_hz / NS
+        return bool(within and self._steps) and t_ns - self._t_ns[-1] > GAP_INTERVALS / self.rate_hz / NS
 
     @property
     def rate_hz(self) -> float:

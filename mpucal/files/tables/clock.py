@@ -7,7 +7,7 @@ stamp that is merely late is not. With the gaps known, the clock is fitted as a 
 (chip/clock.py).
 
 Stamps that are even, or that follow no such line as of a program that measured when it could, are the samples' times;
-a longer step between them is a gap as it is to the estimate (calibration/masks.py).
+a longer step between them is a gap, as it is to the estimate and to a driver that polls.
 """
 
 from __future__ import annotations
@@ -20,9 +20,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ...calibration.masks import GAP_INTERVALS
 from ...chip.clock import NS, SampleClock, make_increasing
-from ...data import Mask, Vector
+from ...data import GAP_INTERVALS, Mask, Vector
 
 FEWEST = 100
 # periods: steps that vary by less are a clock's own
