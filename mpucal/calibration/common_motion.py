@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, polar
 
 from ..data import Vector
-from ..rests.flat import QUIETEST_ACC_MPS2
+from ..rests.flat import QUIETEST_ACC_MPS2, UNVARIED
 from .evidence import Evidence
 from .fit import Fit
 from .parameters import ACCELEROMETER, MODELS
@@ -28,6 +28,7 @@ from .preprocessing import smoothed_rates
 from .rotation import cross
 from .uncertainty import UncertaintyClaim
 
+WINDOW_S = 0.1  # in which readings are seen to stay on two steps
 APART_S = 0.05  # samples of the first one farther apart than this do not say what was in between
 PRIOR_SD = (0.05, 0.05, 0.05, 0.005)  # of r [m] and tau [s]: two chips on one board, whose filters differ
 ROUNDS = 5  # of the weights, which depend on the residuals
@@ -83,7 +84,8 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     s, change, rate, alpha, rates = np.hsplit(np.stack([np.interp(t, there.t, c) for c in columns.T], axis=1), 5)
     L = cross(alpha) + cross(rate) @ cross(rate)
     more = own.D @ np.concatenate([L, -change[:, :, None]], axis=2)
-    theta, covariance = _solve([_axis(k, t, here.acc[near], s, more, here.sensor.steps[0]) for k in range(3)])
+    step, n = here.sensor.steps[0], max(round(WINDOW_S * here.rate_hz), 4)
+    theta, covariance = _solve([_axis(axis, t, here.acc[near], s, more, step, n) for axis in range(3)])
     # D is in the axes of its own gyroscope, whatever their scale factors.
     own_rates = here.gyr[near] - own.b_omega
     Q = polar(np.linalg.solve(rates.T @ rates + np.eye(3), rates.T @ own_rates + np.eye(3)))[0]
@@ -107,12 +109,12 @@ class _Measurements(NamedTuple):
     jitter: Vector
 
 
-def _axis(axis: int, t: Vector, y: Vector, s: Vector, more: Vector, step: float) -> _Measurements:
+def _axis(axis: int, t: Vector, y: Vector, s: Vector, more: Vector, step: float, n: int) -> _Measurements:
     """Return the measurements of an axis: means over readings that stay on two steps, whose rounding is common.
 
-    more : (n, 3, 4) derivatives by r and tau.
+    more : (m, 3, 4) derivatives by r and tau. n : see _groups.
     """
-    starts = _groups(y[:, axis], step)
+    starts = _groups(y[:, axis], step, n)
     size = np.diff(np.append(starts, len(y)))
     columns = np.column_stack([s, more[:, axis], y[:, axis], t, more[:, axis, 3] ** 2])
     means = np.add.reduceat(columns, starts, axis=0) / size[:, None]
@@ -121,17 +123,15 @@ def _axis(axis: int, t: Vector, y: Vector, s: Vector, more: Vector, step: float)
     return _Measurements(A, *means[:, 7:].T)
 
 
-def _groups(values: Vector, step: float) -> NDArray[np.int64]:
-    """Return the first samples of the longest runs that stay on two steps; all samples where there are no steps."""
-    if not step:
-        return np.arange(len(values))
-    starts, low, high = [], -np.inf, np.inf
-    for k, value in enumerate(values.tolist()):
-        low, high = min(low, value), max(high, value)
-        if high - low > 1.5 * step:
-            starts.append(k)
-            low = high = value
-    return np.array(starts)
+def _groups(values: Vector, step: float, n: int) -> NDArray[np.int64]:
+    """Return the first samples of the groups: neighbouring windows of n readings on two steps, or single readings."""
+    starts = np.ones(len(values), bool)
+    windows = values[: len(values) // n * n].reshape(-1, n)
+    stuck, mean = windows.var(axis=1) < UNVARIED * step**2, windows.mean(axis=1)
+    first = starts[: windows.size].reshape(-1, n)
+    first[stuck, 1:] = False
+    first[1:, 0] &= ~(stuck[1:] & stuck[:-1] & (np.abs(np.diff(mean)) < step))
+    return np.flatnonzero(starts)
 
 
 def _solve(axes: Sequence[_Measurements]) -> tuple[Vector, Vector]:
