@@ -30,7 +30,7 @@ COMMANDS = {
     "show": "Show a calibration, a config blob, a recording or a device.",
 }
 HELP = "help"
-# Option whose values add up.
+# Option with a value for each quantity.
 UNITS = "--units"
 # Key of the words of the command line in the context.
 TYPED = "mpucal.typed"
@@ -60,7 +60,10 @@ def amended(words: Sequence[str], options: str, without: str) -> list[str]:
             break
     changes = shlex.split(options)
     for option, value in zip(changes[::2], changes[1::2], strict=True):
-        words = [*words, option, value] if option == UNITS else with_option(words, option, value)
+        if option == UNITS and option in words:
+            units = [words[words.index(option) + 1], value]
+            value = ",".join("=".join(unit) for unit in dict(u.split("=") for u in ",".join(units).split(",")).items())
+        words = with_option(words, option, value)
     return list(words)
 
 

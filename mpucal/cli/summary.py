@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 import textwrap
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.keys import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
-from . import typed_words, with_option
+from . import amended, typed_words, with_option
 
 OUTPUT, NOT_AGAIN = "-o", frozenset({"--replay", "--resume"})
 # A chip's range by the code of the reason that a larger one prevents.
@@ -26,6 +27,9 @@ RANGES = {
     "gyro_clipped": ("--gyro-range", "gyro_range_dps", GYRO_RANGES_DPS),
     "accel_clipped": ("--accel-range", "accel_range_g", ACCEL_RANGES_G),
 }
+
+# Option in a remedy, with its value, which is no placeholder in capitals.
+SAID = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
 
 # For a terminal of 80 columns.
 WIDTH, LABEL, COLUMN = 79, 23, 18
@@ -64,14 +68,17 @@ def page_result(calibration: Calibration) -> Result:
 def command_again(calibration: Calibration, folder: Path | None, recording: Path | None = None) -> str:
     """Return the command line that was typed, as it is for another measurement; empty if it is the same.
 
-    The results get a free name, and so does `recording`. A range at whose end the chip was is replaced by the next
+    The results get a free name, and so does `recording`, unless a remedy says how to read it. A range at whose end the chip was is replaced by the next
     larger one. A replay and a resumed session cannot be measured again: a new session can.
     """
     typed = typed_words()
     if NOT_AGAIN.intersection(typed):
         return "mpucal session"
     words = list(typed)
-    if recording is not None:
+    said = SAID.search(" ".join(reason.get("remedy", "") for reason in calibration.quality.get("reasons", ())))
+    if recording is not None and said:
+        words = amended(words, said[1], "")
+    elif recording is not None:
         words = [str(_free_file(recording)) if Path(word) == recording else word for word in words]
     elif calibration.sensor.origin is Origin.CHIP:
         codes = {reason["code"] for reason in calibration.quality.get("reasons", ())}
@@ -91,8 +98,8 @@ def _free_file(path: Path) -> Path:
 
 def next_after_refusal(again: str) -> str:
     """Return what to do after a refusal, with the whole command if it is another one."""
-    how = f"measure again, and run\n  {again}" if again else "and give the same command again."
-    return f"Next: follow the remedy above, {how}"
+    how = f"run\n  {again}" if again else "give the same command again."
+    return f"Next: follow the remedy above, and {how}"
 
 
 def files_written(paths: Sequence[Path], again: str, verdict: str = GOOD, of_vehicle: bool = False) -> str:

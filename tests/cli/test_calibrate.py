@@ -87,7 +87,7 @@ def test_a_refusal_has_its_reason(mpucal, tmp_path, change, code):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["calibration.json", "report.html"]
     shown = mpucal("calibrate", "walk.npz")
     assert shown.out.startswith("The calibration is refused:")
-    assert shown.out.endswith("measure again, and run\n  mpucal calibrate walk-2.npz\n")
+    assert shown.out.endswith("and run\n  mpucal calibrate walk-2.npz\n")
     elsewhere = mpucal("calibrate", "walk.npz", "--model", "hand", "-o", "out").out.splitlines()[-1]
     assert elsewhere == "  mpucal calibrate walk-2.npz --model hand -o out-2"
 

@@ -88,6 +88,18 @@ def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording):
     assert mpucal("show", "in.csv").err.endswith("mpucal: try `mpucal show in.csv --units gyr=deg/s`\n")
 
 
+def test_a_refused_recording_ends_with_the_command_that_reads_it(mpucal, recording):
+    names, rows = "t,ax,ay,az,gx,gy,gz", (recording.t, recording.acc / 9.80665, recording.gyr)
+    np.savetxt("in.csv", np.column_stack(rows), delimiter=",", header=names, comments="")
+    found = mpucal("calibrate", "in.csv", "--units", "t=s,acc=m/s^2")
+    assert found.out.endswith("and run\n  mpucal calibrate in.csv --units t=s,acc=g\n")
+    np.savetxt("in.csv", np.column_stack([rows[0], rows[2], recording.acc]), delimiter=",", header=names, comments="")
+    found = mpucal("calibrate", "in.csv")
+    assert found.code == 5
+    assert "one is in the place of the other" in " ".join(found.out.split())
+    assert mpucal("calibrate", "in.csv", *found.out.split()[-2:]).code != 5
+
+
 TAKEN, HAS_NONE = "x/y/board", "192.0.2.1:9"  # a folder that cannot be made, and an address of no computer
 INSTEAD = {
     f"session --bus sim -o {TAKEN}": "session --bus sim -o board",

@@ -50,6 +50,9 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
     if 0.2 * e.gravity < acc < 5.0 * e.gravity:
         return None
     if acc < LEAST_G:
+        rate = float(np.median(lengths(e.recording.gyr)))
+        if 0.9 * e.gravity < rate < 1.1 * e.gravity:
+            return reason("not_raw", "exchanged", magnitude=acc, rate=rate)
         return reason("not_raw", "no_gravity", magnitude=acc)
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
     return reason(
