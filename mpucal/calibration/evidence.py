@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import Recording, Vector
 from ..reasons import Reason
@@ -96,18 +97,33 @@ class Evidence:
             if segment is None:
                 return False
             flat = flat_statistics(self.recording, segment)
+        r, (u, first) = self.recording, self._half_seconds(flat)
+        sizes = np.diff(r.t, prepend=r.t[0]) * lengths(r.gyr - flat.b_omega)
+        rotated = np.append(0.0, np.cumsum(sizes))
+        path, angle = (rotated[first + self._half_second] - rotated[first]).sum(), _angles(u[:, 0], u[:, 1]).sum()
+        if not path > DEGREES_RATIO * angle > 0.0:
+            return False
         turns = self._turns_of_half_seconds(flat)
-        path, angle = sum(turn.path for turn in turns), sum(turn.angle for turn in turns)
-        return path > DEGREES_RATIO * angle > 0.0 and _miss(turns, 1.0) > CLEARLY * _miss(turns, np.deg2rad(1.0))
+        return _miss(turns, 1.0) > CLEARLY * _miss(turns, np.deg2rad(1.0))
 
-    def _turns_of_half_seconds(self, flat: Flat) -> list[_Turn]:
-        """Return turns of gravity between the middles of neighbouring half seconds."""
+    def _half_seconds(self, flat: Flat) -> tuple[Vector, NDArray[np.int_]]:
+        """Return the directions of gravity (k, 2, 3) before and after turns, and the samples (k,) where these begin.
+
+        A turn lies between the middles of two neighbouring half seconds.
+        """
         n = self._half_second
         u = _units(_means(self.recording.acc[flat.last :], n))
         at = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_STEP_RAD)
         at = at[:: max(len(at) // ENOUGH_STEPS, 1)]
-        middle = flat.last + n // 2
-        return [self._turn(flat, u[i], u[i + 1], middle + i * n, middle + (i + 1) * n) for i in at.tolist()]
+        return np.stack([u[at], u[at + 1]], axis=1), flat.last + n // 2 + at * n
+
+    def _turns_of_half_seconds(self, flat: Flat) -> list[_Turn]:
+        """Return turns of gravity between the middles of neighbouring half seconds."""
+        u, middles = self._half_seconds(flat)
+        return [
+            self._turn(flat, before, after, first, first + self._half_second)
+            for (before, after), first in zip(u, middles.tolist(), strict=True)
+        ]
 
     def _turns_of_rests(self, flat: Flat, longest_s: float = LONGEST_TURN_S) -> list[_Turn]:
         """Return the turns from rest to rest that move gravity far and take no longer than `longest_s`."""
@@ -158,16 +174,6 @@ class _Turn(NamedTuple):
     steps: Vector
     after: Vector
     clipped: bool
-
-    @property
-    def angle(self) -> float:
-        """Angle [rad] between the two directions."""
-        return float(_angles(self.before[None], self.after[None])[0])
-
-    @property
-    def path(self) -> float:
-        """Sum of the steps' angles [rad]."""
-        return float(lengths(self.steps).sum())
 
 
 def _measured(turns: list[_Turn]) -> list[_Turn]:

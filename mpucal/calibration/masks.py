@@ -46,6 +46,9 @@ def _without_spikes(recording: Recording) -> Vector:
     Whatever spoils a word of a file leaves a spike; no board moves like that. A chip's decoder repairs its own
     (chip/bit_flips.py). A spike of the acceleration stays: it may be a knock, which the fit weighs itself.
     """
+    bent = np.fmax.reduce(np.abs(np.diff(recording.gyr, n=2, axis=0)), axis=None, initial=0.0)
+    if bent <= 2.0 * LEAST_SPIKE[-1]:
+        return recording.gyr
     words = np.hstack((recording.acc, recording.gyr))
     before, after = words[:-2], words[2:]
     mean = 0.5 * (before + after)

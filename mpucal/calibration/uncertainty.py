@@ -51,12 +51,7 @@ def propagate(D: Vector, covariance: Vector, gravity: float, unit: Vector | None
     unit : (n, 3) directions of s; None: all over the sphere.
     """
     unit = fibonacci_sphere(DIRECTIONS) if unit is None else unit
-    # The error is -inv(D) (dD s + db): linear in the twelve parameters, and in (s, 1).
-    s = np.column_stack([gravity * unit, np.ones(len(unit))])
-    J = np.zeros((4, 3, 12))
-    for i in range(3):
-        J[[0, 1, 2, 3], i, [3 * i, 3 * i + 1, 3 * i + 2, 9 + i]] = 1.0
-    errors = (np.linalg.inv(D) @ J).reshape(12, 12)
+    s, errors = np.column_stack([gravity * unit, np.ones(len(unit))]), _errors_of(D)
     by_products = (errors @ covariance @ errors.T).reshape(4, 3, 4, 3).swapaxes(1, 2).reshape(16, 9)
     C = ((s[:, :, None] * s[:, None, :]).reshape(-1, 16) @ by_products).reshape(-1, 3, 3)
     total = np.maximum(np.einsum("nii->n", C), 0.0)
@@ -67,6 +62,14 @@ def propagate(D: Vector, covariance: Vector, gravity: float, unit: Vector | None
         direction_rad=float(np.sqrt(np.maximum(total - along, 0.0).mean()) / gravity),
         worst=unit[int(np.argmax(total))],
     )
+
+
+def _errors_of(D: Vector) -> Vector:
+    """Return (12, 12), -inv(D) (dD s + db) of each parameter (in columns), for each element of (s, 1) in three rows."""
+    J = np.zeros((4, 3, 12))
+    for i in range(3):
+        J[[0, 1, 2, 3], i, [3 * i, 3 * i + 1, 3 * i + 2, 9 + i]] = 1.0
+    return np.asarray((np.linalg.inv(D) @ J).reshape(12, 12))
 
 
 @dataclass(frozen=True)
@@ -130,7 +133,8 @@ def claim_uncertainty(
     """
     if fit.parts is None or not is_usable(fit):
         return None
-    rms = partial(_rms, fit.D, gravity=gravity)
+    # over the sphere, the square of each element of s is gravity^2 / 3 in the mean, and their products are 0
+    rms = partial(_rms, np.repeat([gravity / 3.0**0.5, 1.0], [9, 3])[:, None] * _errors_of(fit.D))
     model = floored = rms(fit.covariance)
     if walked:
         wider = rms(np.diag(walked_variance(fit.parts, fit.D, walked))) / rms(np.diag(np.diag(fit.parts.covariance)))
@@ -153,5 +157,7 @@ def inflate(fit: Fit, claim: UncertaintyClaim | None) -> Fit:
     return fit if claim is None else replace(fit, covariance=claim.widen())
 
 
-def _rms(D: Vector, covariance: Vector, gravity: float) -> float:
-    return max(propagate(D, covariance[ACCELEROMETER, ACCELEROMETER], gravity).rms_mps2, TINY_MPS2)
+def _rms(errors: Vector, covariance: Vector) -> float:
+    """Return the error [m/s^2] over all directions by a covariance (p, p) and the errors (12, 12) of a unit each."""
+    squares = np.sum((errors @ covariance[ACCELEROMETER, ACCELEROMETER]) * errors)
+    return float(np.sqrt(max(squares, TINY_MPS2**2)))

@@ -31,7 +31,7 @@ PIECES = 64
 DEAD_BITS, LOST_BYTE = 3, 7
 BITS = 16
 # Values are whole counts, or whole steps, within this share.
-EXACTLY = 0.02
+EXACTLY, FEW = 0.02, 50
 # Where the counts are not known: so many steps of the other axes make a step that is odd. A smaller one [m/s^2, rad/s]
 # may be that of a float32, which is coarser the larger a value is.
 ODD_STEPS, LEAST_ODD_STEP = 8.0, 1e-3
@@ -95,11 +95,12 @@ def _stuck(e: Evidence, values: Vector, lsbs: Iterable[float], sensor: str, unit
 
 def _words(values: Vector, lsb: float) -> Words | None:
     """Return `values` (n, 3) as words of two's complement; None where those are not whole counts of 16 bits."""
-    scaled = values / lsb
-    counts = np.rint(scaled)
-    # Rates that were not measured are NaN, and fail the comparison.
-    if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= ACCEL_COUNTS):
-        return None
+    for part in (values[:FEW], values):  # the first ones show another scale
+        scaled = part / lsb
+        counts = np.rint(scaled)
+        # Rates that were not measured are NaN, and fail the comparison.
+        if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= ACCEL_COUNTS):
+            return None
     return counts.astype(np.int64).astype(np.uint16)
 
 

@@ -106,7 +106,7 @@ _SIGNED_PERMUTATIONS = [
 
 def gyro_range(e: Evidence) -> Reason | None:
     """Find rates that are all a power of two too small or too large for how gravity turned from rest to rest."""
-    if e.fit is None or e.gyro_factor == 1.0 or (is_trustworthy(e) and _is_within_tolerance(e.fit.K)):
+    if e.fit is None or (is_trustworthy(e) and _is_within_tolerance(e.fit.K)) or e.gyro_factor == 1.0:
         return None
     assumed = e.recording.sensor.gyro_range_dps
     ranges = "" if assumed is None else f": ±{e.gyro_factor * assumed:g} deg/s, read as ±{assumed:g}"
