@@ -60,11 +60,15 @@ def amended(words: Sequence[str], options: str, without: str) -> list[str]:
             break
     changes = shlex.split(options)
     for option, value in zip(changes[::2], changes[1::2], strict=True):
-        if option == UNITS and option in words:
-            units = [words[words.index(option) + 1], value]
-            value = ",".join("=".join(unit) for unit in dict(u.split("=") for u in ",".join(units).split(",")).items())
-        words = with_option(words, option, value)
+        words = with_option(words, option, _merged(words, value) if option == UNITS else value)
     return list(words)
+
+
+def _merged(words: Sequence[str], units: str) -> str:
+    """Return `units` with those of other quantities that the words have already."""
+    before = words[words.index(UNITS) + 1] if UNITS in words else units
+    of_quantity = dict(unit.split("=") for unit in f"{before},{units}".split(","))
+    return ",".join(f"{quantity}={unit}" for quantity, unit in of_quantity.items())
 
 
 def _flags(name: str) -> set[str]:

@@ -68,20 +68,22 @@ def page_result(calibration: Calibration) -> Result:
 def command_again(calibration: Calibration, folder: Path | None, recording: Path | None = None) -> str:
     """Return the command line that was typed, as it is for another measurement; empty if it is the same.
 
-    The results get a free name, and so does `recording`, unless a remedy says how to read it. A range at whose end the chip was is replaced by the next
-    larger one. A replay and a resumed session cannot be measured again: a new session can.
+    The results get a free name, and so does `recording`, unless a remedy says how to read it. A range at whose end the
+    chip was is replaced by the next larger one. A replay and a resumed session cannot be measured again: a new session
+    can.
     """
     typed = typed_words()
     if NOT_AGAIN.intersection(typed):
         return "mpucal session"
     words = list(typed)
-    said = SAID.search(" ".join(reason.get("remedy", "") for reason in calibration.quality.get("reasons", ())))
+    reasons = calibration.quality.get("reasons", ())
+    said = SAID.search(" ".join(reason.get("remedy", "") for reason in reasons))
     if recording is not None and said:
         words = amended(words, said[1], "")
     elif recording is not None:
         words = [str(_free_file(recording)) if Path(word) == recording else word for word in words]
     elif calibration.sensor.origin is Origin.CHIP:
-        codes = {reason["code"] for reason in calibration.quality.get("reasons", ())}
+        codes = {reason["code"] for reason in reasons}
         for option, key, ranges in (row for code, row in RANGES.items() if code in codes):
             larger = [each for each in ranges if each > (getattr(calibration.sensor, key) or math.inf)]
             words = with_option(words, option, str(larger[0])) if larger else words
