@@ -27,7 +27,7 @@ from mpucal.disk.growing_file import SyncThread
 from mpucal.mavlink.dialect import dialect
 from mpucal.session import rotate
 
-# exit codes that a user of the command is told of, but for a wrong use (2)
+# documented exit codes, except that of a wrong use (2)
 CODES = (0, 3, 4, 5, 6)
 CPU_S, WALL_S = 120, 600.0
 POLL_S, KNOW_EVERY_S, SELDOM = 0.5, 3.0, 8.0
@@ -37,11 +37,11 @@ Task = Callable[[Tell], None]
 
 @dataclass(frozen=True)
 class Ended:
-    """A process that ended.
+    """End of a process.
 
     Attributes
     ----------
-    code : exit code; below 0: the signal that ended it; None: it hung. said : on stderr.
+    code : exit code; below 0: the signal that ended it; None: it hung. said : its output on stderr.
     """
 
     code: int | None
@@ -51,11 +51,11 @@ class Ended:
 
     @property
     def last(self) -> str:
-        """Return the last line that it said."""
+        """Return the last line of its output."""
         return (self.said.strip().splitlines() or [""])[-1]
 
     def wrong(self, codes: Container[int | None] = CODES, silent: Container[int | None] = (0, 5)) -> list[str]:
-        """Return what no command may do: hang, trace, end with another exit code, or fail without a sentence.
+        """Return the faults of the command: a hang, a traceback, another exit code, or a failure without a sentence.
 
         silent : exit codes that need no sentence.
         """
@@ -71,11 +71,11 @@ class Ended:
 
 
 class Child:
-    """A function that returns an exit code, in a process of its own, which waits until it is let go.
+    """Process for a function that returns an exit code; it waits until `go`.
 
     Parameters
     ----------
-    folder : it runs there. said : the file that becomes its stderr. cpu_s : of processor time it may use so much.
+    folder : it runs there. said : the file that becomes its stderr. cpu_s : limit of its processor time.
     """
 
     def __init__(self, call: Callable[[], int], folder: Path, said: Path, cpu_s: int = CPU_S) -> None:
@@ -99,23 +99,23 @@ class Child:
         os.close(hold)
 
     def go(self) -> Child:
-        """Begin; another process forked since holds the pipe open, too."""
+        """Start the process by a byte: a pipe that another fork holds open does not close."""
         os.write(self._go, b"!")
         os.close(self._go)
         return self
 
     def wait(self, wall_s: float = WALL_S) -> Ended:
-        """Wait for its end, for so long at most, and return it."""
+        """Wait for its end, for at most `wall_s`, and return it."""
         return ended(self._pid, self._said, wall_s)
 
 
 def limit_cpu(cpu_s: int = CPU_S) -> None:
-    """Have the kernel end this process as soon as it has used so much processor time [s]: `ended` calls that a hang."""
+    """Have the kernel end this process after this processor time [s]; `ended` reports that as a hang."""
     resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
 
 
 def become(folder: Path, said: Path) -> None:
-    """Go on in `folder` as a command that was started there, with stderr in the file `said` and nothing to read."""
+    """Continue as a command that was started in `folder`, with stderr in the file `said` and no input."""
     os.chdir(folder)
     nothing, file = os.open(os.devnull, os.O_RDWR), os.open(said, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o644)
     for number, handle in enumerate((nothing, nothing, file)):
@@ -126,7 +126,7 @@ def become(folder: Path, said: Path) -> None:
 
 
 def ended(pid: int, said: Path, wall_s: float = WALL_S) -> Ended:
-    """Wait for a child, for so long at most, and return how it ended and what it said in the file `said`."""
+    """Wait for a child, for at most `wall_s`, and return how it ended, with its output in the file `said`."""
     until, done, hung = time.monotonic() + wall_s, 0, False
     while not done:
         done, status, used = os.wait4(pid, os.WNOHANG)
@@ -141,7 +141,7 @@ def ended(pid: int, said: Path, wall_s: float = WALL_S) -> Ended:
 
 
 class Died(NamedTuple):
-    """The end of a task that did not come to its own: its exit code, or below 0 the signal."""
+    """Premature end of a task: its exit code, or below 0 the signal."""
 
     code: int
 
@@ -149,7 +149,7 @@ class Died(NamedTuple):
 def forked(tasks: list[Task], jobs: int) -> Iterator[tuple[Task, Any]]:
     """Run tasks in processes of their own, which may crash, hang or be killed.
 
-    Yields a task and what it told, as it comes; last a Died where it died. Tasks may be added to the list meanwhile.
+    Yields a task with each of its messages, and a Died after a premature end. Tasks may be added to the list meanwhile.
     """
     fork, running = multiprocessing.get_context("fork"), {}
     while tasks or running:
@@ -172,7 +172,7 @@ def forked(tasks: list[Task], jobs: int) -> Iterator[tuple[Task, Any]]:
 
 
 def ready() -> None:
-    """Load what a command loads when it needs it, so that no fork has to."""
+    """Load all modules of mpucal before processes are forked."""
     for module in pkgutil.walk_packages(mpucal.__path__, "mpucal."):
         with suppress(ImportError):
             import_module(module.name)
@@ -182,7 +182,7 @@ def ready() -> None:
 
 @contextmanager
 def quick(sync: bool = False) -> Iterator[None]:
-    """Meanwhile sessions spend their time on what is tried: chips are polled and fits made as seldom as may be.
+    """Reduce the work of sessions while the block runs: chips are polled, and fits made, as seldom as possible.
 
     sync : captures are synced to the disk, by a thread, which does not go on in a forked process.
     """

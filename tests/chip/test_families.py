@@ -1,7 +1,6 @@
 """Table of chips: identities, and a new chip by one row."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ from mpucal.chip.driver import Driver
 from mpucal.chip.families import FAMILIES, MPU6050, MPU6500, Part, WordGroup, part_of
 from mpucal.errors import ChipError
 from mpucal.simulated.chip import models, open_simulated
-
-PAGE = Path(__file__).parents[2] / "docs" / "chips.md"
 
 
 @pytest.mark.parametrize(
@@ -45,19 +42,6 @@ def test_an_unknown_identity_is_refused_with_the_known_ones(who_am_i):
 def test_temperature_formula(family, count, celsius):
     """Sources: RM-MPU-6000A register 65, whose example is 35 C at -521; PS-MPU-9250A table 3."""
     assert count / family.lsb_per_c + family.zero_c == pytest.approx(celsius, abs=0.01)
-
-
-def row(family):
-    wide = f", {family.widest_fifo_bytes} once ACCEL_CONFIG2 asks for it" if family.widest_fifo_bytes else ""
-    offsets = ", ".join(f"0x{address:02X}" for address in family.accel_offset_h)
-    parts = ", ".join(f"0x{who_am_i:02X} {chip}" for who_am_i, chip in family.parts)
-    temperature = f"raw / {family.lsb_per_c:g} + {family.zero_c:g}"
-    return f"| {family.name} | {family.fifo_bytes}{wide} | {offsets} | {temperature} | {parts} | {family.source} |"
-
-
-def test_the_page_holds_the_table():
-    lines = PAGE.read_text().split("| family |")[1].split("\n\n")[0].splitlines()[2:]
-    assert lines == [row(family) for family in FAMILIES]
 
 
 def test_a_new_chip_is_one_row(monkeypatch):

@@ -1,7 +1,7 @@
-"""A disk as a power cut leaves it: what was not synced is lost, in part or whole, and in any order.
+"""Model of a disk after a power cut: data that was not synced is lost, in part or whole, and in any order.
 
-Calls come from the log of syscalls.c. What is written to a file is sure once that file was synced; a name that
-is set or taken away, of a file or folder, is sure once the folder that it stands in was.
+The calls come from the log of syscalls.c. Data written to a file is safe once the file is synced. A name that is
+created or removed is safe once its folder is synced.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 
 class Call(NamedTuple):
-    """A call that was logged.
+    """System call in the log.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Call(NamedTuple):
 
 
 def logged(log: bytes, root: str) -> Iterator[Call]:
-    """The calls of a log, with paths below `root`."""
+    """Yield the calls of a log, with paths relative to `root`."""
     while log:
         head, _, log = log.partition(b"\n")
         op, done, at, size, *paths = head.decode().split("\t")
@@ -43,14 +43,14 @@ def logged(log: bytes, root: str) -> Iterator[Call]:
 
 @dataclass
 class Inode:
-    """A file (or folder): its content on the disk, and what was written since."""
+    """File or folder: its content on the disk, and the writes since the last sync."""
 
     kept: bytes = b""
     since: list[tuple[int, bytes]] = field(default_factory=list)
     folder: bool = False
 
     def after(self, writes: Sequence[tuple[int, bytes]]) -> bytes:
-        """Return its content with these writes alone."""
+        """Return the content after only these writes."""
         data = bytearray(self.kept)
         for at, part in writes:
             data.extend(bytes(max(0, at + len(part) - len(data))))
@@ -59,23 +59,23 @@ class Inode:
 
 
 class Disk:
-    """Files by name, which begin with `content`.
+    """Disk with files by name; at first `content`.
 
     Attributes
     ----------
-    synced : content of each file as it last was when it was synced. placed : contents that took the place of a name.
+    synced : content of each file at its last sync. placed : contents that were renamed to a name.
     """
 
     def __init__(self, content: Mapping[str, bytes]) -> None:
         self._names = {name: Inode(data) for name, data in content.items()}
         self._now = dict(self._names)
-        # names that were set or taken away since their folder was synced
+        # names created (or removed: None) since their folder was synced
         self._since: list[tuple[str, Inode | None]] = []
         self.synced: dict[str, bytes] = {}
         self.placed: dict[str, list[bytes]] = {}
 
     def call(self, call: Call) -> None:
-        """Take in a call that happened."""
+        """Apply a call."""
         op, path = call.op, call.path
         inode = self._now.get(path)
         if not call.done:
@@ -101,7 +101,7 @@ class Disk:
             self._set(path, None)
 
     def cut(self, rng: random.Random, share: float) -> dict[str, bytes]:
-        """Return what is there after a cut that lets `share` of what was not synced reach the disk, in any order."""
+        """Return the files after a power cut, when a `share` of the unsynced data reached the disk, in any order."""
         names = dict(self._names)
         for name, inode in rng.sample(self._since, len(self._since)):
             if rng.random() < share:

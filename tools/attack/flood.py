@@ -1,10 +1,10 @@
-"""Flood a UDP port or a serial line, and measure how long mpucal takes to say so and to hear Ctrl-C.
+"""Flood a UDP port or a serial line, and measure how long mpucal takes to report it and to react to Ctrl-C.
 
     python -m tools.attack flood [CASE ...]
 
-Each case runs a command of its own beside a flood: junk datagrams, heartbeats from ever new ports, or a pseudo terminal
-that sends zeros, random bytes or text without end. Once it is left alone, and once it gets one SIGINT after `--after`
-seconds. A line says how long it took to end, with which exit code and sentence.
+Each case runs a command during a flood: junk datagrams, heartbeats from ever new ports, or a pseudo terminal that sends
+zeros, random bytes or text without end. It runs once undisturbed, and once with a SIGINT after `--after` seconds. A
+line gives the time until it ended, its exit code and its last sentence.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ WORDS: dict[str, tuple[str, ...]] = {
 
 
 def send_junk(port: int, after_s: float = 0.0) -> None:
-    """Send datagrams that hold no packet."""
+    """Send datagrams that contain no packet."""
     time.sleep(after_s)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         while True:
@@ -62,14 +62,14 @@ def send_heartbeats(port: int) -> None:
 
 
 def send_bytes(handle: int, what: str) -> None:
-    """Write the same without end to a line."""
+    """Write the same data to a serial line without end."""
     while True:
         os.write(handle, SERIAL[what]())
 
 
 @contextmanager
 def beside(send: Callable[..., None], *arguments: object) -> Iterator[None]:
-    """Have a process send meanwhile."""
+    """Run `send` in a process while the block runs."""
     process = get_context("fork").Process(target=send, args=arguments, daemon=True)
     process.start()
     try:
@@ -81,7 +81,7 @@ def beside(send: Callable[..., None], *arguments: object) -> Iterator[None]:
 
 @contextmanager
 def udp(send: Callable[..., None], vehicle: bool = False) -> Iterator[str]:
-    """Flood a free port meanwhile, and yield it as --mavlink takes it; once a simulated vehicle is heard there."""
+    """Flood a free UDP port while the block runs, and yield its --mavlink option; vehicle : simulate one there."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
@@ -98,7 +98,7 @@ def udp(send: Callable[..., None], vehicle: bool = False) -> Iterator[str]:
 
 @contextmanager
 def serial(what: str, option: str) -> Iterator[str]:
-    """Flood a line meanwhile, and yield it as --serial or --mavlink takes it."""
+    """Flood a serial line while the block runs, and yield its --serial or --mavlink option."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     with beside(send_bytes, master, what):
@@ -110,7 +110,7 @@ def serial(what: str, option: str) -> Iterator[str]:
 LINES = {
     "udp": {"junk": partial(udp, send_junk), "heartbeats": partial(udp, send_heartbeats)},
     "serial": {what: partial(serial, what, "serial") for what in SERIAL},
-    # a flight controller's
+    # the serial line of a flight controller
     "vehicle": {what: partial(serial, what, "mavlink") for what in SERIAL},
     "locked": {"junk": partial(udp, send_junk, vehicle=True)},
 }
@@ -124,7 +124,7 @@ CASES = {
 
 
 def calibration(line: str, folder: Path) -> None:
-    """Make a calibration.json for what is written over this line."""
+    """Make the calibration.json that `mpucal write` writes over this line."""
     source = ("--bus", "sim") if line == "serial" else ("--mavlink", "sim", "--no-write")
     words = [sys.executable, "-m", "mpucal", "session", *source, "--yes", "-o", "made"]
     subprocess.run(words, cwd=folder, check=True, capture_output=True)
@@ -132,7 +132,7 @@ def calibration(line: str, folder: Path) -> None:
 
 
 def flooded(command: str, line: str, option: str, folder: Path, after_s: float | None) -> tuple[float, Ended]:
-    """Run a command, interrupt it after so long, and return the seconds to its end from there on."""
+    """Run a command, interrupt it after `after_s` if given, and return the seconds from then to its end."""
     words = list(WORDS[command])
     if command == "record":
         words += ["-o", "out.mcap"]
@@ -151,12 +151,12 @@ def flooded(command: str, line: str, option: str, folder: Path, after_s: float |
 
 
 def main() -> None:
-    """See the module's docstring."""
+    """Run the cases, and print a line for each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", nargs="*", metavar="CASE", help=f"some of: {', '.join(CASES)}; default: all")
     parser.add_argument("--after", type=float, default=INTERRUPT_S, help="when Ctrl-C comes [s]")
     asked = parser.parse_args()
-    # who runs in the background of a shell ignores it, and so would the commands
+    # a program in the background of a shell ignores SIGINT, and its children inherit that
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for name in asked.cases or CASES:
         command, line, flood = CASES[name]

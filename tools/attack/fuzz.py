@@ -1,4 +1,4 @@
-"""Readers and decoders on mutated bytes: nothing but the package's own errors comes out, and within a second or two.
+"""Fuzz readers and decoders with mutated bytes: they may raise only mpucal's own errors, within a second or two.
 
     python -m tools.attack fuzz --seconds 60 [TARGET ...]
     python -m tools.attack fuzz --guided --seconds 60 [TARGET ...]      # by coverage; needs atheris
@@ -42,11 +42,11 @@ Check = Callable[[bytes], str | None]
 
 
 class TooLongError(BaseException):
-    """A reader takes longer than any may; no reader takes it for an error of a library's."""
+    """Time limit of a reader exceeded; a BaseException, so that no reader catches it as an error of a library."""
 
 
 def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
-    """Damage one of the corpus by a seed."""
+    """Return a file of the corpus, damaged as the seed draws."""
     from ..lab.campaign_recordings import OF_BYTES  # noqa: PLC0415 - not before the package is instrumented
 
     rng = np.random.default_rng(seed)
@@ -60,7 +60,7 @@ def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
 
 
 def checked(run: Run) -> Check:
-    """Return a check: the trace of an exception that should not be; None where all is well."""
+    """Return a check of bytes: it returns the traceback of an unexpected exception, or None."""
     from mpucal.errors import MpucalError  # noqa: PLC0415 - as above
     from mpucal.result.blob import BlobError  # noqa: PLC0415
     from mpucal.sources.bridge.messages import MessageError  # noqa: PLC0415
@@ -79,7 +79,7 @@ def checked(run: Run) -> Check:
 
 
 def blind(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
-    """Run seed after seed; return what was done, and how many raised what they should not."""
+    """Run seed after seed; return a summary, and the number of unexpected exceptions."""
     until, seed, wrong = time.monotonic() + seconds, first, 0
     while True:
         if (trace := check(mutated(corpus, seed))) is not None:
@@ -91,7 +91,7 @@ def blind(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds:
 
 
 def guided(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
-    """Run libFuzzer in a process of its own, which it ends; return as `blind`."""
+    """Run libFuzzer in a process of its own, as it ends its process; return the same as `blind`."""
     folder = KEPT / re.sub(r"\W+", "_", name)
     wrong, log = folder.with_suffix(".wrong"), folder.with_suffix(".log")
     folder.mkdir(parents=True, exist_ok=True)
@@ -143,7 +143,7 @@ def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: 
 
 
 def again(name: str, check: Check, path: Path) -> int:
-    """Run the files again, and return how many of them are wrong."""
+    """Run saved files again, and return how many of them still raise unexpected exceptions."""
     paths = sorted(path.iterdir()) if path.is_dir() else [path]
     traces = [trace for each in paths if (trace := check(each.read_bytes())) is not None]
     print(*traces, f"{name:<44}{len(paths):>9} files: {len(traces)} wrong", sep="\n", flush=True)
@@ -151,12 +151,12 @@ def again(name: str, check: Check, path: Path) -> int:
 
 
 def too_long(_signal: int, _frame: FrameType | None) -> None:
-    """Raise, as a reader takes longer than any may."""
+    """Raise TooLongError, as the handler of the timer's signal."""
     raise TooLongError(f"longer than {LONGEST_S} s of processor time")
 
 
 def main() -> int:
-    """Run them; 1 where one raised what it should not."""
+    """Run the targets; return 1 after an unexpected exception."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", metavar="TARGET")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each target")
@@ -170,10 +170,10 @@ def main() -> int:
             import atheris  # noqa: PLC0415 - a person may do without
         except ImportError:
             sys.exit(MISSING)
-        # an editable install's finder has loaders of its own, whose code cannot be instrumented: it is asked last
+        # code that the finder of an editable install loads cannot be instrumented: it is asked last
         sys.path.insert(0, str(ROOT))
         sys.meta_path.sort(key=lambda finder: not isinstance(finder, type))
-        # what is imported from here on: the package, and what it imports only later
+        # instruments what is imported from here on, also by later imports of mpucal
         atheris.instrument_imports(include=["mpucal"]).__enter__()
     told = io.StringIO() if asked.guided else sys.stderr
     with redirect_stderr(told):

@@ -2,7 +2,7 @@
 
     python -m tools.attack fuzz_core --seconds 60
 
-It needs clang with its runtime library. What was reached is kept in build/fuzz/core, and gone on from.
+It needs clang with its runtime library. build/fuzz/core keeps the corpus for the next run.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LONGEST = 4096
 
 
 def built() -> Path:
-    """The fuzzer; exits with a sentence where clang cannot make it."""
+    """Build and return the fuzzer; exit with a sentence if clang cannot."""
     BUILT.mkdir(parents=True, exist_ok=True)
     fuzzer = BUILT / "core_fuzzer"
     sources = map(str, [*sorted(SOURCES.glob("*.c")), HARNESS])
@@ -41,7 +41,7 @@ def built() -> Path:
 
 
 def seeds() -> list[bytes]:
-    """A bridge that is greeted and then asked for each thing, and the golden blobs."""
+    """Return the first corpus: HELLO and then each kind of request, and the golden blobs."""
 
     def piece(kind: int, content: bytes) -> bytes:
         return bytes([kind, len(content)]) + content
@@ -62,7 +62,7 @@ def seeds() -> list[bytes]:
 
 
 def main() -> int:
-    """Build it and run it; 1 where it found something."""
+    """Build and run the fuzzer; return 1 if it found something."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=int, default=60)
     parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000)

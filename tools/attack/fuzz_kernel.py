@@ -3,8 +3,8 @@
     python -m tools.attack fuzz_kernel --seconds 60
     python -m tools.attack fuzz_kernel --seconds 0 --first SEED     # one again
 
-What a function does not take it must refuse by an exception: an access out of bounds or an undefined operation ends
-the process, and its seed is printed. Lengths are 0 to 70, around the filters' lanes of four. Arrays have other lengths,
+A function must refuse unsuitable arguments by an exception. An access out of bounds or an undefined operation ends the
+process, and its seed is printed. Lengths are 0 to 70, around the filters' lanes of four. Arrays have other lengths,
 shapes, types, strides and values than they should, one in three of them. Then the modules' own tests run once.
 """
 
@@ -82,7 +82,7 @@ ODDITIES = (longer, shaped, typed, strided, valued)
 
 
 def odd(value: Any, rng: Rng) -> Any:
-    """Return an odd value in one of three cases."""
+    """Return the value, or in one of three cases an odd one in its place."""
     if rng.random() > 1 / 3:
         return value
     if isinstance(value, np.ndarray):
@@ -95,7 +95,7 @@ def odd(value: Any, rng: Rng) -> Any:
 
 
 def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]]]:
-    """Return each function, and what makes arguments of n samples that it takes."""
+    """Return the functions, each with a function that makes valid arguments of n samples."""
     from mpucal.calibration.likelihood import EXACT, USED  # noqa: PLC0415 - not before the modules are those of build/asan
     from mpucal.calibration.parameters import TABLE  # noqa: PLC0415
     from mpucal.calibration.theta import Theta  # noqa: PLC0415
@@ -185,7 +185,7 @@ def fuzz(first: int, seconds: float, last: int) -> int:
 
 
 def main() -> int:
-    """Build, fuzz, test; 1 where something was found."""
+    """Build, fuzz and test; return 1 if something was found."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000 * 10**7)

@@ -1,7 +1,7 @@
-"""Peers for tools/attack/fuzz.py: bridges, vehicles, browsers; the bytes to be mutated are what they say.
+"""Hostile peers for tools/attack/fuzz.py: bridges, vehicles and browsers, whose messages are mutated.
 
-Check sums and sequence numbers, which would turn nearly all mutated bytes away, are made here: a peer's bytes are
-pieces, each a head that ends with a length, and so many bytes.
+Mutated bytes would nearly always fail checksums and sequence numbers, so these are computed here: the bytes of a peer
+are pieces, each a header that ends with a length, and that many bytes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from mpucal.sources.bridge.port import Chunk
 from mpucal.sources.bridge.store import BlobStore
 
 MS = 1_000_000
-# kind, sequence number, length: both as asked where they are 0
+# type, sequence number, length; if 0, type and sequence number are those that the request expects
 PIECE_OF_BRIDGE = struct.Struct("<BBB")
 # which of PACKETS, system, component, ms after the piece before, length
 PIECE_OF_VEHICLE = struct.Struct("<BBBHB")
@@ -44,7 +44,7 @@ PACKETS = (
 
 
 def pieces(data: bytes, head: struct.Struct) -> Iterator[tuple[Any, ...]]:
-    """Yield each head's fields, with the bytes in place of their length."""
+    """Yield the fields of each header, with the bytes in place of their length."""
     at = 0
     while at + head.size <= len(data):
         *fields, size = head.unpack_from(data, at)
@@ -58,7 +58,7 @@ def joined(head: struct.Struct, rows: Sequence[Sequence[Any]]) -> bytes:
 
 
 def frames(data: bytes) -> None:
-    """Read what comes over a serial line."""
+    """Decode frames of a serial line."""
     for frame in Deframer().feed(data):
         if frame.type in wire.REQUESTS:
             wire.REQUESTS[frame.type].decode(frame.payload)
@@ -67,7 +67,7 @@ def frames(data: bytes) -> None:
 
 
 class HostileBridge:
-    """A Port, behind which pieces are sent: one for each look, then nothing."""
+    """Port that receives one piece at each read, and then nothing."""
 
     name, bauds = "a port", (115200,)
 
@@ -76,7 +76,7 @@ class HostileBridge:
         self._waiting, self._asked = list[Frame](), Frame(0, 0)
 
     def now_ns(self) -> int:
-        """Return the time; each look takes a millisecond."""
+        """Return the time; each read takes a millisecond."""
         return self._t_ns
 
     def read(self, until_ns: int) -> Chunk | None:
@@ -92,7 +92,7 @@ class HostileBridge:
         return Chunk(frame.encode(), self._t_ns)
 
     def write(self, data: bytes) -> None:
-        """Note what is asked."""
+        """Remember the requests."""
         self._waiting += Deframer().feed(data)
 
     def close(self, *_: object) -> None:
@@ -102,7 +102,7 @@ class HostileBridge:
 
 
 def bridge(data: bytes) -> None:
-    """Ask a bridge who it is, what it keeps and what a chip holds, and take what it pushes."""
+    """Ask a bridge for its identity, its blob and a chip's registers, and read the samples that it pushes."""
     bus = BridgeBus(HostileBridge(data))
     store = BlobStore(bus.link)
     store.who_am_i()
@@ -118,7 +118,7 @@ def bridge(data: bytes) -> None:
 
 
 def bridge_says() -> list[bytes]:
-    """Return what an honest one would say, in the order in which `bridge` asks."""
+    """Return the replies of an honest bridge, in the order of the requests of `bridge`."""
     ok = struct.pack("<BI", 0, 1000)
     hello = wire.HelloReply(0, 1000, wire.MAGIC, 1, 0, 0x68, 7, 3, 512, b"bridge").payload()
     blob = bytes(range(60))
@@ -137,7 +137,7 @@ def packets(data: bytes) -> None:
 
 
 def vehicles(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield times [us] and packets with sums that hold."""
+    """Yield times [us] and packets with valid checksums."""
     m, t_us = dialect(), BEGUN_US
     for number, (which, system, component, step_ms, payload) in enumerate(pieces(data, PIECE_OF_VEHICLE)):
         t_us += 1000 * step_ms
@@ -154,7 +154,7 @@ def tlog(data: bytes) -> bytes:
 
 
 class HostileVehicle:
-    """A Transport, over which packets come, then nothing."""
+    """Transport that receives the packets, and then nothing."""
 
     name, datagrams, outward = "a link", True, False
 
@@ -180,7 +180,7 @@ class HostileVehicle:
 
 
 def vehicle(data: bytes) -> None:
-    """Ask a vehicle who it is, and for its parameters and a file."""
+    """Ask a vehicle for its identity, its parameters and a file."""
     link = Link(HostileVehicle(data), lambda t_ns, packet: None)
     found = link.listen()
     link.lock(found[0])
@@ -190,7 +190,7 @@ def vehicle(data: bytes) -> None:
 
 
 def vehicle_says() -> list[bytes]:
-    """Return what a vehicle says in a second, and answers to `vehicle`."""
+    """Return the messages of a vehicle in a second, and its replies to the requests of `vehicle`."""
     m, link = dialect(), dialect().MAVLink(None, 1, 1)
 
     def piece(message: Any) -> tuple[int, int, int, int, bytes]:
@@ -212,7 +212,7 @@ def vehicle_says() -> list[bytes]:
 
 
 def http(data: bytes) -> None:
-    """Serve what a browser asks for."""
+    """Serve the request of a browser."""
     page = SimpleNamespace(
         filter=RequestFilter("h:1", "t", True),
         results={"report.html": Path(__file__)},
@@ -225,7 +225,7 @@ def http(data: bytes) -> None:
 
 
 def browser_says() -> list[bytes]:
-    """Return what browsers ask for."""
+    """Return requests of browsers."""
     targets = [
         "GET /t/",
         "GET /t/page.js",

@@ -23,16 +23,16 @@ from tools.processes import quick
 
 OTHER_KEY = bytes(32)
 ODD = (float("nan"), float("inf"), -float("inf"), 3.4e38, -3.4e38, 1e-45, 0.0, 1.0, -9.8)
-# how many packets of a kind are kept to be sent again, and how often a new one is made instead
+# number of packets of a kind that are kept to be sent again, and the share of new ones
 KEPT, FRESH = 2000, 0.1
 
 
 class Attacker:
-    """Makes packets of each kind.
+    """Attacker that makes packets of each kind.
 
     Attributes
     ----------
-    heard : what the vehicle sent, to be replayed, and what it sent in an earlier session. now_us : its clock.
+    heard : packets of the vehicle to be replayed, also of an earlier session. now_us : its clock.
     """
 
     def __init__(self, seed: int, firmware: str, heard: Sequence[bytes] = ()) -> None:
@@ -43,7 +43,7 @@ class Attacker:
         self.now_us = 0
 
     def packet(self, kind: str) -> bytes:
-        """Return a packet of `kind`: a new one, or one that was made before, as making them takes longest."""
+        """Return a packet of `kind`: a new one, or an earlier one, since making them is slow."""
         made, rng = self._made.setdefault(kind, []), self._rng
         if len(made) < KEPT:
             made.append(KINDS[kind](self))
@@ -73,7 +73,7 @@ class Attacker:
         return getattr(m, f"MAVLink_{name}_message")(time_us // 1000 % (1 << 32), *counts)
 
     def ids(self) -> bytes:
-        """Return what a vehicle sends, from other systems and components."""
+        """Return messages of a vehicle with ids of other systems and components."""
         rng, m = self._rng, dialect()
         message = rng.choice(
             (
@@ -91,7 +91,7 @@ class Attacker:
         return self._packed(self._imu(t, self._rng.choices(ODD, k=6)))
 
     def time(self) -> bytes:
-        """Return the vehicle's IMU messages at times of anywhere: 0, 2^64 - 1, and its own, running backwards."""
+        """Return IMU messages of the vehicle with any time: 0, 2^64 - 1, or running backwards."""
         rng = self._rng
         back = max(self.now_us - rng.randrange(1 << rng.randrange(1, 28)), 0)
         t = rng.choice((0, 1, (1 << 64) - 1, (1 << 63) + 5, rng.randrange(1 << rng.randrange(1, 64)), back, back))
@@ -107,7 +107,7 @@ class Attacker:
         return self._packed(m.MAVLink_param_value_message(name, value, rng.randrange(256), 100, rng.randrange(65536)))
 
     def ftp(self) -> bytes:
-        """Return FILE_TRANSFER_PROTOCOL: payloads of noise, and answers that might be meant."""
+        """Return FILE_TRANSFER_PROTOCOL: random payloads, and replies that look right."""
         rng = self._rng
         payload = bytearray(rng.randbytes(PAYLOAD))
         if rng.random() < 0.8:
@@ -159,11 +159,11 @@ KINDS: dict[str, Callable[[Attacker], bytes]] = {
 
 STRANGER, FORGED, SIGNED = "a stranger", "the address forged", "against signing"
 ATTACKERS = (STRANGER, FORGED, SIGNED)
-# of a burst: begins so long after the lock [s], lasts [s], comes at [packets/s]
+# limits of a burst: latest begin after the lock [s], duration [s], least rate [packets/s]
 LATEST_S, LASTS_S, LEAST_HZ = {"session": 75.0, "write": 25.0}, (0.2, 60.0), 2.0
-# one of so many begins with the link, before anybody is known
+# one of this many begins with the link, before a vehicle is known
 EARLY = 4
-# signed at; a vehicle's clock goes on from one session to the next
+# timestamp of signatures; a vehicle's clock continues from one session to the next
 SIGNED_AT = 1 << 40
 # packets to replay
 MOST_HEARD = 3000
@@ -171,11 +171,11 @@ MOST_HEARD = 3000
 
 @dataclass
 class Attack:
-    """An attack that one process suffers; `heard` is what the vehicle sent in an earlier session.
+    """Attack on one process; `heard` holds packets of the vehicle of an earlier session.
 
     Attributes
     ----------
-    sent : packets that mpucal was given. sets : (name, value, what the vehicle held first) of each PARAM_SET.
+    sent : number of packets that mpucal received. sets : (name, value, first value in the vehicle) of each PARAM_SET.
     """
 
     kind: str
@@ -192,7 +192,7 @@ class Attack:
     hz: float = 0.0
 
     def draw(self, command: str) -> None:
-        """Draw when and how fast it happens during the next command."""
+        """Draw begin, duration and rate for the next command."""
         self.sets, self.hz = [], self.rate
         if self.seed and self.rate:
             rng = random.Random(f"{self.seed} {command}")
@@ -202,15 +202,15 @@ class Attack:
             self.hz = math.exp(rng.uniform(math.log(LEAST_HZ), math.log(2 * self.rate)))
 
     def due(self, passed_s: float) -> int:
-        """Return how many packets come within so long."""
+        """Return the number of packets until `passed_s`."""
         return int(min(max(passed_s - self.begin_s, 0.0), self.lasts_s) * self.hz)
 
 
 class HostileTransport(SimulatedTransport):
-    """The simulated vehicle's link, onto which `attack` sends."""
+    """Link of the simulated vehicle, on which the packets of `attack` arrive, too."""
 
     attack: Attack
-    # of each that was opened, as it was then
+    # truth of each vehicle when it was opened
     truths: ClassVar[list[dict[str, Any]]] = []
 
     def __init__(self, vehicle: SimulatedVehicle) -> None:
@@ -244,12 +244,12 @@ class HostileTransport(SimulatedTransport):
         return received
 
     def close(self) -> None:
-        """See Transport; what was not read any more was not heard."""
+        """See Transport; packets that were not read do not count as sent."""
         self.attack.sent = max(self.attack.sent - len(self._queue), 0)
         super().close()
 
     def send(self, data: bytes, address: str | None) -> None:
-        """See Transport; what is set is noted, with what the vehicle held at the start."""
+        """See Transport; note each PARAM_SET with the first value in the vehicle."""
         store = self._vehicle.firmware.store
         for packet in self._asked.datagram(data):
             if packet.message.get_type() == "PARAM_SET":
@@ -262,7 +262,7 @@ class HostileTransport(SimulatedTransport):
 
 @contextmanager
 def hostile(attack: Attack) -> Iterator[None]:
-    """Meanwhile `--mavlink sim` is attacked, and little is computed that is not tried here."""
+    """Attack `--mavlink sim` while the block runs, and leave out slow parts that are not tested here."""
     HostileTransport.attack = attack
     with (
         patch("mpucal.simulated.vehicle.source.SimulatedTransport", HostileTransport),

@@ -47,7 +47,7 @@ from .hostile_link import ATTACKERS, FORGED, KINDS, MOST_HEARD, SIGNED, STRANGER
 
 KEY = bytes(range(32))
 FIRMWARES = ("ardupilot", "px4")
-# what may be taken for the vehicle's samples, where the address is forged and nothing signed
+# kinds that may pass for the vehicle's samples if the address is forged and nothing is signed
 OF_SAMPLES = ("values", "time", "replayed", "junk", "mixed")
 MOST_RUNS = 60
 # packets a second of the vehicle's time
@@ -68,8 +68,8 @@ def commands(attack: Attack, clean: Path | None) -> Iterator[tuple[str, list[str
         yield str(clean), words
 
 
-def suffer(attack: Attack, clean: Path | None, place: Path) -> dict[str, Any]:
-    """Run the commands here, in this process, and judge them."""
+def run_attack(attack: Attack, clean: Path | None, place: Path) -> dict[str, Any]:
+    """Run the commands in this process, and judge them."""
     place.mkdir(parents=True)
     become(place, place / "said")
     Path("key").write_bytes(KEY)
@@ -96,7 +96,7 @@ def suffer(attack: Attack, clean: Path | None, place: Path) -> dict[str, Any]:
 
 
 def judge_samples(attack: Attack) -> tuple[int, list[str]]:
-    """Return 1 where a calibration is farther from the truth than it says: wrong where no samples were forged."""
+    """Return 1 if the error of the calibration exceeds its claim, and why that is wrong (not of forged samples)."""
     try:
         calibration = Calibration.load(Path("out/calibration.json"))
     except MpucalError:
@@ -109,7 +109,7 @@ def judge_samples(attack: Attack) -> tuple[int, list[str]]:
 
 
 def not_asked(sets: list[tuple[str, float, float]], file: Path) -> list[tuple[str, float]]:
-    """Return what was set that is neither of the calibration in `file` nor the vehicle's own."""
+    """Return parameters that were set to values neither of the calibration in `file` nor of the vehicle."""
     new: dict[str, float] = {}
     if file.is_file():
         document = json.loads(file.read_text())
@@ -138,16 +138,16 @@ def outcomes(attacks: Sequence[tuple[Attack, Path | None, Path]], jobs: int) -> 
 
 
 def alone(attack: Attack, clean: Path | None, place: Path, tell: Tell) -> None:
-    """Suffer it, and tell what became of it; a hang is ended by the kernel."""
+    """Run an attack, and report its outcome; the kernel ends a process that hangs."""
     limit_cpu(CPU_S)
     signal.alarm(WALL_S)
-    tell({**suffer(attack, clean, place), "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024})
-    # what the session has open need not be closed in order
+    tell({**run_attack(attack, clean, place), "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024})
+    # skips the orderly close of what the session has open
     os._exit(0)
 
 
 def main() -> int:
-    """Run them and print the table; the exit code."""
+    """Run the attacks and print the table; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"some of: {', '.join(KINDS)}; default: all")
     parser.add_argument("--packets", type=int, default=100_000, help="of each kind and attacker, at least")
@@ -169,7 +169,7 @@ def main() -> int:
 
 
 def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
-    """Return what a session without an attack leaves."""
+    """Return the folder of a session without an attack."""
     signed = SIGNED if attacker == SIGNED else STRANGER
     folder = place / f"{firmware} {signed}"
     if not folder.exists():

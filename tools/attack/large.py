@@ -2,9 +2,10 @@
 
     python -m tools.attack large [--files N] [--seed N] [--most-mb MB] [--seconds S]
 
-Archives of zeros, captures and bags with chunks that unpack to gigabytes or say so, tables that repeat a line or end
-nowhere, and logs with a hole. Each is calibrated in a process of its own; of each kind a line gives the largest peak
-and the longest processor time. Exit code 1: a peak beyond 600 MB, a trace, or more than 30 s of processor time.
+Archives of zeros, captures and bags whose chunks unpack, or claim to unpack, to gigabytes, tables that repeat a line
+or do not end, and logs with a hole. Each is calibrated in a process of its own; a line for each kind gives the largest
+peak and the longest processor time. Exit code 1: a peak beyond 600 MB, a traceback, or more than 30 s of processor
+time.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ LINES = {
 
 
 def archive(path: Path, draw: random.Random) -> None:
-    """Write an .npz of zeros, or of a length that it has not."""
+    """Write an .npz of zeros, or with a wrong length in its header."""
     samples, said, more = draw.randrange(10_000, 1_000_000), draw.choice((1, 1, 1000)), draw.choice((1, 1, 70))
     with zipfile.ZipFile(path.with_suffix(".npz"), "w", zipfile.ZIP_DEFLATED) as file:
         shapes = {"t": (samples,), "acc": (samples, 3), "gyr": (samples, 3), "sensor": (more * samples,)}
@@ -63,7 +64,7 @@ def phone(path: Path, draw: random.Random) -> None:
 
 
 def capture(path: Path, draw: random.Random) -> None:
-    """Write a capture with chunks that unpack to more than they, or their heads, say."""
+    """Write a capture with chunks that unpack to a large size, or state a wrong one."""
     data, at = CAPTURE.read_bytes(), 8
     while data[at] != CHUNK:
         at += 9 + struct.unpack_from("<Q", data, at + 1)[0]
@@ -104,7 +105,7 @@ def _zeros(put: Callable[[bytes], object], count: int) -> None:
 
 
 def _chunk(size: int, said: int) -> bytes:
-    """Return a chunk of one record that nobody knows."""
+    """Return a chunk with one record of an unknown kind."""
     packer = ZstdCompressor().compressobj(size=size)
     parts = [packer.compress(bytes([UNKNOWN]) + struct.pack("<Q", size - 9))]
     _zeros(lambda zeros: parts.append(packer.compress(zeros)), size - 9)
@@ -145,7 +146,7 @@ COLUMNS = {
 
 
 def main() -> int:
-    """Read so many; 1 where one took too much."""
+    """Read the files; return 1 if one took too much memory or time."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--files", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,4 +1,4 @@
-"""Each output of each command where it cannot be written: a table of what became of it.
+"""Run each command with outputs that cannot be written, and print a table of the outcomes.
 
     python -m tools.attack outputs [COMMAND ...]
 
@@ -33,7 +33,7 @@ from tools.processes import Child, Ended, ready
 
 QUICK = ("--rate", "25", "--target", "quick", "--yes")
 CALIBRATION, TABLE, RECORDED = "a/calibration.json", "walk.npz", "a/capture.mcap"
-# The words of each command with an output, which is in place of {}.
+# Arguments of each command with an output; {} stands for the output.
 WORDS: dict[str, tuple[str, ...]] = {
     "session": ("session", "--bus", "sim:seed=1", *QUICK, "--no-write", "-o", "{}"),
     "record": ("record", "--bus", "sim:seed=1", "--seconds", "2", "-o", "{}.mcap"),
@@ -50,16 +50,16 @@ WORDS: dict[str, tuple[str, ...]] = {
     "merge": ("merge", CALIBRATION, "b/calibration.json", "-o", "{}"),
     "firmware": ("firmware", "-o", "{}"),
 }
-# Paths that are read; `session --resume` goes on in the folder of a session.
+# Options whose paths are read; `session --resume` continues in the folder of a session.
 READ = {"--noise", "--hints", "--apply", "--resume", "calibration", "calibrations", "recording", "file", "a", "b"}
 OLD, CODES = b"old", (0, 2, 3, 5, 6)
-# of a library of many files these stand for all
+# a library has many files, and these stand for all
 MOST_FILES = 8
 SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 
 
 def check_rows() -> str:
-    """Return what the table of words lacks for the command line, in a sentence; empty if nothing."""
+    """Return a sentence on rows that WORDS lacks for the command line; empty if it is complete."""
     found: set[str] = set()
     for name in COMMANDS:
         command = commands.get_command(click.Context(commands), name)
@@ -98,7 +98,7 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 def obstructed(words: tuple[str, ...], here: Path, file: Path, kind: str) -> str:
-    """Run a command with an obstacle at `file` (relative); return what became of it."""
+    """Run a command with an obstacle at `file` (relative); return the outcome in words."""
     with TemporaryDirectory(dir=here.parent) as place:
         path = Path(place) / file
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -127,7 +127,7 @@ def _content(path: Path) -> object:
 
 @contextmanager
 def _disk(options: str, here: Path) -> Iterator[Path]:
-    """Yield a folder on a disk of its own (root alone)."""
+    """Yield a folder on a disk of its own; needs root."""
     with TemporaryDirectory(dir=here.parent) as place:
         subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", place], check=True)
         try:
@@ -167,7 +167,7 @@ def _refused(done: Ended, place: Path) -> str:
 
 
 def _run(words: tuple[str, ...], here: Path, place: Path, longest: int | None = None) -> Ended:
-    """Run a command in `here` with its output in `place`, whose files may be so long."""
+    """Run a command in `here` with its output in `place`, where files may have `longest` bytes."""
 
     def call() -> int:
         if longest is not None:
@@ -178,14 +178,14 @@ def _run(words: tuple[str, ...], here: Path, place: Path, longest: int | None = 
 
 
 def _odd(done: Ended, place: Path) -> str:
-    """Return what no command may do, in words."""
+    """Return the rules for any command that this one broke, in words; empty if none."""
     odd = [] if done.code == 2 else done.wrong(CODES)
     odd += ["the standard output is blamed"] if "the output cannot be written" in done.last else []
     return "; ".join([*odd, *(f"{path.name} is left" for path in place.rglob(".*"))])
 
 
 def main() -> int:
-    """Run each command with each obstacle, and print the table; 1 where one was wrong."""
+    """Run each command with each obstacle, and print the table; return 1 if an outcome was wrong."""
     if lacks := check_rows():
         sys.exit(lacks)
     asked, wrong = sys.argv[1:] or list(WORDS), []

@@ -1,6 +1,6 @@
-"""The compiled modules of build/asan in place of those that are installed; to be imported before mpucal.
+"""Load the compiled modules of build/asan in place of the installed ones; to be imported before mpucal.
 
-As a plugin of pytest: `-p tools.attack.sanitized`, with what `environment` says.
+As a plugin of pytest: `-p tools.attack.sanitized`, in the environment of `environment`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MODULES = ("kernel._kernel", "files._text", "files._packed", "chip._flips", "chi
 
 
 def build() -> None:
-    """Compile them, with the options of an installation but for the sanitizers and the optimiser's level."""
+    """Compile the modules as for an installation, but with sanitizers and another optimisation level."""
     options = ["-DMPUCAL_SANITIZE=ON", f"-DPython_EXECUTABLE={sys.executable}"]
     targets = [name.partition(".")[2] for name in MODULES]
     for command in (["-S", ROOT, "-B", BUILT, *options], ["--build", BUILT, "--target", *targets]):
@@ -25,8 +25,8 @@ def build() -> None:
 
 
 def environment() -> dict[str, str]:
-    """Return an environment in which a Python loads them, and each of its blocks of memory is by itself."""
-    # C++'s, too: else the exceptions that Python does not know are not intercepted
+    """Return an environment in which Python loads these modules and allocates each block of memory by malloc."""
+    # the library of C++, too: otherwise its exceptions are not intercepted
     libraries = [
         subprocess.run(["gcc", f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout.strip()
         for name in ("libasan.so", "libstdc++.so")

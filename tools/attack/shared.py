@@ -1,4 +1,4 @@
-"""Processes that share a folder or a name, and others that meddle with their files.
+"""Run processes that share a folder or a file name, and disturb their files.
 
     python -m tools.attack shared --pairs 40 --eights 10 --meddled 10 --ended 8
 
@@ -35,36 +35,36 @@ from tools.processes import Child, Ended, ready
 SESSION = ("session", "--rate", "25", "--target", "quick", "--yes", "--no-write")
 RECORD = ("record", "--seconds", "2")
 RECORDED = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
-# starts lie apart by up to this [s]
+# largest time between two starts [s]
 APART_S = 0.02
 # A process that waits for others on a busy computer does not hang; one that computes ends by its processor time.
 ENDS_S = 900.0
-# the time in which a command has all its processes, and that after which none may be left [s]
+# time in which a command starts all its processes, and time after which none may be left [s]
 LONGEST_START_S, LEFT_S = 4.0, 10.0
-# a kind of trial, and what was not as it ought to be; empty where all was
+# called with the kind of a trial, and what was wrong; empty if nothing was
 Tell = Callable[[str, str], None]
 
 
 @contextmanager
 def folder() -> Iterator[Path]:
-    """Yield an empty folder, beside which there is room for what is said."""
+    """Yield an empty folder, with room beside it for the output of the processes."""
     with TemporaryDirectory() as place:
         (here := Path(place) / "here").mkdir()
         yield here
 
 
 def begin(words: Sequence[str], here: Path, number: int = 0) -> Child:
-    """Fork a command that waits until it is let go."""
+    """Fork a command that waits until Child.go."""
     return Child(partial(run, list(words)), here, here.parent / f"said-{number}")
 
 
 def odd_end(done: Ended, codes: Sequence[int] = (0, 3, 5)) -> str:
-    """Return what no command may do, in a sentence."""
+    """Return the rules for any command that this one broke, in a sentence; empty if none."""
     return "; ".join(done.wrong(codes))
 
 
 def wrong(ends: Sequence[Ended], here: Path, most: int) -> str:
-    """Return what is not as it ought to be, where so many may end well."""
+    """Return what is wrong after a race in which `most` processes may succeed; empty if nothing."""
     well = sum(done.code in (0, 5) for done in ends)
     captures = [*here.rglob("capture*.mcap"), *here.glob("record*.mcap")]
     if odd := "; ".join(filter(None, map(odd_end, ends))):
@@ -85,7 +85,7 @@ def wrong(ends: Sequence[Ended], here: Path, most: int) -> str:
 
 
 def races(numbers: Iterable[int], of: int, draw: random.Random, tell: Tell) -> None:
-    """Run so many races of so many processes, which begin together, or nearly so."""
+    """Run races of `of` processes, which begin at nearly the same time."""
     for _ in numbers:
         seeds = [draw.randrange(1 << 20) for _ in range(of)]
         named = [(*SESSION, "--bus", f"sim:seed={seed}") for seed in seeds]
@@ -103,7 +103,7 @@ def races(numbers: Iterable[int], of: int, draw: random.Random, tell: Tell) -> N
 
 
 def meddle(numbers: Iterable[int], draw: random.Random, tell: Tell) -> None:
-    """Run so many sessions whose files another program touches."""
+    """Run sessions whose files another program changes."""
     for number in numbers:
         kind = ("rename", "cut", "remove", "replace", "swap")[number % 5]
         with folder() as here:
@@ -144,11 +144,11 @@ def _after_meddling(kind: str, done: Ended, here: Path) -> str:
 
 
 def end(numbers: Iterable[int], draw: random.Random, tell: Tell) -> None:
-    """Run so many commands with processes of their own, ended by a signal."""
+    """Run commands that start processes, and end each by a signal."""
     for number in numbers:
         kind = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)[number // 2 % 4]
         what, words = (
-            # one with a page outlives its terminal
+            # a session with a page outlives its terminal
             ("session", (*SESSION, "--bus", "sim:pace=real", *(["--page"] if kind != signal.SIGHUP else []))),
             ("batch", ("batch", str(RECORDED), "-o", "fleet", "--workers", "2")),
         )[number % 2]
@@ -169,7 +169,7 @@ def end(numbers: Iterable[int], draw: random.Random, tell: Tell) -> None:
 
 
 def _of_session(leader: int) -> list[int]:
-    """Return the processes that are left of those that `leader` began, by proc(5)."""
+    """Return the ids of the processes in the session of `leader` that still run, by proc(5)."""
     found = []
     for stat_file in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):
@@ -180,7 +180,7 @@ def _of_session(leader: int) -> list[int]:
 
 
 def main() -> int:
-    """Run what was asked for; 1 where something was not as it ought to be."""
+    """Run the trials; return 1 if something was wrong."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in (("--pairs", 10), ("--eights", 2), ("--meddled", 10), ("--ended", 0), ("--seed", 1)):
         parser.add_argument(name, type=int, default=default)

@@ -56,7 +56,7 @@ ERRORS = {
     "l": (errno.EIO, errno.EACCES),
     "a": (errno.ENOMEM, errno.EACCES),
 }
-# of files that are made anew with the time in them: a check counts how old a calibration is
+# times in files, which differ between runs; a check counts the age of a calibration
 DATE = re.compile(
     rb'"digest": "[\w:]+"|(?<=[.]\d{4})\d+|'
     rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?([.]\d+)?([+-]\d\d:\d\d|Z| UTC)?"
@@ -64,7 +64,7 @@ DATE = re.compile(
 TEMPORARY = re.compile(r"(^|/)[.](.+)[.]\w{8}$")
 CAPTURES = (".mcap",)
 COPY = "bridge/"
-# some of whose loops use a buffer that they did not get
+# library with loops that use a buffer although its allocation failed
 NUMPY = "_multiarray_umath"
 DRAWS, LEAST_BYTES = 3, 4096
 Files = Mapping[str, bytes]
@@ -76,10 +76,10 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def either(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Whole:
-    """Return a test: a file is as before, or as the command makes it, at first or after a write-back.
+def is_old_or_new(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Whole:
+    """Return a test of a file: True if it is as before, or as the command writes it, at first or after a write-back.
 
-    A temporary file, and a note of a write, is no result.
+    Temporary files and notes of writes do not count.
     """
 
     def whole(name: str, data: bytes) -> bool:
@@ -88,13 +88,13 @@ def either(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Who
         if name not in new:
             return False
         if name.startswith(COPY):
-            # what mpucal brings along can be had again
+            # a copy of a file of mpucal can be made again
             return True
         if name.endswith(CAPTURES):
-            # what is not closed yet is read as far as it goes, or refused in a sentence
+            # an unfinished capture is read as far as possible, or refused with a sentence
             return True
         if name.endswith(".html"):
-            # it tells the minute
+            # a report contains the time
             return data.rstrip().endswith(b"</html>")
         if name.endswith(".bin"):
             return bool(Blob.decode(data))
@@ -103,8 +103,8 @@ def either(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Who
     return whole
 
 
-def spoilt(found: Files, whole: Whole) -> Iterator[str]:
-    """Yield those that are neither old nor new."""
+def damaged_files(found: Files, whole: Whole) -> Iterator[str]:
+    """Yield the names of the files that are neither old nor new."""
     for name, data in found.items():
         try:
             fit = whole(name, data)
@@ -114,8 +114,8 @@ def spoilt(found: Files, whole: Whole) -> Iterator[str]:
             yield name
 
 
-def noted(found: Files) -> bool:
-    """Return True if a note of a write is there that can be read."""
+def has_write_note(found: Files) -> bool:
+    """Return True if there is a readable note of a write."""
     return any(
         "old" in (said := json.loads(data)) or "registers" in said
         for name, data in found.items()
@@ -124,7 +124,7 @@ def noted(found: Files) -> bool:
 
 
 class Trial:
-    """A command on copies of `start`."""
+    """Trial of a command on copies of the folder `start`."""
 
     def __init__(self, name: str, start: Path) -> None:
         self._words, self._start, self._here = WORDS[name], start, start.parent / "here"
@@ -140,10 +140,10 @@ class Trial:
         disk = Disk(self.old)
         for call in self.calls:
             disk.call(call)
-        self.whole = either(self.old, self.new, disk.placed)
+        self.whole = is_old_or_new(self.old, self.new, disk.placed)
 
     def failed(self, failing: Failing) -> tuple[str, list[str]]:
-        """Run the command where this fails, and return how it ends and what was wrong."""
+        """Run the command with this failure; return its exit in words, and what was wrong."""
         self._anew()
         done = run_failing(self._words, self._here, failing)
         if (done.crashed or "").startswith(NUMPY):
@@ -152,17 +152,17 @@ class Trial:
 
     def _wrong(self, done: Failed, now: Files, call: int) -> Iterator[str]:
         yield from (f"{each} {done.crashed or ''}" for each in done.wrong())
-        # an old report beside a new calibration would be another's
+        # an old report beside a new calibration would be wrong
         yield from (f"{name} is gone" for name in self.old.keys() - now.keys() if not name.endswith("report.html"))
-        yield from (f"{name} is neither old nor new" for name in spoilt(now, self.whole))
+        yield from (f"{name} is neither old nor new" for name in damaged_files(now, self.whole))
         if done.code == 0:
             yield from (f"exit 0 without {name}" for name in self.new.keys() - now.keys())
-        told = noted(now) or "restore the old state" in done.last
+        told = has_write_note(now) or "restore the old state" in done.last
         if told != (done.changed and done.code != 0):
             yield f"exit {done.code}, device {'changed' if done.changed else 'as before'}, told: {told}"
         for name in (name for name in self.new.keys() - self.old.keys() if name.endswith(CAPTURES)):
             written = [i for i, each in enumerate(self.calls, 1) if each.op == "w" and each.path == name]
-            # of which the first holds the head
+            # the first write is the header
             if name in now if done.code == 0 else written[1] < call:
                 try:
                     load(self._here / name)
@@ -180,15 +180,15 @@ class Trial:
             for share in (0.0, 1.0, *(rng.random() for _ in range(DRAWS))) if i in looked else ():
                 left = disk.cut(rng, share)
                 cuts += 1
-                bad = [f"{name} is neither old nor new" for name in spoilt(left, self.whole)]
+                bad = [f"{name} is neither old nor new" for name in damaged_files(left, self.whole)]
                 bad += [
                     f"{name} was synced, and is gone"
                     for name in disk.synced
                     if name.endswith(CAPTURES) and name not in left
                 ]
-                if state and state not in (states[0], states[-1]) and not noted(left):
+                if state and state not in (states[0], states[-1]) and not has_write_note(left):
                     bad.append("the device is neither old nor new, and nothing says so")
-                if i == len(self.log) - 1 and noted(left):
+                if i == len(self.log) - 1 and has_write_note(left):
                     bad.append("all is done, and the next write will undo it")
                 wrong += [f"power cut after {i} ({call.op} {call.path}): {each}" for each in bad]
         return cuts, wrong
@@ -247,7 +247,7 @@ def tried(name: str, start: Path, asked: argparse.Namespace) -> Iterator[str]:
 
 
 def main() -> int:
-    """Run them; the exit code."""
+    """Run the trials; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("commands", nargs="*", metavar="COMMAND", help=f"some of: {', '.join(WORDS)}; default: all")
     parser.add_argument("--each", action="store_true", help="fail every call, and cut the power after each")
@@ -269,7 +269,7 @@ def main() -> int:
 
 
 def preloaded() -> int:
-    """Run this program again with the shim."""
+    """Run this program again with syscalls.c preloaded."""
     with TemporaryDirectory() as place:
         library = Path(place) / "syscalls.so"
         subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-o", library, SHIM, "-ldl"], check=True)

@@ -1,4 +1,4 @@
-"""The commands of syscalls.py, run in a child of the shim's, and the state of their simulated device."""
+"""The commands of syscalls.py, run in child processes with syscalls.c preloaded, and their simulated devices."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ WORDS = {
     "noise": ["noise", "in.npz", "-o", "board"],
     "firmware": ["firmware", "-o", "bridge"],
 }
-# exit codes of crashes are above, and on top of their stack the shim, and what was called
+# exit codes of crashes are above SIGNAL; libraries on top of the stack of a crash that did not cause it
 SIGNAL, OUTER = 128, re.compile(r"syscalls[.]so|libc[.]so|libpython|bin/python")
-# notes of writes, below the folder
+# folder of the notes of writes
 STATE = ".state"
 
 
 @dataclass(frozen=True)
 class Failing:
-    """A failure that is to happen in a run.
+    """Failure to be caused in a run.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Failed(Ended):
 
     Attributes
     ----------
-    allocations : so many counted. changed : its device holds something else than before the write.
+    allocations : number of counted ones. changed : the content of its device differs from that before the write.
     """
 
     allocations: int = 0
@@ -85,7 +85,7 @@ class Failed(Ended):
 
     @property
     def crashed(self) -> str | None:
-        """Return the library that crashed, or called what did."""
+        """Return the library that crashed, or whose call crashed."""
         libraries = re.findall(r"^(\S+)\(", self.said, re.MULTILINE) if (self.code or 0) > SIGNAL else []
         return next((Path(each).name for each in libraries if not OUTER.search(each)), None)
 
@@ -95,7 +95,7 @@ class Devices:
 
     Attributes
     ----------
-    before : what they held as a sink was opened; None: none was.
+    before : their content when a sink was opened; None: none was opened.
     """
 
     def __init__(self) -> None:
@@ -104,7 +104,7 @@ class Devices:
         self.before: str | None = None
 
     def state(self) -> str:
-        """Return what is to last of them: offset registers, parameters that correct samples."""
+        """Return their lasting content: offset registers, and parameters that correct samples."""
         words = [bytes(chip._registers[place[0] : place[2] + 2]).hex() for chip in self._chips for place in PLACES]
         return " ".join(
             [*words, *(f"{name}={store[name]}" for store in self._stores for name in store if CORRECTION.search(name))]
@@ -112,7 +112,7 @@ class Devices:
 
     @contextmanager
     def watched(self, shim: Any) -> Iterator[None]:
-        """Log each change of the state since a sink was opened."""
+        """Log each change of the state after a sink was opened."""
 
         def opening(*words: str) -> Journal:
             self.before = self.state()
@@ -140,7 +140,7 @@ class Devices:
 
 
 def run_failing(words: Sequence[str], folder: Path, failing: Failing = Failing()) -> Failed:
-    """Run a command in `folder`, where this fails."""
+    """Run a command in `folder` with this failure."""
     hear, tell = os.pipe()
     done = Child(partial(_armed, words, folder, failing, tell), folder, folder.parent / "said").go().wait()
     os.close(tell)
@@ -167,7 +167,7 @@ def _armed(words: Sequence[str], folder: Path, failing: Failing, tell: int) -> i
 
 @contextmanager
 def prepared() -> Iterator[Path]:
-    """Yield a folder with what the commands read, and an older result; all of mpucal is loaded, for the children."""
+    """Yield a folder with the inputs of the commands and an older result; load all of mpucal before the children."""
     ready()
     with TemporaryDirectory() as temporary:
         place = Path(temporary).resolve()

@@ -1,1 +1,1 @@
-"""Time and memory: how long things take, in one run beside what they are compared with."""
+"""Time and memory: measurements, each in one run with what it is compared with."""

@@ -33,7 +33,7 @@ B_A = np.array([0.31, -0.22, 1.08])
 
 
 def write_samples(path: Path, count: int) -> None:
-    """Write a recording of that many samples, a run at a time."""
+    """Write a recording of `count` samples, a run at a time."""
     rng = np.random.default_rng(1)
     acc, gyr, no = rng.normal(0.0, 5.0, (ROWS, 3)), rng.normal(0.0, 1.0, (ROWS, 3)), np.zeros(ROWS, bool)
     with open_writer(path, Rows(iter(())), "") as write:
@@ -45,7 +45,7 @@ def write_samples(path: Path, count: int) -> None:
 
 
 def write_capture(path: Path, count: int) -> None:
-    """Write a capture of at least that many samples: those of a stored session, again and again."""
+    """Write a capture of at least `count` samples: those of a stored session, repeated."""
     capture = read_capture(SESSION)
     accesses = [record for record in capture.records if isinstance(record, Transaction)]
     begin = next(i for i, access in enumerate(accesses) if access.register == reg.FIFO_R_W) - 1
@@ -62,7 +62,7 @@ def write_capture(path: Path, count: int) -> None:
 
 
 def in_memory(count: int) -> float:
-    """Return the samples the processor's second of the formula alone, on arrays that are there."""
+    """Return how many samples a second of processor time calibrates by the formula alone, on arrays in memory."""
     rng = np.random.default_rng(1)
     acc, gyr = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
     gain, K, b_omega = np.linalg.inv(D), np.eye(3), np.zeros(3)
@@ -72,7 +72,7 @@ def in_memory(count: int) -> float:
 
 
 def copied(source: Path) -> float:
-    """Return the megabytes a second of a plain copy on the same disk, flushed."""
+    """Return the speed [MB/s] of a plain copy on the same disk, flushed."""
     with used() as time:
         subprocess.run(["dd", f"if={source}", f"of={source}.copy", "bs=4M", "conv=fsync", "status=none"], check=True)
     Path(f"{source}.copy").unlink()
@@ -80,7 +80,7 @@ def copied(source: Path) -> float:
 
 
 def main() -> None:
-    """Measure what the options name."""
+    """Measure the conversions of the options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--gigabytes", type=float, default=1.0)
     kinds = [".npz", ".csv", ".mcap"]

@@ -39,7 +39,7 @@ SESSIONS = Path(__file__).parents[2] / "fixtures" / "sessions"
 
 
 def write_captures(folder: Path, count: int, stored: Sequence[Path]) -> list[str]:
-    """Write that many captures, of which each hundred has one that is cut and one that is junk."""
+    """Write `count` captures; in each hundred, one is cut and one is junk."""
     captures, rng = [read_capture(path) for path in stored], np.random.default_rng(1)
     paths = []
     for i in range(count):
@@ -64,17 +64,17 @@ def write_captures(folder: Path, count: int, stored: Sequence[Path]) -> list[str
 
 
 def cost(time: Used, rows: int) -> str:
-    """Return the cost of so many rows in words."""
+    """Return the cost of `rows` rows in words."""
     program_ms, workers_ms = (1e3 * x / rows for x in (time.cpu_s, time.children_s))
     of = f"of a processor a row: program and scheduler {program_ms:.2f} ms, workers {workers_ms:.2f} ms"
     return f"{rows / time.wall_s:.2f} rows/s; {of}"
 
 
 def timed(paths: list[str], workers: int, journal: RowJournal, settings: Settings, until: int | None = None) -> Used:
-    """Run a batch on workers of its own; `until` : one is killed after half of so many rows, and all after them."""
+    """Run a batch on workers of its own; `until` : kill a worker after half of this number of rows, and all at it."""
     with local_client(workers) as client:
         client.wait_for_workers(workers)
-        # what a worker imports with its first row
+        # loads the imports of a first row
         client.run(make_row, str(SESSIONS / "mpu6050.mcap"), settings)
         processes = list(client.run(_process).values())
         children = psutil.Process().children(recursive=True)
@@ -107,7 +107,7 @@ def measured(folder: Path, paths: list[str], workers: int, settings: Settings, k
 
 
 def main() -> None:
-    """Measure what the options name."""
+    """Measure the batches of the options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--captures", type=int, default=100)
     parser.add_argument("--of", type=Path, nargs="+", default=sorted(SESSIONS.glob("mpu6[05]*.mcap")), help="captures")

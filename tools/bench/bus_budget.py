@@ -64,33 +64,33 @@ class NumberedFeed:
 
 
 class JitterClock(FastClock):
-    """A host that wakes up to `late_s` too late, each time by chance."""
+    """Clock of a host that wakes up to `late_s` too late, at random."""
 
     def __init__(self, late_s: float, seed: int = 0) -> None:
         super().__init__()
         self._late_ns, self._rng = late_s * 1e9, np.random.default_rng(seed)
 
     def sleep_until(self, t_ns: int) -> None:
-        """Go on to `t_ns`, and by chance further."""
+        """Advance to `t_ns` and a random time further."""
         super().sleep_until(t_ns + int(self._rng.uniform(0, self._late_ns)))
 
 
-class Kept(list[Transaction]):
-    """Keeps what crosses the bus."""
+class TransactionList(list[Transaction]):
+    """List of the transactions on a bus."""
 
     def transaction(self, transaction: Transaction) -> None:
-        """Keep one more."""
+        """Append a transaction."""
         self.append(transaction)
 
 
 def share(transactions: Sequence[Transaction]) -> float:
-    """Return the share of an I2C bus, from the first of them to the last."""
+    """Return the share of the I2C bus's time that the transactions take."""
     bits = sum((READ_BITS if t.op == "read" else WRITE_BITS) + BYTE_BITS * t.count for t in transactions)
     return bits / BUS_HZ / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
 
 
 def spi_share(transactions: Sequence[Transaction]) -> float:
-    """Return the share of an SPI bus, as mpucal/sources/spi.py moves them."""
+    """Return the share of the SPI bus's time that the transactions take, at the clocks of mpucal/sources/spi.py."""
     busy_s = sum(8 * (t.count + 1) / (MPU6500.spi_data_hz if t.register in DATA else REGISTER_HZ) for t in transactions)
     return busy_s / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
 
@@ -104,16 +104,16 @@ def run(
     seed: int = 0,
     share: Callable[[Sequence[Transaction]], float] = share,
 ) -> tuple[Recording, float, float]:
-    """Return what was recorded on a host that is late, the share of the bus, and processor seconds a second."""
-    kept = Kept()
+    """Return the recording on a late host, the share of the bus, and the share of a processor."""
+    kept = TransactionList()
     bus = SimulatedBus(Chip(MODELS[model], NumberedFeed(), ppm, FactoryTrim()), JitterClock(late_s, seed))
     driver = Driver(Tap(bus, kept), Config(rate_hz=rate_hz))
     processor = polled(driver, seconds, kept)
     return driver.recording(), share(kept), processor
 
 
-def polled(driver: Driver, seconds: float, kept: Kept) -> float:
-    """Poll for so long from the start on, and return processor seconds a second."""
+def polled(driver: Driver, seconds: float, kept: TransactionList) -> float:
+    """Poll for `seconds`, and return the share of a processor."""
     driver.start()
     kept.clear()
     until_ns = driver.now_ns() + seconds * 1e9
@@ -123,8 +123,8 @@ def polled(driver: Driver, seconds: float, kept: Kept) -> float:
     return found.cpu_s / seconds
 
 
-class Wired:
-    """A part of spidev.SpiDev, as much as SpiBus uses, with an MPU-6500 behind it that lives in real time."""
+class SimulatedSpiDev:
+    """Stand-in for spidev.SpiDev, as far as SpiBus uses it, with a simulated MPU-6500 in real time."""
 
     def __init__(self) -> None:
         self._chip = SimulatedBus(Chip(MODELS["mpu6500"], NumberedFeed(), 0.0, FactoryTrim()), RealClock())
@@ -141,10 +141,10 @@ class Wired:
 
 
 def spi_processor(rate_hz: float, seconds: float) -> float:
-    """Return processor seconds a second of reading over SPI in real time; the simulated chip is in it, no wires are."""
+    """Return the share of a processor of reading over SPI in real time, with the simulation of the chip."""
     sys.modules["spidev"] = library = ModuleType("spidev")
-    library.SpiDev = Wired  # type: ignore[attr-defined]
-    kept = Kept()
+    library.SpiDev = SimulatedSpiDev  # type: ignore[attr-defined]
+    kept = TransactionList()
     return polled(Driver(Tap(SpiBus("simulated"), kept), Config(rate_hz=rate_hz)), seconds, kept)
 
 
@@ -166,7 +166,7 @@ def rate_error_ppm(rate_hz: float, seconds: float, seeds: int) -> float:
 
 
 def main() -> None:
-    """Print it all."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("capture", type=Path, nargs="?", help="count its transactions instead")
     parser.add_argument("--seconds", type=float, default=3600.0, help="how long the long run takes, of simulated time")

@@ -3,8 +3,8 @@
     python -m tools.bench link_load                 # 333 Hz, the most that ArduPilot gives, for 20 s
     python -m tools.bench link_load --rate 100
 
-What is counted is this process alone, whose thread listens, decodes, records and hands out samples as a session does;
-the vehicle is tools/lab/sim_vehicle.py.
+Only this process counts; it receives, decodes, records and hands out samples as a session does. The vehicle is
+tools/lab/sim_vehicle.py.
 """
 
 from __future__ import annotations

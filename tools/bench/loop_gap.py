@@ -1,12 +1,12 @@
-"""The reading loop's worst gap while fits run beside it, and what of a core a live session takes.
+"""Longest gap of the reading loop while fits run, and the share of a core that a live session takes.
 
 python -m tools.bench loop_gap --rate 1000 --seconds 70
 python -m tools.bench loop_gap --rate 200 --seconds 70
 
-A session on the simulated chip at a person's pace, recorded into a capture: the gap is the time between two looks into
-the FIFO, which at 1 kHz overflows 36 ms after it was emptied. Compared are a session without fits, with fits in the
-loop, with fits in a process of their own, as a session has them, and that with a page which one client reads, and
-another one has stopped reading. The simulation itself takes a part of the time.
+A session on the simulated chip at a person's pace, recorded into a capture: the gap is the time between reads of
+FIFO_COUNT; at 1 kHz the FIFO overflows 36 ms after it was emptied. The program compares sessions without fits, with
+fits in the loop, with fits in a process of their own (as in a real session), and this with a page that one client reads
+and another one has stopped reading. The simulation takes part of the time.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ FIFO_FRAMES = 512 // reg.FRAME_BYTES
 Hire = Callable[[Plan, Sensor], Worker]
 
 
-class Idle:
-    """Answers nothing, at once."""
+class IdleWorker:
+    """Worker that does not compute: each answer is empty, at once."""
 
     def __init__(self, _plan: Plan, _sensor: Sensor) -> None: ...
 
@@ -67,7 +67,7 @@ class Idle:
 
 
 HIRED: dict[str, tuple[Hire, bool]] = {
-    "without fits": (Idle, False),
+    "without fits": (IdleWorker, False),
     "with fits in the loop": (InlineWorker, False),
     "with fits apart": (ProcessWorker, False),
     "with fits apart, and a page": (ProcessWorker, True),
@@ -75,8 +75,8 @@ HIRED: dict[str, tuple[Hire, bool]] = {
 READS = "import sys, urllib.request; urllib.request.urlopen(sys.argv[1] + 'events').read()"
 
 
-class Timed:
-    """A bus that notes when the FIFO is looked at, and ends after some seconds."""
+class TimedBus:
+    """Bus that notes the times of reads of FIFO_COUNT, and ends after some seconds."""
 
     def __init__(self, bus: Bus, seconds: float) -> None:
         self._bus, self._end_ns = bus, time.monotonic_ns() + round(seconds * 1e9)
@@ -92,15 +92,15 @@ class Timed:
         return self._bus.read(register, count)
 
 
-class Nobody:
-    """A person who presses nothing; at the first prompt, when the chip is set up, the looks begin to be counted."""
+class SilentOperator:
+    """Operator who presses nothing; the count of reads begins at the first prompt, when the chip is configured."""
 
-    def __init__(self, bus: Timed, feed: Feed | None) -> None:
-        self._bus: Timed | None = bus
+    def __init__(self, bus: TimedBus, feed: Feed | None) -> None:
+        self._bus: TimedBus | None = bus
         self._feed = feed
 
     def hear(self, output: Output) -> None:
-        """Begin to count; a page is told everything."""
+        """Begin to count at the first output; pass all outputs to the page."""
         if self._feed is not None:
             self._feed.hear(output)
         if self._bus is not None:
@@ -114,7 +114,7 @@ class Nobody:
 
 @contextmanager
 def followed(page: bool) -> Iterator[Feed | None]:
-    """Yield a page with its two clients, if there is to be one."""
+    """Yield a page with two clients if `page` is given, else None."""
     if not page:
         yield None
         return
@@ -132,9 +132,9 @@ def followed(page: bool) -> Iterator[Feed | None]:
 
 
 def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> tuple[Vector, float]:
-    """Run a session for so long; return the gaps (n,) between looks [ms], and the share of a core that was used."""
+    """Run a session; return the gaps (n,) between reads [ms], and the share of a core that was used."""
     chip = open_simulated("sim:pace=real", seed=1)
-    bus = Timed(chip, seconds)
+    bus = TimedBus(chip, seconds)
     plan = Plan(Config(rate_hz=rate_hz), target="best")
     with (
         followed(page) as feed,
@@ -143,14 +143,14 @@ def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> t
     ):
         writer.start({})
         driver = Driver(Tap(bus, writer), plan.config)
-        runner = Runner(driver, Nobody(bus, feed), writer.event, plan, (chip.hear,), start_worker=start_worker)
+        runner = Runner(driver, SilentOperator(bus, feed), writer.event, plan, (chip.hear,), start_worker=start_worker)
         with used(ended_children_s) as found:
             runner.measure()
     return np.diff(bus.looks_ns) * 1e-6, (found.cpu_s + found.children_s) / found.wall_s
 
 
 def main() -> None:
-    """Measure all of them."""
+    """Measure each arrangement."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rate", type=float, default=1000.0)
     parser.add_argument("--seconds", type=float, default=70.0)

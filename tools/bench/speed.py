@@ -33,9 +33,9 @@ from tools.lab.table import plain_table, show
 from .timing import ended_children_s, median_s, peak_bytes
 
 FLAT_S, TURNS = 10.0, 3
-# long enough for a loop's start not to count, and what the twins do in a second
+# long enough that the start of a loop does not count, and what the NumPy twins do in a second
 KERNEL_STEPS, TWIN_STEPS = 10_000, 300
-# a millisecond or two each: so many that a burst of other work does not make the median
+# runs of a millisecond or two: many, so that a burst of other work does not affect the median
 MORE_OF_A_KERNEL = 15
 GROWTH = (1_000, 10_000, 100_000, 1_000_000)
 HELP = "from mpucal.__main__ import run; run(['--help']); import sys; sys.stderr.write(str('numpy' in sys.modules))"
@@ -76,14 +76,14 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
 
 
 def problem_of(recording: Recording) -> tuple[Problem, Theta]:
-    """Return what the filters run over, and where an estimate begins."""
+    """Return the problem of the filters, and the initial estimate."""
     flat = flat_statistics(recording, recording.flat)
     problem = Problem(Series.after(recording, flat), flat, GRAVITY_MPS2)
     return problem, initialise(problem, flat.b_omega)
 
 
 def as_hand(problem: Problem) -> Problem:
-    """Return the problem for the hand's filter, with everything that it may be given."""
+    """Return the problem for the hand's filter, with all optional inputs."""
     series = problem.series
     n = len(series)
     alpha = np.gradient(series.omega, axis=0) / series.dt[:, None]

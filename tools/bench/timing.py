@@ -20,7 +20,7 @@ from tools.processes import Ended, ended
 
 @dataclass
 class Used:
-    """Time that was used: s by the clock, s of processors by this process, and by its children."""
+    """Time that a block used [s]: wall time, processor time of this process, and of its children."""
 
     wall_s: float = 0.0
     cpu_s: float = 0.0
@@ -29,7 +29,7 @@ class Used:
 
 @contextmanager
 def used(children_s: Callable[[], float] = lambda: 0.0) -> Iterator[Used]:
-    """Yield what is used meanwhile, known at the end; `children_s` returns what children have used so far."""
+    """Yield the time that the block uses, set at its end; `children_s` returns the time of the children so far [s]."""
     found, begun, cpu_s, of_children_s = Used(), time.perf_counter(), time.process_time(), children_s()
     try:
         yield found

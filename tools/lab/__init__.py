@@ -1,1 +1,1 @@
-"""Trials: simulated or recorded sensors, calibrated and judged against what is known of them."""
+"""Trials: simulated or recorded sensors, calibrated and compared with their truth."""

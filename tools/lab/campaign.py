@@ -35,29 +35,29 @@ from tools.processes import Child, Died, Ended, Task, Tell, become, ended, forke
 
 from .campaign_judge import FOLDER, Outcome, judged, show_outcomes
 from .campaign_recordings import struck_recordings
-from .campaign_worlds import BRIDGE, CHIP, KINDS, VEHICLE, Blow, World
+from .campaign_worlds import BRIDGE, CHIP, KINDS, VEHICLE, TimedFault, World
 
 CASES = 16
-# a session that aims at less ends sooner: how often each, and until when faults begin
+# targets of sessions: how often each comes, and the last time [s] at which faults begin; a lower target ends sooner
 TARGETS = (*("quick",) * 7, "normal")
 LAST_S = {"quick": 50.0, "normal": 66.0}
 CHIPS = ("mpu6050", "mpu6500", "clone98")
 HANDS = (*("guided",) * 6, "wandering", "placing", "random")
 RATES = (50, 25, 100, 25)
 FIRMWARES = ("ardupilot", "px4")
-# a report is made for one of so many
+# one session in this many makes a report
 REPORTS = 8
-# once for every so many of the chip alone, which costs least
+# the chip alone is cheapest, and comes most often
 WORLDS = (*(CHIP,) * 15, BRIDGE, VEHICLE)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A struck session: `number` of its prefix, `k` of the case, and its faults, the earliest first."""
+    """Session with faults: `number` of its prefix, `k` of the case, and the faults, the earliest first."""
 
     number: int
     k: int
-    blows: tuple[Blow, ...] = ()
+    blows: tuple[TimedFault, ...] = ()
 
     @property
     def name(self) -> str:
@@ -80,7 +80,7 @@ def drawn(number: int, k: int) -> Case:
     rng = np.random.default_rng([number, k])
     names = rng.choice(KINDS[world_of(number)], rng.integers(1, 5)).tolist()
     last_s = LAST_S[target_of(number)]
-    blows = [Blow(name, round(float(rng.uniform(0.0, last_s)), 2), int(rng.integers(1 << 31))) for name in names]
+    blows = [TimedFault(name, round(float(rng.uniform(0.0, last_s)), 2), int(rng.integers(1 << 31))) for name in names]
     return Case(number, k, tuple(sorted(blows, key=lambda blow: blow.at_s)))
 
 
@@ -97,7 +97,7 @@ def words(number: int) -> list[str]:
 
 
 class Prefix:
-    """A session without faults, and the struck ones that leave it."""
+    """Session without faults, from which sessions with faults are forked."""
 
     def __init__(self, number: int, cases: Sequence[Case], place: Path, keep: bool) -> None:
         self._number, self._place, self._keep = number, place, keep
@@ -107,7 +107,7 @@ class Prefix:
             self._world.moments.add(case.blows[0].at_s, partial(self._leave, case))
 
     def run(self, tell: Tell) -> None:
-        """Run the session to its end, and this process too; `tell` hears of each case."""
+        """Run the session to its end and end this process; pass the outcome of each case to `tell`."""
         self._tell = tell
         here = self._place / "prefix"
         here.mkdir(parents=True)
@@ -136,7 +136,7 @@ class Prefix:
                 results.report = lambda _: None
             self._move(place)
             self._world.moments.due.clear()
-            self._world.suffer(case.blows)
+            self._world.begin_faults(case.blows)
             return
         self._judge(case, place, ended(pid, place / "err"))
         if not self._keep:
@@ -145,7 +145,7 @@ class Prefix:
     def _judge(self, case: Case, place: Path, done: Ended) -> None:
         outcome = judged(case.name, place, done, case.blows, self._world)
         if case.blows and outcome.recorded and done.code not in (0, 5):
-            # what is left of a session that did not end well is a recording, or no recording
+            # a session that failed leaves a recording or nothing
             (place / "after").mkdir()
             again = partial(run, ["calibrate", FOLDER, "-o", "after/board"])
             after = Child(again, place, place / "after" / "err").go().wait()
@@ -154,7 +154,7 @@ class Prefix:
         self._tell(outcome)
 
     def _move(self, place: Path) -> None:
-        """Have everything that the session has open go on in `place`."""
+        """Move all files that the session has open to `place`."""
         shutil.copytree(Path.cwd(), place)
         here = f"{Path.cwd()}/"
         for link in Path("/proc/self/fd").iterdir():
@@ -171,14 +171,14 @@ class Prefix:
 
 
 def sessions(prefixes: Sequence[tuple[int, Sequence[Case]]], jobs: int, place: Path, keep: bool) -> Iterator[Outcome]:
-    """Yield the outcomes, as they come."""
+    """Yield the outcomes in the order in which they end."""
     tasks: list[Task] = [Prefix(number, cases, place / str(number), keep).run for number, cases in prefixes]
     for _, told in forked(tasks, jobs):
         yield Outcome("?", "?", wrong=(f"a prefix ended with {told}",)) if isinstance(told, Died) else told
 
 
 def outcomes(asked: argparse.Namespace, place: Path) -> Iterator[Outcome]:
-    """Yield the outcomes of what was asked for."""
+    """Yield the outcomes of the sessions and recordings of the options."""
     if asked.case and not asked.case.startswith("r"):
         number, k = map(int, asked.case.split("."))
         yield from sessions([(number, [drawn(number, k)])], 1, place, bool(asked.keep))
@@ -193,7 +193,7 @@ def outcomes(asked: argparse.Namespace, place: Path) -> Iterator[Outcome]:
 
 
 def main() -> int:
-    """Run them; the exit code."""
+    """Run the campaign; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=0)
     parser.add_argument("--recordings", type=int, default=0)

@@ -1,4 +1,4 @@
-"""The judge of struck sessions and recordings, against the truth of their sensor; and the table of them all."""
+"""Judgement of sessions and recordings with faults, against the truth of their sensor, and the table of all."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FOLDER = "board"
 
 @dataclass(frozen=True)
 class Outcome:
-    """A session or recording that was struck, and judged.
+    """Outcome of a session or recording with faults.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Outcome:
     recorded: bool = False
 
     def __str__(self) -> str:
-        """Return it in a few lines, with the command that repeats it where it was wrong."""
+        """Return the outcome in a few lines, with the command that repeats it if it was wrong."""
         lines = [f"{self.world} {' '.join(self.blows) or 'no fault'}: exit {self.code} {self.verdict}"]
         lines.append(f"    error {self.error} m/s^2, {self.claims} claims, an element {self.z} off; {self.said}")
         again = f"python -m tools.lab campaign --case {self.case} --keep /tmp/struck"
@@ -60,7 +60,7 @@ class Outcome:
 def judged(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any) -> Outcome:
     """Judge a session that ran in `place` and left its files in `board`."""
     names, folder = {str(blow).partition("@")[0] for blow in blows}, place / FOLDER
-    # one that was killed, or whose stderr was full, says nothing
+    # a killed process, or one whose stderr was full, prints nothing
     killed = (-9,) if "killed" in names else ()
     silent = (*CODES, *killed) if "deaf" in names else (0, 5, *killed)
     document = folder / "calibration.json"
@@ -86,12 +86,12 @@ def judged(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any
 
 
 def false(judgement: Judgement) -> list[str]:
-    """Return what a calibration promises and does not hold."""
+    """Return the verdict as a fault if the error is larger than it allows; empty if not."""
     return [f"called {judgement.verdict}"] if judgement.false else []
 
 
 def _unfit(code: int | None, document: Path, names: set[str]) -> list[str]:
-    """Return what the files say that the exit code does not."""
+    """Return contradictions between the files and the exit code."""
     if code in WITH_RESULT and not document.exists():
         return [f"exit code {code} without calibration.json"]
     if not document.exists() or code == -9:
@@ -101,14 +101,14 @@ def _unfit(code: int | None, document: Path, names: set[str]) -> list[str]:
         return [f"exit code {code} of a refused calibration"]
     if code == 5 and not refused:
         return ["exit code 5 of a calibration that was not refused"]
-    # a report that had no room, a signal after the files
+    # a report may fail on a full disk, and a signal may come after the files
     if code in (3, 4) and not names & {"disk_full", "terminated", "interrupted"}:
         return [f"exit code {code} beside calibration.json"]
     return []
 
 
 def partial_files(folder: Path, code: int | None) -> list[str]:
-    """Return the files of a session that are not whole."""
+    """Return the files of a session that are incomplete."""
     found = []
     for path in folder.iterdir() if folder.exists() else ():
         if path.name.startswith("."):
@@ -129,7 +129,7 @@ def partial_files(folder: Path, code: int | None) -> list[str]:
 
 
 def largest(name: str) -> Column:
-    """Return a column of the largest figure of those that were not refused."""
+    """Return a column: the largest figure of the calibrations that were not refused."""
     return lambda outcomes: over(name, max)([o for o in outcomes if o.verdict in MOST_CLAIMS]) or 0.0
 
 
@@ -145,7 +145,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def show_outcomes(outcomes: Sequence[Outcome]) -> None:
-    """Print by kind of fault, alone or among others, how they ended, and the worst error of those not refused."""
+    """Print by kind of fault, alone or with others, the exits and the largest error of those that were not refused."""
     kinds: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
         for name in {blow.partition("@")[0] for blow in outcome.blows}:

@@ -33,7 +33,7 @@ SOURCES = {
     "csv": ["--bus", "sim:seed=6,chip=clone98", "--rate", "25"],
     "tlog": ["--mavlink", "sim:seed=7", "--rate", "25"],
 }
-# packet by packet, a log takes ten times as long
+# a log is decoded packet by packet, and takes ten times as long
 ORDER = (*("mcap", "npz", "csv") * 3, "tlog")
 ODD = (np.nan, np.inf, 1e300, -1e300, 5e-324, 0.0, -32768.0, 1e19)
 Rng = np.random.Generator
@@ -58,7 +58,7 @@ def cut(data: bytearray, rng: Rng) -> None:
 
 
 def hole(data: bytearray, rng: Rng) -> None:
-    """Clear a page, as if it never reached the disk."""
+    """Set a page to zeros, as if it never reached the disk."""
     at = int(rng.integers(len(data)))
     size = min(4096, len(data) - at)
     data[at : at + size] = bytes(size)
@@ -91,7 +91,7 @@ def swapped(rows: Table, rng: Rng) -> Table:
 
 
 def odd(rows: Table, rng: Rng) -> Table:
-    """Set up to 5 values to what no sensor gives."""
+    """Set up to 5 values to numbers that no sensor reads."""
     for at in rng.integers(0, len(rows), rng.integers(1, 6)):
         rows[at][rng.integers(len(rows[at]))] = rng.choice(ODD)
     return rows
@@ -114,7 +114,7 @@ def stuck(rows: Table, rng: Rng) -> Table:
 
 
 def shifted(rows: Table, rng: Rng) -> Table:
-    """Have the clock jump, in either direction."""
+    """Make the clock jump, forwards or backwards."""
     by_s = rng.normal() * 10.0 ** rng.uniform(-2, 4)
     for row in rows[rng.integers(len(rows)) :]:
         row[0] += by_s
@@ -126,7 +126,7 @@ OF_ROWS = (lost, twice, swapped, odd, spikes, stuck, shifted)
 
 
 def originals(place: Path) -> dict[str, tuple[Path, SimpleNamespace]]:
-    """Record in each format, and return the file and what is true of its sensor."""
+    """Record in each format; return the file and the truth of its sensor."""
     found = {}
     for suffix, source in SOURCES.items():
         folder = place / f"of_{suffix}"
@@ -153,7 +153,7 @@ def _written(recording: Recording, path: Path) -> Path:
 
 
 def damaged(path: Path, number: int) -> tuple[list[str], bytes]:
-    """Return the kinds of damage by its number, and the damaged file."""
+    """Return the kinds of damage that the number draws, and the damaged file."""
     rng = np.random.default_rng(number)
     kinds: list[Callable] = []
     data = bytearray(path.read_bytes())
@@ -205,7 +205,7 @@ def strike(number: int, of: dict[str, tuple[Path, SimpleNamespace]], place: Path
 
 
 def struck_recordings(first: int, count: int, jobs: int, place: Path) -> Iterator[Outcome]:
-    """Yield the outcomes, as they come; who crashes or hangs is told by number, and the others go on."""
+    """Yield the outcomes as they end; a recording that crashes or hangs is named, and the others continue."""
     of = originals(place)
     left = [range(first + j, first + count, jobs) for j in range(jobs)]
     tasks: list[Task] = [partial(work, j, left[j], of, place) for j in range(jobs)]
@@ -221,11 +221,11 @@ def struck_recordings(first: int, count: int, jobs: int, place: Path) -> Iterato
 
 
 def work(j: int, numbers: range, of: dict, place: Path, tell: Tell) -> None:
-    """Strike one recording after the other; before each, those that are left are told."""
+    """Damage and judge the recordings one by one; report before each which ones are left."""
     with suppress(ValueError):
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     for n, number in enumerate(numbers):
         tell(numbers[n:])
-        # of processor time: the machine may have other things to do
+        # limit of processor time, as the machine may be busy
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
         tell(strike(number, of, place / f"job{j}"))

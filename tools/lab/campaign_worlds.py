@@ -1,7 +1,7 @@
 """Simulated worlds that can be left at any instant: a session goes on in a forked process, where faults strike it.
 
 A world is `--bus sim`, the same chip behind the emulated bridge, or `--mavlink sim`. Whenever its time goes on,
-`Moments.reach` hears of it. There the prefix forks a child for each case whose first fault is due, and goes on itself
+`Timeline.reach` hears of it. There the prefix forks a child for each case whose first fault is due, and goes on itself
 without; the child gives the faults to chip, bus, line, vehicle or its own process.
 """
 
@@ -34,7 +34,7 @@ from mpucal.sources.bridge.bus import BridgeBus
 
 CHIP, BRIDGE, VEHICLE = "chip", "bridge", "vehicle"
 SERIAL = tuple(fault_kinds(Where.SERIAL))
-# of the process and its clock, in any world
+# faults of the process and its clock, in any world
 STEP = "step"
 PROCESS = ("killed", "terminated", "interrupted", "disk_full", "deaf")
 CLOCK = ("stopped_5s", "suspended_2min")
@@ -51,8 +51,8 @@ ROOM_BYTES, SAID_BYTES = 400_000, 20_000
 
 
 @dataclass(frozen=True)
-class Blow:
-    """A fault of KINDS at a time of the world's clock, and a number that varies it."""
+class TimedFault:
+    """Fault, one of KINDS, at a time of the world's clock, with a number that varies it."""
 
     name: str
     at_s: float
@@ -62,39 +62,39 @@ class Blow:
         return f"{self.name}@{self.at_s:g}"
 
     def fault(self) -> Fault | None:
-        """Return the fault of the simulation's own table."""
+        """Return the row of the simulation's table of faults."""
         table = fault_kinds(*OF_CHIP, *OF_VEHICLE, Where.HAND, Where.DEFECT)
         return Fault(self.name, self.at_s if table[self.name].timed else 0.0) if self.name in table else None
 
 
-class Moments:
-    """Hears how time goes on; `due` holds who is to be called at which time [s]."""
+class Timeline:
+    """Calls of functions at times of the world's clock; `due` holds the times [s] and functions."""
 
     def __init__(self) -> None:
         self.due: list[tuple[float, Callable[[], None]]] = []
 
     def reach(self, now_s: float) -> None:
-        """Call what is due at `now_s`."""
+        """Call the functions that are due at `now_s`."""
         while self.due and self.due[0][0] <= now_s:
             self.due.pop(0)[1]()
 
     def add(self, at_s: float, call: Callable[[], None]) -> None:
-        """Call that at a time [s]."""
+        """Have a function called at a time [s]."""
         self.due = sorted([*self.due, (at_s, call)], key=lambda item: item[0])
 
 
 class World:
-    """A simulated world, with what the hooks below have opened; one a process."""
+    """Simulated world: the sources that the hooks below have opened; one for each process."""
 
     def __init__(self, kind: str) -> None:
-        self.kind, self.moments = kind, Moments()
+        self.kind, self.moments = kind, Timeline()
         self.bus: HookedBus | None = None
         self.line: EmulatedLine | None = None
         self.transport: HookedTransport | None = None
 
     @contextmanager
     def opened(self) -> Iterator[None]:
-        """Have `--bus sim` and `--mavlink sim` open this world meanwhile."""
+        """Open this world by `--bus sim` and `--mavlink sim` while the block runs."""
 
         def bridged(*arguments: Any) -> Bridged:
             return Bridged(open_simulated(*arguments), self)
@@ -106,20 +106,20 @@ class World:
         ):
             yield
 
-    def suffer(self, blows: Sequence[Blow]) -> None:
-        """Begin these, each at its time."""
+    def begin_faults(self, blows: Sequence[TimedFault]) -> None:
+        """Begin these faults, each at its time."""
         faults = _faults(blows)
         if self.bus is not None:
-            self.bus.suffer(faults, blows[0].number)
+            self.bus.begin_faults(faults, blows[0].number)
             self.bus._motion.mishaps = (*self.bus._motion.mishaps, *_befallen(blows))
         else:
-            self.transport.suffer(faults)
+            self.transport.begin_faults(faults)
         for blow in blows:
             if blow.name in (*PROCESS, *CLOCK, *SERIAL):
                 self.moments.add(blow.at_s, lambda blow=blow: self._strike(blow))
 
-    def truths(self, blows: Sequence[Blow], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return (D, b_a) of the sensor as it may be called: before and after what befell it, and amid what is slow."""
+    def truths(self, blows: Sequence[TimedFault], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the values of (D, b_a) that count as true: before and after each fault, and amid slow ones."""
         document = self.truth(folder)
         D, b_a = np.array(document["D"], float), np.array(document["b_a"], float)
         maps = []
@@ -135,14 +135,14 @@ class World:
         return found
 
     def truth(self, folder: Path) -> dict[str, Any]:
-        """Return what a session without faults writes to truth.json."""
+        """Return the content of truth.json of a session without faults."""
         if self.bus is not None:
             return self.bus.truth_document() or {}
         # a vehicle may have changed its own offsets meanwhile, and is written to afterwards
         written = folder / "truth.json"
         return json.loads(written.read_text()) if written.exists() else self.transport.truth
 
-    def _strike(self, blow: Blow) -> None:
+    def _strike(self, blow: TimedFault) -> None:
         if blow.name in SIGNALS:
             os.kill(os.getpid(), SIGNALS[blow.name])
         elif blow.name == "disk_full":
@@ -163,7 +163,7 @@ class World:
 
 
 class HookedBus(SimulatedBus):
-    """The simulated bus, whose world hears of each transfer."""
+    """Simulated bus that reports the time of each transfer to the world."""
 
     def __init__(self, world: World, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -180,8 +180,8 @@ class HookedBus(SimulatedBus):
         self._world.moments.reach(self._clock.now() * 1e-9)
         return super().write(register, data)
 
-    def suffer(self, faults: Sequence[Fault], seed: int) -> None:
-        """Begin these now."""
+    def begin_faults(self, faults: Sequence[Fault], seed: int) -> None:
+        """Begin these faults now."""
         self._faults = FaultInjector(faults, self._chip, self._clock, np.random.default_rng(seed)) if faults else None
 
 
@@ -206,7 +206,7 @@ class Bridged(BridgeBus):
 
 
 class HookedTransport(SimulatedTransport):
-    """The simulated vehicle's line, whose world hears of each look."""
+    """Link of the simulated vehicle that reports the time of each read to the world."""
 
     def __init__(self, world: World, vehicle: Any) -> None:
         super().__init__(vehicle)
@@ -219,8 +219,8 @@ class HookedTransport(SimulatedTransport):
         self._world.moments.reach(self._vehicle.now_us * 1e-6)
         return super().receive(until_ns)
 
-    def suffer(self, faults: Sequence[Fault]) -> None:
-        """Begin these now."""
+    def begin_faults(self, faults: Sequence[Fault]) -> None:
+        """Begin these faults now."""
         vehicle = self._vehicle
         vehicle.options = replace(vehicle.options, fault=tuple(faults))
         vehicle._schedule = Schedule(faults)
@@ -228,25 +228,25 @@ class HookedTransport(SimulatedTransport):
 
 
 def fill_disk(room: int) -> None:
-    """Have no file of this process be longer than `room` bytes: its writes fail as on a full disk.
+    """Limit the files of this process to `room` bytes, so that writes fail as on a full disk.
 
-    But what is said goes to a file here, and has room.
+    Messages on stderr go to a file, too, and get the room that they need.
     """
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     room = max(room, os.fstat(2).st_size + SAID_BYTES)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
 
 
-def _faults(blows: Sequence[Blow]) -> list[Fault]:
+def _faults(blows: Sequence[TimedFault]) -> list[Fault]:
     return [fault for fault in (blow.fault() for blow in blows) if fault is not None]
 
 
-def _befallen(blows: Sequence[Blow]) -> list[Mishap]:
-    """Return what befalls the sensor; none of a vehicle's."""
+def _befallen(blows: Sequence[TimedFault]) -> list[Mishap]:
+    """Return the faults of the sensor; a vehicle has none."""
     return [*begin_mishaps(_faults(blows)), *(_step(blow) for blow in blows if blow.name == STEP)]
 
 
-def _step(blow: Blow) -> ZeroStep:
+def _step(blow: TimedFault) -> ZeroStep:
     rng = np.random.default_rng(blow.number)
     direction = rng.normal(size=3)
     size = np.exp(rng.uniform(*np.log(STEP_MG))) / MG_PER_MPS2
@@ -256,7 +256,7 @@ def _step(blow: Blow) -> ZeroStep:
 
 
 def _affine(mishap: Mishap, t_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return (A, c) by which specific force s is felt as A s + c then."""
+    """Return (A, c): the sensor measures the specific force s as A s + c at that time."""
     at = np.full(4, t_s)
     felt, _ = mishap.apply(np.vstack((np.zeros(3), np.eye(3))), np.zeros((4, 3)), at)
     return (felt[1:] - felt[0]).T, felt[0]

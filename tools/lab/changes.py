@@ -22,7 +22,7 @@ from .scenarios.faults import MG_MPS2
 from .scenarios.recordings import hand_scenario
 from .table import Column, count, grouped, over, show, table
 
-# ranges of what is drawn evenly by its logarithm: mg, mg, 1, deg
+# ranges of the changes, drawn uniformly in their logarithm: mg, mg, 1, deg
 KINDS = {"none": (0.0, 0.0), "bias": (2.0, 50.0), "drift": (2.0, 20.0), "scale": (1e-3, 1e-2), "mount": (0.3, 3.0)}
 MOTION, RATE_HZ = "pose12", 100.0
 FAR = 4.0
@@ -30,7 +30,7 @@ FAR = 4.0
 
 @dataclass(frozen=True)
 class Run(Judgement):
-    """A recording of a sensor that changed, its kind of change, and how many elements are far off."""
+    """Result for a sensor that changed: the kind of change, and the number of elements that are far off."""
 
     kind: str = ""
     seed: int = 0

@@ -51,7 +51,7 @@ EVENTS = (
 
 @dataclass(frozen=True)
 class Trial:
-    """A pair: what happened, and what the check said."""
+    """Pair of a calibration and a check: the event between them, and the result of the check."""
 
     event: str
     seed: int
@@ -89,7 +89,7 @@ def aged_by(truth: SensorTruth, theta: Vector) -> SensorTruth:
 
 
 def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.Recording:
-    """Return the recording with a mounting that gives in each orientation, and a gyroscope that errs in each turn."""
+    """Return the recording with a mounting that bends in each orientation, and a gyroscope with errors."""
     acc, gyr, step_s = recording.acc.copy(), recording.gyr.copy(), 1.0 / recording.rate_hz
     every_s = CHECK_S / 3
     for k in range(3):
@@ -127,7 +127,7 @@ def at(recording: mpucal.Recording, temperature_c: float) -> mpucal.Recording:
 
 
 def of_pair(event: str, seed: int, motion: str, perfect: bool) -> Trial | None:
-    """Calibrate, let something happen, and check; None where the calibration was refused."""
+    """Calibrate, apply an event, and check; None if the calibration was refused."""
     if (begun := calibrated_and_aged(seed)) is None:
         return None
     calibration, aged, of_event, of_errors = begun
@@ -142,7 +142,7 @@ def of_pair(event: str, seed: int, motion: str, perfect: bool) -> Trial | None:
 
 
 def of_halves(path: Path, gravity: float) -> list[Trial]:
-    """Check each half of a recording against the calibration of the other, as far as it is one."""
+    """Check each half of a recording against the calibration of the other, if that was not refused."""
     try:
         parts = halves(mpucal.load(path))
     except mpucal.MpucalError:
@@ -164,12 +164,12 @@ def tried(item: Path | tuple[str, int], any: bool, perfect: bool, gravity: float
 
 
 def events_of(asked: Asked) -> list[tuple[str, int]]:
-    """Return an event for each seed, each as often."""
+    """Return an event for each seed; all events come equally often."""
     return [(asked.only[number % len(asked.only)], seed) for number, seed in enumerate(asked.seeds)]
 
 
 def told_as(trials: Sequence[Trial]) -> str:
-    """Return what was told, and of how many %."""
+    """Return the results of the checks, each with its share in %."""
     told = Counter(trial.verdict if trial.what == "nothing" else trial.what for trial in trials)
     return ", ".join(f"{name} {100.0 * count / len(trials):.1f}" for name, count in told.most_common())
 

@@ -33,11 +33,11 @@ RAW, AUTO = "uncalibrated", "mpucal auto"
 
 @dataclass(frozen=True)
 class Grade:
-    """The result of a method on a recording; NaN where nobody knows.
+    """Result of a method on a recording; NaN: not known.
 
     Attributes
     ----------
-    of : the scene, or the recording. why : why there is no result, or nothing. note : what else to know of it.
+    of : the scene, or the recording. why : why there is no result, or empty. note : remark on the result.
     error, before : m/s^2, against the truth, over all directions, and without a calibration. ms : the time it took.
     median, mean, std : m/s^2, of the magnitude of all samples.
     rest_rms : m/s^2, of the rests' magnitudes less gravity. miss_median, miss_max : deg, by which gravity, carried from
@@ -83,7 +83,7 @@ def ours(recording: Recording, gravity: float, model: str) -> Estimate:
 
 
 def on_rests(recording: Recording, gravity: float, fit: Callable[[Rests, float], Estimate]) -> Estimate:
-    """Calibrate by a method that sees the rests alone."""
+    """Calibrate by a method that uses only the rests."""
     return fit(Rests.of(recording), gravity)
 
 
@@ -100,7 +100,7 @@ METHODS: Mapping[str, Callable[[Recording, float], Estimate]] = {
 
 
 def grade(of: str, method: str, recording: Recording, gravity: float, truth: SensorTruth | None = None) -> Grade:
-    """Calibrate by a method, and judge what it gives."""
+    """Calibrate by a method, and judge the result."""
     began = time.perf_counter()
     try:
         estimate = METHODS[method](recording, gravity)
@@ -148,7 +148,7 @@ def graded(item: Path | tuple[str, int], without: Sequence[str], gravity: float)
 
 
 def digits(name: str, places: int = 3) -> Column:
-    """Return a column of the first row's figure with so many decimals."""
+    """Return a column: the first row's figure with `places` decimals."""
     return lambda of: f"{value:.{places}f}" if np.isfinite(value := getattr(of[0], name)) else ""
 
 

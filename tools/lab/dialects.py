@@ -28,14 +28,14 @@ Write = Callable[[Path, Walk, Any], Path]
 
 
 def walk() -> Walk:
-    """The session's samples, at a steady rate: some dialects have no times."""
+    """Return the samples of the session at a constant rate, since some dialects have no times."""
     whole = mpucal.load(SESSION)
     t_ns = np.arange(len(whole)) * 10_000_000
     return Walk.from_arrays(t_ns * 1e-9, whole.acc, whole.gyr, name="walk")
 
 
 def to(name: str, put: Callable[[Path, Walk, Any], Any]) -> Write:
-    """Return what writes a file of that name."""
+    """Return a function that writes a file of that name."""
 
     def write(folder: Path, w: Walk, ns: Any) -> Path:
         put(folder / name, w, ns)
@@ -51,7 +51,10 @@ def own(path: Path, w: Walk, _ns: Any) -> None:
 
 
 def dialects() -> dict[str, tuple[str, Write, Hints]]:
-    """Return by name whose program writes it, how, and what has to be said to read it; the writers are the tests'."""
+    """Return for each dialect its writing program, the function that writes it, and the hints to read it.
+
+    The functions are those of the tests.
+    """
     tables, fixtures, logs, loggers, strangers = (
         run_path(str(ROOT / "tests" / "files" / f"{name}.py"))
         for name in ("test_tables", "conftest", "test_logs", "test_loggers", "test_strangers")
@@ -128,7 +131,7 @@ def dialects() -> dict[str, tuple[str, Write, Hints]]:
 
 
 def main() -> None:
-    """Write, read and calibrate each; a calibration is made once of the same samples."""
+    """Write, read and calibrate each dialect, and compare with the calibration of the samples themselves."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="Dialects with this in their names.")
     only = parser.parse_args().only

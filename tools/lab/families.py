@@ -30,11 +30,11 @@ from .table import Column, count, frequencies, grouped, known, over, show, table
 
 GOOD_MPS2 = 0.1
 CRASHED = "crashed"
-# who is told of an unlikely gravity knows that all gains are in units of it, and the truth is compared so
+# after the warning of an unlikely gravity, scale factors count in units of it
 GRAVITY_NAMED = "gravity_unlikely"
-# limits over all families, and over one of those whose recordings nothing is wrong with
+# limits over all families, and for one of the families with sound recordings
 FALSE_SHARE, GOOD_SHARE, SHARP_MPS2 = 0.003, 0.98, 1e-3
-# of a family's errors in claims: below, its claims are too wide, and above, too narrow
+# limits of the rms of a family's errors in units of its claims: too wide below, too narrow above
 RMS_CLAIMS = (0.5, 1.5)
 
 
@@ -50,7 +50,7 @@ class Run(Judgement):
 
     @property
     def false(self) -> bool:
-        """Return True if the verdict is."""
+        """Return True if the verdict is false."""
         return super().false or (self.verdict == GOOD and not self.error <= GOOD_MPS2)
 
 
@@ -62,7 +62,7 @@ def of_seed(item: tuple[str, int], model: str = "auto") -> Run:
     gravity, began = family.told_gravity or GRAVITY_MPS2, time.perf_counter()
     try:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=gravity)
-    except Exception as error:  # whatever it is, the other runs go on, and the exit code is 1
+    except Exception as error:  # after any error the other runs continue, and the exit code is 1
         verdict = REFUSED if isinstance(error, MpucalError) else CRASHED
         return Run(verdict, (type(error).__name__,), family=name, seed=seed, why=repr(error))
     seconds, truth = time.perf_counter() - began, simulated.truth
@@ -76,27 +76,27 @@ def of_seed(item: tuple[str, int], model: str = "auto") -> Run:
 
 
 def used(runs: Sequence[Run]) -> list[Run]:
-    """Return those that are not refused."""
+    """Return the runs that are not refused."""
     return [run for run in runs if run.verdict in (GOOD, USABLE)]
 
 
 def false(runs: Sequence[Run], verdict: str) -> int:
-    """Return how many of this verdict are false."""
+    """Return the number of false verdicts of this kind."""
     return sum(run.false and run.verdict == verdict for run in runs)
 
 
 def of_used(name: str, make: Column) -> Column:
-    """Return a column over an attribute of those that are not refused."""
+    """Return a column over an attribute of the runs that are not refused."""
     return lambda runs: over(name, make)(used(runs))
 
 
 def rms_claims(runs: Sequence[Run]) -> float:
-    """Return the rms of the errors in claims of those that are not refused."""
+    """Return the rms of the errors, in units of the claims, of the runs that are not refused."""
     return rms(known(used(runs), "claims"))
 
 
 def worst_good(runs: Sequence[Run]) -> float | None:
-    """Return the largest error of a good one [m/s^2]."""
+    """Return the largest error of a good calibration [m/s^2]."""
     return max((run.error for run in runs if run.verdict == GOOD), default=None)
 
 
@@ -116,7 +116,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def broken(runs: Sequence[Run]) -> list[str]:
-    """Return the limits that the runs break, a sentence each."""
+    """Return a sentence for each limit that the runs exceed."""
     good, usable, crashed = (count("verdict", verdict)(runs) for verdict in (GOOD, USABLE, CRASHED))
     found = []
     if false(runs, GOOD) > FALSE_SHARE * good:

@@ -1,4 +1,4 @@
-"""The guidance that a person is shown, tried by hands of every kind, and by a hand that has nothing but the words.
+"""Trial of the guidance of a session by simulated hands of every kind, and by one that only follows the words.
 
 python -m tools.lab guidance_trials --seeds 20
 python -m tools.lab guidance_trials --seeds 20 --hand wandering
@@ -44,7 +44,7 @@ from .sessions import session
 from .table import Column, count, grouped, known, show, table
 
 BEYOND_DEG = 20.0
-# More than a hand trembles, and misses by.
+# More than a hand's tremor and its error of aim.
 TURNED_DEG = 10.0
 COUNT = re.compile(r"(\d+) of (\d+)")
 BY_WORDS = "by words"
@@ -52,7 +52,7 @@ LOOKS_S = 0.25
 SLOWEST = 1.2
 
 
-class ByWords(Guided):
+class WordFollower(Guided):
     """Turns the board as it is told in words, seen from where it laid the board flat, and looks again.
 
     Its motion is computed some time ahead: it reacts to words from when they were shown (`SINCE_S`).
@@ -66,7 +66,7 @@ class ByWords(Guided):
         self._words, self._due_s, self._turned_s = "", math.inf, 0.0
 
     def rotate(self, now: Stance) -> Leg:
-        """Turn by what is said, a reaction time after it was said; hold still where nothing is."""
+        """Turn as the announcements say, a reaction time later; hold still without one."""
         if self._room is None or now.grip == ON_THE_TABLE:
             self._room = now.attitude
         way = self.HEADLINE.lower()
@@ -91,7 +91,7 @@ class ByWords(Guided):
         return leg
 
 
-HANDS[BY_WORDS] = ByWords
+HANDS[BY_WORDS] = WordFollower
 STAY, GO = "stay", "go"
 SENSES = {Moment.COUNTING: STAY, Moment.NEAR: STAY, Moment.TURN: GO}
 
@@ -147,7 +147,7 @@ def is_taken_back(then: View, now: View) -> bool:
 
 @dataclass
 class Watcher:
-    """Looks at what the page shows, and counts what is wrong with it."""
+    """Observer of the page that counts its faults."""
 
     view: View = field(default_factory=View)
     wrong: Counter[str] = field(default_factory=Counter)
@@ -157,7 +157,7 @@ class Watcher:
     finished_s: float = math.nan
 
     def hear(self, output: Output) -> None:
-        """Look at what the page makes of it."""
+        """Check the page after this output."""
         before, self.view = self.view, self.view.after(output)
         self.transcript.hear(self.view)
         shown = state(self.view)
@@ -165,9 +165,9 @@ class Watcher:
             self._since_counted = shown["moment"]
         match output:
             case Meter():
-                if shown["headline"] != ByWords.HEADLINE:
-                    ByWords.HEADLINE, ByWords.SINCE_S = shown["headline"], output.t_s
-                ByWords.DEGREES = 5.0 * round((output.missing_deg or 0.0) / 5.0)
+                if shown["headline"] != WordFollower.HEADLINE:
+                    WordFollower.HEADLINE, WordFollower.SINCE_S = shown["headline"], output.t_s
+                WordFollower.DEGREES = 5.0 * round((output.missing_deg or 0.0) / 5.0)
                 self._jumps(before, output)
                 self._hold(shown["headline"], output)
             case Prompt(kind=kind):
@@ -221,7 +221,7 @@ def angle(a: Any, b: Any) -> float:
 
 @dataclass(frozen=True)
 class Trial:
-    """A session in a hand: how it ended, and what was wrong with what was shown."""
+    """Session in a hand: how it ended, and the faults of its guidance."""
 
     hand: str
     verdict: str
@@ -239,12 +239,12 @@ def of_hand(item: tuple[str, int]) -> Trial:
 
 
 def typical_s(trials: Sequence[Trial]) -> float:
-    """Return the median time to the verdict of good ones [s]."""
+    """Return the median time to the verdict of good sessions [s]."""
     return float(np.median(known((t for t in trials if t.verdict == GOOD), "finished_s") or [math.nan]))
 
 
 def total_wrong(trials: Sequence[Trial]) -> Counter[str]:
-    """Return what was wrong, and how often."""
+    """Return the faults, and how often each occurred."""
     return sum((Counter(trial.wrong) for trial in trials), Counter())
 
 
@@ -258,7 +258,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def report(trials: list[Trial], asked: Asked) -> int:
-    """Print a line a hand; return 1 where something was shown wrong, or words take too long."""
+    """Print a line for each hand; return 1 after a fault, or if the words alone take too long."""
     by_hand = grouped(trials, "hand")
     show(table(by_hand, COLUMNS))
     ratio = typical_s(by_hand.get(BY_WORDS, [])) / typical_s(by_hand.get("guided", []))

@@ -24,7 +24,7 @@ from .judge import rms
 from .runner import Asked, Program, option
 from .table import Column, grouped, over, show, table
 
-# of 12 parameters each: what an honest claim gives, and what is wanted of the median and of the worst
+# rms z of 12 parameters: 1 for a true claim, and the limits of the median and the worst
 WANTED = "wanted: median 0.7 to 1.3, worst 2 or less"
 LEAST_REST_S = 1.0
 
@@ -44,7 +44,7 @@ class Agreement:
 
     @property
     def rms_z(self) -> float:
-        """Return the rms of z; NaN where there is none."""
+        """Return the rms of z; NaN if it is empty."""
         return rms(self.z)
 
 
@@ -80,7 +80,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
 
 
 def reversed_in_time(recording: Recording) -> Recording:
-    """Return the same motion backwards."""
+    """Return the recording of the same motion backwards in time."""
     return replace(
         recording,
         t=recording.t[-1] - recording.t[::-1],
@@ -124,7 +124,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def report(found: list[Agreement], asked: Asked) -> None:
-    """Print a line a recording, and one of all by each model."""
+    """Print a line for each recording, and one for all recordings by each model."""
     of_all = {("all", model): rows for model, rows in grouped(found, "model").items()}
     show(table(grouped(found, "name", "model") | of_all, COLUMNS, f"halves of recordings; {WANTED}"))
 

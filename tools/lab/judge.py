@@ -1,4 +1,4 @@
-"""A calibration, or a vehicle's parameters, against the truth: the error in m/s^2, and in units of what is claimed."""
+"""Errors of a calibration, or of a vehicle's parameters, against the truth: in m/s^2, and in units of the claim."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from mpucal.result.calibration import GOOD, USABLE, Calibration
 from mpucal.result.error_model import sensor_axes
 from mpucal.simulated.sensor import SensorTruth
 
-# a verdict is false where the error is more than so many times what is claimed, or that of an element more than so many
-# of its standard uncertainties
+# a verdict is false if the error exceeds the claim by this factor, or that of an element exceeds its standard
+# uncertainty by MOST_Z
 MOST_CLAIMS = {GOOD: 3.0, USABLE: 5.0}
 MOST_Z = 5.0
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict on a calibration beside its errors.
+    """Verdict on a calibration, and its errors.
 
     Attributes
     ----------
-    error : of a calibrated reading, rms over all directions of gravity [m/s^2]. claim : what it says of that [m/s^2].
+    error : of a calibrated reading, rms over all directions of gravity [m/s^2]. claim : its stated value [m/s^2].
     z : (12,) errors of D row-major and of b_a in units of their standard uncertainties; 0 between the truths of a
         sensor that changed, NaN where no uncertainty is claimed.
     """
@@ -43,7 +43,7 @@ class Judgement:
 
     @property
     def claims(self) -> float:
-        """Return the error in units of the claim; infinite of one that is used and claims nothing."""
+        """Return the error in units of the claim; infinite if it may be used but states no uncertainty."""
         if self.claim > 0.0:
             return self.error / self.claim
         return math.inf if self.verdict in MOST_CLAIMS else math.nan
@@ -55,7 +55,7 @@ class Judgement:
 
     @property
     def rms_z(self) -> float:
-        """Return the rms of z: 1 where the uncertainties are honest."""
+        """Return the rms of z: 1 if the uncertainties are true."""
         return rms(self.z)
 
     @property
@@ -97,7 +97,7 @@ def sphere_rms(calibration: Calibration, truth: tuple[Vector, Vector], gravity: 
 
 
 def rms(values: Sequence[float]) -> float:
-    """Return the root mean square of what is known; NaN of nothing."""
+    """Return the root mean square of the known values; NaN if there is none."""
     known = [value for value in values if not math.isnan(value)]
     return math.sqrt(sum(value * value for value in known) / len(known)) if known else math.nan
 

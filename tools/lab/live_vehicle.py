@@ -48,7 +48,7 @@ from mpucal.simulated.vehicle.imus import FROM_HAND, to_hand_axes
 from .judge import off, rms, z_of
 
 MPUCAL = Path(sys.executable).parent / "mpucal"
-# the head of what a SITL sends for each step: a magic number, its steps a second, their count
+# header of a message of the SITL for each step: magic number, steps a second, number of the step
 HEAD, MAGIC = struct.Struct("<HHI"), (18458, 29569)
 BLOCK = 20
 OWN_SYSTEM = 255
@@ -59,7 +59,7 @@ KINDS_OF_ERROR = ("BIAS", "SCAL")
 
 
 class Body:
-    """The vehicle's body in the hand: answers each step of the SITL with what its sensors feel then.
+    """Body of the vehicle in the hand: answers each step of the SITL with the measurements of its sensors.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ class Body:
             magic, rate_hz, count = HEAD.unpack_from(data)
             if magic not in MAGIC:
                 continue
-            # what is asked again is answered as before
+            # a repeated request gets the same answer
             if count != last or not answer:
-                # a SITL's clock starts with it
+                # the clock of a SITL starts with the program
                 self._booted_s = self._t_s if count < last else self._booted_s
                 answer = self._next(rate_hz)
             last = count
@@ -117,7 +117,7 @@ class Body:
 
 
 class Held:
-    """Parameters that a vehicle holds of its IMUs, and those that it should.
+    """Parameters of a vehicle's IMUs, and those that would be true.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class Held:
     def true(self, imu: int) -> Correction:
         """Return the parameters that IMU `imu`, counted from 1, needs."""
         bias, scale = (np.array([self.parameters[f"SIM_ACC{imu}_{kind}_{a}"] for a in AXES]) for kind in KINDS_OF_ERROR)
-        # a scale of 0 is 1 to it
+        # the vehicle takes a scale of 0 as 1
         return Correction(bias, np.where(scale == 0, 1.0, scale))
 
     def off(self) -> str:
@@ -175,7 +175,7 @@ def _opened(url: str) -> Transport:
 
 
 def main() -> int:
-    """Run one session, and print its line; its exit code."""
+    """Run one session, and print its line; return its exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--mavlink", required=True, metavar="URL", help="of the session")
     parser.add_argument("--parameters", required=True, metavar="URL", help="another one of the same SITL")
@@ -203,7 +203,7 @@ def main() -> int:
 
 
 def session(body: Body, words: list[str], killed_at: int | None = None) -> int:
-    """Run `mpucal session`, have the hand hear its prompts, and say what it says; its exit code.
+    """Run `mpucal session`, pass its prompts to the hand, and print its output; return its exit code.
 
     killed_at : number of the prompt at which the session is killed.
     """

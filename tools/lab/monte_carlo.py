@@ -32,23 +32,23 @@ from .scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_
 from .scenarios.sensors import hand_sensor, paper_sensor
 from .table import Column, cell, frequencies, grouped, known, over, plain_table, show, table
 
-# on data that conform to the model NIS is 3, and tens where the fit ended in a wrong optimum
+# NIS is 3 for data that conform to the model, and tens if the fit ended in a wrong optimum
 NIS_WRONG = 10.0
 FITS = {"accel": fit_accel, "paper": fit_paper}
 TILTS = ("uncalibrated", "true D, b_a", "calibrated")
-# mean errors that are wanted, and means (standard deviations) of the paper's before and after [deg]
+# required mean errors, and means (standard deviations) of the paper before and after calibration [deg]
 PAPER = {"roll": ("0.345", "8.3 (7.1)", "0.32 (0.40)"), "pitch": ("0.265", "8.3 (6.9)", "0.33 (0.43)")}
 
 
 class Scene(NamedTuple):
-    """A simulation of a seed, and the mean error [m/s^2] that is wanted; None: nothing was set."""
+    """Simulation by a seed, and the required mean error [m/s^2]; None: not set."""
 
     simulate: Callable[[int], Simulated]
     wanted: float | None = None
 
 
 def gyro_off(seed: int) -> Simulated:
-    """Simulate the paper's scenario with a gyroscope that is not ideal."""
+    """Simulate the paper's scenario with a gyroscope that has scale factor errors and misalignments."""
     of_sensor, of_gyro = np.random.default_rng(seed).spawn(2)
     return paper_scenario(seed, sensor=replace(paper_sensor(of_sensor), K=hand_sensor(of_gyro).K))
 
@@ -77,7 +77,7 @@ class Run(Judgement):
     Attributes
     ----------
     before : the error without a calibration [m/s^2]. failure : why it does not count; None where it does.
-    known_K : how many of K's six elements it claims to know.
+    known_K : number of K's six elements with a standard uncertainty.
     roll_deg, pitch_deg : mean errors of the paper's filter with each of TILTS; none in a hand.
     """
 
@@ -134,12 +134,12 @@ def tilts(simulated: Simulated, result: mpucal.Calibration) -> tuple[tuple[float
 
 
 def successful(runs: Sequence[Run]) -> list[Run]:
-    """Return those that count."""
+    """Return the runs without failure."""
     return [run for run in runs if run.failure is None]
 
 
 def met(runs: Sequence[Run]) -> bool | None:
-    """Return True if all runs of a scene succeeded with the mean error that is wanted; None where nothing is."""
+    """Return True if all runs of a scene succeeded with the required mean error; None if none is set."""
     wanted = SCENES[runs[0].scene].wanted
     if wanted is None:
         return None
@@ -147,7 +147,7 @@ def met(runs: Sequence[Run]) -> bool | None:
 
 
 def of_successful(name: str, make: Column = np.mean) -> Column:
-    """Return a column over an attribute of the successful."""
+    """Return a column over an attribute of the runs without failure."""
     return lambda runs: over(name, make)(successful(runs))
 
 

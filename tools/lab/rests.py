@@ -1,11 +1,11 @@
-"""Does the session, which hears a few samples at a time, call still what is a rest of the whole recording?
+"""Compare the rests that a session detects as samples arrive with the rests of the whole recording.
 
 python -m tools.lab rests                                     six recordings of each family, about 500
 python -m tools.lab rests --families 'poses*' --seeds 0:33
 
-A recording agrees where what is told to be held as its samples come, in parts of any size, is what is told of all of
-them at once, where each of these holds is a rest of the recording, and each rest that is as long was told to be held.
-The exit code is 1 where fewer agree than --least.
+A recording agrees if the session detects the same holds from samples in parts of any size as from all at once, if each
+hold is a rest of the recording, and if each rest of this length is a hold. The exit code is 1 if fewer recordings than
+--least agree.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .scenarios.table import FAMILIES
 from .table import grouped, show, table
 
 LARGEST_PART = 60  # samples
-# so long a rest holds all windows of a hold, wherever they begin, and what is trimmed of it is beside them
+# a rest of this length contains all windows of a hold, even after its ends are trimmed
 LONG_S = HOLD_S
 
 Span = tuple[float, float]
@@ -37,12 +37,12 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True)
 class Found:
-    """The holds told live and the rests found offline of one recording, and those [s] that only one of both has.
+    """Holds detected live and rests found offline in one recording, and those [s] that only one of them has.
 
     Attributes
     ----------
     flat : it has a flat segment, and something after it.
-    held, rests : how many; of rests those as long as a hold. in_parts : parts and all at once say the same.
+    held, rests : numbers of holds, and of rests as long as a hold. in_parts : parts give the same as all at once.
     """
 
     family: str
@@ -56,7 +56,7 @@ class Found:
 
     @property
     def agrees(self) -> bool:
-        """Return True if both have the same, however the samples come."""
+        """Return True if both agree, however the samples arrive."""
         return self.in_parts and not self.only_held and not self.only_rests
 
 
@@ -67,7 +67,7 @@ def of_seed(item: tuple[str, int]) -> Found:
 
 
 def of_recording(recording: Recording, name: str, seed: int) -> Found:
-    """Compare a recording; the seed draws how its samples come."""
+    """Compare a recording; the seed draws how its samples arrive."""
     segment = recording.flat or find_flat(recording)
     if segment is None or segment[1] == len(recording):
         return Found(name, seed, flat=False)
@@ -92,10 +92,10 @@ def of_recording(recording: Recording, name: str, seed: int) -> Found:
 
 
 def _held(flat: Flat, parts: Iterable[Samples]) -> list[Span]:
-    """Return what the session calls held for long enough, as these samples come."""
+    """Return the holds that the session detects as these samples arrive."""
     x, y, z, *rates = (*flat.y.tolist(), *flat.b_omega.tolist())
     pauses = PauseDetector(Rested(flat.n, (x, y, z), (rates[0], rates[1], rates[2])))
-    # of the stillness that it begins in a session says nothing
+    # a session ignores the rest in which it begins
     pauses.leave(-1)
     runs: dict[int, Span] = {}
     for pause in (pause for samples in parts for pause in pauses.add(samples)):
@@ -109,7 +109,7 @@ def _touched(span: Span, others: Iterable[Span]) -> bool:
 
 
 def agreeing(found: Sequence[Found]) -> str:
-    """Return how many agree, of all."""
+    """Return the number that agree, of all."""
     return f"{sum(one.agrees for one in found)} of {len(found)}"
 
 
@@ -123,7 +123,7 @@ COLUMNS = {
 
 
 def report(of_all: list[Found], asked: Asked) -> int:
-    """Print those that differ, and how many agree; return 1 where these are too few."""
+    """Print the recordings that differ, and the number that agree; return 1 if too few agree."""
     found = [one for one in of_all if one.flat]
     differ = [one for one in found if not one.agrees]
     if differ:

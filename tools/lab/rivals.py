@@ -18,8 +18,8 @@ from mpucal.data import Recording, Vector
 from mpucal.rests.flat import Flat, find_flat, flat_statistics
 from mpucal.rests.intervals import Intervals, RestFinder
 
-FACE_RAD = np.deg2rad(25.0)  # a face may be as far from straight up: a large bias tilts what is measured
-TURN_RAD = np.deg2rad(20.0)  # a complete turn may miss 360 deg by so much
+FACE_RAD = np.deg2rad(25.0)  # limit of a face's angle from the vertical: a large bias tilts the measurement
+TURN_RAD = np.deg2rad(20.0)  # limit of a complete turn's deviation from 360 deg
 LONGEST_MOVE_S = 20.0
 FEWEST_POSES, WORST_CONDITION = 9, 1e4
 STEPS = 30
@@ -27,12 +27,12 @@ SHORTEST_S, TRIM_S, MOST_TRIMMED = 1.0, 0.5, 0.25
 
 
 class Unfit(Exception):  # noqa: N818 - reads as the sentence it is
-    """The recording does not hold what a method needs; the message says what."""
+    """Recording that lacks what a method needs, as the message says."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """y = D s + b_a and w = K (y - b_omega), in m/s^2 and rad/s; `note` is what else there is to say."""
+    """y = D s + b_a and w = K (y - b_omega), in m/s^2 and rad/s; `note` is a remark."""
 
     D: Vector
     b_a: Vector
@@ -99,7 +99,7 @@ class Rests:
 
 
 def six_positions(rests: Rests, gravity: float) -> Estimate:
-    """Find gains and biases, each axis by itself, from six faces: what most instructions for hobbyists do."""
+    """Estimate scale factors and biases, each axis by itself, from six faces, as most instructions for hobbyists do."""
     up, down = (np.diag([rests.y[k] for k in faces(rests)[i::2]]) for i in (0, 1))
     return Estimate(np.diag((up - down) / (2.0 * gravity)), (up + down) / 2.0, np.eye(3), rests.flat.b_omega)
 

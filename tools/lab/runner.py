@@ -1,4 +1,4 @@
-"""Runs a program of trials: its options, a pool of processes over its items, its report and a file of what it found."""
+"""Runner of trial programs: options, a pool of processes for the items, the report, and a JSON file of the rows."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Program:
     line: Callable[[Any], str] | None = None
 
     def __call__(self, words: Sequence[str] | None = None) -> int:
-        """Try everything that the words ask for, print it, and return the exit code."""
+        """Try all items of the command line, print the report, and return the exit code."""
         asked = self._parser().parse_args(words)
         passed = {name: vars(asked)[name] for name in inspect.signature(self.run).parameters if name in vars(asked)}
         rows: list[Any] = []
@@ -57,7 +57,7 @@ class Program:
                 print(self.line(row), flush=True)
         code = self.report(rows, asked)
         if asked.json:
-            # a figure that nobody knows is null
+            # an unknown figure is null
             text = json.dumps([asdict(row) if is_dataclass(row) else row for row in rows], indent=1)
             asked.json.write_text(text.replace("NaN", "null") + "\n", encoding="utf-8")
         return code or 0

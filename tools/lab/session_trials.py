@@ -35,11 +35,11 @@ from mpucal.simulated.mishaps import ZeroStep
 
 from .judge import rms
 from .runner import Asked, Program, option, seed_range
-from .sessions import ABANDONED, NOTHING, Ear, Ended, by_command, ended_of, session
+from .sessions import ABANDONED, NOTHING, JudgedSession, SilentOperator, by_command, judge_session, session
 from .table import Column, count, frequencies, grouped, known, over, show, table
 
 RATE_HZ = 50.0
-# of a part: its temperature, which is to be known so well, as each element of D is
+# limits for a part: the temperature [C], and each element of D
 TEMPERATURE_C, NEAR_C, NEAR = 27.0, 0.3, 2e-3
 HELD = (*HANDS, *(f"guided,arm={arm}" for arm in ARMS))
 DAMAGES = {"zero": None, "byte": "low_byte", "bits": "bit_errors", "none": None}
@@ -56,12 +56,12 @@ def parts() -> dict[str, tuple[str, str]]:
     return {**found, "mpu6050c": ("MPU-6050C", PARTS[0x68].family.source)}
 
 
-def of_hand(name: str, seed: int) -> Ended:
-    """Run a session in that hand, and note when what was said."""
-    ear = Ear()
+def of_hand(name: str, seed: int) -> JudgedSession:
+    """Run a session in that hand, and note the times of its steps."""
+    ear = SilentOperator()
     done = session(f"sim:hand={name}", Plan(), seed, ear)
     rotated_s, finished_s = ear.when(PromptKind.VERIFY), ear.when(PromptKind.REST)
-    return Ended(
+    return JudgedSession(
         **asdict(done.judged()),
         name=name,
         seed=seed,
@@ -76,22 +76,22 @@ def of_hand(name: str, seed: int) -> Ended:
     )
 
 
-def of_part(name: str, seed: int) -> Ended:
-    """Run a session on a part, which is to end good, under the right name and at the right temperature."""
+def of_part(name: str, seed: int) -> JudgedSession:
+    """Run a session on a part; it must end good, with the right name and temperature."""
     words = ("--bus", f"sim:chip={name},temperature_c={TEMPERATURE_C}", "--seed", str(seed))
     done, document = by_command(*words, "--rate", f"{RATE_HZ:g}", "--model", "hand")
     if done.calibration is None:
-        return ended_of(name, seed, done, "no calibration")
+        return judge_session(name, seed, done, "no calibration")
     (chip, source), sensor = parts()[name], document["sensor"]
     error = float(np.abs(done.calibration.D - done.truth["D"]).max())
     near = abs(sensor["temperature_c"] - TEMPERATURE_C) < NEAR_C and error < NEAR
     right = near and done.calibration.verdict == GOOD and sensor["chip"] == chip
     said = f"{sensor['chip']}, {sensor['temperature_c']:.1f} C, D within {error:.1e} ({source})"
-    return ended_of(name, seed, replace(done, said=said), "" if right else "not as its row says")
+    return judge_session(name, seed, replace(done, said=said), "" if right else "not as its row says")
 
 
-def of_damage(name: str, seed: int) -> Ended:
-    """Run a session that is damaged, and not told so."""
+def of_damage(name: str, seed: int) -> JudgedSession:
+    """Run a session with damage that nothing reports."""
     rng = np.random.default_rng([seed, list(DAMAGES).index(name)])
     at_s, direction = round(float(rng.uniform(*DAMAGED_S)), 1), rng.normal(size=3)
     step = direction / np.linalg.norm(direction) * math.exp(rng.uniform(*np.log(STEP_MG))) / MG_PER_MPS2
@@ -101,30 +101,30 @@ def of_damage(name: str, seed: int) -> Ended:
     words = f"sim:fault={DAMAGES[name]}@{at_s}" if DAMAGES[name] else "sim"
     done = session(words, Plan(Config(rate_hz=RATE_HZ)), seed, mishaps=(zero,))
     stepped = name == "zero" and done.recording is not None and done.recording.t[-1] > at_s
-    return ended_of(name, seed, done, "", *([step] if stepped else []))
+    return judge_session(name, seed, done, "", *([step] if stepped else []))
 
 
-# by name: the things to try, the function that tries one, and the seeds unless told otherwise
-TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], Ended], str]] = {
+# trials by name: the items, the function that tries one, and the default seeds
+TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], JudgedSession], str]] = {
     "hands": (HELD, of_hand, "50"),
     "parts": (tuple(parts()), of_part, "4:5"),
     "damage": (tuple(DAMAGES), of_damage, "40"),
 }
 
 
-def tried(item: tuple[str, str, int]) -> Ended:
+def tried(item: tuple[str, str, int]) -> JudgedSession:
     """Run one session of a trial."""
     trial, name, seed = item
     return TRIALS[trial][1](name, seed)
 
 
 def typical(name: str, middle: Callable[[Sequence[float]], Any] = np.median) -> Column:
-    """Return a column of the median of what is known, or the mean, and the largest."""
+    """Return a column: the median (or mean) of the known values, and the largest."""
     return lambda group: f"{middle(values):.3g} ({max(values):.3g})" if (values := known(group, name)) else ""
 
 
 def most_claims(verdict: str) -> Column:
-    """Return a column of the largest error of those with this verdict, in units of what they claim."""
+    """Return a column: the largest error with this verdict, in units of the claim."""
     return lambda group: over("claims", max)([ended for ended in group if ended.verdict == verdict])
 
 
@@ -156,14 +156,14 @@ def items(asked: Asked) -> list[tuple[str, str, int]]:
     return [(asked.trial, name, seed) for name in chosen for seed in asked.seeds or seed_range(seeds)]
 
 
-def line(ended: Ended) -> str:
+def line(ended: JudgedSession) -> str:
     """Return how a session ended, in a line."""
     mark = f"WRONG {ended.wrong}: " if ended.wrong else ""
     return f"{mark}{ended.name}, seed {ended.seed}: {ended.verdict}, {ended.error:.4f} m/s² {ended.said}"
 
 
-def report(found: list[Ended], asked: Asked) -> int:
-    """Print a line for each of what was tried; return 1 where a session ended as it should not."""
+def report(found: list[JudgedSession], asked: Asked) -> int:
+    """Print a line for each group; return 1 if a session ended wrongly."""
     show(table(grouped(found, "name"), COLUMNS))
     return int(any(ended.wrong for ended in found))
 

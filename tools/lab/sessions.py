@@ -1,4 +1,4 @@
-"""Sessions on simulated sensors for the trials: in this process, with an ear for what they say, or as the command."""
+"""Sessions on simulated sensors for the trials, in this process with their outputs, or as the command."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from .judge import Judgement, judged
 NOTHING, ABANDONED = "nothing", "abandoned"
 
 
-class Ear:
-    """Hears a session, presses nothing, and remembers when what was said."""
+class SilentOperator:
+    """Operator who presses nothing, and keeps the outputs of the session with their times."""
 
     def __init__(self) -> None:
         self.t_s = 0.0
         self.heard: list[tuple[float, Output]] = []
 
     def hear(self, output: Output) -> None:
-        """Keep what was said, and when."""
+        """Keep an output with its time."""
         if isinstance(output, Meter):
             self.t_s = output.t_s
         else:
@@ -55,7 +55,7 @@ class Ear:
         return [output for _, output in self.heard if isinstance(output, kind)]
 
     def when(self, kind: PromptKind) -> float:
-        """Return when that was first asked for [s]; NaN if it never was."""
+        """Return the time [s] of the first prompt of a kind; NaN if there was none."""
         return next((t_s for t_s, one in self.heard if isinstance(one, Prompt) and one.kind is kind), math.nan)
 
 
@@ -75,17 +75,17 @@ class Session:
     said: str = ""
 
     def judged(self, *steps: Vector) -> Judgement:
-        """Compare the calibration with the truth, before and after steps of what the accelerometer feels [m/s^2]."""
+        """Compare the calibration with the truth, before and after steps of the specific force [m/s^2]."""
         if self.calibration is None:
             return Judgement(ABANDONED if self.code == Abandoned.exit_code else NOTHING)
         D, b_a = np.array(self.truth["D"]), np.array(self.truth["b_a"])
-        # such a step is felt before D
+        # the step is in front of D
         return judged(self.calibration, (D, b_a), *((D, b_a + D @ step) for step in steps))
 
 
 @dataclass(frozen=True)
-class Ended(Judgement):
-    """A session that was judged; times in simulated seconds, NaN where it did not come so far."""
+class JudgedSession(Judgement):
+    """Session that was judged; times in simulated seconds, NaN for steps that it did not reach."""
 
     name: str = ""
     seed: int = 0
@@ -96,20 +96,20 @@ class Ended(Judgement):
     verified_z: tuple[float, ...] = ()
 
 
-def ended_of(name: str, seed: int, done: Session, wrong: str, *steps: Vector) -> Ended:
-    """Judge a session: a trace is wrong in any trial, and a good one that is farther from the truth than it claims."""
+def judge_session(name: str, seed: int, done: Session, wrong: str, *steps: Vector) -> JudgedSession:
+    """Judge a session; a traceback is wrong in any trial, and so is a good verdict whose error exceeds its claim."""
     judgement = done.judged(*steps)
     if "Traceback" in done.said:
         wrong = "a trace"
     elif judgement.verdict == GOOD and judgement.false:
         wrong = "called good"
-    return Ended(**asdict(judgement), name=name, seed=seed, said=done.said, wrong=wrong)
+    return JudgedSession(**asdict(judgement), name=name, seed=seed, said=done.said, wrong=wrong)
 
 
 def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequence[Mishap] = ()) -> Session:
     """Run a session on `--bus words` in this process."""
     bus = open_simulated(words, plan.gravity, seed, mishaps=mishaps)
-    runner = Runner(Driver(bus, plan.config), ear or Ear(), lambda *_: None, plan, (bus.hear,))
+    runner = Runner(Driver(bus, plan.config), ear or SilentOperator(), lambda *_: None, plan, (bus.hear,))
     try:
         recording = runner.measure()
     except Abandoned as error:
@@ -119,7 +119,7 @@ def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequenc
 
 
 def by_command(*words: str) -> tuple[Session, dict[str, Any]]:
-    """Run `mpucal session words --yes`, and return the calibration.json that it left, too."""
+    """Run `mpucal session words --yes`; return the session and its calibration.json."""
     with TemporaryDirectory() as place, redirect_stdout(StringIO()), redirect_stderr(StringIO()) as err:
         folder = Path(place) / "session"
         code = run(["session", *words, "--yes", "-o", str(folder)])

@@ -42,7 +42,7 @@ CHUNK = 65536
 
 
 class UdpPort:
-    """Sends to one station's UDP port, as a vehicle's telemetry does, and hears whoever answers.
+    """UDP port of a vehicle's telemetry: sends to one station, and receives from any.
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class UdpPort:
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> None:
-        """Send to the station; what is sent where none is is lost."""
+        """Send to the station; without a station the data is lost."""
         with suppress(OSError):
             self._socket.sendto(data, self._station)
 
     def receive(self) -> list[bytes]:
-        """Return what stations sent meanwhile."""
+        """Return the data that stations have sent since."""
         received: list[bytes] = []
         with suppress(OSError):
             while True:
@@ -76,7 +76,7 @@ class UdpPort:
 
 
 class TcpPort:
-    """Listens on a TCP port, as a SITL does; any number of stations. See UdpPort.
+    """TCP port of a SITL that listens for any number of stations. See UdpPort.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class TcpPort:
                 station.sendall(data)
 
     def receive(self) -> list[bytes]:
-        """Return what stations sent meanwhile; take in those that come, and let go of those that leave."""
+        """Return the data that stations have sent since; accept new stations, and drop those that left."""
         received: list[bytes] = []
         ready, _, _ = select.select([self._server, *self._stations], [], [], 0)
         for channel in ready:
@@ -141,7 +141,7 @@ class PtyPort:
             os.write(self._master, data)
 
     def receive(self) -> list[bytes]:
-        """Return what was written to the line meanwhile."""
+        """Return the data that was written to the line since."""
         with suppress(OSError):
             return [os.read(self._master, CHUNK)]
         return []
@@ -179,7 +179,7 @@ class Ride:
         self._line = PacketLine(vehicle.options.fault, vehicle.options.seed)
 
     def go_on(self, until_us: int) -> None:
-        """Hear what came, and live until `until_us`."""
+        """Pass the received data to the vehicle, and simulate it until `until_us`."""
         for data in self._port.receive():
             self._vehicle.receive(data, self._port.datagrams)
         for data in self._line.carry([packet.data for packet in self._vehicle.run_until(until_us)]):
@@ -192,7 +192,7 @@ def run(rides: Sequence[Ride], speed: float) -> NoReturn:
     while True:
         time.sleep(STEP_S)
         now = time.monotonic()
-        # on a machine that is too busy its time stands still, rather than to come in a burst
+        # on a busy machine the simulated time stops, instead of arriving in a burst
         passed_s += min(now - last, LONGEST_STEP_S) * speed
         last = now
         for ride in rides:
@@ -200,7 +200,7 @@ def run(rides: Sequence[Ride], speed: float) -> NoReturn:
 
 
 def main() -> int:
-    """Run it; the exit code."""
+    """Run the vehicle; return the exit code."""
     faults = "\n".join(f"  {name:<16}{kind.what}" for name, kind in fault_kinds(*OF_VEHICLE, Where.HAND).items())
     parser = argparse.ArgumentParser(
         description=__doc__, epilog=f"faults:\n{faults}", formatter_class=argparse.RawDescriptionHelpFormatter

@@ -1,9 +1,9 @@
-"""Recordings of strangers: at which try each is read, its verdict, and |a| of its rests before and after.
+"""Recordings of other people: the try at which each is read, its verdict, and |a| of its rests before and after.
 
 python -m tools.lab strangers recordings/*.csv folder/
 
-A try follows the options that the refusal before it gives. |a| of the rests is beside an ellipsoid that is fitted to
-all rests but one, and judged by this one.
+A try adds the options that the error message before it suggests. |a| of the rests is compared with an ellipsoid that is
+fitted to all rests but one, and judged by that one.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ MOST_TRIES, MOST_LEFT_OUT = 5, 60
 
 @dataclass(frozen=True)
 class Tried:
-    """A recording that was tried.
+    """Result for a recording.
 
     Attributes
     ----------
-    tries : until it was read, 0 if never. verdict : with the model and the reasons. rests : number of its rests.
+    tries : number of tries until it was read, 0 if never. verdict : with model and reasons. rests : their number.
     before, after : rms of |a| - g of the rests, raw and calibrated. left_out : that of an ellipsoid, each rest judged
     by a fit to the others [mm/s^2].
     """

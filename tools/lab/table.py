@@ -25,7 +25,7 @@ def grouped(rows: Iterable[Any], *names: str) -> dict[Any, list[Any]]:
 
 
 def known(rows: Iterable[Any], name: str) -> list[float]:
-    """Return the values of an attribute that are known, of rows that have one or several each."""
+    """Return the known values of an attribute, of which a row may have several."""
     values = [getattr(row, name) for row in rows]
     flat = [each for value in values for each in (value if isinstance(value, tuple) else (value,))]
     return [each for each in flat if not math.isnan(each)]
@@ -49,7 +49,7 @@ def frequencies(values: Iterable[Any], most: int | None = None) -> str:
 def table(groups: Mapping[Any, Sequence[Any]], columns: Mapping[str, Column], title: str | None = None) -> Table:
     """Return a table with a line a group: its name, a tuple in columns of its own, and each column's figure.
 
-    A column that says nothing of any group is left out.
+    A column without any figure is left out.
     """
     cells = {heading: [cell(of(rows)) for rows in groups.values()] for heading, of in columns.items()}
     cells = {heading: texts for heading, texts in cells.items() if any(texts)}

@@ -57,12 +57,12 @@ class Outcome:
 
     @property
     def near(self) -> bool:
-        """Return True if it is good, and as near as it should be; or makes no such claim."""
+        """Return True if the calibration is good and near enough to the truth, or is not called good."""
         return self.verdict != GOOD or (self.offset <= OFFSET_MPS2 and self.scale <= SCALE)
 
 
 def items(asked: Asked) -> list[str]:
-    """Return the words of each seed's vehicle, and of half as many of PX4."""
+    """Return the --mavlink value of each seed's ArduPilot, and of half as many PX4."""
     return [
         words_of(firmware, n)
         for firmware, share in (("ardupilot", 1), ("px4", 2))
@@ -74,7 +74,7 @@ COLUMNS = {"took": over("took"), "offset": over("offset"), "scale": over("scale"
 
 
 def report(outcomes: list[Outcome], asked: Asked) -> int:
-    """Print how many are near and the rms z of all; return 1 where one is not, or claims are wrong."""
+    """Print the number of accurate sessions and the rms z of all; return 1 if one is not, or the claims are wrong."""
     good = [outcome for outcome in outcomes if outcome.verdict == GOOD]
     show(table(grouped(outcomes, "words", "code", "verdict"), COLUMNS))
     z, near = rms(known(good, "z")), sum(outcome.near for outcome in good)
@@ -83,7 +83,7 @@ def report(outcomes: list[Outcome], asked: Asked) -> int:
 
 
 def words_of(firmware: str, n: int) -> str:
-    """Return the words of the n-th vehicle; every second one has been in use."""
+    """Return the --mavlink value of the n-th vehicle; every second one has been in use."""
     used = USED[firmware]
     more = "" if n % 2 == 0 else "," + used[n // 2 % len(used)]
     return f"firmware={firmware},seed={FIRST_SEED + n}{more}"

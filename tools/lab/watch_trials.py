@@ -30,13 +30,13 @@ RATE_HZ = 100.0
 USES = ("pose7", "pose9", "continuous", "wobble30")
 WATCHED = ("nothing", "bias 5 mg", "bias 10 mg", "bias 20 mg")
 PART_S = 5.0
-# a mounting gives in anew about as often as a hand holds the board otherwise
+# a mounting bends anew about as often as the hand takes another orientation
 GIVES_S = 7.0
 
 
 @dataclass(frozen=True)
 class Run:
-    """Hours of use: how many, and which sensor was warned of first, after how long [s]."""
+    """Result of hours of use: their number, and the sensor of the first warning with its time [s]."""
 
     event: str
     seed: int
@@ -45,7 +45,7 @@ class Run:
 
 
 def of_use(item: tuple[str, int], hours: float) -> Run | None:
-    """Watch one sensor for so long; None where its calibration was refused."""
+    """Watch one sensor for `hours`; None if its calibration was refused."""
     event, seed = item
     if (begun := calibrated_and_aged(seed)) is None:
         return None
@@ -62,7 +62,7 @@ def of_use(item: tuple[str, int], hours: float) -> Run | None:
 
 
 def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Iterator[Recording]:
-    """Yield the sensor's samples in parts; nothing is known of what is between one minute and the next."""
+    """Yield the sensor's samples in parts, with gaps between the minutes."""
     begun_s, size = 0.0, round(PART_S * RATE_HZ)
     while begun_s < 3600.0 * hours:
         seed, use = int(rng.integers(2**31)), str(rng.choice(USES))
@@ -77,7 +77,7 @@ def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Ite
 
 
 def minutes_until(runs: Sequence[Run], share: float) -> str:
-    """Return after how many minutes that share of the sensors was warned of; nothing where it never was."""
+    """Return the minutes until a warning for this share of the sensors; empty if there was none."""
     minutes = [run.told[0][1] / 60.0 if run.told else np.inf for run in runs]
     told = float(np.quantile(minutes, share, method="higher"))
     return f"{told:.1f}" if np.isfinite(told) else ""

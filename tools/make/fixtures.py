@@ -39,17 +39,17 @@ from mpucal.terminal.lines import JsonLines
 from . import vectors
 
 FOLDER = Path(__file__).parents[2] / "fixtures"
-# named, so that what `auto` chooses is free to change without them
+# named, so that the choice of `auto` may change without them
 MODEL = "hand"
 FAULTY = Plan(Config(rate_hz=50))
 FAULT_S, END_S = 5.0, 10.0
-# what a person is asked and told, without the dials between
+# outputs that are compared: prompts and decisions, without the progress between them
 SAID = ("prompt", "decision")
 
 
 @dataclass(frozen=True)
 class Script:
-    """A session to be captured: on which simulated chip, how set, and when the person presses Enter.
+    """Session to be captured: the simulated chip, its settings, and when the person presses Enter.
 
     Attributes
     ----------
@@ -78,20 +78,20 @@ class Typist(JsonLines):
         self._pressed: list[Key] = []
 
     def hear(self, output: Output) -> None:
-        """Say it, and perhaps answer."""
+        """Keep the output, and answer it with Enter if the script says so."""
         super().hear(output)
         if isinstance(output, Progress) and self._enter and output.text.startswith(self._enter[0]):
             self._enter.pop(0)
             self._pressed.append(Key.ENOUGH)
 
     def pressed(self) -> Sequence[Key]:
-        """Return what was pressed since the last call."""
+        """Return the keys pressed since the last call."""
         pressed, self._pressed = self._pressed, []
         return pressed
 
 
 def make_session(script: Script, capture: Path) -> dict[str, Any]:
-    """Run it into `capture`, and return what it said and found."""
+    """Run the session into `capture`; return its outputs and its result."""
     source = reopen_source({"bus": script.bus}, Plan(script.config, model=MODEL))
     person = Typist(script.enter)
     with tempfile.TemporaryDirectory() as folder:
@@ -124,7 +124,7 @@ def without_date(dated: Path, capture: Path) -> None:
 
 
 def measured(bus: Bus) -> tuple[Recording, str | None]:
-    """Return what the driver measures on `bus` until ten seconds are over or it gives up, and why it gave up."""
+    """Return the recording of ten seconds on `bus`, or until the driver gives up, and why it gave up."""
     driver = Driver(bus, FAULTY.config)
     try:
         driver.start()
@@ -139,7 +139,7 @@ def measured(bus: Bus) -> tuple[Recording, str | None]:
 
 
 def made_of_it(recording: Recording, why: str | None) -> dict[str, Any]:
-    """Return that as JSON."""
+    """Return the expected result of a recording as JSON."""
     return {
         "samples": len(recording),
         "gaps": int(recording.gap.sum()),
@@ -159,7 +159,7 @@ def make_faults(folder: Path) -> None:
 
 
 def main() -> None:
-    """Make them all."""
+    """Make all fixtures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     for name in ("sessions", "faults"):
         (folder / name).mkdir(parents=True, exist_ok=True)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import grimp
 
+from mpucal.chip.families import FAMILIES
 from mpucal.export.forms import FORMS
 from mpucal.reasons import KINDS, Kind
 from mpucal.result.session_files import SESSION_FILES
@@ -207,6 +208,19 @@ def files() -> str:
     return "\n".join(["| file | what |", "|---|---|", *rows])
 
 
+def chips() -> str:
+    """Return the table of the families of chips."""
+    rows = []
+    for family in FAMILIES:
+        wide = f", {family.widest_fifo_bytes} once ACCEL_CONFIG2 asks for it" if family.widest_fifo_bytes else ""
+        offsets = ", ".join(f"0x{address:02X}" for address in family.accel_offset_h)
+        temperature = f"raw / {family.lsb_per_c:g} + {family.zero_c:g}"
+        parts = ", ".join(f"0x{who_am_i:02X} {chip}" for who_am_i, chip in family.parts)
+        rows.append(_row(family.name, f"{family.fifo_bytes}{wide}", offsets, temperature, parts, family.source))
+    head = "family", "FIFO, bytes", "accelerometer offsets at", "temperature, °C", "WHO_AM_I", "source"
+    return "\n".join([_row(*head), f"|{'---|' * 6}", *rows])
+
+
 def targets() -> str:
     """Return the table of the targets of a session."""
     head = "bias", "scale factor error", "misalignment", "orientations at least", "turning at most", "verified by"
@@ -240,6 +254,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "files": files,
     "sinks": sinks,
     "forms": forms,
+    "chips": chips,
     "keys": keys.table,
 }
 

@@ -26,7 +26,7 @@ from rich.text import Text
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
 BUS = "sim:pace=real,seed=3"
 FLAGS = ("headless", "no-sandbox", "disable-gpu", "disable-background-networking", "disable-sync", "no-first-run")
-# a window has a least width, a frame has none
+# a window has a minimum width, a frame has none
 FRAME = (
     '<body style="margin:0"><iframe style="border:0;width:{width}px;height:{height}px" srcdoc="{page}"></iframe></body>'
 )
@@ -36,7 +36,7 @@ DARK = "@media screen and (prefers-color-scheme: dark)"
 
 
 def chromium() -> str | None:
-    """Return the program, where there is one; the one without windows takes half of the time."""
+    """Return the path of a Chromium, if there is one; the headless shell is twice as fast."""
     return next(filter(None, map(shutil.which, ("chromium-headless-shell", "chromium", "google-chrome"))), None)
 
 
@@ -56,11 +56,11 @@ class Tmux:
         self._tmux("new-session", "-d", "-x", str(columns), "-y", str(rows), shlex.join(words) + "; sleep 9")
 
     def text(self, colours: bool) -> str:
-        """Return what is on it, with escape codes for its colours or without."""
+        """Return the text of the terminal, with or without escape codes for colours."""
         return self._tmux("capture-pane", "-p", *(["-e"] if colours else []))
 
     def close(self) -> None:
-        """End it, and what runs in it."""
+        """End the terminal and the program in it."""
         self._tmux("kill-server")
 
     def _tmux(self, *words: str) -> str:
@@ -69,7 +69,7 @@ class Tmux:
 
 
 def drawing(ansi: str, columns: int, title: str) -> str:
-    """Return the text as SVG, every character in its cell and no font from elsewhere."""
+    """Return the text as SVG, each character in its cell, without external fonts."""
     with Path(os.devnull).open("w") as nowhere:
         console = Console(record=True, width=columns, file=nowhere, force_terminal=True)
         console.print(Text.from_ansi(ansi))
@@ -77,7 +77,7 @@ def drawing(ansi: str, columns: int, title: str) -> str:
 
 
 def screen(folder: Path, size: str, at_s: str) -> None:
-    """Run a simulated session, and take pictures of its screen after so many seconds."""
+    """Run a simulated session, and take pictures of its screen at the given times."""
     columns, rows = (int(number) for number in size.split("x"))
     browser = chromium()
     with tempfile.TemporaryDirectory() as results:
@@ -101,7 +101,7 @@ def report(browser: str, file: Path, folder: Path) -> None:
     """Take pictures of a report in each width and light."""
     light = file.read_text(encoding="utf-8")
     for place, width in WIDTHS.items():
-        # the night's colours by day, as the browser here cannot be told what time it is
+        # replaces the media query of dark colours, which this browser cannot be given
         for name, page in (("light", light), ("dark", light.replace(DARK, "@media all"))):
             target = folder / f"{place}-{name}.png"
             with tempfile.TemporaryDirectory() as place_of_frame:
@@ -112,7 +112,7 @@ def report(browser: str, file: Path, folder: Path) -> None:
 
 
 def main() -> int:
-    """Take all of them."""
+    """Take all pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("report", type=Path, nargs="?", help="a report, in place of a session")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where the pictures go")

@@ -19,15 +19,15 @@ from mkdocs.structure.files import File, Files
 from nbclient import NotebookClient
 
 ROOT = Path(__file__).parents[2]
-# read by people who never see the site, and so at the top of the source tree
+# also read by people without the site, and therefore at the top of the source tree
 OUTSIDE = ("firmware_protocol.md", "CONTRIBUTING.md")
 SCHEMA = "calibration.schema.json"
-# what the theme would fetch so that the search works in pages that are read from a folder, and what does that here
+# script that the theme would fetch for the search in pages opened from a folder, and its local replacement
 SHIM, WORKER = "https://unpkg.com/iframe-worker/shim", "javascripts/worker.js"
 LINK = re.compile(r"\[([^\]]+)\]\(([^)#:]+)(#[^)]*)?\)")
 NOTEBOOK = "notebook"
 TIMEOUT_S = 300
-# of a line that was written over, what stayed
+# the part of a line that was overwritten after a carriage return
 WRITTEN_OVER = re.compile(r"^.*\r(?!\n)", re.MULTILINE)
 # the theme lets a table without a class scroll on a narrow screen
 TABLE = re.compile(r"<table[^>]*>")
@@ -50,7 +50,7 @@ def _notebook(files: Files, config: Any) -> Iterator[str]:
         client = NotebookClient(
             notebook, timeout=TIMEOUT_S, coalesce_streams=True, resources={"metadata": {"path": folder}}
         )
-        client.execute(stderr=subprocess.DEVNULL)  # the kernel says there that it uses TCP
+        client.execute(stderr=subprocess.DEVNULL)  # where the kernel prints that it uses TCP
     for cell in notebook.cells:
         yield cell.source if cell.cell_type == "markdown" else _fenced(cell.source, "python")
         for output in cell.get("outputs", ()):
@@ -94,17 +94,17 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
-    """Show no default where click has none, which mkdocs-click shows by its name."""
+    """Remove the name that mkdocs-click shows for a missing default."""
     return html.replace("<code>Sentinel.UNSET</code>", "")
 
 
 def on_post_page(output: str, page: Any, config: Any) -> str:
-    """Have a page fetch nothing from elsewhere."""
+    """Replace the script that the theme would fetch."""
     return output.replace(SHIM, "../" * page.url.count("/") + WORKER)
 
 
 def on_post_template(output_content: str, template_name: str, config: Any) -> str:
-    """Leave out the theme's page of what is not found: its links begin at a server's root, which no folder has."""
+    """Leave out the theme's 404 page: its links begin at the root of a server, which a folder does not have."""
     return "" if template_name == "404.html" else output_content
 
 

@@ -23,12 +23,12 @@ COMPILED = (
     "mpucal.chip._flips",
     "mpucal.chip._pieces",
 )
-# what an array is besides its type (order, device) is asked for as a call is made; type checkers know none of it
+# order and device of an array are checked at run time, and type checkers know neither
 DETAILS = re.compile(r"Annotated\[(NDArray\[[\w.]+\]), dict\((?:[^()]|\([^)]*\))*\)\]")
 
 
 def stubs() -> Iterator[tuple[Path, str]]:
-    """The path and the text of each stub."""
+    """Yield the path and the text of each stub."""
     for name in COMPILED:
         made = StubGen(import_module(name), include_docstrings=False, quiet=True)
         made.put(made.module)

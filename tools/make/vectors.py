@@ -53,32 +53,32 @@ UNKNOWN = replace(
 )
 APPLIED = replace(MEASURED, who_am_i=0x70, applied_b_a=(0.234375, -0.3671875, 0.8046875))
 SLOPED = replace(MEASURED, b_a_slope=(0.0078125, -0.001953125, 0.015625), temperature_range_c=(10.5, 52.25))
-# one degree each side of the ends, where b_a(T) stays as it is, and one between
+# two a degree outside the range, where b_a(T) is constant, and one inside
 TEMPERATURES_C = (9.5, 40.0, 53.25)
 Y = (0.5, -1.25, 10.5)
 COUNTED = replace(SLOPED, gyro_counts=GYRO_COUNTS)
-# by libraries that divide by the range of 16 bits
+# as of libraries that take 32768 counts as full scale
 COUNTED_OTHERWISE = replace(MEASURED, gyro_counts=32768.0)
-# of the gyroscope
+# counts of the gyroscope
 COUNTS = (3000, -20000, 32767)
 
 
 def sealed(body: bytes, length: int | None = None) -> bytes:
-    """Return `body` with its length and CRC-32 made right; `length` writes another one."""
+    """Return `body` with the right length and CRC-32; `length` : write this length instead."""
     body = bytearray(body)
     struct.pack_into("<H", body, 6, len(body) + 4 if length is None else length)
     return bytes(body) + struct.pack("<I", zlib.crc32(body))
 
 
 def accepted(blob: Blob, data: bytes | None = None) -> tuple[bytes, dict[str, Any]]:
-    """Return a blob and what a reader finds in it; `data` are other bytes that mean the same."""
+    """Return a blob and its content for a reader; `data` : other bytes with the same content."""
     values = {key: plain(value) for key, value in asdict(blob).items() if value is not None}
     content = {"blob": values, "y": list(Y), "a": applied(blob, 0.0), "counts": list(COUNTS), "w": rates(blob)}
     return data or blob.encode(), content | (at_temperatures(blob) if any(blob.b_a_slope) else {})
 
 
 def at_temperatures(blob: Blob) -> dict[str, Any]:
-    """Return what b_a(T) makes of Y."""
+    """Return Y calibrated by b_a(T)."""
     low, high = blob.temperature_range_c
     away = [min(max(T, low), high) - blob.temperature_c for T in TEMPERATURES_C]
     return {"at_c": TEMPERATURES_C, "a_at": [applied(blob, each) for each in away]}
@@ -94,7 +94,7 @@ def applied(blob: Blob, away_c: float) -> list[float]:
 
 
 def rates(blob: Blob) -> list[float]:
-    """Return K (y_omega - b_omega) of COUNTS at the blob's range, 500 deg/s where it says none; rounded once, too."""
+    """Return K (y_omega - b_omega) of COUNTS at the blob's range (default 500 deg/s), also rounded only once."""
     unit = Fraction(math.pi) / 180 * Fraction(blob.gyro_range_dps or 500.0) / Fraction(blob.gyro_counts or GYRO_COUNTS)
     bias = [0.0 if math.isnan(value) else value for value in blob.b_omega]
     y = [count * unit - Fraction(value) for count, value in zip(COUNTS, bias, strict=True)]
@@ -268,11 +268,11 @@ def commit(seq: int, length: int, crc: int = 0x5D9B9255) -> str:
 
 
 def greeting(seq: int, asked: int, found: int) -> str:
-    """Return HELLO and its reply, in which version and address are of meaning."""
+    """Return HELLO and its reply with their version and address."""
     return f"01 {seq} {wire.Hello(address=asked).payload().hex()} > OK {(wire.MAGIC + bytes([1, 0, found])).hex()}"
 
 
-# of each talk what is settled by it, and what it needs
+# talks by name: the rule that each one tests, what it needs of a bridge, and its lines
 TALKS: dict[str, tuple[str, tuple[str, ...], list[str]]] = {
     "fifo_count": ("FIFO_COUNT passes through as it is in the chip, big-endian", ("chip",), [READ]),
     "types_from_0x80": (
@@ -383,8 +383,8 @@ def talks() -> dict[str, dict[str, Any]]:
 
 
 def clock(bits: int) -> dict[str, Any]:
-    """Return a clock's JSON: what one of so many bits shows when it is asked, and `t_us`, which wraps meanwhile."""
-    # hardly less than it counts to
+    """Return the JSON of a clock of `bits` bits: its readings, and `t_us`, which wraps in between."""
+    # steps a little shorter than its period
     passed_us = [i * (2**bits - 3) for i in range(6)]
     return {
         "settled": "a clock that is narrower than 32 bits is extended to them",
@@ -400,7 +400,7 @@ def slots(*generations: int) -> bytes:
     return b"".join(seal + MEASURED.encode().ljust(256, b"\0") for seal in seals)
 
 
-# MicroPython's has 30; others have a timer of 24
+# MicroPython's clock has 30 bits, other boards have a timer of 24
 CLOCK_BITS = (24, 30)
 SLOTS = {"wrapped": (2**32 - 1, 1), "before_the_wrap": (2**32 - 2, 2**32 - 1), "half_way": (2**31, 1)}
 

@@ -24,7 +24,7 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.sources.tap import Tap
 from tools.lab import session_trials as trials
-from tools.lab.sessions import NOTHING, Ear, Session, by_command, ended_of
+from tools.lab.sessions import NOTHING, Session, SilentOperator, by_command, judge_session
 from tools.processes import quick
 
 FAULTS = tuple(fault_kinds(*OF_CHIP))
@@ -45,7 +45,7 @@ def recorded(words):
     bus, accesses, said = open_simulated(words), [], ""
     tapped = Tap(bus, SimpleNamespace(transaction=accesses.append))
     try:
-        Runner(Driver(tapped, plan.config), Ear(), lambda *_: None, plan, (bus.hear,)).record(RECORDED_S)
+        Runner(Driver(tapped, plan.config), SilentOperator(), lambda *_: None, plan, (bus.hear,)).record(RECORDED_S)
     except SourceError as error:
         said = str(error)
     try:
@@ -63,7 +63,7 @@ def judged(faults, seed, record=False):
     else:
         with quick():
             done, _ = by_command("--bus", words, "--rate", "25", "--target", "quick", "--model", "accel")
-    ended = ended_of("", seed, done, "" if done.code in CODES else f"exit code {done.code}")
+    ended = judge_session("", seed, done, "" if done.code in CODES else f"exit code {done.code}")
     assert not ended.wrong, (faults, seed, ended)
     assert ended.verdict != GOOD or max(map(abs, ended.z)) <= FARTHEST_Z, (faults, seed, ended)
     assert ended.verdict != NOTHING or ended.said
