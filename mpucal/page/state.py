@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
-from ..session.boards import flat_caption
+from ..session.boards import KINDS
 from ..session.events import Knowledge
 from ..terminal.lines import plain
 from ..terminal.view import View
@@ -25,7 +25,7 @@ def state(view: View, said: Said | None = None) -> dict[str, Any]:
         "prompt": view.prompt,
         "said": said,
         "confirming": view.confirming,
-        "flat": flat_caption(view.board),
+        "flat": KINDS[view.board].picture,
         "meter": view.meter,
         "countdown": view.waiting,
         "progress": view.progress,

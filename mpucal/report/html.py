@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from datetime import datetime
-from types import MappingProxyType
 
 import numpy as np
 
@@ -42,14 +42,13 @@ VERDICTS = {
     USABLE: "Usable, with the reservations below.",
     REFUSED: "Refused: do not use these parameters.",
 }
-_NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 def render(calibration: Calibration, recording: Recording | None = None) -> str:
     """Return the report of a calibration; with its recording, it includes pictures. Collapsed parts are not printed."""
-    track = _track(calibration, recording)
-    drawn = _NOTHING if track is None else gallery(track)
-    no_pictures = recording is not None and track is None
+    no_pictures = recording is not None and not sections.is_regular(calibration)
+    track = None if recording is None or no_pictures else Track(recording, calibration)
+    drawn: Mapping[str, str] = defaultdict(str) if track is None else gallery(track)
     body = (
         _verdict(calibration, recording),
         first(sections.other_uses(calibration), sections.accelerometer_section(calibration)),
@@ -58,13 +57,13 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
             "At rest, before and after",
             _magnitudes(track),
             paragraph("D cannot be inverted, so there are no pictures.", note=True) if no_pictures else "",
-            pair(*_select(drawn, "sphere", "residuals")),
+            pair(drawn["sphere"], drawn["residuals"]),
         ),
-        section("Orientations and motion", pair(*_select(drawn, "coverage", "innovations"))),
+        section("Orientations and motion", pair(drawn["coverage"], drawn["innovations"])),
         sections.vehicle_section(calibration),
         details("The formula", sections.formula(calibration)),
-        details("The gyroscope", sections.gyroscope_table(calibration), *_select(drawn, "rates")),
-        details("Over time", *_select(drawn, "magnitude", "temperature")),
+        details("The gyroscope", sections.gyroscope_table(calibration), drawn["rates"]),
+        details("Over time", drawn["magnitude"], drawn["temperature"]),
         details("How to apply it", _application(calibration)),
         details("Sensor and settings", _settings(calibration, recording)),
         details("Parameters in calibration.json", sections.matrices(calibration)),
@@ -104,11 +103,6 @@ def _verdict(calibration: Calibration, recording: Recording | None) -> str:
     return f"{said}{listed}{sections.next_step(calibration)}{recovered}"
 
 
-def _track(calibration: Calibration, recording: Recording | None) -> Track | None:
-    """Return the recording with its calibration; None without a recording, or if D cannot be inverted."""
-    return None if recording is None or not sections.is_regular(calibration) else Track(recording, calibration)
-
-
 def _magnitudes(track: Track | None) -> str:
     """Return a table of |a| of the rests before and after; empty if there are no rests."""
     if track is None or not len(track.runs):
@@ -119,10 +113,6 @@ def _magnitudes(track: Track | None) -> str:
         rows.append([name, *(number(f(of_rests), 4) for f in (np.median, np.mean, np.std))])
     caption = f"|a| of {len(track.runs)} rests, m/s²; gravity is {track.gravity:.6g}"
     return table("magnitudes", caption, ["", "median", "mean", "standard deviation"], rows)
-
-
-def _select(drawn: Mapping[str, str], *names: str) -> list[str]:
-    return [drawn[name] for name in names if name in drawn]
 
 
 def _application(calibration: Calibration) -> str:

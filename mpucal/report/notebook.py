@@ -96,9 +96,9 @@ def _parameters(calibration: Calibration) -> Figure:
 
 def _values(axes: Axes, rows: Sequence[ParameterRow], sheet: Family | None) -> None:
     """Plot rows of one unit over the tolerance of the data sheet."""
-    name, *_ = rows[0].name.split(" x->")
     which = [(row, i) for row in rows for i in range(3) if AXES[i] in row.axes]
-    x = [row.name.split()[-1] if len(row.axes) == 1 else AXES[i] for row, i in which]
+    # A misalignment is named by both of its axes.
+    x = [f"{AXES[i]} to {row.name[-1]}" if len(rows) > 1 else AXES[i] for row, i in which]
     if sheet is not None:
         allowed = np.array([tolerance(row, sheet)[i] for row, i in which])
         axes.bar(x, 2.0 * allowed, bottom=-allowed, color="0.9", label="data sheet")
@@ -107,7 +107,7 @@ def _values(axes: Axes, rows: Sequence[ParameterRow], sheet: Family | None) -> N
     axes.axhline(0.0, color="black", linewidth=0.8)
     values, std = ([getattr(row, of)[i] for row, i in which] for of in ("value", "std"))
     axes.errorbar(x, values, std, fmt="o", capsize=4.0)
-    axes.set_title(f"{name} [{rows[0].unit}]")
+    axes.set_title(f"{rows[0].name.partition(' to ')[0]} [{rows[0].unit}]")
 
 
 def _before_and_after(track: Track) -> Figure:

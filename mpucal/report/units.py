@@ -44,7 +44,7 @@ class ParameterRow:
 def accelerometer(c: Calibration) -> list[ParameterRow]:
     """Return scale factor error, bias and misalignments of the accelerometer."""
     bias = ParameterRow("bias", "mg", error_model.bias_mg(c.b_a), error_model.bias_mg(c.b_a_std))
-    return [_scale_factor_error(c.D, c.D_std), bias, *_misalignments(c.D, c.D_std)]
+    return _rows(c.D, c.D_std, bias)
 
 
 def gyroscope(c: Calibration) -> list[ParameterRow]:
@@ -53,21 +53,18 @@ def gyroscope(c: Calibration) -> list[ParameterRow]:
     matrix = np.asarray(np.linalg.inv(c.K)) if known else unknown(3, 3)
     # for K near the identity, the standard deviations of inv(K) are those of K to first order
     bias = ParameterRow("bias", "deg/s", np.degrees(c.b_omega), np.degrees(c.b_omega_std))
-    return [_scale_factor_error(matrix, c.K_std), bias, *_misalignments(matrix, c.K_std)]
+    return _rows(matrix, c.K_std, bias)
 
 
-def _scale_factor_error(matrix: Vector, std: Vector) -> ParameterRow:
-    value = error_model.scale_factor_error(matrix)
-    return ParameterRow("scale factor error", "%", value, error_model.scale_factor_error_std(std))
-
-
-def _misalignments(matrix: Vector, std: Vector) -> list[ParameterRow]:
-    """Return three rows, each with the angles of the other two axes towards one axis."""
+def _rows(matrix: Vector, std: Vector, bias: ParameterRow) -> list[ParameterRow]:
+    """Return scale factor error, bias, and three rows, each with the angles of the other two axes towards one axis."""
+    gain, gain_std = error_model.scale_factor_error(matrix), error_model.scale_factor_error_std(std)
     angle, angle_std = error_model.misalignment(matrix), error_model.misalignment_std(matrix, std)
-    return [
+    misalignments = [
         ParameterRow(f"misalignment to {other}", "deg", angle[:, j], angle_std[:, j], AXES.replace(other, ""))
         for j, other in enumerate(AXES)
     ]
+    return [ParameterRow("scale factor error", "%", gain, gain_std), bias, *misalignments]
 
 
 def with_std(value: float, std: float, most_digits: int = 5) -> str:

@@ -24,7 +24,7 @@ TILTED = 0.15
 
 
 @dataclass(frozen=True)
-class _Kind:
+class Kind:
     """Words for a kind of board.
 
     Attributes
@@ -41,27 +41,27 @@ class _Kind:
 
 
 _EDGES = {"+X": "right edge", "−X": "left edge", "+Y": "far edge", "+Z": "chip face", "−Z": "back"}
-_KINDS = {
-    BOARD: _Kind(
+KINDS = {
+    BOARD: Kind(
         "Lay the board flat",
         {**_EDGES, "−Y": "pin edge"},
         ("Chip up, pins toward you", "Chip down, pins away from you"),
         "flat: the chip up, the pins toward you",
     ),
-    PLAIN: _Kind(
+    PLAIN: Kind(
         "Lay the board flat",
         {**_EDGES, "−Y": "near edge"},
         ("Chip up, +Y away from you", "Chip down, +Y toward you"),
         "flat: the chip up",
     ),
-    VEHICLE: _Kind(
+    VEHICLE: Kind(
         "Put the vehicle on its feet",
         {"+X": "nose", "−X": "tail", "+Y": "right side", "−Y": "left side", "+Z": "underside", "−Z": "top"},
         ("Upside down, nose to the right", "On its feet, nose to the right"),
         "level, on its feet",
     ),
 }
-BOARDS = tuple(_KINDS)
+BOARDS = tuple(KINDS)
 
 
 def usual_board(origin: Origin) -> str:
@@ -73,17 +73,7 @@ def flat_description(down: Direction, board: str) -> str:
     """Return the question to confirm for a `board` whose unit vector `down` points down."""
     if abs(down[2]) < LIES:
         return "It is tilted now."
-    return f"{_KINDS[board].flat[down[2] > 0.0]}? Then leave it. If not, turn it."
-
-
-def flat_caption(board: str) -> str:
-    """Return the caption of the picture of a `board` that lies flat."""
-    return _KINDS[board].picture
-
-
-def lay_flat(board: str) -> str:
-    """Return the request to lay a `board` flat, without the place."""
-    return _KINDS[board].lay
+    return f"{KINDS[board].flat[down[2] > 0.0]}? Then leave it. If not, turn it."
 
 
 def speak_of(output: T, board: str) -> T:
@@ -98,7 +88,7 @@ def speak_of(output: T, board: str) -> T:
 def describe(down: Direction, board: str) -> str:
     """Describe the orientation of a `board` whose unit vector `down` points down: "on its left edge (−X)"."""
     axes = named_axes(down)
-    words = (_stand if board == VEHICLE else _lean)(axes, _KINDS[board].parts)
+    words = (_stand if board == VEHICLE else _lean)(axes, KINDS[board].parts)
     return f"{words} ({' '.join(axes)})"
 
 
@@ -108,7 +98,7 @@ def describe_tilt(down: Direction, board: str) -> str:
     axes = [axis for axis in named_axes(down, TILTED) if axis[1] != AXES[level]]
     if not axes:
         return "level"
-    return f"lower at its {' and '.join(_KINDS[board].parts[axis] for axis in axes)} ({' '.join(axes)})"
+    return f"lower at its {' and '.join(KINDS[board].parts[axis] for axis in axes)} ({' '.join(axes)})"
 
 
 def _lean(axes: list[str], parts: Mapping[str, str]) -> str:

@@ -8,7 +8,7 @@ from ..data import Samples
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import Windows
-from .boards import BOARD, lay_flat
+from .boards import BOARD, KINDS
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
 from .step import SAY_AGAIN_S, Step
 
@@ -51,7 +51,7 @@ class LayFlat(Step):
 
     def __init__(self, patient: bool = False, board: str = BOARD) -> None:
         self._patient = patient
-        lay = lay_flat(board)
+        lay = KINDS[board].lay
         text = f"{lay} on a firm surface, let go of it, and leave it still for {FLAT_S:.0f} s."
         self.prompt = Prompt(PromptKind.LAY_FLAT, text)
         self._windows = Windows(WINDOW_S)

@@ -16,27 +16,21 @@ class Source(Protocol):
 
     def start(self) -> Sensor:
         """Set the sensor up, and start to measure."""
-        ...
 
     def poll(self) -> Samples:
         """Wait a little, and return the samples that came meanwhile; EndOfCapture if no more will come."""
-        ...
 
     def recording(self) -> Recording:
         """Return all samples so far, with their final times."""
-        ...
 
     def forget(self) -> None:
         """Drop all samples so far, so that memory lasts for hours."""
-        ...
 
     def now_ns(self) -> int:
         """Return the time of the clock that the samples' times are in."""
-        ...
 
     def stop(self) -> None:
         """Stop measuring, and put the sensor to rest."""
-        ...
 
 
 def polled(source: Source, seconds: float | None = None) -> Iterator[Samples]:
@@ -56,11 +50,9 @@ class Operator(Protocol):
 
     def hear(self, output: Output) -> None:
         """Show an output."""
-        ...
 
     def pressed(self) -> Sequence[Key]:
         """Return the keys that were pressed since the last call; never waits."""
-        ...
 
 
 class ReplayedOperator:

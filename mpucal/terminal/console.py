@@ -22,23 +22,18 @@ class Console(Protocol):
 
     def hear(self, output: Output) -> None:
         """Show an output."""
-        ...
 
     def say(self, text: str) -> None:
         """Show a message."""
-        ...
 
     def pressed(self) -> Sequence[Key]:
         """Return the keys that were pressed since the last call; never waits."""
-        ...
 
     def listening(self) -> AbstractContextManager[None]:
         """Show the session, and accept keys, Ctrl-C among them, within the context."""
-        ...
 
     def hung_up(self, stop: bool) -> None:
         """Handle a terminal that was closed; with `stop`, as if Ctrl-C was pressed."""
-        ...
 
 
 def console(

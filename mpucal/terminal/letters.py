@@ -2,55 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 ROWS = 5
 WIDTH, GAP = 5, 1
 # Rows of two lines of letters of half the height, with a gap between them.
 TWO_ROWS = 6
 _HALVES = {"  ": " ", "# ": "▀", " #": "▄", "##": "█"}
-_UNKNOWN = " ### /#   #/  ## /     /  #  "
-_LETTERS = {
-    " ": "     /     /     /     /     ",
-    "A": " ### /#   #/#####/#   #/#   #",
-    "B": "#### /#   #/#### /#   #/#### ",
-    "C": " ####/#    /#    /#    / ####",
-    "D": "#### /#   #/#   #/#   #/#### ",
-    "E": "#####/#    /#### /#    /#####",
-    "F": "#####/#    /#### /#    /#    ",
-    "G": " ####/#    /#  ##/#   #/ ####",
-    "H": "#   #/#   #/#####/#   #/#   #",
-    "I": "#####/  #  /  #  /  #  /#####",
-    "J": "  ###/    #/    #/#   #/ ### ",
-    "K": "#  # /# #  /##   /# #  /#  # ",
-    "L": "#    /#    /#    /#    /#####",
-    "M": "#   #/## ##/# # #/#   #/#   #",
-    "N": "#   #/##  #/# # #/#  ##/#   #",
-    "O": " ### /#   #/#   #/#   #/ ### ",
-    "P": "#### /#   #/#### /#    /#    ",
-    "Q": " ### /#   #/# # #/#  # / ## #",
-    "R": "#### /#   #/#### /#  # /#   #",
-    "S": " ####/#    / ### /    #/#### ",
-    "T": "#####/  #  /  #  /  #  /  #  ",
-    "U": "#   #/#   #/#   #/#   #/ ### ",
-    "V": "#   #/#   #/#   #/ # # /  #  ",
-    "W": "#   #/#   #/# # #/## ##/#   #",
-    "X": "#   #/ # # /  #  / # # /#   #",
-    "Y": "#   #/ # # /  #  /  #  /  #  ",
-    "Z": "#####/   # /  #  / #   /#####",
-    "0": " ### /#  ##/# # #/##  #/ ### ",
-    "1": "  #  / ##  /  #  /  #  /#####",
-    "2": "#### /    #/ ### /#    /#####",
-    "3": "#### /    #/ ### /    #/#### ",
-    "4": "#  # /#  # /#####/   # /   # ",
-    "5": "#####/#    /#### /    #/#### ",
-    "6": " ### /#    /#### /#   #/ ### ",
-    "7": "#####/   # /  #  / #   /#    ",
-    "8": " ### /#   #/ ### /#   #/ ### ",
-    "9": " ### /#   #/ ####/    #/ ### ",
-    ",": "     /     /     /  #  / #   ",
-    ":": "     /  #  /     /  #  /     ",
-    "+": "     /  #  /#####/  #  /     ",
-    "-": "     /     /#####/     /     ",
-}
+# Blocks of letters: their names, and five rows of pictures, one column apart.
+_SHEET = """
+ABCDEFGHIJKLMN
+ ###  ####   #### ####  ##### #####  #### #   # #####   ### #  #  #     #   # #   #
+#   # #   # #     #   # #     #     #     #   #   #       # # #   #     ## ## ##  #
+##### ####  #     #   # ####  ####  #  ## #####   #       # ##    #     # # # # # #
+#   # #   # #     #   # #     #     #   # #   #   #   #   # # #   #     #   # #  ##
+#   # ####   #### ####  ##### #      #### #   # #####  ###  #  #  ##### #   # #   #
+
+OPQRSTUVWXYZ01
+ ###  ####   ###  ####   #### ##### #   # #   # #   # #   # #   # #####  ###    #
+#   # #   # #   # #   # #       #   #   # #   # #   #  # #   # #     #  #  ##  ##
+#   # ####  # # # ####   ###    #   #   # #   # # # #   #     #     #   # # #   #
+#   # #     #  #  #  #      #   #   #   #  # #  ## ##  # #    #    #    ##  #   #
+ ###  #      ## # #   # ####    #    ###    #   #   # #   #   #   #####  ###  #####
+
+23456789,:+-
+####  ####  #  #  #####  ###  #####  ###   ###
+    #     # #  #  #     #        #  #   # #   #         #     #
+ ###   ###  ##### ####  ####    #    ###   ####             ##### #####
+#         #    #      # #   #  #    #   #     #   #     #     #
+##### ####     #  ####   ###  #      ###   ###   #
+"""
+_SPACE, _UNKNOWN = [" " * WIDTH] * ROWS, [" ### ", "#   #", "  ## ", "     ", "  #  "]
+
+
+def _cut(sheet: str) -> Iterator[tuple[str, list[str]]]:
+    """Yield the name and the rows of each letter."""
+    for block in sheet.strip("\n").split("\n\n"):
+        names, *rows = block.split("\n")
+        for k, name in enumerate(names):
+            first = k * (WIDTH + GAP)
+            yield name, [row[first : first + WIDTH].ljust(WIDTH) for row in rows]
+
+
+_LETTERS = {" ": _SPACE, **dict(_cut(_SHEET))}
 
 
 def width(text: str, scale: int = 1) -> int:
@@ -60,7 +54,7 @@ def width(text: str, scale: int = 1) -> int:
 
 def large(text: str, block: str, scale: int = 1) -> list[str]:
     """Return ROWS * scale rows of `block` and spaces that show `text`."""
-    letters = [_LETTERS.get(letter, _UNKNOWN).split("/") for letter in text.upper()]
+    letters = [_LETTERS.get(letter, _UNKNOWN) for letter in text.upper()]
     rows = []
     for k in range(ROWS):
         row = (" " * GAP).join(letter[k] for letter in letters)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 from ..session.boards import BOARD, flat_description
 from ..session.events import (
@@ -92,18 +93,11 @@ class View:
                 return self._prompted(output)
             case Decision(why, _):
                 return self.noted(why)
-            case Meter():
-                view = replace(self, meter=output)
-            case Countdown():
-                view = replace(self, countdown=output)
+            case Meter() | Countdown() | Progress() | Knowledge() | Caution():
+                latest: dict[str, Any] = {type(output).__name__.lower(): output}
+                view = replace(self, **latest)
             case Held():
                 view = replace(self, held=output, countdown=None)
-            case Progress():
-                view = replace(self, progress=output)
-            case Knowledge():
-                view = replace(self, knowledge=output)
-            case Caution():
-                view = replace(self, caution=output)
             case Seen():
                 # When the turning starts again, the numbers do as well.
                 kept = tuple(s for s in self.seen if s.paused != output.paused or s.number < output.number)

@@ -77,7 +77,9 @@ def test_the_figures_hold_the_data(recording, calibration):
 
 def test_the_figure_of_a_calibration_holds_its_parameters(calibration):
     pytest.importorskip("matplotlib")
-    drawn = [value for axes in calibration.plot().axes for value in axes.containers[-1].lines[0].get_ydata()]
+    panels = calibration.plot().axes
+    assert [len(axes.get_xticklabels()) for axes in panels] == [3, 3, 6]
+    drawn = [value for axes in panels for value in axes.containers[-1].lines[0].get_ydata()]
     rows = accelerometer(calibration)
     assert drawn == [value for row in rows for value, cell in zip(row.value, row.cells, strict=True) if cell]
 

@@ -21,11 +21,9 @@ class Worker(Protocol):
 
     def submit(self, task: Task) -> Future[Event | None]:
         """Queue a task; never waits."""
-        ...
 
     def close(self) -> None:
         """Stop, and drop the tasks that are not done."""
-        ...
 
 
 class InlineWorker:
