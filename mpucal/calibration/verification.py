@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -79,18 +80,21 @@ def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float,
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))
     return [
-        _Transition(recording, flat, long[k - 1], long[k]).verify(fit, gravity) for k in range(max(first, 1), len(long))
+        _Transition(recording, flat, fit, long[k - 1], long[k]).verify(gravity) for k in range(max(first, 1), len(long))
     ]
 
 
 class _Transition:
     """Transition from one rest to the next: their means, and the gyroscope's steps between them."""
 
-    def __init__(self, recording: Recording, flat: Flat, start: tuple[int, int], end: tuple[int, int]) -> None:
+    def __init__(
+        self, recording: Recording, flat: Flat, fit: Fit, start: tuple[int, int], end: tuple[int, int]
+    ) -> None:
         (a, b), (c, d) = start, end
-        r, between = recording, slice(b - 1, c + 1)
-        self.z, self.z_var = _mean(r.acc[a:b], r.rate_hz)
-        self.y, self.y_var = _mean(r.acc[c:d], r.rate_hz)
+        r, between, self._fit = recording, slice(b - 1, c + 1), fit
+        # An arm sways as it rests: its readings are carried to the sample where the turn begins, or ends.
+        self.z, self.z_var = _mean(carried(r, flat, fit, slice(a, b), -1), r.rate_hz)
+        self.y, self.y_var = _mean(carried(r, flat, fit, slice(c, d), 0), r.rate_hz)
         dt = np.diff(r.t[between])
         rates = 0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega
         late = np.where(dt > LONG / r.rate_hz, dt - 1.0 / r.rate_hz, 0.0)
@@ -100,8 +104,9 @@ class _Transition:
         noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
         self.gyro_var = 2.0 * noise + (LEAP_RAD**2 if _leaps(r.gyr[between], dt) else 0.0)
 
-    def verify(self, fit: Fit, gravity: float) -> NewOrientation:
-        """Compare the rest at its end with a fit."""
+    def verify(self, gravity: float) -> NewOrientation:
+        """Compare the rest at its end with the fit."""
+        fit = self._fit
         theta, covariance = _theta(fit)
         s, miss = self._end(theta), self._miss(theta)
         of_length = _slope(lambda x: np.array([np.linalg.norm(self._end(x))]), theta)
@@ -131,6 +136,26 @@ class _Transition:
         """Return the sine (3,) of the angle from gravity as carried to its end to gravity there, along its axis."""
         F = turned(-(self.steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
         return np.cross(_unit(F @ _calibrated(theta, self.z)), _unit(self._end(theta)))
+
+
+class Known(Protocol):
+    """Errors of a sensor that are known: D, K (3, 3) and b_a (3,)."""
+
+    @property
+    def D(self) -> Vector: ...  # noqa: D102, N802 - the paper's letter
+    @property
+    def b_a(self) -> Vector: ...  # noqa: D102
+    @property
+    def K(self) -> Vector: ...  # noqa: D102, N802
+
+
+def carried(recording: Recording, flat: Flat, known: Known, rest: slice, to: int) -> Vector:
+    """Return the readings (n, 3) of a rest as they are in the axes of its sample number `to`; a rest turns little."""
+    acc = recording.acc[rest]
+    steps = np.gradient(recording.t[rest])[:, None] * ((recording.gyr[rest] - flat.b_omega) @ known.K.T)
+    path = np.cumsum(steps, axis=0)
+    s = np.linalg.solve(known.D, (acc - known.b_a).T).T
+    return np.asarray(acc + np.cross(path - path[to], s) @ known.D.T)
 
 
 def _leaps(gyr: Vector, dt: Vector) -> bool:

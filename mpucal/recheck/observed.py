@@ -16,13 +16,14 @@ rest; and the logarithm of its noise, relative to the calibration's, unless a ha
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..calibration.masks import with_masks
 from ..calibration.rotation import cross, turned
-from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S
+from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S, carried
 from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import Intervals, RestFinder, remove_drift
@@ -109,7 +110,12 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
     known = bool(np.isfinite(T).any())
     has_rates = bool(np.isfinite(recording.gyr).all())
     mended = remove_drift(recording, flat, found.bias_runs(runs)) if has_rates else recording
-    rests = _Rests(mended, runs, calibration, float(np.nanmean(T)) if known else None)
+    # A hand sways as it rests: its readings are carried to the middle of the rest, from where turns are compared.
+    readings = [
+        carried(mended, flat, calibration, slice(a, b), (b - a) // 2) if has_rates else mended.acc[a:b]
+        for a, b in runs.tolist()
+    ]
+    rests = _Rests(mended, runs, readings, calibration, float(np.nanmean(T)) if known else None)
     parts = [_Residuals.magnitude(rests, k, gravity) for k in range(len(runs))]
     turns = (_Residuals.direction(rests, k, flat, calibration) for k in range(1, len(runs) if has_rates else 1))
     parts += [turn for turn in turns if turn is not None]
@@ -126,19 +132,23 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
 class _Rests:
     """Calibrated means `a` (k, 3) of the rests, their unit vectors and norms, and the covariance (3 k, 3 k) of `a`."""
 
-    def __init__(self, recording: Recording, runs: Intervals, calibration: Calibration, temperature_c: float | None):
+    def __init__(
+        self,
+        recording: Recording,
+        runs: Intervals,
+        readings: Sequence[Vector],
+        calibration: Calibration,
+        temperature_c: float | None,
+    ) -> None:
         self.recording, self.runs, self.temperature_c = recording, runs, temperature_c
         A = calibration.inverse
-        means = np.array([recording.acc[a:b].mean(0) for a, b in runs])
-        self.a = calibration.apply(means, temperature_c=temperature_c)
+        means = [acc.mean(0) for acc in readings]
+        self.a = calibration.apply(np.array(means), temperature_c=temperature_c)
         self.norm = np.linalg.norm(self.a, axis=1)
         self.unit = self.a / self.norm[:, None]
         shortest = max(round(BLOCK_S * recording.rate_hz), 1)
         sizes = np.maximum((runs[:, 1] - runs[:, 0]) // BLOCKS, shortest).tolist()
-        own = [
-            recording.acc[a : a + (b - a) // n * n].reshape(-1, n, 3).mean(1)
-            for (a, b), n in zip(runs, sizes, strict=True)
-        ]
+        own = [acc[: len(acc) // n * n].reshape(-1, n, 3).mean(1) for acc, n in zip(readings, sizes, strict=True)]
         counts = np.array([len(block) for block in own])
         variances = np.array([block.var(0, ddof=1).mean() for block in own])
         others = variances[1:].mean() if len(runs) > 1 else variances[0]

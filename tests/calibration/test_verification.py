@@ -24,15 +24,17 @@ KNOWN = Fit(
 )
 
 
-def turned(turn_s, missing_deg, message=None, late=()):
+def turned(turn_s, missing_deg, message=None, late=(), sway_deg=0.0):
     """Return the verification by a rest, a quarter turn about x at a constant rate, and a rest.
 
     Parameters
     ----------
     late : samples of the turn whose times are late by a period, as are all after them.
+    sway_deg : by which the board turns on, slowly, as it rests the second time.
     """
     n_rest, n_turn = round(REST_S * HZ), round(turn_s * HZ)
-    rate = np.concatenate([np.zeros(n_rest), np.full(n_turn, 0.5 * np.pi / turn_s), np.zeros(n_rest)])
+    sways = np.radians(sway_deg) / REST_S * (1.0 - np.cos(2 * np.pi * np.arange(n_rest) / n_rest))
+    rate = np.concatenate([np.zeros(n_rest), np.full(n_turn, 0.5 * np.pi / turn_s), sways])
     angle = np.cumsum(rate) / HZ
     rng = np.random.default_rng(1)
     acc = G * np.column_stack([0 * angle, np.sin(angle), np.cos(angle)]) + rng.normal(0, 0.01, (len(angle), 3))
@@ -53,6 +55,14 @@ def test_a_leap_is_carried_less_well_than_a_hands_turn(turn_s, missing_deg, agre
     rest = turned(turn_s, missing_deg)
     assert np.degrees(rest.direction) == pytest.approx(missing_deg, abs=0.1)
     assert rest.agrees == agrees
+
+
+def test_an_arm_that_sways_as_it_rests_is_followed():
+    """The mean of the rest is half a degree from where the turn ended."""
+    rest = turned(1.5, 0.0, sway_deg=1.0)
+    assert np.degrees([rest.direction, rest.direction_std]) == pytest.approx([0.0, 0.07], abs=0.05)
+    assert rest.agrees
+    assert not turned(1.5, 1.0, sway_deg=1.0).agrees
 
 
 def test_a_vehicles_samples_that_come_late_do_not_speak_against_the_calibration():
