@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 
 import pytest
 
@@ -25,6 +26,8 @@ WATCH = """() => {
 DRAWN = """([look, number]) =>
     document.body.dataset.look === look && document.querySelector("#number").textContent === number"""
 
+MARKED = "(transform) => document.querySelector('#way').getAttribute('transform') === transform"
+
 
 def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
     view, old = View(), {}
@@ -42,6 +45,14 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
         show()
         tab.wait_for_function(DRAWN, arg=[look, number])
         assert tab.inner_text("#headline") == headline
+        if look == "turn":
+            assert tab.get_attribute("#way", "transform") == "rotate(-90)"
+    # Half a turn ends alike both ways round: the mark points where the words say.
+    for words, degrees in (("tip it away from you", 0), ("tip it toward you", 180)):
+        turned_over = {"t_s": 20.0, "missing_deg": 179.0, "wanted": (0.0, 1.0, 0.0, 0.0)}
+        view = view.after(replace(view.meter, turn=f"180 deg more, {words}", **turned_over))
+        show()
+        tab.wait_for_function(MARKED, arg=f"rotate({degrees})")
     against = Reason("few_orientations", "too few orientations", "turn it more", refuse=True)
     show(verdict="refused", reasons=[against.document()])
     tab.wait_for_selector("#reasons li")

@@ -6,6 +6,8 @@ import * as sound from "./sound.js";
 const $ = (id) => document.getElementById(id);
 // The attitude comes four times a second; the animation takes a little less.
 const MOVE_MS = 230;
+// From this angle [rad] on a turn the other way round is about as short.
+const NEARLY_ROUND = 2.6;
 // The server sends at least every two seconds: after this silence the connection counts as lost.
 const SILENCE_MS = 5000, REOPEN_MS = 1500;
 const VERDICTS = {
@@ -134,7 +136,7 @@ function task() {
   put("step", done ? "" : state.confirming || (state.count ?? ""));
   put("number", number ?? "");
   $("arc").setAttribute("stroke-dasharray", `${Math.max(0, Math.min(100, 100 * share))} 100`);
-  if (look === "turn") $("way").setAttribute("transform", `rotate(${wayDegrees()})`);
+  if (look === "turn") $("way").setAttribute("transform", `rotate(${Math.atan2(...said()) * 180 / Math.PI})`);
 }
 
 // Returns the form of the dial, the drawn share of its ring, and its number.
@@ -161,10 +163,17 @@ function promptWords() {
   return prompt?.text ?? "";
 }
 
-// Returns the direction in which the top turns, clockwise from "away from you".
-function wayDegrees() {
-  const [x, y] = turn(state.meter.attitude, state.meter.wanted);
-  return Math.atan2(y, -x) * 180 / Math.PI;
+// Returns the direction in which the top is said to turn: to the right, and away from the person.
+function said() {
+  const words = state.meter.turn, has = (word) => Number(words.includes(word));
+  return [has("right") - has("left"), has("away") - has("toward")];
+}
+
+// Returns the turn to the wanted attitude. Near half a turn both ways round are about as short, and the words decide.
+function way(attitude) {
+  const rotation = turn(attitude, state.meter.wanted), angle = Math.hypot(...rotation), [right, away] = said();
+  const against = right * rotation[1] - away * rotation[0] < 0;
+  return against && angle > NEARLY_ROUND ? rotation.map((v) => v * (1 - 2 * Math.PI / angle)) : rotation;
 }
 
 function caution() {
@@ -269,7 +278,7 @@ function frame(t) {
   seenFrom.turn += k * (view.turn - seenFrom.turn);
   seenFrom.tilt += k * (view.tilt - seenFrom.tilt);
   if (!$("pictures").hidden) {
-    drawBoard(now, state.board, attitude, seenFrom, goes && state.meter?.wanted ? turn(attitude, goes) : null);
+    drawBoard(now, state.board, attitude, seenFrom, goes && state.meter?.wanted ? way(attitude) : null);
     if (goes) drawBoard(goal, state.board, goes, seenFrom);
   }
   if (!$("ball-figure").hidden) drawBall(ball, attitude, state.seen ?? [], state.verdict ? null : target());
