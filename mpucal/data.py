@@ -35,7 +35,7 @@ GYRO_COUNTS = 32750.0
 ACCEL_RANGES_G, GYRO_RANGES_DPS = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000)
 # names are exported to scripts and source code: these characters cannot end a string or comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
-# a longer time between two samples than so many intervals is a gap
+# a time between two samples that is longer than this number of intervals is a gap
 GAP_INTERVALS = 2.5
 BYTE = 0xFF
 MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")

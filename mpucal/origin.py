@@ -16,5 +16,5 @@ class Origin(Enum):
 
 
 def name_thing(text: str, origin: Origin) -> str:
-    """Return a sentence about a board as one about that what samples of `origin` come from."""
+    """Return a sentence about a board; it speaks of a vehicle if samples of `origin` come from one."""
     return re.sub(r"\bboard\b", "vehicle", text) if origin is Origin.VEHICLE else text

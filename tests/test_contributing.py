@@ -5,11 +5,13 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mpucal.errors import RefusedError, UsageError
 from mpucal.result.calibration import Calibration
 
 ROOT = Path(__file__).parents[1]
@@ -76,8 +78,10 @@ for line in sys.stdin:
 
 @pytest.fixture
 def follow(tmp_path):
-    """follow(recipe)(words): the command line after the recipe, in a folder with a calibration."""
-    Calibration(np.diag([1.1, 1.0, 0.9]), np.array([0.5, 0.0, -0.5])).save(tmp_path / "c.json")
+    """Return follow(recipe)(words): the output of a command after the recipe, beside two calibrations."""
+    made = Calibration(np.diag([1.1, 1.0, 0.9]), np.array([0.5, 0.0, -0.5]))
+    made.save(tmp_path / "c.json")
+    replace(made, quality={"verdict": "refused"}).save(tmp_path / "refused.json")
     begun = []
 
     def follow(recipe):
@@ -96,11 +100,11 @@ def follow(tmp_path):
         )
         begun.append(program)
 
-        def call(*words):
+        def call(*words, code=0):
             print(json.dumps(words), file=program.stdin, flush=True)
-            code, out, err = json.loads(program.stdout.readline())
-            assert code == 0, err
-            return out
+            ended, out, err = json.loads(program.stdout.readline())
+            assert ended == code, err
+            return err if code else out
 
         return call
 
@@ -130,7 +134,12 @@ def test_an_export_form(follow, tmp_path):
     D, b_a = (re.search(rf"^{name} = \[(.*)\]", script, re.MULTILINE).group(1) for name in ("D", "b_a"))
     np.testing.assert_array_equal(np.array([row.split() for row in D.split(";")], float), np.diag([1.1, 1.0, 0.9]))
     assert json.loads(f"[{b_a}]") == [0.5, 0.0, -0.5]
-    assert "octave" in call("export", "--help")
+    document = json.loads(call("export", "c.json", "--to", "octave", "--json"))
+    assert (document["to"], document["ending"], document["text"]) == ("octave", ".m", script)
+    assert any("does not correct the gyroscope" in note for note in document["cannot_carry"])
+    assert re.search(r"octave +Octave, MATLAB", call("export", "--help"))
+    assert "'octave'" in call("export", "c.json", "--to", "nothing", code=UsageError.exit_code)
+    call("export", "refused.json", "--to", "octave", code=RefusedError.exit_code)
 
 
 def test_a_reader(follow, tmp_path):

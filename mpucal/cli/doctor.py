@@ -81,7 +81,7 @@ def _examine(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> It
         yield Finding.failed("bus", error)
         return
     check_gyroscope(source.plan.config)
-    # A vehicle is told over its link, once that is locked.
+    # A vehicle gets this prompt over its link, once the link is locked.
     of_vehicle = source.origin is Origin.VEHICLE
     put_down(() if of_vehicle else source.listeners, say, STAND if of_vehicle else PUT_DOWN)
     yield from resolve_name(kind.doctor)(source, seconds)

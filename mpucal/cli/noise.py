@@ -116,11 +116,9 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noi
 def _runs(source: Source) -> Iterator[Samples]:
     """Yield samples in runs of a second: the meter could not keep up with many small ones."""
     held: list[Samples] = []
-    for samples in polled(source):
+    for samples in filter(len, polled(source)):
         held.append(samples)
-        last = next((part for part in reversed(held) if len(part)), None)
-        first = next((part for part in held if len(part)), None)
-        if first is not None and last is not None and last.t[-1] - first.t[0] >= 1.0:
+        if samples.t[-1] - held[0].t[0] >= 1.0:
             yield Samples.joined(held)
             held = []
 

@@ -76,8 +76,9 @@ def command(
         check_gyroscope(source.plan.config)
     text = CsvText(lambda text: sys.stdout.write(text.decode()))
     on_page = live_page(page, source_title(options), choose_board(board, source))
-    messages = _Messages(json_events)
-    capture = source.measuring(file or Path(os.devnull), messages.say, now().isoformat())
+    events = JsonLines(sys.stderr, Keys()) if json_events else None
+    tell = say if events is None else events.say
+    capture = source.measuring(file or Path(os.devnull), tell, now().isoformat())
     with capture as measuring, on_page as screen, suppress(KeyboardInterrupt):
         ready: Correction | None = None
         monitor: DriftMonitor | None = None
@@ -88,7 +89,7 @@ def command(
                 recording = measuring.source.recording()
                 ready = make_correction(applied, recording.sensor, recording.autopilot)
                 for remark in ready.remarks:
-                    messages.say(remark)
+                    tell(remark)
                 monitor = DriftMonitor(ready.calibration, days_since(applied)) if watched else None
             calibrated = ready.apply(samples)
             if as_json:
@@ -97,29 +98,19 @@ def command(
                 text.write(calibrated)
             screen.add(samples, calibrated, recording.sensor)
             for contradiction in () if monitor is None else monitor.add(calibrated):
-                messages.warn(contradiction)
+                _warn(contradiction, events)
                 screen.say(str(contradiction))
             sys.stdout.flush()
             measuring.source.forget()
 
 
-class _Messages:
-    """Messages on stderr, as sentences or as lines of JSON."""
-
-    def __init__(self, as_json: bool) -> None:
-        self._events = JsonLines(sys.stderr, Keys()) if as_json else None
-
-    def say(self, text: str) -> None:
-        """Print a sentence."""
-        (say if self._events is None else self._events.say)(text)
-
-    def warn(self, contradiction: Contradiction) -> None:
-        """Print a warning of the monitor."""
-        if self._events is None:
-            say(str(contradiction))
-        else:
-            code = f"{contradiction.sensor}_contradicted"
-            self._events.hear(Caution(contradiction.t_s, code, contradiction.what, contradiction.do))
+def _warn(contradiction: Contradiction, events: JsonLines | None) -> None:
+    """Print a warning of the monitor on stderr, as a sentence or as an event."""
+    if events is None:
+        say(str(contradiction))
+    else:
+        code = f"{contradiction.sensor}_contradicted"
+        events.hear(Caution(contradiction.t_s, code, contradiction.what, contradiction.do))
 
 
 def _poll(source: Source, seconds: float | None) -> Iterator[Samples]:

@@ -28,7 +28,7 @@ LONG_S, MANY_CHANGES = 2.0, 50.0
 
 # Lower bits move with the noise, or show as a dead axis; the highest step takes the reading through zero.
 STEPS = tuple(range(8, 15))
-# A reading may miss by this share of a step, the error of its measured scale, and by so many counts of noise.
+# A reading may miss by this share of a step, the error of its measured scale, and by this number of counts of noise.
 TOLERANCE, NOISE_COUNTS = 0.02, 64.0
 
 

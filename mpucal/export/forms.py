@@ -122,7 +122,6 @@ FORMS = (
         "imu.yaml: noise densities; correct the samples before",
         vio.kalibr,
         (vio.kalibr_losses,),
-        only_usable=False,
     ),
     Form(
         "openvins",
@@ -131,7 +130,6 @@ FORMS = (
         "kalibr_imu_chain.yaml: `Ta`, `R_IMUtoACC` of inv(D), `Tw`, `R_IMUtoGYRO` of K; it estimates the biases",
         vio.openvins,
         (vio.openvins_losses,),
-        only_usable=False,
     ),
     Form(
         "i2cdevlib",

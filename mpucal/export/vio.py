@@ -20,7 +20,7 @@ from ..errors import WriteBackError
 from ..result.calibration import Calibration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from ..result.noise import WALK as RANDOM_WALK
-from .losses import check_usable, heading
+from .losses import heading
 
 # random walks over densities, as a calibration does not measure random walks
 WALK = 0.1
@@ -35,14 +35,13 @@ def kalibr(calibration: Calibration, notes: Sequence[str]) -> str:
 
     Raises
     ------
-    RefusedError : the calibration must not be used. WriteBackError : its noise or rate is not known.
+    WriteBackError : the noise or rate of the calibration is not known.
     """
     return "\n".join([*heading(calibration, notes, "# "), "#", *_noise(calibration)]) + "\n"
 
 
 def openvins(calibration: Calibration, notes: Sequence[str]) -> str:
     """Return kalibr_imu_chain.yaml for OpenCV's FileStorage; see kalibr."""
-    check_usable(calibration)
     Q_a, L_a = rotation_and_lower(calibration.inverse)
     Q_w, L_w = rotation_and_lower(calibration.K)
     lines = ["%YAML:1.0", *heading(calibration, notes, "# "), "", "imu0:"]
@@ -93,7 +92,6 @@ def rotation_and_lower(M: Vector) -> tuple[Vector, Vector]:
 
 
 def _noise(calibration: Calibration) -> list[str]:
-    check_usable(calibration)
     rate_hz = calibration.sensor.rate_hz
     known = calibration.extra.get(KEY)
     stds = calibration.noise_std, calibration.gyro_noise_std

@@ -80,7 +80,7 @@ def _log_odds(rows: Vector, W: Vector, prior: float, added: Vector) -> Vector:
     values, vectors = np.linalg.eigh(added)
     used = values > 1e-15 * values.max()
     V = W @ (vectors[:, used] * np.sqrt(values[used]))
-    if not V.any():  # the observations say nothing of it
+    if not V.any():  # these observations do not depend on it
         return np.full(len(rows), -math.inf)
     # S_h = I + V V^T
     inner = np.eye(V.shape[1]) + V.T @ V

@@ -36,11 +36,11 @@ UPPER = np.triu_indices(3)
 # Standard deviation of a turn, relative to its angle, by the gyroscope's nonlinearity (PS-MPU-6000A r3.4, section 6.1:
 # 0.2 % of full scale).
 NONLINEAR = 0.001
-# A rest's variance is that of so many block means: a tremor averages out within them, a sway does not.
+# The variance of a rest is that of this number of block means: a tremor averages out within them, a sway does not.
 BLOCKS = 4
-# A rest has few blocks: the mean variance of the others counts as so many degrees of freedom more.
+# A rest has few blocks: the mean variance of the other rests counts as this many degrees of freedom more.
 POOLED = 6.0
-# Noise averages out in a mean over so long; means of a board that is shaken vary more, by this factor.
+# Noise averages out in means over this time [s]; means of a board that is shaken vary more, by this factor.
 SHAKEN_S, SHAKEN = 0.1, 4.0
 # Samples of a filtered stream are worth at least this share of independent ones.
 INDEPENDENT = 0.2
@@ -160,7 +160,7 @@ class _Rests:
 
 @dataclass(frozen=True)
 class _Residuals:
-    """Residuals r (q,), their derivatives by the k means and by theta besides, and variance (q,) besides the means'."""
+    """Residuals r (q,), their derivatives by the k means and by theta, and variance (q,) in addition to the means'."""
 
     r: Vector
     J_rests: Vector
@@ -220,7 +220,7 @@ class _Residuals:
         J_theta[:, NOISE] = np.eye(2)
         r = np.full(2, np.nan)
         pairs = (recording.acc, calibration.noise_std), (recording.gyr, calibration.gyro_noise_std)
-        # Another rate has another bandwidth, and thereby other noise.
+        # At another rate, bandwidth and noise differ.
         same_rate = calibration.sensor.rate_hz == recording.sensor.rate_hz is not None
         for k, (values, then) in enumerate(pairs):
             now = values[flat.first : flat.last]

@@ -20,8 +20,8 @@ ENOUGH_FLAT_S = 5.0
 # With less variance at rest than this [steps^2], the readings stay on one step or two, and no mean makes them finer.
 UNVARIED = 0.3
 UNIFORM = 1.0 / 12.0  # variance of rounding [steps^2]
-# Share of it that a short rest in a hand leaves: noise and tremor, low-passed by an autopilot, cross few steps. From
-# simulated vehicles with low passes of 5 and 20 Hz.
+# Share of this variance that a short rest in a hand leaves: noise and tremor, low-passed by an autopilot, cross few
+# steps. From simulated vehicles with low passes of 5 and 20 Hz.
 UNAVERAGED = 0.15
 
 # No sensor of this kind has less noise; data without noise are simulated, or stuck.

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..data import Vector
 
-# A noisy sensor may exceed the limits of spread, up to so many times its own noise and up to these.
+# A noisy sensor may exceed the limits of spread, up to this multiple of its own noise and up to these values.
 TIMES_NOISE = 2.5
 NOISIEST_GYRO_RAD_S, NOISIEST_ACC_MPS2 = 0.15, 0.5
 # The MPU-6050's bias may be 20 deg/s; where the bias is not known, a larger mean rate than this is a turn.
@@ -56,7 +56,7 @@ HAND = Limits(gyro_sd=0.06, acc_sd=0.3, gyro_step=0.06, acc_step=0.3, gyro_mean=
 # For the strongest tremor (7 deg/s) of a hand that holds an orientation.
 ANY_HAND = Limits(gyro_sd=0.12, acc_sd=0.6, gyro_step=0.06, acc_step=0.3, gyro_mean=0.12)
 
-# A rest's logarithm of spread lies at most so many standard deviations above the median of possible rests.
+# The logarithm of a rest's spread lies at most this many standard deviations above the median of possible rests.
 LIKE_THE_OTHERS = 2.0
 LEAST_DEVIATION = 0.15  # of the logarithm, by chance: a window holds only few periods of a tremor
 OF_NORMAL = 1.4826  # ratio of a normal standard deviation to the median absolute deviation

@@ -34,7 +34,7 @@ BUMP_RAD = math.radians(3.0)
 # A hand's limits are learned from the newest windows that may be rests: from more than the fewest.
 FEWEST_WINDOWS, NEWEST_WINDOWS = 2, 12
 
-# Two means of noise differ by at most so many standard deviations.
+# Two means of noise differ by at most this many standard deviations.
 CHANCE = 4.5
 
 AXES = "xyz"

@@ -87,13 +87,9 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
 
         def of(sensor: str) -> dict[str, Any]:
             part = _part(sensor)
+            ends = {"value": self.values, "low": self.low, "high": self.high}
             found: dict[str, Any] = {
-                name: {
-                    "value": _plain(self.values[name][part]),
-                    "low": _plain(self.low[name][part]),
-                    "high": _plain(self.high[name][part]),
-                }
-                for name in COEFFICIENTS
+                name: {end: _plain(of_all[name][part]) for end, of_all in ends.items()} for name in COEFFICIENTS
             }
             found["allan_deviation"] = _plain(self.deviations[:, part])
             if sensor in self.data_sheet:

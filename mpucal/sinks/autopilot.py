@@ -255,7 +255,7 @@ class AutopilotSink:
             yield f"you interrupted what follows the write; {NOT_REBOOTED}"
 
     def _await_ready(self, before: PrearmState) -> PrearmState:
-        """Return the pre-arm state after a reboot, once it is ready or complains of nothing but what it did before.
+        """Return the pre-arm state after a reboot, once it is ready, or has no complaints other than those before.
 
         Accelerometers that were inconsistent before should agree now.
         """
@@ -345,7 +345,7 @@ def _level_clause(level: Level, words: str) -> str:
 
 
 def _horizon_clause(error_deg: Vector | None) -> str:
-    """Return a clause on what the attitude after a reboot differs from gravity by."""
+    """Return a clause on the error of the attitude after a reboot."""
     if error_deg is None:
         return "it is rebooted, but its horizon was not checked, as it did not rest"
     apart = float(np.abs(error_deg).max())

@@ -1,6 +1,5 @@
-"""Table of faults: the pages hold it, the options accept it, and faults of the hand affect chip and vehicle."""
+"""Table of faults: the options accept it, and faults of the hand affect chip and vehicle."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,20 +12,7 @@ from mpucal.simulated.chip.options import ChipOptions
 from mpucal.simulated.faults import FAULTS, OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, fault_kinds
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
-DOCS = Path(__file__).parents[2] / "docs"
 WORLDS = {ChipOptions: (*OF_CHIP, Where.DEFECT, Where.HAND), VehicleOptions: (*OF_VEHICLE, Where.HAND)}
-
-
-def table(page, number=1):
-    return (DOCS / page).read_text().split("| name | what happens |\n|---|---|\n")[number].split("\n\n")[0].splitlines()
-
-
-def test_the_pages_hold_the_table():
-    for page, number, where in (("chips.md", 1, (*OF_CHIP, Where.HAND)), ("chips.md", 2, (Where.DEFECT,))):
-        rows = [f"| {kind.name} | {kind.what} |" for kind in fault_kinds(*where).values()]
-        assert table(page, number) == rows
-    vehicles = fault_kinds(*OF_VEHICLE).values()
-    assert table("mavlink.md") == [f"| {kind.name}{'@' * kind.timed} | {kind.what} |" for kind in vehicles]
 
 
 @pytest.mark.parametrize("options", WORLDS)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mpucal.sources.table import SOURCES
-from tools.make import pages
+from tools.make import drawings, pages
 
 ROOT = Path(__file__).parents[3]
 DOCUMENT = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -17,13 +17,13 @@ REFERENCES = {(path, name) for path, name in re.findall(r"`([\w/]+\.(?:py|[ch]pp
 
 def test_an_arrow_that_a_longer_way_implies_is_left_out():
     imports = {"top": {"middle", "bottom"}, "middle": {"bottom"}, "bottom": set()}
-    assert pages.floors(imports) == ["bottom", "middle", "top"]
-    assert pages.reduced(imports) == {"top": {"middle"}, "middle": {"bottom"}, "bottom": set()}
+    assert drawings.floors(imports) == ["bottom", "middle", "top"]
+    assert drawings.reduced(imports) == {"top": {"middle"}, "middle": {"bottom"}, "bottom": set()}
 
 
 def test_a_circle_cannot_be_drawn():
     with pytest.raises(CycleError):
-        pages.floors({"one": {"other"}, "other": {"one"}})
+        drawings.floors({"one": {"other"}, "other": {"one"}})
 
 
 def defined(tree, name):
