@@ -39,28 +39,22 @@ DISAGREE = 32.9  # quantile 0.999 of chi-square of twelve degrees of freedom
 
 
 def beside_first(first: Evidence, other: Evidence) -> Evidence:
-    """Return the evidence of the other accelerometer, with D and b_a by the first one where that is better.
+    """Return the evidence of the other accelerometer, with D and b_a by the first one where that has finer readings.
 
-    It is where the first one has finer readings, or is more certain. The other's own estimate stays where either has a
-    fault or a change, and where the two disagree.
+    Its own estimate stays where either has a fault or a change, and where the two disagree.
     """
-    if first.fit is None or other.fit is None or not (_is_plain(first) and _is_plain(other)):
+    finer = first.recording.sensor.steps[0] < other.recording.sensor.steps[0]
+    if first.fit is None or other.fit is None or not (finer and _is_plain(first) and _is_plain(other)):
         return other
     own, compared = other.fit, _compare(first, first.fit, other, other.fit)
     if compared is None:
         return other
     away = np.append(own.D - compared.D, own.b_a - compared.b_a)
     spread = (own.covariance + compared.covariance)[ACCELEROMETER, ACCELEROMETER]
-    beside = replace(other, fit=compared, claim=None)
-    before, now = other.uncertainty, beside.uncertainty
-    if before is None or now is None:
+    known = (beside := replace(other, fit=compared, claim=None)).uncertainty
+    if known is None or away @ np.linalg.solve(spread, away) > DISAGREE:
         return other
-    finer = first.recording.sensor.steps[0] < other.recording.sensor.steps[0]
-    if not finer and now.magnitude_mps2 > before.magnitude_mps2:
-        return other
-    if away @ np.linalg.solve(spread, away) > DISAGREE:
-        return other
-    return replace(beside, claim=UncertaintyClaim(compared.covariance, now.rms_mps2, now.rms_mps2))
+    return replace(beside, claim=UncertaintyClaim(compared.covariance, known.rms_mps2, known.rms_mps2))
 
 
 def _is_plain(evidence: Evidence) -> bool:
