@@ -192,6 +192,11 @@ def test_gravity_from_a_fusion_filter_is_not_raw(in_hand, decimals):
     refused_for("not_raw", replace(in_hand.recording, acc=gravity), "stays within", "raw accelerometer")
 
 
+def test_gravity_in_a_unit_that_is_far_too_small_is_gravity(in_hand):
+    recording = in_hand.recording
+    refused_for("units_suspect", replace(recording, acc=recording.acc / 1e3), "in a unit about", "times as large")
+
+
 def test_linear_acceleration_from_a_fusion_filter_is_not_raw(in_hand):
     acc = in_hand.recording.acc
     linear = 0.3 * (acc - G * acc / np.linalg.norm(acc, axis=1, keepdims=True))

@@ -20,6 +20,9 @@ LONGEST_STEP_S = 2.0
 # Times that are farther apart than this are rather in microseconds, or in nanoseconds.
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
 LEAST_G = 0.5  # magnitude in g below which a recording holds no gravity
+# Half of the magnitudes of gravity are within this share of the median, whatever the sensor's errors; of a hand's own
+# acceleration, or of noise on three axes, half are within 60 %.
+STEADY = 0.2
 # Gains, biases, noise and a hand's acceleration make a magnitude vary by more; rounding to two decimals leaves as much.
 LEAST_SPREAD = 4e-4
 # No sensor repeats a value for so long while it is turned: its noise alone prevents that.
@@ -53,7 +56,11 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
         rate = float(np.median(lengths(e.recording.gyr)))
         if 0.9 * e.gravity < rate < 1.1 * e.gravity:
             return reason("not_raw", "exchanged", magnitude=acc, rate=rate)
-        return reason("not_raw", "no_gravity", magnitude=acc)
+        low, high = np.quantile(lengths(e.recording.acc), (0.25, 0.75))
+        if high - low > STEADY * acc:
+            return reason("not_raw", "no_gravity", magnitude=acc)
+        unit, said = f"a unit about {e.gravity / acc:.0f} times as large", "UNIT"
+        return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=unit, said=said)
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
     return reason(
         "units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=guess, said=guess.removeprefix("raw ")
