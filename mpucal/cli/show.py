@@ -169,7 +169,7 @@ def _device_page(facts: Mapping[str, Any]) -> str:
     """Return the page of a device's registers or parameters; see OpenedSource.contents."""
     rows = _vehicle_rows(facts) if "parameters" in facts else _chip_rows(facts) if "who_am_i" in facts else dict(facts)
     rows.pop("where", None)
-    width = max(18, *(len(key) + 2 for key in rows))
+    width = max([18, *(len(key) + 2 for key in rows)])
     return "\n".join([f"{facts['where']}, as it is now.", "", *(f"  {key:<{width}}{rows[key]}" for key in rows)])
 
 

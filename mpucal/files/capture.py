@@ -11,6 +11,7 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from pkgutil import resolve_name
 from tempfile import TemporaryFile
 from weakref import finalize
 
@@ -23,11 +24,10 @@ from ..chip.fifo import Run
 from ..chip.records import BEGUN, FORGET, OPENED, RESUMED, UTC, SessionEvent
 from ..data import Recording, Samples
 from ..errors import CaptureError, RecordingError
-from ..iio.decode import decode as decode_iio
 from ..mavlink.log import read_log
 from ..mavlink.tlog import RawPacket
-from ..origin import Origin
 from .mcap import CaptureReader, one_by_one
+from .recorders import CHIP, VEHICLE, Recorder, recorder_of
 from .rows import ROWS, Rows
 from .tables.times import plausible_utc_ns
 
@@ -40,13 +40,13 @@ def load_capture(*paths: Path) -> Recording:
     CaptureError, RecordingError, ChipError : see load.
     """
     session = _SessionRecords(paths)
-    origin, guided = _origin(paths)
-    if origin is Origin.VEHICLE:
+    recorder, guided = _recorder(paths)
+    if recorder is VEHICLE:
         recording = read_log(_Packets(session), session.name, over_reboots=guided)
-    elif origin is Origin.DEVICE:
-        recording = decode_iio(one_by_one(session.accesses()), session.name)
-    else:
+    elif recorder is CHIP:
         recording = decode(session.accesses(), session.name)
+    else:
+        recording = resolve_name(recorder.decode)(one_by_one(session.accesses()), session.name)
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
     if len(recording) < 2:
@@ -61,7 +61,7 @@ def capture_rows(*paths: Path) -> Rows:
     ------
     CaptureError, RecordingError, ChipError : see load.
     """
-    if _origin(paths)[0] is not Origin.CHIP:
+    if _recorder(paths)[0] is not CHIP:
         return Rows.of(load_capture(*paths))
     session = _SessionRecords(paths)
     decoder, spool = Decoder(session.name), Spool()
@@ -138,19 +138,18 @@ class _Packets:
         return self.session.packets()
 
 
-def _origin(paths: Sequence[Path]) -> tuple[Origin, bool]:
-    """Return where the records of captures come from, and whether events of a session come before them."""
+def _recorder(paths: Sequence[Path]) -> tuple[Recorder, bool]:
+    """Return what recorded captures, and whether events of a session come before the records."""
     events = False
     for reader in map(CaptureReader, paths):
         with closing(reader.blocks()) as records:
             for record in records:
                 if isinstance(record, RawPacket):
-                    return Origin.VEHICLE, events
+                    return VEHICLE, events
                 if not isinstance(record, SessionEvent):
-                    access = next(iter(record)) if isinstance(record, Accesses) else record
-                    return Origin.DEVICE if isinstance(access.register, str) else Origin.CHIP, events
+                    return recorder_of(reader.meta, reader.name), events
                 events = True
-    return Origin.CHIP, events
+    return CHIP, events
 
 
 @dataclass

@@ -264,7 +264,7 @@ class CaptureReader:
 
     Attributes
     ----------
-    name : of the file, for messages. meta, recovered : see Capture; set when all records are read.
+    name : of the file, for messages. meta, recovered : see Capture; set with the first record, and when all are read.
 
     Raises
     ------
@@ -296,7 +296,7 @@ class CaptureReader:
         self._check(file.read(len(MCAP0_MAGIC)))
         file.seek(0)
         channels: dict[int, Channel] = {}
-        meta: Mapping[str, Any] | None = None
+        headed = False
         whole, finished = 0, False
         stream = _SizeLimitedFile(file, size)
         items = _records(
@@ -310,7 +310,7 @@ class CaptureReader:
                 break
             whole, finished = stream.at, item is None
             if isinstance(item, Metadata) and item.name == FORMAT:
-                meta = _meta(item, self._path)
+                self.meta, headed = _meta(item, self._path), True
             elif isinstance(item, Metadata) and item.name == CALIBRATED:
                 raise CaptureError(
                     f"{self._path} holds samples that are calibrated already ({item.metadata.get('done')})",
@@ -323,12 +323,11 @@ class CaptureReader:
                 if block is not None:
                     self._count_block(block)
                     yield block
-        if meta is None:
+        if not headed:
             raise CaptureError(
                 f"{self._path} lacks the metadata of a capture",
                 _REMEDY,
             )
-        self.meta = meta
         self.recovered = None if finished else self._recovery_sentence(size - whole)
 
     def _block(self, channel: Channel | None, message: Message) -> Accesses | Record | None:

@@ -7,22 +7,14 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
-from ..chip.config import Config, RateOnlyConfig
-from ..chip.driver import DRIVER_VERSION
+from ..chip.config import Config
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
-from ..iio import IIO_VERSION
-from ..mavlink import MAVLINK_VERSION
+from ..files.recorders import CHIP, DRIVER, recorder_of
 from .aims import AIMS, NORMAL
 from .boards import BOARDS
 
-DRIVER, PLAN = "driver", "plan"
-# The class of a capture's sensor settings, by the version of the driver that recorded it.
-CONFIGS: Mapping[Any, type[Config]] = {
-    DRIVER_VERSION: Config,
-    IIO_VERSION: RateOnlyConfig,
-    MAVLINK_VERSION: RateOnlyConfig,
-}
+PLAN = "plan"
 
 
 @dataclass(frozen=True)
@@ -60,7 +52,7 @@ class Plan:
 
     def meta(self) -> dict[str, Any]:
         """Return the head of a capture, in JSON's own types."""
-        return {DRIVER: DRIVER_VERSION, PLAN: asdict(self)}
+        return {DRIVER: CHIP.version, PLAN: asdict(self)}
 
     @classmethod
     def of_capture(cls, meta: Mapping[str, Any], name: str) -> Self:
@@ -70,16 +62,10 @@ class Plan:
         ------
         CaptureError : another version of the driver recorded it, or its head holds no plan.
         """
-        version = meta.get(DRIVER)
-        # A damaged head may hold a list, which is no key.
-        if version not in list(CONFIGS):
-            raise CaptureError(
-                f"{name} was recorded by version {version} of the driver, and this is {DRIVER_VERSION}",
-                "use `mpucal calibrate`, which reads captures of every version",
-            )
+        recorder = recorder_of(meta, name, same=True)
         try:
             plan = dict(meta[PLAN])
-            return cls(**{**plan, "config": CONFIGS[version](**plan["config"])})
+            return cls(**{**plan, "config": recorder.config(**plan["config"])})
         except (KeyError, TypeError, ValueError) as error:
             raise CaptureError(
                 f"the head of {name} does not hold the session's settings ({error})", "use `mpucal calibrate`"

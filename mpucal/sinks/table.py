@@ -34,7 +34,7 @@ SINKS = {
         ),
         SinkKind(
             KERNEL,
-            behind=lambda source: source.origin is Origin.DEVICE,
+            behind=lambda source: source.option.name == "iio",
             where="the kernel's driver",
             holds="D as ACCEL_MOUNT_MATRIX of udev; b_a in calibbias of an MPU-6050, until its next power cycle",
             opener="mpucal.sinks.iio:open_kernel",

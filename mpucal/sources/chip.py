@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..chip.access import Bus
 from ..chip.contents import chip_contents
 from ..chip.driver import Driver
 from ..files.messages import BUS
 from ..origin import Origin
+from ..session.plan import Plan
 from ..session.ports import Source
+from .chain import Chain
 from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
 from .tap import Tap
+
+if TYPE_CHECKING:
+    from ..files.mcap import Capture
 
 
 @dataclass
@@ -49,3 +54,13 @@ class OpenedChip(OpenedSource):
         """See OpenedSource."""
         driver = self.driver(Tap(self.bus, recorder), name, lambda text: say(f"  {text}."))
         yield ActiveSource(driver, recorder.event, self.go_on, self.is_late)
+
+
+def replayed(_capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], **how: Any) -> OpenedChip:
+    """Open the replay of a chip.
+
+    Parameters
+    ----------
+    _capture : the first one. line : all that is replayed. _values : of the options. how : attributes of OpenedSource.
+    """
+    return OpenedChip(line, plan, **how)

@@ -6,6 +6,7 @@ Source: Linux Documentation/driver-api/iio and Documentation/ABI/testing/sysfs-b
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +15,14 @@ from typing import Any
 from ..chip.access import Reply
 from ..errors import BusError, CaptureError
 from ..files.mcap import Capture
+from ..files.recorders import DRIVER
 from ..iio import IIO_VERSION
 from ..iio.devices import Devices
 from ..iio.driver import IioDriver
 from ..iio.setup import LIST_BYTES, TEXT_BYTES, TRIGGERS
 from ..origin import Origin
-from ..session.plan import DRIVER
+from ..session.plan import Plan
+from .chain import Chain
 from .chip import OpenedChip
 from .host_bus import HostBus, converting
 from .iio_errors import attribute_error, buffer_error
@@ -79,8 +82,8 @@ class OpenedIio(OpenedChip):
         return IioDriver(bus, self.devices, self.plan.config, name, say, self.trigger)
 
 
-def devices_in(capture: Capture) -> dict[str, Any]:
-    """Return the `devices` and the `trigger` of the OpenedIio that recorded a capture.
+def replayed(capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], **how: Any) -> OpenedIio:
+    """Open the replay of devices; see mpucal.sources.chip.replayed.
 
     Raises
     ------
@@ -92,7 +95,7 @@ def devices_in(capture: Capture) -> dict[str, Any]:
         raise CaptureError(
             f"the head of {capture.name} does not name the IIO devices", "use `mpucal calibrate`"
         ) from error
-    return {"devices": Devices(str(accel), str(gyro)), "trigger": trigger}
+    return OpenedIio(line, plan, **how, devices=Devices(str(accel), str(gyro)), trigger=trigger)
 
 
 def open_source(request: Request) -> OpenedIio:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 from ..files.folder import all_captures_in
 from ..files.mcap import Capture, read_capture
+from ..files.recorders import VEHICLE, recorder_of
 from ..files.tlog import TLOG, read_tlog
-from ..iio import IIO_VERSION
-from ..mavlink import MAVLINK_VERSION
-from ..session.plan import DRIVER, Plan
+from ..session.plan import Plan
 from .chain import Chain, ChainedBus, ChainedTransport, ShiftedClockBus, split_at_resumes
-from .chip import OpenedChip
-from .iio import OpenedIio, devices_in
 from .kind import Request
 from .opened_source import OpenedSource
 from .opening import refuse_fixed_options
@@ -37,19 +35,13 @@ def open_source(request: Request) -> OpenedSource:
     first = captures[0]
     how: dict[str, Any] = {"recovered": last_recovered(captures), "real_time": False}
     # The log of another ground station has no head, and fixes no options.
-    plan, driver = replace(request.plan, until_end=True), MAVLINK_VERSION
+    plan, recorder = replace(request.plan, until_end=True), VEHICLE
     if first.meta:
         refuse_fixed_options(request)
-        plan, driver = Plan.of_capture(first.meta, first.name), first.meta[DRIVER]
+        plan, recorder = Plan.of_capture(first.meta, first.name), recorder_of(first.meta, first.name)
         plan = replace(plan, board=request.plan.board or plan.board)
-    if driver == MAVLINK_VERSION:
-        # pymavlink loads slowly, and a chip on a bus does not need it.
-        from .vehicle import replayed_vehicle  # noqa: PLC0415
-
-        return replayed_vehicle(first, chained(captures), plan, request.values.get("system"), **how)
-    if driver == IIO_VERSION:
-        return OpenedIio(chained(captures), plan, **how, **devices_in(first))
-    return OpenedChip(chained(captures), plan, **how)
+    opened: OpenedSource = resolve_name(recorder.replay)(first, chained(captures), plan, request.values, **how)
+    return opened
 
 
 def read_captures(place: Path) -> list[Capture]:
@@ -73,6 +65,6 @@ def chained(captures: Sequence[Capture], live: Any = None) -> Chain[Any]:
     parts = split_at_resumes((capture.records for capture in captures), more=live is not None)
     name = captures[0].name
     last_ns = max((record.t_ns for part in parts for record in part), default=0)
-    if captures[0].meta.get(DRIVER, MAVLINK_VERSION) == MAVLINK_VERSION:
+    if not captures[0].meta or recorder_of(captures[0].meta, name) is VEHICLE:
         return ChainedTransport([*(PacketReplay(part, name) for part in parts), *([live] if live else [])], last_ns)
     return ChainedBus([*(ReplayBus(part, name) for part in parts), *([ShiftedClockBus(live, last_ns)] if live else [])])

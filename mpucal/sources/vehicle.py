@@ -13,6 +13,7 @@ from ..data import Recording
 from ..errors import EndOfCapture, LinkError
 from ..files.mcap import Capture
 from ..files.messages import PACKETS
+from ..files.recorders import DRIVER
 from ..mavlink import MAVLINK_VERSION
 from ..mavlink.link import OWN_SYSTEM, Link, Recorder
 from ..mavlink.log import read_log
@@ -26,7 +27,7 @@ from ..mavlink.url import parse_url
 from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
 from ..origin import Origin
 from ..session.events import Prompt
-from ..session.plan import DRIVER, Plan
+from ..session.plan import Plan
 from .chain import Chain
 from .kind import Request
 from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
@@ -144,19 +145,16 @@ class OpenedLog(OpenedVehicle):
         yield ActiveSource(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
 
 
-def replayed_vehicle(capture: Capture, line: Chain[Any], plan: Plan, system: int | None, **how: Any) -> OpenedVehicle:
+def replayed(capture: Capture, line: Chain[Any], plan: Plan, values: Mapping[str, Any], **how: Any) -> OpenedVehicle:
     """Open the replay of a vehicle: a session of mpucal as it was, any other log until its end.
 
-    Parameters
-    ----------
-    capture : the first one. line : all that is replayed. system : id of one of several vehicles in a log. how : further
-        attributes of OpenedSource.
+    See mpucal.sources.chip.replayed; an option names one of several vehicles in a log.
 
     Raises
     ------
     RecordingError : the log has no IMU.
     """
-    how[SYSTEM], how[PREPARE] = capture.meta.get(SYSTEM, system), bool(capture.meta.get(PREPARE))
+    how[SYSTEM], how[PREPARE] = capture.meta.get(SYSTEM, values.get(SYSTEM)), bool(capture.meta.get(PREPARE))
     packets = [record for record in capture.records if isinstance(record, RawPacket)]
     if len(packets) < len(capture.records):
         return OpenedVehicle(line, plan, **how)

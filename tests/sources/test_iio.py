@@ -353,7 +353,7 @@ def test_devices_by_their_names(text):
 @pytest.mark.parametrize("head", [{}, {"iio": None}, {"iio": ["iio:device0"]}])
 def test_a_capture_whose_head_names_no_devices_is_not_replayed(head):
     with pytest.raises(CaptureError, match=r"the head of a\.mcap does not name the IIO devices"):
-        iio.devices_in(SimpleNamespace(meta=head, name="a.mcap"))
+        iio.replayed(SimpleNamespace(meta=head, name="a.mcap"), None, None, {})
 
 
 def test_what_is_no_device_is_wrong_usage():

@@ -1,0 +1,73 @@
+"""Table of the drivers that record captures: the version in the head says how to decode and replay the records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..chip.config import Config, RateOnlyConfig
+from ..chip.driver import DRIVER_VERSION
+from ..errors import CaptureError
+from ..iio import IIO_VERSION
+from ..mavlink import MAVLINK_VERSION
+
+# Key of a capture's head.
+DRIVER = "driver"
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """Driver that records captures.
+
+    Attributes
+    ----------
+    version : number, or a word and a number. A capture of another version of the same driver is decoded, not replayed.
+    config : class of the sensor's settings in the head.
+    replay : "module:function" that opens a replay, as mpucal.sources.chip:replayed does.
+    decode : "module:function" from accesses, one by one, and a name to a Recording.
+    """
+
+    version: int | str
+    config: type[Config]
+    replay: str
+    decode: str = ""
+
+    @property
+    def family(self) -> str:
+        """Name of the driver, whatever its version; empty for that of chips."""
+        return _family(self.version)
+
+
+CHIP = Recorder(DRIVER_VERSION, Config, "mpucal.sources.chip:replayed")
+VEHICLE = Recorder(MAVLINK_VERSION, RateOnlyConfig, "mpucal.sources.vehicle:replayed")
+RECORDERS = [
+    CHIP,
+    VEHICLE,
+    Recorder(IIO_VERSION, RateOnlyConfig, "mpucal.sources.iio:replayed", "mpucal.iio.decode:decode"),
+]
+
+
+def recorder_of(meta: Mapping[str, Any], name: str, same: bool = False) -> Recorder:
+    """Return what recorded the capture `name` with that head; a chip's driver if the head does not say it.
+
+    Parameters
+    ----------
+    same : it must be of the same version, for a replay.
+
+    Raises
+    ------
+    CaptureError : an unknown driver, or another version of it.
+    """
+    version = meta.get(DRIVER)
+    for recorder in RECORDERS:
+        if version == recorder.version or (not same and _family(version) == recorder.family):
+            return recorder
+    raise CaptureError(
+        f"{name} was recorded by version {version} of the driver, and this is {DRIVER_VERSION}",
+        "use `mpucal calibrate`, which reads captures of every version" if same else "use the mpucal that recorded it",
+    )
+
+
+def _family(version: Any) -> str:
+    return version.rpartition(" ")[0] if isinstance(version, str) else ""

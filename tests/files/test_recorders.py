@@ -1,0 +1,60 @@
+"""Drivers that record captures: a row decodes and replays theirs, and an unknown one is named."""
+
+import numpy as np
+import pytest
+
+from mpucal.chip.access import Transaction
+from mpucal.chip.config import RateOnlyConfig
+from mpucal.data import Recording
+from mpucal.errors import CaptureError
+from mpucal.files import load, recorders
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.sources.opening import open_source
+
+META = {"driver": "pigeon 2", "plan": {"config": {"rate_hz": 50.0}}}
+
+
+def decode(accesses, name):
+    """Return a sample for each letter, as the module of a source does."""
+    t = np.array([access.t_ns * 1e-9 for access in accesses if access.data])
+    return Recording.from_arrays(t, np.ones((len(t), 3)), np.zeros((len(t), 3)), name=name)
+
+
+def replayed(capture, line, plan, values, **how):
+    """Return what the module of a source opens."""
+    return capture.name, line.read("loft", 1).data, plan.config, how["real_time"]
+
+
+@pytest.fixture
+def capture(tmp_path):
+    path = tmp_path / "letters.mcap"
+    with CaptureWriter(path) as writer:
+        writer.start(META)
+        for i in range(5):
+            writer.transaction(Transaction("read", "loft", 1, b"x", i * 1_000_000_000))
+    return path
+
+
+def add(monkeypatch, version):
+    row = recorders.Recorder(version, RateOnlyConfig, f"{__name__}:replayed", f"{__name__}:decode")
+    monkeypatch.setattr(recorders, "RECORDERS", [*recorders.RECORDERS, row])
+
+
+def test_a_row_decodes_and_replays_what_its_driver_recorded(capture, monkeypatch):
+    add(monkeypatch, "pigeon 2")
+    assert load(capture).t.tolist() == [0, 1, 2, 3, 4]
+    opened = open_source({"replay": capture})
+    assert opened == ("letters.mcap", b"x", RateOnlyConfig(rate_hz=50.0), False)
+
+
+def test_another_version_is_decoded_and_not_replayed(capture, monkeypatch):
+    add(monkeypatch, "pigeon 3")
+    assert len(load(capture)) == 5
+    with pytest.raises(CaptureError, match=r"recorded by version pigeon 2 of the driver.*use `mpucal calibrate`"):
+        open_source({"replay": capture})
+
+
+def test_an_unknown_driver_is_named(capture):
+    assert read_capture(capture).meta["driver"] == "pigeon 2"
+    with pytest.raises(CaptureError, match=r"by version pigeon 2 of the driver.*use the mpucal that recorded it"):
+        load(capture)
