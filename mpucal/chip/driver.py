@@ -13,11 +13,11 @@ from contextlib import suppress
 from dataclasses import replace
 from enum import Enum, auto
 
+from ..clocks.sample_clock import poll_phase
 from ..data import Recording, Samples, Sensor
 from ..errors import BusError, BusHeld, ChipError, EndOfCapture
 from . import registers as reg
 from .access import Bus
-from .clock import poll_phase
 from .config import Config
 from .decode import Decoder
 from .families import Part

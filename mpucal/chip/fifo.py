@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from ..clocks.host_clock import HostClock
+from ..clocks.polled_clock import PolledClock
+from ..clocks.sample_clock import NS, SampleClock, Times, Whole, make_increasing
 from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
 from .bit_flips import BitFlipFilter, Counts
-from .clock import NS, SampleClock, Times, Whole, make_increasing
-from .host_clock import HostClock
-from .polled_clock import PolledClock
 from .settings import Settings
 
 FULL_SCALE_COUNT = 32767

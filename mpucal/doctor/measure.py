@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..chip.clock import RATE_TOLERANCE
 from ..chip.families import Family
+from ..clocks.sample_clock import RATE_TOLERANCE
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from .dead_axes import dead_axes, live_axes
 from .finding import Finding, Mark

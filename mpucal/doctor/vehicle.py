@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..chip.host_clock import HostClock
+from ..clocks.host_clock import HostClock
+from ..clocks.vehicle_clock import Jump
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..errors import RecordingError, SourceError
-from ..mavlink.clock import Jump
 from ..mavlink.dialect import Message, Parser, dialect, read_header
 from ..mavlink.firmwares import FILTERS, PX4, accel_lag_s
 from ..mavlink.link import Link

@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..clocks.vehicle_clock import Jump
 from ..data import Recording
 from ..errors import RecordingError
 from ..rests.flat import find_flat
-from .clock import Jump
 from .dialect import Message, Parser, dialect, read_header
 from .firmwares import PX4, preferred_messages
 from .imu import HIGHRES, MESSAGE_ID, RAW, Reading, Stream, decode_reading

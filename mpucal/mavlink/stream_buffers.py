@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..clocks.vehicle_clock import VehicleClock
 from ..data import Autopilot, Recording, Samples, Sensor, Vector
-from .clock import VehicleClock
 from .firmwares import accel_lag_s
 from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from ..clocks.vehicle_clock import Jump
 from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError, WriteBackError
-from .clock import Jump
 from .dialect import Message
 from .firmwares import PX4
 from .imu import Stream

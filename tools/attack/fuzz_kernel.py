@@ -28,7 +28,6 @@ TESTS = (
     "files/test_csv.py",
     "files/test_protobuf.py",
     "chip/test_bit_flips.py",
-    "chip/test_piecewise_rate.py",
 )
 REFUSED = (TypeError, ValueError, OverflowError, MemoryError)
 ODD = (np.nan, np.inf, -np.inf, 5e-324, -0.0, 0.0, 1e308, -1e308, 1e-300, -1.0)
@@ -99,7 +98,7 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
     from mpucal.calibration.likelihood import EXACT, USED  # noqa: PLC0415 - not before the modules are those of build/asan
     from mpucal.calibration.parameters import TABLE  # noqa: PLC0415
     from mpucal.calibration.theta import Theta  # noqa: PLC0415
-    from mpucal.chip import _flips, _pieces  # noqa: PLC0415
+    from mpucal.chip import _flips  # noqa: PLC0415
     from mpucal.files import _packed, _text  # noqa: PLC0415
     from mpucal.kernel import _kernel  # noqa: PLC0415
 
@@ -152,7 +151,6 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
             np.sort(rng.integers(2, n + 3, 4)),
             np.full(7, 8.0),
         ),
-        _pieces.best_break: lambda n, rng: (np.arange(n) * 0.1, some(n, rng), int(rng.integers(-2, 20)), 0.3),
     }
 
 

@@ -21,7 +21,6 @@ COMPILED = (
     "mpucal.files._text",
     "mpucal.files._packed",
     "mpucal.chip._flips",
-    "mpucal.chip._pieces",
 )
 # order and device of an array are checked at run time, and type checkers know neither
 DETAILS = re.compile(r"Annotated\[(NDArray\[[\w.]+\]), dict\((?:[^()]|\([^)]*\))*\)\]")

@@ -4,7 +4,7 @@ A sensor measures evenly. Over USB, radio or a busy computer its samples arrive 
 within a run without a missing sample one line, with the sample period as its slope, lies below all stamps; after
 missing samples, or a logger's pause, the line lies higher. A jump of that lower envelope is therefore a gap, while a
 stamp that is merely late is not. With the gaps known, the clock is fitted as a chip's is by polls of its FIFO
-(chip/clock.py).
+(clocks/sample_clock.py).
 
 Stamps that are even, or that follow no such line as of a program that measured when it could, are the samples' times;
 a longer step between them is a gap, as it is to the estimate and to a driver that polls.
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ...chip.clock import NS, SampleClock, make_increasing
+from ...clocks.sample_clock import NS, SampleClock, make_increasing
 from ...data import GAP_INTERVALS, Mask, Vector
 
 FEWEST = 100

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from ...chip.access import Bus
+from ...clocks.bridge_clock import US, WRAP_US
 from ...errors import BusError, NoAnswer
 from ...result.blob import MAGIC
 from ...sources.bridge import board
-from ...sources.bridge.clock import US, WRAP_US
 from ...sources.bridge.messages import Feature, Status
 from .line import EmulatedLine
 

@@ -12,7 +12,7 @@ from contextlib import suppress
 
 from ...chip import registers as reg
 from ...chip.access import Reply
-from ...chip.clock import poll_phase
+from ...clocks.sample_clock import poll_phase
 from ...errors import BusError, NoAnswer
 from .fifo_tracker import CONTROLS, FifoTracker
 from .link import MS, Link, LinkLost

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from itertools import cycle
 
+from ...clocks.bridge_clock import BridgeClock
 from ...errors import BusError, LinkError
-from .clock import BridgeClock
 from .frame import DELIMITER, Deframer, Frame
 from .latency import Latency
 from .link_errors import flooded, no_reply, other_version, restarted

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpucal.chip.clock import SampleClock, make_increasing, poll_phase
+from mpucal.clocks.sample_clock import SampleClock, make_increasing, poll_phase
 
 POLL_S = 0.020
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpucal.chip.host_clock import RATE_STD, HostClock, fit_pairs
+from mpucal.clocks.host_clock import RATE_STD, HostClock, fit_pairs
 
 
 def pairs(rng, seconds, ppm, drift_ppm_a_minute=0.0, burst_s=0.0, a_second=10):

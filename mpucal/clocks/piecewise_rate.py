@@ -1,7 +1,7 @@
 """Piecewise linear regression for a sample clock whose rate changed.
 
 Binary segmentation: the place at which two lines explain the points best is a break if they do so beyond chance; then
-the points on either side of it are searched in the same way. `pieces.cpp` tries all places.
+the points on either side of it are searched in the same way.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from itertools import pairwise
 import numpy as np
 
 from ..data import Vector
-from ._pieces import best_break
 
 # A break must explain this many times the residual variance. Chance alone, over all places, stays below 30.
 LEAST_BREAK_RATIO = 100.0
@@ -110,8 +109,21 @@ def _find_break(t_s: Vector, y: Vector) -> int | None:
     n = len(t_s)
     if n < 2 * LEAST_POINTS or t_s[-1] - t_s[0] < 2 * LEAST_S:
         return None
-    at, both, one = best_break(t_s - t_s.mean(), y - y.mean(), LEAST_POINTS, LEAST_S)
-    if at < 0:
+    t, y = t_s - t_s.mean(), y - y.mean()
+    before, after = _residual_squares(t, y), _residual_squares(t[::-1], y[::-1])[::-1]
+    places = np.arange(LEAST_POINTS, n - LEAST_POINTS + 1)
+    places = places[(t[places - 1] - t[0] >= LEAST_S) & (t[-1] - t[places] >= LEAST_S)]
+    if not len(places):
         return None
-    variance = max(both / (n - 4), LEAST_VARIANCE)
-    return at if one - both > LEAST_BREAK_RATIO * variance else None
+    both = before[places - 1] + after[places]
+    best = int(np.argmin(both))
+    variance = max(both[best] / (n - 4), LEAST_VARIANCE)
+    return int(places[best]) if before[-1] - both[best] > LEAST_BREAK_RATIO * variance else None
+
+
+def _residual_squares(t: Vector, y: Vector) -> Vector:
+    """Return the sum of squares about the line through points 0..k, for every k (n,)."""
+    k, st, sy = np.arange(1.0, len(t) + 1.0), np.cumsum(t), np.cumsum(y)
+    stt, sty = np.cumsum(t * t) - st * st / k, np.cumsum(t * y) - st * sy / k
+    explained = np.divide(sty * sty, stt, out=np.zeros(len(t)), where=stt > 0)
+    return np.maximum(np.cumsum(y * y) - sy * sy / k - explained, 0.0)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.mavlink.clock import Jump, VehicleClock
+from mpucal.clocks.vehicle_clock import Jump, VehicleClock
 
 WRAP = 1 << 32
 

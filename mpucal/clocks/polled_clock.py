@@ -7,7 +7,7 @@ from array import array
 import numpy as np
 
 from ..data import GAP_INTERVALS, Vector
-from .clock import NS, Times, Whole
+from .sample_clock import NS, Times, Whole
 
 
 class PolledClock:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mpucal.chip.clock import SampleClock
-from mpucal.chip.piecewise_rate import best_break, find_breaks, fit_lines, merge_equal_slopes
+from mpucal.clocks.piecewise_rate import find_breaks, fit_lines, merge_equal_slopes
+from mpucal.clocks.sample_clock import SampleClock
 
 
 def counted(rates_hz, each_s=20.0, seed=0, late_s=0.001):
@@ -66,11 +66,3 @@ def test_final_times_follow_a_clock_that_changes():
 def test_final_times_of_a_steady_clock_are_those_of_one_line():
     clock, index, segment = clock_of(*counted([199.0]))
     np.testing.assert_allclose(clock.final()(segment, index), clock.times_s(segment, index), rtol=0, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("n", "least", "message"), [(10, 3, "different lengths"), (20, 0, "one point")], ids=["lengths", "no point"]
-)
-def test_impossible_points_are_refused(n, least, message):
-    with pytest.raises(ValueError, match=message):
-        best_break(np.arange(20.0), np.arange(float(n)), least, -1e9)

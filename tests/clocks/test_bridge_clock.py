@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.sources.bridge.clock import WRAP_US, BridgeClock
+from mpucal.clocks.bridge_clock import WRAP_US, BridgeClock
 
 S, MS, US = 1_000_000_000, 1_000_000, 1000
 
