@@ -10,7 +10,8 @@ from typing import Any
 import click
 
 from ..report.units import with_std
-from ..result.comparison import CONFIDENCE, Comparison, Difference, compare
+from ..result.comparison import CONFIDENCE, Comparison, compare
+from ..result.document import plain
 from .arguments import CALIBRATION_PATH, json_option
 from .loading import load_calibration
 
@@ -37,15 +38,10 @@ def _document(comparison: Comparison) -> dict[str, Any]:
         "confidence": CONFIDENCE,
         "limit": comparison.limit,
         "margin": comparison.margin,
-        "numbers": [_plain(d) for d in comparison.numbers],
-        "gyroscope": [_plain(d) for d in comparison.gyroscope],
+        "numbers": [plain({**asdict(d), "z": d.z}) for d in comparison.numbers],
+        "gyroscope": [plain({**asdict(d), "z": d.z}) for d in comparison.gyroscope],
         "remarks": list(comparison.remarks),
     }
-
-
-def _plain(d: Difference) -> dict[str, Any]:
-    # NaN, the only value unequal to itself, becomes null.
-    return {key: None if value != value else value for key, value in {**asdict(d), "z": d.z}.items()}  # noqa: PLR0124
 
 
 def _page(comparison: Comparison) -> str:

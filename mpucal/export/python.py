@@ -9,42 +9,24 @@ import numpy as np
 from ..data import Vector
 from ..result.calibration import Calibration
 from .losses import heading, temperature_range
+from .templates import fill
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """Return the module's text, with `notes` in its docstring."""
-    docstring = "\n\n".join(heading(calibration, notes, "", "m/s^2, rad/s"))
-    return f'''"""{docstring}
-"""
-
-{python_functions(calibration)}
-
-K = np.array([
-{_rows(calibration.K)},
-])
-B_OMEGA = np.array([{_row(np.nan_to_num(calibration.b_omega))}])  # rad/s
-
-
-def apply_gyro(y):
-    """Return calibrated rates (..., 3) [rad/s]."""
-    return (np.asarray(y) - B_OMEGA) @ K.T
-'''
+    return fill(
+        "module.py",
+        heading="\n\n".join(heading(calibration, notes, "", "m/s^2, rad/s")),
+        functions=python_functions(calibration),
+        K=_rows(calibration.K),
+        b_omega=_row(np.nan_to_num(calibration.b_omega)),
+    )
 
 
 def python_functions(c: Calibration) -> str:
     """Return constants and `apply` for NumPy."""
-    at, start, end = temperature_range(c)
-    return f"""import numpy as np
-
-{python_constants(c)}B_A_SLOPE = np.array([{_row(c.b_a_slope)}])  # m/s^2 per degree Celsius
-AT_C, RANGE_C = {at:.6g}, ({start:.6g}, {end:.6g})
-
-
-def apply(y, temperature_c=np.nan):
-    \"\"\"Return calibrated accelerations (..., 3) [m/s^2], at the chip's temperature (...) deg C if known.\"\"\"
-    away = np.nan_to_num(np.clip(temperature_c, *RANGE_C) - AT_C)
-    return (np.asarray(y) - B_A - np.multiply.outer(away, B_A_SLOPE)) @ INV_D.T
-"""
+    at, start, end = (f"{value:.6g}" for value in temperature_range(c))
+    return fill("numpy.py", constants=python_constants(c), slope=_row(c.b_a_slope), at=at, start=start, end=end)
 
 
 def python_constants(c: Calibration) -> str:

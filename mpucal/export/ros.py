@@ -16,6 +16,7 @@ from ..result.calibration import Calibration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from .losses import heading
 from .python import python_constants
+from .templates import fill
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -45,29 +46,7 @@ def ros_node(c: Calibration) -> str:
     noise = np.diag(c.noise_std**2)
     known = f"COVARIANCE = {noise.ravel().tolist()}\n" if np.isfinite(noise).all() else ""
     covariance = "        imu.linear_acceleration_covariance = COVARIANCE\n" if known else ""
-    return f"""import numpy as np
-import rclpy
-from rclpy.node import Node
-from sensor_msgs.msg import Imu
-
-{python_constants(c)}{known}
-
-class Calibrated(Node):
-    def __init__(self):
-        super().__init__("calibrated_imu")
-        self.out = self.create_publisher(Imu, "imu/data", 10)
-        self.create_subscription(Imu, "imu/data_raw", self.correct, 10)
-
-    def correct(self, imu):
-        y = imu.linear_acceleration
-        y.x, y.y, y.z = (INV_D @ (np.array([y.x, y.y, y.z]) - B_A)).tolist()
-{covariance}        self.out.publish(imu)
-
-
-if __name__ == "__main__":
-    rclpy.init()
-    rclpy.spin(Calibrated())
-"""
+    return fill("ros_node.py", constants=python_constants(c), known=known, covariance=covariance)
 
 
 def losses(calibration: Calibration) -> tuple[str, ...]:

@@ -52,7 +52,7 @@ def to_document(fields: Mapping[str, Any], follows_temperature: bool) -> dict[st
         **({KEY: below} if (below := fields[KEY][LOWER]).any() else {}),
         **fields["extra"],
     }
-    return {key: _plain(value) for key, value in values.items()}
+    return {key: plain(value) for key, value in values.items()}
 
 
 def _check_format(document: Mapping[str, Any]) -> None:
@@ -203,16 +203,16 @@ def _array(values: Any, shape: tuple[int, ...]) -> Vector:
     return array
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return a value of JSON types; NaN and infinities become None."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

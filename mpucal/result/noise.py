@@ -17,6 +17,7 @@ from ..disk.atomic import write_atomically
 from ..errors import RecordingError
 from ..strict_json import MOST_BYTES, parse_json
 from .calibration import Calibration
+from .document import plain
 
 FORMAT, VERSION = "mpucal.noise", 1
 # its key in calibration.json
@@ -88,15 +89,11 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
         def of(sensor: str) -> dict[str, Any]:
             part = _part(sensor)
             ends = {"value": self.values, "low": self.low, "high": self.high}
-            found: dict[str, Any] = {
-                name: {end: _plain(of_all[name][part]) for end, of_all in ends.items()} for name in COEFFICIENTS
-            }
-            found["allan_deviation"] = _plain(self.deviations[:, part])
-            if sensor in self.data_sheet:
-                found["data_sheet"] = {WHITE: self.data_sheet[sensor]}
-            return found
+            found = {name: {end: of_all[name][part] for end, of_all in ends.items()} for name in COEFFICIENTS}
+            data_sheet = {"data_sheet": {WHITE: self.data_sheet[sensor]}} if sensor in self.data_sheet else {}
+            return {**found, "allan_deviation": self.deviations[:, part], **data_sheet}
 
-        return {
+        document = {
             "format": FORMAT,
             "version": VERSION,
             "created": self.created,
@@ -104,12 +101,13 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
             "rate_hz": self.rate_hz,
             "samples": self.samples,
             "seconds": self.seconds,
-            "tau_s": _plain(self.tau_s),
-            "clusters": _plain(self.clusters),
+            "tau_s": self.tau_s,
+            "clusters": self.clusters,
             ACCELEROMETER: of(ACCELEROMETER),
             GYROSCOPE: of(GYROSCOPE),
-            "suspicious": [dict(row) for row in self.suspicious],
+            "suspicious": self.suspicious,
         }
+        return {key: plain(value) for key, value in document.items()}
 
     def json(self) -> str:
         """Return the document as text."""
@@ -186,7 +184,3 @@ def with_noise(calibration: Calibration, noise: Noise) -> Calibration:
 
 def _part(sensor: str) -> slice:
     return slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)
-
-
-def _plain(values: Vector) -> Any:
-    return [_plain(row) for row in values] if values.ndim else float(values) if np.isfinite(values) else None
