@@ -125,6 +125,9 @@ def minimise(
         trial = _At(problem, at.theta.moved(step), parameters, prior, ends)
         if trial.V < at.V or (frozen and _nearer(trial, at, free, decrement)):
             at, damping, iterations = trial, damping * EASIER, iterations + 1
+        elif not frozen and -float(gradient @ step[free]) < until:
+            converged = True  # nor does V fall along the gradient
+            break
         else:
             damping *= HARDER
     theta, V = (at.theta.moved(last), at.V - decrement) if last.any() else (at.theta, at.V)

@@ -246,3 +246,10 @@ def test_a_nearly_full_disk_is_refused_before_the_board_is_lifted(mpucal, tmp_pa
     assert "only 1.5 MB are free" in result.err
     assert "Lay the board flat" not in result.err
     assert not (tmp_path / "board").exists()
+
+
+def test_tilts_in_an_arm_that_sways_are_enough(mpucal, tmp_path):
+    words = ("--bus", "sim:seed=2,arm=raised", "--rate", "100", "--tilt-only", "--yes", "-o", "board")
+    assert mpucal("session", *words).code == 0
+    quality = json.loads((tmp_path / "board" / "calibration.json").read_text())["quality"]
+    assert {reason["code"] for reason in quality["reasons"]} == {"few_orientations"}

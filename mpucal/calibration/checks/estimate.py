@@ -61,8 +61,8 @@ def inconsistent(e: Evidence) -> Reason | None:
     """Find data that the model does not explain: innovations beyond white noise."""
     if e.fit is None or e.uncertainty is None:
         return None
-    # A robust model leaves outliers in its innovations: its parts judge it.
-    if e.model == "hand" or not e.fit.nis > MOST_NIS:
+    # A robust model leaves outliers in its innovations: its parts judge it, or its uncertainty has grown by them.
+    if e.model in ("hand", "tilt") or not e.fit.nis > MOST_NIS:
         return None
     after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
     refuse = _is_useless(e) or not abs(after / e.gravity - 1.0) < 0.05
