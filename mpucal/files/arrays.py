@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,9 @@ from .hints import NO_HINTS, Hints
 from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
 from .reading import reading
-from .tables.array_table import ArrayTable, columns_of_arrays, tables_of_arrays
+from .tables.array_table import ArrayTable, columns_of_arrays, stated_rate, tables_of_arrays
 from .tables.phone import is_pair, recording_of_tables
-from .tables.table import recording_from_table
+from .tables.table import recording_from_table, stated_rate_hz
 
 _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is what with --columns t=NAME,ax=NAME,..."
 
@@ -53,7 +53,8 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
     columns = columns_of_arrays(found)
     if not columns:
         raise RecordingError(f"{path.name} holds no columns of numbers", _REMEDY)
-    return recording_from_arrays(columns, hints, path.name)
+    table = ArrayTable(path.name, list(columns), columns, rate_hz=stated_rate_hz(stated_rate(found)))
+    return recording_from_table(table, hints)
 
 
 def _read_numpy(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -74,8 +75,3 @@ def _fields(name: str, array: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]
         yield name, array
     for field in array.dtype.names or ():
         yield field, array[field]
-
-
-def recording_from_arrays(arrays: Mapping[str, NDArray[Any]], hints: Hints, name: str) -> Recording:
-    """Return the recording in arrays (n,) by name; see recording_from_table."""
-    return recording_from_table(ArrayTable(name, list(arrays), arrays), hints)

@@ -95,7 +95,6 @@ def _others(
 
 _TEXTS = ".csv .txt .log .tsv"
 _TABLE = ("another program's table", "tables.table:load_table", "tables.table:is_table")
-_RAW = ("MPU6050_raw's output", "serial_log:load_serial_log", "serial_log:is_serial_log")
 _TWO = ("a phone's tables", "tables.phone:load_two_tables", "tables.phone:is_one_of_two_tables")
 _ARCHIVE = ("a phone's tables", "tables.phone:load_archive_of_tables", "tables.phone:is_archive_of_tables")
 _PHONE = ("the folder of a phone's tables", "tables.phone:load_folder_of_tables", "tables.phone:is_folder_of_tables")
@@ -121,9 +120,15 @@ FORMATS = (
     *_others(".mat", "a file of MATLAB", _ARRAYS),
     Format(".npz", "a NumPy archive", rows=f"{_HERE}.npz:npz_rows", writer=f"{_HERE}.npz:npz_file"),
     *_others(".parquet", "a Parquet file", "parquet:load_parquet", only=False),
-    *_others(_TEXTS, *_RAW),
+    Format(
+        ".csv",
+        "a table",
+        rows=f"{_HERE}.csv:csv_rows",
+        writer=f"{_HERE}.csv:csv_file",
+        recognises=f"{_HERE}.tables.table:is_own_table",
+        only_recognised=True,
+    ),
     *_others(_TEXTS, *_TABLE, only=False),
-    Format(".csv", "a table", rows=f"{_HERE}.csv:csv_rows", writer=f"{_HERE}.csv:csv_file"),
     *_others(".zip", *_ARCHIVE),
     Format(".mcap", "sensor_msgs/Imu for ROS 2 and Foxglove", writer=f"{_HERE}.imu:imu_file"),
     *_others(FOLDER, "the folder of a bag", _BAG, "ros:is_folder_of_ros", _BAG_ROWS, only=False),

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ..data import Recording
 from ..errors import RecordingError
-from .arrays import recording_from_arrays
 from .hints import NO_HINTS, Hints
 from .reading import import_extra
+from .tables.array_table import ArrayTable
+from .tables.table import recording_from_table
 
 
 def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -28,7 +29,7 @@ def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
         arrays = {field.name: _array(table.column(place), field.type) for place, field in enumerate(table.schema)}
     except (arrow.ArrowException, OSError, ValueError, TypeError) as error:
         raise RecordingError(f"{path} is not a whole Parquet file ({error})", "write it again") from error
-    return recording_from_arrays(arrays, hints, path.name)
+    return recording_from_table(ArrayTable(path.name, list(arrays), arrays), hints)
 
 
 def _array(column: Any, kind: Any) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from ..errors import RecordingError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
 from .hints import NO_HINTS, Hints
 from .reading import reading
+from .tables.phone import tables_of_sides
 
 # of files that may be such recordings
 SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet")
@@ -33,16 +34,24 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
 
     Raises
     ------
-    RecordingError : one of them cannot be read.
+    RecordingError : fewer than two of them can be read.
     """
     from .formats import find_format  # noqa: PLC0415 - its table names this module
 
     with reading(path):
         files = _recordings(path)
-    try:
-        parts = [find_format(file, hints).read(file, hints=hints) for file in files]
-    except RecordingError as error:
-        raise RecordingError(f"{path.name}: {error.what}", error.remedy, error.options) from error
+    read: dict[str, Recording] = {}
+    failed: dict[str, RecordingError] = {}
+    for file in files:
+        try:
+            read[file.name] = find_format(file, hints).read(file, hints=hints)
+        except RecordingError as error:
+            failed[file.name] = error
+    if len(read) < FEWEST:
+        first_error = next(iter(failed.values()))
+        what = f"{path.name}: {first_error.what}"
+        raise RecordingError(what, first_error.remedy, first_error.options) from first_error
+    parts = list(read.values())
     utc_ns = [part.utc_ns for part in parts if part.utc_ns is not None]
     if len(utc_ns) == len(parts):
         parts = sorted(parts, key=lambda part: (part.utc_ns or 0) + part.t[0] * 1e9)
@@ -63,8 +72,10 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     first = parts[0]
     taken = (
         f"{path.name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
-        f" {', '.join(file.name for file in files)}. {first.taken or ''}"
+        f" {', '.join(read)}. {first.taken or ''}"
     )
+    if failed:
+        taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
     return Recording(**arrays, sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=taken.strip())
 
 
@@ -74,5 +85,6 @@ def _recordings(path: Path) -> list[Path]:
     files = sorted(child for child in path.iterdir() if child.is_file())
     if {file.name for file in files} & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(files) > MOST:
         return []
-    found = [file for file in files if file.suffix.lower() in SUFFIXES]
+    sides = tables_of_sides(file.name for file in files)
+    found = [file for file in files if file.name in sides or (not sides and file.suffix.lower() in SUFFIXES)]
     return [file for file in found if (of := recognise(file)) is not None and (of.hinted or file.suffix == ".npz")]

@@ -440,3 +440,80 @@ def test_a_slow_recording_is_called_slow(even_walk, tmp_path):
     slow = mpucal.Recording.from_arrays(np.arange(300) * 0.4, even_walk.acc[:300], even_walk.gyr[:300])
     (reason,) = [r for r in mpucal.calibrate(slow).quality["reasons"] if r["code"] == "units_suspect"]
     assert "0.4 s apart (2.5 Hz), too far to follow a turn" in reason["message"]
+
+
+def as_sides(walk, path):
+    """Write pairs of tables that are called after sides, with their rate in each, and a file of something else."""
+    for k, side in enumerate(("x_up", "y_down")):
+        part = walk.part(700 * k, 700 * (k + 1))
+        savemat(path / f"{side}_accel.mat", {"accel": part.acc, "Fs": 50})
+        savemat(path / f"{side}_gyro.mat", {"gyro": part.gyr, "Fs": 50})
+
+
+def test_pairs_of_tables_of_sides_are_one_recording_at_the_rate_that_they_state(even_walk, tmp_path):
+    as_sides(even_walk, tmp_path)
+    read = mpucal.load(tmp_path, units="gyr=rad/s", rate=HZ)
+    np.testing.assert_allclose(si(read), si(even_walk))
+    assert np.flatnonzero(read.gap).tolist() == [700]
+    assert mpucal.load(tmp_path / "x_up_accel.mat", units="gyr=rad/s").rate_hz == pytest.approx(50.0)
+
+
+def test_a_file_of_a_folder_that_is_no_recording_is_left_out_and_said(even_walk, tmp_path):
+    for name, part in (("a.npy", even_walk.part(0, 700)), ("b.npy", even_walk.part(700, 1400))):
+        as_npy(part, tmp_path / name)
+    savemat(tmp_path / "results.mat", {"accel_bias": np.zeros((3, 1)), "M_a": 0.005 * np.eye(3)})
+    read = mpucal.load(tmp_path)
+    assert len(read) == len(even_walk)
+    assert "Left out were results.mat (" in read.taken
+
+
+def vectornav(walk):
+    rows = (f"+00.1,+00.2,+00.3,{','.join(f'{v:+.9f}' for v in row)},+26.8,+096.5" for row in si(walk))
+    return "\n".join(f"$VNIMU,{row}*67" for row in rows) + "\n"
+
+
+def axes_by_words(walk):
+    at = (walk.t[:, None] * 1e3).round().astype(np.int64)[:, 0] + np.datetime64("2025-10-04T16:35:12.186", "ms")
+    lines = zip(np.datetime_as_string(at).tolist(), walk.gyr.tolist(), walk.acc.tolist(), strict=True)
+    text = "{},EULER(deg): R=1.7,GYRO: X={:.9f},Y={:.9f},Z={:.9f},ACCEL: X={:.9f},Y={:.9f},Z={:.9f},GPS: FIX,SAT=4"
+    return "\n".join(text.format(at.replace("T", " "), *w, *a) for at, w, a in lines) + "\n"
+
+
+def names_over_lines(walk):
+    """Write the whole seconds and the microseconds of a time in columns of their own."""
+    names = ['"Date\n(YY:MM:DD)"', '"Time\n(HH:MM:SS)"', '"Time\n(µs)"']
+    names += [f'"A{axis}\n(m/s^2)"' for axis in "xyz"] + [f'"G{axis}\n(rad/s)"' for axis in "xyz"]
+    us = np.rint(walk.t * 1e6).astype(np.int64).tolist()
+    lines = (
+        f"2021-09-22,13:11:{at // 10**6:02d},{at % 10**6},{','.join(map(str, row))}"
+        for at, row in zip(us, si(walk).tolist(), strict=True)
+    )
+    return ",".join(names) + "\n" + "\n".join(lines) + "\n"
+
+
+def minutes_of_a_spreadsheet(walk):
+    """Write one time as a spreadsheet does that takes it for a date."""
+    at = [f"{int(t) // 60 + 34}:{t % 60:05.2f}" for t in walk.t]
+    at[500] = "6/25/2022 14:05"
+    rows = [f"{','.join(map(str, row))},{t},1" for row, t in zip(si(walk).tolist(), at, strict=True)]
+    return "accX,accY,accZ,gyroX,gyroY,gyroZ,timestamp,Activity\n" + "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize("form", [vectornav, axes_by_words, names_over_lines, minutes_of_a_spreadsheet])
+def test_further_forms_are_read_at_the_first_try(form, even_walk, tmp_path):
+    (tmp_path / "walk.csv").write_text(form(even_walk), encoding="utf-8")
+    read = mpucal.load(tmp_path / "walk.csv")
+    np.testing.assert_allclose(si(read), si(even_walk), atol=1e-8)
+    assert read.rate_hz == pytest.approx(HZ, rel=0.15 if form is vectornav else 1e-6)
+
+
+def test_a_board_that_never_turned_has_an_accelerometer_all_the_same(even_walk, tmp_path):
+    """Name no rates, which nothing shows."""
+    rng = np.random.default_rng(7)
+    acc = np.array([9.85, 0.1, -0.3]) + rng.normal(0, 0.05, (900, 3))
+    still = np.column_stack([rng.normal(0, 0.004, (900, 3)), acc])
+    (tmp_path / "x_up.txt").write_text(text(np.column_stack([254500 + np.arange(900) / HZ, still])))
+    read = mpucal.load(tmp_path / "x_up.txt")
+    assert "its columns were guessed from the length of gravity: --columns t,-,-,-,ax,ay,az" in read.taken
+    np.testing.assert_allclose(read.acc, still[:, 3:])
+    assert np.isnan(read.gyr).all()

@@ -80,6 +80,12 @@ def columns_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[A
     return found
 
 
+def stated_rate(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the single numbers among arrays as lines of text, of which one may state the sample rate."""
+    single = {name.rpartition(".")[2]: array for name, array in arrays.items() if array.size == 1}
+    return "\n".join(f"{name}: {array.item()}" for name, array in single.items() if array.dtype.kind in "iuf")
+
+
 def tables_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ArrayTable]:
     """Return each structure, or timetable, of arrays (n,) as a table under its name."""
     found: dict[str, dict[str, NDArray[Any]]] = {}

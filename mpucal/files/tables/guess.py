@@ -7,11 +7,12 @@ units. Nothing is guessed that physics does not confirm.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from ...data import Vector
+from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..hints import ROLES, Hints
 from .clock import sample_period
 from .units import (
@@ -20,6 +21,8 @@ from .units import (
     COUNTS,
     EXPLAINED,
     FASTEST_HZ,
+    FEWEST_PER_G,
+    MOST_PER_G,
     QUANTITIES,
     acceleration_unit,
     are_counts,
@@ -27,7 +30,9 @@ from .units import (
     turning,
 )
 
-FEWEST, WIDEST = 300, 16
+FEWEST, WIDEST = 200, 16
+# relative error of |a| at rest that is still nearly 1 g: the scale factors and biases of usual sensors
+ONE_G = 0.04
 # largest distance of the quartiles of |a|, over its median: gravity, with the biases of an uncalibrated sensor
 MOST_SCATTER = 0.75
 # factor by which the speed may differ from a unit's
@@ -63,7 +68,26 @@ def guess_columns(table: Vector, hints: Hints, sensors: Sequence[int] = ()) -> d
             found = next((pair for pair in alike if turned[pair] >= best - ALIKE), None)
             if found is not None:
                 return dict(zip(ROLES[1:], found, strict=True)) | ({} if at is None else {"t": at})
-    return {}
+    return {} if sensors else _accelerometer_alone(table, clocks)
+
+
+def _accelerometer_alone(table: Vector, clocks: list[int]) -> dict[str, int]:
+    """Return the only triple of columns as long as gravity, and the time; for a board that hardly turned."""
+    places = [place for place in range(table.shape[1]) if place not in clocks[:1]]
+    triples = [places[first : first + 3] for first in range(0, len(places) - 2, 3)]
+    found = [triple for triple in triples if _is_one_g(table[:, triple])]
+    return (
+        dict(zip(ROLES[1:4], found[0], strict=True)) | dict(zip("t", clocks, strict=False)) if len(found) == 1 else {}
+    )
+
+
+def _is_one_g(acc: Vector) -> bool:
+    """Return True if (n, 3) numbers are nearly 1 g long in m/s^2, g or counts, and vary."""
+    low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
+    units = [QUANTITIES["acc"]["m/s^2"] / STANDARD_GRAVITY_MPS2, 1.0]
+    if size > 0.0 and are_counts(acc):
+        units = [2.0 ** -min(max(round(math.log2(size)), FEWEST_PER_G), MOST_PER_G)]
+    return 0.0 < high - low < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
 
 
 def _has_size(table: Vector, pair: Sequence[int]) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
 
@@ -33,19 +33,21 @@ def _stems(words: str) -> dict[str, str]:
 # a unit stands only where the program that uses the stem always writes that one
 ACC_STEMS = _stems(
     "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
-    " acce acc accs ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
+    " acce acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
 )
 GYR_STEMS = _stems(
     "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w:rad/s"
-    " angularvelocity:rad/s angularrate gyroadc:deg/s rotationrate motionrotationrate rotation"
+    " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate gyroadc:deg/s rotationrate"
+    " motionrotationrate rotation"
 )
 TIME_STEMS = _stems(
     "headerstamp:ns stamp epoch timestampsample:us timestamp timestamps time times t ts timesincestart"
     " timesincestartin secondselapsed:s elapsed elapsedtime seconds:s sec:s millis:ms micros:us rtctime datetime date"
-    " secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s sampletimefine:0.1ms"
+    " secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s timestampsec:s sampletimefine:0.1ms"
 )
 # the part below a second, in a column beside whole seconds: builtin_interfaces/Time, and ROS 1's time
-NANOSECOND_STEMS = tuple(f"{of}{word}" for of in ("", "stamp", "headerstamp") for word in ("nanosec", "nsecs", "nsec"))
+_STAMPS = ("", "stamp", "headerstamp", "timestamp")
+NANOSECOND_STEMS = tuple(f"{of}{word}" for of in _STAMPS for word in ("nanosec", "nsecs", "nsec"))
 # SensorLog has a clock for each sensor
 SENSOR_CLOCKS = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
 TEMPERATURE_STEMS = tuple(
@@ -58,6 +60,7 @@ _TIME_UNITS = ("", *QUANTITIES[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
 _AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
+_OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 _UNIT_TAIL = re.compile(
     r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|dps|mdps|mps2|m_s2|m/s2|ms2|rad_s|rads|rad|deg_s|degs|deg"
     r"|deg_per_s|rad_per_s)"
@@ -95,10 +98,12 @@ class Table(ABC):
     Attributes
     ----------
     name : of the file, for messages. header : the columns' names; empty if it has none.
+    rate_hz : the sample rate, if the file states it.
     """
 
     name: str
     header: list[str]
+    rate_hz: float | None = field(default=None, kw_only=True)
 
     @property
     def columns(self) -> list[Column]:
@@ -148,6 +153,8 @@ def parse_column_name(name: str, place: int) -> Column | None:
         text, inside = match.groups()
         if inside in ("0", "1", "2"):
             axis = int(inside)
+        elif _OF_DAY(inside.lower()):
+            continue
         elif inside.lower().replace("°", "").removeprefix("deg ").strip() in ("c", "degc", "celsius", "℃"):
             unit = "C"
         elif not (unit := find_unit(inside)):
@@ -162,7 +169,7 @@ def parse_column_name(name: str, place: int) -> Column | None:
 def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Column | None:
     """Return the column whose stem is `text`, without or with prefixes; None if no stem is known."""
     word = re.sub(r"[^a-z0-9]", "", text)
-    words = [word]
+    words = [word, word.removesuffix("imu")]
     for prefix in _PREFIXES:
         if word.startswith(prefix) and len(word) > len(prefix):
             word = word.removeprefix(prefix)

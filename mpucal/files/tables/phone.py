@@ -26,10 +26,10 @@ from ..hints import NO_HINTS, Hints
 from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import first_bytes, reading
 from .app_metadata import is_app_metadata, read_app_metadata
-from .array_table import ArrayTable, columns_of_arrays
+from .array_table import ArrayTable, columns_of_arrays, stated_rate
 from .names import ACC, GYR, Column, Table, first_triple, parse_axis_name, parse_header
 from .streams import join_streams
-from .table import SNIFFED, columns_by_hint, sensor_stream
+from .table import SNIFFED, columns_by_hint, sensor_stream, stated_rate_hz
 from .text import decode_text, find_table
 from .times import Stream
 from .units import QUANTITIES, acceleration_unit, are_counts, to_signed
@@ -44,6 +44,7 @@ UNITS = {ACC: "", GYR: "rad/s"}
 SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat")
 # of a table within a file
 OF_FILE = ".table"
+SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|face|side)(?![a-z])")
 # MATLAB's spelling of a hyphen in a name
 HYPHEN = "0x2d"
 # the columns of a table without names, as data sets have them; the time may be missing
@@ -57,7 +58,14 @@ _DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, l
 def is_folder_of_tables(path: Path) -> bool:
     """Return True if a folder holds a table of an accelerometer and one of a gyroscope, and no session."""
     names = {child.name for child in path.iterdir()}
-    return bool(_pairs(names)) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
+    return bool(_pairs(names)) and not tables_of_sides(names) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
+
+
+def tables_of_sides(names: Iterable[str]) -> list[str]:
+    """Return the accelerometer's table of each pair, if pairs are called after the sides of a board; else none."""
+    found = [next(name for name, (quantity, _) in pair.items() if quantity == ACC) for pair in _pairs(names)]
+    of_sides = all((of := _parse(name)) and SIDE.search(of[2]) for name in found)
+    return found if len(found) > 1 and of_sides else []
 
 
 def is_archive_of_tables(path: Path) -> bool:
@@ -179,7 +187,13 @@ def _recording(
     for member, (quantity, _) in sorted(pair.items(), key=lambda item: (item[1][1], item[0])):
         if quantity in found and (quantity == GYR or _holds_gravity(found[ACC][1])):
             continue
-        stream = _stream(f"{name}/{Path(member).name}" if member != name else name, read(member), quantity, hints)
+        try:
+            stream = _stream(f"{name}/{Path(member).name}" if member != name else name, read(member), quantity, hints)
+        except RecordingError:
+            # another table of that sensor may do
+            if quantity in found or member == [of for of in pair if pair[of][0] == quantity][-1]:
+                raise
+            continue
         if quantity not in found or _holds_gravity(stream):
             found[quantity] = member, stream
     (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
@@ -243,9 +257,12 @@ def _text_table(data: bytes, name: str, wanted: Sequence[str | int]) -> Table | 
 
 
 def _array_table(data: bytes, name: str) -> Table | None:
-    columns = columns_of_arrays(dict(read_matlab_arrays(data, Path(name))))
+    arrays = dict(read_matlab_arrays(data, Path(name)))
+    columns, rate_hz = columns_of_arrays(arrays), stated_rate_hz(stated_rate(arrays))
     header = list(columns) if len(columns) != len(UNNAMED) or parse_header(list(columns)) else UNNAMED
-    return ArrayTable(name, header, dict(zip(header, columns.values(), strict=True))) if columns else None
+    if not columns:
+        return None
+    return ArrayTable(name, header, dict(zip(header, columns.values(), strict=True)), rate_hz=rate_hz)
 
 
 def _columns_without_sensor(table: Table, quantity: str) -> tuple[Column, ...]:

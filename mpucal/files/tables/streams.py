@@ -37,8 +37,6 @@ OF_COUNTS = "in counts of"
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # samples over which shaking averages out: a few of its periods at the rates of most loggers
 SHAKEN = 100
-# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
-FEWEST_PER_G, MOST_PER_G = 8, 14
 
 
 def index_with_gravity(streams: Sequence[Stream]) -> int:
@@ -85,6 +83,8 @@ def join_streams(
     )
     rate_remark, untimed = "", acc.times is None or gyr.times is None
     alike = len(acc.values) == len(gyr.values) and np.array_equal(acc.number, gyr.number)
+    if untimed:
+        hints = replace(hints, rate_hz=hints.rate_hz or acc.rate_hz)
     if hints.rate_hz is None and untimed:
         hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints) if alike else None)
         rate_remark = "this sample rate is that at which its rates turn gravity"
@@ -202,7 +202,7 @@ def _averaged(values: Vector) -> Vector:
 
 def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
     """Return the same of (n, 3) counts, whose median magnitude is `size`."""
-    per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), FEWEST_PER_G), MOST_PER_G)
+    per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
     scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
     if is_wrong_full_scale(size * scale / STANDARD_GRAVITY_MPS2) and "acc" not in hints.units:

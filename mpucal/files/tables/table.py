@@ -18,7 +18,7 @@ from ..reading import first_bytes, reading
 from .app_metadata import FLIPPED
 from .clock import FEWEST
 from .guess import guess_columns
-from .labelled import labelled_table
+from .labelled import labelled_table, marked_table
 from .names import (
     ACC,
     GYR,
@@ -34,17 +34,15 @@ from .names import (
     plausible_celsius,
 )
 from .streams import index_with_gravity, join_streams
-from .text import PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
+from .text import HEAD, PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
 from .units import acceleration_unit, are_counts
 
 SNIFFED = 1 << 16
-FEWEST_COLUMNS = 6
 # with a larger share of empty lines, these lines are another sensor's and not lost
 ANOTHERS = 0.1
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
-PREAMBLE_CHARACTERS = 4096
 # above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
 RATE = re.compile(
     r"(?<![a-z])(?:fs|(?:sampl(?:e|ing)|data|output)[ _]?(?:rate|freq\w{0,6}))[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
@@ -60,33 +58,30 @@ IN_G_ON_IOS, EITHER_SIGN = "accelerometeruncalibrated_", "totalacceleration_"
 
 
 def is_table(path: Path) -> bool:
-    """Return True if a file begins as a table of both sensors that is not in mpucal's own format."""
-    begun = first_bytes(path, SNIFFED)
-    first = begun.partition(b"\n")[0].decode("utf-8-sig", "replace").lower().partition("\r")[0]
-    is_own = set(COLUMNS) <= {cell.strip().strip('"') for cell in first.split(",")}
+    """Return True if a file begins as a table of a sensor."""
+    return _begun(path) is not None
+
+
+def is_own_table(path: Path) -> bool:
+    """Return True if a file begins as a table in mpucal's own format and units."""
+    table = _begun(path)
+    named = {name.strip().lower() for name in table.header} if table else set()
+    return table is not None and table.separator == "," and set(COLUMNS) <= named and _may_be_si(table)
+
+
+def _begun(path: Path) -> TextTable | None:
     try:
-        table = _find(decode_text(begun, path.name), path.name)
-        return table is not None and not (is_own and _may_be_si(table))
+        return _find(decode_text(first_bytes(path, SNIFFED), path.name), path.name)
     except RecordingError:
-        return False
+        return None
 
 
 def _find(text: str, name: str) -> TextTable | None:
-    """Return the table of named columns, or else of numbers."""
-    found = labelled_table(text, name) or find_table(text, name) or find_numeric_table(text, name, FEWEST_COLUMNS)
-    return found or _accelerometer_alone(text, name)
-
-
-def _accelerometer_alone(text: str, name: str) -> TextTable | None:
-    """Return the table of three unnamed columns in a file that is called after an accelerometer; None for another."""
-    table = _three_columns(text, name)
-    found = replace(table, header=axes_of(Path(name).stem)) if table else None
-    return found if found and first_triple(found.columns, ACC) else None
-
-
-def _three_columns(text: str, name: str) -> TextTable | None:
-    table = find_numeric_table(text, name, 3)
-    return table if table and not table.header and len(table.rows[0]) == 3 else None
+    """Return the table of named columns, or else of numbers; three are called after the file."""
+    found = marked_table(text, name) or labelled_table(text, name) or find_table(text, name)
+    if found or not (found := find_numeric_table(text, name, 3)) or found.header or len(found.rows[0]) > 3:
+        return found
+    return replace(found, header=axes_of(Path(name).stem))
 
 
 def _may_be_si(table: TextTable) -> bool:
@@ -110,12 +105,8 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
         check_size(path, HELD * path.stat().st_size)
         text = decode_text(path.read_bytes(), path.name)
     table = find_table(text, path.name, list(hints.columns.values())) if hints.columns else _find(text, path.name)
-    if table is None and not hints.columns and _three_columns(text, path.name):
-        raise RecordingError(
-            f"{path.name} holds three columns of numbers, and nothing says of which sensor",
-            "if they are an accelerometer's, name them with --columns ax,ay,az",
-            "--columns ax,ay,az",
-        )
+    if not text.strip():
+        raise RecordingError(f"{path} is empty", "record it again")
     if table is None:
         raise RecordingError(
             f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
@@ -123,11 +114,18 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
         )
     if not table.rows:
         raise RecordingError(f"{path.name} holds no lines below the names of its columns", "record it again")
-    begun = text[:PREAMBLE_CHARACTERS]
-    known = next((units for words, units in PROGRAMS.items() if words in begun), {})
-    rate = RATE.search(begun)
-    rate_hz = hints.rate_hz or (float(rate[1]) if rate and not table.clocks(table.columns) else None)
-    return recording_from_table(table, replace(hints, units={**known, **hints.units}, rate_hz=rate_hz))
+    known = next((units for words, units in PROGRAMS.items() if words in text[:HEAD]), {})
+    table = replace(table, rate_hz=stated_rate_hz(text[:HEAD]))
+    hints = replace(hints, units={**known, **hints.units})
+    if table.ranges and not (hints.accel_range_g or hints.gyro_range_dps):
+        hints = replace(hints, accel_range_g=table.ranges[0], gyro_range_dps=table.ranges[1])
+    return recording_from_table(table, hints)
+
+
+def stated_rate_hz(text: str) -> float | None:
+    """Return the sample rate that a text states; None if it states none."""
+    found = RATE.search(text)
+    return float(found[1]) if found else None
 
 
 def recording_from_table(table: Table, hints: Hints) -> Recording:
@@ -164,6 +162,7 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
     """Return the columns with those that only physics shows, and a remark on them; see guess_columns."""
     acc, gyr = first_triple(columns, ACC), first_triple(columns, GYR)
     known = (*acc, *gyr) if acc and gyr else ()
+    hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if known and (table.clocks(columns) or hints.rate_hz):
         return columns, ""
     places = table.numeric_places()
@@ -179,7 +178,8 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
     for role, place in found.items():
         words[place] = role
     kept = [c for c in columns if c.quantity == TEMPERATURE]
-    remark = f"its columns were guessed from how gravity turns: --columns {','.join(words)}"
+    by = "how gravity turns" if "gx" in found else "the length of gravity"
+    remark = f"its columns were guessed from {by}: --columns {','.join(words)}"
     return [*columns_by_hint(table.header, replace(hints, columns=found)), *kept], remark
 
 
@@ -193,6 +193,12 @@ def _missing_sensors(table: Table, columns: list[Column]) -> RecordingError:
         return RecordingError(
             f"{table.name} holds no columns of an accelerometer; its columns are {_list_names(table.header)}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
+        )
+    if len(table.numeric_places()) == 3:
+        return RecordingError(
+            f"{table.name} holds three columns of numbers, and nothing says of which sensor",
+            "if they are an accelerometer's, name them with --columns ax,ay,az",
+            "--columns ax,ay,az",
         )
     order = ",".join(ROLES if table.clocks(columns) else ROLES[1:])
     return RecordingError(
@@ -242,6 +248,7 @@ def sensor_stream(
         places=None if others and clock else np.flatnonzero(kept),
         temperature_c=plausible_celsius(table.numbers(warm[:1])[kept, 0]) if warm else None,
         lost=0 if others else int((~kept).sum()),
+        rate_hz=table.rate_hz,
     )
 
 

@@ -7,7 +7,7 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, time
+from datetime import UTC, datetime
 from decimal import Decimal, InvalidOperation
 from io import StringIO
 from itertools import pairwise, zip_longest
@@ -19,12 +19,16 @@ from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..budget import check_size
 from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
-from .units import NS, find_unit
+from .units import NS, QUANTITIES, find_unit
 
 # separator -> its name for messages; None: any blanks
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 # lines that may precede the header: a sketch's greeting, `sep=;`, the settings that Betaflight's Explorer writes
 PREAMBLE = 200
+# characters within which the names of columns begin
+HEAD = 4096
+# rows by which a column of times is known
+LOOKED_AT = 50
 # a file with a larger share of NUL bytes is binary
 MOST_NUL = 0.1
 # a header may begin with such a mark; any other line that does is a comment
@@ -36,10 +40,15 @@ MOST_BAD = 0.01
 LINE, CELL = 216, 16
 # exponents of numbers beyond this would take all memory as integers
 MOST_DIGITS = 40
+# units of a column beside whole seconds
+BELOW_A_SECOND = ("ms", "us", "ns")
+# names within quotation marks may span lines
+_QUOTED = re.compile(r'"[^"]{0,60}"')
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 # Arduino's serial monitor writes the time before each line
 MONITORED = re.compile(r"^\d\d:\d\d:\d\d\.\d{3} -> ", re.MULTILINE)
-_TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d(\.\d+)?").fullmatch
+# the hours may be missing
+_TIME_OF_DAY = re.compile(r"(?:(\d\d?):)?(\d\d):(\d\d(?:\.\d+)?)").fullmatch
 
 
 @dataclass(frozen=True)
@@ -49,18 +58,20 @@ class TextTable(Table):
     Attributes
     ----------
     rows : the cells of each line that is not empty; none of a line that was torn. lines : the line number of each row.
-    separator : one of SEPARATORS, or `:` of labelled numbers.
+    separator : one of SEPARATORS, or `:` of labelled numbers. ranges : g and deg/s, of counts, if a program sets them.
     """
 
     rows: list[list[str]]
     lines: list[int]
     separator: str | None = ","
+    ranges: tuple[float, float] | None = None
 
     @property
     def remarks(self) -> list[str]:
         """See Table."""
-        called = SEPARATORS.get(self.separator, "names")
-        return [] if self.separator == "," else [f"its cells are separated by {called}"]
+        called = SEPARATORS.get(self.separator)
+        told = ["the ranges are those that MPU6050::initialize() sets"] if self.ranges else []
+        return told if self.separator in (",", ":") else [f"its cells are separated by {called}", *told]
 
     def has(self, column: Column) -> Mask:
         """See Table."""
@@ -73,8 +84,10 @@ class TextTable(Table):
 
     def clocks(self, columns: Sequence[Column]) -> list[Column]:
         """See Table."""
-        first = self.rows[0]
-        return [c for c in columns if c.quantity == TIME and c.place < len(first) and _is_number(first[c.place])]
+        # the last of them may be torn
+        some = self.rows[:: max(len(self.rows) // LOOKED_AT, 1)][: LOOKED_AT + 1] or self.rows
+        cells = [(c, [row[c.place] for row in some if c.place < len(row)]) for c in columns if c.quantity == TIME]
+        return [c for c, of in cells if of and all(map(_is_number, filter(str.strip, of)))]
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """See Table; a cell that a line lacks, or of a few damaged lines, is empty. The error names the line."""
@@ -92,24 +105,36 @@ class TextTable(Table):
 
     def times(self, column: Column, kept: Mask) -> tuple[list[Decimal], str]:
         """See Table; the error names the line. A column of nanoseconds beside whole seconds is added to these."""
-        found = self._exact(column, kept)
+        found, unit = self._exact(column, kept), column.unit
+        parts = [c for c in self.columns if c.quantity == NANOSECONDS and unit == "s"]
         try:
             Decimal(_with_point(self.rows[0][column.place].strip()))
         except InvalidOperation:
-            return found, "ns"
-        parts = [c for c in self.columns if c.quantity == NANOSECONDS]
-        if column.unit != "s" or not parts:
-            return found, column.unit
-        return [s * NS + ns for s, ns in zip(found, self._exact(parts[0], kept), strict=True)], "ns"
+            unit = "ns"
+            below = [c for c in self.columns if c.quantity == TIME and c.unit in BELOW_A_SECOND and c != column]
+            parts = [] if any(ns % NS for ns in found) else below
+        if not parts:
+            return found, unit
+        ticks = round(QUANTITIES["t"][parts[0].unit or "ns"] * NS)
+        more = [part * ticks for part in self._exact(parts[0], kept)]
+        if max(more) >= NS:
+            return found, unit
+        return [at * (1 if unit == "ns" else NS) + part for at, part in zip(found, more, strict=True)], "ns"
 
     def _exact(self, column: Column, kept: Mask) -> list[Decimal]:
-        found = []
+        found, bad = [], []
         for i in np.flatnonzero(kept).tolist():
             text = self._cell(i, column)
             try:
                 found.append(_exact(text))
             except ValueError as error:
-                raise self._not_a_number(i, column, text) from error
+                bad.append(len(found))
+                found.append(found[-1] if found else Decimal(0))
+                if len(bad) > MOST_BAD * len(self.rows) or bad[0] == 0:
+                    raise self._not_a_number(i, column, text) from error
+        # a spreadsheet writes some times otherwise
+        for i in bad:
+            found[i] = (found[i - 1] + found[min(i + 1, len(found) - 1)]) / 2
         return found
 
     def _cell(self, i: int, column: Column) -> str:
@@ -142,10 +167,10 @@ def _exact(text: str) -> Decimal:
         if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
             return number
     except InvalidOperation:
-        if _TIME_OF_DAY(text):
-            date = datetime.combine(datetime.min, time.fromisoformat(text))
-        else:
-            date = datetime.fromisoformat(text)
+        if of_day := _TIME_OF_DAY(text):
+            hours, minutes, seconds = of_day.groups()
+            return ((int(hours or 0) * 60 + int(minutes)) * 60 + Decimal(seconds)) * NS
+        date = datetime.fromisoformat(text)
         since = date - (EPOCH if date.tzinfo else datetime.min)
         return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
     raise ValueError(text)
@@ -173,6 +198,8 @@ def decode_text(data: bytes, name: str) -> str:
             text = data.decode("cp1252", "replace")
     if "\n" not in text:
         text = text.replace("\r", "\n")
+    head = _QUOTED.sub(lambda quoted: " ".join(quoted[0].split("\n")), text[:HEAD])
+    text = head + text[HEAD:]
     return MONITORED.sub("", text) if MONITORED.match(text) else text
 
 

@@ -33,6 +33,7 @@ class Stream:
     zero_ns : the time of day at time 0, in ns since 1970, if another file tells it.
     places : (n,) of the samples in the order of measurement, with holes where lines without a sample are between.
     temperature_c : (n,), if the file has it. lost : number of lines that hold no sample and no time.
+    rate_hz : the sample rate, if the file states it.
     """
 
     times: Times | None
@@ -43,6 +44,7 @@ class Stream:
     places: Numbers | None = None
     temperature_c: Vector | None = None
     lost: int = 0
+    rate_hz: float | None = None
 
     @cached_property
     def number(self) -> Numbers:

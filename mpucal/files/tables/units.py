@@ -17,6 +17,8 @@ from ...errors import RecordingError
 NS = 1_000_000_000
 COUNTS = "counts"
 FULL_SCALE = 32768
+# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
+FEWEST_PER_G, MOST_PER_G = 8, 14
 # quantity -> unit -> SI
 QUANTITIES = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4},
