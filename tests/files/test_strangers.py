@@ -343,6 +343,7 @@ def test_lines_without_times_that_repeat_a_sample_are_left_out(even_walk, tmp_pa
     read = mpucal.load(tmp_path / "acc.txt")
     np.testing.assert_allclose(read.acc, even_walk.acc)
     np.testing.assert_allclose(read.t, even_walk.t * 5, atol=1e-9)
+    assert not read.gap.any()
     assert f"{4 * len(even_walk)} repeated samples were left out" in read.taken
 
 

@@ -96,9 +96,10 @@ def are_new(at_once: Mask | None, values: Vector) -> Mask:
     return np.append(True, ~again)[: len(values)]
 
 
-def are_gaps(number: Numbers) -> Mask:
-    """Return (n,) True where more than one sample is missing before a sample, by their increasing numbers (n,)."""
-    return np.append(False, np.diff(number) > GAP_INTERVALS)[: len(number)]
+def are_gaps(t: Vector | Numbers) -> Mask:
+    """Return (n,) True where more than one sample is missing before a sample, by increasing times or numbers (n,)."""
+    steps = np.diff(t, prepend=t[:1])
+    return steps > GAP_INTERVALS * np.median(steps[1:]) if len(t) > 1 else np.zeros(len(t), bool)
 
 
 def sample_period(stamps: Vector, number: Numbers | None = None) -> float:
@@ -118,8 +119,7 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
     n = len(stamps)
     number = np.arange(n) if number is None else number
     period, steps = sample_period(stamps, number), np.diff(stamps)
-    gap = np.append(False, steps > GAP_INTERVALS * np.median(steps))[:n] if n > 1 else np.zeros(n, bool)
-    own = Clock(stamps, gap, 1.0 / period if period else 0.0)
+    own = Clock(stamps, are_gaps(stamps), 1.0 / period if period else 0.0)
     off = steps - period * np.diff(number)
     if n < FEWEST or not period > 0.0 or (np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period):
         return own
