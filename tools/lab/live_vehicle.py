@@ -5,15 +5,17 @@
 
 The hand does what the session's prompts say; where it brings the vehicle goes to the SITL through its JSON interface
 (ArduPilot's libraries/SITL/examples/JSON). What the SITL makes of it, SIM_ACCn_BIAS and SIM_ACCn_SCAL, is what the
-session is to find. Words after `--` go to `mpucal session`. The line at the end: exit code, verdict, how far the
-vehicle's parameters were from the truth at worst and how far they are now (offset [m/s^2], scale), and the rms over D
-and b_a of all IMUs of (estimate - truth) / standard uncertainty.
+session is to find. Words after `--` go to `mpucal session`; with --own, ArduPilot calibrates itself in the same hand
+instead. The line at the end: exit code, verdict, how far the vehicle's parameters were from the truth at worst and how
+far those of each IMU are now (offset [m/s^2], scale), the rms over D and b_a of all IMUs of (estimate - truth) /
+standard uncertainty, the time that was measured [s], and how far the attitude is off after a reboot [deg].
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import socket
 import struct
 import subprocess
@@ -25,11 +27,11 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mpucal.data import STANDARD_GRAVITY_MPS2
+from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
 from mpucal.errors import NoAnswer
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
@@ -43,14 +45,17 @@ from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.simulated.hands import HANDS
 from mpucal.simulated.motion import Motion
+from mpucal.simulated.rotation import up_in_board
 from mpucal.simulated.vehicle.imus import FROM_HAND, to_hand_axes
 
+from . import own_calibration
 from .judge import off, rms, z_of
 
 MPUCAL = Path(sys.executable).parent / "mpucal"
 # header of a message of the SITL for each step: magic number, steps a second, number of the step
 HEAD, MAGIC = struct.Struct("<HHI"), (18458, 29569)
 BLOCK = 20
+TURNED_RAD_S = 0.1
 OWN_SYSTEM = 255
 IMUS = 3
 PATIENCE_S = 30
@@ -63,16 +68,23 @@ class Body:
 
     Parameters
     ----------
-    port : of UDP, where the SITL sends its steps. hand : its kind. seed : of the hand.
+    port : of UDP, where the SITL sends its steps. hand : its kind. seed : of the hand and of the skew.
+    cross_axis : standard deviation of the accelerometers' cross-axis sensitivities.
+
+    Attributes
+    ----------
+    t_s : time of the motion. up : (3,) unit vector in the vehicle's axes. skew : (3, 3) of the accelerometers.
     """
 
-    def __init__(self, port: int, hand: str, seed: int) -> None:
-        of_hand, of_motion = np.random.default_rng(seed).spawn(2)
+    def __init__(self, port: int, hand: str, seed: int, cross_axis: float) -> None:
+        of_hand, of_motion, of_skew = np.random.default_rng(seed).spawn(3)
+        self.skew = np.where(np.eye(3, dtype=bool), 1.0, of_skew.normal(0.0, cross_axis, (3, 3)))
         self._motion = Motion(HANDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
         self._lock = threading.Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
-        self._t_s = self._booted_s = 0.0
+        self.t_s = self._booted_s = self._moved_s = 0.0
+        self.up = np.array([0.0, 0.0, -1.0])
         self._ahead: deque[tuple[float, dict[str, Any]]] = deque()
         # R_b, from the axes of the sensors, in which the SITL's body is, to those of the vehicle
         self.mounting = np.eye(3)
@@ -81,7 +93,12 @@ class Body:
     def hear(self, kind: str, down: tuple[float, float, float] | None) -> None:
         """Hear a prompt, whose `down` is in the vehicle's axes."""
         with self._lock:
-            self._motion.hear(ReceivedPrompt(kind, None if down is None else to_hand_axes(down)), self._t_s)
+            self._motion.hear(ReceivedPrompt(kind, None if down is None else to_hand_axes(down)), self.t_s)
+
+    @property
+    def still_s(self) -> float:
+        """Time for which it has not been turned."""
+        return self.t_s - self._moved_s
 
     def _serve(self) -> None:
         answer, last = b"", -1
@@ -93,7 +110,7 @@ class Body:
             # a repeated request gets the same answer
             if count != last or not answer:
                 # the clock of a SITL starts with the program
-                self._booted_s = self._t_s if count < last else self._booted_s
+                self._booted_s = self.t_s if count < last else self._booted_s
                 answer = self._next(rate_hz)
             last = count
             self._socket.sendto(answer, sitl)
@@ -101,18 +118,22 @@ class Body:
     def _next(self, rate_hz: int) -> bytes:
         if not self._ahead:
             self._ahead.extend(self._steps(rate_hz))
-        self._t_s, step = self._ahead.popleft()
-        step["timestamp"] = self._t_s - self._booted_s
+        self.t_s, step = self._ahead.popleft()
+        step["timestamp"] = self.t_s - self._booted_s
         # its parser wants no space after a colon
         return f"\n{json.dumps(step, separators=(',', ':'))}\n".encode()
 
     def _steps(self, rate_hz: int) -> Iterator[tuple[float, dict[str, Any]]]:
         with self._lock:
-            edges = self._t_s + np.arange(BLOCK + 1) / rate_hz
+            edges = self.t_s + np.arange(BLOCK + 1) / rate_hz
             force, rate = (means @ FROM_HAND @ self.mounting for means in self._motion.means(edges))
-            w, x, y, z = self._motion.attitude(float(edges[-1])).tolist()
+            attitude = self._motion.attitude(float(edges[-1]))
+        self.up = up_in_board(attitude) @ FROM_HAND
+        if np.abs(rate).max() > TURNED_RAD_S:
+            self._moved_s = float(edges[-1])
+        w, x, y, z = attitude.tolist()
         at = {"position": [0, 0, 0], "velocity": [0, 0, 0], "quaternion": [w, x, -y, -z]}
-        for t_s, felt, turn in zip(edges[1:].tolist(), force.tolist(), rate.tolist(), strict=True):
+        for t_s, felt, turn in zip(edges[1:].tolist(), (force @ self.skew.T).tolist(), rate.tolist(), strict=True):
             yield t_s, {"imu": {"gyro": turn, "accel_body": felt}, **at}
 
 
@@ -133,31 +154,34 @@ class Held:
         # the vehicle takes a scale of 0 as 1
         return Correction(bias, np.where(scale == 0, 1.0, scale))
 
-    def off(self) -> str:
-        """Return how far its parameters are from the truth at worst: offset [m/s^2] and scale."""
+    def off(self) -> list[str]:
+        """Return how far the parameters of each IMU are from the truth at worst: offset [m/s^2] and scale."""
         imus = range(1, round(self.parameters["SIM_IMU_COUNT"]) + 1)
-        far = [off(ardupilot_slot(imu), self.parameters, self.true(imu)) for imu in imus]
-        return "{:.5f} {:.6f}".format(*map(max, zip(*far, strict=True)))
+        return ["{:.5f} {:.6f}".format(*off(ardupilot_slot(imu), self.parameters, self.true(imu))) for imu in imus]
 
-    def z(self, document: Mapping[str, Any]) -> tuple[float, ...]:
+    def z(self, document: Mapping[str, Any], skew: Vector) -> tuple[float, ...]:
         """Return (12,) of D and b_a of one IMU's document, where this is what was held while it was measured."""
         imu = int(document["autopilot"]["imu"])
         where = ardupilot_slot(imu)
         R, held, true = mounting(ARDUPILOT, where, self.parameters), where.correction(self.parameters), self.true(imu)
         if R is None or held is None:
             return ()
-        D, b_a = R @ np.diag(held.scale / true.scale) @ R.T, R @ (held.scale * (true.offset - held.offset))
+        D, b_a = R @ np.diag(held.scale / true.scale) @ skew @ R.T, R @ (held.scale * (true.offset - held.offset))
         return z_of(document, {"D": D, "b_a": b_a})
 
 
 def held(url: str) -> Held:
     """Ask the vehicle at another of its ports for what it holds now."""
     names = [f"SIM_ACC{imu}_{kind}_{a}" for imu in range(1, IMUS + 1) for kind in KINDS_OF_ERROR for a in AXES]
-    with closing(_opened(url)) as transport:
-        link = Link(transport, lambda _t_ns, _packet: None, own_system=OWN_SYSTEM)
-        link.lock(link.listen()[0])
+    with closing(_locked(url)) as link:
         own = read_parameters(link, ["SIM_IMU_COUNT", *names], ARDUPILOT)
         return Held(own | read_stream_parameters(link, ARDUPILOT))
+
+
+def _locked(url: str) -> Link:
+    link = Link(_opened(url), lambda _t_ns, _packet: None, own_system=OWN_SYSTEM)
+    link.lock(link.listen()[0])
+    return link
 
 
 def _opened(url: str) -> Transport:
@@ -183,14 +207,23 @@ def main() -> int:
     parser.add_argument("--hand", choices=HANDS, default="guided")
     parser.add_argument("--seed", type=int, default=0, help="of the hand")
     parser.add_argument("--killed-at", type=int, metavar="N", help="prompt at which it is killed, and then resumed")
+    parser.add_argument("--cross-axis", type=float, default=0.0, metavar="SD", help="of the accelerometers")
+    parser.add_argument("--own", action="store_true", help="ArduPilot calibrates itself")
     parser.add_argument("-o", "--folder", type=Path, help="of the session's files")
     parser.add_argument("words", nargs="*", help="for mpucal session")
     arguments = parser.parse_args()
-    body = Body(arguments.port, arguments.hand, arguments.seed)
+    body = Body(arguments.port, arguments.hand, arguments.seed, arguments.cross_axis)
     before = held(arguments.parameters)
     R_b = mounting(ARDUPILOT, ardupilot_slot(1), before.parameters)
     if R_b is not None:
         body.mounting = R_b
+    if arguments.own:
+        with closing(_locked(arguments.mavlink)) as link:
+            done, took_s, level = own_calibration.calibrate(link, body)
+            angle = own_calibration.attitude_error_deg(link, body, level, reboot=True)
+        result = Result(int(not done), None, took_s, angle)
+        print(line(result, before, held(arguments.parameters), body.skew))
+        return int(not done)
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.folder or Path(temporary) / "session"
         code = session(body, ["--mavlink", arguments.mavlink, "-o", str(folder), *arguments.words], arguments.killed_at)
@@ -198,7 +231,10 @@ def main() -> int:
             code = session(body, ["--resume", str(folder), *arguments.words])
         file = folder / "calibration.json"
         document = json.loads(file.read_text()) if file.exists() else None
-    print(line(code, before, held(arguments.parameters), document))
+    with closing(_locked(arguments.mavlink)) as link:
+        angle = own_calibration.attitude_error_deg(link, body, np.zeros(2), reboot=False)
+    took_s = document["fit"]["seconds"] if document else math.nan
+    print(line(Result(code, document, took_s, angle), before, held(arguments.parameters), body.skew))
     return code
 
 
@@ -224,9 +260,21 @@ def session(body: Body, words: list[str], killed_at: int | None = None) -> int:
     return process.returncode
 
 
-def line(code: int, before: Held, after: Held, document: Mapping[str, Any] | None) -> str:
+class Result(NamedTuple):
+    """Outcome of a calibration; document : calibration.json of a session. angle_deg : of the attitude afterwards."""
+
+    code: int
+    document: Mapping[str, Any] | None
+    took_s: float
+    angle_deg: float
+
+
+def line(result: Result, before: Held, after: Held, skew: Vector) -> str:
     """Return the result in a line."""
+    document = result.document
     imus = [document, *document.get("others", [])] if document else []
-    z = rms([each for one in imus if "accelerometer" in one for each in before.z(one)])
+    z = rms([each for one in imus if "accelerometer" in one for each in before.z(one, skew)])
     verdict = document["quality"]["verdict"] if document else "none"
-    return f"exit {code} {verdict}: was {before.off()}, is {after.off()}, z {z:.2f}"
+    was, now = max(before.off()), ", ".join(after.off())
+    end = f"took {result.took_s:.0f} s, attitude off {result.angle_deg:.2f} deg"
+    return f"exit {result.code} {verdict}: was {was}, is {now}, z {z:.2f}, {end}"

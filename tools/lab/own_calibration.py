@@ -1,0 +1,82 @@
+"""ArduPilot's own calibration of its accelerometers: six sides in a simulated hand, and the attitude afterwards."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from mpucal.data import Vector
+from mpucal.mavlink.dialect import Message, dialect
+from mpucal.mavlink.horizon import Horizon
+from mpucal.mavlink.link import Link, S
+from mpucal.mavlink.parameters.level import tilt_deg
+from mpucal.mavlink.request import send_command
+from mpucal.session.aims import SIDES
+
+PATIENCE_NS, LISTEN_NS = 600 * S, S // 5
+# A person presses the key once the vehicle rests as it should.
+HELD_S, NEAR = 1.0, 0.97
+# What it reports in place of a side.
+SUCCESS, FAILED = 16777215, 16777216
+# The attitude's estimator settles within this, and is then averaged.
+SETTLED_S, AVERAGED = 20.0, 20
+ATTITUDE_US = 100_000
+
+
+class Turned(Protocol):
+    """The vehicle's body in a hand: its time [s], for how long it has been still, and what is up in its axes (3,)."""
+
+    t_s: float
+    still_s: float
+    up: Vector
+
+    def hear(self, kind: str, down: tuple[float, float, float] | None) -> None: ...  # noqa: D102
+
+
+def calibrate(link: Link, body: Turned) -> tuple[bool, float, Vector]:
+    """Have the vehicle calibrate itself on six sides; return if it succeeded, the time [s] it took, and its level.
+
+    The level (2,) [deg] is roll and pitch of the vehicle as it was put down for the first side.
+    """
+    side, confirmed, level, begun_s = 0, 0, np.zeros(2), body.t_s
+    command = dialect().MAV_CMD_ACCELCAL_VEHICLE_POS
+
+    def reported(message: Message) -> int:
+        is_side = message.get_type() == "COMMAND_LONG" and message.command == command
+        return round(message.param1) if is_side else 0
+
+    body.hear("lay_flat", None)
+    send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 1)
+    end_ns = link.now_ns() + PATIENCE_NS
+    while link.now_ns() < end_ns:
+        for message in link.messages(link.now_ns() + LISTEN_NS):
+            asked = reported(message)
+            if asked in (SUCCESS, FAILED):
+                return asked == SUCCESS, body.t_s - begun_s, level
+            if 0 < asked != side:
+                side = asked
+                if side > 1:
+                    body.hear("rotate", tuple(SIDES[side - 1].tolist()))
+        if side > confirmed and body.still_s > HELD_S and -body.up @ SIDES[side - 1] > NEAR:
+            level = tilt_deg(body.up) if side == 1 else level
+            confirmed = side
+            send_command(link, command, side)
+    return False, body.t_s - begun_s, level
+
+
+def attitude_error_deg(link: Link, body: Turned, level_deg: Vector, reboot: bool) -> float:
+    """Return how far roll and pitch [deg] of the vehicle at rest are from the truth, less `level_deg`, at worst."""
+    if reboot:
+        Horizon(link).reboot()
+    body.hear("lay_flat", None)
+    heard: list[tuple[float, float]] = []
+    begun_s = body.t_s
+    while body.t_s - begun_s < SETTLED_S or body.still_s < HELD_S or len(heard) < AVERAGED:
+        if not heard:
+            send_command(link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, 30, ATTITUDE_US)
+        for message in link.messages(link.now_ns() + S):
+            if message.get_type() == "ATTITUDE":
+                heard.append((message.roll, message.pitch))
+    found = np.degrees(np.mean(heard[-AVERAGED:], axis=0))
+    return float(np.abs(found - (tilt_deg(body.up) - level_deg)).max())
