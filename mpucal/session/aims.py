@@ -22,15 +22,19 @@ TILT_RAD = math.radians(30.0)
 UNSEEN_RAD, UNSEEN_TILT_RAD = math.radians(20.0), math.radians(10.0)
 
 
+FLAT_S = 10.0  # of rest, after which noise and gyroscope bias are known
+
+
 @dataclass(frozen=True)
 class Aim:
-    """Conditions for the end of the turning, and the number of verifications.
+    """Conditions for the end of each step, and the number of verifications.
 
     Attributes
     ----------
     target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
     longest_s : time limit of the turning [s]. verify : number of new orientations for the verification.
     sides : orientations that are enough for a vehicle that is put down in each, in place of `least`; 0: they are not.
+    flat_s : time for which the board lies flat first.
     """
 
     target: Target
@@ -38,6 +42,7 @@ class Aim:
     longest_s: float
     verify: int
     sides: int = 0
+    flat_s: float = FLAT_S
 
 
 AIMS: Mapping[str, Aim] = MappingProxyType(
@@ -50,6 +55,8 @@ AIMS: Mapping[str, Aim] = MappingProxyType(
 NORMAL = "normal"
 # A vehicle's samples are filtered, rounded, or taken at other times than they say: they need more orientations.
 LEAST_OF_VEHICLE = 14
+# An autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows what is left of it.
+FLAT_OF_VEHICLE_S = 5.0
 # Directions that point down on the six sides of a vehicle, as a pilot takes them: level, left, right, nose down, nose
 # up, back. One that rests on things needs no more, as no hand moves it, and one new orientation for its verification.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1)], np.float64)
@@ -60,7 +67,7 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     """Return the aim of a target, one of AIMS; a vehicle's IMU needs more orientations for the normal one."""
     aim = AIMS[target]
     if target == NORMAL and sensor is not None and sensor.origin is Origin.VEHICLE:
-        return replace(aim, least=LEAST_OF_VEHICLE, sides=len(SIDES))
+        return replace(aim, least=LEAST_OF_VEHICLE, sides=len(SIDES), flat_s=FLAT_OF_VEHICLE_S)
     return aim
 
 

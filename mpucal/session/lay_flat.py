@@ -1,4 +1,4 @@
-"""The first step of a session: wait until the board has been flat and still for ten seconds."""
+"""The first step of a session: wait until the board has been flat and still for long enough."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ..data import Samples
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import Windows
+from .aims import FLAT_S
 from .boards import BOARD, KINDS
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
 from .step import SAY_AGAIN_S, Step
 
 WINDOW_S = 0.5
-FLAT_S = 10.0
 # Least rest after which Enter goes on.
 SHORTEST_S = 2.0
 # Least rest in a recording without a session, whose person knew of no countdown.
@@ -46,13 +46,13 @@ class LayFlat(Step):
     Parameters
     ----------
     patient : there is no time limit, and RECORDED_S of rest is enough once the board is moved.
-    board : its kind, for the words of the prompts.
+    board : its kind, for the words of the prompts. flat_s : time for which it is to be still.
     """
 
-    def __init__(self, patient: bool = False, board: str = BOARD) -> None:
-        self._patient = patient
+    def __init__(self, patient: bool = False, board: str = BOARD, flat_s: float = FLAT_S) -> None:
+        self._patient, self._flat_s = patient, flat_s
         lay = KINDS[board].lay
-        text = f"{lay} on a firm surface, let go of it, and leave it still for {FLAT_S:.0f} s."
+        text = f"{lay} on a firm surface, let go of it, and leave it still for {flat_s:.0f} s."
         self.prompt = Prompt(PromptKind.LAY_FLAT, text)
         self._windows = Windows(WINDOW_S)
         self._stillness = Detector(QUIET)
@@ -76,7 +76,7 @@ class LayFlat(Step):
                     return [*outputs, self._never_still(sight)]
                 continue
             outputs += self._rests(sight, t_s)
-            if sight.seconds >= FLAT_S - 1e-6:
+            if sight.seconds >= self._flat_s - 1e-6:
                 return [*outputs, self._rested(sight)]
         return outputs
 
@@ -102,7 +102,7 @@ class LayFlat(Step):
             self._cautioned_s = t_s
             what, remedy = f"the board was moved: {self._motion}", "let go of it; the countdown starts again"
             outputs.append(Caution(t_s, "moved", what, remedy))
-        return outputs + self._countdown(t_s, f"still for {still.seconds:.0f} of {FLAT_S:.0f} s", paused=False)
+        return outputs + self._countdown(t_s, f"still for {still.seconds:.0f} of {self._flat_s:.0f} s", paused=False)
 
     def _moved(self, moved: Moved, t_s: float) -> list[Output]:
         self._motion = moved.what
@@ -114,12 +114,15 @@ class LayFlat(Step):
         return outputs
 
     def _countdown(self, t_s: float, text: str, paused: bool) -> list[Output]:
-        still_s = min(self._stillness.seconds, FLAT_S)
-        return [Countdown(t_s, FLAT_S - still_s, FLAT_S, paused), Progress(t_s, still_s, FLAT_S, text)]
+        still_s = min(self._stillness.seconds, self._flat_s)
+        return [
+            Countdown(t_s, self._flat_s - still_s, self._flat_s, paused),
+            Progress(t_s, still_s, self._flat_s, text),
+        ]
 
     def _never_still(self, moved: Moved) -> Stopped:
         return Stopped(
-            f"the board was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
+            f"the board was not still for {self._flat_s:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
             f"{LOST}, and start again"
             if moved.lost
             else "put it on a firm surface, away from vibration, and start again",

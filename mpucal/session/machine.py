@@ -146,7 +146,7 @@ class Machine:
         """Begin the step of the present state, if it has one; return the first outputs."""
         match self.state:
             case State.LAY_FLAT:
-                self._step = LayFlat(self._plan.until_end, self._plan.board)
+                self._step = LayFlat(self._plan.until_end, self._plan.board, self._aim.flat_s)
             case State.ROTATE if self._flat is not None:
                 self._coverage = Coverage()
                 self._step = (

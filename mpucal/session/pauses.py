@@ -21,7 +21,7 @@ WINDOW_S = 0.25
 HOLD_S = 1.25
 # A vehicle that is put down is left there for longer: no tremor moves its readings over the steps of its streams. The
 # newest windows show that nobody touches it.
-PLACED_S, NEWEST = 4.0, 2
+PLACED_S, NEWEST = 3.0, 2
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0
 # A check and a verification end after this time without a new orientation.
