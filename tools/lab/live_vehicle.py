@@ -5,10 +5,11 @@
 
 The hand does what the session's prompts say; where it brings the vehicle goes to the SITL through its JSON interface
 (ArduPilot's libraries/SITL/examples/JSON). What the SITL makes of it, SIM_ACCn_BIAS and SIM_ACCn_SCAL, is what the
-session is to find. Words after `--` go to `mpucal session`; with --own, ArduPilot calibrates itself in the same hand
-instead. The line at the end: exit code, verdict, how far the vehicle's parameters were from the truth at worst and how
-far those of each IMU are now (offset [m/s^2], scale), the rms over D and b_a of all IMUs of (estimate - truth) /
-standard uncertainty, the time that was measured [s], and how far the attitude is off after a reboot [deg].
+session is to find. The vehicle takes its level before. Words after `--` go to `mpucal session`; with --own, ArduPilot
+calibrates itself in the same hand instead. The line at the end: exit code, verdict, how far the vehicle's parameters
+were from the truth at worst and how far those of each IMU are now (offset [m/s^2], scale), the rms over D and b_a of
+all IMUs of (estimate - truth) / standard uncertainty, the time that was measured [s], and how far the attitude is off
+that level at the end [deg].
 """
 
 from __future__ import annotations
@@ -224,6 +225,8 @@ def main() -> int:
         result = Result(int(not done), None, took_s, angle)
         print(line(result, before, held(arguments.parameters), body.skew))
         return int(not done)
+    with closing(_locked(arguments.mavlink)) as link:
+        level = own_calibration.set_level(link, body)
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.folder or Path(temporary) / "session"
         code = session(body, ["--mavlink", arguments.mavlink, "-o", str(folder), *arguments.words], arguments.killed_at)
@@ -232,7 +235,7 @@ def main() -> int:
         file = folder / "calibration.json"
         document = json.loads(file.read_text()) if file.exists() else None
     with closing(_locked(arguments.mavlink)) as link:
-        angle = own_calibration.attitude_error_deg(link, body, np.zeros(2), reboot=False)
+        angle = own_calibration.attitude_error_deg(link, body, level, reboot=False)
     took_s = document["fit"]["seconds"] if document else math.nan
     print(line(Result(code, document, took_s, angle), before, held(arguments.parameters), body.skew))
     return code

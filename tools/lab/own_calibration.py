@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from mpucal.data import Vector
+from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Message, dialect
 from mpucal.mavlink.horizon import Horizon
 from mpucal.mavlink.link import Link, S
@@ -17,6 +18,7 @@ from mpucal.session.aims import SIDES
 PATIENCE_NS, LISTEN_NS = 600 * S, S // 5
 # A person presses the key once the vehicle rests as it should.
 HELD_S, NEAR = 1.0, 0.97
+PUT_DOWN_S = 5.0
 # What it reports in place of a side.
 SUCCESS, FAILED = 16777215, 16777216
 # The attitude's estimator settles within this, and is then averaged.
@@ -63,6 +65,22 @@ def calibrate(link: Link, body: Turned) -> tuple[bool, float, Vector]:
             confirmed = side
             send_command(link, command, side)
     return False, body.t_s - begun_s, level
+
+
+def set_level(link: Link, body: Turned) -> Vector:
+    """Have the vehicle take its level as it is put down; return roll and pitch (2,) [deg] of its body there.
+
+    Raises
+    ------
+    LinkError : it refuses.
+    """
+    body.hear("lay_flat", None)
+    begun_s = body.t_s
+    while body.t_s - begun_s < PUT_DOWN_S or body.still_s < HELD_S:
+        list(link.messages(link.now_ns() + LISTEN_NS))
+    if send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 2, timeout_s=30.0):
+        raise LinkError("the vehicle does not take its level", "look what it says")
+    return tilt_deg(body.up)
 
 
 def attitude_error_deg(link: Link, body: Turned, level_deg: Vector, reboot: bool) -> float:
