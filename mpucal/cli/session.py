@@ -145,7 +145,7 @@ def _open(
         return open_source(opening, given_options()), kinds, options
     check_resume_options(given_options())
     check_unfinished(resume)
-    from ..sources.resumed import open_resumed  # noqa: PLC0415 - it loads all that reads captures
+    from ..sources.replayed import open_resumed  # noqa: PLC0415 - it loads all that reads captures
 
     source = open_resumed(resume)
     options = {**options, **source.words}

@@ -1,4 +1,4 @@
-"""Common parts of the buses of this computer: the monotonic clock, the search for the chip, and system errors."""
+"""Common parts of the buses of this computer: the monotonic clock, the search for the chip, its lock, and errors."""
 
 from __future__ import annotations
 
@@ -62,3 +62,24 @@ def converting(convert: Callable[[OSError], BusError]) -> Iterator[None]:
         yield
     except OSError as error:
         raise convert(error) from error
+
+
+def lock_device(handle: int | None, chip: str, remedy: str = "end it", address: int = 0) -> None:
+    """Lock `chip`, behind an open device, against other processes, which would empty its FIFO.
+
+    The lock ends with its process. It is on the byte at `address` (fcntl(2)), so that two chips on one bus have two
+    locks. A device without locks is not locked.
+
+    Raises
+    ------
+    BusError : another process has the lock.
+    """
+    try:
+        import fcntl  # noqa: PLC0415 - not on Windows, which has no such bus
+
+        if handle is not None:
+            fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, address)
+    except (BlockingIOError, PermissionError) as error:
+        raise BusError(f"another mpucal uses {chip}", remedy) from error
+    except (ImportError, OSError, TypeError):
+        return

@@ -1,4 +1,4 @@
-"""Replay of a capture as a source: the accesses of a bus or the packets of a vehicle."""
+"""Captures as sources: replayed, or followed by the sensor itself in a session that is resumed."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
+from ..errors import UsageError
 from ..files.folder import all_captures_in
 from ..files.mcap import Capture, read_capture
 from ..files.recorders import VEHICLE, recorder_of
 from ..files.tlog import TLOG, read_tlog
+from ..result.session_files import CAPTURE
 from ..session.plan import Plan
 from .chain import Chain, ChainedBus, ChainedTransport, ShiftedClockBus, split_at_resumes
 from .kind import Request
-from .opened_source import OpenedSource
-from .opening import refuse_fixed_options
+from .opened_source import SOURCE, OpenedSource
+from .opening import refuse_fixed_options, reopen_source
 from .packet_replay import PacketReplay
 from .replay import ReplayBus
 
@@ -31,20 +33,44 @@ def open_source(request: Request) -> OpenedSource:
     """
     if request.value.suffix.lower() != TLOG:
         refuse_fixed_options(request)
-    captures = read_captures(request.value)
+    captures = _read(request.value)
     first = captures[0]
-    how: dict[str, Any] = {"recovered": last_recovered(captures), "real_time": False}
+    how: dict[str, Any] = {"recovered": _last_recovered(captures), "real_time": False}
     # The log of another ground station has no head, and fixes no options.
     plan, recorder = replace(request.plan, until_end=True), VEHICLE
     if first.meta:
         refuse_fixed_options(request)
         plan, recorder = Plan.of_capture(first.meta, first.name), recorder_of(first.meta, first.name)
         plan = replace(plan, board=request.plan.board or plan.board)
-    opened: OpenedSource = resolve_name(recorder.replay)(first, chained(captures), plan, request.values, **how)
+    opened: OpenedSource = resolve_name(recorder.replay)(first, _chained(captures), plan, request.values, **how)
     return opened
 
 
-def read_captures(place: Path) -> list[Capture]:
+def open_resumed(folder: Path) -> OpenedSource:
+    """Open the session in `folder` and the source that its first capture names, which goes on after the replay.
+
+    Raises
+    ------
+    UsageError : no session, or its source cannot be opened again. CaptureError : a damaged head.
+    """
+    if not all_captures_in(folder):
+        raise UsageError(f"{folder} does not hold a session", "give the folder of an interrupted session")
+    captures = _read(folder)
+    words = captures[0].meta.get(SOURCE)
+    if not words:
+        raise UsageError(f"the capture in {folder} does not name its source", "use `mpucal calibrate` on the folder")
+    plan = Plan.of_capture(captures[0].meta, captures[0].name)
+    live = reopen_source(words, plan)
+    return replace(
+        live,
+        line=_chained(captures, live.line),
+        plan=plan,
+        recovered=_last_recovered(captures),
+        capture_name=CAPTURE.numbered(len(captures) + 1),
+    )
+
+
+def _read(place: Path) -> list[Capture]:
     """Read a capture, or all captures in the folder of a session.
 
     Raises
@@ -55,12 +81,12 @@ def read_captures(place: Path) -> list[Capture]:
     return [read_tlog(file) if file.suffix.lower() == TLOG else read_capture(file) for file in files]
 
 
-def last_recovered(captures: Sequence[Capture]) -> str | None:
+def _last_recovered(captures: Sequence[Capture]) -> str | None:
     """Return the sentence on the last damaged capture, None if all are whole."""
     return next((capture.recovered for capture in reversed(captures) if capture.recovered), None)
 
 
-def chained(captures: Sequence[Capture], live: Any = None) -> Chain[Any]:
+def _chained(captures: Sequence[Capture], live: Any = None) -> Chain[Any]:
     """Return the recorded parts of a session, followed by its `live` bus or transport, as one."""
     parts = split_at_resumes((capture.records for capture in captures), more=live is not None)
     name = captures[0].name

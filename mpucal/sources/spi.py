@@ -24,8 +24,7 @@ from ..chip.registers import (
 )
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
-from .device_lock import lock_device
-from .host_bus import HostBus, converting, register_after
+from .host_bus import HostBus, converting, lock_device, register_after
 from .kind import Request
 from .read_timer import ReadTimer
 

@@ -13,7 +13,7 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, BusHeld, NoAnswer
-from mpucal.sources.device_lock import lock_device
+from mpucal.sources.host_bus import lock_device
 from mpucal.sources.i2c import I2cBus, found_chips
 
 
@@ -293,7 +293,7 @@ def test_a_chip_that_another_process_uses_is_not_shared(tmp_path):
     device = tmp_path / "i2c-1"
     device.touch()
     holder = (
-        "import sys; from mpucal.sources.device_lock import lock_device; file = open(sys.argv[1], 'r+b');"
+        "import sys; from mpucal.sources.host_bus import lock_device; file = open(sys.argv[1], 'r+b');"
         " lock_device(file.fileno(), '', address=0x68); print(flush=True); input()"
     )
     command = [sys.executable, "-c", holder, device]

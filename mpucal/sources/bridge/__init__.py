@@ -6,13 +6,16 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from typing import Any
 
+from ...errors import UsageError
+from ..chip import OpenedChip
+from ..kind import Request
 from .bus import BridgeBus
 from .link import Link
 from .micropython import MicroPythonPort
 from .port import Port, SerialPort
 from .store import BlobStore
 
-__all__ = ["BlobStore", "BridgeBus", "open_bridge", "open_link", "open_store"]
+__all__ = ["BlobStore", "BridgeBus", "open_bridge", "open_link", "open_source", "open_store"]
 
 
 def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ...] | None = None) -> BridgeBus:
@@ -28,6 +31,23 @@ def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ..
     UsageError : no port is named. BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
     """
     return BridgeBus(_open_port(text, pins), address)
+
+
+def open_source(request: Request) -> OpenedChip:
+    """Open the chip behind the bridge on a port; see open_bridge.
+
+    Raises
+    ------
+    UsageError : the requested rate is more than a serial line can carry.
+    """
+    config = request.plan.config
+    if config.accel_only:
+        raise UsageError(
+            f"a bridge cannot carry {config.rate_hz:g} samples a second",
+            "use --rate 1000 or less, or connect the chip to an I2C bus of this computer",
+        )
+    bridge = open_bridge(request.value, request.values.get("address"), request.values.get("micropython"))
+    return OpenedChip(bridge, request.plan, words=request.words)
 
 
 @contextmanager
