@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, polar
 
 from ..data import Vector
 from ..rests.flat import QUIETEST_ACC_MPS2, UNVARIED
@@ -65,6 +64,8 @@ def _is_plain(evidence: Evidence) -> bool:
 
 def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     """Return the fit of the other accelerometer by the first one's; None where they have too few samples in common."""
+    from scipy.linalg import block_diag, polar  # noqa: PLC0415 - SciPy loads slowly
+
     there, here = first.recording, other.recording
     after = np.clip(np.searchsorted(there.t, here.t), 1, len(there) - 1)
     near = (there.t[after] - there.t[after - 1] < APART_S) & (here.t >= there.t[0]) & (here.t <= there.t[-1])
