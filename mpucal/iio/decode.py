@@ -72,8 +72,8 @@ class IioDecoder:
         self._scales: dict[str, tuple[str, SensorScale]] = {}
         self._streams: dict[str, int] = {}
         self._aligned: StreamAligner | None = None
-        self._flips = BitFlipFilter(ROW)
-        self._waiting: tuple[Times, Vector] = np.zeros(0, np.int64), np.zeros((0, ROW))
+        self._flips: BitFlipFilter
+        self._waiting: tuple[Times, Vector]
         self._gyro_to_accel: Vector | None = None
         self._temperature = np.nan
         self._last_ns: int | None = None
