@@ -66,9 +66,10 @@ VERIFY_PLACED = 1
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     """Return the aim of a target, one of AIMS; a vehicle's IMU needs more orientations for the normal one."""
     aim = AIMS[target]
-    if target == NORMAL and sensor is not None and sensor.origin is Origin.VEHICLE:
-        return replace(aim, least=LEAST_OF_VEHICLE, sides=len(SIDES), flat_s=FLAT_OF_VEHICLE_S)
-    return aim
+    if sensor is None or sensor.origin is not Origin.VEHICLE:
+        return aim
+    least = LEAST_OF_VEHICLE if target == NORMAL else aim.least
+    return replace(aim, least=least, sides=len(SIDES), flat_s=FLAT_OF_VEHICLE_S)
 
 
 def unseen_rad(tilt_only: bool) -> float:

@@ -237,11 +237,11 @@ def test_prompts_speak_of_the_kind_of_board(board, options, sensor, lay, words):
     assert session.feed(board.still(10.6)).of(Prompt)[-1].text.startswith(words)
 
 
-def placed(make_board, tremor):
+def placed(make_board, tremor, target="normal"):
     """A vehicle is put on its sides as it is asked for, by somebody who lets go of it (no tremor) or does not."""
     board, session = make_board(), Session()
     board.up = np.array([0.0, 0.0, -1.0])
-    session.machine = Machine(Plan())
+    session.machine = Machine(Plan(target=target))
     session.said = session.machine.handle(Connected(Sensor(message="RAW_IMU")))
     assert "still for 5 s" in session.of(Prompt)[-1].text
     session.feed(board.still(5.6))
@@ -254,8 +254,9 @@ def placed(make_board, tremor):
     return session, held
 
 
-def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board):
-    session, held = placed(make_board, 0.0)
+@pytest.mark.parametrize("target", ["quick", "normal", "best"])
+def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board, target):
+    session, held = placed(make_board, 0.0, target)
     assert held == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
     assert session.state is State.VERIFY
     assert "Verification 1 of 1" in session.of(Prompt)[-1].text
