@@ -48,6 +48,7 @@ READY_NS = 40 * S
 REBOOT = (
     "Reboot {} now? Its attitude estimate keeps biases that it learnt under the old parameters until it is rebooted."
 )
+NOT_CHECKED = "look whether its horizon is level before it flies"
 NOT_REBOOTED = "reboot it before it flies: its attitude estimate keeps biases that it learnt under the old parameters"
 TILTED_DEG = 0.1
 KEPT_LEVEL = "what was level stays level"
@@ -231,6 +232,7 @@ class AutopilotSink:
 
     def _finish(self, before: PrearmState, first: Change, level: Level) -> Iterator[str]:
         """Reboot the vehicle if the user agrees, and yield clauses on its horizon and on its pre-arm check."""
+        left = NOT_REBOOTED
         try:
             now = self._await_prearm()
             if not self._confirm(REBOOT.format(self.where), True):
@@ -245,14 +247,15 @@ class AutopilotSink:
             self._say(f"{self.where} reboots: leave it as it stands.")
             horizon = Horizon(self._link)
             if not horizon.reboot():
-                yield f"it refused to reboot; {NOT_REBOOTED}"
+                yield f"it refused to reboot; {left}"
                 return
+            left = NOT_CHECKED
             yield _horizon_clause(horizon.error_deg(first.stream, level.wanted_deg))
             yield f"before, it {before}; now it {self._await_ready(before)}"
         except LinkError as error:
-            yield f"but {error.what}: {error.remedy}, and {NOT_REBOOTED}"
+            yield f"but {error.what}: {error.remedy}, and {left}"
         except KeyboardInterrupt:
-            yield f"you interrupted what follows the write; {NOT_REBOOTED}"
+            yield f"you interrupted what follows the write; {left}"
 
     def _await_ready(self, before: PrearmState) -> PrearmState:
         """Return the pre-arm state after a reboot, once it is ready, or has no complaints other than those before.

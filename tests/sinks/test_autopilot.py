@@ -16,9 +16,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.data import Autopilot
-from mpucal.errors import RecordingError, WriteBackError
+from mpucal.errors import LinkError, RecordingError, WriteBackError
 from mpucal.mavlink import rest_monitor
 from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.horizon import Horizon
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
@@ -197,6 +198,17 @@ def test_it_is_level_as_it_stands_where_the_person_says_so(firmware):
     truth = vehicle.truth_document()
     np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
     np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
+
+
+@pytest.mark.usefixtures("brief")
+def test_a_vehicle_whose_horizon_cannot_be_checked_after_its_reboot_need_not_reboot_again(monkeypatch):
+    def silent(*_):
+        raise LinkError("it is silent", "look")
+
+    monkeypatch.setattr(Horizon, "error_deg", silent)
+    vehicle, _, link = vehicle_of("ardupilot", ",imus=1")
+    applied = AutopilotSink(link, confirm=lambda question, with_yes: with_yes).write(calibration_of(vehicle))
+    assert "it is silent: look, and look whether its horizon is level before it flies" in applied.what
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
