@@ -37,7 +37,7 @@ def test_the_session_is_a_real_one(session):
     assert shown[-len(result) :] == result
     # the keys are named, and a line is written over, on a terminal only
     talk = [line for line in shown[: -len(result)] if not line.startswith("(Enter")]
-    assert {"LAY FLAT", "ROTATE", "VERIFY", "REST"} <= set(talk)
+    assert {"LAY FLAT", "TURN IT", "CHECK", "PUT IT DOWN"} <= set(talk)
     # in the order in which they are said, with some left out
     program = iter(shape(said))
     assert [line for line in talk if line not in program] == []

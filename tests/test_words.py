@@ -81,6 +81,6 @@ def test_the_screen():
 def test_a_session_its_summary_and_its_report(tmp_path, capsys):
     assert run(["session", "--replay", str(CAPTURE), "-o", str(tmp_path)]) == 0
     said = capsys.readouterr()
-    assert "VERIFY" in said.err
+    assert "CHECK" in said.err
     for text in (said.err, said.out, (tmp_path / "report.html").read_text(encoding="utf-8")):
         assert retired(text) == []

@@ -9,21 +9,15 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any, TextIO
 
-from ..session.events import Caution, Decision, Key, Knowledge, Output, Progress, Prompt, PromptKind, Verification
+from ..session.events import Caution, Decision, Key, Knowledge, Output, Progress, Prompt, Verification
 from .keys import Keys
+from .view import HEADLINES
 from .words import known, sentence
 
 PROGRESS_EVERY_S = 1.0
 KNOWLEDGE_EVERY_S = 5.0
 # Least time between two cautions of one kind.
 CAUTION_EVERY_S = 5.0
-HEADINGS = {
-    PromptKind.LAY_FLAT: "LAY FLAT",
-    PromptKind.ROTATE: "ROTATE",
-    PromptKind.VERIFY: "VERIFY",
-    PromptKind.AGAIN: "AGAIN?",
-    PromptKind.REST: "REST",
-}
 KEYS = "(Enter: skip ahead; r and Enter: restart the turning; q and Enter, or Ctrl-C: stop.)"
 BELL = "\a"
 
@@ -95,7 +89,7 @@ class Lines:
             return
         keys = "" if self._explained else f"\n  {KEYS}"
         self._explained = True
-        self.say(f"{bell}\n{HEADINGS[prompt.kind]}\n  {prompt.text}{keys}\n")
+        self.say(f"{bell}\n{HEADLINES[prompt.kind]}\n  {prompt.text}{keys}\n")
 
     def _is_due(self, name: str, t_s: float, every_s: float) -> bool:
         if t_s < self._due_s.get(name, -math.inf) - 1e-6:

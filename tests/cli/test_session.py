@@ -39,7 +39,7 @@ def test_a_session_writes_its_files_and_prints_the_summary(session):
     assert "bias, mg" in out
     assert "±" in out
     assert "firmware" in out
-    for heading in ("LAY FLAT", "ROTATE", "REST"):
+    for heading in ("LAY FLAT", "TURN IT", "PUT IT DOWN"):
         assert heading in session.result.err
         assert heading not in out
 

@@ -19,7 +19,7 @@ def out():
 
 def test_a_prompt_is_a_heading_and_its_words(out):
     Lines(out, Keys()).hear(Prompt(PromptKind.ROTATE, "Now turn it."))
-    assert out.getvalue() == "\nROTATE\n  Now turn it.\n\n"
+    assert out.getvalue() == "\nTURN IT\n  Now turn it.\n\n"
 
 
 def test_a_prompt_that_goes_on_is_a_line(out):
@@ -27,7 +27,7 @@ def test_a_prompt_that_goes_on_is_a_line(out):
     lines.hear(Prompt(PromptKind.ROTATE, "Now turn it."))
     lines.hear(Prompt(PromptKind.ROTATE, "Turn it: +X down.", (1.0, 0.0, 0.0)))
     assert out.getvalue().endswith("\n\n  Turn it: +X down.\n")
-    assert out.getvalue().count("ROTATE") == 1
+    assert out.getvalue().count("TURN IT") == 1
 
 
 def test_the_bell_rings_at_new_prompts_only(out):
@@ -75,7 +75,7 @@ def test_a_whole_session_is_told(out, session):
         "still for 3 of 10 s",
         "1 sigma: scale factor error ±0.31 % (target 0.1), misalignment not observable (target 0.05), bias ±3 mg",
         "Turn it more slowly.",
-        "VERIFY",
+        "CHECK",
         "orientation 1 of 2 agrees",
         "the calibration is good",
     ):
