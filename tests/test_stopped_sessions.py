@@ -45,7 +45,7 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
     assert recording.gap[1:][steps > 0.5].all()
     for stopped_s in stops_s.values():
         assert f"Reading paused for {stopped_s:.0f} s" in said
-    assert said.index("Reading paused for 70 s") < said.index("ROTATE") < said.index("Reading paused for 90 s")
+    assert said.index("Reading paused for 70 s") < said.index("TURN IT") < said.index("Reading paused for 90 s")
 
 
 @pytest.mark.parametrize(("kind", "stopped_s"), [pytest.param("CHIP", 5.0, marks=pytest.mark.slow), ("BRIDGE", 300.0)])
