@@ -128,12 +128,6 @@ def minimum_jerk(share: Vector) -> Vector:
     return np.asarray(s * s * s * (10 - 15 * s + 6 * s * s))
 
 
-def minimum_jerk_rate(share: Vector) -> Vector:
-    """Return the derivative of `minimum_jerk`."""
-    s = np.clip(share, 0.0, 1.0)
-    return np.asarray(30.0 * s * s * (1.0 - s) ** 2)
-
-
 def _window(nodes: Vector, first: int, last: int) -> Vector:
     """Return 1 inside, smoothly 0 at both ends."""
     inside = np.minimum(nodes - first, last - nodes) * STEP_S / min(RAMP_S, (last - first) * STEP_S / 2)

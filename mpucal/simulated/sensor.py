@@ -8,9 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.rotation import rotation
 from ..chip.families import MPU6050, MPU6500
-from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Vector
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 
 Counts = NDArray[np.int16]
 
@@ -182,31 +181,6 @@ def to_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector,
     return D @ Q.T, (symmetric + symmetric.T) / 2, Q
 
 
-def non_orthogonality(zeta: float, eta: float, rho: float) -> Vector:
-    """Return C_no of Kok and Schön (2014), section 4.3, of skewed axes [rad]."""
-    return np.array(
-        [
-            [1.0, 0.0, 0.0],
-            [np.sin(zeta), np.cos(zeta), 0.0],
-            [-np.sin(eta), np.cos(eta) * np.sin(rho), np.cos(eta) * np.cos(rho)],
-        ]
-    )
-
-
-def euler_rotation(angles_rad: Vector) -> Vector:
-    """Return Rx Ry Rz of three angles [rad]."""
-    x, y, z = rotation(np.diag(angles_rad))
-    return np.asarray(x @ y @ z)
-
-
 def density(std: Vector, rate_hz: float) -> Vector:
     """Return the noise density at which a sample at `rate_hz` has the standard deviation `std`."""
     return np.asarray(std / np.sqrt(rate_hz / 2.0))
-
-
-def quantise(y: Vector, step: float) -> tuple[Vector, Mask]:
-    """Round y (n, 3) to 16-bit counts of size `step`; return it, and True (n,) where an axis is at full scale."""
-    if step == 0.0:
-        return y, np.zeros(len(y), bool)
-    counts = np.clip(np.rint(y / step), -FULL_SCALE, FULL_SCALE - 1)
-    return counts * step, ((counts == -FULL_SCALE) | (counts == FULL_SCALE - 1)).any(axis=1)

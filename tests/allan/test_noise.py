@@ -14,7 +14,7 @@ from mpucal.allan.spectrum import Spectrum
 from mpucal.data import Recording, Sensor
 from mpucal.export.forms import form
 from mpucal.result.noise import Noise, with_noise
-from mpucal.simulated.noise import noise
+from tools.lab.scenarios.noise import noise
 
 RATE_HZ = 100.0
 TRUE = {"white_noise": 2.8e-3, "bias_instability": 1.0e-3, "random_walk": 1e-4}

@@ -8,7 +8,7 @@ import pytest
 
 from mpucal.data import Recording, Sensor
 from mpucal.result.noise import FORMAT
-from mpucal.simulated.noise import noise
+from tools.lab.scenarios.noise import noise
 
 
 @pytest.fixture

@@ -23,7 +23,6 @@ import numpy as np
 
 from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
-from mpucal.simulated.bridge.line_faults import LineFaults
 from mpucal.simulated.chip import SimulatedBus, open_simulated
 from mpucal.simulated.chip.fault_injector import FaultInjector
 from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, begin_mishaps, fault_kinds
@@ -31,6 +30,8 @@ from mpucal.simulated.mishaps import Mishap, ZeroStep
 from mpucal.simulated.vehicle.line import PacketLine
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sources.bridge.bus import BridgeBus
+
+from .line_faults import LineFaults
 
 CHIP, BRIDGE, VEHICLE = "chip", "bridge", "vehicle"
 SERIAL = tuple(fault_kinds(Where.SERIAL))

@@ -22,10 +22,11 @@ from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
-from mpucal.simulated.sensor import SensorTruth, euler_rotation, non_orthogonality
+from mpucal.simulated.sensor import SensorTruth
 
 from .judge import followed, sph_rms, tilts_deg
 from .runner import Asked, Program, option
+from .scenarios.sensors import euler_rotation, non_orthogonality
 from .table import Column, grouped, over, show, table
 
 GAIN, SKEW_RAD, MISALIGNMENT_RAD, BIAS_MPS2 = 0.1, np.radians(5.0), np.radians(3.0), 1.0

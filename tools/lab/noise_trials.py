@@ -14,9 +14,9 @@ import numpy as np
 
 from mpucal.allan.model import NAMES, fit_coefficients
 from mpucal.allan.octaves import Octaves
-from mpucal.simulated.noise import noise
 
 from .runner import Program, option
+from .scenarios.noise import noise
 from .table import Column, grouped, show, table
 
 RATE_HZ = 100.0

@@ -13,7 +13,6 @@ from mpucal.errors import BusError, MpucalError, NoAnswer, WriteBackError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.simulated.bridge import EmulatedLine, Memory
-from mpucal.simulated.bridge.line_faults import LineFaults
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.faults import Where, fault_kinds
 from mpucal.sinks.bridge import BridgeSink
@@ -21,6 +20,7 @@ from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.port import Chunk
 from mpucal.sources.bridge.store import BlobStore
+from tools.lab.line_faults import LineFaults
 
 MS = 1_000_000
 

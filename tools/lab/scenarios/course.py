@@ -12,7 +12,6 @@ import numpy as np
 
 from mpucal.data import Vector
 from mpucal.simulated import rotation
-from mpucal.simulated.legs import minimum_jerk_rate
 
 Rng = np.random.Generator
 Span = tuple[float, float]
@@ -53,6 +52,12 @@ class Leg:
     turn_rad: Vector
     seconds: float
     hold_s: float
+
+
+def minimum_jerk_rate(share: Vector) -> Vector:
+    """Return the derivative of `minimum_jerk` of mpucal.simulated.legs."""
+    s = np.clip(share, 0.0, 1.0)
+    return np.asarray(30.0 * s * s * (1.0 - s) ** 2)
 
 
 def along(legs: Sequence[Leg], step_s: float, rate: Callable[[Vector], Vector] = minimum_jerk_rate) -> Course:

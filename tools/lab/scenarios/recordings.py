@@ -18,11 +18,11 @@ from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from mpucal.errors import UsageError
 from mpucal.simulated import rotation
 from mpucal.simulated.disturbance import HandDisturbance
-from mpucal.simulated.legs import minimum_jerk_rate
-from mpucal.simulated.sensor import SensorTruth, SiSetting, quantise
+from mpucal.simulated.sensor import SensorTruth, SiSetting
 
 from .body import acceleration, tremor
-from .sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
+from .course import minimum_jerk_rate
+from .sensors import GRAVITY_MPS2, hand_sensor, paper_sensor, quantise
 
 FLAT_S, MOVING_S = 10.0, 40.0
 CHECK_S = 15.0

@@ -9,9 +9,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from mpucal.calibration.rotation import rotation
 from mpucal.chip.families import MPU6050
 from mpucal.data import STANDARD_GRAVITY_MPS2, Mask, Vector
-from mpucal.simulated.sensor import SensorTruth, density, euler_rotation, non_orthogonality
+from mpucal.simulated.sensor import FULL_SCALE, SensorTruth, density
 
 Counts = NDArray[np.int32]
 
@@ -181,3 +182,28 @@ class Sampling:
         sos = np.concatenate(([1.0, 2.0, 1.0], a))[None] / a[0]
         settled = scipy.signal.sosfilt_zi(sos)[:, :, None] * y[0]
         return np.asarray(scipy.signal.sosfilt(sos, y, axis=0, zi=settled)[0])
+
+
+def non_orthogonality(zeta: float, eta: float, rho: float) -> Vector:
+    """Return C_no of Kok and Schön (2014), section 4.3, of skewed axes [rad]."""
+    return np.array(
+        [
+            [1.0, 0.0, 0.0],
+            [np.sin(zeta), np.cos(zeta), 0.0],
+            [-np.sin(eta), np.cos(eta) * np.sin(rho), np.cos(eta) * np.cos(rho)],
+        ]
+    )
+
+
+def euler_rotation(angles_rad: Vector) -> Vector:
+    """Return Rx Ry Rz of three angles [rad]."""
+    x, y, z = rotation(np.diag(angles_rad))
+    return np.asarray(x @ y @ z)
+
+
+def quantise(y: Vector, step: float) -> tuple[Vector, Mask]:
+    """Round y (n, 3) to 16-bit counts of size `step`; return it, and True (n,) where an axis is at full scale."""
+    if step == 0.0:
+        return y, np.zeros(len(y), bool)
+    counts = np.clip(np.rint(y / step), -FULL_SCALE, FULL_SCALE - 1)
+    return counts * step, ((counts == -FULL_SCALE) | (counts == FULL_SCALE - 1)).any(axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.rotation import rotation
-from mpucal.simulated.legs import minimum_jerk_rate
+from tools.lab.scenarios.course import minimum_jerk_rate
 from tools.lab.scenarios.recordings import (
     FLAT_S,
     attitude,

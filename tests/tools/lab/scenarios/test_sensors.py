@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from mpucal.simulated.sensor import SiSetting, euler_rotation, non_orthogonality, quantise
-from tools.lab.scenarios.sensors import hand_sensor, paper_sensor
+from mpucal.simulated.sensor import SiSetting
+from tools.lab.scenarios.sensors import euler_rotation, hand_sensor, non_orthogonality, paper_sensor, quantise
 
 
 def rngs(n):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..faults import FAULTS
+from mpucal.simulated.faults import FAULTS
 
 LATE = "late"
 

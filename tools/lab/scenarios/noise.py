@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data import Vector
+from mpucal.data import Vector
 
 
 def noise(rng: np.random.Generator, n: int, rate_hz: float, white: float, instability: float, walk: float) -> Vector:
