@@ -1,1 +1,1 @@
-"""Simulated world: a sensor, a hand, a chip, a serial bridge and a vehicle."""
+"""Simulated world: a sensor, a hand, a chip, a driver of the kernel and a vehicle."""

@@ -6,11 +6,11 @@ import pytest
 
 from mpucal.chip import registers as reg
 from mpucal.errors import EndOfCapture
-from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.sources.bridge import BridgeBus
 from mpucal.sources.i2c import I2cBus
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
+from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
 
 def script(bus):

@@ -22,7 +22,6 @@ from unittest.mock import patch
 import numpy as np
 
 from mpucal.result.error_model import MG_PER_MPS2
-from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import SimulatedBus, open_simulated
 from mpucal.simulated.chip.fault_injector import FaultInjector
 from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, begin_mishaps, fault_kinds
@@ -31,7 +30,8 @@ from mpucal.simulated.vehicle.line import PacketLine
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sources.bridge.bus import BridgeBus
 
-from .line_faults import LineFaults
+from .bridge import EmulatedBridge, EmulatedLine
+from .bridge.line_faults import LineFaults
 
 CHIP, BRIDGE, VEHICLE = "chip", "bridge", "vehicle"
 SERIAL = tuple(fault_kinds(Where.SERIAL))

@@ -13,11 +13,11 @@ import numpy as np
 import mpucal
 from mpucal.chip.driver import Driver
 from mpucal.session.events import Prompt, PromptKind
-from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.sources.bridge.bus import BridgeBus
 
+from .bridge import EmulatedBridge, EmulatedLine
 from .judge import rms
 from .runner import Program
 from .table import known

@@ -13,7 +13,6 @@ import pytest
 
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
@@ -21,6 +20,7 @@ from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge import bus, link
 from mpucal.sources.bridge.bus import BridgeBus
+from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
 MS = 1_000_000
 

@@ -12,12 +12,12 @@ from mpucal.__main__ import run
 from mpucal.errors import BusError, OutputError
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Prompt, PromptKind
-from mpucal.simulated.bridge import EmulatedBridge, Memory
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.sources.bridge.conformance import talks
 from mpucal.sources.bridge.frame import Frame
 from mpucal.sources.bridge.messages import REPLY_BIT, Hello
+from tools.lab.bridge import EmulatedBridge, Memory
 
 BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
 

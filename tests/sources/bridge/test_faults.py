@@ -12,7 +12,6 @@ from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, MpucalError, NoAnswer, WriteBackError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
-from mpucal.simulated.bridge import EmulatedLine, Memory
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.faults import Where, fault_kinds
 from mpucal.sinks.bridge import BridgeSink
@@ -20,7 +19,8 @@ from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.port import Chunk
 from mpucal.sources.bridge.store import BlobStore
-from tools.lab.line_faults import LineFaults
+from tools.lab.bridge import EmulatedLine, Memory
+from tools.lab.bridge.line_faults import LineFaults
 
 MS = 1_000_000
 

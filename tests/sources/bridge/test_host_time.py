@@ -10,7 +10,6 @@ from mpucal.chip.records import UTC
 from mpucal.doctor.finding import Mark
 from mpucal.doctor.measure import examine_stream
 from mpucal.files.mcap import CaptureWriter, read_capture
-from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.chip.factory import FactoryTrim
@@ -19,6 +18,7 @@ from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.opened_source import NewRecords
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
+from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
 MS = 1_000_000
 

@@ -9,7 +9,6 @@ from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.cli.running import open_runner
 from mpucal.session.plan import Plan
-from mpucal.simulated.bridge import EmulatedLine
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.sources.bridge import board as program
@@ -20,6 +19,7 @@ from mpucal.sources.bridge.messages import Status
 from mpucal.sources.bridge.micropython import MicroPythonPort
 from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
+from tools.lab.bridge import EmulatedLine
 
 BLOB = (Path(__file__).parents[4] / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
 

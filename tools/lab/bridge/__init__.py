@@ -9,12 +9,13 @@ import errno
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ...chip.access import Bus
-from ...clocks.bridge_clock import US, WRAP_US
-from ...errors import BusError, NoAnswer
-from ...result.blob import MAGIC
-from ...sources.bridge import board
-from ...sources.bridge.messages import Feature, Status
+from mpucal.chip.access import Bus
+from mpucal.clocks.bridge_clock import US, WRAP_US
+from mpucal.errors import BusError, NoAnswer
+from mpucal.result.blob import MAGIC
+from mpucal.sources.bridge import board
+from mpucal.sources.bridge.messages import Feature, Status
+
 from .line import EmulatedLine
 
 __all__ = ["EmulatedBridge", "EmulatedLine", "Memory"]
