@@ -27,10 +27,7 @@ _HOME = {
     "MpucalError": ".errors",
     "Noise": ".result.noise",
     "Recording": ".data",
-    "calibrate": ".api",
-    "check": ".api",
-    "load": ".api",
-    "noise": ".api",
+    **dict.fromkeys(("calibrate", "check", "load", "noise"), ".api"),
 }
 
 

@@ -13,8 +13,7 @@ from ..errors import RecordingError
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
 from .model import fit_coefficients
 from .octaves import Octaves
-from .spectrum import Spectrum
-from .trace import Trace, find_steps, find_turn
+from .trace import Spectrum, Trace, find_steps, find_turn
 
 __all__ = ["NoiseMeter", "noise_of"]
 

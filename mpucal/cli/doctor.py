@@ -13,7 +13,7 @@ from ..doctor.finding import Finding, Mark, document, text
 from ..errors import SourceError, UsageError
 from ..origin import Origin
 from ..session.lay_flat import PUT_DOWN, STAND, put_down
-from ..sinks.interrupted import interrupted_writes
+from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from .options import Finite, check_gyroscope, check_source, source_options

@@ -19,7 +19,7 @@ from ..files.hints import Hints
 from ..rests.flat import find_flat
 from ..result.blob import Blob
 from ..result.calibration import Calibration
-from ..sinks.interrupted import interrupted_writes
+from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_for, matching_kinds

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
+from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..result.calibration import Calibration
 from . import arduino, c_code, esphome, i2cdevlib, linux_iio, micropython, python, ros, vehicles, vio
 from .losses import (
@@ -103,7 +105,7 @@ FORMS = (
         "Mission Planner, MAVProxy",
         "ArduPilot's offsets and scales",
         vehicles.ardupilot,
-        (vehicles.ardupilot_losses,),
+        (partial(vehicles.losses, firmware=ARDUPILOT),),
         only_usable=False,
     ),
     Form(
@@ -112,7 +114,7 @@ FORMS = (
         "QGroundControl",
         "PX4's offsets and scales",
         vehicles.px4,
-        (vehicles.px4_losses,),
+        (partial(vehicles.losses, firmware=PX4),),
         only_usable=False,
     ),
     Form(

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..data import Vector
 from ..result.calibration import Calibration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from .losses import heading
 from .python import python_constants
-from .templates import fill
+from .templates import fill, yaml_row
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -25,8 +24,8 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     lines = [
         *heading(calibration, notes, "# "),
         "# corrected = SM * raw - bias, as in imu_calib's apply_calib: bias is inv(D) b_a",
-        f"SM: {_row(SM.ravel())}",
-        f"bias: {_row(SM @ calibration.b_a_to_subtract)}",
+        f"SM: {yaml_row(SM.ravel())}",
+        f"bias: {yaml_row(SM @ calibration.b_a_to_subtract)}",
     ]
     known, rate_hz = calibration.extra.get(KEY), calibration.sensor.rate_hz
     for key, sensor, noise in (
@@ -37,7 +36,7 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
             # from a density to one sample
             noise = np.full(3, known[sensor][WHITE] * np.sqrt(rate_hz or known["rate_hz"]))  # noqa: PLW2901
         if np.isfinite(noise).all():
-            lines.append(f"{key}: {_row(np.diag(noise**2).ravel())}")
+            lines.append(f"{key}: {yaml_row(np.diag(noise**2).ravel())}")
     return "\n".join(lines) + "\n"
 
 
@@ -57,8 +56,3 @@ def losses(calibration: Calibration) -> tuple[str, ...]:
         "imu_calib subtracts the gyroscope's bias at the start of its node, when the sensor must be still; it does not"
         f" correct scale factor errors and misalignments of the gyroscope{remaining}.",
     )
-
-
-def _row(values: Vector) -> str:
-    # YAML reads 1e-05 as a word: a number needs its point
-    return "[" + ", ".join(np.format_float_positional(v, trim="0") for v in values) + "]"

@@ -35,16 +35,6 @@ def px4(calibration: Calibration, notes: Sequence[str]) -> str:
     return params_text(values, (_head(calibration, PX4), *notes), types=dict.fromkeys(ids, INT32))
 
 
-def ardupilot_losses(calibration: Calibration) -> tuple[str, ...]:
-    """Return notes on errors that remain with ArduPilot's parameters; for errors raised see ardupilot."""
-    return _losses(calibration, ARDUPILOT)
-
-
-def px4_losses(calibration: Calibration) -> tuple[str, ...]:
-    """Return notes on errors that remain with PX4's parameters; for errors raised see ardupilot."""
-    return (*_losses(calibration, PX4), UNNOTICED)
-
-
 def _values(calibration: Calibration, firmware: str) -> dict[str, float]:
     """Return the new parameters of every IMU by name, rounded to float32."""
     held: dict[str, float] = {}
@@ -64,7 +54,8 @@ def _head(calibration: Calibration, firmware: str) -> str:
     return f"Accelerometer calibration of a {firmware} vehicle by mpucal, {date_text(calibration)}: IMU {imus}"
 
 
-def _losses(calibration: Calibration, firmware: str) -> tuple[str, ...]:
+def losses(calibration: Calibration, firmware: str) -> tuple[str, ...]:
+    """Return notes on errors that remain with the parameters of a firmware; for errors raised see ardupilot."""
     notes = [
         f"IMU {change.imu}: parameters have no cross-axis terms, which leaves errors of up to {change.residual}."
         for change in plan_changes(calibration, firmware)
@@ -78,4 +69,4 @@ def _losses(calibration: Calibration, firmware: str) -> tuple[str, ...]:
     ]
     if refused := refused_imus(calibration):
         notes.append(f"IMU {', '.join(map(str, refused))} is not in the file: its calibration was refused.")
-    return tuple(notes)
+    return (*notes, UNNOTICED) if firmware == PX4 else tuple(notes)

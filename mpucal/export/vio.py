@@ -21,6 +21,7 @@ from ..result.calibration import Calibration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from ..result.noise import WALK as RANDOM_WALK
 from .losses import heading
+from .templates import yaml_number, yaml_row
 
 # random walks over densities, as a calibration does not measure random walks
 WALK = 0.1
@@ -110,17 +111,12 @@ def _noise(calibration: Calibration) -> list[str]:
         *(
             line
             for sensor, (white, walk) in zip((ACCELEROMETER, GYROSCOPE), densities, strict=True)
-            for line in (f"{sensor}_noise_density: {_number(white)}", f"{sensor}_random_walk: {_number(walk)}")
+            for line in (f"{sensor}_noise_density: {yaml_number(white)}", f"{sensor}_random_walk: {yaml_number(walk)}")
         ),
         "rostopic: /imu/data",
-        f"update_rate: {_number(rate_hz)}",
+        f"update_rate: {yaml_number(rate_hz)}",
     ]
 
 
 def _block(key: str, matrix: Vector) -> list[str]:
-    return [f"  {key}:", *(f"    - [{', '.join(map(_number, row))}]" for row in matrix)]
-
-
-def _number(value: float) -> str:
-    # YAML reads 1e-05 as a word: a number needs its point
-    return np.format_float_positional(value + 0.0, trim="0")
+    return [f"  {key}:", *(f"    - {yaml_row(row)}" for row in matrix)]

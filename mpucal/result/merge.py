@@ -133,10 +133,8 @@ def _recordings(c: Calibration) -> frozenset[str]:
 
 
 def _is_sure(c: Calibration) -> bool:
-    known = np.isfinite(c.D).all() and np.isfinite(c.b_a).all()
-    return bool(
-        known and np.isfinite(c.b_a_std).all() and np.isfinite(c.D_std).all() and c.b_a_std.all() and c.D_std.all()
-    )
+    known = all(np.isfinite(values).all() for values in (c.D, c.b_a, c.D_std, c.b_a_std))
+    return bool(known and c.b_a_std.all() and c.D_std.all())
 
 
 def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Vector, Vector]:

@@ -69,11 +69,8 @@ def _check_object(value: Mapping[str, Any], schema: Mapping[str, Any], where: st
         if key not in value:
             raise ValueError(f"{where} has no {key!r}")
     for key, item in value.items():
-        _check(
-            item,
-            known.get(key, schema.get("additionalProperties", {})),
-            key if where == "it" else f"{where}.{key}",
-        )
+        of_item = known.get(key, schema.get("additionalProperties", {}))
+        _check(item, of_item, key if where == "it" else f"{where}.{key}")
 
 
 def _wrong(where: str, value: Any, what: str) -> ValueError:

@@ -1,11 +1,13 @@
-"""Choice of the sinks that a session writes to: those of --to, or the defaults of the source."""
+"""Sinks of a source: those that a session writes to, by --to or by default, and those with an interrupted write."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from ..errors import UsageError
 from ..origin import Origin
+from ..result.journal import AT, Journal
 from ..sources.kind import SourceKind
 from ..sources.opening import one_of
 from ..sources.table import SOURCES, unique
@@ -73,3 +75,14 @@ def default_sinks() -> str:
 def source_flags(kind: SinkKind) -> list[str]:
     """Return the command-line options of the sources that have the sink."""
     return [option.flag for option in unique(source.option for source in SOURCES if kind.behind(source))]
+
+
+def interrupted_writes(kind: SourceKind, options: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a sentence for each sink of a source where a write was interrupted, as by a power cut."""
+    for sink in SINKS.values():
+        left = Journal.of(sink.name, options[kind.option.name]).interrupted() if sink.behind(kind) else None
+        if left is not None:
+            yield (
+                f"a write to {sink.where} was cut off at {left[AT]}: it may hold old and new values;"
+                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.flag} ...` first restores the old"
+            )

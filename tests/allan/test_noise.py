@@ -10,7 +10,7 @@ import mpucal
 from mpucal.allan import NoiseMeter, noise_of
 from mpucal.allan.model import design_matrix, fit_coefficients
 from mpucal.allan.octaves import Octaves
-from mpucal.allan.spectrum import Spectrum
+from mpucal.allan.trace import Spectrum
 from mpucal.data import Recording, Sensor
 from mpucal.export.forms import form
 from mpucal.result.noise import Noise, with_noise

@@ -13,7 +13,7 @@ from mpucal.cli.destination import make_device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
-from mpucal.sinks.interrupted import interrupted_writes
+from mpucal.sinks.choose import interrupted_writes
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import session_recorder, write_to_all
 from mpucal.sources.table import matching_kinds

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from string import Template
+
+import numpy as np
 
 
 def fill(name: str, **values: object) -> str:
@@ -15,3 +18,13 @@ def fill(name: str, **values: object) -> str:
     """
     text = (Path(__file__).parent / f"{name}.txt").read_text(encoding="utf-8")
     return Template(text).substitute(values)
+
+
+def yaml_row(values: Iterable[float]) -> str:
+    """Return a sequence of numbers for YAML."""
+    return f"[{', '.join(map(yaml_number, values))}]"
+
+
+def yaml_number(value: float) -> str:
+    """Return a number for YAML, which reads 1e-05 as a word: a number needs its point."""
+    return np.format_float_positional(value + 0.0, trim="0")
