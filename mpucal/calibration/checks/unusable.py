@@ -57,9 +57,9 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
         if 0.9 * e.gravity < rate < 1.1 * e.gravity:
             return reason("not_raw", "exchanged", magnitude=acc, rate=rate)
         low, high = np.quantile(lengths(e.recording.acc), (0.25, 0.75))
-        if high - low > STEADY * acc:
+        if acc == 0.0 or high - low > STEADY * acc:
             return reason("not_raw", "no_gravity", magnitude=acc)
-        unit, said = f"a unit about {e.gravity / acc:.0f} times as large", "UNIT"
+        unit, said = f"a unit about {e.gravity / acc:.4g} times as large", "UNIT"
         return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=unit, said=said)
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
     return reason(
