@@ -29,6 +29,7 @@ class Fit:
     at_prior : names of parameters that the data hardly determine: they keep what was known beforehand.
     parts : scores of the parts of the recording at the estimate; None where they are not known.
     delay_s : delay of the accelerometer behind the gyroscope; 0 where the model does not estimate it.
+    spread_mps2 : error of a rest's |a| beside noise and tremor, of an estimate from the rests alone.
     """
 
     D: Vector
@@ -44,6 +45,7 @@ class Fit:
     at_prior: tuple[str, ...] = ()
     parts: Parts | None = None
     delay_s: float = 0.0
+    spread_mps2: float = 0.0
 
     def std(self, *names: str) -> Vector:
         """Return standard deviations of the named parameters, NaN for those that were not estimated."""

@@ -61,6 +61,8 @@ def inconsistent(e: Evidence) -> Reason | None:
     """Find data that the model does not explain: innovations beyond white noise."""
     if e.fit is None or e.uncertainty is None:
         return None
+    if e.fit.spread_mps2 > CHANGED_MPS2:
+        return reason("inconsistent", "rests", spread=e.fit.spread_mps2)
     # A robust model leaves outliers in its innovations: its parts judge it, or its uncertainty has grown by them.
     if e.model in ("hand", "tilt") or not e.fit.nis > MOST_NIS:
         return None
