@@ -59,8 +59,6 @@ def csv_rows(path: Path) -> Rows:
         raise RecordingError(f"{path} is not text", _REMEDY) from error
     except csv.Error as error:
         raise _bad_line(path, 1, error) from error
-    if not first.strip():
-        raise RecordingError(f"{path}: its first line is empty", _REMEDY)
     begin = len(begun) - len(text.removeprefix(first).encode())
     table = _Table(path, begin, len(header), _column_places(header, path))
     others = ignored_sensors(header, [c for c in parse_header(header) if c.name in table.places])
@@ -87,10 +85,6 @@ def _utc_ns(header: list[str], second: bytes) -> int | None:
 
 def _column_places(header: list[str], path: Path) -> dict[str, int]:
     """Return column name -> place, for the columns that are read."""
-    missing = [name for name in COLUMNS if name not in header]
-    if missing:
-        whole = f" (it is {header[0]!r}, without a comma)" if len(header) == 1 else ""
-        raise RecordingError(f"{path}: its first line names no {', '.join(missing)}{whole}", _REMEDY)
     warm = [c.name for c in parse_header(header) if c.quantity == TEMPERATURE]
     wanted = (*COLUMNS, *sorted(warm, key=TEMPERATURE.__ne__)[:1])
     twice = [name for name in wanted if header.count(name) > 1]
