@@ -63,7 +63,7 @@ def test_the_accelerometer_alone_cannot_be_calibrated(mpucal, capture):
     assert result.code == 5
     (reason,) = json.loads(result.out)["quality"]["reasons"]
     assert reason["code"] == "gyro_off"
-    assert "record it at 1000 Hz or less" in reason["message"]
+    assert "record the gyroscope as well, at 1000 Hz or less" in reason["message"]
 
 
 @pytest.mark.parametrize("command", ["session", "doctor"])
