@@ -11,7 +11,8 @@ import numpy as np
 from ..data import Recording, Vector
 from ..kernel import _kernel
 from ..rests.flat import UNAVERAGED, Flat, flat_statistics, rounding_variance
-from ..rests.intervals import Intervals, RestFinder, remove_drift, statistics
+from ..rests.gyro_drift import remove_drift
+from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.tremor import fit_lambda, level_rests, tremor_variance
 from ..rests.windows import WINDOW_S, noise_ratio, noise_variance
 from .masks import mask

@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from ..data import Recording, Vector
 from ..origin import Origin
 from ..rests.flat import Flat
-from ..rests.intervals import RestFinder, remove_drift
+from ..rests.gyro_drift import remove_drift
+from ..rests.intervals import RestFinder
+from ..result.calibration import Calibration
 from .fit import Fit
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import turned
@@ -138,19 +139,11 @@ class _Transition:
         return np.cross(_unit(F @ _calibrated(theta, self.z)), _unit(self._end(theta)))
 
 
-class Known(Protocol):
-    """Errors of a sensor that are known: D, K (3, 3) and b_a (3,)."""
+def carried(recording: Recording, flat: Flat, known: Fit | Calibration, rest: slice, to: int) -> Vector:
+    """Return the readings (n, 3) of a rest as they are in the axes of its sample number `to`; a rest turns little.
 
-    @property
-    def D(self) -> Vector: ...  # noqa: D102, N802 - the paper's letter
-    @property
-    def b_a(self) -> Vector: ...  # noqa: D102
-    @property
-    def K(self) -> Vector: ...  # noqa: D102, N802
-
-
-def carried(recording: Recording, flat: Flat, known: Known, rest: slice, to: int) -> Vector:
-    """Return the readings (n, 3) of a rest as they are in the axes of its sample number `to`; a rest turns little."""
+    [m/s^2], by the D, b_a and K of `known`; as transitions.py does for the means of all rests of a fit at once.
+    """
     acc = recording.acc[rest]
     steps = np.gradient(recording.t[rest])[:, None] * ((recording.gyr[rest] - flat.b_omega) @ known.K.T)
     path = np.cumsum(steps, axis=0)

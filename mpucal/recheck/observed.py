@@ -26,7 +26,8 @@ from ..calibration.rotation import cross, turned
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S, carried
 from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
-from ..rests.intervals import Intervals, RestFinder, remove_drift
+from ..rests.gyro_drift import remove_drift
+from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration
 
 E, BETA, G, DELTA, NOISE = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21), slice(21, 23)

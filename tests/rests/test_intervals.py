@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
-from mpucal.rests.intervals import RestFinder, remove_drift
+from mpucal.rests.gyro_drift import remove_drift
+from mpucal.rests.intervals import RestFinder
 from mpucal.rests.limits import ANY_HAND
 
 

@@ -31,7 +31,7 @@ PIECES = 64
 DEAD_BITS, LOST_BYTE = 3, 7
 BITS = 16
 # Values are whole counts, or whole steps, within this share.
-EXACTLY, FEW = 0.02, 50
+EXACTLY = 0.02
 # Where the counts are not known: so many steps of the other axes make a step that is odd. A smaller one [m/s^2, rad/s]
 # may be that of a float32, which is coarser the larger a value is.
 ODD_STEPS, LEAST_ODD_STEP = 8.0, 1e-3
@@ -95,7 +95,7 @@ def _stuck(e: Evidence, values: Vector, lsbs: Iterable[float], sensor: str, unit
 
 def _words(values: Vector, lsb: float) -> Words | None:
     """Return `values` (n, 3) as words of two's complement; None where those are not whole counts of 16 bits."""
-    for part in (values[:FEW], values):  # the first ones show another scale
+    for part in (values[:1], values):  # the first sample most often shows another scale
         scaled = part / lsb
         counts = np.rint(scaled)
         # Rates that were not measured are NaN, and fail the comparison.
