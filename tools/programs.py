@@ -1,14 +1,26 @@
-"""The programs of a folder of tools/, each a module with `main`: listed by their docstrings, run by name."""
+"""Programs of a folder of tools/: modules with `main`, listed by their docstrings, run by name.
+
+The parameters of `main` are what a command line may give: its arguments, and after `*` its options. Their annotations
+hold the type, the choices or a function that converts the text, and the help.
+"""
 
 from __future__ import annotations
 
+import argparse
 import ast
+import inspect
 import os
 import sys
+from collections.abc import Callable, Container, Sequence
 from importlib import import_module
 from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from mpucal.session.threads import ONE_THREAD
+
+Jobs = Annotated[int, "processes"]
+PROCESSORS = os.cpu_count() or 1
 
 
 def run(folder: str) -> None:
@@ -23,12 +35,59 @@ def run(folder: str) -> None:
     match sys.argv[1:]:
         case [name, *arguments] if name in programs:
             sys.argv = [f"python -m tools.{folder} {name}", *arguments]
-            sys.exit(import_module(f"tools.{folder}.{name}").main())
+            sys.exit(call(import_module(f"tools.{folder}.{name}"), arguments))
         case [name, *_] if not name.startswith("-"):
             sys.exit(f"tools.{folder} has no program {name!r}; `python -m tools.{folder}` lists them")
         case _:
             for name, path in programs.items():
                 print(f"{name:18} {(ast.get_docstring(ast.parse(path.read_text())) or '').splitlines()[0]}")
+
+
+def call(module: Any, words: Sequence[str]) -> int | None:
+    """Call `main` of a program with what the command line gives; return the exit code."""
+    if not inspect.isfunction(module.main):
+        return module.main(words)
+    if not inspect.signature(module.main).parameters:
+        return module.main()
+    return module.main(**parsed(module.__doc__, words, module.main))
+
+
+def parsed(
+    doc: str | None, words: Sequence[str] | None, *functions: Callable[..., Any], without: Container[str] = ()
+) -> dict[str, Any]:
+    """Return the values of these functions' parameters by their names, `without` some."""
+    parser, known = (
+        argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter),
+        set(),
+    )
+    for function in functions:
+        hints = get_type_hints(function, include_extras=True)
+        for parameter in inspect.signature(function).parameters.values():
+            if parameter.name not in without and parameter.name not in known:
+                known.add(parameter.name)
+                _add(parser, parameter, hints[parameter.name])
+    return vars(parser.parse_args(words))
+
+
+def _add(parser: argparse.ArgumentParser, parameter: inspect.Parameter, hint: Any) -> None:
+    hint, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    if get_origin(hint) is UnionType:
+        hint = next(each for each in get_args(hint) if each is not NoneType)
+    kind = get_args(hint)[0] if get_origin(hint) is list else hint
+    needed = parameter.default is parameter.empty
+    how: dict[str, Any] = {"type": kind, "default": None if needed else parameter.default}
+    if get_origin(hint) is list:
+        how["nargs"] = "+" if needed or parameter.kind is parameter.KEYWORD_ONLY else "*"
+    for note in notes:
+        how["help" if isinstance(note, str) else "type" if callable(note) else "choices"] = note
+    if how["type"] is not kind:
+        how.pop("nargs", None)
+    if hint is bool:
+        how = {"action": "store_true", "help": how.get("help")}
+    if parameter.kind is parameter.KEYWORD_ONLY:
+        parser.add_argument(f"--{parameter.name.replace('_', '-')}", required=needed, **how)
+    else:
+        parser.add_argument(parameter.name, **how, **({"nargs": "?"} if not needed and "nargs" not in how else {}))
 
 
 def _runs(path: Path) -> bool:

@@ -7,15 +7,16 @@ python -m tools.lab check_trials recordings/*.npz                halves of real 
 A pair is an MPU-6050 in a trembling hand: twelve poses make the calibration, a flat rest and the three orientations
 that are asked for, each missed by some degrees, the check; with `--any` any three. Every sensor also ages by five days,
 as `mpucal.recheck.drift` says of an unchanged one, and its rests and turns err by what `mpucal.recheck.observed` says
-that no mounting and no gyroscope is better than; `--perfect` leaves that out.
+that no mounting and no gyroscope is better than.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -25,15 +26,16 @@ from mpucal.calibration.verification import BIAS_RAD_S, FLOOR_MPS2, FLOOR_RAD
 from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
 from mpucal.recheck.observed import BETA, NONLINEAR, apply_errors
+from mpucal.result.calibration import REFUSED
 from mpucal.simulated.sensor import SensorTruth
 
 from .halves import halves
 from .judge import rms
-from .runner import Asked, Program, names_of, option
+from .runner import Trial, names_of
 from .scenarios.course import direction
 from .scenarios.recordings import CHECK_S, FLAT_S, GRAVITY_MPS2, hand_scenario
 from .scenarios.sensors import hand_sensor
-from .table import Column, grouped, over, show, table
+from .table import Column, Row, over
 
 DAYS, TEMPERATURE_C = 5.0, 25.0
 # the length of a turn in that motion
@@ -47,19 +49,6 @@ EVENTS = (
     "15 degC",
     "another sensor",
 )
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Pair of a calibration and a check: the event between them, and the result of the check."""
-
-    event: str
-    seed: int
-    verdict: str
-    what: str
-    probability: float | None
-    seconds: float
-    error_mg: float = np.nan
 
 
 def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[SensorTruth, float]:
@@ -113,7 +102,7 @@ def calibrated_and_aged(
     of_sensor, of_event, of_age, of_errors = np.random.default_rng([seed, 21]).spawn(4)
     before = hand_scenario(2 * seed, "pose12", tremble=True, sensor=hand_sensor(of_sensor))
     calibration = mpucal.calibrate(at(before.recording, TEMPERATURE_C), gravity=GRAVITY_MPS2)
-    if calibration.verdict == "refused":
+    if calibration.verdict == REFUSED:
         return None
     age = drift.ageing(calibration, DAYS, 0.0)
     aged = aged_by(before.truth, of_age.multivariate_normal(np.zeros(len(age)), age))
@@ -126,72 +115,76 @@ def at(recording: mpucal.Recording, temperature_c: float) -> mpucal.Recording:
     return replace(recording, sensor=sensor, temperature_c=np.full(len(recording), temperature_c), flat=None)
 
 
-def of_pair(event: str, seed: int, motion: str, perfect: bool) -> Trial | None:
+def of_pair(event: str, seed: int, motion: str) -> Row | None:
     """Calibrate, apply an event, and check; None if the calibration was refused."""
     if (begun := calibrated_and_aged(seed)) is None:
         return None
     calibration, aged, of_event, of_errors = begun
     after, temperature_c = happened(aged, event, of_event)
     recording = at(hand_scenario(2 * seed + 1, motion, tremble=True, sensor=after).recording, temperature_c)
-    recording = recording if perfect else imperfect(recording, of_errors)
-    told = check(calibration, recording, days=DAYS)
-    error = np.nan
-    if told.theta is not None:
-        error = float(np.abs(calibration.D @ told.theta[BETA] + calibration.b_a - after.b_a).max()) / drift.MG
-    return Trial(event, seed, told.verdict, told.what, told.probability, told.seconds, error)
+    row = Row(name=event, seed=seed, **told(calibration, imperfect(recording, of_errors), DAYS))
+    if row.theta is not None:
+        off = calibration.D @ row.theta[BETA] + calibration.b_a - after.b_a
+        row.error_mg = float(np.abs(off).max()) / drift.MG
+    del row.theta
+    return row
 
 
-def of_halves(path: Path, gravity: float) -> list[Trial]:
+def told(calibration: mpucal.Calibration, recording: mpucal.Recording, days: float) -> dict[str, Any]:
+    """Return what a check says of a calibration, and the likeliest change."""
+    found = check(calibration, recording, days=days)
+    return {name: getattr(found, name) for name in ("verdict", "what", "probability", "seconds", "theta")}
+
+
+def of_halves(path: Path, gravity: float) -> list[Row]:
     """Check each half of a recording against the calibration of the other, if that was not refused."""
-    try:
-        parts = halves(mpucal.load(path))
-    except mpucal.MpucalError:
-        return []
-    trials = []
-    for number, (one, other) in enumerate((parts, parts[::-1])):
+    rows = []
+    parts = halves(mpucal.load(path))
+    for one, other in (parts, parts[::-1]):
         calibration = mpucal.calibrate(one, gravity=gravity)
-        if calibration.verdict != "refused":
-            told = check(calibration, other, days=0.0)
-            trials.append(Trial(path.stem, number, told.verdict, told.what, told.probability, told.seconds))
-    return trials
+        if calibration.verdict != REFUSED:
+            rows.append(Row(name=path.stem, **{**told(calibration, other, 0.0), "theta": None}))
+    return rows
 
 
-def tried(item: Path | tuple[str, int], any: bool, perfect: bool, gravity: float) -> list[Trial] | Trial | None:
+def tried(
+    item: Path | tuple[str, int],
+    *,
+    any: Annotated[bool, "any three orientations, not those that are asked for"] = False,
+    gravity: Annotated[float, "m/s^2, of the recordings"] = 9.81,
+) -> list[Row] | Row | None:
     """Check the halves of a recording, or a simulated pair of an event and a seed."""
     if isinstance(item, Path):
         return of_halves(item, gravity)
-    return of_pair(*item, motion="check" if any else "check as asked", perfect=perfect)
+    return of_pair(*item, motion="check" if any else "check as asked")
 
 
-def events_of(asked: Asked) -> list[tuple[str, int]]:
+def events(seeds: range, only: Sequence[str]) -> list[tuple[str, int]]:
     """Return an event for each seed; all events come equally often."""
-    return [(asked.only[number % len(asked.only)], seed) for number, seed in enumerate(asked.seeds)]
+    return [(only[number % len(only)], seed) for number, seed in enumerate(seeds)]
 
 
-def told_as(trials: Sequence[Trial]) -> str:
+def scenarios(
+    recordings: Annotated[list[Path], "real recordings, halved"] = (),
+    *,
+    seeds: range,
+    only: Annotated[list[str], names_of(EVENTS), "events, with ; between"] = EVENTS,
+) -> Sequence[Path | tuple[str, int]]:
+    """Return the recordings, or pairs of an event and a seed."""
+    return recordings or events(seeds, only)
+
+
+def told_as(rows: Sequence[Row]) -> str:
     """Return the results of the checks, each with its share in %."""
-    told = Counter(trial.verdict if trial.what == "nothing" else trial.what for trial in trials)
-    return ", ".join(f"{name} {100.0 * count / len(trials):.1f}" for name, count in told.most_common())
+    told = Counter(row.verdict if row.what == "nothing" else row.what for row in rows)
+    return ", ".join(f"{name} {100.0 * count / len(rows):.1f}" for name, count in told.most_common())
 
 
 COLUMNS: dict[str, Column] = {
     "pairs": len,
-    "called changed, %": lambda of: 100.0 * float(np.mean([t.verdict not in UNCHANGED for t in of])),
+    "called changed, %": lambda of: 100.0 * float(np.mean([row.verdict not in UNCHANGED for row in of])),
     "told as, %": told_as,
     "error, mg": over("error_mg", rms),
 }
 
-main = Program(
-    __doc__,
-    tried,
-    items=lambda asked: asked.recordings or events_of(asked),
-    report=lambda trials, asked: show(table(grouped(trials, "event"), COLUMNS)),
-    options=(
-        option("recordings", nargs="*", type=Path, help="real recordings, halved"),
-        option("--only", type=names_of(EVENTS), default=EVENTS, help="events, with ; between"),
-        option("--any", action="store_true", help="any three orientations, not those that are asked for"),
-        option("--perfect", action="store_true", help="neither the mounting nor the gyroscope errs besides"),
-        option("--gravity", type=float, default=9.81, help="m/s^2, of the recordings"),
-    ),
-    seeds="0:504",
-)
+main = Trial(__doc__, tried, scenarios, COLUMNS, seeds="0:504")

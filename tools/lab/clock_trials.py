@@ -5,7 +5,6 @@ python -m tools.lab clock_trials --seeds 5000:5200     # -1 to +1 %, drifts of 5
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,20 +18,10 @@ from mpucal.sources.bridge.bus import BridgeBus
 
 from .bridge import EmulatedBridge, EmulatedLine
 from .judge import rms
-from .runner import Program
-from .table import known
+from .runner import Trial
+from .table import Row, known
 
 SECONDS, FLAT_S, MS = 75.0, 12.0, 1_000_000
-
-
-@dataclass(frozen=True)
-class Found:
-    """A session in words, and the errors of rate [ppm], K and D in their standard uncertainties."""
-
-    words: str
-    ppm: float
-    K: tuple[float, ...]
-    D: tuple[float, ...]
 
 
 def recorded(seed: int, ppm: float, drift_ppm_a_minute: float, burst_ms: int) -> tuple[mpucal.Recording, Any]:
@@ -53,28 +42,25 @@ def recorded(seed: int, ppm: float, drift_ppm_a_minute: float, burst_ms: int) ->
     return driver.recording(), chip.truth_document()
 
 
-def of_seed(seed: int) -> Found:
-    """Record behind a bridge that the seed draws, calibrate and compare."""
+def of_seed(seed: int) -> Row:
+    """Record behind a bridge that the seed draws, calibrate and compare: errors in their standard uncertainties."""
     rng = np.random.default_rng([seed, 7])
     ppm, drift, burst_ms = rng.uniform(-1e4, 1e4), float(rng.choice([-50, 0, 50])), int(rng.choice([1, 4, 16]))
     recording, truth = recorded(seed, ppm, drift, burst_ms)
     found, sensor = mpucal.calibrate(recording, gravity=truth["gravity"]), recording.sensor
     error = (sensor.clock_ppm or 0.0) - (ppm + drift * SECONDS / 120)
     std = (sensor.clock_std or np.nan) * 1e6
-    return Found(
-        f"{seed:4d}  {burst_ms:2d} ms {ppm:+7.0f} ppm: off by {error:+.2f} ({std:.2f}), {found.verdict}",
-        error / std,
-        tuple(np.diag((found.K - truth["K"]) / found.K_std).tolist()),
-        tuple(((found.D - truth["D"]) / found.D_std).ravel().tolist()),
+    return Row(
+        words=f"{seed:4d}  {burst_ms:2d} ms {ppm:+7.0f} ppm: off by {error:+.2f} ({std:.2f}), {found.verdict}",
+        ppm=error / std,
+        K=tuple(np.diag((found.K - truth["K"]) / found.K_std).tolist()),
+        D=tuple(((found.D - truth["D"]) / found.D_std).ravel().tolist()),
     )
 
 
-main = Program(
-    __doc__,
-    of_seed,
-    items=lambda asked: asked.seeds,
-    report=lambda found, asked: print(
-        "rms z: " + ", ".join(f"{name} {rms(known(found, name)):.2f}" for name in ("ppm", "K", "D"))
-    ),
-    line=lambda found: found.words,
-)
+def report(rows: list[Row]) -> None:
+    """Print the rms of the errors."""
+    print("rms z: " + ", ".join(f"{name} {rms(known(rows, name)):.2f}" for name in ("ppm", "K", "D")))
+
+
+main = Trial(__doc__, of_seed, lambda seeds: seeds, report=report, line=lambda row: row.words)

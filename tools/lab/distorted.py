@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -25,42 +26,20 @@ from mpucal.rests.intervals import RestFinder
 from mpucal.simulated.sensor import SensorTruth
 
 from .judge import followed, sph_rms, tilts_deg
-from .runner import Asked, Program, option
+from .runner import Trial, each_seed
 from .scenarios.sensors import euler_rotation, non_orthogonality
-from .table import Column, grouped, over, show, table
+from .table import Column, Row, grouped, over, show, table
 
 GAIN, SKEW_RAD, MISALIGNMENT_RAD, BIAS_MPS2 = 0.1, np.radians(5.0), np.radians(3.0), 1.0
 SETS = ("uncalibrated", "calibrated", "with the gyroscope's K", "undistorted")
-
-
-@dataclass(frozen=True)
-class Errors:
-    """The errors of one of SETS with a seed's distortion of a recording.
-
-    Attributes
-    ----------
-    error : m/s^2 against the distortion, over all directions. claim : what the calibration says of it.
-    roll_deg, pitch_deg : means of the absolute errors against the motion capture, from the end of the flat segment.
-    roll_turned_deg, pitch_turned_deg : the same without the rest at the end, which flatters the mean.
-    """
-
-    of: str
-    which: str
-    error: float = np.nan
-    roll_deg: float = np.nan
-    pitch_deg: float = np.nan
-    roll_turned_deg: float = np.nan
-    pitch_turned_deg: float = np.nan
-    seed: int = 0
-    told: str = ""
-    claim: float = np.nan
+FIGURES = ("which", "error", "roll_deg", "pitch_deg", "roll_turned_deg", "pitch_turned_deg")
 
 
 BESIDE = (
-    Errors("wanted", "", 0.094, 0.47, 0.22),
+    Row(name="wanted", which="", error=0.094, roll_deg=0.47, pitch_deg=0.22),
     # the paper's means over its optical recording
-    Errors("the paper", "before", np.nan, 3.43, 1.61),
-    Errors("the paper", "after", np.nan, 1.82, 0.78),
+    Row(name="the paper", which="before", roll_deg=3.43, pitch_deg=1.61),
+    Row(name="the paper", which="after", roll_deg=1.82, pitch_deg=0.78),
 )
 
 
@@ -98,8 +77,16 @@ def distortion(seed: int) -> tuple[Vector, Vector]:
     return np.diag(gain) @ non_orthogonality(*skew) @ euler_rotation(-turn), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
 
 
-def of_seed(item: tuple[Path, int], model: str, gravity: float) -> list[Errors]:
-    """Distort, calibrate, and judge each of SETS by the distortion and by motion capture.
+def of_seed(
+    item: tuple[Path, int],
+    *,
+    model: Annotated[str, MODELS] = "auto",
+    gravity: Annotated[float, "m/s^2"] = 9.81,
+) -> list[Row]:
+    """Distort, calibrate, and judge each of SETS by the distortion [m/s^2] and by motion capture [deg].
+
+    The tilts are means from the end of the flat segment on; the `turned` ones are so without the rest at the end, which
+    flatters the mean.
 
     Raises
     ------
@@ -117,10 +104,11 @@ def of_seed(item: tuple[Path, int], model: str, gravity: float) -> list[Errors]:
     b_a = np.array([np.zeros(3), result.b_a, result.b_a, b_true])
     s, turned_until = orientations(recording, D, b_a, result.K, gravity)
     s_true = captured.specific_force[-len(s) :]
-    told, claim = f"{result.fit['model']}, {result.verdict}", float(result.quality["error_std"]["rms"])
     errors = [sph_rms(truth, *sets) for sets in zip(D, b_a, strict=True)]
     tilts = (*tilts_deg(s_true, s), *tilts_deg(s_true[:turned_until], s[:turned_until]))
-    return [Errors(path.stem, *each, seed, told, claim) for each in zip(SETS, errors, *tilts, strict=True)]
+    same = {"name": path.stem, "seed": seed, "told": f"{result.fit['model']}, {result.verdict}"}
+    same["claim"] = float(result.quality["error_std"]["rms"])
+    return [Row(**same, **dict(zip(FIGURES, each, strict=True))) for each in zip(SETS, errors, *tilts, strict=True)]
 
 
 def orientations(recording: Recording, D: Vector, b_a: Vector, K: Vector, gravity: float) -> tuple[Vector, int]:
@@ -146,25 +134,20 @@ COLUMNS: dict[str, Column] = {
     "pitch, deg": over("pitch_deg"),
     "roll, without the rest at the end": over("roll_turned_deg"),
     "pitch": over("pitch_turned_deg"),
-    "verdicts": lambda of: "; ".join(sorted({e.told for e in of})),
+    "verdicts": lambda of: "; ".join(sorted({e.told for e in of if hasattr(e, "told")})),
 }
 
 
-def report(found: list[Errors], asked: Asked) -> None:
+def scenarios(
+    recordings: Annotated[list[Path], ".npz with t, acc, gyr and quat"], *, seeds: range
+) -> list[tuple[Path, int]]:
+    """Return each recording with each seed."""
+    return each_seed(recordings, seeds)
+
+
+def report(found: list[Row]) -> None:
     """Print a line for each of SETS, beside what is wanted and the paper's."""
-    title = f"section 4.2: {len(asked.seeds)} distortions"
-    show(table(grouped([*found, *BESIDE], "of", "which"), COLUMNS, title))
+    show(table(grouped([*found, *BESIDE], "name", "which"), COLUMNS, "section 4.2"))
 
 
-main = Program(
-    __doc__,
-    of_seed,
-    items=lambda asked: [(path, seed) for path in asked.recordings for seed in asked.seeds],
-    report=report,
-    options=(
-        option("recordings", nargs="+", type=Path, help=".npz with t, acc, gyr and quat"),
-        option("--model", choices=MODELS, default="auto"),
-        option("--gravity", type=float, default=9.81, help="m/s^2"),
-    ),
-    seeds="0:4",
-)
+main = Trial(__doc__, of_seed, scenarios, report=report, seeds="0:4")

@@ -12,9 +12,8 @@ limit is broken.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +22,10 @@ from mpucal.errors import MpucalError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
 
 from .judge import Judgement, judged, rms
-from .runner import Asked, Program, names_of, option
+from .runner import Trial
 from .scenarios.family import GRAVITY_MPS2, Wanted, simulate
-from .scenarios.table import FAMILIES
-from .table import Column, count, frequencies, grouped, known, over, show, table
+from .scenarios.table import FAMILIES, of_families
+from .table import VERDICTS, Column, Row, count, frequencies, grouped, known, over, show, table
 
 GOOD_MPS2 = 0.1
 CRASHED = "crashed"
@@ -38,49 +37,35 @@ FALSE_SHARE, GOOD_SHARE, SHARP_MPS2 = 0.003, 0.98, 1e-3
 RMS_CLAIMS = (0.5, 1.5)
 
 
-@dataclass(frozen=True)
-class Run(Judgement):
-    """The verdict on the recording of a seed: which model, how long it took [s], and its reasons in words."""
-
-    family: str = ""
-    seed: int = 0
-    model: str = ""
-    seconds: float = 0.0
-    why: str = ""
-
-    @property
-    def false(self) -> bool:
-        """Return True if the verdict is false."""
-        return super().false or (self.verdict == GOOD and not self.error <= GOOD_MPS2)
-
-
-def of_seed(item: tuple[str, int], model: str = "auto") -> Run:
+def of_seed(item: tuple[str, int], *, model: str = "auto") -> Row:
     """Simulate a family's name and a seed, calibrate and compare."""
     name, seed = item
     family = FAMILIES[name]
-    simulated = simulate(family, seed)
-    gravity, began = family.told_gravity or GRAVITY_MPS2, time.perf_counter()
+    simulated, gravity = simulate(family, seed), family.told_gravity or GRAVITY_MPS2
     try:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=gravity)
     except Exception as error:  # after any error the other runs continue, and the exit code is 1
         verdict = REFUSED if isinstance(error, MpucalError) else CRASHED
-        return Run(verdict, (type(error).__name__,), family=name, seed=seed, why=repr(error))
-    seconds, truth = time.perf_counter() - began, simulated.truth
-    reasons = result.quality["reasons"]
+        return row(Judgement(verdict, (type(error).__name__,)), family=name, seed=seed, why=repr(error))
+    truth, reasons = simulated.truth, result.quality["reasons"]
     D, unit = truth.D, truth.gravity
     if GRAVITY_NAMED in [reason["code"] for reason in reasons] and result.verdict != GOOD:
         D, unit = D * (unit / gravity), gravity
-    worth = judged(result, (D, truth.b_a), gravity=unit)
-    why = "; ".join(str(reason["message"]) for reason in reasons)
-    return Run(**vars(worth), family=name, seed=seed, model=str(result.fit["model"]), seconds=seconds, why=why)
+    worth, why = judged(result, (D, truth.b_a), gravity=unit), [str(reason["message"]) for reason in reasons]
+    return row(worth, family=name, seed=seed, model=result.fit["model"], why=why)
 
 
-def used(runs: Sequence[Run]) -> list[Run]:
+def row(worth: Judgement, **more: Any) -> Row:
+    """Return a judgement as a row; a good verdict is false of a large error, too."""
+    return worth.row(**more, false=worth.false or (worth.verdict == GOOD and not worth.error <= GOOD_MPS2))
+
+
+def used(runs: Sequence[Row]) -> list[Row]:
     """Return the runs that are not refused."""
     return [run for run in runs if run.verdict in (GOOD, USABLE)]
 
 
-def false(runs: Sequence[Run], verdict: str) -> int:
+def false(runs: Sequence[Row], verdict: str) -> int:
     """Return the number of false verdicts of this kind."""
     return sum(run.false and run.verdict == verdict for run in runs)
 
@@ -90,20 +75,19 @@ def of_used(name: str, make: Column) -> Column:
     return lambda runs: over(name, make)(used(runs))
 
 
-def rms_claims(runs: Sequence[Run]) -> float:
+def rms_claims(runs: Sequence[Row]) -> float:
     """Return the rms of the errors, in units of the claims, of the runs that are not refused."""
     return rms(known(used(runs), "claims"))
 
 
-def worst_good(runs: Sequence[Run]) -> float | None:
+def worst_good(runs: Sequence[Row]) -> float | None:
     """Return the largest error of a good calibration [m/s^2]."""
     return max((run.error for run in runs if run.verdict == GOOD), default=None)
 
 
 COLUMNS: dict[str, Column] = {
-    "good": count("verdict", GOOD),
-    "usable": count("verdict", USABLE),
-    "refused": count("verdict", REFUSED, CRASHED),
+    **VERDICTS,
+    CRASHED: lambda runs: count("verdict", CRASHED)(runs) or "",
     "false\ngood": lambda runs: false(runs, GOOD),
     "false\nusable": lambda runs: false(runs, USABLE),
     "rms in\nclaims": rms_claims,
@@ -115,7 +99,7 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def broken(runs: Sequence[Run]) -> list[str]:
+def broken(runs: Sequence[Row]) -> list[str]:
     """Return a sentence for each limit that the runs exceed."""
     good, usable, crashed = (count("verdict", verdict)(runs) for verdict in (GOOD, USABLE, CRASHED))
     found = []
@@ -136,13 +120,13 @@ def broken(runs: Sequence[Run]) -> list[str]:
     return found
 
 
-def beside(runs: Sequence[Run]) -> dict[str, float]:
+def beside(runs: Sequence[Row]) -> dict[str, float]:
     """Return the rms in claims by name of those families in which it lies outside RMS_CLAIMS."""
     claims = {name: rms_claims(of) for name, of in grouped(runs, "family").items()}
     return {name: x for name, x in claims.items() if x < RMS_CLAIMS[0] or x > RMS_CLAIMS[1]}
 
 
-def report(runs: list[Run], asked: Asked) -> int:
+def report(runs: list[Row]) -> int:
     """Print a line a family, and which limits are broken; return 1 where one is."""
     lines = {(name, FAMILIES[name].wanted.value): of for name, of in grouped(runs, "family").items()}
     title = f"{len(runs)} calibrations; errors in m/s², rms over the sphere"
@@ -154,14 +138,4 @@ def report(runs: list[Run], asked: Asked) -> int:
     return int(bool(limits))
 
 
-main = Program(
-    __doc__,
-    of_seed,
-    items=lambda asked: [(name, seed) for name in asked.families for seed in asked.seeds],
-    report=report,
-    options=(
-        option("--families", type=names_of(FAMILIES), default=[*FAMILIES], help="patterns, with ; between"),
-        option("--model", default="auto"),
-    ),
-    seeds="0:6",
-)
+main = Trial(__doc__, of_seed, of_families, report=report, seeds="0:6")

@@ -21,8 +21,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import product
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -39,9 +38,9 @@ from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
 from mpucal.terminal.voice import HOLD, REPEAT_S, SETTLED_S, Said, Tone, Voice
 
-from .runner import Asked, Program, option
+from .runner import Trial, each_seed
 from .sessions import session
-from .table import Column, count, grouped, known, show, table
+from .table import Column, Row, count, grouped, known
 
 BEYOND_DEG = 20.0
 # More than a hand's tremor and its error of aim.
@@ -219,33 +218,23 @@ def angle(a: Any, b: Any) -> float:
     return math.degrees(2.0 * math.acos(min(1.0, abs(float(np.dot(a, b))))))
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Session in a hand: how it ended, and the faults of its guidance."""
-
-    hand: str
-    verdict: str
-    finished_s: float
-    holds: int
-    wrong: dict[str, int]
-
-
-def of_hand(item: tuple[str, int]) -> Trial:
-    """Watch a session in a hand."""
+def of_hand(item: tuple[str, int]) -> Row:
+    """Watch a session in a hand: how it ended, and the faults of its guidance."""
     hand, seed = item
     watcher = Watcher()
     verdict = session(f"sim:hand={hand}", Plan(), seed, watcher).judged().verdict
-    return Trial(hand, verdict, watcher.finished_s, watcher.holds, dict(watcher.wrong + watcher.transcript.wrong))
+    wrong = watcher.wrong + watcher.transcript.wrong
+    return Row(name=hand, verdict=verdict, finished_s=watcher.finished_s, holds=watcher.holds, wrong=wrong)
 
 
-def typical_s(trials: Sequence[Trial]) -> float:
+def typical_s(trials: Sequence[Row]) -> float:
     """Return the median time to the verdict of good sessions [s]."""
     return float(np.median(known((t for t in trials if t.verdict == GOOD), "finished_s") or [math.nan]))
 
 
-def total_wrong(trials: Sequence[Trial]) -> Counter[str]:
+def total_wrong(trials: Sequence[Row]) -> Counter[str]:
     """Return the faults, and how often each occurred."""
-    return sum((Counter(trial.wrong) for trial in trials), Counter())
+    return sum((trial.wrong for trial in trials), Counter())
 
 
 COLUMNS: dict[str, Column] = {
@@ -257,19 +246,17 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def report(trials: list[Trial], asked: Asked) -> int:
-    """Print a line for each hand; return 1 after a fault, or if the words alone take too long."""
-    by_hand = grouped(trials, "hand")
-    show(table(by_hand, COLUMNS))
+def scenarios(*, seeds: range, hand: Annotated[list[str], HANDS] = tuple(HANDS)) -> list[tuple[str, int]]:
+    """Return each hand with each seed."""
+    return each_seed(hand, seeds)
+
+
+def report(trials: list[Row]) -> int:
+    """Print how long the words alone take; return 1 after a fault, or if that is too long."""
+    by_hand = grouped(trials, "name")
     ratio = typical_s(by_hand.get(BY_WORDS, [])) / typical_s(by_hand.get("guided", []))
     print(f"by words in {ratio:.2f} times the time of the hand that is given the orientation")
     return 1 if total_wrong(trials) or ratio > SLOWEST else 0
 
 
-main = Program(
-    __doc__,
-    of_hand,
-    items=lambda asked: product(asked.hand, asked.seeds),
-    report=report,
-    options=(option("--hand", nargs="*", default=list(HANDS), choices=list(HANDS)),),
-)
+main = Trial(__doc__, of_hand, scenarios, COLUMNS, report=report)

@@ -7,8 +7,9 @@ Simulations are compared with their truth by monte_carlo.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -21,31 +22,10 @@ from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
 
 from .judge import rms
-from .runner import Asked, Program, option
-from .table import Column, grouped, over, show, table
+from .runner import Trial
+from .table import Column, Row, grouped, over, show, table
 
-# rms z of 12 parameters: 1 for a true claim, and the limits of the median and the worst
-WANTED = "wanted: median 0.7 to 1.3, worst 2 or less"
 LEAST_REST_S = 1.0
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """The difference of the estimates of two halves.
-
-    name : of the recording. model : that made the estimates, or both with a stroke.
-    z : (12,) differences of D row-major and b_a in units of what both claim; empty where `why` says why.
-    """
-
-    name: str
-    model: str
-    z: tuple[float, ...] = ()
-    why: str = ""
-
-    @property
-    def rms_z(self) -> float:
-        """Return the rms of z; NaN if it is empty."""
-        return rms(self.z)
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:
@@ -95,22 +75,28 @@ def reversed_in_time(recording: Recording) -> Recording:
     )
 
 
-def agreement(name: str, one: mpucal.Calibration, other: mpucal.Calibration) -> Agreement:
-    """Compare two calibrations of one sensor."""
+def agreement(name: str, one: mpucal.Calibration, other: mpucal.Calibration) -> Row:
+    """Compare two calibrations of one sensor: z are differences of D row-major and b_a in units of what both claim."""
     difference = np.append(one.D - other.D, one.b_a - other.b_a)
     std = np.hypot(np.append(one.D_std, one.b_a_std), np.append(other.D_std, other.b_a_std))
     models = "/".join(dict.fromkeys(str(half.fit["model"]) for half in (one, other)))
     if not np.isfinite(difference).all():
-        return Agreement(name, models, why="nothing could be estimated")
-    return Agreement(name, models, tuple((difference / std).tolist()))
+        return Row(name=name, model=models, why="nothing could be estimated")
+    z = tuple((difference / std).tolist())
+    return Row(name=name, model=models, z=z, rms_z=rms(z), why=None)
 
 
-def of_file(path: Path, model: str, gravity: float) -> Agreement:
+def of_file(
+    path: Path,
+    *,
+    model: Annotated[str, MODELS] = "auto",
+    gravity: Annotated[float, "m/s^2"] = STANDARD_GRAVITY_MPS2,
+) -> Row:
     """Cut a recorded file, calibrate both halves and compare them."""
     try:
         one, other = (mpucal.calibrate(half, model=model, gravity=gravity) for half in halves(mpucal.load(path)))
     except MpucalError as error:
-        return Agreement(path.stem, model, why=str(error))
+        return Row(name=path.stem, model=model, why=str(error))
     return agreement(path.stem, one, other)
 
 
@@ -123,20 +109,17 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def report(found: list[Agreement], asked: Asked) -> None:
+def scenarios(recordings: Annotated[list[Path], "files that mpucal reads"]) -> list[Path]:
+    """Return the recordings."""
+    return recordings
+
+
+def report(found: list[Row]) -> None:
     """Print a line for each recording, and one for all recordings by each model."""
     of_all = {("all", model): rows for model, rows in grouped(found, "model").items()}
-    show(table(grouped(found, "name", "model") | of_all, COLUMNS, f"halves of recordings; {WANTED}"))
+    show(table(grouped(found, "name", "model") | of_all, COLUMNS, WANTED))
 
 
-main = Program(
-    __doc__,
-    of_file,
-    items=lambda asked: asked.recordings,
-    report=report,
-    options=(
-        option("recordings", nargs="+", type=Path, help="files that mpucal reads"),
-        option("--model", choices=MODELS, default="auto"),
-        option("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2"),
-    ),
-)
+# rms z of 12 parameters: 1 for a true claim, and the limits of the median and the worst
+WANTED = "halves of recordings; wanted: median 0.7 to 1.3, worst 2 or less"
+main = Trial(__doc__, of_file, scenarios, report=report)

@@ -18,6 +18,8 @@ from mpucal.result.calibration import GOOD, USABLE, Calibration
 from mpucal.result.error_model import sensor_axes
 from mpucal.simulated.sensor import SensorTruth
 
+from .table import Row
+
 # a verdict is false if the error exceeds the claim by this factor, or that of an element exceeds its standard
 # uncertainty by MOST_Z
 MOST_CLAIMS = {GOOD: 3.0, USABLE: 5.0}
@@ -40,6 +42,11 @@ class Judgement:
     error: float = math.nan
     claim: float = math.nan
     z: tuple[float, ...] = ()
+
+    def row(self, **more: Any) -> Row:
+        """Return it as a row of a trial, with more attributes."""
+        derived = {name: getattr(self, name) for name in ("claims", "farthest", "rms_z", "false")}
+        return Row(**{**vars(self), **derived, **more})
 
     @property
     def claims(self) -> float:

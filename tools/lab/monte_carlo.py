@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from rich.table import Table
@@ -27,10 +27,10 @@ from mpucal.rests.flat import flat_statistics
 from mpucal.result.calibration import REFUSED
 
 from .judge import Judgement, followed, judged, sph_rms, tilts_deg
-from .runner import Asked, Program, names_of, option
+from .runner import Trial, each_seed, names_of
 from .scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
 from .scenarios.sensors import hand_sensor, paper_sensor
-from .table import Column, cell, frequencies, grouped, known, over, plain_table, show, table
+from .table import Column, Row, cell, frequencies, grouped, known, over, plain_table, show, table
 
 # NIS is 3 for data that conform to the model, and tens if the fit ended in a wrong optimum
 NIS_WRONG = 10.0
@@ -70,37 +70,19 @@ SCENES = {
 }
 
 
-@dataclass(frozen=True)
-class Run(Judgement):
-    """A simulated calibration.
+def of_seed(item: tuple[str, int], model: str) -> Row:
+    """Simulate and calibrate a scene and a seed, and judge the result.
 
-    Attributes
-    ----------
-    before : the error without a calibration [m/s^2]. failure : why it does not count; None where it does.
-    known_K : number of K's six elements with a standard uncertainty.
-    roll_deg, pitch_deg : mean errors of the paper's filter with each of TILTS; none in a hand.
+    In the row, `before` is the error without a calibration [m/s^2], `failure` why it does not count, `known_K` the
+    number of K's six elements with a standard uncertainty, and the tilts are errors with each of TILTS.
     """
-
-    scene: str = ""
-    seed: int = 0
-    model: str = ""
-    failure: str | None = None
-    before: float = np.nan
-    ms: float = 0.0
-    known_K: int = 0
-    roll_deg: tuple[float, ...] = ()
-    pitch_deg: tuple[float, ...] = ()
-
-
-def of_seed(item: tuple[str, int], model: str) -> Run:
-    """Simulate and calibrate a scene and a seed, and judge the result."""
     scene, seed = item
     simulated = SCENES[scene].simulate(seed)
     truth, began = simulated.truth, time.perf_counter()
     try:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=GRAVITY_MPS2)
     except MpucalError as error:
-        return Run(REFUSED, scene=scene, seed=seed, model=model, failure=str(error))
+        return Judgement(REFUSED).row(scene=scene, seed=seed, model=model, failure=str(error))
     ms, of_paper = 1e3 * (time.perf_counter() - began), scene.startswith("paper")
     worth, before = judged(result, (truth.D, truth.b_a), gravity=truth.gravity), sph_rms(truth, np.eye(3), np.zeros(3))
     failure = None
@@ -110,19 +92,12 @@ def of_seed(item: tuple[str, int], model: str) -> Run:
         failure = "wrong optimum (NIS)"
     elif not worth.error < before:
         failure = "worse than no calibration"
-    roll, pitch = tilts(simulated, result) if of_paper else ((), ())
-    return Run(
-        **vars(worth),
-        scene=scene,
-        seed=seed,
-        model=result.fit["model"],
-        failure=failure,
-        before=before,
-        ms=ms,
-        known_K=int(np.isfinite(result.K_std[np.triu_indices(3)]).sum()),
-        roll_deg=roll,
-        pitch_deg=pitch,
-    )
+    known_K = int(np.isfinite(result.K_std[np.triu_indices(3)]).sum())
+    row = worth.row(scene=scene, seed=seed, model=result.fit["model"], failure=failure)
+    vars(row).update(before=before, ms=ms, known_K=known_K)
+    if of_paper:
+        row.roll_deg, row.pitch_deg = tilts(simulated, result)
+    return row
 
 
 def tilts(simulated: Simulated, result: mpucal.Calibration) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -133,12 +108,12 @@ def tilts(simulated: Simulated, result: mpucal.Calibration) -> tuple[tuple[float
     return tilts_deg(simulated.specific_force[flat.last :], followed(recording, flat, D, b_a, GRAVITY_MPS2))
 
 
-def successful(runs: Sequence[Run]) -> list[Run]:
+def successful(runs: Sequence[Row]) -> list[Row]:
     """Return the runs without failure."""
     return [run for run in runs if run.failure is None]
 
 
-def met(runs: Sequence[Run]) -> bool | None:
+def met(runs: Sequence[Row]) -> bool | None:
     """Return True if all runs of a scene succeeded with the required mean error; None if none is set."""
     wanted = SCENES[runs[0].scene].wanted
     if wanted is None:
@@ -169,7 +144,7 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def tilt_table(runs: Sequence[Run]) -> Table:
+def tilt_table(runs: Sequence[Row]) -> Table:
     """Return section 4.3: means (standard deviations) of the errors of roll and pitch, beside the paper's."""
     lines = Table("deg", *TILTS, "wanted", "the paper, before", "after", title="the paper's scenario")
     for name, beside in PAPER.items():
@@ -179,15 +154,7 @@ def tilt_table(runs: Sequence[Run]) -> Table:
     return lines
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """A fit to one sensor: the covariance (12, 12) of D and b_a, and their errors (12,)."""
-
-    covariance: list[list[float]]
-    errors: list[float]
-
-
-def fit_fixed(seed: int, model: str) -> Fitted | None:
+def fit_fixed(seed: int, model: str) -> Row | None:
     """Fit one sensor with a seed's noise, as in section 4.4; None if it failed."""
     simulated = paper_scenario(seed, sensor=paper_sensor(np.random.default_rng(0)))
     recording = simulated.recording
@@ -196,10 +163,10 @@ def fit_fixed(seed: int, model: str) -> Fitted | None:
         return None
     errors = np.concatenate([(fit.D - simulated.truth.D).ravel(), fit.b_a - simulated.truth.b_a])
     # the other parameters' meaning may change with the run (tilts about an estimated axis)
-    return Fitted(fit.covariance[:12, :12].tolist(), errors.tolist())
+    return Row(covariance=fit.covariance[:12, :12].tolist(), errors=errors.tolist())
 
 
-def efficiency(fits: Sequence[Fitted]) -> list[dict[str, Any]]:
+def efficiency(fits: Sequence[Row]) -> list[dict[str, Any]]:
     """Return a row a parameter of D and b_a: RMSE against the Cramér-Rao bound of the mean Fisher information."""
     fisher = np.mean([np.linalg.inv(fit.covariance) for fit in fits], axis=0)
     bound = np.sqrt(np.diag(np.linalg.inv(fisher)))
@@ -208,28 +175,26 @@ def efficiency(fits: Sequence[Fitted]) -> list[dict[str, Any]]:
     return [dict(zip(("", "RMSE", "√CRLB", "RMSE / √CRLB"), row, strict=True)) for row in rows]
 
 
-def tried(item: int | tuple[str, int], model: str) -> Fitted | Run | None:
+def tried(item: int | tuple[str, int], *, model: Annotated[str, MODELS] = "auto") -> Row | None:
     """Fit one sensor with a seed's noise, or calibrate a scene and a seed."""
     return fit_fixed(item, model) if isinstance(item, int) else of_seed(item, model)
 
 
-def items(asked: Asked) -> Sequence[int | tuple[str, int]]:
-    """Return the seeds of one sensor's noises, or the seeds of each scene.
-
-    Raises
-    ------
-    SystemExit : there is no fit of this model alone.
-    """
-    if asked.crlb and asked.model not in FITS:
-        raise SystemExit(f"--crlb goes with --model {' or '.join(FITS)}")
-    return asked.seeds if asked.crlb else [(scene, seed) for scene in asked.scenes for seed in asked.seeds]
+def scenarios(
+    *,
+    seeds: range,
+    scenes: Annotated[list[str], names_of(SCENES), "patterns, with ; between"] = tuple(SCENES),
+    crlb: Annotated[bool, f"section 4.4: one sensor, many noises; --model {' or '.join(FITS)}"] = False,
+) -> Sequence[int | tuple[str, int]]:
+    """Return the seeds of one sensor's noises, or the seeds of each scene."""
+    return seeds if crlb else each_seed(scenes, seeds)
 
 
-def report(found: list[Any], asked: Asked) -> None:
+def report(found: list[Any], seeds: range, model: str, crlb: bool) -> None:
     """Print the efficiency of the fits, or a line a scene."""
-    about = f"model {asked.model}, {len(asked.seeds)} seeds from {asked.seeds[0]}"
-    if asked.crlb:
-        failed = len(asked.seeds) - len(found)
+    about = f"model {model}, {len(seeds)} seeds from {seeds[0]}"
+    if crlb:
+        failed = len(seeds) - len(found)
         show(plain_table(efficiency(found), f"section 4.4, {about}, of one sensor; {failed} failed"))
         return
     show(table(grouped(found, "scene"), COLUMNS, about))
@@ -238,15 +203,4 @@ def report(found: list[Any], asked: Asked) -> None:
         show(tilt_table(of_paper))
 
 
-main = Program(
-    __doc__,
-    tried,
-    items=items,
-    report=report,
-    options=(
-        option("--scenes", type=names_of(SCENES), default=[*SCENES], help="patterns, with ; between"),
-        option("--model", choices=MODELS, default="auto"),
-        option("--crlb", action="store_true", help="section 4.4: one sensor, many noises"),
-    ),
-    seeds="0:60",
-)
+main = Trial(__doc__, tried, scenarios, report=report, seeds="0:60")

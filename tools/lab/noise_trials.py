@@ -7,7 +7,6 @@ python -m tools.lab noise_trials --hours 3 --seeds 100
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -15,9 +14,9 @@ import numpy as np
 from mpucal.allan.model import NAMES, fit_coefficients
 from mpucal.allan.octaves import Octaves
 
-from .runner import Program, option
+from .runner import Trial, each_seed
 from .scenarios.noise import noise
-from .table import Column, grouped, show, table
+from .table import Column, Row
 
 RATE_HZ = 100.0
 # white [units/sqrt(Hz)], bias instability [units], random walk [units/sqrt(s)]
@@ -30,18 +29,11 @@ AXES = {
 CONFIDENCES = (0.68, 0.95)
 
 
-@dataclass(frozen=True)
-class Found:
-    """A coefficient of an axis, its truth, and by that: the value found, and the low and high end by confidence."""
+def of_seed(item: tuple[str, int], *, hours: float = 1.0) -> list[Row]:
+    """Simulate an axis for so long, and find its coefficients.
 
-    axis: str
-    name: str
-    truth: float
-    by_truth: list[float]
-
-
-def of_seed(item: tuple[str, int], hours: float) -> list[Found]:
-    """Simulate an axis for so long, and find its coefficients."""
+    A row's `by_truth` is the value found, and the low and high end by confidence, in units of the truth.
+    """
     axis, seed = item
     n = round(3600.0 * hours * RATE_HZ)
     samples = noise(np.random.default_rng([seed, *axis.encode()]), n, RATE_HZ, *AXES[axis])
@@ -53,10 +45,11 @@ def of_seed(item: tuple[str, int], hours: float) -> list[Found]:
     ends = [end[:3] for one in found if one is not None for end in (one.low, one.high)]
     value = np.full(3, np.nan) if found[0] is None else found[0].value[:3]
     by_truth = (np.array([value, *ends]) / np.array(AXES[axis])).T.tolist()
-    return [Found(axis, *each) for each in zip(NAMES, AXES[axis], by_truth, strict=False)]
+    of_names = zip(NAMES, AXES[axis], by_truth, strict=False)
+    return [Row(axis=axis, name=name, truth=truth, by_truth=found) for name, truth, found in of_names]
 
 
-def inside(found: Sequence[Found], low: int) -> str:
+def inside(found: Sequence[Row], low: int) -> str:
     """Return how many intervals hold the truth."""
     return f"{100.0 * np.mean([one.by_truth[low] <= 1.0 <= one.by_truth[low + 1] for one in found]):.0f} %"
 
@@ -69,10 +62,4 @@ COLUMNS: dict[str, Column] = {
     "its end / true": lambda found: f"{np.median([one.by_truth[4] for one in found]):.2f}",
 }
 
-main = Program(
-    __doc__,
-    of_seed,
-    items=lambda asked: [(axis, seed) for axis in AXES for seed in asked.seeds],
-    report=lambda found, asked: show(table(grouped(found, "axis", "name", "truth"), COLUMNS)),
-    options=(option("--hours", type=float, default=1.0),),
-)
+main = Trial(__doc__, of_seed, lambda seeds: each_seed(AXES, seeds), COLUMNS, by=("axis", "name", "truth"))

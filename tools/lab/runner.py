@@ -1,4 +1,4 @@
-"""Runner of trial programs: options, a pool of processes for the items, the report, and a JSON file of the rows."""
+"""Runner of trials: options, a pool of processes for the scenarios, the table, and a JSON file of the rows."""
 
 from __future__ import annotations
 
@@ -7,69 +7,83 @@ import fnmatch
 import inspect
 import json
 import multiprocessing
-import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from rich.console import Console
 from rich.progress import track
 
-Asked = argparse.Namespace
-Option = tuple[tuple[str, ...], dict[str, Any]]
+from tools.programs import PROCESSORS, Jobs, parsed
 
-
-def option(*names: str, **how: Any) -> Option:
-    """Declare an option or argument, as argparse takes it."""
-    return names, how
+from .table import Column, Row, grouped, show, table
 
 
 @dataclass(frozen=True)
-class Program:
-    """A program of trials, as a module's `main`; `python -m tools.lab NAME --help` prints `doc`.
+class Trial:
+    """A trial, as a module's `main`; `python -m tools.lab NAME --help` prints `doc`.
+
+    The parameters of the functions, besides what they are about, are its options, as tools/programs.py makes them.
 
     Attributes
     ----------
-    run : tries one item and returns a row, several, or None; it gets those options that it has parameters of.
-    items : what there is to try, by the options. report : prints what was found and returns the exit code.
-    seeds : the seeds without --seeds. line : the text of a row that is printed as it comes.
+    judge : tries one scenario and returns a row, several, or None. scenarios : by the seeds and other options.
+    columns : of the table, with a line for each value of the attributes `by`; title : of the table, by the options.
+    report : prints more of the rows, and returns the exit code.
+    seeds : without --seeds. line : text of a row that is printed as it comes.
     """
 
     doc: str | None
-    run: Callable[..., Any]
-    items: Callable[[Asked], Iterable[Any]]
-    report: Callable[[list[Any], Asked], int | None]
-    options: tuple[Option, ...] = ()
-    seeds: str | None = "0:20"
-    line: Callable[[Any], str] | None = None
+    judge: Callable[..., Row | list[Row] | None]
+    scenarios: Callable[..., Iterable[Any]]
+    columns: Mapping[str, Column] | None = None
+    by: tuple[str, ...] = ("name",)
+    title: str = ""
+    report: Callable[..., int | None] | None = None
+    seeds: str = "0:20"
+    line: Callable[[Row], str] | None = None
 
     def __call__(self, words: Sequence[str] | None = None) -> int:
-        """Try all items of the command line, print the report, and return the exit code."""
-        asked = self._parser().parse_args(words)
-        passed = {name: vars(asked)[name] for name in inspect.signature(self.run).parameters if name in vars(asked)}
-        rows: list[Any] = []
-        for told in in_parallel(partial(self.run, **passed), self.items(asked), asked.jobs):
+        """Try all scenarios of the command line, print the table, and return the exit code."""
+
+        def options(
+            *,
+            seeds: Annotated[range, seed_range, "A:B, or a count"] = seed_range(self.seeds),
+            jobs: Jobs = PROCESSORS,
+            json: Annotated[Path | None, "file for the rows"] = None,
+        ) -> None: ...
+
+        functions = (options, self.scenarios, self.judge, *([self.report] if self.report else []))
+        # what these are about is no option
+        about = {next(iter(inspect.signature(each).parameters)) for each in functions[2:]}
+        given = parsed(self.doc, words, *functions, without=about)
+        rows: list[Row] = []
+        judge = partial(self.judge, **_taken(self.judge, given))
+        for told in in_parallel(judge, self.scenarios(**_taken(self.scenarios, given)), given["jobs"]):
             several = told if isinstance(told, list) else [] if told is None else [told]
             rows += several
             for row in several if self.line else ():
                 print(self.line(row), flush=True)
-        code = self.report(rows, asked)
-        if asked.json:
+        if self.columns:
+            show(table(grouped(rows, *self.by), self.columns, self.title.format(**given) or None))
+        code = self.report(rows, **_taken(self.report, given)) if self.report else 0
+        if given["json"]:
             # an unknown figure is null
-            text = json.dumps([asdict(row) if is_dataclass(row) else row for row in rows], indent=1)
-            asked.json.write_text(text.replace("NaN", "null") + "\n", encoding="utf-8")
+            text = json.dumps([vars(row) for row in rows], indent=1)
+            given["json"].write_text(text.replace("NaN", "null") + "\n", encoding="utf-8")
         return code or 0
 
-    def _parser(self) -> argparse.ArgumentParser:
-        parser = argparse.ArgumentParser(description=self.doc, formatter_class=argparse.RawDescriptionHelpFormatter)
-        parser.add_argument("--seeds", type=seed_range, default=self.seeds, metavar="A:B", help="or a count")
-        parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
-        parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found to it")
-        for names, how in self.options:
-            parser.add_argument(*names, **how)
-        return parser
+
+def _taken(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: given[name] for name in inspect.signature(function).parameters if name in given}
+
+
+def each_seed(names: Iterable[Any], seeds: Iterable[int]) -> list[tuple[Any, int]]:
+    """Return each name with each seed."""
+    return list(product(names, seeds))
 
 
 def seed_range(text: str) -> range:

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -18,16 +18,16 @@ import numpy as np
 from mpucal.__main__ import run
 from mpucal.calibration import calibrate
 from mpucal.chip.driver import Driver
-from mpucal.data import Recording, Vector
+from mpucal.data import Recording
 from mpucal.errors import Abandoned
 from mpucal.result.calibration import GOOD, Calibration
 from mpucal.session.events import Key, Meter, Output, Prompt, PromptKind
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.mishaps import Mishap
 
 from .judge import Judgement, judged
+from .table import Row
 
 NOTHING, ABANDONED = "nothing", "abandoned"
 
@@ -74,42 +74,27 @@ class Session:
     code: int = 0
     said: str = ""
 
-    def judged(self, *steps: Vector) -> Judgement:
-        """Compare the calibration with the truth, before and after steps of the specific force [m/s^2]."""
+    def judged(self) -> Judgement:
+        """Compare the calibration with the truth."""
         if self.calibration is None:
             return Judgement(ABANDONED if self.code == Abandoned.exit_code else NOTHING)
-        D, b_a = np.array(self.truth["D"]), np.array(self.truth["b_a"])
-        # the step is in front of D
-        return judged(self.calibration, (D, b_a), *((D, b_a + D @ step) for step in steps))
+        return judged(self.calibration, (np.array(self.truth["D"]), np.array(self.truth["b_a"])))
 
 
-@dataclass(frozen=True)
-class JudgedSession(Judgement):
-    """Session that was judged; times in simulated seconds, NaN for steps that it did not reach."""
-
-    name: str = ""
-    seed: int = 0
-    said: str = ""
-    wrong: str = ""
-    rotated_s: float = math.nan
-    finished_s: float = math.nan
-    verified_z: tuple[float, ...] = ()
-
-
-def judge_session(name: str, seed: int, done: Session, wrong: str, *steps: Vector) -> JudgedSession:
+def judge_session(name: str, seed: int, done: Session, wrong: str = "", **more: Any) -> Row:
     """Judge a session; a traceback is wrong in any trial, and so is a good verdict whose error exceeds its claim."""
-    judgement = done.judged(*steps)
+    judgement = done.judged()
     if "Traceback" in done.said:
         wrong = "a trace"
     elif judgement.verdict == GOOD and judgement.false:
         wrong = "called good"
-    return JudgedSession(**asdict(judgement), name=name, seed=seed, said=done.said, wrong=wrong)
+    return judgement.row(**{"name": name, "seed": seed, "said": done.said, "wrong": wrong, **more})
 
 
-def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequence[Mishap] = ()) -> Session:
+def session(words: str, plan: Plan, seed: int, ear: Any) -> Session:
     """Run a session on `--bus words` in this process."""
-    bus = open_simulated(words, plan.gravity, seed, mishaps=mishaps)
-    runner = Runner(Driver(bus, plan.config), ear or SilentOperator(), lambda *_: None, plan, (bus.hear,))
+    bus = open_simulated(words, plan.gravity, seed)
+    runner = Runner(Driver(bus, plan.config), ear, lambda *_: None, plan, (bus.hear,))
     try:
         recording = runner.measure()
     except Abandoned as error:

@@ -9,9 +9,9 @@ fitted to all rests but one, and judged by that one.
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -21,30 +21,10 @@ from mpucal.errors import MpucalError, RecordingError
 
 from .judge import rms
 from .rivals import Rests, Unfit, ellipsoid
-from .runner import Asked, Program, option
-from .table import Column, grouped, over, show, table
+from .runner import Trial
+from .table import Column, Row, first, over
 
 MOST_TRIES, MOST_LEFT_OUT = 5, 60
-
-
-@dataclass(frozen=True)
-class Tried:
-    """Result for a recording.
-
-    Attributes
-    ----------
-    tries : number of tries until it was read, 0 if never. verdict : with model and reasons. rests : their number.
-    before, after : rms of |a| - g of the rests, raw and calibrated. left_out : that of an ellipsoid, each rest judged
-    by a fit to the others [mm/s^2].
-    """
-
-    name: str
-    tries: int = 0
-    verdict: str = ""
-    rests: int = 0
-    before: float = float("nan")
-    after: float = float("nan")
-    left_out: float = float("nan")
 
 
 def read(path: Path) -> tuple[Recording | None, int, str]:
@@ -69,23 +49,24 @@ def read(path: Path) -> tuple[Recording | None, int, str]:
     return None, 0, why
 
 
-def of_path(path: Path, gravity: float) -> Tried:
-    """Read a recording, calibrate it, and judge its rests."""
+def of_path(path: Path, *, gravity: Annotated[float, "m/s^2"] = STANDARD_GRAVITY_MPS2) -> Row:
+    """Read a recording, calibrate it, and judge its rests: rms of |a| - g, raw, calibrated, and by an ellipsoid."""
     name = f"{path.parent.name}/{path.name}"
     recording, tries, why = read(path)
     if recording is None:
-        return Tried(name, verdict=why)
+        return Row(name=name, tries=0, verdict=why)
     calibration = mpucal.calibrate(recording, gravity=gravity)
     reasons = ", ".join(reason["code"] for reason in calibration.quality["reasons"])
-    found = Tried(name, tries, f"{calibration.quality['verdict']} ({calibration.fit['model']}) {reasons}".strip())
+    found = Row(name=name, tries=tries, verdict=f"{calibration.verdict} ({calibration.fit['model']}) {reasons}".strip())
     try:
         rests = Rests.of(recording)
     except Unfit:
         return found
-    found = replace(found, rests=len(rests.y), before=_off(rests.y, gravity))
+    found.rests, found.before = len(rests.y), _off(rests.y, gravity)
     if np.isfinite(calibration.D).all() and len(rests.y):
-        found = replace(found, after=_off(calibration.apply(rests.y), gravity))
-    return replace(found, left_out=left_out(rests, gravity))
+        found.after = _off(calibration.apply(rests.y), gravity)
+    found.left_out = left_out(rests, gravity)
+    return found
 
 
 def left_out(rests: Rests, gravity: float) -> float:
@@ -106,28 +87,18 @@ def _off(acc: Any, gravity: float) -> float:
 
 COLUMNS: dict[str, Column] = {
     "try": lambda of: of[0].tries or "never",
-    "rests": lambda of: of[0].rests,
+    "rests": first("rests"),
     "before": over("before"),
     "after": over("after"),
     "ellipsoid": over("left_out"),
-    "verdict": lambda of: of[0].verdict,
+    "verdict": first("verdict"),
 }
 
 
-def report(found: list[Tried], asked: Asked) -> None:
-    """Print a line a recording."""
-    show(
-        table(grouped(found, "name"), COLUMNS, "rms of |a| - g of the rests [mm/s^2]; the ellipsoid's of one left out")
-    )
+def scenarios(recordings: Annotated[list[Path], "files and folders that mpucal reads"]) -> list[Path]:
+    """Return the recordings."""
+    return recordings
 
 
-main = Program(
-    __doc__,
-    of_path,
-    items=lambda asked: asked.recordings,
-    report=report,
-    options=(
-        option("recordings", nargs="+", type=Path, help="files and folders that mpucal reads"),
-        option("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2"),
-    ),
-)
+TITLE = "rms of |a| - g of the rests, mm/s²; the ellipsoid's of one left out"
+main = Trial(__doc__, of_path, scenarios, COLUMNS, title=TITLE)

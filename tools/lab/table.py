@@ -6,13 +6,18 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from mpucal.result.calibration import GOOD, REFUSED, USABLE
+
 Column = Callable[[Sequence[Any]], Any]
+# what a trial found in a scenario: its attributes are figures and names
+Row = SimpleNamespace
 WIDTH = 170
 
 
@@ -25,8 +30,8 @@ def grouped(rows: Iterable[Any], *names: str) -> dict[Any, list[Any]]:
 
 
 def known(rows: Iterable[Any], name: str) -> list[float]:
-    """Return the known values of an attribute, of which a row may have several."""
-    values = [getattr(row, name) for row in rows]
+    """Return the known values of an attribute, of which a row may have several or none."""
+    values = [getattr(row, name, math.nan) for row in rows]
     flat = [each for value in values for each in (value if isinstance(value, tuple) else (value,))]
     return [each for each in flat if not math.isnan(each)]
 
@@ -39,6 +44,14 @@ def over(name: str, make: Callable[[list[float]], Any] = np.mean) -> Column:
 def count(name: str, *wanted: Any) -> Column:
     """Return a column: the number of rows whose attribute is one of these values, or is true where none is given."""
     return lambda rows: sum(getattr(row, name) in wanted if wanted else bool(getattr(row, name)) for row in rows)
+
+
+def first(name: str) -> Column:
+    """Return a column: the attribute of the first row."""
+    return lambda rows: getattr(rows[0], name, None)
+
+
+VERDICTS: dict[str, Column] = {verdict: count("verdict", verdict) for verdict in (GOOD, USABLE, REFUSED)}
 
 
 def frequencies(values: Iterable[Any], most: int | None = None) -> str:

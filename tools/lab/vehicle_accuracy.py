@@ -13,8 +13,7 @@ SCALE off, or the z of all of them is not within Z.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from typing import Annotated
 
 from mpucal.mavlink.parameters.slots import slot_of
 from mpucal.result.calibration import GOOD
@@ -22,9 +21,9 @@ from mpucal.simulated.hands import HANDS
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 from .judge import needed, off, rms, z_of
-from .runner import Asked, Program, option
+from .runner import Trial
 from .sessions import by_command
-from .table import grouped, known, over, show, table
+from .table import Row, known, over
 
 OFFSET_MPS2, SCALE, Z = 2e-3, 5e-4, (0.7, 1.3)
 FIRST_SEED = 100
@@ -43,45 +42,6 @@ USED = {
 }
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """The result of a session; z : of all IMUs."""
-
-    words: str
-    code: int
-    verdict: str = "none"
-    offset: float = math.nan
-    scale: float = math.nan
-    took: float = math.nan
-    z: tuple[float, ...] = ()
-
-    @property
-    def near(self) -> bool:
-        """Return True if the calibration is good and near enough to the truth, or is not called good."""
-        return self.verdict != GOOD or (self.offset <= OFFSET_MPS2 and self.scale <= SCALE)
-
-
-def items(asked: Asked) -> list[str]:
-    """Return the --mavlink value of each seed's ArduPilot, and of half as many PX4."""
-    return [
-        words_of(firmware, n)
-        for firmware, share in (("ardupilot", 1), ("px4", 2))
-        for n in asked.seeds[: len(asked.seeds) // share]
-    ]
-
-
-COLUMNS = {"took": over("took"), "offset": over("offset"), "scale": over("scale"), "z": over("z", rms)}
-
-
-def report(outcomes: list[Outcome], asked: Asked) -> int:
-    """Print the number of accurate sessions and the rms z of all; return 1 if one is not, or the claims are wrong."""
-    good = [outcome for outcome in outcomes if outcome.verdict == GOOD]
-    show(table(grouped(outcomes, "words", "code", "verdict"), COLUMNS))
-    z, near = rms(known(good, "z")), sum(outcome.near for outcome in good)
-    print(f"{len(good)} of {len(outcomes)} good, {near} of these within {OFFSET_MPS2} m/s^2 and {SCALE}; rms z {z:.2f}")
-    return 0 if near == len(good) > 0 and Z[0] <= z <= Z[1] else 1
-
-
 def words_of(firmware: str, n: int) -> str:
     """Return the --mavlink value of the n-th vehicle; every second one has been in use."""
     used = USED[firmware]
@@ -89,12 +49,21 @@ def words_of(firmware: str, n: int) -> str:
     return f"firmware={firmware},seed={FIRST_SEED + n}{more}"
 
 
-def of_vehicle(words: str, hand: str) -> Outcome:
+def scenarios(*, seeds: range) -> list[str]:
+    """Return the --mavlink value of each seed's ArduPilot, and of half as many PX4."""
+    return [
+        words_of(firmware, n)
+        for firmware, share in (("ardupilot", 1), ("px4", 2))
+        for n in seeds[: len(seeds) // share]
+    ]
+
+
+def of_vehicle(words: str, *, hand: Annotated[str, HANDS, "that turns the vehicle"] = "guided") -> Row:
     """Run a session with a vehicle in this hand, and compare."""
     words += f",hand={hand}"
     done, document = by_command("--mavlink", f"sim:{words}", "--no-write")
     if done.calibration is None:
-        return Outcome(words, done.code)
+        return Row(words=words, code=done.code, verdict="none")
     documents, truths = ([first, *first["others"]] for first in (document, done.truth))
     z = [each for one, truth in zip(documents, truths, strict=True) for each in z_of(one, truth)]
     far = []
@@ -104,10 +73,20 @@ def of_vehicle(words: str, hand: str) -> Outcome:
         where = slot_of(autopilot["firmware"], autopilot["imu"], autopilot["params_new"])
         far.append(off(where, autopilot["params_new"], needed(truth)))
     offset, scale = map(max, zip(*far, strict=True))
-    return Outcome(
-        words, done.code, done.calibration.verdict, offset, scale, float(document["fit"]["seconds"]), tuple(z)
-    )
+    row = Row(words=words, code=done.code, verdict=done.calibration.verdict, z=tuple(z), offset=offset, scale=scale)
+    row.took = float(document["fit"]["seconds"])
+    return row
 
 
-HAND = option("--hand", choices=HANDS, default="guided", help="that turns the vehicle")
-main = Program(__doc__, of_vehicle, items, report, (HAND,))
+COLUMNS = {"took": over("took"), "offset": over("offset"), "scale": over("scale"), "z": over("z", rms)}
+
+
+def report(rows: list[Row]) -> int:
+    """Print the number of accurate sessions and the rms z of all; return 1 if one is not, or the claims are wrong."""
+    good = [row for row in rows if row.verdict == GOOD]
+    z, near = rms(known(good, "z")), sum(row.offset <= OFFSET_MPS2 and row.scale <= SCALE for row in good)
+    print(f"{len(good)} of {len(rows)} good, {near} of these within {OFFSET_MPS2} m/s^2 and {SCALE}; rms z {z:.2f}")
+    return 0 if near == len(good) > 0 and Z[0] <= z <= Z[1] else 1
+
+
+main = Trial(__doc__, of_vehicle, scenarios, COLUMNS, ("words", "code", "verdict"), report=report)

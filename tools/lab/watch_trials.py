@@ -11,8 +11,9 @@ days before, as in tools/lab/check_trials.py, and each rest's mounting gives in 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 
@@ -21,10 +22,10 @@ from mpucal.data import Recording
 from mpucal.recheck.watch import DriftMonitor
 from mpucal.simulated.sensor import SensorTruth
 
-from .check_trials import DAYS, TEMPERATURE_C, at, calibrated_and_aged, events_of, happened
-from .runner import Program, names_of, option
+from .check_trials import DAYS, TEMPERATURE_C, at, calibrated_and_aged, events, happened
+from .runner import Trial, names_of
 from .scenarios.recordings import hand_scenario
-from .table import Column, count, grouped, show, table
+from .table import Column, Row, count
 
 RATE_HZ = 100.0
 USES = ("pose7", "pose9", "continuous", "wobble30")
@@ -34,18 +35,8 @@ PART_S = 5.0
 GIVES_S = 7.0
 
 
-@dataclass(frozen=True)
-class Run:
-    """Result of hours of use: their number, and the sensor of the first warning with its time [s]."""
-
-    event: str
-    seed: int
-    hours: float
-    told: tuple[tuple[str, float], ...]
-
-
-def of_use(item: tuple[str, int], hours: float) -> Run | None:
-    """Watch one sensor for `hours`; None if its calibration was refused."""
+def of_use(item: tuple[str, int], *, hours: Annotated[float, "of use, of each sensor"] = 0.5) -> Row | None:
+    """Watch one sensor, and return the sensors of the warnings with their times [s]; None if it was refused."""
     event, seed = item
     if (begun := calibrated_and_aged(seed)) is None:
         return None
@@ -58,7 +49,7 @@ def of_use(item: tuple[str, int], hours: float) -> Run | None:
         told += [(each.sensor, each.t_s) for each in watch.add(replace(samples, acc=acc, gyr=gyr))]
         if told and event != "nothing":
             break
-    return Run(event, seed, hours, tuple(told))
+    return Row(name=event, seed=seed, told=told)
 
 
 def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Iterator[Recording]:
@@ -76,7 +67,7 @@ def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Ite
         begun_s = float(minute.t[-1]) + 1.0
 
 
-def minutes_until(runs: Sequence[Run], share: float) -> str:
+def minutes_until(runs: Sequence[Row], share: float) -> str:
     """Return the minutes until a warning for this share of the sensors; empty if there was none."""
     minutes = [run.told[0][1] / 60.0 if run.told else np.inf for run in runs]
     told = float(np.quantile(minutes, share, method="higher"))
@@ -93,13 +84,12 @@ COLUMNS: dict[str, Column] = {
     "last": partial(minutes_until, share=1.0),
 }
 
-main = Program(
-    __doc__,
-    of_use,
-    items=events_of,
-    report=lambda runs, asked: show(table(grouped(runs, "event"), COLUMNS, f"{asked.hours:g} h each")),
-    options=(
-        option("--only", type=names_of(WATCHED), default=WATCHED, help="events, with ; between"),
-        option("--hours", type=float, default=0.5, help="of use, of each sensor"),
-    ),
-)
+
+def scenarios(
+    *, seeds: range, only: Annotated[list[str], names_of(WATCHED), "events, with ; between"] = WATCHED
+) -> list[tuple[str, int]]:
+    """Return pairs of an event and a seed."""
+    return events(seeds, only)
+
+
+main = Trial(__doc__, of_use, scenarios, COLUMNS, title="{hours:g} h each")

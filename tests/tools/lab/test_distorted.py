@@ -1,16 +1,11 @@
-import io
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from rich.console import Console
 
 from mpucal.calibration.ekf import specific_force
 from mpucal.errors import RecordingError
 from mpucal.simulated.sensor import SensorTruth, density
 from tools.lab import distorted
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, paper_scenario
-from tools.lab.table import grouped, table
 
 
 def quaternion(R):
@@ -63,7 +58,7 @@ def test_motion_capture_says_where_gravity_is(captured_file):
 
 
 def test_a_distortion_is_found_and_its_tilt_removed(captured_file):
-    before, after, with_gyro, exact = distorted.of_seed((captured_file, 0), "auto", GRAVITY_MPS2)
+    before, after, with_gyro, exact = distorted.of_seed((captured_file, 0), gravity=GRAVITY_MPS2)
     assert "refused" not in before.told
     assert before.error > 0.5
     assert after.error == with_gyro.error < 0.1
@@ -88,15 +83,6 @@ def test_a_recording_without_motion_capture_is_none(tmp_path):
     np.savez(path, t=np.arange(3.0), acc=np.ones((3, 3)), gyr=np.ones((3, 3)))
     with pytest.raises(RecordingError, match="no quat"):
         distorted.Captured.load(path, 9.81)
-
-
-def test_the_table_stands_beside_the_goals_and_the_papers():
-    of = distorted.Errors("desk", "calibrated", 0.0917, 0.51, 0.26, 0.51, 0.27, 0, "hand, good", 0.05)
-    stream = io.StringIO()
-    lines = grouped([of, replace(of, seed=1, error=0.1), *distorted.BESIDE], "of", "which")
-    Console(file=stream, width=200).print(table(lines, distorted.COLUMNS))
-    for word in ("0.0959", "0.51", "0.47", "1.82", "hand, good"):
-        assert word in stream.getvalue()
 
 
 def test_the_quaternions_of_this_test_turn_as_the_filters():

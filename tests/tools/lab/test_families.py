@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from tools.lab import families, runner
+from tools.lab.judge import Judgement
 from tools.lab.scenarios import around, body, course, family, faults, sensors, table
 
 STEP_S = 1.0 / 2000.0
@@ -171,8 +172,9 @@ def test_seeds_and_families_differ():
     assert not np.allclose(first.truth.D, simulate(families["bench"], 1).truth.D)
 
 
-def verdict(**values):
-    return families.Run(**{"family": "poses", "seed": 0, "verdict": "good", "error": 0.01, "claim": 0.01, **values})
+def verdict(*, family="poses", **values):
+    known = {"verdict": "good", "error": 0.01, "claim": 0.01, **values}
+    return families.row(Judgement(known["verdict"], error=known["error"], claim=known["claim"]), family=family)
 
 
 def test_what_is_called_false():

@@ -93,11 +93,3 @@ def test_z_is_the_rms_in_units_of_the_claim():
     assert agreement.model == "hand/imu"
     assert halves.COLUMNS["rms z, worst"]([agreement]) == pytest.approx(np.sqrt(0.5))
     assert halves.COLUMNS["largest |z|"]([agreement]) == pytest.approx(1.0)
-
-
-def test_a_recording_without_halves_says_why():
-    runs = [halves.Agreement("desk", "hand", (0.8,) * 12), halves.Agreement("desk", "hand", why="no second rest")]
-    told = {name: column(runs) for name, column in halves.COLUMNS.items()}
-    assert told["rms z, median"] == pytest.approx(0.8)
-    assert told["why there is none"] == "no second rest"
-    assert halves.COLUMNS["rms z, worst"](runs[1:]) is None

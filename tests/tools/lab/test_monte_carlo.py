@@ -5,10 +5,12 @@ import pytest
 from rich.console import Console
 
 from tools.lab import monte_carlo
+from tools.lab.judge import Judgement
+from tools.lab.table import Row
 
 
 def run(error, failure=None, scene="12 poses", **more):
-    return monte_carlo.Run("good", error=error, z=(1.0,) * 12, scene=scene, model="hand", failure=failure, **more)
+    return Judgement("good", error=error, z=(1.0,) * 12).row(scene=scene, model="hand", failure=failure, **more)
 
 
 def column(name, *runs):
@@ -23,7 +25,7 @@ def test_a_failure_is_named_and_not_among_the_successful():
 
 
 def test_runs_that_all_failed_have_no_mean():
-    failed = monte_carlo.Run("refused", scene="12 poses", failure="refused")
+    failed = Judgement("refused").row(scene="12 poses", failure="refused")
     assert [column(name, failed) for name in ("error, m/s²", "rms z, median", "largest |z|")] == [None] * 3
 
 
@@ -58,6 +60,6 @@ def test_an_efficient_estimator_has_a_ratio_of_one():
     rng = np.random.default_rng(0)
     covariance = np.diag(sd**2)
 
-    fits = [monte_carlo.Fitted(covariance, sd * rng.standard_normal(12)) for _ in range(2000)]
+    fits = [Row(covariance=covariance, errors=sd * rng.standard_normal(12)) for _ in range(2000)]
     found = monte_carlo.efficiency(fits)
     assert [row["RMSE / √CRLB"] for row in found] == pytest.approx([1.0] * 12, abs=0.06)

@@ -1,12 +1,11 @@
 """Live and offline find the same rests, in a dozen of the recordings of which the program takes hundreds."""
 
-from argparse import Namespace
-
 import numpy as np
 import pytest
 
 from mpucal.data import Recording
 from tools.lab import rests
+from tools.lab.table import Row
 
 KINDS = ("poses", "poses trembling", "poses of a session", "six poses", "phone poses", "two decimals")
 
@@ -26,9 +25,9 @@ def test_a_recording_that_never_lies_flat_is_not_compared():
 
 
 def test_the_program_counts_and_lists(capsys):
-    differs = rests.Found("lift", 1, held=3, rests=2, only_held=((1.0, 2.5),))
-    found = [rests.Found("poses", 0, held=9, rests=9), differs, rests.Found("still", 0, flat=False)]
-    assert rests.report(found, Namespace(least=0.6)) == 1
+    differs = Row(name="lift", seed=1, flat=True, held=3, rests=2, only_held=[(1.0, 2.5)], only_rests=[], agrees=False)
+    found = [Row(flat=True, agrees=True), differs, Row(flat=False)]
+    assert rests.report(found, least=0.6) == 1
     said = capsys.readouterr().out
     assert "lift" in said
     assert "1 of 2 agree; 1 more have no flat segment" in said

@@ -25,8 +25,8 @@ def test_a_try_follows_the_options_of_the_refusal(unit, tries, made, tmp_path):
     names = ",".join(["time", *(f"acc_{axis}" for axis in "xyz"), *(f"gyro_{axis}{unit}" for axis in "xyz")])
     rows = np.column_stack([made.t, made.acc, np.degrees(made.gyr)])
     np.savetxt(tmp_path / "walk.csv", rows, "%.9g", ",", header=names, comments="")
-    found = strangers.of_path(tmp_path / "walk.csv", GRAVITY_MPS2)
+    found = strangers.of_path(tmp_path / "walk.csv", gravity=GRAVITY_MPS2)
     assert found.tries == tries
     assert found.before > 10.0 * found.after
     (tmp_path / "note.txt").write_text("no table\n")
-    assert strangers.of_path(tmp_path / "note.txt", GRAVITY_MPS2).tries == 0
+    assert strangers.of_path(tmp_path / "note.txt").tries == 0

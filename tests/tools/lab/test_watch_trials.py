@@ -5,9 +5,9 @@ from tools.lab import watch_trials as trials
 
 def test_a_right_calibration_is_not_warned_of_and_a_wrong_one_is():
     """A few minutes of use, of which the campaign simulates hours."""
-    unchanged = trials.of_use(("nothing", 4), 0.03)
-    assert unchanged.told == ()
-    changed = trials.of_use(("bias 20 mg", 4), 0.03)
+    unchanged = trials.of_use(("nothing", 4), hours=0.03)
+    assert unchanged.told == []
+    changed = trials.of_use(("bias 20 mg", 4), hours=0.03)
     assert changed.told[0][0] == "accelerometer"
     assert changed.told[0][1] < 150.0
     told, last = (trials.COLUMNS[name]([changed]) for name in ("told", "last"))

@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 
+from ..runner import each_seed, names_of
 from . import around, course, faults
 from .around import Hand
 from .family import PLAIN, SHARP, Family
@@ -186,3 +187,10 @@ FAMILIES: dict[str, Family] = {
         *_TOLD,
     )
 }
+
+
+def of_families(
+    *, seeds: range, families: Annotated[list[str], names_of(FAMILIES), "patterns, with ; between"] = tuple(FAMILIES)
+) -> list[tuple[str, int]]:
+    """Return each family with each seed."""
+    return each_seed(families, seeds)
