@@ -21,6 +21,7 @@ from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, choose_model
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
+from .words import correct_signed_bytes
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
@@ -43,7 +44,10 @@ def estimate(
         raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
-    before = Evidence(with_masks(recording), gravity, None, None, model, gravity_anyway=gravity_anyway)
+    recording, signed_bytes = correct_signed_bytes(recording)
+    before = Evidence(
+        with_masks(recording), gravity, None, None, model, gravity_anyway=gravity_anyway, signed_bytes=signed_bytes
+    )
     whole = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
     if model != "auto":
         return whole

@@ -38,6 +38,7 @@ class Evidence:
 
     gravity_anyway : the caller confirms a gravity [m/s^2] outside the range found on Earth.
     gyroscope : why the estimate uses the rests alone; None where it does not, or where that was asked for.
+    signed_bytes : axes of which a low byte was taken for signed, before the recording was corrected.
     """
 
     recording: Recording
@@ -48,6 +49,7 @@ class Evidence:
     claim: UncertaintyClaim | None = None
     gravity_anyway: bool = False
     gyroscope: Reason | None = None
+    signed_bytes: str = ""
 
     @cached_property
     def uncertainty(self) -> Uncertainty | None:

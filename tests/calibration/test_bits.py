@@ -163,3 +163,11 @@ def test_single_faces_that_were_joined_are_not_accused(in_hand):
     joined = replace(part, acc=acc, gyr=np.full(acc.shape, np.nan), sensor=KNOWN, gap=gap)
     assert against(joined) is None
     assert against(replace(joined, gap=np.zeros(len(gap), bool))) is None
+
+
+def test_a_rate_that_is_turned_a_few_times_is_not_accused_beside_one_that_passes_zero(in_hand):
+    n = 2000
+    at_zero = -(np.arange(n) % 2)
+    turned = np.where(np.arange(n) % 200 < 5, 90, -16)  # of both, bit 6 is set
+    gyr = GYRO_LSB * np.column_stack([at_zero, turned, at_zero])
+    assert against(replace(in_hand.recording.part(0, n), gyr=gyr, sensor=KNOWN)) is None

@@ -2,7 +2,7 @@
 
 unusable     no estimate is possible: wrong units, no rest, no turn, a dead axis
 recording    moved while flat, clipped, lost, warming or vibrating; a gravity not found on Earth
-bits         low or high bits of an axis that never change
+bits         low or high bits of an axis that never change, a low byte that was taken for signed
 sensor       wrong range, units, axes, gyroscope or clock, by a trustworthy fit
 estimate     directions not observable, no convergence, contradictions, a change midway
 """
@@ -42,6 +42,7 @@ CHECKS: tuple[Check, ...] = (
     recording.temperature_moved,
     recording.vibrating,
     recording.gravity_unlikely,
+    bits.low_byte_signed,
     bits.bits_stuck,
     sensor.clock_off,
     sensor.sensors_lag,

@@ -1,0 +1,106 @@
+"""Words of the readings: the counts that a logger made of the chip's bytes, and a low byte that it took for signed.
+
+The counts are recovered where the range is known, or where all values are whole counts of one of the chip's ranges (16
+bits, as the MPU-6050 and its successors have).
+
+A logger that takes the low byte for a signed number makes a word 256 too low wherever bit 7 is set. Nothing is lost by
+it: the low byte is the true one. Whether it did so shows wherever bit 7 changes from one sample to the next: either the
+words as they are, or the corrected ones, leap there by 256. Steps of a sensor are distributed as by Laplace, with the
+scale that they have where bit 7 does not change, and the odds are those of all steps together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import (
+    ACCEL_COUNTS,
+    ACCEL_RANGES_G,
+    GYRO_COUNTS,
+    GYRO_RANGES_DPS,
+    STANDARD_GRAVITY_MPS2,
+    Mask,
+    Recording,
+    Vector,
+)
+
+# Values are whole counts within this share.
+EXACTLY = 0.02
+# Odds at which a fault of the bits is believed.
+ODDS = 1e6
+SIGN, BYTE = 0x80, 0x100
+
+Counts = NDArray[np.int_]
+
+
+class Words(NamedTuple):
+    """Words of a sensor: counts (n, 3), and the value of a count."""
+
+    counts: Counts
+    lsb: float
+
+
+def words_of(recording: Recording) -> tuple[Words | None, Words | None]:
+    """Return the words of the accelerometer and of the gyroscope; None where they are not known."""
+    acc_range, gyro_range = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
+    # A coarse count is no whole number of finer ones.
+    acc_lsbs = [g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS for g in ([acc_range] if acc_range else ACCEL_RANGES_G[::-1])]
+    gyro_ranges = [gyro_range] if gyro_range else GYRO_RANGES_DPS[-2:0:-1]
+    # programs of others divide the range by 2^15 counts
+    gyr_lsbs = [np.deg2rad(each / most) for each in gyro_ranges for most in (GYRO_COUNTS, ACCEL_COUNTS)]
+    return _words(recording.acc, acc_lsbs), _words(recording.gyr, gyr_lsbs)
+
+
+def _words(values: Vector, lsbs: Iterable[float]) -> Words | None:
+    return next((Words(counts, lsb) for lsb in lsbs if (counts := _counts(values, lsb)) is not None), None)
+
+
+def _counts(values: Vector, lsb: float) -> Counts | None:
+    """Return `values` (n, 3) in counts; None where those are not whole counts of 16 bits."""
+    for part in (values[:1], values):  # the first sample most often shows another scale
+        scaled = part / lsb
+        counts = np.rint(scaled)
+        # Rates that were not measured are NaN, and fail the comparison.
+        if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= ACCEL_COUNTS):
+            return None
+    return counts.astype(np.int64)
+
+
+def correct_signed_bytes(recording: Recording) -> tuple[Recording, str]:
+    """Return the recording with the words corrected whose low byte was taken for signed, and these words' axes."""
+    words = words_of(recording)
+    odds = np.array([np.zeros(3) if each is None else _log_odds(each.counts, recording.gap) for each in words])
+    sure = math.log(ODDS)
+    # One program reads all words: an axis that shows nothing is taken to be as the others.
+    wrong = (odds > sure) | ((odds > -sure) & (odds.sum() > sure))
+    if not wrong.any():
+        return recording, ""
+    acc, gyr = (
+        values if each is None else np.where(at, each.lsb * _corrected(each.counts), values)
+        for each, values, at in zip(words, (recording.acc, recording.gyr), wrong, strict=True)
+    )
+    names = [
+        f"the {sensor}'s " + ", ".join(axis for axis, is_wrong in zip("xyz", at, strict=True) if is_wrong)
+        for sensor, each, at in zip(("accelerometer", "gyroscope"), words, wrong, strict=True)
+        if each is not None and at.any()
+    ]
+    return replace(recording, acc=acc, gyr=gyr), " and ".join(names)
+
+
+def _corrected(counts: Counts) -> Counts:
+    return np.asarray(counts + BYTE * ((counts & SIGN) > 0))
+
+
+def _log_odds(counts: Counts, gap: Mask) -> Vector:
+    """Return (3,) the log odds of a low byte that was taken for signed, by axis."""
+    is_step = ~gap[1:, None]
+    steps, corrected = (np.abs(np.diff(each, axis=0)) for each in (counts, _corrected(counts)))
+    same = is_step & (steps == corrected)
+    scale = np.sum(steps, axis=0, where=same) / np.maximum(same.sum(0), 1)
+    return np.asarray(np.sum(steps - corrected, axis=0, where=is_step) / np.maximum(scale, 1.0))
