@@ -25,7 +25,7 @@ from mpucal.calibration.rotation import rotation
 from mpucal.calibration.verification import BIAS_RAD_S, FLOOR_MPS2, FLOOR_RAD
 from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
-from mpucal.recheck.observed import BETA, NONLINEAR, apply_errors
+from mpucal.recheck.observed import BETA, NOISE, NONLINEAR, apply_errors
 from mpucal.result.calibration import REFUSED
 from mpucal.simulated.sensor import SensorTruth
 
@@ -72,9 +72,18 @@ def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[
 
 
 def aged_by(truth: SensorTruth, theta: Vector) -> SensorTruth:
-    """Return the sensor after a change theta (21,), see mpucal.recheck.observed."""
+    """Return the sensor after a change theta (23,), see mpucal.recheck.observed."""
     after = apply_errors(mpucal.Calibration(truth.D, truth.b_a, K=truth.K, b_omega=truth.b_omega), theta)
-    return replace(truth, D=after.D, b_a=after.b_a, K=after.K, b_omega=after.b_omega)
+    noise = np.exp(theta[NOISE]) * [truth.accel_noise_density, truth.gyro_noise_density]
+    return replace(
+        truth,
+        D=after.D,
+        b_a=after.b_a,
+        K=after.K,
+        b_omega=after.b_omega,
+        accel_noise_density=noise[0],
+        gyro_noise_density=noise[1],
+    )
 
 
 def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.Recording:
