@@ -189,9 +189,16 @@ def told_as(rows: Sequence[Row]) -> str:
     return ", ".join(f"{name} {100.0 * count / len(rows):.1f}" for name, count in told.most_common())
 
 
+def shares_of_p(rows: Sequence[Row]) -> str:
+    """Return the shares of the checks with a probability below 0.1 and 0.5 in %: as many, if nothing happened."""
+    p = np.array([row.probability for row in rows if row.probability is not None])
+    return ", ".join(f"{100.0 * np.mean(p < limit):.1f}" for limit in (0.1, 0.5))
+
+
 COLUMNS: dict[str, Column] = {
     "pairs": len,
     "called changed, %": lambda of: 100.0 * float(np.mean([row.verdict not in UNCHANGED for row in of])),
+    "p below 0.1, 0.5, %": shares_of_p,
     "told as, %": told_as,
     "error, mg": over("error_mg", rms),
 }
