@@ -52,8 +52,13 @@ def estimate(
     if model != "auto":
         return whole
     at_fault = find_gyroscope_fault(whole[0])
-    other = _before_clipping(whole[0]) if at_fault is None else _of_rests(before, at_fault)
-    return other or whole
+    if at_fault is None:
+        return _before_clipping(whole[0]) or whole
+    of_rests = _of_rests(before, at_fault)
+    if refusing := tuple(reason for reason in find_reasons(of_rests) if reason.refuse):
+        # other faults of the gyroscope can be mended, and then the rests need not be enough
+        return (replace(whole[0], against_rests=refusing) if no_gyroscope(before) else whole[0]), whole[1]
+    return of_rests, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
 
 
 def _before_clipping(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
@@ -74,19 +79,16 @@ def _before_clipping(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] |
     return of_calm, {**chosen, "why": chosen["why"] + left_out}
 
 
-def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str, str]] | None:
-    """Return the estimate from the rests alone; None where they do not suffice."""
+def _of_rests(before: Evidence, at_fault: Reason) -> Evidence:
+    """Return the estimate from the rests alone; without a fit where the recording does not begin with a rest."""
     recording = before.recording
     segment = recording.flat or find_flat(recording)
-    if segment is None or not is_long_enough(recording, segment):
-        return None
-    flat = flat_statistics(recording, segment)
-    fit = fit_static(recording, flat, before.gravity)
     usable = replace(at_fault, what=at_fault.what + OF_RESTS, refuse=False)
-    evidence = replace(before, flat=flat, fit=fit, model="static", gyroscope=usable)
-    if any(reason.refuse for reason in find_reasons(evidence)):
-        return None
-    return evidence, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
+    flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
+    evidence = replace(before, model="static", gyroscope=usable, flat=flat)
+    if flat is None or is_unusable(evidence):
+        return evidence
+    return replace(evidence, fit=fit_static(recording, flat, before.gravity))
 
 
 def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:

@@ -39,6 +39,7 @@ class Evidence:
     gravity_anyway : the caller confirms a gravity [m/s^2] outside the range found on Earth.
     gyroscope : why the estimate uses the rests alone; None where it does not, or where that was asked for.
     signed_bytes : axes of which a low byte was taken for signed, before the recording was corrected.
+    against_rests : why it cannot use the rests alone, where nothing else was recorded.
     """
 
     recording: Recording
@@ -50,6 +51,7 @@ class Evidence:
     gravity_anyway: bool = False
     gyroscope: Reason | None = None
     signed_bytes: str = ""
+    against_rests: tuple[Reason, ...] = ()
 
     @cached_property
     def uncertainty(self) -> Uncertainty | None:

@@ -1,8 +1,10 @@
-"""Arrays by name from NumPy (.npz, .npy) and MATLAB (.mat) files: columns of one length, and matrices of them."""
+"""Arrays by name: of NumPy (.npz, .npy), MATLAB (.mat), Parquet, and JSON (samples as objects, rows or columns)."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +13,20 @@ from numpy.typing import NDArray
 
 from ..data import Recording
 from ..errors import RecordingError
-from .budget import check_size
+from .budget import HELD, check_size
 from .hints import NO_HINTS, Hints
 from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
-from .reading import reading
+from .reading import first_bytes, import_extra, reading
 from .tables.array_table import ArrayTable, columns_of_arrays, stated_rate, tables_of_arrays
 from .tables.phone import is_pair, recording_of_tables
 from .tables.table import recording_from_table, stated_rate_hz
 
 _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is what with --columns t=NAME,ax=NAME,..."
+Arrays = Iterator[tuple[str, NDArray[Any]]]
+# bytes from the beginning of a document of JSON, and numbers in them beyond which it holds samples, not settings
+SNIFFED, FEWEST_NUMBERS = 1 << 16, 200
+_IS_OWN = b'"D":', b'"b_a":'
 
 
 def is_of_others(path: Path) -> bool:
@@ -33,6 +39,12 @@ def is_of_others(path: Path) -> bool:
         return False
 
 
+def is_json_of_samples(path: Path) -> bool:
+    """Return True if a file of JSON begins with many numbers, and is no calibration."""
+    begun = first_bytes(path, SNIFFED)
+    return sum(byte in b",:" for byte in begun) > FEWEST_NUMBERS and not all(key in begun for key in _IS_OWN)
+
+
 def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """Return the recording in a file's arrays.
 
@@ -42,8 +54,7 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     try:
         with reading(path):
-            of_matlab = path.suffix.lower() == ".mat"
-            found = dict(read_matlab_arrays(path.read_bytes(), path) if of_matlab else _read_numpy(path))
+            found = dict(_READERS.get(path.suffix.lower(), _read_json)(path))
     except DAMAGED as error:
         # NumPy takes unknown bytes for pickled objects, and advises to load these, which would run code
         said = "damaged, or pickled Python objects" if "pickle" in str(error) else error
@@ -57,7 +68,7 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
     return recording_from_table(table, hints)
 
 
-def _read_numpy(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+def _read_numpy(path: Path) -> Arrays:
     with path.open("rb") as file:
         # no pickles: a recording must not run code
         loaded = np.load(file, allow_pickle=False)
@@ -70,8 +81,64 @@ def _read_numpy(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
                 yield from _fields(name, archive[name])
 
 
-def _fields(name: str, array: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+def _fields(name: str, array: NDArray[Any]) -> Arrays:
     if array.dtype.names is None:
         yield name, array
     for field in array.dtype.names or ():
         yield field, array[field]
+
+
+def _read_json(path: Path) -> Arrays:
+    check_size(path, HELD * path.stat().st_size)
+    text = path.read_text(encoding="utf-8-sig")
+    try:
+        document = json.loads(text)
+    except ValueError:
+        # an object on each line, of which the last may be torn
+        lines = [line for line in text.split("\n") if line.strip()]
+        document = [json.loads(line) for line in lines[: len(lines) if text.endswith("\n") else -1]]
+    return _json_arrays("", document)
+
+
+def _json_arrays(name: str, value: Any) -> Arrays:
+    """Yield name and array of the numbers in a value of JSON; of a list of objects, a column for each key."""
+    if isinstance(value, list) and any(isinstance(row, dict) for row in value):
+        rows = [row if isinstance(row, dict) else {} for row in value]
+        value = {key: [row.get(key) for row in rows] for key in dict.fromkeys(chain(*rows))}
+    if isinstance(value, dict):
+        if {"sensors", "values"} <= value.keys():
+            # Edge Impulse's data acquisition format
+            named = [f"{sensor['name']} ({sensor['units']})" for sensor in value["sensors"]]
+            yield from zip(named, np.asarray(value.pop("values"), float).T, strict=False)
+        for key, each in value.items():
+            yield from _json_arrays(f"{name}.{key}".removeprefix("."), each)
+        return
+    for kind in (None, float, "M8[ns]"):
+        try:
+            array = np.asarray(value, kind)
+        except (TypeError, ValueError):
+            continue
+        if array.dtype.kind in "iufM":
+            yield name, array
+            return
+
+
+def _read_parquet(path: Path) -> Arrays:
+    arrow, parquet = (import_extra(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
+    try:
+        table = parquet.read_table(path)
+    except (arrow.ArrowException, OSError) as error:
+        raise ValueError(error) from error
+    for place, field in enumerate(table.schema):
+        values = np.asarray(table.column(place).to_numpy())
+        if values.dtype.kind == "M" and not getattr(field.type, "tz", None):
+            # without a zone they are no times of day, and count from the first
+            values = np.asarray((values - values[:1]).astype("timedelta64[ns]"))
+        yield field.name, values
+
+
+def _read_matlab(path: Path) -> Arrays:
+    return read_matlab_arrays(path.read_bytes(), path)
+
+
+_READERS = {".mat": _read_matlab, ".npz": _read_numpy, ".npy": _read_numpy, ".parquet": _read_parquet}

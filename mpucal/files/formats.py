@@ -118,8 +118,9 @@ FORMATS = (
     *_others(".npz", "another program's archive of NumPy", _ARRAYS, "arrays:is_of_others"),
     *_others(".npy", "an array of NumPy", _ARRAYS),
     *_others(".mat", "a file of MATLAB", _ARRAYS),
+    *_others(".json .jsonl .ndjson", "samples in JSON", _ARRAYS, "arrays:is_json_of_samples"),
     Format(".npz", "a NumPy archive", rows=f"{_HERE}.npz:npz_rows", writer=f"{_HERE}.npz:npz_file"),
-    *_others(".parquet", "a Parquet file", "parquet:load_parquet", only=False),
+    *_others(".parquet", "a Parquet file", _ARRAYS, only=False),
     Format(
         ".csv",
         "a table",

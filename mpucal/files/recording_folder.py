@@ -16,12 +16,11 @@ from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
 from .hints import NO_HINTS, Hints
 from .reading import reading
 from .tables.phone import tables_of_sides
+from .tables.times import GAP_S
 
 # of files that may be such recordings
-SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet")
+SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet", ".json", ".jsonl")
 FEWEST, MOST = 2, 500
-# s between two files without times of day: longer than the gaps that a bus leaves
-GAP_S = 15.0
 
 
 def is_folder_of_recordings(path: Path) -> bool:

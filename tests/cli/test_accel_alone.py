@@ -61,9 +61,10 @@ def test_the_accelerometer_alone_is_streamed_without_rates(mpucal, calibration):
 def test_the_accelerometer_alone_cannot_be_calibrated(mpucal, capture):
     result = mpucal("calibrate", capture, "--json")
     assert result.code == 5
-    (reason,) = json.loads(result.out)["quality"]["reasons"]
+    reason, of_rests = json.loads(result.out)["quality"]["reasons"]
     assert reason["code"] == "gyro_off"
     assert "record the gyroscope as well, at 1000 Hz or less" in reason["message"]
+    assert of_rests["code"] == "never_still", "what the rests alone lack"
 
 
 @pytest.mark.parametrize("command", ["session", "doctor"])

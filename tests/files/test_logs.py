@@ -159,7 +159,7 @@ def test_its_columns_are_named(walk, assert_same, tmp_path):
 
 def test_a_parquet_file_that_is_none(tmp_path):
     (tmp_path / "walk.parquet").write_bytes(b"PAR1 and no more")
-    with pytest.raises(RecordingError, match="not a whole Parquet file"):
+    with pytest.raises(RecordingError, match="not a whole file of arrays"):
         load(tmp_path / "walk.parquet")
 
 

@@ -500,7 +500,27 @@ def minutes_of_a_spreadsheet(walk):
     return "accX,accY,accZ,gyroX,gyroY,gyroZ,timestamp,Activity\n" + "\n".join(rows) + "\n"
 
 
-@pytest.mark.parametrize("form", [vectornav, axes_by_words, names_over_lines, minutes_of_a_spreadsheet])
+def a_bag_in_text(walk):
+    """Write the text and covariances of messages between the numbers, with clocks that one word calls so."""
+    cells = zip(walk.t.tolist(), walk.gyr.tolist(), walk.acc.tolist(), strict=True)
+    rows = (f'{t},base,"[1.0, 0.0]",{",".join(map(str, w))},0.25,{",".join(map(str, a))}' for t, w, a in cells)
+    return "bagTimestamp,frame_id,orientation,xav,yav,zav,cov,xla,yla,zla\n" + "\n".join(rows) + "\n"
+
+
+def lines_of_json(walk):
+    names = ("ax", "ay", "az", "gx", "gy", "gz")
+    found = ({"mac_timestamp": t} | dict(zip(names, row, strict=True)) for t, row in rows_of(walk))
+    return "".join(json.dumps(row) + "\n" for row in found)
+
+
+def rows_of(walk):
+    return zip(walk.t.tolist(), si(walk).tolist(), strict=True)
+
+
+FURTHER = [vectornav, axes_by_words, names_over_lines, minutes_of_a_spreadsheet, a_bag_in_text, lines_of_json]
+
+
+@pytest.mark.parametrize("form", FURTHER)
 def test_further_forms_are_read_at_the_first_try(form, even_walk, tmp_path):
     (tmp_path / "walk.csv").write_text(form(even_walk), encoding="utf-8")
     read = mpucal.load(tmp_path / "walk.csv")
@@ -518,3 +538,107 @@ def test_a_board_that_never_turned_has_an_accelerometer_all_the_same(even_walk, 
     assert "its columns were guessed from the length of gravity: --columns t,-,-,-,ax,ay,az" in read.taken
     np.testing.assert_allclose(read.acc, still[:, 3:])
     assert np.isnan(read.gyr).all()
+
+
+def objects(walk):
+    return [{"t": t, "acc": dict(zip("xyz", row[:3], strict=True)), "gyro": row[3:]} for t, row in rows_of(walk)]
+
+
+def columns_of_json(walk):
+    return {"imu": {"timestamp": walk.t.tolist(), "accel": walk.acc.tolist(), "gyro": walk.gyr.tolist()}, "n": 3}
+
+
+def edge_impulse(walk):
+    names = [f"{of}{axis}" for of in ("acc", "gyr") for axis in "XYZ"]
+    units = ["m/s2"] * 3 + ["rad/s"] * 3
+    sensors = [{"name": name, "units": unit} for name, unit in zip(names, units, strict=True)]
+    return {"payload": {"interval_ms": 1000 / HZ, "sensors": sensors, "values": si(walk).tolist()}}
+
+
+def at_a_frequency(walk):
+    """Write many more values of another sensor, at another rate."""
+    data = [{"gyroscope": row[3:], "acceleration": row[:3]} for _, row in rows_of(walk)]
+    return {"at": "26/06/20", "emg": {"data": [[0] * 8] * 4000}, "imu": {"frequency": HZ, "data": data}}
+
+
+@pytest.mark.parametrize("form", [objects, columns_of_json, edge_impulse, at_a_frequency])
+def test_samples_in_json_are_read_at_the_first_try(form, even_walk, tmp_path):
+    (tmp_path / "walk.json").write_text(json.dumps(form(even_walk)))
+    read = mpucal.load(tmp_path / "walk.json")
+    np.testing.assert_allclose(si(read), si(even_walk), atol=1e-12)
+    assert read.rate_hz == pytest.approx(HZ, rel=1e-6)
+
+
+def test_an_object_on_each_line_of_which_the_last_is_torn(even_walk, tmp_path):
+    (tmp_path / "walk.jsonl").write_text(lines_of_json(even_walk) + '{"mac_timestamp": 14.0, "ax"')
+    np.testing.assert_allclose(si(mpucal.load(tmp_path / "walk.jsonl")), si(even_walk))
+
+
+@pytest.mark.parametrize("content", ["[1, 2", "{}", '{"rates": [1.0, "a", null]}', "[" * 9000])
+def test_json_that_is_no_recording(content, tmp_path):
+    path = tmp_path / "walk.json"
+    path.write_text(content + " " * 9 + "\n" + "," * 300 * content.startswith("[["))
+    with pytest.raises(RecordingError, match=r"is not a recording that mpucal knows|is not a whole file"):
+        mpucal.load(path)
+
+
+def test_a_calibration_is_no_recording(even_walk, tmp_path):
+    mpucal.calibrate(even_walk).save(tmp_path / "calibration.json")
+    with pytest.raises(RecordingError, match="is not a recording that mpucal knows"):
+        mpucal.load(tmp_path / "calibration.json")
+
+
+def test_two_tables_of_marked_lines_without_names(even_walk, tmp_path):
+    """Tell their unit by how gravity turns."""
+    for name, values in (("acceleration", even_walk.acc / G), ("gyroscope", np.degrees(even_walk.gyr))):
+        rows = text(np.column_stack([even_walk.t * 1e3, values]), ",").splitlines()
+        (tmp_path / f"{name}_20180927.csv").write_text("".join(f"{name},{row}\n" for row in rows))
+    read = mpucal.load(tmp_path / "gyroscope_20180927.csv")
+    assert "accelerations in g and rates in deg/s" in read.taken
+    np.testing.assert_allclose(si(read), si(even_walk))
+
+
+def test_times_that_begin_anew_are_an_interruption(even_walk, tmp_path):
+    """Tell a sketch that is started again from a clock that is set back a little."""
+    half = len(even_walk) // 2
+    t = np.where(np.arange(len(even_walk)) < half, even_walk.t, even_walk.t - even_walk.t[half])
+    t[half + 300] -= 0.02
+    (tmp_path / "walk.csv").write_text(
+        "t,ax,ay,az,gx,gy,gz,n\n" + text(np.column_stack([t, si(even_walk), t * 0]), ",")
+    )
+    read = mpucal.load(tmp_path / "walk.csv", units="acc=m/s^2,gyr=rad/s")
+    assert "times in s, which begin anew 1 times," in read.taken
+    np.testing.assert_array_equal(si(read), si(even_walk))
+    assert np.flatnonzero(read.gap).tolist() == [half]
+    assert np.diff(read.t)[half - 1] == pytest.approx(15.0, abs=0.02)
+
+
+def still(unit_in_rad_s, shaking_mps2, seed=3):
+    """Return accelerations and rates in a unit, of a board that is shaken and hardly turned."""
+    rng = np.random.default_rng(seed)
+    rates = np.radians(rng.normal((0.3, -0.5, 0.2), 0.05, (900, 3)))
+    rates[300:] += rng.normal(0.0, 0.2, (600, 3))
+    return np.array([0.1, -0.2, G]) + rng.normal(0, shaking_mps2, (900, 3)), rates / unit_in_rad_s
+
+
+@pytest.mark.parametrize(("unit", "si_of_it"), [("rad/s", 1.0), ("deg/s", np.radians(1))])
+def test_the_unit_of_rates_that_turn_nothing_is_one_of_a_gyroscope(unit, si_of_it, tmp_path):
+    acc, rates = still(si_of_it, 0.5)
+    rows = np.column_stack([np.arange(900) / HZ, acc, rates])
+    (tmp_path / "shaken.csv").write_text("time,accX,accY,accZ,gyroX,gyroY,gyroZ\n" + text(rows, ","))
+    read = mpucal.load(tmp_path / "shaken.csv")
+    assert f"rates in {unit} (by their noise and bias, as gravity hardly turns)" in read.taken
+    np.testing.assert_allclose(read.gyr, rates * si_of_it)
+
+
+def test_the_command_for_unknown_columns_gives_the_clock_its_place(even_walk, tmp_path):
+    """Read a runner's counts, whose |a| is no gravity, by their mean."""
+    rng = np.random.default_rng(5)
+    acc = np.array([0.0, 4000.0, 7150.0]) + rng.normal(0.0, 6000.0, (900, 3))
+    rows = np.column_stack([100 + 20 * np.arange(900), acc.clip(-32768, 32767), rng.normal(0, 900.0, (900, 3))])
+    (tmp_path / "running.csv").write_text(text(np.rint(rows).astype(int), ","))
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(tmp_path / "running.csv")
+    assert refused.value.options == "--columns t,ax,ay,az,gx,gy,gz"
+    read = mpucal.load(tmp_path / "running.csv", columns="t,ax,ay,az,gx,gy,gz")
+    assert "times in ms, accelerations in counts of ±4 g (by |a|)" in read.taken

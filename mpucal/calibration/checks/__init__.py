@@ -81,13 +81,13 @@ def find_reasons(evidence: Evidence) -> list[Reason]:
     """Return all reasons against an estimate, those that refuse it first."""
     reasons = []
     if evidence.model == "static":
-        checks = [check for check in UNUSABLE + CHECKS if check not in NOT_OF_RESTS]
+        checks = _suited(evidence, UNUSABLE + CHECKS)
         reasons = [] if evidence.gyroscope is None else [evidence.gyroscope]
     else:
         # Without a gyroscope, or with rates of another range, the other checks mean nothing.
         only = unusable.no_gyroscope(evidence) or sensor.gyro_range(evidence)
         if only is not None:
-            return [only]
+            return [only, *evidence.against_rests]
         # A fit exists only where the recording is usable.
         checks = [*CHECKS] if evidence.fit is not None else [*UNUSABLE, *CHECKS]
     reasons += [reason for check in checks if (reason := check(evidence)) is not None]
@@ -96,4 +96,8 @@ def find_reasons(evidence: Evidence) -> list[Reason]:
 
 def is_unusable(evidence: Evidence) -> bool:
     """Return True if nothing can be estimated from the recording."""
-    return any(check(evidence) is not None for check in UNUSABLE)
+    return any(check(evidence) is not None for check in _suited(evidence, UNUSABLE))
+
+
+def _suited(evidence: Evidence, checks: tuple[Check, ...]) -> list[Check]:
+    return [check for check in checks if evidence.model != "static" or check not in NOT_OF_RESTS]

@@ -83,7 +83,10 @@ def columns_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[A
 def stated_rate(arrays: Mapping[str, NDArray[Any]]) -> str:
     """Return the single numbers among arrays as lines of text, of which one may state the sample rate."""
     single = {name.rpartition(".")[2]: array for name, array in arrays.items() if array.size == 1}
-    return "\n".join(f"{name}: {array.item()}" for name, array in single.items() if array.dtype.kind in "iuf")
+    numbers = {name: array.item() for name, array in single.items() if array.dtype.kind in "iuf"}
+    if numbers.get("interval_ms"):
+        numbers["rate"] = 1000.0 / numbers["interval_ms"]
+    return "\n".join(f"{name}: {number}" for name, number in numbers.items())
 
 
 def tables_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ArrayTable]:

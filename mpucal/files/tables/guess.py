@@ -51,10 +51,14 @@ def guess_columns(table: Vector, hints: Hints, sensors: Sequence[int] = ()) -> d
     sensors : the places of ax ... gz, if they are known; then only the time is looked for.
     """
     table = table[np.isfinite(table).all(axis=1)][:MOST_SAMPLES]
+    if len(table) >= FEWEST and not sensors:
+        varies = np.flatnonzero(np.ptp(table, axis=0) > 0.0)
+        if len(varies) < table.shape[1]:
+            return {role: int(varies[at]) for role, at in guess_columns(table[:, varies], hints).items()}
     n, width = table.shape
     if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND).all():
         return {}
-    clocks = [place for place in range(width) if place not in sensors and _is_clock(table[:, place])]
+    clocks = [place for place in range(width) if place not in sensors and is_clock(table[:, place])]
     # an index increases, too
     clocks.sort(key=lambda place: bool((np.diff(table[:, place]) == 1.0).all()))
     for at in (*clocks, None):
@@ -96,7 +100,8 @@ def _has_size(table: Vector, pair: Sequence[int]) -> bool:
     return are_counts(acc) or bool(acceleration_unit(acc))
 
 
-def _is_clock(column: Vector) -> bool:
+def is_clock(column: Vector) -> bool:
+    """Return True if (n,) numbers increase, and do not only repeat."""
     steps = np.diff(column)
     return bool((steps >= 0).all() and column[-1] > column[0] and (steps > 0).mean() > 0.01)
 
@@ -124,7 +129,7 @@ def _is_gravity(acc: Vector) -> bool:
 def _turned(table: Vector, pair: Sequence[int], t: Vector, *, any_rate: bool) -> float:
     """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
     acc, gyr = (to_signed(table[:, list(places)]) for places in (pair[:3], pair[3:]))
-    factor, correlation = turning(t, acc, gyr)
+    factor, correlation, _ = turning(t, acc, gyr)
     ratios = [factor / si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS]
     of_a_unit = any_rate or are_counts(gyr) or any(1 / NEAR < ratio < NEAR for ratio in ratios)
     return correlation if factor > 0.0 and of_a_unit else 0.0

@@ -16,7 +16,7 @@ _NAME, _NUMBER = (
     r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})",
     r"([-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?)",
 )
-_PAIR = re.compile(rf"{_NAME}\s?[:=][ \t]{{0,9}}(?:({_DATE})|{_NUMBER})(?![\w:])")
+_PAIR = re.compile(rf"{_NAME}\"?\s?[:=][ \t]{{0,9}}(?:({_DATE})|{_NUMBER})(?![\w:])")
 _AT = re.compile(rf"^(?={_DATE}\b)", re.MULTILINE)
 # three axes at once: `accel=(9252, -5612, -12084)`, `GYRO: X=0.1,Y=0.2,Z=0.3`, `Acceleration X: 0.1, Y: 0.2, Z: 0.3`
 _CELL = r"([^,()\[\]\n=:]{1,30})"

@@ -57,9 +57,13 @@ COLDEST_C, WARMEST_C = -60.0, 130.0
 # iOS has the opposite sign of specific force: at rest it reads -1 g along the axis that points upwards
 FLIPPED_STEMS = ("accelerometeracceleration",)
 _TIME_UNITS = ("", *QUANTITIES[TIME])
+# the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
+BY_A_WORD = len(TIME_STEMS)
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
 _AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
+_CLOCK = re.compile(r"(?<![a-z])(?:time|timestamp|stamp|millis|micros|date)(?![a-z])")
+_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 _UNIT_TAIL = re.compile(
     r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|dps|mdps|mps2|m_s2|m/s2|ms2|rad_s|rads|rad|deg_s|degs|deg"
@@ -162,18 +166,24 @@ def parse_column_name(name: str, place: int) -> Column | None:
     text = text.lower()
     found = _match_stem(name, place, text, axis, unit)
     if found is None and not unit and (tail := _UNIT_TAIL.fullmatch(text)):
-        found = _match_stem(name, place, tail[1], axis, find_unit(tail[2]))
+        text, unit = tail[1], find_unit(tail[2])
+        found = _match_stem(name, place, text, axis, unit)
+    words = _CAMEL.sub("_", name).lower()
+    if found is None and axis < 0 and unit in _TIME_UNITS and (unit or _CLOCK.search(words)):
+        return Column(name, place, TIME, unit=unit, rank=BY_A_WORD)
     return found
 
 
 def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Column | None:
     """Return the column whose stem is `text`, without or with prefixes; None if no stem is known."""
-    word = re.sub(r"[^a-z0-9]", "", text)
+    word = _plain(text)
     words = [word, word.removesuffix("imu")]
     for prefix in _PREFIXES:
         if word.startswith(prefix) and len(word) > len(prefix):
             word = word.removeprefix(prefix)
             words.append(word)
+    # a field of a structure, such as samples.acc.x
+    words += [_plain(text[at + 1 :]) for at, letter in enumerate(text) if letter == "."]
     for word in words:
         if word in SENSOR_CLOCKS and unit in _TIME_UNITS:
             return Column(name, place, TIME, unit=unit or "s", clock_of=SENSOR_CLOCKS[word])
@@ -191,12 +201,16 @@ def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Colum
     return None
 
 
+def _plain(text: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", text)
+
+
 def _split_axis(word: str, axis: int) -> list[tuple[str, int]]:
     """Return the (stem, axis) that a word may consist of, such as ax, gyroX or xacc."""
     if axis >= 0:
         return [(word, axis)]
     found = []
-    for suffix in ("", "raw", "adc", "lsb", "counts"):
+    for suffix in ("", "raw", "adc", "lsb", "counts", "data", "value"):
         stem = word.removesuffix(suffix)
         if word.endswith(suffix) and stem[-1:] in ("x", "y", "z"):
             found.append((stem[:-1], "xyz".index(stem[-1])))

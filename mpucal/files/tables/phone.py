@@ -27,10 +27,10 @@ from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import first_bytes, reading
 from .app_metadata import is_app_metadata, read_app_metadata
 from .array_table import ArrayTable, columns_of_arrays, stated_rate
-from .names import ACC, GYR, Column, Table, first_triple, parse_axis_name, parse_header
+from .names import ACC, GYR, TIME, Column, Table, first_triple, parse_axis_name, parse_header
 from .streams import join_streams
 from .table import SNIFFED, columns_by_hint, sensor_stream, stated_rate_hz
-from .text import decode_text, find_table
+from .text import decode_text, find_numeric_table, find_table
 from .times import Stream
 from .units import QUANTITIES, acceleration_unit, are_counts, to_signed
 
@@ -38,8 +38,6 @@ from .units import QUANTITIES, acceleration_unit, are_counts, to_signed
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
 _OF_GYR = "gyroscopeuncalibrated gyroscope gyro gyr gyrm rotationrate angularvelocity omega"
 NAMES = {ACC: _OF_ACC.split(), GYR: _OF_GYR.split()}
-# the unit of tables that name none
-UNITS = {ACC: "", GYR: "rad/s"}
 # imu_tk names tables of text .mat, too
 SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat")
 # of a table within a file
@@ -131,8 +129,9 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
 
 
 def is_pair(tables: Mapping[str, ArrayTable]) -> bool:
-    """Return True if two of the tables are called as an accelerometer's and a gyroscope's."""
-    return bool(_pairs(map(_as_file, tables)))
+    """Return True if two tables are called as an accelerometer's and a gyroscope's, and have clocks of their own."""
+    timed = any(column.quantity == TIME for table in tables.values() for column in table.columns)
+    return timed and bool(_pairs(map(_as_file, tables)))
 
 
 def recording_of_tables(name: str, tables: Mapping[str, ArrayTable], hints: Hints) -> Recording:
@@ -231,10 +230,7 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
         raise RecordingError(
             f"{name} holds the columns {', '.join(table.header)}, but no {quantity}", "record both sensors"
         )
-    stream = sensor_stream(table, columns, of)
-    # the unit was assumed, as of a phone's
-    doubtful = of[0].unit == UNITS[quantity] and (isinstance(table, ArrayTable) or _are_counts(stream))
-    return replace(stream, unit="") if doubtful else stream
+    return sensor_stream(table, columns, of)
 
 
 def _hinted_columns(hints: Hints, quantity: str) -> dict[str, str | int]:
@@ -249,10 +245,11 @@ def _text_table(data: bytes, name: str, wanted: Sequence[str | int]) -> Table | 
     text = decode_text(data, name)
     table = find_table(text, name, wanted)
     if table is None and not wanted:
-        table = find_table(text, name, bare=True) or find_table(text, name, range(len(UNNAMED) - 1))
+        table = find_table(text, name, bare=True) or find_numeric_table(text, name, len(UNNAMED) - 1)
         if table and not table.header:
-            widths = {len(row) for row in table.rows}
-            table = replace(table, header=UNNAMED[-max(widths) :]) if widths in ({3}, {4}) else None
+            names = iter(UNNAMED[-len(places) :] if len(places := table.numeric_places()) in (3, 4) else ())
+            header = [next(names, "") if place in places else "" for place in range(len(table.rows[0]))]
+            table = replace(table, header=header) if any(header) else None
     return table if table and table.rows else None
 
 
@@ -271,7 +268,7 @@ def _columns_without_sensor(table: Table, quantity: str) -> tuple[Column, ...]:
     if set(found) != {0, 1, 2}:
         return ()
     return tuple(
-        Column(table.header[place], place, quantity, i, unit or UNITS[quantity])
+        Column(table.header[place], place, quantity, i, unit)
         for i, (place, unit) in sorted(found.items())
         if unit in ("", *QUANTITIES[quantity])
     )

@@ -35,6 +35,8 @@ SURE_RANGE = 0.35
 OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
+# quartile distance of |a| over its median, beyond which the median is that of a motion
+SHAKING = 0.25
 # samples over which shaking averages out: a few of its periods at the rates of most loggers
 SHAKEN = 100
 
@@ -202,6 +204,9 @@ def _averaged(values: Vector) -> Vector:
 
 def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
     """Return the same of (n, 3) counts, whose median magnitude is `size`."""
+    low, high = np.percentile(np.linalg.norm(values, axis=1), [25, 75]).tolist()
+    if high - low > SHAKING * size:
+        size = float(np.percentile(np.linalg.norm(_averaged(values), axis=1), 90))
     per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
     scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
@@ -239,8 +244,12 @@ def _rates(
         return values * scale, f"rates in {of}{by}{_sign_remark(factor)}", _is_clipped(values)
     factor = units.rate_factor(t, a, values)
     seen = hints.units.get("gyr", units.gyro_unit(factor))
+    at_rest = "" if said or seen or factor else units.resting_gyro_unit(t, a, values)
+    if at_rest:
+        by = "(by their noise and bias, as gravity hardly turns)"
+        return values * QUANTITIES["gyr"][at_rest], f"rates in {at_rest} {by}", np.zeros(len(values), bool)
     if not said and not seen and not (factor and hints.rate_hz):
-        return _left_out(t, "rates left out, because gravity turns as in none of their units (--units gyr=UNIT)")
+        return _left_out(t, "rates left out, because nothing shows their unit (--units gyr=UNIT)")
     if factor and not seen:
         known = [unit for unit in QUANTITIES["gyr"] if unit != COUNTS]
         of = said or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))

@@ -17,11 +17,13 @@ from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import first_bytes, reading
 from .app_metadata import FLIPPED
 from .clock import FEWEST
-from .guess import guess_columns
+from .guess import guess_columns, is_clock
 from .labelled import labelled_table, marked_table
 from .names import (
     ACC,
+    BY_A_WORD,
     GYR,
+    NANOSECONDS,
     TEMPERATURE,
     TIME,
     Column,
@@ -45,14 +47,15 @@ ANOTHERS = 0.1
 PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
 # above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
 RATE = re.compile(
-    r"(?<![a-z])(?:fs|(?:sampl(?:e|ing)|data|output)[ _]?(?:rate|freq\w{0,6}))[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
+    r"(?:^|(?<![a-z])(?:sampl(?:e|ing)|data|output|acquisition|update|sensor|imu|log(?:ging)?|recording))[ _]?"
+    r"(?:(?<![a-z])fs|rate|freq\w{0,6})[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
     r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
     re.IGNORECASE | re.MULTILINE,
 )
 # m/s^2: whole numbers that are larger are counts
 LARGEST_OF_SI = 300.0
 # accelerations from which a program has taken gravity
-WITHOUT_GRAVITY = re.compile(r"\s*(?:free|user|linear)[ _]?acc", re.IGNORECASE)
+WITHOUT_GRAVITY = re.compile(r"\s*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
 # stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
 IN_G_ON_IOS, EITHER_SIGN = "accelerometeruncalibrated_", "totalacceleration_"
 
@@ -177,7 +180,9 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
     words = ["-"] * (max(found.values()) + 1)
     for role, place in found.items():
         words[place] = role
-    kept = [c for c in columns if c.quantity == TEMPERATURE]
+    named = (TEMPERATURE, TIME, NANOSECONDS) if table.clocks(columns) and not known else (TEMPERATURE,)
+    kept = [c for c in columns if c.quantity in named]
+    found = {role: place for role, place in found.items() if role != "t" or TIME not in named}
     by = "how gravity turns" if "gx" in found else "the length of gravity"
     remark = f"its columns were guessed from {by}: --columns {','.join(words)}"
     return [*columns_by_hint(table.header, replace(hints, columns=found)), *kept], remark
@@ -200,13 +205,29 @@ def _missing_sensors(table: Table, columns: list[Column]) -> RecordingError:
             "if they are an accelerometer's, name them with --columns ax,ay,az",
             "--columns ax,ay,az",
         )
-    order = ",".join(ROLES if table.clocks(columns) else ROLES[1:])
+    order = _likely_order(table, columns)
     return RecordingError(
         f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are"
         f" {_list_names(table.header)}",
-        f"name its columns in their order with --columns {order}, and - for one to leave out",
-        f"--columns {order}",
+        f"name its columns in their order with --columns {order or ','.join(ROLES)}, and - for one to leave out",
+        order and f"--columns {order}",
     )
+
+
+def _likely_order(table: Table, columns: list[Column]) -> str:
+    """Return the roles of the columns if their order is the usual one; empty if they are too few."""
+    places = table.numeric_places()
+    try:
+        numbers = table.numbers([Column("", place, "") for place in places])
+    except RecordingError:
+        return ""
+    increasing = [place for place, column in zip(places, numbers.T, strict=True) if is_clock(column)]
+    clocks = [c.place for c in table.clocks(columns)] or increasing
+    sensors = [place for place in places if place not in {*clocks, *increasing}]
+    if len(sensors) < len(ROLES[1:]):
+        return ""
+    roles = dict(zip(sensors, ROLES[1:], strict=False)) | dict(zip(clocks[:1], "t", strict=False))
+    return ",".join(roles.get(place, "-") for place in range(max(roles) + 1))
 
 
 def _list_names(header: Sequence[str]) -> str:
@@ -240,6 +261,8 @@ def sensor_stream(
     kept = np.asarray(~empty if others else ~empty | timed)
     unit = axes[0].unit if len({column.unit for column in axes}) == 1 else ""
     times, time_unit = (None, "") if clock is None else table.times(clock, kept)
+    if clock is not None and clock.rank == BY_A_WORD and not is_clock(np.array(times, float)):
+        times = None
     return Stream(
         times,
         values[kept],

@@ -38,6 +38,8 @@ MOST_BAD = 0.01
 # Bytes that a line takes at least while it is read, in CPython on 64 bits: a list (56), its reference and line number
 # (16 and 32), a Decimal of its time (104 and 8). A cell takes a reference and a float64.
 LINE, CELL = 216, 16
+# numbers of both sensors
+SIX = 6
 # exponents of numbers beyond this would take all memory as integers
 MOST_DIGITS = 40
 # units of a column beside whole seconds
@@ -251,12 +253,17 @@ def _header_cells(above: str, line: str, separator: str | None) -> list[str]:
 
 
 def find_numeric_table(text: str, name: str, least: int) -> TextTable | None:
-    """Return the table whose lines hold `least` numbers or more, with any header or none; None if there is none."""
+    """Return the table whose lines hold `least` numbers or more, with any header or none; None if there is none.
+
+    Among fewer than six numbers, other cells are a mark that each line repeats.
+    """
     begun = text.split("\n", PREAMBLE)[:PREAMBLE]
     for first, (line, following) in enumerate(pairwise(begun)):
         for separator in SEPARATORS:
             cells, more = _cells(line, separator), _cells(following, separator)
-            if len(cells) >= least and len(more) == len(cells) and all(map(_is_number, (*cells, *more))):
+            alike = [_is_number(one) and _is_number(other) for one, other in zip(cells, more, strict=False)]
+            marked = all(one == other for one, other, number in zip(cells, more, alike, strict=False) if not number)
+            if sum(alike) >= least and len(more) == len(cells) and (marked or sum(alike) >= SIX):
                 above = _cells(begun[first - 1], separator) if first else []
                 return _read(text, name, above if len(above) == len(cells) else [], first, separator)
     return None

@@ -14,10 +14,14 @@ from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import units
-from .clock import Clock, Numbers, are_gaps, fit_clock, sample_period
+from .clock import FEWEST, Clock, Numbers, are_gaps, fit_clock, sample_period
 from .names import Times
 from .units import NS, QUANTITIES, resolve_unit
 
+# s between two files, or parts of one, without a common clock: longer than the gaps that a bus leaves
+GAP_S = 15.0
+# s by which times go back where a logger began anew; a sample that was merely delayed is less late
+ANEW_S = 1.0
 # ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
 UTC_NS = (10**18, 41 * 10**17)
 
@@ -75,7 +79,7 @@ class Stream:
 
 def utc_ns(stream: Stream, of_t: str) -> int | None:
     """Return the time of day of the first sample, ns since 1970; None if its time is not one."""
-    unit = of_t.removeprefix("times in ")
+    unit = of_t.removeprefix("times in ").partition(",")[0]
     if stream.times is None or unit not in QUANTITIES["t"]:
         return None
     first = round(Decimal(str(stream.times[0])) * round(QUANTITIES["t"][unit] * NS)) + (stream.zero_ns or 0)
@@ -100,20 +104,30 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
-    step, said = sample_period(ticks), hints.units.get("t", stream.time_unit)
+    step, named = sample_period(ticks), hints.units.get("t", stream.time_unit)
     # milliseconds are whole numbers: a fraction of them is a slow recording's second
     slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
-    seen = hints.units.get("t", units.time_unit(step, said or slow))
-    unit = resolve_unit(name, "t", said, seen, f"the step of {step:g}")
+    seen = hints.units.get("t", units.time_unit(step, named or slow))
+    unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}")
     t = ticks * QUANTITIES["t"][unit]
-    back = np.diff(t) < 0
-    if back.any():
-        at = int(back.argmax()) + 1
+    anew, said = np.flatnonzero(np.diff(t) < -ANEW_S) + 1, f"times in {unit}"
+    back = np.flatnonzero(np.diff(t) < 0) + 1
+    if len(back) * FEWEST > len(t) or (len(anew) and not _are_equal(stream.times, first.times)):
+        at = int(back[0])
         raise RecordingError(
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
-    return fit_clock(t, stream.number), f"times in {unit}"
+    for at in anew.tolist():
+        t[at:] += t[at - 1] + GAP_S - t[at]
+    said += f", which begin anew {len(anew)} times" if len(anew) else ""
+    # a clock that was set back, or a sample that came late
+    kept = t >= np.maximum.accumulate(t)
+    return fit_clock(np.interp(stream.number, stream.number[kept], t[kept]), stream.number), said
+
+
+def _are_equal(one: Times, other: Times) -> bool:
+    return len(one) == len(other) and all(a == b for a, b in zip(one, other, strict=True))
 
 
 def _since(times: Times, origin: Any) -> Vector:

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ...data import STANDARD_GRAVITY_MPS2, Vector
+from ...data import GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
 from ...errors import RecordingError
 
 NS = 1_000_000_000
@@ -58,6 +58,9 @@ ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
 SETTLED = 0.25
 # the fastest rate of a hand and of usual sensors
 FASTEST_RAD_S = 37.0
+# samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; the largest
+# bias, of the MPU-6050; and how much more than it does gravity may seem to turn by noise
+QUIET, LEAST_NOISE_RAD_S, MOST_BIAS_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), math.radians(20.0), 3.0
 # the units that most programs write
 LIKELY = {"t": "s", "acc": "m/s^2", "gyr": "deg/s"}
 # larger numbers are not from a sensor in any unit; their squares are finite
@@ -117,21 +120,22 @@ def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     ----------
     t : (n,) s. acc : in any unit. gyr : in rad/s if the factor is 1.
     """
-    factor, correlation = turning(t, acc, gyr)
+    factor, correlation, _ = turning(t, acc, gyr)
     return factor if correlation >= EXPLAINED else None
 
 
-def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
-    """Return the factor of rate_factor, and the correlation of both turnings, 0 if there is none."""
+def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float, float]:
+    """Return the factor of rate_factor, the correlation of both turnings, 0 if there is none, and their ratio."""
     # stamps of arrival may repeat
     dt = (float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)) if len(t) >= LEAST_TURNS else 0.0
     width = max(1, round(min(TURN_S / 2 / dt, len(t)))) if dt > 0.0 else len(t)
     if len(t) < LEAST_TURNS * width:
-        return 0.0, 0.0
+        return 0.0, 0.0, math.inf
     kernel = np.full(width, 1.0 / width)
     smooth = np.column_stack([np.convolve(column, kernel, "same") for column in acc.T])
     rates = np.column_stack([np.convolve(column, kernel, "same") for column in gyr.T])
-    steps = np.cross(rates, smooth) * -np.gradient(t)[:, None]
+    # how it turned in a gap is unknown
+    steps = np.cross(rates, smooth) * -np.minimum(np.gradient(t), GAP_INTERVALS * dt)[:, None]
     path = np.cumsum(steps, axis=0)
     inner = slice(width, len(t) - width)
     lag = 2 * width
@@ -139,7 +143,7 @@ def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
     power = float((predicted**2).sum())
     both = float((seen * predicted).sum())
     size = math.sqrt(power * float((seen**2).sum()))
-    return (both / power, abs(both) / size) if size > 0.0 else (0.0, 0.0)
+    return (both / power, abs(both) / size, size / power) if size > 0.0 else (0.0, 0.0, math.inf)
 
 
 def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
@@ -162,6 +166,29 @@ def gyro_unit(factor: float | None) -> str:
     """Return the unit of rates with this rate_factor; empty if there is none."""
     units = {unit: si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS}
     return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
+
+
+def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:
+    """Return the only usual unit in which (n, 3) rates are those of a sensor that hardly turned gravity; or empty.
+
+    In larger units its rates would turn gravity, or its bias be too large; in smaller ones it would be too quiet.
+    """
+    width = min(len(gyr), QUIET)
+    parts = gyr[: len(gyr) // width * width].reshape(-1, width, 3)
+    quiet = min(parts, key=lambda part: float(part.std(axis=0).sum()))
+    noise, bias = float(quiet.std(axis=0).max()), float(np.abs(quiet.mean(axis=0)).max())
+    fastest = float(np.percentile(np.abs(gyr), 99))
+    ratio = turning(t, acc, gyr)[2]
+    likely = [
+        unit
+        for unit, si in QUANTITIES["gyr"].items()
+        if unit in ("rad/s", "deg/s")
+        and si < MOST_TURNED_MORE * ratio
+        and bias * si < MOST_BIAS_RAD_S
+        and fastest * si < FASTEST_RAD_S
+        and not 0.0 < noise * si < LEAST_NOISE_RAD_S
+    ]
+    return likely[0] if len(likely) == 1 else ""
 
 
 def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str) -> str:
