@@ -38,6 +38,7 @@ AROUND = np.array([step for step in range(-NEIGHBOURS, NEIGHBOURS + 1) if step])
 # A spike exceeds so much [m/s^2, rad/s], and so many times the departures of its neighbours from theirs; its
 # neighbours differ by less than this share of it.
 LEAST_SPIKE, SPIKES, RETURNS = np.repeat((0.3, 0.15), 3), 8.0, 0.25
+BESIDE = np.arange(-4, 5)
 
 
 def _without_spikes(recording: Recording) -> Vector:
@@ -46,22 +47,28 @@ def _without_spikes(recording: Recording) -> Vector:
     Whatever spoils a word of a file leaves a spike; no board moves like that. A chip's decoder repairs its own
     (chip/bit_flips.py). A spike of the acceleration stays: it may be a knock, which the fit weighs itself.
     """
-    bent = np.fmax.reduce(np.abs(np.diff(recording.gyr, n=2, axis=0)), axis=None, initial=0.0)
-    if bent <= 2.0 * LEAST_SPIKE[-1]:
-        return recording.gyr
-    words = np.hstack((recording.acc, recording.gyr))
-    before, after = words[:-2], words[2:]
+    gyr = recording.gyr
+    # Few depart from their neighbours, and by much more than the sample two before: `bent` is twice the departure.
+    bent = np.abs(np.diff(gyr, n=2, axis=0))
+    at = np.flatnonzero((bent > 2.0 * LEAST_SPIKE[-1]).any(axis=1))
+    at = 1 + at[(at < 2) | (bent[at] > SPIKES * bent[np.maximum(at - 2, 0)]).any(axis=1)]
+    if not len(at):
+        return gyr
+    near = at[:, None] + BESIDE
+    inside = (near > 0) & (near < len(gyr) - 1)
+    near = near.clip(0, len(gyr) - 1)
+    words = np.concatenate((recording.acc[near], gyr[near]), axis=2)
+    before, here, after = words[:, :-2], words[:, 1:-1], words[:, 2:]
     mean = 0.5 * (before + after)
-    off = np.pad(np.abs(words[1:-1] - mean), ((3, 3), (0, 0)))
+    off = np.where(inside[:, 1:-1, None], np.abs(here - mean), 0.0)
     # The departures of the samples beside it hold half of the spike: those beyond them do not.
-    usual = np.max([off[k : len(off) - 6 + k] for k in (0, 1, 5, 6)], axis=0)
-    off = off[3:-3]
-    jumps = off > np.maximum(LEAST_SPIKE, SPIKES * usual)
-    alone = jumps & (np.abs(after - before) < RETURNS * off) & (jumps.sum(axis=1, keepdims=True) == 1)
-    if not alone[:, 3:].any():
-        return recording.gyr
-    words[1:-1][alone] = mean[alone]
-    return words[:, 3:].copy()
+    usual, of_it = off[:, [0, 1, 5, 6]].max(axis=1), off[:, 3]
+    jumps = of_it > np.maximum(LEAST_SPIKE, SPIKES * usual)
+    alone = jumps & (np.abs(after - before)[:, 3] < RETURNS * of_it) & (jumps.sum(axis=1, keepdims=True) == 1)
+    of, axis = np.nonzero(alone[:, 3:])
+    mended = gyr.copy()
+    mended[at[of], axis] = mean[of, 3, 3 + axis]
+    return mended
 
 
 def with_masks(recording: Recording) -> Recording:

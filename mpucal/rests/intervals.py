@@ -59,7 +59,7 @@ class RestFinder:
         if self._windows is None:
             return np.zeros((0, 2), np.intp)
         detector = Detector(limits, (np.sqrt(flat.Sigma_a), np.sqrt(flat.Sigma_omega)), flat.b_omega)
-        at = np.flatnonzero(detector.shares(self._windows).level < 1.0)
+        at = np.flatnonzero(np.concatenate([detector.shares(part).level for part in self._windows.parts()]) < 1.0)
         changes = np.zeros(len(recording) + 1, np.intp)
         changes[at] += 1
         changes[at + self._n] -= 1

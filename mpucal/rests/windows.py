@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -18,6 +19,7 @@ UNKNOWN = np.full(3, np.nan)
 ORDER, SQUARES = 4, 70.0
 # Ratio of variances up to which a window may be as noisy as the flat segment, but for chance and a hand.
 LOUDER = 2.0
+PART = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,11 @@ class Spreads:
     acc_sd: Vector
     gyr_sd: Vector
     acc_noise: Vector
+
+    def parts(self) -> Iterator[Spreads]:
+        """Yield the windows in parts of which each takes little memory."""
+        for first in range(0, len(self.gyr), PART):
+            yield Spreads(*(each[first : first + PART] for each in vars(self).values()))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.calibration import MODELS, calibrate
-from mpucal.calibration.parameters import ACCEL
+from mpucal.calibration.parameters import ACCEL, D_NAMES
 from mpucal.data import Recording, Sensor
 from mpucal.errors import MpucalError, UsageError
 from tools.lab.judge import sph_rms
@@ -175,8 +175,10 @@ def test_every_recording_gets_a_verdict(arrays, model):
     if calibration.verdict == "refused":
         assert document["quality"]["reasons"]
     else:
-        for name in ("D", "b_a", "D_std", "b_a_std", "b_omega", "K"):
+        for name in ("D", "b_a", "b_a_std", "b_omega", "K"):
             assert np.isfinite(getattr(calibration, name)).all(), name
+        at_prior = np.isin(D_NAMES, calibration.fit["at_prior"]).reshape(3, 3)
+        assert np.array_equal(np.isfinite(calibration.D_std), ~at_prior)
         assert np.linalg.det(calibration.D) > 0
     for reason in document["quality"]["reasons"]:
         assert not {"nan", "inf", "-inf"} & set(reason["message"].replace("(", " ").split())
