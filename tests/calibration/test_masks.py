@@ -101,11 +101,6 @@ def masked(recording):
     return plain, mask(plain, recording, flat), flat
 
 
-def test_without_marks_nothing_changes():
-    plain, series, _ = masked(noise())
-    assert series is plain
-
-
 def test_a_clipped_acceleration_hardly_counts():
     marks = np.zeros(1000, bool)
     marks[[50, 300]] = True
@@ -113,44 +108,6 @@ def test_a_clipped_acceleration_hardly_counts():
     assert np.flatnonzero(series.r_scale == CLIPPED_R_SCALE).tolist() == [200]
     assert (np.delete(series.r_scale, 200) == 1.0).all()
     assert not series.q_extra.any()
-
-
-def test_both_steps_beside_a_clipped_rate_get_more_noise():
-    marks = np.zeros(1000, bool)
-    marks[300] = True
-    plain, series, flat = masked(noise(gyr_clipped=marks))
-    assert np.flatnonzero(series.q_extra).tolist() == [200, 201]
-    omega = np.linalg.norm(plain.omega[[200, 201]] - flat.b_omega, axis=1)
-    # Two steps in a row get 0.15 % of the rate, times the root of two.
-    np.testing.assert_allclose(np.sqrt(series.q_extra[[200, 201]]), 0.0015 * np.sqrt(2.0) * omega * 0.01, rtol=1e-6)
-
-
-def test_a_longer_clipped_run_gets_more_noise():
-    short, long = np.zeros(1000, bool), np.zeros(1000, bool)
-    short[300], long[300:307] = True, True
-    variance = [masked(noise(gyr_clipped=marks))[1].q_extra[201] for marks in (short, long)]
-    np.testing.assert_allclose(variance[1] / variance[0], 8.0 / 2.0)
-
-
-def test_a_gap_gets_no_rate_and_an_unknown_turn(pick):
-    kept = np.ones(1000, bool)
-    kept[400:600] = False
-    recording = with_masks(pick(noise(), kept))
-    plain, series, flat = masked(recording)
-    np.testing.assert_array_equal(series.omega[300], flat.b_omega)
-    assert series.q_extra[300] == pytest.approx(2.01)
-    # More than one sample corrects a long gap.
-    after = np.flatnonzero(series.q_extra)[1:]
-    assert after.tolist() == [301, 302, 303, 304, 305]
-    assert (series.q_extra[after] < 0.1 * series.q_extra[300]).all()
-    np.testing.assert_array_equal(np.delete(series.omega, 300, 0), np.delete(plain.omega, 300, 0))
-
-
-def test_a_short_gap_is_corrected_for_at_once(pick):
-    kept = np.ones(1000, bool)
-    kept[400:402] = False
-    _, series, _ = masked(with_masks(pick(noise(), kept)))
-    assert np.flatnonzero(series.q_extra).tolist() == [300]
 
 
 def drawn(recording, first, last, at=slice(None)):

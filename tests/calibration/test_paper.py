@@ -37,9 +37,8 @@ def test_it_finds_simulated_sensors_with_right_standard_deviations():
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the other simulator's recordings are not beside this checkout")
-@pytest.mark.parametrize("number", range(2))
-def test_it_finds_the_sensors_of_another_simulator(number):
-    with np.load(SHARED / f"paper_{number}.npz") as file:
+def test_it_finds_the_sensor_of_another_simulator():
+    with np.load(SHARED / "paper_0.npz") as file:
         every = 4  # downsampled: a quarter of the time, twice the error
         n_flat = int(file["flat_samples"]) // every
         columns = (file[key][::every] for key in ("t", "acc", "gyr"))
@@ -76,12 +75,6 @@ def test_hessian_is_near_the_curvature_of_the_cost():
         e = step[k] * np.eye(12)[k]
         curvature = (expand(ekf, theta + e).gradient - expand(ekf, theta - e).gradient)[k] / (2 * step[k])
         assert curvature == pytest.approx(H[k, k], rel=0.25)
-
-
-def test_it_is_invariant_to_when_the_recording_began():
-    recording = paper_scenario(7, rate_hz=10).recording
-    later = replace(recording, t=recording.t + 1000.0)
-    np.testing.assert_allclose(fitted(later).D, fitted(recording).D, atol=1e-6)
 
 
 @pytest.mark.parametrize("scale", [1e3, 1e150], ids=["nonsense", "overflow"])

@@ -24,7 +24,7 @@ def sigmas(calibration, D, b_a):
     return np.append((calibration.D - symmetric) / calibration.D_std, (calibration.b_a - b_a) / calibration.b_a_std)
 
 
-@pytest.mark.parametrize("seed", range(60, 66))
+@pytest.mark.parametrize("seed", range(60, 63))
 def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, seed):
     made = hand(seed, "pose12")
     calibration = calibrate(replace(made.recording, gyr=np.zeros_like(made.recording.gyr)), "auto", G)
@@ -50,7 +50,7 @@ def test_it_is_an_ellipsoid_through_the_rests(hand):
     assert np.abs(away / std).max() < 1.0
 
 
-@pytest.mark.parametrize("gap_s", [0.0, 3.0, 30.0])
+@pytest.mark.parametrize("gap_s", [0.0, 3.0])
 def test_six_faces_that_were_joined_give_biases_and_scale_factors(gap_s):
     rng = np.random.default_rng(7)
     D, b_a = np.diag([1.015, 0.985, 1.01]), np.array([0.3, -0.2, 0.4])

@@ -7,7 +7,7 @@ import pytest
 
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.calibration.rotation import rotation
-from mpucal.calibration.tilt import BIAS_SD_MPS2, CONE_RAD, CROSS_AXIS_SD, SCALE_FACTOR_SD, fit_tilt, tilted_directions
+from mpucal.calibration.tilt import BIAS_SD_MPS2, CROSS_AXIS_SD, SCALE_FACTOR_SD, fit_tilt
 from mpucal.data import Recording
 from mpucal.rests.flat import find_flat, flat_statistics
 
@@ -85,11 +85,3 @@ def test_a_board_that_lay_still_keeps_the_data_sheets_tolerances():
     assert set(D_NAMES) <= set(fit.at_prior)
     np.testing.assert_allclose(fit.D, np.eye(3), atol=3.0 * max(SCALE_FACTOR_SD, CROSS_AXIS_SD))
     assert np.abs(fit.b_a).max() < 3.0 * BIAS_SD_MPS2
-
-
-def test_the_cone_holds_the_directions_near_how_it_lay():
-    down = np.array([0.0, 0.0, -1.0])
-    angles = np.radians([0.0, 20.0, 34.0, 36.0, 90.0, 180.0])
-    directions = np.stack([np.sin(angles), np.zeros(6), -np.cos(angles)], axis=1)
-    np.testing.assert_array_equal(tilted_directions(down, directions), directions[:3])
-    assert np.degrees(CONE_RAD) == pytest.approx(35.0)

@@ -5,7 +5,6 @@ import pytest
 
 from mpucal.calibration.parameters import NAMES
 from mpucal.calibration.preprocessing import preprocess
-from mpucal.calibration.problem import Series
 from mpucal.calibration.theta import Theta
 from mpucal.calibration.transitions import Transition, leverages, miss_variances, q_scale, transitions_of
 
@@ -34,14 +33,8 @@ class Moved:
         return slice(self.runs[k][1] - self.flat.last, self.runs[k + 1][0] - self.flat.last)
 
 
-def test_moves_that_agree_keep_their_noise(hand):
-    for seed in range(3):
-        assert Moved(hand(seed, "pose12")).scale().max() < 2.0
-
-
-@pytest.mark.parametrize("k", [3, 6])
-def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand, k):
-    prepared = Moved(in_hand)
+def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand):
+    k, prepared = 6, Moved(in_hand)
     gyr = in_hand.recording.gyr.copy()
     first, last = prepared.runs[k][1], prepared.runs[k + 1][0]
     gyr[first:last] = prepared.flat.b_omega
@@ -54,27 +47,6 @@ def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand, k)
     doubted = in_the_middle.pop(k)
     assert doubted > 100.0
     assert max(in_the_middle) < 1e-3 * doubted
-
-
-def test_the_doubt_is_as_large_as_the_miss(in_hand):
-    """Compare the variance of the move's angle with the square of the miss of gravity."""
-    prepared = Moved(in_hand)
-    gyr = in_hand.recording.gyr.copy()
-    first, last = prepared.runs[5][1], prepared.runs[6][0]
-    gyr[first:last] = prepared.flat.b_omega
-    factor = Moved(in_hand, gyr).scale()
-    series = Series.after(in_hand.recording, prepared.flat)
-    span = prepared.move(5)
-    variance = np.sum(series.dt[span] ** 2 * factor[span]) * prepared.flat.Sigma_omega.mean()
-    before, after = (in_hand.specific_force[(a + b) // 2] for a, b in prepared.runs[5:7])
-    missed = np.linalg.norm(np.cross(before, after)) / G**2
-    assert 0.2 * missed < np.sqrt(variance) < 5.0 * missed
-
-
-def test_fewer_than_three_moves_cannot_outvote_one(in_hand):
-    moved = Moved(in_hand)
-    few = replace(moved.prepared, runs=moved.runs[:3])
-    assert transitions_of(few, moved.theta) == []
 
 
 def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
