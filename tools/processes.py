@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 import traceback
+from collections import Counter
 from collections.abc import Callable, Container, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -138,6 +139,26 @@ def ended(pid: int, said: Path, wall_s: float = WALL_S) -> Ended:
     hung |= code == -signal.SIGXCPU
     text = said.read_text("utf-8", "replace") if said.exists() else ""
     return Ended(None if hung else code, text, used.ru_utime + used.ru_stime, used.ru_maxrss >> 10)
+
+
+class Report:
+    """Outcomes by kind: their numbers, and what was wrong."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, list[str]] = {}
+
+    def tell(self, kind: str, wrong: str = "") -> None:
+        """Count an outcome of this kind, and what was wrong, if anything was."""
+        self._told.setdefault(kind, []).append(wrong)
+
+    def shown(self) -> int:
+        """Print a line for each kind; return 1 if something was wrong."""
+        for kind, told in self._told.items():
+            wrong = Counter(filter(None, told))
+            print(f"{kind:32} {len(told):7} {f'{wrong.total()} wrong' if wrong else 'as they ought to be'}")
+            for what, count in wrong.most_common(8):
+                print(f"    WRONG {count} x {what}", flush=True)
+        return int(any(map(any, self._told.values())))
 
 
 class Died(NamedTuple):

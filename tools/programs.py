@@ -1,7 +1,7 @@
 """Programs of a folder of tools/: modules with `main`, listed by their docstrings, run by name.
 
 The parameters of `main` are what a command line may give: its arguments, and after `*` its options. Their annotations
-hold the type, the choices or a function that converts the text, and the help.
+hold the type, the words to choose from or a function that converts the text, and the help.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import ast
 import inspect
 import os
 import sys
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import NoneType, UnionType
@@ -79,15 +80,25 @@ def _add(parser: argparse.ArgumentParser, parameter: inspect.Parameter, hint: An
     if get_origin(hint) is list:
         how["nargs"] = "+" if needed or parameter.kind is parameter.KEYWORD_ONLY else "*"
     for note in notes:
-        how["help" if isinstance(note, str) else "type" if callable(note) else "choices"] = note
-    if how["type"] is not kind:
-        how.pop("nargs", None)
+        if isinstance(note, str):
+            how["help"] = note
+        elif callable(note):
+            how["type"] = note
+            how.pop("nargs", None)
+        else:
+            how["type"] = partial(_one_of, note)
     if hint is bool:
         how = {"action": "store_true", "help": how.get("help")}
     if parameter.kind is parameter.KEYWORD_ONLY:
         parser.add_argument(f"--{parameter.name.replace('_', '-')}", required=needed, **how)
     else:
         parser.add_argument(parameter.name, **how, **({"nargs": "?"} if not needed and "nargs" not in how else {}))
+
+
+def _one_of(known: Iterable[str], text: str) -> str:
+    if text not in known:
+        raise argparse.ArgumentTypeError(f"{text!r} is none of: {', '.join(known)}")
+    return text
 
 
 def _runs(path: Path) -> bool:

@@ -16,7 +16,6 @@ build/fuzz/TARGET, coverage.py tells which lines are reached.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import io
 import os
@@ -30,11 +29,14 @@ from contextlib import redirect_stderr
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
+from typing import Annotated
 
 import numpy as np
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "build" / "fuzz"
+# seeds and what is drawn change by the day
+TODAY = time.time_ns() // 86_400_000_000_000
 LONGEST_S, LARGEST_MB = 20, 4096
 MISSING = "fuzz.py: --guided needs atheris, which is not installed: pip install atheris (CPython 3.11 to 3.13)."
 Run = Callable[[bytes], object]
@@ -90,7 +92,7 @@ def blind(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds:
             return f"{seed - first:>9} executions, seeds from {first} on", wrong
 
 
-def guided(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
+def by_coverage(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
     """Run libFuzzer in a process of its own, as it ends its process; return the same as `blind`."""
     folder = KEPT / re.sub(r"\W+", "_", name)
     wrong, log = folder.with_suffix(".wrong"), folder.with_suffix(".log")
@@ -104,14 +106,18 @@ def guided(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds
     if not pid:
         _fuzz(name, check, folder, wrong, log, first, seconds)
     status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    said = log.read_text(errors="replace")
-    count, reached = (
-        (re.findall(pattern, said) or ["0"])[-1] for pattern in (r"number_of_executed_units: (\d+)", r" cov: (\d+)")
-    )
+    count, branches = reached(log.read_text(errors="replace"))
     if status:
         print(f"{name}: ended with {status}; see {log}", flush=True)
     found = len(list(wrong.glob("*"))) + bool(status)
-    return f"{count:>9} executions, {reached:>5} branches, seed {first}", found
+    return f"{count:>9} executions, {branches:>5} branches, seed {first}", found
+
+
+def reached(said: str) -> list[str]:
+    """Return the numbers of executions and of branches that libFuzzer says at its end."""
+    return [
+        (re.findall(pattern, said) or ["0"])[-1] for pattern in (r"number_of_executed_units: (\d+)", r" cov: (\d+)")
+    ]
 
 
 def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: int, seconds: float) -> None:
@@ -142,12 +148,12 @@ def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: 
     atheris.Fuzz()
 
 
-def again(name: str, check: Check, path: Path) -> int:
-    """Run saved files again, and return how many of them still raise unexpected exceptions."""
+def run_again(check: Check, path: Path) -> tuple[str, int]:
+    """Run saved files again; return the same as `blind`."""
     paths = sorted(path.iterdir()) if path.is_dir() else [path]
     traces = [trace for each in paths if (trace := check(each.read_bytes())) is not None]
-    print(*traces, f"{name:<44}{len(paths):>9} files: {len(traces)} wrong", sep="\n", flush=True)
-    return len(traces)
+    print(*traces, sep="\n", end="", flush=True)
+    return f"{len(paths):>9} files", len(traces)
 
 
 def too_long(_signal: int, _frame: FrameType | None) -> None:
@@ -155,17 +161,17 @@ def too_long(_signal: int, _frame: FrameType | None) -> None:
     raise TooLongError(f"longer than {LONGEST_S} s of processor time")
 
 
-def main() -> int:
+def main(
+    targets: Annotated[list[str], "default: all"] = (),
+    *,
+    seconds: Annotated[float, "of each target"] = 60.0,
+    budget: Annotated[float | None, "of all of them, in place of --seconds"] = None,
+    first: int = TODAY * 10**7,
+    guided: Annotated[bool, "by coverage"] = False,
+    again: Annotated[Path | None, "run a target on this file, or all of a folder"] = None,
+) -> int:
     """Run the targets; return 1 after an unexpected exception."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("targets", nargs="*", metavar="TARGET")
-    parser.add_argument("--seconds", type=float, default=60.0, help="of each target")
-    parser.add_argument("--budget", type=float, help="of all of them, in place of --seconds")
-    parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000 * 10**7)
-    parser.add_argument("--guided", action="store_true", help="by coverage")
-    parser.add_argument("--again", type=Path, help="run a target on this file, or all of a folder")
-    asked = parser.parse_args()
-    if asked.guided:
+    if guided:
         try:
             import atheris  # noqa: PLC0415 - a person may do without
         except ImportError:
@@ -175,24 +181,19 @@ def main() -> int:
         sys.meta_path.sort(key=lambda finder: not isinstance(finder, type))
         # instruments what is imported from here on, also by later imports of mpucal
         atheris.instrument_imports(include=["mpucal"]).__enter__()
-    told = io.StringIO() if asked.guided else sys.stderr
-    with redirect_stderr(told):
-        from .fuzz_targets import targets  # noqa: PLC0415 - see above
+    with redirect_stderr(io.StringIO() if guided else sys.stderr), TemporaryDirectory() as place:
+        from . import fuzz_targets  # noqa: PLC0415 - see above
 
-    signal.signal(signal.SIGVTALRM, too_long)
-    bad = 0
-    with TemporaryDirectory() as place:
-        with redirect_stderr(told):
-            of = targets(Path(place))
-        names = asked.targets or list(of)
-        seconds = asked.seconds if asked.budget is None else asked.budget / len(names)
-        for name in names:
+        of = fuzz_targets.targets(Path(place))
+        signal.signal(signal.SIGVTALRM, too_long)
+        bad = 0
+        for name in targets or of:
             run, corpus = of[name]
-            if asked.again is not None:
-                bad += again(name, checked(run), asked.again)
-                continue
-            way = guided if asked.guided else blind
-            did, wrong = way(name, checked(run), corpus, asked.first, seconds)
+            if again is not None:
+                did, wrong = run_again(checked(run), again)
+            else:
+                each_s = seconds if budget is None else budget / len(targets or of)
+                did, wrong = (by_coverage if guided else blind)(name, checked(run), corpus, first, each_s)
             bad += wrong
             print(f"{name:<44}{did}: {wrong} wrong", flush=True)
     return int(bad > 0)

@@ -7,18 +7,16 @@ It needs clang with its runtime library. build/fuzz/core keeps the corpus for th
 
 from __future__ import annotations
 
-import argparse
-import re
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 from mpucal.sources.bridge import messages as wire
 
-ROOT = Path(__file__).parents[2]
-BUILT = ROOT / "build" / "fuzz"
+from .fuzz import KEPT as BUILT
+from .fuzz import ROOT, TODAY, reached
+
 SOURCES = ROOT / "mpucal" / "firmware" / "src"
 HARNESS = ROOT / "tests" / "firmware" / "host" / "fuzz.c"
 MISSING = "fuzz_core.py: needs clang, and its libFuzzer (on Debian: apt install clang libclang-rt-14-dev)."
@@ -61,24 +59,18 @@ def seeds() -> list[bytes]:
     return [*talks, *(piece(BLOB, blob) for blob in blobs if len(blob) < 256)]
 
 
-def main() -> int:
+def main(*, seconds: int = 60, first: int = TODAY) -> int:
     """Build and run the fuzzer; return 1 if it found something."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=int, default=60)
-    parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000)
-    asked = parser.parse_args()
     fuzzer, corpus = built(), BUILT / "core"
     corpus.mkdir(exist_ok=True)
     for number, seed in enumerate(seeds()):
         (corpus / f"seed{number}").write_bytes(seed)
-    options = {"max_total_time": max(asked.seconds, 1), "seed": asked.first, "max_len": LONGEST, "print_final_stats": 1}
+    options = {"max_total_time": max(seconds, 1), "seed": first, "max_len": LONGEST, "print_final_stats": 1}
     words = [fuzzer, *(f"-{key}={value}" for key, value in options.items()), f"-artifact_prefix={BUILT}/core.", corpus]
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
         print(done.stderr[-6000:])
         return 1
-    count, edges = (
-        re.findall(pattern, done.stderr)[-1] for pattern in (r"number_of_executed_units: (\d+)", r" cov: (\d+)")
-    )
-    print(f"the firmware's core {count} executions, {edges} edges, seed {asked.first}: nothing wrong")
+    count, edges = reached(done.stderr)
+    print(f"the firmware's core {count} executions, {edges} edges, seed {first}: nothing wrong")
     return 0

@@ -10,25 +10,20 @@ shapes, types, strides and values than they should, one in three of them. Then t
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from . import sanitized
+from .fuzz import TODAY
 
-TESTS = (
-    "kernel",
-    "files/test_csv.py",
-    "files/test_protobuf.py",
-    "chip/test_bit_flips.py",
-)
+TESTS = ("kernel", "files/test_csv.py", "files/test_protobuf.py", "chip/test_bit_flips.py")
 REFUSED = (TypeError, ValueError, OverflowError, MemoryError)
 ODD = (np.nan, np.inf, -np.inf, 5e-324, -0.0, 0.0, 1e308, -1e308, 1e-300, -1.0)
 ODD_NUMBERS = (0, 1, -1, 2, 3, 7, 63, 1 << 31, 1 << 62, (1 << 63) - 1, 1 << 63, (1 << 64) - 1, 6148914691236517206, 0.5)
@@ -36,14 +31,11 @@ ODD_TYPES = ("f4", ">f8", "i8", "u1", "?", "c16", "O", "M8[ns]", "f2")
 Rng = np.random.Generator
 
 
-def longer(array: Any, rng: Rng) -> Any:
-    """Return the array in another length."""
-    return np.resize(array, max(0, array.size + int(rng.integers(-4, 5))))
-
-
 def shaped(array: Any, rng: Rng) -> Any:
-    """Return the array in another shape."""
-    return [array.ravel(), array.T, array[None], array[..., None], array[:0], np.zeros((0, 1 << 40))][rng.integers(6)]
+    """Return the array in another length or shape."""
+    longer = np.resize(array, max(0, array.size + int(rng.integers(-4, 5))))
+    shapes = [array.ravel(), array.T, array[None], array[..., None], array[:0], np.zeros((0, 1 << 40))]
+    return longer if rng.random() < 0.5 else shapes[rng.integers(6)]
 
 
 def typed(array: Any, rng: Rng) -> Any:
@@ -54,18 +46,16 @@ def typed(array: Any, rng: Rng) -> Any:
 
 def strided(array: Any, rng: Rng) -> Any:
     """Return the same numbers elsewhere in memory: backwards, with gaps, by columns, not aligned, or read-only."""
-    way = rng.integers(5)
-    if way == 0:
-        return array[::-1].copy()[::-1] if array.ndim else array
-    if way == 1:
-        return np.repeat(array, 2, axis=0)[::2] if array.ndim else array
-    if way == 2:
-        return np.asfortranarray(array)
-    if way == 3:
-        return np.frombuffer(b"\0" + array.tobytes(), array.dtype, offset=1).reshape(array.shape)
-    array = array.copy()
-    array.flags.writeable = False
-    return array
+    frozen = array.copy()
+    frozen.flags.writeable = False
+    ways = [
+        array[::-1].copy()[::-1] if array.ndim else array,
+        np.repeat(array, 2, axis=0)[::2] if array.ndim else array,
+        np.asfortranarray(array),
+        np.frombuffer(b"\0" + array.tobytes(), array.dtype, offset=1).reshape(array.shape),
+        frozen,
+    ]
+    return ways[rng.integers(len(ways))]
 
 
 def valued(array: Any, rng: Rng) -> Any:
@@ -77,7 +67,7 @@ def valued(array: Any, rng: Rng) -> Any:
     return array
 
 
-ODDITIES = (longer, shaped, typed, strided, valued)
+ODDITIES = (shaped, shaped, typed, strided, valued)
 
 
 def odd(value: Any, rng: Rng) -> Any:
@@ -182,38 +172,27 @@ def fuzz(first: int, seconds: float, last: int) -> int:
     return 0
 
 
-def main() -> int:
+def main(
+    *,
+    seconds: float = 60.0,
+    first: int = TODAY * 10**7,
+    last: Annotated[int | None, "the descriptor of a file for the seed; without one it starts itself with one"] = None,
+) -> int:
     """Build, fuzz and test; return 1 if something was found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000 * 10**7)
-    parser.add_argument("--last", type=int, help=argparse.SUPPRESS)
-    asked = parser.parse_args()
-    if asked.last is not None:
-        return fuzz(asked.first, asked.seconds, asked.last)
+    if last is not None:
+        return fuzz(first, seconds, last)
     sanitized.build()
     environment = sanitized.environment()
     path = sanitized.BUILT / "last"
     with path.open("wb") as file:
-        options = ["--seconds", asked.seconds, "--first", asked.first, "--last", file.fileno()]
+        options = ["--seconds", seconds, "--first", first, "--last", file.fileno()]
         words = [sys.executable, "-W", "ignore", "-m", "tools.attack", "fuzz_kernel", *map(str, options)]
         done = subprocess.run(words, env=environment, cwd=sanitized.ROOT, check=False, pass_fds=[file.fileno()])
     if done.returncode:
         print(f"seed {path.read_text()} ended it with {done.returncode}")
         return 1
-    if asked.seconds:
-        tests = [str(sanitized.ROOT / "tests" / name) for name in TESTS]
-        words = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "-p",
-            "tools.attack.sanitized",
-            "-p",
-            "no:xdist",
-            "-p",
-            "no:cacheprovider",
-        ]
-        return subprocess.run([*words, *tests], env=environment, check=False).returncode
-    return 0
+    if not seconds:
+        return 0
+    plugins = [f"-p{name}" for name in ("tools.attack.sanitized", "no:xdist", "no:cacheprovider")]
+    words = [sys.executable, "-m", "pytest", "-q", *plugins, *(str(sanitized.ROOT / "tests" / name) for name in TESTS)]
+    return subprocess.run(words, env=environment, check=False).returncode

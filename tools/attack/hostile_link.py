@@ -111,14 +111,9 @@ class Attacker:
         rng = self._rng
         payload = bytearray(rng.randbytes(PAYLOAD))
         if rng.random() < 0.8:
-            head = (
-                rng.randrange(64),
-                rng.randrange(3),
-                rng.choice((128, 129)),
-                rng.randrange(256),
-                rng.randrange(1, 10),
-            )
-            payload[:12] = struct.pack("<HBBBBBxI", *head, 0, rng.randrange(1 << 12))
+            head = [rng.randrange(64), rng.randrange(3), rng.choice((128, 129))]
+            head += [rng.randrange(256), rng.randrange(1, 10), 0, rng.randrange(1 << 12)]
+            payload[:12] = struct.pack("<HBBBBBxI", *head)
         return self._packed(dialect().MAVLink_file_transfer_protocol_message(0, 254, 190, payload))
 
     def replayed(self) -> bytes:

@@ -12,24 +12,22 @@ on, the others with bursts of any rate and length at any time, some from before 
 Of a stranger, and against signing, the calibration must be the undisturbed one to the bit, and be written. Always
 wrong is an exit code that says nothing, a trace, a hang, no sentence, a file in part, a parameter set that is neither
 the vehicle's own value nor that of calibration.json, and a calibration that promises what it does not hold, where no
-samples were forged. Exit code 1 where a run was wrong; `--said` shows how the others ended.
+samples were forged. Exit code 1 where a run was wrong.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import re
-import resource
 import signal
-import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -41,7 +39,8 @@ from mpucal.mavlink.tlog import RawPacket
 from mpucal.result.calibration import Calibration
 from tools.lab.campaign_judge import false, partial_files
 from tools.lab.judge import judged
-from tools.processes import CODES, Died, Ended, Tell, become, forked, limit_cpu, ready
+from tools.processes import CODES, Died, Ended, Report, Tell, become, forked, limit_cpu, ready
+from tools.programs import PROCESSORS, Jobs
 
 from .hostile_link import ATTACKERS, FORGED, KINDS, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
 
@@ -133,7 +132,7 @@ def same(file: Path, clean: Path) -> bool:
 def outcomes(attacks: Sequence[tuple[Attack, Path | None, Path]], jobs: int) -> Iterator[dict[str, Any]]:
     """Run each attack in a process of its own, and yield the outcomes, as they end."""
     for _, told in forked([partial(alone, *each) for each in attacks], jobs):
-        died = {"sent": 0, "codes": ["?"], "unasked": 0, "fooled": 0, "ends": [], "mb": 0}
+        died = {"sent": 0, "codes": ["?"], "unasked": 0, "fooled": 0, "ends": []}
         yield {**died, "wrong": [f"it hung, or was ended ({told.code})"]} if isinstance(told, Died) else told
 
 
@@ -141,31 +140,37 @@ def alone(attack: Attack, clean: Path | None, place: Path, tell: Tell) -> None:
     """Run an attack, and report its outcome; the kernel ends a process that hangs."""
     limit_cpu(CPU_S)
     signal.alarm(WALL_S)
-    tell({**run_attack(attack, clean, place), "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024})
+    tell(run_attack(attack, clean, place))
     # skips the orderly close of what the session has open
     os._exit(0)
 
 
-def main() -> int:
-    """Run the attacks and print the table; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"some of: {', '.join(KINDS)}; default: all")
-    parser.add_argument("--packets", type=int, default=100_000, help="of each kind and attacker, at least")
-    parser.add_argument("--runs", type=int, default=3, help="of each kind, attacker and firmware, at least")
-    parser.add_argument("--attacker", choices=ATTACKERS, action="append")
-    parser.add_argument("--firmware", choices=FIRMWARES, action="append")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--said", action="store_true", help="show with which sentences commands ended")
-    parser.add_argument("--keep", type=Path, help="where the files of the runs stay")
-    asked = parser.parse_args()
+def main(
+    kinds: Annotated[list[str], KINDS, "default: all"] = tuple(KINDS),
+    *,
+    packets: Annotated[int, "of each kind and attacker, at least"] = 100_000,
+    runs: Annotated[int, "of each kind, attacker and firmware, at least"] = 3,
+    jobs: Jobs = PROCESSORS,
+) -> int:
+    """Run the attacks and print a line for each kind and attacker; return the exit code."""
     ready()
-    failed = 0
+    wrong = False
     with tempfile.TemporaryDirectory() as temporary:
-        place = (asked.keep or Path(temporary)).resolve()
-        for kind in asked.kinds or KINDS:
-            for attacker in asked.attacker or ATTACKERS:
-                failed += campaign(asked, place, kind, attacker)
-    return int(failed > 0)
+        place = Path(temporary).resolve()
+        for kind, attacker in product(kinds, ATTACKERS):
+            report = Report()
+            done = attacked(place, kind, attacker, packets, runs, jobs)
+            for outcome in done:
+                report.tell(f"{kind}, {attacker}", "; ".join(outcome["wrong"]))
+            wrong |= bool(report.shown())
+            sent, unasked, fooled = (sum(outcome[key] for outcome in done) for key in ("sent", "unasked", "fooled"))
+            ends = Counter(end for outcome in done for end in outcome["ends"]).most_common()
+            exits = ", ".join(f"{count} x {end}" for end, count in ends)
+            print(
+                f"    {sent} packets, {unasked} sets not asked for, {fooled} fooled; {exits or 'all exit 0'}",
+                flush=True,
+            )
+    return int(wrong)
 
 
 def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
@@ -179,41 +184,21 @@ def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
     return folder / "out"
 
 
-def campaign(asked: argparse.Namespace, place: Path, kind: str, attacker: str) -> int:
-    """Run attacks until enough packets of a kind were heard; return how many were wrong."""
-    firmwares = asked.firmware or FIRMWARES
-    clean = {firmware: undisturbed(place, attacker, firmware) for firmware in firmwares}
-    captures = {firmware: read_capture(clean[firmware] / "capture.mcap") for firmware in firmwares}
-    packets = {f: [r.data for r in captures[f].records if isinstance(r, RawPacket)] for f in firmwares}
-    heard = {firmware: tuple(packets[firmware][-MOST_HEARD // 2 :]) for firmware in firmwares}
+def attacked(place: Path, kind: str, attacker: str, packets: int, runs: int, jobs: int) -> list[dict[str, Any]]:
+    """Run attacks until enough packets of a kind were heard; return their outcomes."""
+    clean = {firmware: undisturbed(place, attacker, firmware) for firmware in FIRMWARES}
+    heard = {}
+    for firmware in FIRMWARES:
+        records = read_capture(clean[firmware] / "capture.mcap").records
+        heard[firmware] = tuple(r.data for r in records if isinstance(r, RawPacket))[-MOST_HEARD // 2 :]
     done: list[dict[str, Any]] = []
     for seed in range(MOST_RUNS):
-        if seed >= asked.runs and sum(outcome["sent"] for outcome in done) >= asked.packets:
+        if seed >= runs and sum(outcome["sent"] for outcome in done) >= packets:
             break
         tasks = []
-        for firmware in firmwares:
+        for firmware in FIRMWARES:
             here = place / f"{kind}-{attacker.replace(' ', '-')}-{firmware}-{seed}"
             attack = Attack(kind, attacker, firmware, seed, RATE, heard[firmware])
             tasks.append((attack, clean[firmware] / "calibration.json", here))
-        done += outcomes(tasks, asked.jobs)
-    print(row(kind, attacker, done))
-    wrongs = Counter(wrong for outcome in done for wrong in outcome["wrong"])
-    ends = Counter(end for outcome in done for end in outcome["ends"])
-    for wrong, count in wrongs.most_common(8):
-        print(f"    WRONG {count} x {wrong}")
-    for end, count in ends.most_common() if asked.said else ():
-        print(f"    {count} x {end}")
-    sys.stdout.flush()
-    return len(wrongs)
-
-
-def row(kind: str, attacker: str, done: Sequence[dict[str, Any]]) -> str:
-    """Return a row of the table."""
-    sent, unasked, fooled = (sum(outcome[key] for outcome in done) for key in ("sent", "unasked", "fooled"))
-    wrong = sum(bool(outcome["wrong"]) for outcome in done)
-    codes = Counter(",".join(map(str, outcome["codes"])) for outcome in done)
-    exits = " ".join(f"{code} x{count}" for code, count in codes.most_common())
-    return (
-        f"{kind:11}{attacker:20}{sent:8} packets in {len(done)} runs, {unasked} sets not asked for, {fooled} fooled,"
-        f" {wrong} wrong; {max(o['mb'] for o in done)} MB; exits {exits}"
-    )
+        done += outcomes(tasks, jobs)
+    return done

@@ -20,9 +20,10 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
 
 import click
 import numpy as np
@@ -72,27 +73,22 @@ def check_rows() -> str:
     return f"no row, or no option -o: {', '.join(sorted(odd))}" if odd else ""
 
 
-def _link(path: Path) -> None:
-    _beside(path).write_bytes(OLD)
-    path.symlink_to(_beside(path))
+def _linked(path: Path, make: Callable[[Path], object]) -> None:
+    make(target := path.with_name("target"))
+    path.symlink_to(target)
 
 
-def _link_to_folder(path: Path) -> None:
-    _beside(path).mkdir()
-    path.symlink_to(_beside(path))
-
-
-def _beside(path: Path) -> Path:
-    return path.with_name("target")
+def _old(path: Path) -> None:
+    path.write_bytes(OLD)
 
 
 OBSTACLES: dict[str, Callable[[Path], object]] = {
-    "file": lambda path: path.write_bytes(OLD),
+    "file": _old,
     "folder": Path.mkdir,
     "device": lambda path: os.mknod(path, 0o600 | stat.S_IFCHR, os.makedev(1, 3)),
     "pipe": os.mkfifo,
-    "link": _link,
-    "link to a folder": _link_to_folder,
+    "link": lambda path: _linked(path, _old),
+    "link to a folder": lambda path: _linked(path, Path.mkdir),
     "link to nothing": lambda path: path.symlink_to("nothing"),
 }
 
@@ -127,8 +123,11 @@ def _content(path: Path) -> object:
 
 @contextmanager
 def _disk(options: str, here: Path) -> Iterator[Path]:
-    """Yield a folder on a disk of its own; needs root."""
+    """Yield a folder on a disk of its own if this is root's process."""
     with TemporaryDirectory(dir=here.parent) as place:
+        if os.geteuid():
+            yield Path(place)
+            return
         subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", place], check=True)
         try:
             yield Path(place)
@@ -138,26 +137,19 @@ def _disk(options: str, here: Path) -> Iterator[Path]:
 
 def on_full_disk(words: tuple[str, ...], here: Path) -> str:
     """Run a command whose output lies on a disk without a free page."""
-    if os.geteuid():
-        with TemporaryDirectory(dir=here.parent) as place:
-            return _refused(_run(words, here, Path(place), longest=1), Path(place))
     with _disk("size=64k", here) as place:
-        with (place / "filler").open("wb", buffering=0) as filler:
-            try:
+        if not os.geteuid():
+            with suppress(OSError), (place / "filler").open("wb", buffering=0) as filler:
                 while filler.write(bytes(4096)):
                     pass
-            except OSError:
-                pass
-        return _refused(_run(words, here, place), place)
+        return _refused(_run(words, here, place, longest=1 if os.geteuid() else None), place)
 
 
 def on_read_only_disk(words: tuple[str, ...], here: Path) -> str:
     """Run a command whose output lies where nothing may be written."""
-    if os.geteuid():
-        with TemporaryDirectory(dir=here.parent) as place:
-            Path(place).chmod(0o555)
-            return _refused(_run(words, here, Path(place)), Path(place))
     with _disk("ro", here) as place:
+        if os.geteuid():
+            place.chmod(0o555)
         return _refused(_run(words, here, place), place)
 
 
@@ -184,38 +176,38 @@ def _odd(done: Ended, place: Path) -> str:
     return "; ".join([*odd, *(f"{path.name} is left" for path in place.rglob(".*"))])
 
 
-def main() -> int:
+def main(commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS)) -> int:
     """Run each command with each obstacle, and print the table; return 1 if an outcome was wrong."""
     if lacks := check_rows():
         sys.exit(lacks)
-    asked, wrong = sys.argv[1:] or list(WORDS), []
+    wrong = False
     ready()
     with TemporaryDirectory() as base:
         (here := Path(base) / "here").mkdir()
         (here / "a").mkdir()
         shutil.copy(SESSION, here / RECORDED)
         _run(("calibrate", RECORDED, "-o", "a"), here, here)
-        if "merge" in asked:
+        if "merge" in commands:
             _run((*WORDS["session"], "--bus", "sim:seed=1,temperature_c=45", "-o", "b"), here, here)
         np.savez(here / TABLE, t=np.arange(9) / 9, acc=np.full((9, 3), 9.0), gyr=np.zeros((9, 3)))
-        for name in asked:
-            words = WORDS[name]
-            with TemporaryDirectory(dir=here.parent) as place:
-                done = _run(words, here, Path(place))
-                files = sorted(path.relative_to(place) for path in Path(place).rglob("*") if path.is_file())
-            folder = {Path("out")} if files and files[0].parts[0] == "out" and len(files[0].parts) > 1 else set()
-            print(f"{name} writes {', '.join(map(str, files))}", flush=True)
-            if done.code or not files:
-                sys.exit(f"exit code {done.code}: {done.last}")
-            for kind in OBSTACLES:
-                cells = Counter(obstructed(words, here, file, kind) for file in files[:MOST_FILES])
-                cells += Counter(f"the folder {obstructed(words, here, file, kind)}" for file in folder)
-                wrong += _show(name, kind, cells)
-            wrong += _show(name, "full disk", Counter([on_full_disk(words, here)]))
-            wrong += _show(name, "read-only", Counter([on_read_only_disk(words, here)]))
-    return int(bool(wrong))
+        for name in commands:
+            for kind, cells in tried(WORDS[name], here, name):
+                print(f"  {kind:17} {', '.join(f'{count} {what}' for what, count in cells.items())}", flush=True)
+                wrong |= any("WRONG" in what for what in cells)
+    return int(wrong)
 
 
-def _show(name: str, kind: str, cells: Counter[str]) -> list[str]:
-    print(f"  {kind:17} {', '.join(f'{count} {what}' for what, count in cells.items())}", flush=True)
-    return [f"{name}, {kind}: {what}" for what in cells if "WRONG" in what]
+def tried(words: tuple[str, ...], here: Path, name: str) -> Iterator[tuple[str, Counter[str]]]:
+    """Print which files a command writes, and yield by obstacle how often which outcome comes."""
+    with TemporaryDirectory(dir=here.parent) as place:
+        done = _run(words, here, Path(place))
+        files = sorted(path.relative_to(place) for path in Path(place).rglob("*") if path.is_file())
+    print(f"{name} writes {', '.join(map(str, files))}", flush=True)
+    if done.code or not files:
+        sys.exit(f"exit code {done.code}: {done.last}")
+    folder = {Path("out")} if files[0].parts[0] == "out" and len(files[0].parts) > 1 else set()
+    for kind in OBSTACLES:
+        cells = Counter(obstructed(words, here, file, kind) for file in files[:MOST_FILES])
+        yield kind, cells + Counter(f"the folder {obstructed(words, here, file, kind)}" for file in folder)
+    yield "full disk", Counter([on_full_disk(words, here)])
+    yield "read-only", Counter([on_read_only_disk(words, here)])

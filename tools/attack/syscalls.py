@@ -18,7 +18,6 @@ Seeds are the day's number. Exit code 1 where something was wrong.
 
 from __future__ import annotations
 
-import argparse
 import errno
 import json
 import os
@@ -27,17 +26,19 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
 
 from mpucal.errors import MpucalError
 from mpucal.files import load
 from mpucal.result.blob import Blob
 
 from .disk_model import Call, Disk, logged
+from .fuzz import TODAY
 from .syscalls_commands import STATE, WORDS, Failed, Failing, prepared, run_failing
 
 SHIM = Path(__file__).with_suffix(".c")
@@ -207,64 +208,51 @@ def sampled(calls: Sequence[Call], each: bool) -> list[int]:
     return list(range(len(calls))) if each else sorted(set().union(*some))
 
 
-def tried(name: str, start: Path, asked: argparse.Namespace) -> Iterator[str]:
+def tried(name: str, start: Path, seed: int, each: bool, most: int | None, allocations: int) -> Iterator[str]:
     """Try a command, print its line of the table, and yield what was wrong."""
-    rng = random.Random(f"{name} {asked.seed}")
+    rng = random.Random(f"{name} {seed}")
     trial = Trial(name, start)
-    todo = [
-        (f"{trial.calls[i].op} {trial.calls[i].path}", Failing(i + 1, rng.choice(ERRORS[trial.calls[i].op])))
-        for i in sampled(trial.calls, asked.each)
-    ]
-    todo = rng.sample(todo, min(asked.most or len(todo), len(todo)))
-    most = trial.allocations
-    drawn = sorted({1, most, *(rng.randint(1, most) for _ in range(asked.allocations))}) if asked.allocations else ()
-    starved = [
-        ("memory", Failing(least=LEAST_BYTES, allocation=n, since=since)) for n in drawn for since in (False, True)
-    ]
-    codes: dict[str, Counter[str]] = defaultdict(Counter)
-    wrong = []
-    for what, failing in (*todo, *starved):
-        code, bad = trial.failed(failing)
-        codes["memory" if failing.least else "calls"][code] += 1
-        how = (
-            f"allocation {failing.allocation}{' on' if failing.since else ''}"
-            if failing.least
-            else (f"call {failing.call} ({what}) {errno.errorcode[failing.error]}")
-        )
-        wrong += [f"{name}: {how}: {each}" for each in bad]
-    looked = sampled(trial.log, asked.each)
-    cuts, worse = trial.cut_off(rng, [*looked, len(trial.log) - 1])
+    failures = []
+    for i in sampled(trial.calls, each):
+        call = trial.calls[i]
+        failing = Failing(i + 1, rng.choice(ERRORS[call.op]))
+        failures.append((f"call {i + 1} ({call.op} {call.path}) {errno.errorcode[failing.error]}", failing))
+    failures = rng.sample(failures, min(most or len(failures), len(failures)))
+    of = trial.allocations
+    drawn = sorted({1, of, *(rng.randint(1, of) for _ in range(allocations))}) if allocations else ()
+    for n, since in product(drawn, (False, True)):
+        failing = Failing(least=LEAST_BYTES, allocation=n, since=since)
+        failures.append((f"allocation {n}{' on' if since else ''}", failing))
+    ends, wrong = Counter[str](), []
+    for what, failing in failures:
+        end, bad = trial.failed(failing)
+        ends[f"{what.partition(' ')[0]} failed, {end}"] += 1
+        wrong += [f"{name}: {what}: {each}" for each in bad]
+    cuts, worse = trial.cut_off(rng, [*sampled(trial.log, each), len(trial.log) - 1])
     wrong += [f"{name}: {each}" for each in worse]
-    ends = "; ".join(
-        f"{counted.total()} of {len(trial.calls) if what == 'calls' else most} {what} ("
-        + ", ".join(f"{code}: {n}" for code, n in sorted(counted.items()))
-        + ")"
-        for what, counted in codes.items()
+    said = "; ".join(f"{end}: {n}" for end, n in sorted(ends.items()))
+    print(
+        f"{name:<21} {len(trial.calls)} calls, {of} allocations; {said}; {cuts} power cuts: {len(wrong)} wrong",
+        flush=True,
     )
-    print(f"{name:<21} failed {ends}; {cuts} power cuts: {len(wrong)} wrong", flush=True)
-    asked.totals.update({"calls": len(todo), "allocations": len(starved), "power cuts": cuts})
     yield from wrong
 
 
-def main() -> int:
+def main(
+    commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS),
+    *,
+    each: Annotated[bool, "fail every call, and cut the power after each"] = False,
+    most: Annotated[int | None, "fail so many calls of a command at most, drawn by the seed"] = None,
+    allocations: Annotated[int, "fail so many, too"] = 0,
+    seed: int = TODAY,
+) -> int:
     """Run the trials; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("commands", nargs="*", metavar="COMMAND", help=f"some of: {', '.join(WORDS)}; default: all")
-    parser.add_argument("--each", action="store_true", help="fail every call, and cut the power after each")
-    parser.add_argument(
-        "--most", type=int, metavar="N", help="fail so many calls of a command at most, drawn by the seed"
-    )
-    parser.add_argument("--allocations", type=int, default=0, metavar="N", help="fail so many, too")
-    parser.add_argument("--seed", type=int, default=int(time.time()) // 86400)
-    asked = parser.parse_args()
     if "LD_PRELOAD" not in os.environ:
         return preloaded()
-    asked.totals = Counter()
-    print(f"seed {asked.seed}", flush=True)
+    print(f"seed {seed}", flush=True)
     with prepared() as start:
-        wrong = [each for name in asked.commands or WORDS for each in tried(name, start, asked)]
-    print("\n".join(wrong))
-    print(", ".join(f"{n} {what}" for what, n in asked.totals.items()) + f": {len(wrong)} wrong")
+        wrong = [what for name in commands for what in tried(name, start, seed, each, most, allocations)]
+    print(*wrong, f"{len(wrong)} wrong", sep="\n")
     return int(bool(wrong))
 
 

@@ -10,15 +10,14 @@ lost one is seen.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
+from typing import Annotated
 
 import numpy as np
 
-from mpucal.chip.access import Transaction
+from mpucal.chip.access import Bus, Transaction
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.chip.families import MPU6500
@@ -26,11 +25,11 @@ from mpucal.data import Recording, Vector
 from mpucal.files.mcap import read_capture
 from mpucal.simulated.chip.bus import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.clock import FastClock, RealClock
+from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.sensor import Counts, Setting
-from mpucal.sources.spi import DATA, REGISTER_HZ, SpiBus
+from mpucal.sources.spi import DATA, REGISTER_HZ
 from mpucal.sources.tap import Tap
 
 from .timing import used
@@ -75,14 +74,6 @@ class JitterClock(FastClock):
         super().sleep_until(t_ns + int(self._rng.uniform(0, self._late_ns)))
 
 
-class TransactionList(list[Transaction]):
-    """List of the transactions on a bus."""
-
-    def transaction(self, transaction: Transaction) -> None:
-        """Append a transaction."""
-        self.append(transaction)
-
-
 def share(transactions: Sequence[Transaction]) -> float:
     """Return the share of the I2C bus's time that the transactions take."""
     bits = sum((READ_BITS if t.op == "read" else WRITE_BITS) + BYTE_BITS * t.count for t in transactions)
@@ -105,47 +96,22 @@ def run(
     share: Callable[[Sequence[Transaction]], float] = share,
 ) -> tuple[Recording, float, float]:
     """Return the recording on a late host, the share of the bus, and the share of a processor."""
-    kept = TransactionList()
     bus = SimulatedBus(Chip(MODELS[model], NumberedFeed(), ppm, FactoryTrim()), JitterClock(late_s, seed))
-    driver = Driver(Tap(bus, kept), Config(rate_hz=rate_hz))
-    processor = polled(driver, seconds, kept)
-    return driver.recording(), share(kept), processor
+    driver, transactions, processor = polled(bus, rate_hz, seconds)
+    return driver.recording(), share(transactions), processor
 
 
-def polled(driver: Driver, seconds: float, kept: TransactionList) -> float:
-    """Poll for `seconds`, and return the share of a processor."""
+def polled(bus: Bus, rate_hz: float, seconds: float) -> tuple[Driver, list[Transaction], float]:
+    """Poll for `seconds`; return the driver, the transactions after its start, and the share of a processor."""
+    kept: list[Transaction] = []
+    driver = Driver(Tap(bus, SimpleNamespace(transaction=kept.append)), Config(rate_hz=rate_hz))
     driver.start()
     kept.clear()
     until_ns = driver.now_ns() + seconds * 1e9
     with used() as found:
         while driver.now_ns() < until_ns:
             driver.poll()
-    return found.cpu_s / seconds
-
-
-class SimulatedSpiDev:
-    """Stand-in for spidev.SpiDev, as far as SpiBus uses it, with a simulated MPU-6500 in real time."""
-
-    def __init__(self) -> None:
-        self._chip = SimulatedBus(Chip(MODELS["mpu6500"], NumberedFeed(), 0.0, FactoryTrim()), RealClock())
-
-    def open_path(self, path: str) -> None:
-        """Open any path."""
-
-    def xfer2(self, values: list[int], _hz: int) -> list[int]:
-        """Transfer a message: the address, with bit 7 to read, and the data."""
-        if values[0] & 0x80:
-            return [0, *self._chip.read(values[0] & 0x7F, len(values) - 1).data]
-        self._chip.write(values[0], bytes(values[1:]))
-        return values
-
-
-def spi_processor(rate_hz: float, seconds: float) -> float:
-    """Return the share of a processor of reading over SPI in real time, with the simulation of the chip."""
-    sys.modules["spidev"] = library = ModuleType("spidev")
-    library.SpiDev = SimulatedSpiDev  # type: ignore[attr-defined]
-    kept = TransactionList()
-    return polled(Driver(Tap(SpiBus("simulated"), kept), Config(rate_hz=rate_hz)), seconds, kept)
+    return driver, kept, found.cpu_s / seconds
 
 
 def lost(recording: Recording) -> int:
@@ -165,15 +131,15 @@ def rate_error_ppm(rate_hz: float, seconds: float, seeds: int) -> float:
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-def main() -> None:
+def main(
+    capture: Annotated[Path | None, "count its transactions instead"] = None,
+    *,
+    seconds: Annotated[float, "how long the long run takes, of simulated time"] = 3600.0,
+    seeds: Annotated[int, "how often each rate is measured"] = 100,
+) -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("capture", type=Path, nargs="?", help="count its transactions instead")
-    parser.add_argument("--seconds", type=float, default=3600.0, help="how long the long run takes, of simulated time")
-    parser.add_argument("--seeds", type=int, default=100, help="how often each rate is measured")
-    options = parser.parse_args()
-    if options.capture is not None:
-        records = read_capture(options.capture).records
+    if capture is not None:
+        records = read_capture(capture).records
         print(f"{share([r for r in records if isinstance(r, Transaction)]):.1%} of a 400 kHz bus, with the start")
         return
     for model, rate_hz, late_s in BUDGETS:
@@ -184,12 +150,11 @@ def main() -> None:
         )
     for rate_hz in (1000, 4000):
         _, of_bus, _ = run("mpu6500", rate_hz, 60.0, 0.010, share=spi_share)
-        of_processor = spi_processor(rate_hz, 10.0)
-        print(f"mpu6500 at {rate_hz} Hz over SPI: {of_bus:.1%} of the bus, {of_processor:.1%} of a processor")
+        print(f"mpu6500 at {rate_hz} Hz over SPI: {of_bus:.1%} of the bus")
     for model, late_s in (("mpu6050", 0.020), ("mpu6500", 0.010)):
-        recording, _, _ = run(model, 1000, options.seconds, late_s)
+        recording, _, _ = run(model, 1000, seconds, late_s)
         missing = f"{lost(recording)} of {len(recording)} samples lost"
-        print(f"{model}, {options.seconds:.0f} s at 1000 Hz: {missing}", flush=True)
-    for rate_hz, seconds in ((1000, 10), (200, 10), (1000, 30)):
-        ppm = rate_error_ppm(rate_hz, seconds, options.seeds)
-        print(f"rate at {rate_hz} Hz after {seconds} s: {ppm:.1f} ppm rms, {options.seeds} seeds", flush=True)
+        print(f"{model}, {seconds:.0f} s at 1000 Hz: {missing}", flush=True)
+    for rate_hz, after_s in ((1000, 10), (200, 10), (1000, 30)):
+        ppm = rate_error_ppm(rate_hz, after_s, seeds)
+        print(f"rate at {rate_hz} Hz after {after_s} s: {ppm:.1f} ppm rms, {seeds} seeds", flush=True)

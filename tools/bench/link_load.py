@@ -9,12 +9,12 @@ tools/lab/sim_vehicle.py.
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Annotated
 
 from mpucal.files.mcap import CaptureWriter
 from mpucal.files.messages import PACKETS
@@ -29,12 +29,8 @@ ROOT = Path(__file__).parents[2]
 URL = "udp:127.0.0.1:24550"
 
 
-def main() -> None:
+def main(*, rate: Annotated[float, "Hz"] = 333.0, seconds: float = 20.0) -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rate", type=float, default=333.0, metavar="HZ")
-    parser.add_argument("--seconds", type=float, default=20.0)
-    asked = parser.parse_args()
     words = [sys.executable, "-m", "tools.lab", "sim_vehicle", URL, "imus=3"]
     with (
         subprocess.Popen(words, stdout=subprocess.DEVNULL, cwd=ROOT) as vehicle,
@@ -43,10 +39,10 @@ def main() -> None:
     ):
         writer.start({}, PACKETS)
         link = Link(open_transport(parse_url(URL)), writer.packet)
-        source = VehicleSource(link, asked.rate, None, lambda text: None, "load")
+        source = VehicleSource(link, rate, None, lambda text: None, "load")
         try:
             source.start()
-            samples, until_s = 0, time.monotonic() + asked.seconds
+            samples, until_s = 0, time.monotonic() + seconds
             with used() as found:
                 while time.monotonic() < until_s:
                     samples += len(source.poll())

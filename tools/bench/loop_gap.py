@@ -11,13 +11,12 @@ and another one has stopped reading. The simulation takes part of the time.
 
 from __future__ import annotations
 
-import argparse
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,7 +33,7 @@ from mpucal.errors import EndOfCapture
 from mpucal.files.mcap import CaptureWriter
 from mpucal.page.address import Address
 from mpucal.page.feed import Feed
-from mpucal.session.events import Event, Key, Output
+from mpucal.session.events import Event, Output
 from mpucal.session.live.fits import Task
 from mpucal.session.live.scheduler import InlineWorker, Worker
 from mpucal.session.live.worker_process import ProcessWorker
@@ -42,6 +41,7 @@ from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.tap import Tap
+from tools.lab.sessions import SilentOperator
 
 from .timing import ended_children_s, used
 
@@ -92,24 +92,20 @@ class TimedBus:
         return self._bus.read(register, count)
 
 
-class SilentOperator:
+class Listener(SilentOperator):
     """Operator who presses nothing; the count of reads begins at the first prompt, when the chip is configured."""
 
     def __init__(self, bus: TimedBus, feed: Feed | None) -> None:
-        self._bus: TimedBus | None = bus
-        self._feed = feed
+        super().__init__()
+        self._bus, self._feed = bus, feed
 
     def hear(self, output: Output) -> None:
         """Begin to count at the first output; pass all outputs to the page."""
         if self._feed is not None:
             self._feed.hear(output)
-        if self._bus is not None:
+        if not self.heard:
             self._bus.looks_ns.clear()
-        self._bus = None
-
-    def pressed(self) -> Sequence[Key]:
-        """Press nothing."""
-        return ()
+        super().hear(output)
 
 
 @contextmanager
@@ -143,22 +139,17 @@ def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> t
     ):
         writer.start({})
         driver = Driver(Tap(bus, writer), plan.config)
-        runner = Runner(driver, SilentOperator(bus, feed), writer.event, plan, (chip.hear,), start_worker=start_worker)
+        runner = Runner(driver, Listener(bus, feed), writer.event, plan, (chip.hear,), start_worker=start_worker)
         with used(ended_children_s) as found:
             runner.measure()
     return np.diff(bus.looks_ns) * 1e-6, (found.cpu_s + found.children_s) / found.wall_s
 
 
-def main() -> None:
+def main(*, rate: float = 1000.0, seconds: float = 70.0) -> None:
     """Measure each arrangement."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--rate", type=float, default=1000.0)
-    parser.add_argument("--seconds", type=float, default=70.0)
-    arguments = parser.parse_args()
-    print(f"{arguments.rate:g} Hz, {arguments.seconds:g} s; a 512-byte FIFO holds", end=" ")
-    print(f"{1000.0 * FIFO_FRAMES / arguments.rate:.0f} ms")
+    print(f"{rate:g} Hz, {seconds:g} s; a 512-byte FIFO holds {1000.0 * FIFO_FRAMES / rate:.0f} ms")
     for name, (start_worker, page) in HIRED.items():
-        gaps, share = measure(arguments.rate, arguments.seconds, start_worker, page)
+        gaps, share = measure(rate, seconds, start_worker, page)
         print(
             f"{name}: gaps {np.median(gaps):.1f} ms in the median, "
             f"{np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {share:.0%} of a core",

@@ -1,4 +1,4 @@
-"""Times and memory of what mpucal does: python -m tools.bench speed [--json FILE].
+"""Times and memory of what mpucal does: python -m tools.bench speed.
 
 The kernel is compared with its NumPy twins on the same data in the same run, so that their ratio means the same on
 every machine. Times are the processor's, so that what else runs counts little. Nothing here passes or fails.
@@ -6,13 +6,8 @@ every machine. Times are the processor's, so that what else runs counts little. 
 
 from __future__ import annotations
 
-import argparse
-import json
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -30,7 +25,7 @@ from tools.lab.reference import evaluate_hand_reference, evaluate_reference
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
 from tools.lab.table import plain_table, show
 
-from .timing import ended_children_s, median_s, peak_bytes
+from .timing import median_s, peak_bytes
 
 FLAT_S, TURNS = 10.0, 3
 # long enough that the start of a loop does not count, and what the NumPy twins do in a second
@@ -38,7 +33,6 @@ KERNEL_STEPS, TWIN_STEPS = 10_000, 300
 # runs of a millisecond or two: many, so that a burst of other work does not affect the median
 MORE_OF_A_KERNEL = 15
 GROWTH = (1_000, 10_000, 100_000, 1_000_000)
-HELP = "from mpucal.__main__ import run; run(['--help']); import sys; sys.stderr.write(str('numpy' in sys.modules))"
 
 
 def turned(seconds: float, rate_hz: float) -> Recording:
@@ -142,34 +136,11 @@ def growth(runs: int) -> list[dict[str, Any]]:
     return rows
 
 
-def start(runs: int) -> dict[str, Any]:
-    """Time `mpucal --help` as a process, beside an interpreter that does nothing."""
-
-    def process(program: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-
-    def ms(program: str) -> float:
-        return 1e3 * median_s(lambda: process(program), runs, ended_children_s)
-
-    return {
-        "mpucal --help ms": ms(HELP),
-        "of which the interpreter": ms("pass"),
-        "NumPy loaded": process(HELP).stderr,
-    }
-
-
-def main() -> None:
-    """Measure, print and save."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--runs", type=int, default=7, help="of which the median counts")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    options = parser.parse_args()
+def main(*, runs: Annotated[int, "of which the median counts"] = 7) -> None:
+    """Measure and print."""
     measured = {
-        "mpucal.calibrate": calibrations(options.runs),
-        f"one step of the filter ({_kernel.instruction_set()})": kernel(options.runs),
-        "the fit of `accel`, by the number of samples": growth(min(options.runs, 3)),
-        "processes": [start(options.runs)],
+        "mpucal.calibrate": calibrations(runs),
+        f"one step of the filter ({_kernel.instruction_set()})": kernel(runs),
+        "the fit of `accel`, by the number of samples": growth(min(runs, 3)),
     }
     show(*(plain_table(rows, title) for title, rows in measured.items()))
-    if options.json:
-        options.json.write_text(json.dumps(measured, indent=1) + "\n", encoding="utf-8")

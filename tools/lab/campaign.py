@@ -13,25 +13,25 @@ the command that repeats it. Seeds begin with the day's number. Exit code 1 wher
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import shutil
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
+from datetime import date
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
 
 import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.session import results
 from tools.processes import Child, Died, Ended, Task, Tell, become, ended, forked, limit_cpu, quick, ready
+from tools.programs import PROCESSORS, Jobs
 
 from .campaign_judge import FOLDER, Outcome, judged, show_outcomes
 from .campaign_recordings import struck_recordings
@@ -65,35 +65,31 @@ class Case:
         return f"{self.number}.{self.k}"
 
 
-def world_of(number: int) -> str:
-    """Return the kind of world of a prefix."""
-    return WORLDS[number % len(WORLDS)]
-
-
-def target_of(number: int) -> str:
-    """Return the target of a prefix."""
-    return TARGETS[number // 2 % len(TARGETS)]
+def kind_of(number: int) -> tuple[str, str]:
+    """Return the kind of world of a prefix, and the target."""
+    return WORLDS[number % len(WORLDS)], TARGETS[number // 2 % len(TARGETS)]
 
 
 def drawn(number: int, k: int) -> Case:
     """Draw the faults of a case."""
     rng = np.random.default_rng([number, k])
-    names = rng.choice(KINDS[world_of(number)], rng.integers(1, 5)).tolist()
-    last_s = LAST_S[target_of(number)]
+    world, target = kind_of(number)
+    names, last_s = rng.choice(KINDS[world], rng.integers(1, 5)).tolist(), LAST_S[target]
     blows = [TimedFault(name, round(float(rng.uniform(0.0, last_s)), 2), int(rng.integers(1 << 31))) for name in names]
     return Case(number, k, tuple(sorted(blows, key=lambda blow: blow.at_s)))
 
 
 def words(number: int) -> list[str]:
     """Return the command of a prefix."""
+    world, target = kind_of(number)
     to = ["--to", "chip"] if number % 3 == 0 else []
-    if world_of(number) == VEHICLE:
+    if world == VEHICLE:
         vehicle = f"sim:seed={number % 1000},firmware={FIRMWARES[number // 10 % 2]}"
         source, to = ["--mavlink", vehicle, "--rate", "50"], []
     else:
         chip = f"sim:seed={number % 100_000},chip={CHIPS[number % 3]},hand={HANDS[number // 3 % len(HANDS)]}"
         source = ["--bus", chip, "--rate", str(RATES[number // 7 % len(RATES)])]
-    return ["session", *source, *to, "--target", target_of(number), "-o", FOLDER, "--yes"]
+    return ["session", *source, *to, "--target", target, "-o", FOLDER, "--yes"]
 
 
 class Prefix:
@@ -101,7 +97,7 @@ class Prefix:
 
     def __init__(self, number: int, cases: Sequence[Case], place: Path, keep: bool) -> None:
         self._number, self._place, self._keep = number, place, keep
-        self._world = World(world_of(number))
+        self._world = World(kind_of(number)[0])
         self._child, self._left = False, not cases
         for case in cases:
             self._world.moments.add(case.blows[0].at_s, partial(self._leave, case))
@@ -170,52 +166,50 @@ class Prefix:
         os.chdir(place)
 
 
-def sessions(prefixes: Sequence[tuple[int, Sequence[Case]]], jobs: int, place: Path, keep: bool) -> Iterator[Outcome]:
+def run_all(prefixes: Sequence[tuple[int, Sequence[Case]]], jobs: int, place: Path, keep: bool) -> Iterator[Outcome]:
     """Yield the outcomes in the order in which they end."""
     tasks: list[Task] = [Prefix(number, cases, place / str(number), keep).run for number, cases in prefixes]
     for _, told in forked(tasks, jobs):
         yield Outcome("?", "?", wrong=(f"a prefix ended with {told}",)) if isinstance(told, Died) else told
 
 
-def outcomes(asked: argparse.Namespace, place: Path) -> Iterator[Outcome]:
+def outcomes(
+    first: int, count: int, recordings: int, case: str | None, jobs: int, place: Path, keep: bool
+) -> Iterator[Outcome]:
     """Yield the outcomes of the sessions and recordings of the options."""
-    if asked.case and not asked.case.startswith("r"):
-        number, k = map(int, asked.case.split("."))
-        yield from sessions([(number, [drawn(number, k)])], 1, place, bool(asked.keep))
-        return
-    if asked.case or asked.recordings:
-        first, count = (int(asked.case[1:]), 1) if asked.case else (asked.first, asked.recordings)
-        yield from struck_recordings(first, count, asked.jobs, place)
-    numbers = range(asked.first, asked.first + -(-asked.sessions // CASES))
-    for at in range(0, len(numbers), 10 * asked.jobs):
-        batch = [(n, [drawn(n, k) for k in range(CASES)]) for n in numbers[at : at + 10 * asked.jobs]]
-        yield from sessions(batch, asked.jobs, place, bool(asked.keep))
+    if case and not case.startswith("r"):
+        number, k = map(int, case.split("."))
+        yield from run_all([(number, [drawn(number, k)])], 1, place, keep)
+    elif case:
+        yield from struck_recordings(int(case[1:]), 1, jobs, place)
+    elif recordings:
+        yield from struck_recordings(first, recordings, jobs, place)
+    numbers = range(first, first + -(-count // CASES))
+    for at in range(0, len(numbers), 10 * jobs):
+        batch = [(n, [drawn(n, k) for k in range(CASES)]) for n in numbers[at : at + 10 * jobs]]
+        yield from run_all(batch, jobs, place, keep)
 
 
-def main() -> int:
+def main(
+    *,
+    sessions: int = 0,
+    recordings: int = 0,
+    first: int = date.today().toordinal() * 1000,
+    jobs: Jobs = PROCESSORS,
+    case: Annotated[str | None, "this one alone, PREFIX.NUMBER, or rNUMBER of a recording"] = None,
+    keep: Annotated[Path | None, "where its files stay"] = None,
+) -> int:
     """Run the campaign; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sessions", type=int, default=0)
-    parser.add_argument("--recordings", type=int, default=0)
-    parser.add_argument("--first", type=int, default=datetime.now(UTC).date().toordinal() * 1000)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--case", help="this one alone, PREFIX.NUMBER, or rNUMBER of a recording")
-    parser.add_argument("--keep", type=Path, help="where its files stay")
-    parser.add_argument("--json", type=Path, help="a line for each outcome")
-    asked = parser.parse_args()
-    print(f"seeds from {asked.first} on", flush=True)
+    print(f"seeds from {first} on", flush=True)
     ready()
     begun, found = time.monotonic(), list[Outcome]()
     with TemporaryDirectory() as temporary:
-        place = asked.keep or Path(temporary)
+        place = keep or Path(temporary)
         os.environ["XDG_STATE_HOME"] = str(place / "state")
-        for outcome in outcomes(asked, place):
+        for outcome in outcomes(first, sessions, recordings, case, jobs, place, bool(keep)):
             found.append(outcome)
-            if outcome.wrong or asked.case:
+            if outcome.wrong or case:
                 print(outcome, flush=True)
-            if asked.json:
-                with asked.json.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(asdict(outcome)) + "\n")
     struck = [outcome for outcome in found if outcome.blows]
     show_outcomes(struck)
     took_s, cpu_s = time.monotonic() - begun, sum(outcome.cpu_s for outcome in struck)

@@ -12,12 +12,12 @@ from typing import Any
 from mpucal.errors import MpucalError
 from mpucal.files.folder import captures_in
 from mpucal.result.blob import Blob, BlobError
-from mpucal.result.calibration import GOOD, REFUSED, USABLE, Calibration
+from mpucal.result.calibration import REFUSED, Calibration
 from tools.processes import CODES, Ended
 
 from .judge import MOST_CLAIMS, Judgement
 from .judge import judged as judged_against
-from .table import Column, count, over, show, table
+from .table import VERDICTS, Column, count, over, show, table
 
 WITH_RESULT = (0, 5, 6)
 FOLDER = "board"
@@ -64,11 +64,8 @@ def judged(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any
     killed = (-9,) if "killed" in names else ()
     silent = (*CODES, *killed) if "deaf" in names else (0, 5, *killed)
     document = folder / "calibration.json"
-    wrong = [
-        *done.wrong((*CODES, *killed), silent),
-        *_unfit(done.code, document, names),
-        *partial_files(folder, done.code),
-    ]
+    wrong = done.wrong((*CODES, *killed), silent)
+    wrong += [*_unfit(done.code, document, names), *partial_files(folder, done.code)]
     known: dict[str, Any] = {"verdict": ""}
     try:
         calibration = Calibration.load(document)
@@ -135,7 +132,7 @@ def largest(name: str) -> Column:
 
 COLUMNS: dict[str, Column] = {
     "all": len,
-    **{verdict: count("verdict", verdict) for verdict in (GOOD, USABLE, REFUSED)},
+    **VERDICTS,
     "ended": count("verdict", ""),
     "worst m/s²": largest("error"),
     "claims": largest("claims"),

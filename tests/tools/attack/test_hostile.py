@@ -35,8 +35,7 @@ def fuzzed(targets, monkeypatch):
     handler = signal.getsignal(signal.SIGVTALRM)
 
     def call(first, *names):
-        monkeypatch.setattr(sys, "argv", ["fuzz", "--first", str(first), "--seconds", "0", *names])
-        return fuzz.main()
+        return fuzz.main(names, first=int(first), seconds=0.0)
 
     yield call
     signal.setitimer(signal.ITIMER_VIRTUAL, 0)
