@@ -46,6 +46,8 @@ def files(walk, write_bag, tmp_path_factory):
     table(some).to_csv(folder / "a.csv", index=False)
     table(some).to_csv(folder / "a.tsv", index=False, sep="\t")
     table(some).to_parquet(folder / "a.parquet")
+    table(some).to_json(folder / "a.json", orient="records")
+    table(some).to_json(folder / "a.jsonl", orient="records", lines=True)
     counts = np.rint(np.column_stack([some.acc / 9.80665 * 16384, np.degrees(some.gyr) * 131])).astype(int)
     (folder / "a.txt").write_text("".join("a/g:\t" + "\t".join(map(str, row)) + "\n" for row in counts.tolist()))
     archive(some, folder)
@@ -56,7 +58,7 @@ def files(walk, write_bag, tmp_path_factory):
     return Whole({path.suffix: path.read_bytes() for path in folder.iterdir() if path.is_file()})
 
 
-SUFFIXES = [".csv", ".tsv", ".parquet", ".txt", ".zip", ".mcap", ".db3", ".bag"]
+SUFFIXES = [".csv", ".tsv", ".json", ".jsonl", ".parquet", ".txt", ".zip", ".mcap", ".db3", ".bag"]
 # what befalls a file: cut, bytes changed, a piece twice, a piece gone, a piece of text put in
 PLACES = st.floats(0, 1, exclude_max=True)
 DAMAGE = st.one_of(

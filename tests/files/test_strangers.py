@@ -642,3 +642,12 @@ def test_the_command_for_unknown_columns_gives_the_clock_its_place(even_walk, tm
     assert refused.value.options == "--columns t,ax,ay,az,gx,gy,gz"
     read = mpucal.load(tmp_path / "running.csv", columns="t,ax,ay,az,gx,gy,gz")
     assert "times in ms, accelerations in counts of ±4 g (by |a|)" in read.taken
+
+
+@pytest.mark.parametrize(
+    "text", ['{"acc": [' + "1," * 300, '{"values": [' + ",".join(["[NaN,Infinity,1,2,3,4]"] * 300) + "]}"]
+)
+def test_json_without_samples_is_refused(text, tmp_path):
+    (tmp_path / "walk.json").write_text(text)
+    with pytest.raises(RecordingError, match="holds no columns that are known"):
+        mpucal.load(tmp_path / "walk.json")

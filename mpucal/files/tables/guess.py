@@ -102,8 +102,8 @@ def _has_size(table: Vector, pair: Sequence[int]) -> bool:
 
 def is_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase, and do not only repeat."""
-    steps = np.diff(column)
-    return bool((steps >= 0).all() and column[-1] > column[0] and (steps > 0).mean() > 0.01)
+    steps = np.diff(column[np.isfinite(column)])
+    return len(steps) > 0 and bool((steps >= 0).all() and (steps > 0).mean() > 0.01)
 
 
 def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
