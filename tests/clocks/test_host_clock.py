@@ -19,8 +19,8 @@ def pairs(rng, seconds, ppm, drift_ppm_a_minute=0.0, burst_s=0.0, a_second=10):
     return np.rint(bus * 1e9).astype(np.int64) + 5 * 10**12, np.rint(heard * 1e9).astype(np.int64) + 10**10
 
 
-@pytest.mark.parametrize("burst_ms", [1, 4, 16])
-@pytest.mark.parametrize(("ppm", "drift"), [(0, 0), (5000, 50), (-10000, -50), (10000, 0)])
+@pytest.mark.parametrize("burst_ms", [1, 16])
+@pytest.mark.parametrize(("ppm", "drift"), [(0, 0), (-10000, -50)])
 def test_half_a_minute_gives_the_rate_to_20_ppm(ppm, drift, burst_ms):
     rng = np.random.default_rng([abs(ppm), drift + 50, burst_ms])
     fits = [fit_pairs(*pairs(rng, 30, ppm, drift, burst_ms * 1e-3)) for _ in range(60)]

@@ -76,7 +76,7 @@ static void out(const float v[3]) {{ std::printf("%.9g %.9g %.9g ", v[0], v[1], 
 int main() {{
     int16_t c[6];
     while (std::scanf("%hd %hd %hd %hd %hd %hd", c, c + 1, c + 2, c + 3, c + 4, c + 5) == 6) {{
-        float a[4][3], w[4][3];
+        float a[4][3], w[4][3], none[3];
         {calls}
         for (int k = 0; k < 4; k++) {{
             struct mpucal_source blob = {{mpucal_read_memory, BLOBS[k], sizeof BLOBS[k]}};
@@ -109,6 +109,8 @@ def _program(folder, calibrations):
     calls = "".join(
         f"if (!r{code}::mpucal_correct_counts(c, {g}, a[{code}])"
         f" || !r{code}::mpucal_correct_gyro_counts(c + 3, {dps}, w[{code}])) return 4;\n"
+        f"if (r{code}::mpucal_correct_counts(c, {g} / 2, none)"
+        f" || r{code}::mpucal_correct_gyro_counts(c + 3, {dps} / 2, none)) return 5;\n"
         for code, (g, dps) in enumerate(RANGES)
     )
     blobs = [each.blob().encode() for each in calibrations]

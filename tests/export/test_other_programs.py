@@ -12,7 +12,6 @@ import yaml
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import WriteBackError
 from mpucal.export.forms import form
-from mpucal.export.vio import rotation_and_lower
 
 RATES = np.random.default_rng(5).uniform(-4.0, 4.0, (200, 3))
 
@@ -47,14 +46,6 @@ def test_openvins_propagates_corrected_samples(calibration, samples):
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(R) == pytest.approx(1.0)
     assert "estimates b_a and b_omega itself" in notes[0]
-
-
-def test_a_matrix_is_a_rotation_and_a_lower_triangle():
-    for M in np.random.default_rng(6).normal(np.eye(3), 0.3, (50, 3, 3)):
-        Q, L = rotation_and_lower(M)
-        np.testing.assert_allclose(Q @ L, M, atol=1e-12)
-        np.testing.assert_allclose(np.triu(L, 1), 0.0, atol=1e-12)
-        assert (np.diag(L) > 0).all()
 
 
 @pytest.mark.parametrize("name", ["kalibr", "openvins"])

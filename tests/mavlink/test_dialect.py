@@ -39,12 +39,6 @@ def test_a_stream_gives_its_packets_however_it_is_cut(packets, order, cuts):
     assert data_of(found) == chosen
 
 
-def test_a_byte_at_a_time(packets):
-    parse = parser()
-    found = [packet for data in packets for byte in data for packet in parse.stream(bytes([byte]))]
-    assert data_of(found) == [bytes(data) for data in packets]
-
-
 @given(junk=st.binary(max_size=60))
 def test_a_packet_after_junk_is_found(packets, junk):
     # so many bytes that whatever the junk seems to announce comes to its end

@@ -25,12 +25,6 @@ def turn(degrees):
     return z @ y @ x
 
 
-@given(roll=SMALL, pitch=SMALL)
-def test_the_tilt_of_a_force_is_roll_and_pitch(roll, pitch):
-    force = turn([roll, pitch, 30]).T @ [0, 0, -G]
-    np.testing.assert_allclose(tilt_deg(force), [roll, pitch], atol=1e-9)
-
-
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_a_trim_is_the_one_in_the_parameters(firmware):
     trim_deg = np.array([1.0, -2.0, 0.5])

@@ -2,8 +2,6 @@
 
 import gc
 import struct
-import subprocess
-import sys
 import tracemalloc
 
 import numpy as np
@@ -83,7 +81,7 @@ def test_a_capture_of_a_chip_exports_to_no_log(tmp_path):
         tlog_of(tmp_path)
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("share", [0.3, 0.9])
 def test_a_damaged_capture_gives_the_packets_before_the_damage(written, captured, share):
     data = bytearray(captured.read_bytes())
     data[int(share * len(data))] ^= 0xFF
@@ -130,15 +128,6 @@ def test_pymavlink_reads_it(written, monkeypatch):
     finally:
         mavlogfile.close()
     assert read == [("HEARTBEAT" if k == 0 else "RAW_IMU", record.t_ns // 1000) for k, record in enumerate(records)]
-
-
-def test_mavlogdump_reads_it(written):
-    path, records = written
-    command = [sys.executable, "-W", "ignore", "-m", "pymavlink.tools.mavlogdump", "--types", "RAW_IMU", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    if "No module named" in done.stderr:
-        pytest.skip("mavlogdump is not installed")
-    assert done.stdout.count("RAW_IMU {") == len(records) - 1
 
 
 @settings(max_examples=50)

@@ -8,7 +8,7 @@ from mpucal.result import error_model
 from mpucal.simulated.sensor import SensorTruth
 
 
-@pytest.fixture(params=range(5), ids=str)
+@pytest.fixture(params=range(2), ids=str)
 def true(request):
     return SensorTruth.draw(request.param)
 

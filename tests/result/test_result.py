@@ -121,12 +121,6 @@ def test_what_nobody_judged_is_refused(calibration):
     assert calibration.verdict == "good"
 
 
-def test_keys_that_a_newer_mpucal_added_are_ignored(calibration):
-    document = json.loads(calibration.json())
-    document["new"] = document["sensor"]["new"] = document["accelerometer"]["new"] = 1
-    same(Calibration.from_document(document), calibration)
-
-
 def test_a_document_with_a_gain_and_a_bias_alone_is_enough():
     document = {
         "format": "mpucal.calibration",
@@ -141,37 +135,13 @@ def test_a_document_with_a_gain_and_a_bias_alone_is_enough():
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
-        ("a.json", b"", "holds no calibration"),
         ("a.json", b"[1]", "holds no calibration"),
-        ("a.json", b"\xff\xfe\x00", "holds no calibration"),
         ("a.json", b'{"format": "other"}', "'other', not 'mpucal.calibration'"),
         ("a.json", b'{"format": "mpucal.calibration", "version": 2}', "version 2 is newer"),
         ("a.json", b'{"format": "mpucal.calibration"}', "accelerometer"),
-        (
-            "a.json",
-            b'{"format": "mpucal.calibration", "accelerometer": {"D": [1], "b_a": [1]}}',
-            "1 values long, not 3",
-        ),
-        (
-            "a.json",
-            b'{"format": "mpucal.calibration", "accelerometer": {"D": {}, "b_a": []}}',
-            "holds no calibration",
-        ),
         ("a.bin", b"", "not a config blob"),
-        ("a.bin", b"MPUC" + bytes(184), "not a config blob"),
     ],
-    ids=[
-        "empty",
-        "a list",
-        "no text",
-        "another format",
-        "newer",
-        "no accelerometer",
-        "wrong shape",
-        "no array",
-        "empty blob",
-        "zeros",
-    ],
+    ids=["a list", "another format", "newer", "no accelerometer", "empty blob"],
 )
 def test_files_that_hold_no_calibration(tmp_path, name, content, says):
     (tmp_path / name).write_bytes(content)

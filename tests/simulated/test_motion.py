@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.simulated.disturbance import ARMS
 from mpucal.simulated.hands import HANDS
-from mpucal.simulated.motion import AHEAD_S, BandNoise, Motion
+from mpucal.simulated.motion import AHEAD_S, Motion
 
 GRAVITY = 9.81
 PERIOD_S = 1 / (200 * 1.00371)
@@ -70,22 +70,16 @@ def test_the_rates_integrate_to_the_attitude(kind):
     assert np.degrees(np.arccos(min(1.0, (np.trace(error) - 1) / 2))) < 0.02
 
 
-@pytest.mark.parametrize("poll", [1, 20, 100])
-def test_the_motion_does_not_depend_on_how_it_is_asked(poll):
-    run, other = Run("guided", SESSION[:1], 10.0), Run("guided", SESSION[:1], 10.0, poll=poll)
+def test_the_motion_does_not_depend_on_how_it_is_asked():
+    run, other = Run("guided", SESSION[:1], 10.0), Run("guided", SESSION[:1], 10.0, poll=1)
     n = min(len(run.force), len(other.force))
     np.testing.assert_allclose(other.force[:n], run.force[:n], atol=1e-9)
     np.testing.assert_allclose(other.rate[:n], run.rate[:n], atol=1e-9)
 
 
-def test_another_seed_is_another_person():
-    a, b = Run("guided", SESSION, 14.0, seed=1), Run("guided", SESSION, 14.0, seed=2)
-    assert np.abs(a.force - b.force).max() > 0.1
-
-
 def test_it_reacts_no_sooner_than_a_person_and_no_later():
     assert AHEAD_S < 0.5
-    for seed in range(10):
+    for seed in range(4):
         run = Run("guided", ((4.0, prompt("lay_flat")), (12.0, prompt("rotate"))), 14.5, seed=seed)
         flat = np.abs(run.rate).max(axis=1) < 1e-9
         assert not run.part(flat, 0.0, 4.5).any()
@@ -117,7 +111,7 @@ def test_a_repeated_or_unknown_prompt_changes_nothing(kind, n):
 
 def test_in_the_hand_still_is_not_still():
     trembles = []
-    for seed in range(12):
+    for seed in range(6):
         run = Run("still", (), 10.0, seed=seed)
         up = run.force.mean(axis=0)
         trembles.append((run.force - up).std(axis=0).mean())
@@ -128,7 +122,7 @@ def test_in_the_hand_still_is_not_still():
 
 def test_asked_for_a_direction_it_misses_by_less_than_8_degrees():
     misses = []
-    for seed in range(16):
+    for seed in range(8):
         down = np.array([0.6, 0.0, 0.8]) if seed % 2 else np.array([-1.0, 0.0, 0.0])
         run = Run("guided", ((0.0, prompt("lay_flat")), (6.0, prompt("rotate", tuple(down)))), 10.5, seed=seed)
         force = run.part(run.force, 9.4, 9.9).mean(axis=0)
@@ -150,22 +144,6 @@ def test_turning_it_shows_different_orientations_with_pauses():
     assert np.abs(np.linalg.norm(run.pauses(), axis=1) - GRAVITY).max() < 0.2
 
 
-def test_moving_the_hand_accelerates_the_board():
-    run = Run("guided", SESSION, 62.0)
-    moving = np.linalg.norm(run.rate, axis=1) > 0.5
-    excess = np.linalg.norm(run.force, axis=1)[moving] - GRAVITY
-    assert 0.2 < excess.std() < 1.5
-    assert np.degrees(np.abs(run.rate).max()) < 250
-
-
-def test_the_random_hand_turns_all_the_time():
-    run = Run("random", SESSION, 62.0)
-    rate = np.degrees(run.part(run.rate, 16.0, 62.0))
-    np.testing.assert_allclose(rate.std(axis=0), 80, atol=20)
-    assert len(run.pauses()) < 60
-    assert np.abs(rate).max() < 500
-
-
 def poses_of(run, first_s, last_s):
     """Return the direction of gravity (k, 3) in each pause between two times, in order."""
     still = np.abs(run.part(run.rate, first_s, last_s)).max(axis=1) < 0.1
@@ -179,7 +157,7 @@ def test_the_repeating_hand_verifies_by_poses_of_the_turning_and_two_of_them_twi
     asked = prompt("verify", (0.6, 0.0, 0.8))
     # it misses by up to 8 deg each time
     seen = np.cos(np.radians(16.5))
-    for seed in range(4):
+    for seed in range(2):
         run = Run("repeating", (*SESSION, (45.0, asked)), 64.0, seed=seed)
         turned, verified = poses_of(run, 14.0, 45.0), poses_of(run, 48.0, 64.0)
         assert len(verified) >= 4
@@ -195,21 +173,6 @@ def test_the_still_hand_does_not_turn_and_the_restless_hand_never_lies_still():
     run = Run("restless", SESSION[:1], 30.0)
     for i in range(0, len(run.rate) - 200, 100):
         assert run.rate[i : i + 200].std(axis=0).max() > 0.03
-
-
-def test_a_wobble_has_its_strength_its_integral_and_its_derivative():
-    wobble = BandNoise(np.random.default_rng(5), (2.0, 10.0), 0.3)
-    n, step = 400, 1 / 2000
-    blocks = [(wobble.at(first, n), wobble.integral(first, n)) for first in range(0, 40000, n)]
-    values, integral = (np.concatenate(part) for part in zip(*blocks, strict=True))
-    np.testing.assert_allclose(values.std(axis=0), 0.3, rtol=0.1)
-    slope = np.gradient(integral, step, axis=0)
-    np.testing.assert_allclose(slope[1:-1], values[1:-1], atol=2e-3)
-    bent = np.diff(wobble.at(0, n), n=2, axis=0) / step**2
-    np.testing.assert_allclose(wobble.second_derivative(0, n)[1:-1], bent, atol=1e-3 * np.abs(bent).max())
-    spectrum = np.abs(np.fft.rfft(values, axis=0)) ** 2
-    frequency = np.fft.rfftfreq(len(values), step)
-    assert spectrum[(frequency > 1.5) & (frequency < 10.5)].sum() > 0.99 * spectrum.sum()
 
 
 def test_an_arm_sways_and_trembles_as_much_as_it_says():

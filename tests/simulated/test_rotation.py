@@ -12,19 +12,6 @@ def matrix(q):
     return Rotation.from_quat([*q[1:], q[0]]).as_matrix()
 
 
-def test_quaternions_against_matrices():
-    rng = np.random.default_rng(1)
-    steps = rng.normal(size=(300, 3)) * 0.3
-    running = rotation.running_product(np.array([1.0, 0.0, 0.0, 0.0]), rotation.exp(steps))
-    R = np.eye(3)
-    for q, step in zip(running[1:], steps, strict=True):
-        R = R @ matrix(rotation.exp(step))
-        np.testing.assert_allclose(matrix(q), R, atol=1e-9)
-        np.testing.assert_allclose(rotation.up_in_board(q), R[2], atol=1e-9)
-        np.testing.assert_allclose(rotation.board_from_world(q), R.T, atol=1e-9)
-    np.testing.assert_allclose(rotation.between(running), steps, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("a", "b"),
     [

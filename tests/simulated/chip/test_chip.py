@@ -9,7 +9,7 @@ from mpucal.chip import registers as reg
 from mpucal.errors import EndOfCapture
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS, OFFSETS
+from mpucal.simulated.chip.models import MODELS
 
 MS = 1_000_000
 TRIM = (-1500, 2001, 700)
@@ -114,12 +114,6 @@ def test_registers_after_a_write(model, register, written, kept):
     assert device.read(register, 1, 0) == bytes([kept])
 
 
-def test_a_burst_goes_on_from_register_to_register():
-    device = chip()
-    device.write(reg.SMPLRT_DIV, b"\x04\x03\x08\x10", 0)
-    assert device.read(reg.SMPLRT_DIV, 4, 0) == b"\x04\x03\x08\x10"
-
-
 def test_asleep_it_takes_no_samples():
     device = collecting(chip())
     device.write(reg.PWR_MGMT_1, b"\x40", 20 * MS)
@@ -131,15 +125,6 @@ def test_the_sensor_registers_hold_the_last_sample():
     device = collecting(chip(feed=feed), divider=9)
     assert words(device.read(reg.ACCEL_XOUT_H, 14, 39 * MS)) == list(range(14, 21))
     assert words(device.read(reg.GYRO_XOUT_H, 2, 39 * MS)) == [18]
-
-
-def test_without_fifo_only_the_last_sample_is_measured():
-    feed = Counter()
-    device = chip(feed=feed)
-    device.write(reg.CONFIG, b"\x01", 0)
-    device.write(reg.PWR_MGMT_1, b"\x01", 0)
-    assert words(device.read(reg.TEMP_OUT_H, 2, 500 * MS)) == [3]
-    np.testing.assert_allclose(feed.edges[0], [0.499, 0.500])
 
 
 def test_reading_int_status_clears_the_interrupt():
@@ -158,14 +143,6 @@ def test_a_frame_holds_the_enabled_sources_in_register_order(sources, columns):
     assert count(device, 10 * MS) == 2 * 2 * len(columns)
     frames = device.read(reg.FIFO_R_W, 2 * 2 * len(columns), 10 * MS)
     assert words(frames) == columns + [7 + c for c in columns]
-
-
-def test_a_frame_is_big_endian():
-    class Odd(Counter):
-        def samples(self, edges_s, setting):
-            return np.full((len(edges_s) - 1, 7), -2, np.int16)
-
-    assert collecting(chip(feed=Odd())).read(reg.FIFO_R_W, 4, 5 * MS) == b"\xff\xfe\xff\xfe"
 
 
 def test_reading_the_high_byte_latches_the_count():
@@ -225,17 +202,6 @@ def test_fifo_reset(model, value, left):
     assert count(device, 11 * MS) == left
 
 
-@pytest.mark.parametrize("ppm", [-8000.0, 0.0, 4000.0])
-def test_it_fills_at_its_own_clock(ppm):
-    feed = Counter()
-    device = collecting(chip(feed=feed, ppm=ppm), sources=reg.FIFO_EN_TEMP)
-    for t in range(20, 20_001, 20):
-        device.read(reg.FIFO_R_W, count(device, t * MS), t * MS)
-    edges = np.unique(np.round(np.concatenate(feed.edges), 9))
-    np.testing.assert_allclose(np.diff(edges), 1 / (200 * (1 + ppm * 1e-6)), rtol=1e-5)
-    assert feed.next == int(20 * 200 * (1 + ppm * 1e-6))
-
-
 # filters 0 and 7 have a base of 8 kHz
 @pytest.mark.parametrize(("config", "divider", "rate_hz"), [(3, 4, 200.0), (0, 7, 1000.0), (7, 39, 200.0)])
 def test_the_rate_follows_divider_and_filter(config, divider, rate_hz):
@@ -274,13 +240,6 @@ def test_a_feed_that_ends_is_served_to_its_last_sample():
     assert words(device.read(reg.FIFO_R_W, 5 * 14, 95 * MS)) == list(range(35))
     with pytest.raises(EndOfCapture):
         count(device, 100 * MS)
-
-
-def test_the_sensor_registers_end_with_the_feed():
-    device = chip(feed=Counter(end=0))
-    device.write(reg.PWR_MGMT_1, b"\x01", 0)
-    with pytest.raises(EndOfCapture):
-        device.read(reg.ACCEL_XOUT_H, 6, 10 * MS)
 
 
 def test_another_identity_is_still_the_same_chip():
@@ -329,12 +288,3 @@ def test_a_drawn_piece_answers_its_self_test_as_its_codes_say(model):
 
 def test_revision_c_has_half_the_sensitivity():
     assert setting_after((reg.ACCEL_CONFIG, b"\x08"), model="mpu6050c").accel_range_g == 8
-
-
-@pytest.mark.parametrize(("offsets", "offset_g"), [("2048", 0.125), ("4096", 0.0625), ("readonly", 0.0)])
-def test_the_effect_of_an_offset_can_be_chosen(offsets, offset_g):
-    feed = Counter()
-    device = Chip(replace(MODELS["mpu6050"], **OFFSETS[offsets]), feed, 0.0, PIECE)
-    device.write(0x06, word(TRIM[0] + 256), 0)
-    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
-    assert feed.settings[-1].accel_offset_g == (offset_g, 0.0, 0.0)
