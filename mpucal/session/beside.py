@@ -39,3 +39,8 @@ def end_beside(process: subprocess.Popen[Any]) -> None:
         if pipe is not None:
             with suppress(OSError):
                 pipe.close()
+
+
+def describe_end(code: int) -> str:
+    """Describe how a process ended, by its exit code: after `the process ...`."""
+    return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..chip.access import Bus
@@ -14,6 +14,7 @@ from ..files.messages import BUS
 from ..origin import Origin
 from ..session.plan import Plan
 from ..session.ports import Source
+from .apart import CAN_FORK, SourceApart
 from .chain import Chain
 from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
 from .tap import Tap
@@ -24,8 +25,15 @@ if TYPE_CHECKING:
 
 @dataclass
 class OpenedChip(OpenedSource):
-    """Chip on a bus, which is its `line`; see OpenedSource."""
+    """Chip on a bus, which is its `line`; see OpenedSource.
 
+    Attributes
+    ----------
+    apart : True to read its bus in a process of its own, as one whose FIFO does not wait for this program.
+    """
+
+    _: KW_ONLY
+    apart: bool = False
     origin = Origin.CHIP
     topic = BUS
 
@@ -52,8 +60,21 @@ class OpenedChip(OpenedSource):
     @contextmanager
     def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
         """See OpenedSource."""
-        driver = self.driver(Tap(self.bus, recorder), name, lambda text: say(f"  {text}."))
-        yield ActiveSource(driver, recorder.event, self.go_on, self.is_late)
+
+        tap = Tap(self.bus, recorder)
+
+        def tell(text: str) -> None:
+            # Not in the process that reads.
+            if tap.recorder is recorder:
+                say(f"  {text}.")
+
+        driver, event = self.driver(tap, name, tell), recorder.event
+        if not (self.apart and CAN_FORK):
+            yield ActiveSource(driver, event, self.go_on, self.is_late)
+            return
+        with closing(SourceApart(driver, tap, self.parts, self.hands)) as source:
+            self.hands = (source.hear,)
+            yield ActiveSource(source, event, self.go_on, self.is_late)
 
 
 def replayed(_capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], **how: Any) -> OpenedChip:

@@ -70,17 +70,27 @@ class ReplayBus:
     def _next_recorded(self, asked: Transaction) -> Transaction:
         if self._next == len(self._accesses):
             raise EndOfCapture(f"{self._name} ends before {_words(asked)}")
-        recorded = self._accesses[self._next]
-        if _words(asked) != _words(recorded):
-            raise CaptureError(
-                f"the program makes {_words(asked)}, but access {self._next} of {self._name} is {_words(recorded)}",
-                "replay it with the mpucal and options that recorded it, or calibrate it without replaying",
-            )
+        recorded = as_asked(asked, self._accesses[self._next], f"access {self._next} of {self._name}")
         self._next += 1
         self._pending += self._events[self._next]
-        if recorded.error is not None:
-            raise _RAISES.get(recorded.error.name, BusError)(recorded.error.what, recorded.error.remedy)
-        return recorded
+        return successful(recorded)
+
+
+def as_asked(asked: Transaction, recorded: Transaction, which: str) -> Transaction:
+    """Return a recorded access; CaptureError if the program asked for another one."""
+    if _words(asked) != _words(recorded):
+        raise CaptureError(
+            f"the program makes {_words(asked)}, but {which} is {_words(recorded)}",
+            "replay it with the mpucal and options that recorded it, or calibrate it without replaying",
+        )
+    return recorded
+
+
+def successful(recorded: Transaction) -> Transaction:
+    """Return a recorded access, or raise its error."""
+    if recorded.error is not None:
+        raise _RAISES.get(recorded.error.name, BusError)(recorded.error.what, recorded.error.remedy)
+    return recorded
 
 
 def _words(access: Transaction) -> str:

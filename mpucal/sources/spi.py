@@ -39,7 +39,7 @@ DATA = (*range(ACCEL_XOUT_H, ACCEL_XOUT_H + FRAME_BYTES), FIFO_R_W)
 
 def open_source(request: Request) -> OpenedChip:
     """Open the chip on the device that --spi names; see SpiBus."""
-    return OpenedChip(SpiBus(request.value), request.plan, words=request.words)
+    return OpenedChip(SpiBus(request.value), request.plan, words=request.words, apart=True)
 
 
 class SpiBus(HostBus):

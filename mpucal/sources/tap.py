@@ -15,36 +15,36 @@ T = TypeVar("T")
 class Tap:
     """Passes every access on to `bus` and records it in `recorder`, failed accesses included.
 
-    A failed access has no time: it is recorded with the last known time.
+    A failed access has no time: it is recorded with the last known time. Both may be replaced between two accesses.
     """
 
     def __init__(self, bus: Bus | Files, recorder: Recorder) -> None:
-        self._bus = bus
-        self._recorder = recorder
+        self.bus = bus
+        self.recorder = recorder
         self._latest_ns = 0
 
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
-        reply = self._tried("read", register, count, b"", lambda: self._bus.read(register, count))
+        reply = self._tried("read", register, count, b"", lambda: self.bus.read(register, count))
         self._latest_ns = max(self._latest_ns, reply.t_ns)
-        self._recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns, host_ns=reply.host_ns))
+        self.recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns, host_ns=reply.host_ns))
         return reply
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
-        t_ns = self._tried("write", register, len(data), data, lambda: self._bus.write(register, data))
+        t_ns = self._tried("write", register, len(data), data, lambda: self.bus.write(register, data))
         self._latest_ns = max(self._latest_ns, t_ns)
-        self._recorder.transaction(Transaction("write", register, len(data), data, t_ns))
+        self.recorder.transaction(Transaction("write", register, len(data), data, t_ns))
         return t_ns
 
     def sleep_until(self, t_ns: int) -> None:
         """See Bus."""
-        self._bus.sleep_until(t_ns)
+        self.bus.sleep_until(t_ns)
         self._latest_ns = max(self._latest_ns, t_ns)
 
     def close(self) -> None:
         """Close the bus; the recorder stays open."""
-        self._bus.close()
+        self.bus.close()
 
     def _tried(
         self, op: Literal["read", "write"], register: Any, count: int, data: bytes, access: Callable[[], T]
@@ -54,5 +54,5 @@ class Tap:
             return access()
         except BusError as error:
             failure = Failure(type(error).__name__, error.what, error.remedy)
-            self._recorder.transaction(Transaction(op, register, count, data, self._latest_ns, failure))
+            self.recorder.transaction(Transaction(op, register, count, data, self._latest_ns, failure))
             raise

@@ -147,6 +147,8 @@ def adapter(monkeypatch, tmp_path, still_chip):
         monkeypatch.setattr(smbus2, "ioctl", kernel.ioctl)
         time = SimpleNamespace(monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9)))
         monkeypatch.setattr(mpucal.sources.host_bus, "time", time)
+        # Time that only waiting takes waits for one process alone.
+        monkeypatch.setattr("mpucal.sources.chip.CAN_FORK", False)
         return kernel
 
     return make

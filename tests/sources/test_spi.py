@@ -71,6 +71,8 @@ def opened(monkeypatch):
             monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9))
         )
         monkeypatch.setattr(host_bus, "time", stopped)
+        # Time that only waiting takes waits for one process alone.
+        monkeypatch.setattr("mpucal.sources.chip.CAN_FORK", False)
         bus = SpiBus("/dev/spidev0.0")
         return bus, library.SpiDev.made
 

@@ -1,157 +1,129 @@
-"""Longest gap of the reading loop while fits run, and the share of a core that a live session takes.
+"""Samples that a session loses, and the longest gap between two of its reads, on a computer that is busy.
 
-python -m tools.bench loop_gap --rate 1000 --seconds 70
-python -m tools.bench loop_gap --rate 200 --seconds 70
+python -m tools.bench loop_gap --seconds 60
+python -m tools.bench loop_gap --seconds 60 --load 20 --rate 1000 --chip mpu6500
 
-A session on the simulated chip at a person's pace, recorded into a capture: the gap is the time between reads of
-FIFO_COUNT; at 1 kHz the FIFO overflows 36 ms after it was emptied. The program compares sessions without fits, with
-fits in the loop, with fits in a process of their own (as in a real session), and this with a page that one client reads
-and another one has stopped reading. The simulation takes part of the time.
+`mpucal session` on the simulated chip at a person's pace, on a terminal of its own and with a page that one client
+reads and another one has stopped reading, beside `load` endless loops of the same priority. The capture shows the times
+of the reads of FIFO_COUNT, and the samples that are missing. An MPU-6050's FIFO holds 0.36 s at 200 Hz and 73 ms at
+1 kHz, an MPU-6500's half of it.
 """
 
 from __future__ import annotations
 
+import os
+import pty
+import re
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import Annotated
 from urllib.parse import urlsplit
 
 import numpy as np
 
+import mpucal
 from mpucal.chip import registers as reg
-from mpucal.chip.access import Bus, Reply
-from mpucal.chip.config import Config
-from mpucal.chip.driver import Driver
-from mpucal.data import Sensor, Vector
-from mpucal.errors import EndOfCapture
-from mpucal.files.mcap import CaptureWriter
-from mpucal.page.address import Address
-from mpucal.page.feed import Feed
-from mpucal.session.events import Event, Output
-from mpucal.session.live.fits import Task
-from mpucal.session.live.scheduler import InlineWorker, Worker
-from mpucal.session.live.worker_process import ProcessWorker
-from mpucal.session.plan import Plan
-from mpucal.session.runner import Runner
-from mpucal.simulated.chip import open_simulated
-from mpucal.sources.tap import Tap
-from tools.lab.sessions import SilentOperator
+from mpucal.chip.access import Transaction
+from mpucal.data import Recording, Vector
+from mpucal.files.mcap import read_capture
 
-from .timing import ended_children_s, used
-
-FIFO_FRAMES = 512 // reg.FRAME_BYTES
-
-
-Hire = Callable[[Plan, Sensor], Worker]
-
-
-class IdleWorker:
-    """Worker that does not compute: each answer is empty, at once."""
-
-    def __init__(self, _plan: Plan, _sensor: Sensor) -> None: ...
-
-    def submit(self, _task: Task) -> Future[Event | None]:
-        """See Worker."""
-        answer: Future[Event | None] = Future()
-        answer.set_result(None)
-        return answer
-
-    def close(self) -> None:
-        """See Worker."""
-
-
-HIRED: dict[str, tuple[Hire, bool]] = {
-    "without fits": (IdleWorker, False),
-    "with fits in the loop": (InlineWorker, False),
-    "with fits apart": (ProcessWorker, False),
-    "with fits apart, and a page": (ProcessWorker, True),
-}
+ENDLESS = "while True: pass"
 READS = "import sys, urllib.request; urllib.request.urlopen(sys.argv[1] + 'events').read()"
 
 
-class TimedBus:
-    """Bus that notes the times of reads of FIFO_COUNT, and ends after some seconds."""
-
-    def __init__(self, bus: Bus, seconds: float) -> None:
-        self._bus, self._end_ns = bus, time.monotonic_ns() + round(seconds * 1e9)
-        self.write, self.sleep_until, self.close = bus.write, bus.sleep_until, bus.close
-        self.looks_ns: list[int] = []
-
-    def read(self, register: int, count: int) -> Reply:
-        """See Bus."""
-        if register == reg.FIFO_COUNT_H:
-            self.looks_ns.append(time.monotonic_ns())
-        if time.monotonic_ns() > self._end_ns:
-            raise EndOfCapture
-        return self._bus.read(register, count)
-
-
-class Listener(SilentOperator):
-    """Operator who presses nothing; the count of reads begins at the first prompt, when the chip is configured."""
-
-    def __init__(self, bus: TimedBus, feed: Feed | None) -> None:
-        super().__init__()
-        self._bus, self._feed = bus, feed
-
-    def hear(self, output: Output) -> None:
-        """Begin to count at the first output; pass all outputs to the page."""
-        if self._feed is not None:
-            self._feed.hear(output)
-        if not self.heard:
-            self._bus.looks_ns.clear()
-        super().hear(output)
-
-
 @contextmanager
-def followed(page: bool) -> Iterator[Feed | None]:
-    """Yield a page with two clients if `page` is given, else None."""
-    if not page:
-        yield None
-        return
-    feed = Feed(Address(), {"title": "trial", "board": "gy-521"})
-    where = urlsplit(feed.url)
-    with (
-        socket.create_connection((where.hostname, where.port)) as stalled,
-        subprocess.Popen([sys.executable, "-c", READS, feed.url]) as reading,
-    ):
+def running(*code: str) -> Iterator[None]:
+    """Run code of Python in a process of its own for the duration of a `with` block."""
+    with subprocess.Popen([sys.executable, "-c", *code], stderr=subprocess.DEVNULL) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+class Terminal:
+    """Terminal of a session: its output is read, and searched for the address of the page."""
+
+    def __init__(self) -> None:
+        self._ours, self.theirs = pty.openpty()
+        self._said = b""
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def url(self) -> str:
+        """Wait for the address of the page."""
+        while not (found := re.search(rb"http://\S+/", self._said)):
+            time.sleep(0.1)
+        return found[0].decode()
+
+    def press(self, keys: bytes) -> None:
+        """Press keys."""
+        os.write(self._ours, keys)
+
+    def _read(self) -> None:
+        with suppress(OSError):
+            while data := os.read(self._ours, 1 << 16):
+                self._said = (self._said + data)[-(1 << 16) :]
+
+
+def measure(words: list[str], seconds: float, load: int, folder: Path) -> tuple[Path, float]:
+    """Run a session for some seconds; return its capture, and the share of a core that it used."""
+    terminal, stack = Terminal(), ExitStack()
+    command = [sys.executable, "-m", "mpucal", "session", *words, "-o", str(folder), "--page", "--target", "best"]
+    begun = time.monotonic()
+    session = subprocess.Popen(command, stdin=terminal.theirs, stdout=terminal.theirs, stderr=terminal.theirs)
+    url = terminal.url()
+    where = urlsplit(url)
+    with stack:
+        stalled = stack.enter_context(socket.create_connection((where.hostname, where.port)))
         stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
         stalled.sendall(f"GET {where.path}events HTTP/1.1\r\nHost: {where.netloc}\r\n\r\n".encode())
-        yield feed
-        reading.kill()
-        feed.close()
+        stack.enter_context(running(READS, url))
+        terminal.press(b"\n")
+        for _ in range(load):
+            stack.enter_context(running(ENDLESS))
+        time.sleep(seconds)
+    session.send_signal(signal.SIGINT)
+    _, _, spent = os.wait4(session.pid, 0)
+    return next(folder.parent.rglob("*.mcap")), (spent.ru_utime + spent.ru_stime) / (time.monotonic() - begun)
 
 
-def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> tuple[Vector, float]:
-    """Run a session; return the gaps (n,) between reads [ms], and the share of a core that was used."""
-    chip = open_simulated("sim:pace=real", seed=1)
-    bus = TimedBus(chip, seconds)
-    plan = Plan(Config(rate_hz=rate_hz), target="best")
-    with (
-        followed(page) as feed,
-        tempfile.TemporaryDirectory() as folder,
-        CaptureWriter(Path(folder) / "capture.mcap") as writer,
-    ):
-        writer.start({})
-        driver = Driver(Tap(bus, writer), plan.config)
-        runner = Runner(driver, Listener(bus, feed), writer.event, plan, (chip.hear,), start_worker=start_worker)
-        with used(ended_children_s) as found:
-            runner.measure()
-    return np.diff(bus.looks_ns) * 1e-6, (found.cpu_s + found.children_s) / found.wall_s
+def gaps_ms(capture: Path, recording: Recording) -> Vector:
+    """Return the times (n,) between two reads of FIFO_COUNT [ms], from the first sample on."""
+    accesses = [record for record in read_capture(capture).records if isinstance(record, Transaction)]
+    looks_s = np.array([access.t_ns for access in accesses if access.register == reg.FIFO_COUNT_H]) * 1e-9
+    return np.asarray(np.diff(looks_s[looks_s >= recording.t[0]]) * 1e3)
 
 
-def main(*, rate: float = 1000.0, seconds: float = 70.0) -> None:
-    """Measure each arrangement."""
-    print(f"{rate:g} Hz, {seconds:g} s; a 512-byte FIFO holds {1000.0 * FIFO_FRAMES / rate:.0f} ms")
-    for name, (start_worker, page) in HIRED.items():
-        gaps, share = measure(rate, seconds, start_worker, page)
-        print(
-            f"{name}: gaps {np.median(gaps):.1f} ms in the median, "
-            f"{np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {share:.0%} of a core",
-            flush=True,
-        )
+def lost_s(recording: Recording) -> Vector:
+    """Return the duration of each place (k,) where samples are missing [s]."""
+    steps = np.diff(recording.t)
+    return np.asarray(steps[recording.gap[1:]] - 1.0 / recording.rate_hz)
+
+
+def main(
+    *,
+    rate: Annotated[float, "Hz"] = 200.0,
+    seconds: float = 60.0,
+    load: Annotated[int, "endless loops beside the session"] = 0,
+    chip: str = "mpu6050",
+) -> None:
+    """Measure and print."""
+    words = ["--bus", f"sim:pace=real,chip={chip}", "--seed", "1", "--rate", f"{rate:g}"]
+    with tempfile.TemporaryDirectory() as folder:
+        capture, share = measure(words, seconds, load, Path(folder) / "board")
+        recording = mpucal.load(capture)
+        gaps = gaps_ms(capture, recording)
+    lost = lost_s(recording)
+    print(
+        f"{chip} at {rate:g} Hz, {load} loops beside it: reads {np.median(gaps):.1f} ms apart in the"
+        f" median, {np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {len(recording)} samples,"
+        f" {lost.sum():.2f} s lost in {len(lost)} places; {share:.0%} of a core"
+    )

@@ -15,7 +15,7 @@ from typing import IO
 
 from ...data import Sensor
 from ...errors import Abandoned
-from ..beside import end_beside, start_beside
+from ..beside import describe_end, end_beside, start_beside
 from ..events import Event
 from ..plan import Plan
 from .fits import Fits, Task
@@ -57,10 +57,9 @@ class ProcessWorker:
             self._send(task)
             answer: Event | Exception | None = pickle.load(_open_pipe(self._process.stdout))
         except (EOFError, OSError, pickle.UnpicklingError):
-            code = self._process.wait()
-            how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+            ended = describe_end(self._process.wait())
             raise Abandoned(
-                f"the process that computes the fits {how}", "free some memory, and continue with --resume"
+                f"the process that computes the fits {ended}", "free some memory, and continue with --resume"
             ) from None
         if isinstance(answer, Exception):
             raise answer

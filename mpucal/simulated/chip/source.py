@@ -19,4 +19,5 @@ def open_source(request: Request) -> OpenedChip:
     config = request.plan.config
     seldom = replace(config, poll_s=min(SELDOM_S, MAX_FRAMES_A_POLL / config.rate_hz))
     plan = request.plan if bus.real_time else replace(request.plan, config=seldom)
-    return OpenedChip(bus, plan, (bus.hear,), bus.truth_document, words=request.words, real_time=bus.real_time)
+    live, words = bus.real_time, request.words
+    return OpenedChip(bus, plan, (bus.hear,), bus.truth_document, words=words, real_time=live, apart=live)

@@ -112,6 +112,8 @@ def begin(words: dict[str, Any]) -> None:
     sys.stdin, sys.stdout, sys.stderr = (os.fdopen(at, mode, closefd=False) for at, mode in enumerate("rww"))
     if "MPUCAL_TEST_CLOCK" in os.environ:
         ctypes.CDLL(None).share_test_clock()
+        # the clock waits for this process alone
+        importlib.import_module("mpucal.sources.chip").CAN_FORK = False
     sys.argv = words["argv"]
     exec(compile(words["run"], sys.argv[0], "exec"), {"__name__": "__main__"})
 

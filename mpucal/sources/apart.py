@@ -1,0 +1,190 @@
+"""Process of its own that reads a sensor, so that nothing else that a session does keeps the FIFO waiting.
+
+The process is forked when the sensor starts. Its driver reads the bus, and here the same driver continues from the same
+state with the accesses that arrive from there. A driver's accesses depend on the replies alone, so that both make the
+same ones, and what happens above the bus is as without the process.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection, Pipe
+from queue import SimpleQueue
+from threading import Thread
+from typing import Any
+
+from ..chip.access import Transaction
+from ..data import Sensor
+from ..errors import BusError
+from ..session.beside import describe_end
+from ..session.events import Prompt
+from ..session.ports import Source
+from .chain import Chain
+from .replay import ReplayBus, as_asked, successful
+from .tap import Tap
+
+CAN_FORK = sys.platform == "linux"
+# Wish of the session, and what the process sends between its last poll and the accesses that stop the sensor.
+STOP = None
+
+
+class SourceApart:
+    """Source that a process of its own reads from `start` on.
+
+    Parameters
+    ----------
+    driver : measures through `tap`, whose bus is usable after a fork. parts : of a resumed session: the process reads
+        the last one. hands : receivers of the prompts, in the process.
+    """
+
+    def __init__(
+        self, driver: Source, tap: Tap, parts: Chain[Any] | None, hands: Sequence[Callable[[Prompt], None]]
+    ) -> None:
+        self._driver, self._tap, self._parts, self._hands = driver, tap, parts, hands
+        self.poll, self.recording = driver.poll, driver.recording
+        self.forget, self.now_ns = driver.forget, driver.now_ns
+        self._followed: FollowedBus | None = None
+
+    def start(self) -> Sensor:
+        """Start the process, and the sensor in it; see Source."""
+        if self._parts is None or not self._parts.replaying:
+            here, there = Pipe()
+            with warnings.catch_warnings():
+                # Python 3.12 warns of a fork beside threads; the process uses none of their locks.
+                warnings.simplefilter("ignore", DeprecationWarning)
+                pid = os.fork()
+            if not pid:
+                here.close()
+                self._read(there)
+            there.close()
+            self._followed = self._tap.bus = FollowedBus(here, pid)
+        return self._driver.start()
+
+    def stop(self) -> None:
+        """Stop the sensor, after the poll at which the process is; what it read beyond this one is dropped."""
+        if self._followed is not None:
+            self._followed.stop_polling()
+        self._driver.stop()
+
+    def hear(self, prompt: Prompt) -> None:
+        """Pass a prompt to the hands."""
+        if self._followed is not None:
+            self._followed.tell(prompt)
+
+    def close(self) -> None:
+        """End the process."""
+        if self._followed is not None:
+            self._followed.close()
+
+    def _read(self, session: Connection) -> None:
+        """Read the bus until the session says so or has ended; the main function of the process, which ends here."""
+        try:
+            # Ctrl-C reaches the session alone.
+            os.setpgid(0, 0)
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                signal.signal(number, signal.SIG_DFL)
+            # Before all other programs where the user may; it sleeps between two polls.
+            with suppress(OSError):
+                os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+            outbox = self._tap.recorder = Outbox(session)
+            try:
+                self._driver.start()
+                while not self._is_to_stop(session):
+                    self._driver.poll()
+                    self._driver.forget()
+                outbox.put(STOP)
+                self._driver.stop()
+            except Exception as error:  # the session raises it at this place
+                error.add_note(f"in the reading process:\n{traceback.format_exc()}")
+                outbox.put(error)
+            outbox.close()
+        finally:
+            os._exit(0)
+
+    def _is_to_stop(self, session: Connection) -> bool:
+        """Pass what the session sent to the hands; return True if it wishes to stop, or has ended."""
+        with suppress(OSError, EOFError):
+            while session.poll():
+                wish = session.recv()
+                if wish is STOP:
+                    return True
+                for hand in self._hands:
+                    hand(wish)
+            return False
+        return True
+
+
+class Outbox:
+    """Queue in the reading process, which never waits for the session: memory holds what that does not take."""
+
+    def __init__(self, session: Connection) -> None:
+        self._queue: SimpleQueue[Any] = SimpleQueue()
+        self.put = self.transaction = self._queue.put
+        self._thread = Thread(target=self._send, args=(session,))
+        self._thread.start()
+
+    def close(self) -> None:
+        """Send what is left."""
+        self.put(self)
+        self._thread.join()
+
+    def _send(self, session: Connection) -> None:
+        with suppress(OSError):
+            while (item := self._queue.get()) is not self:
+                session.send(item)
+
+
+class FollowedBus(ReplayBus):
+    """Bus of the session: it answers with the accesses that the reading process has made.
+
+    Parameters
+    ----------
+    process : connection to it. pid : its process id.
+    """
+
+    def __init__(self, process: Connection, pid: int) -> None:
+        super().__init__((), "the reading process")
+        self._process, self.pid = process, pid
+        self._ended: BusError | None = None
+
+    def tell(self, wish: Prompt | None) -> None:
+        """Send a prompt, or the wish to stop."""
+        with suppress(OSError):
+            self._process.send(wish)
+
+    def stop_polling(self) -> None:
+        """Drop the accesses until those that stop the sensor."""
+        self.tell(STOP)
+        with suppress(Exception):
+            while self._received() is not STOP:
+                pass
+
+    def close(self) -> None:
+        """End the process."""
+        if self._ended is None:
+            os.kill(self.pid, signal.SIGKILL)
+            os.waitpid(self.pid, 0)
+        self._process.close()
+
+    def _next_recorded(self, asked: Transaction) -> Transaction:
+        return successful(as_asked(asked, self._received(), "that of the reading process"))
+
+    def _received(self) -> Any:
+        """Wait for the next access; raise what the process raised in its place, or BusError if that has ended."""
+        if self._ended is not None:
+            raise self._ended
+        try:
+            item = self._process.recv()
+        except (OSError, EOFError):
+            code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+            self._ended = BusError(f"the process that reads the sensor {describe_end(code)}", "start again")
+            raise self._ended from None
+        if isinstance(item, Exception):
+            raise item
+        return item

@@ -1,0 +1,175 @@
+"""Reading in a process of its own; the chip is simulated."""
+
+import os
+import signal
+from contextlib import closing
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.chip.registers import FIFO_COUNT_H, USER_CTRL
+from mpucal.errors import BusError, EndOfCapture, NoAnswer
+from mpucal.session.events import Prompt, PromptKind
+from mpucal.simulated.chip import open_recorded, open_simulated
+from mpucal.sources.apart import CAN_FORK, SourceApart
+from mpucal.sources.chain import ChainedBus, ShiftedClockBus
+from mpucal.sources.replay import ReplayBus
+from mpucal.sources.tap import Tap
+
+pytestmark = pytest.mark.skipif(not CAN_FORK, reason="only Linux forks here")
+
+
+def rest(n=400):
+    """A simulated chip that serves n samples and ends."""
+    rng = np.random.default_rng(5)
+    counts = rng.normal(0.0, 8.0, (2, n, 3)).round().astype(int)
+    counts[0, :, 2] += 8192
+    return open_recorded(*counts, rate_hz=200.0, accel_range_g=4, gyro_range_dps=500)
+
+
+def tapped(bus):
+    accesses = []
+    return Tap(bus, SimpleNamespace(transaction=accesses.append)), accesses
+
+
+def apart(bus, hands=(), parts=None):
+    tap, accesses = tapped(bus)
+    return SourceApart(Driver(tap, Config()), tap, parts, hands), accesses
+
+
+def measure(source, polls=10**6):
+    """Return the samples of each poll until the end."""
+    samples = []
+    try:
+        source.start()
+        for _ in range(polls):
+            samples.append(source.poll())
+    except EndOfCapture:
+        pass
+    return samples
+
+
+def test_records_and_measures_as_without_the_process():
+    bus, alone = tapped(rest())
+    driver = Driver(bus, Config())
+    expected = measure(driver)
+    opened, accesses = apart(rest())
+    with closing(opened) as source:
+        found = measure(source)
+        assert accesses == alone
+        assert len(source.recording()) > 300
+        for one, other in zip([*found, source.recording()], [*expected, driver.recording()], strict=True):
+            np.testing.assert_array_equal(one.t, other.t)
+            np.testing.assert_array_equal(one.acc, other.acc)
+
+
+def test_stops_the_sensor_after_what_the_session_used():
+    opened, accesses = apart(open_simulated("sim", seed=1))
+    with closing(opened) as source:
+        samples = measure(source, polls=5)
+        source.stop()
+    assert accesses[-1].register == USER_CTRL
+    assert sum(access.register == FIFO_COUNT_H for access in accesses) < 30
+    # A replay stops at the same place, and reads all of it.
+    bus = ReplayBus(accesses)
+    again = Driver(bus, Config())
+    np.testing.assert_array_equal(measure(again, polls=5)[-1].t, samples[-1].t)
+    again.stop()
+    assert bus.unread() == 0
+
+
+def test_raises_the_error_of_a_bus_that_fails():
+    def no_answer(_register, _count):
+        raise NoAnswer("nothing acknowledges", "check the wires")
+
+    bus = SimpleNamespace(read=no_answer, sleep_until=lambda t_ns: None)
+    with closing(apart(bus)[0]) as source, pytest.raises(NoAnswer, match="nothing acknowledges: check the wires"):
+        source.start()
+
+
+def test_raises_a_fault_of_the_program_with_its_place():
+    def fault(_register, _count):
+        raise ZeroDivisionError("for a trial")
+
+    bus = SimpleNamespace(read=fault, sleep_until=lambda t_ns: None)
+    with closing(apart(bus)[0]) as source, pytest.raises(ZeroDivisionError, match="for a trial") as raised:
+        source.start()
+    assert any("in fault" in note for note in raised.value.__notes__)
+
+
+def test_says_that_the_process_was_killed():
+    simulated = open_simulated("sim", seed=1)
+
+    def killing(register, count):
+        if register == FIFO_COUNT_H:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return simulated.read(register, count)
+
+    bus = SimpleNamespace(read=killing, write=simulated.write, sleep_until=simulated.sleep_until)
+    with (
+        closing(apart(bus)[0]) as source,
+        pytest.raises(BusError, match="reads the sensor was killed by signal 9: start again"),
+    ):
+        measure(source)
+
+
+def test_the_hand_gets_the_prompts_in_the_process():
+    seen, told = os.pipe()
+    prompt = Prompt(PromptKind.LAY_FLAT, "Lay it flat")
+    opened, _ = apart(open_simulated("sim", seed=1), hands=[lambda prompt: os.write(told, prompt.text.encode())])
+    with closing(opened) as source:
+        measure(source, polls=1)
+        source.hear(prompt)
+        assert os.read(seen, 100) == b"Lay it flat"
+        source.stop()
+    os.close(seen)
+    os.close(told)
+
+
+def test_ends_with_the_session_and_stops_the_sensor():
+    written, told = os.pipe()
+    simulated = open_simulated("sim", seed=1)
+
+    def write(register, data):
+        if register == USER_CTRL and os.getpid() != session:
+            os.write(told, data)
+        return simulated.write(register, data)
+
+    session = os.getpid()
+    bus = SimpleNamespace(read=simulated.read, write=write, sleep_until=simulated.sleep_until)
+    pid = os.fork()
+    if not pid:
+        # A session that is killed.
+        session = os.getpid()
+        measure(apart(bus)[0], polls=1)
+        os.kill(session, signal.SIGKILL)
+    os.close(told)
+    os.waitpid(pid, 0)
+    with os.fdopen(written, "rb") as stream:
+        assert stream.read()[-1:] == b"\0"
+
+
+def test_a_resumed_session_is_replayed_here_before_the_process_goes_on():
+    before = tapped(rest())
+    measure(Driver(before[0], Config()))
+
+    def resumed():
+        return ChainedBus([ReplayBus(before[1]), ShiftedClockBus(rest(), before[1][-1].t_ns)])
+
+    chain = resumed()
+    bus, alone = tapped(chain)
+    driver = Driver(bus, Config())
+    measure(driver)
+    assert chain.go_on()
+    measure(driver)
+    chain = resumed()
+    opened, accesses = apart(chain, parts=chain)
+    with closing(opened) as source:
+        measure(source)
+        assert chain.go_on()
+        assert measure(source)
+        assert accesses == alone
+        np.testing.assert_array_equal(source.recording().t, driver.recording().t)
