@@ -16,16 +16,17 @@ from ..rests.intervals import RestFinder
 from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
-from .hypotheses import SURE, Explanation, explain, remove_walk, walk_of
+from .hypotheses import SURE, Explanation, explain, gyroscope_change, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, choose_model
+from .parameters import ACCELEROMETER
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
 from .words import correct_signed_bytes
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
-MOST_WALKS = 3  # each is what is left of a drift after the one before
+MOST_CHANGES = 3  # each is what is left of a drift after the one before
 
 
 def estimate(
@@ -102,24 +103,24 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
     choice, explanations = _fit(recording, flat, gravity, model)
-    claim = claim_uncertainty(choice.fit, gravity, explanations, choice.walked)
+    claim = claim_uncertainty(choice.fit, gravity, explanations, choice.freed)
     evidence = replace(before, fit=inflate(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 
 
 def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation]]:
-    """Return the fit without the walk of the gyroscope's bias during the turning, and what explains the rest."""
+    """Return the fit without changes of the gyroscope's bias during the turning, and what explains the rest."""
     choice, found = _fit_once(recording, flat, gravity, model)
-    for _ in range(MOST_WALKS):
-        walk = walk_of(found)
-        if walk is None or not choice.fit.converged:
+    for _ in range(MOST_CHANGES):
+        change = gyroscope_change(found)
+        if change is None or not choice.fit.converged:
             break
-        without, left = _fit_once(remove_walk(choice.recording, flat, walk), flat, gravity, model)
-        # A walk whose removal explains nothing is none.
+        without, left = _fit_once(remove_change(choice.recording, flat, change), flat, gravity, model)
+        # A change whose removal explains nothing is none.
         if not choice.fit.V - np.log(SURE) > without.fit.V:
             break
-        choice, found = without._replace(walked=without.walked + choice.walked + walk.q), left
+        choice, found = without._replace(freed=without.freed + choice.freed + change.freed[ACCELEROMETER]), left
     return choice, found
 
 

@@ -14,16 +14,15 @@ eigenvalues of S and the components c of the scores
 
     2 log p(q)/p(0) = sum c^2 / (lambda + 1/q) - log(1 + q lambda)
 
-The evidence is the mean of p(q)/p(0) over the values of q, and over the times of a step. The hypotheses do not exclude
-each other, and each is compared with nothing alone: where several are likely, the one that leaves an element least
-certain counts.
+The evidence is the mean of p(q)/p(0) over the values of q, and over the times of a step. All hypotheses together are
+beforehand as likely as nothing, and all are weighed against each other: what one common cause explains needs no other.
 
 Source: Kass, Raftery, "Bayes factors" (1995); of random effects, Robinson, "That BLUP is a good thing" (1991).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
@@ -60,13 +59,13 @@ class Hypothesis(NamedTuple):
         return "change" if self.is_change and self.what != "gyroscope" else "time"
 
 
-WALK = Hypothesis("gyroscope", "walk", 16)
 HYPOTHESES = (
     Hypothesis("accelerometer", "step", 48),
     Hypothesis("scale", "step", 48),
     Hypothesis("mount", "step", 48),
     Hypothesis("accelerometer", "walk", 16),
-    WALK,
+    Hypothesis("gyroscope", "step", 48),
+    Hypothesis("gyroscope", "walk", 16),
     Hypothesis("accelerometer", "pulse", 48),
     Hypothesis("accelerometer", "each", 16),
     Hypothesis("scale", "each", 16),
@@ -90,22 +89,23 @@ class Explanation(NamedTuple):
     Attributes
     ----------
     hypothesis : which one. evidence : log of its evidence as a multiple of that of nothing.
-    q : likeliest variance of x. delta : (k, 3) by group, m/s^2, 1, rad or rad/s, at the likeliest q and time.
+    delta : (k, 3) by group, m/s^2, 1, rad or rad/s, at the likeliest q and time.
     start, end : (k,) s after the flat segment, of the groups; of sides, the first and last time that each was down.
     away : (p,) rms distance of the estimate from the parameters, if it is true; of a change, from their mean over time.
     farthest : (p,) largest distance of the parameters from the estimate, before the first group and in any.
-    weight : probability among the hypotheses of its quantity and nothing.
+    freed : (p,) share of itself by which the variance of the estimate grows, if x is estimated too.
+    weight : probability among all hypotheses and nothing.
     is_sure : True for a change of the accelerometer against which all else is unlikely; `away` is `farthest` then.
     """
 
     hypothesis: Hypothesis
     evidence: float
-    q: float
     delta: Vector
     start: Vector
     end: Vector
     away: Vector
     farthest: Vector
+    freed: Vector
     weight: float = 0.0
     is_sure: bool = False
 
@@ -145,38 +145,26 @@ def explain(parts: Parts, D: Vector) -> list[Explanation]:
         return []
     groups = {number: _Groups.of(parts, number) for number in {each.groups for each in HYPOTHESES}}
     found = [_explain(each, groups[each.groups], parts, D) for each in HYPOTHESES if len(groups[each.groups].start) > 1]
-    totals = {what: log_total([each for each in found if each.hypothesis.what == what]) for what in LARGEST}
-    found = [each._replace(weight=float(np.exp(each.log_share - totals[each.hypothesis.what]))) for each in found]
+    total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # with nothing, whose share is 1
+    found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
     found.sort(key=lambda each: -each.evidence)
     changes = [each for each in found if each.hypothesis.kind == "change"]
-    others = [each for each in found if not each.hypothesis.is_change]
-    if changes and log_total(changes) - log_total(others) > np.log(SURE):
+    if sum(each.weight for each in changes) > 1.0 - 1.0 / SURE:
         of_sure = changes[0]._replace(weight=1.0, away=changes[0].farthest, is_sure=True)
         found = [of_sure if each is changes[0] else each for each in found]
     return found
 
 
-def log_total(explanations: Iterable[Explanation]) -> float:
-    """Return the log of the shares of the explanations and of nothing, whose share is 1."""
-    return float(np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)]))
-
-
-def walk_of(explanations: Sequence[Explanation]) -> Explanation | None:
-    """Return the walk of the gyroscope's bias; None where nothing, or a change of the accelerometer, is likelier."""
+def gyroscope_change(explanations: Sequence[Explanation]) -> Explanation | None:
+    """Return the change of the gyroscope's bias; None where nothing, or a change of the accelerometer, is likelier."""
     first = next((each for each in explanations if each.hypothesis.is_change), None)
-    return first if first is not None and first.hypothesis == WALK and first.log_share > np.log(SURE) else None
+    is_likely = first is not None and first.hypothesis.what == "gyroscope" and first.log_share > np.log(SURE)
+    return first if is_likely else None
 
 
-def remove_walk(recording: Recording, flat: Flat, walk: Explanation) -> Recording:
-    """Subtract a walk of the gyroscope's bias from the rates."""
-    return replace(recording, gyr=recording.gyr - walk.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0)))
-
-
-def walked_variance(parts: Parts, D: Vector, q: float) -> Vector:
-    """Return (p,) the variance of theta if the gyroscope's bias walks by q [(rad/s)^2] from group to group."""
-    likelihood = _Likelihood.of(WALK, _Groups.of(parts, WALK.groups), parts, D)
-    walked = np.einsum("md,mdp->p", 1.0 / (likelihood.eigenvalues + 1.0 / q), likelihood.follow**2)
-    return np.asarray(np.diag(parts.covariance) + walked)
+def remove_change(recording: Recording, flat: Flat, change: Explanation) -> Recording:
+    """Subtract a change of the gyroscope's bias from the rates."""
+    return replace(recording, gyr=recording.gyr - change.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0)))
 
 
 class _Groups(NamedTuple):
@@ -264,7 +252,8 @@ def _explain(hypothesis: Hypothesis, groups: _Groups, parts: Parts, D: Vector) -
         astray += likelihood.mean() @ B.T
     away = np.einsum("mq,mqp->p", p, variance @ astray**2 + ((c * variance) @ astray) ** 2)
     farthest = np.abs(np.vstack([np.zeros(3), delta]) @ B.T - x @ likelihood.follow[m]).max(axis=0)
-    return Explanation(hypothesis, evidence, float(q[best]), delta, groups.start, groups.end, np.sqrt(away), farthest)
+    freed = variance[m, best] @ likelihood.follow[m] ** 2 / np.diag(parts.covariance)
+    return Explanation(hypothesis, evidence, delta, groups.start, groups.end, np.sqrt(away), farthest, freed)
 
 
 def _directions(what: What, D: Vector, p: int) -> Vector:

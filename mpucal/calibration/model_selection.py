@@ -18,14 +18,14 @@ from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import fit_hand
-from .hypotheses import explain, remove_walk, walk_of
+from .hypotheses import explain, gyroscope_change, remove_change
 from .hypothesis_tests import WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
-from .parameters import ACCEL, IMU
+from .parameters import ACCEL, ACCELEROMETER, IMU
 from .parts import ends_of, parts_of
 from .problem import Problem, Series
 from .rotation import lengths
@@ -56,21 +56,22 @@ class Errors(NamedTuple):
 NO_ERRORS = Errors()
 ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
 ERROR_PASSES, ERRING_NIS = 2, 30.0
-MOST_WALKS = 2
+MOST_CHANGES = 2
+NOTHING = np.zeros(len(range(ACCEL)[ACCELEROMETER]))
 PROMISING = WALD_99 / 3.0  # least decrement for a search with K: twice the decrement estimates the statistic
 
 
 class ModelChoice(NamedTuple):
     """Chosen model: its name, its fit, and why it was chosen.
 
-    recording : as fitted, without a walk of its gyroscope's bias with variance `walked` [(rad/s)^2] from part to part.
+    recording : as fitted, without changes of its gyroscope's bias. freed : (12,) see claim_uncertainty.
     """
 
     fit: Fit
     model: str
     why: str
     recording: Recording
-    walked: float = 0.0
+    freed: Vector = NOTHING
 
 
 def fit_accel(recording: Recording, flat: Flat, gravity: float) -> Fit:
@@ -96,7 +97,7 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
     """Choose the simplest model that explains the data.
 
-    White noise and a trusted gyroscope come first, then its matrix K; then the same without a walk of the gyroscope's
+    White noise and a trusted gyroscope come first, then its matrix K; then the same without a change of the gyroscope's
     bias, and with small errors of both sensors. K is kept where a Wald test finds it different from the identity. Data
     that none of them explains, or that show a lever arm, were measured in a hand.
     """
@@ -132,14 +133,14 @@ def _chosen(in_place: InPlaceFits, minimum: Minimum, errors: Errors) -> ModelCho
     gyroscope = "a perfect gyroscope explain" if perfect else "a gyroscope that is not perfect explain"
     why = f"{noise} and {gyroscope} the data (innovations {minimum.nis:.1f}, expected 3)"
     model = "accel" if perfect else "imu"
-    return ModelChoice(in_place.as_fit(minimum, errors), model, why, in_place.recording, in_place.walked)
+    return ModelChoice(in_place.as_fit(minimum, errors), model, why, in_place.recording, in_place.freed)
 
 
 class InPlaceFits:
     """Fits of a sensor that turns in place, by the exact filter, to one recording."""
 
-    def __init__(self, recording: Recording, flat: Flat, gravity: float, walked: float = 0.0) -> None:
-        self.recording, self._flat, self._gravity, self.walked = recording, flat, gravity, walked
+    def __init__(self, recording: Recording, flat: Flat, gravity: float, freed: Vector = NOTHING) -> None:
+        self.recording, self._flat, self._gravity, self.freed = recording, flat, gravity, freed
         self._prior = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
@@ -147,7 +148,7 @@ class InPlaceFits:
         """Yield the recordings to explain, and True with errors of the sensors: the simplest first."""
         yield self, False
         if self._errors_may_explain():
-            yield self._without_walk(), False
+            yield self._without_change(), False
             yield self, True
 
     def _errors_may_explain(self) -> bool:
@@ -155,17 +156,17 @@ class InPlaceFits:
         squares = evaluate(_with_errors(self._thin, ERRORS[-1]), self._rough(IMU).theta, 0).squares
         return squares < ERRING_NIS * (self._thin.flat.last + len(self._thin.series))
 
-    def _without_walk(self) -> InPlaceFits:
-        """Remove the walk of the gyroscope's bias that the parts show, which small errors would explain as well."""
+    def _without_change(self) -> InPlaceFits:
+        """Remove the change of the gyroscope's bias that the parts show, which small errors would explain as well."""
         steady = self
-        for _ in range(MOST_WALKS):
+        for _ in range(MOST_CHANGES):
             rough = steady._rough(IMU)
             parts = parts_of(steady._thin, rough, self._prior)
-            walk = walk_of(explain(parts, rough.theta.D)) if parts else None
-            if walk is None:
+            change = gyroscope_change(explain(parts, rough.theta.D)) if parts else None
+            if change is None:
                 break
-            recording, walked = remove_walk(steady.recording, self._flat, walk), steady.walked + walk.q
-            steady = InPlaceFits(recording, self._flat, self._gravity, walked)
+            recording, freed = remove_change(steady.recording, self._flat, change), change.freed[ACCELEROMETER]
+            steady = InPlaceFits(recording, self._flat, self._gravity, steady.freed + freed)
         return steady
 
     def fit(self, parameters: int) -> Fit:

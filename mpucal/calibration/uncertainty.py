@@ -15,13 +15,13 @@ import numpy as np
 
 from ..data import Vector
 from .fit import Fit
-from .hypotheses import Explanation, Kind, walked_variance
+from .hypotheses import Explanation, Kind
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere
 
 DIRECTIONS = 400
 LEAST_DETERMINANT = 1e-6  # a D of less is singular
-# Nothing is known better than this where a walk was removed, since it is interpolated linearly from part to part.
+# Nothing is known better than this where a change of the gyroscope's bias was removed: it is interpolated linearly.
 FLOOR_MPS2 = 5e-5
 MOST_NIS = 5.0  # NIS of a model that explains the data; 3 is expected
 # The model's uncertainty is multiplied by this where too few sides were down for a comparison of them.
@@ -79,8 +79,8 @@ class UncertaintyClaim:
     Attributes
     ----------
     covariance : (p, p) of the model. model : m/s^2, the error by it, rms over all directions.
-    floored : m/s^2, `model` enlarged by what is left of a walk of the gyroscope's bias that was removed, and where too
-        few sides were down for a comparison of them.
+    floored : m/s^2, `model` enlarged by changes of the gyroscope's bias that were removed, and where too few sides were
+        down for a comparison of them.
     explanations : what may have happened besides, the likeliest first. errors : (n,) m/s^2, what each adds.
     """
 
@@ -112,33 +112,28 @@ class UncertaintyClaim:
         return max(of, default=0.0)
 
     def widen(self) -> Vector:
-        """Return the covariance (p, p) as it is claimed: where several explanations are likely, the widest counts.
-
-        Those of one quantity exclude each other, and count by their weights.
-        """
+        """Return the covariance (p, p) as it is claimed."""
         wide = (self.floored / self.model) ** 2 * self.covariance
-        by_quantity = {each.hypothesis.what: np.zeros(len(wide)) for each in self.explanations}
-        for each in self.explanations:
-            by_quantity[each.hypothesis.what] += each.weight * each.away**2
-        return wide + np.diag(np.max([*by_quantity.values(), np.zeros(len(wide))], axis=0))
+        away = [each.weight * each.away**2 for each in self.explanations]
+        return np.asarray(wide + np.diag(np.sum(away, axis=0)))
 
 
 def claim_uncertainty(
-    fit: Fit, gravity: float, explanations: Sequence[Explanation], walked: float
+    fit: Fit, gravity: float, explanations: Sequence[Explanation], freed: Vector
 ) -> UncertaintyClaim | None:
     """Return the claimed uncertainty of a fit; None where its parts are not known, or D or the covariance is unusable.
 
-    explanations : of the fit's parts. walked : (rad/s)^2 from part to part, of a walk of the gyroscope's bias that was
-        removed.
+    explanations : of the fit's parts. freed : (12,) share of the variance that changes of the gyroscope's bias
+        added, which were removed.
     """
     if fit.parts is None or not is_usable(fit):
         return None
     # over the sphere, the square of each element of s is gravity^2 / 3 in the mean, and their products are 0
     rms = partial(_rms, np.repeat([gravity / 3.0**0.5, 1.0], [9, 3])[:, None] * _errors_of(fit.D))
     model = floored = rms(fit.covariance)
-    if walked:
-        wider = rms(np.diag(walked_variance(fit.parts, fit.D, walked))) / rms(np.diag(np.diag(fit.parts.covariance)))
-        floored = float(np.hypot(max(1.0, wider) * model, FLOOR_MPS2))
+    if freed.any():
+        known = np.diag(fit.parts.covariance)[ACCELEROMETER]
+        floored = float(np.hypot(model * rms(np.diag((1.0 + freed) * known)) / rms(np.diag(known)), FLOOR_MPS2))
     if len(np.unique(fit.parts.side)) < FEWEST_SIDES:
         floored *= UNCOMPARED
     errors = [each.weight**0.5 * rms(np.diag(each.away**2)) for each in explanations]

@@ -11,13 +11,11 @@ from mpucal.calibration.hypotheses import (
     LARGEST,
     SIDES,
     VARIANCES,
-    WALK,
     Explanation,
     Hypothesis,
     _explain,
     _Groups,
     explain,
-    walked_variance,
 )
 from mpucal.calibration.parameters import PLACES
 from mpucal.calibration.parts import Parts
@@ -155,22 +153,45 @@ def test_the_estimate_is_as_far_away_as_the_other_posterior_says():
     np.testing.assert_allclose(told.away**2, weights @ squares / weights.sum(), rtol=1e-6)
 
 
-def test_the_variance_with_a_walk_is_that_of_the_joint_gaussian():
-    A, _, parts = linear_parts()
+def test_the_variance_with_a_walk_removed_is_that_of_the_joint_gaussian():
+    A, y, parts = linear_parts()
     k, m, p = A.shape
-    design, q = A.reshape(k * m, p), 0.3
-    blocks = A[:, :, PLACES["b_omega"]]
-    walked = np.einsum("ks,kmi->kmsi", np.tri(k), blocks).reshape(k * m, -1)
-    noise = np.eye(k * m) + q * walked @ walked.T
-    expected = np.linalg.inv(np.eye(p) + design.T @ np.linalg.solve(noise, design))
-    np.testing.assert_allclose(walked_variance(parts, np.eye(3), q), np.diag(expected), rtol=1e-6)
+    told = _explain(Hypothesis("gyroscope", "walk", 5), _Groups.of(parts, 5), parts, np.eye(3))
+    design, y = A.reshape(k * m, p), y.ravel()
+    walked = np.einsum("ks,kmi->kmsi", np.tri(k), A[:, :, PLACES["b_omega"]]).reshape(k * m, -1)
+    logs, variances = [], []
+    for q in LARGEST["gyroscope"] ** 2 * VARIANCES:
+        noise = np.eye(k * m) + q * walked @ walked.T
+        variances.append(np.diag(np.linalg.inv(np.eye(p) + design.T @ np.linalg.solve(noise, design))))
+        marginal = noise + design @ design.T
+        logs.append(-0.5 * (np.linalg.slogdet(marginal)[1] + y @ np.linalg.solve(marginal, y)))
+    expected = variances[int(np.argmax(logs))] / np.diag(parts.covariance)
+    np.testing.assert_allclose(1.0 + told.freed, expected, rtol=1e-6)
+
+
+def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
+    _, _, parts = linear_parts()
+    found = explain(parts, np.eye(3))
+    odds = np.exp([each.evidence for each in found]) / len(HYPOTHESES)
+    np.testing.assert_allclose([each.weight for each in found], odds / (1.0 + odds.sum()))
 
 
 def test_a_walk_is_drawn_straight_from_where_the_turning_begins():
-    delta = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]])
-    none = np.zeros(15)
-    walk = Explanation(WALK, 30.0, 1e-8, delta, np.array([0.0, 2.0]), np.array([2.0, 4.0]), none, none)
+    delta, none = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.zeros(15)
+    hypothesis, times = Hypothesis("gyroscope", "walk", 2), (np.array([0.0, 2.0]), np.array([2.0, 4.0]))
+    walk = Explanation(hypothesis, 30.0, delta, *times, none, none, none)
     np.testing.assert_allclose(walk.at(np.array([0.0, 0.5, 1.0, 2.0, 9.0]))[:, 2], [0.0, 0.1, 0.2, 0.3, 0.4])
+
+
+@pytest.mark.parametrize("drift_dps", [0.1, 0.5])
+def test_a_steady_drift_of_the_gyroscope_is_removed(hand, drift_dps):
+    made = hand(3, "continuous")
+    recording = made.recording
+    drift = np.radians(drift_dps) * (recording.t / recording.t[-1])[:, None] * np.array([0.6, -0.8, 0.0])
+    found = calibrate(replace(recording, gyr=recording.gyr + drift), gravity=G)
+    assert judged(found, (made.truth.D, made.truth.b_a)).farthest < 3.0
+    still = calibrate(recording, gravity=G)
+    assert found.quality["error_std"]["rms"] < 1.5 * still.quality["error_std"]["rms"]
 
 
 @pytest.mark.parametrize("motion", ["continuous", "pose12", "pose7"])
@@ -195,7 +216,7 @@ def test_with_too_few_sides_to_compare_the_models_uncertainty_is_doubled(hand):
     fit = estimate(hand(1, "continuous").recording, "hand", G)[0].fit
     alike = np.zeros_like(fit.parts.side)
     one_side = replace(fit, parts=replace(fit.parts, side=alike))
-    sides = [claim_uncertainty(of, G, [], 0.0) for of in (fit, one_side)]
+    sides = [claim_uncertainty(of, G, [], np.zeros(12)) for of in (fit, one_side)]
     assert sides[1].floored == 2.0 * sides[0].floored
     assert {each.hypothesis.groups for each in explain(one_side.parts, fit.D)} == {
         each.groups for each in HYPOTHESES if each.groups != SIDES

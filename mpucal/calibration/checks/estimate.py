@@ -66,8 +66,8 @@ def inconsistent(e: Evidence) -> Reason | None:
     # A robust model leaves outliers in its innovations: its parts judge it, or its uncertainty has grown by them.
     if e.model in ("hand", "tilt") or not e.fit.nis > MOST_NIS:
         return None
-    after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
-    refuse = _is_useless(e) or not abs(after / e.gravity - 1.0) < 0.05
+    # The noise is larger than the model's by as much as the innovations are, and so is what is known.
+    refuse = e.uncertainty.rms_mps2 * (e.fit.nis / 3.0) ** 0.5 > USABLE_RMS_MPS2
     return reason("inconsistent", "innovations", refuse, nis=e.fit.nis)
 
 

@@ -13,7 +13,7 @@ from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
 from ..evidence import MOST_MISS_RAD, Evidence
 from ..parameters import BY_NAME
-from .estimate import USABLE_RMS_MPS2, inconsistent
+from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent
 
 WORST_AXES_RAD = np.deg2rad(60.0)
 GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
@@ -115,7 +115,7 @@ def gyro_range(e: Evidence) -> Reason | None:
 
 def gyro_contradicts(e: Evidence) -> Reason | None:
     """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest."""
-    if e.fit is None or is_trustworthy(e):
+    if e.fit is None or (is_trustworthy(e) and e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2):
         return None
     within, of_all = e.gyro_miss
     if within > MOST_MISS_RAD:
