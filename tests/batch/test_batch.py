@@ -293,9 +293,10 @@ def test_the_page_names_what_is_odd(tmp_path):
     assert 0.9 < float(rms) < 1.1
 
 
-def test_workers_that_are_killed_while_they_start_are_told(tmp_path, capfd):
+def test_workers_that_are_killed_while_they_start_are_told(distributed, tmp_path, capfd):
     import dask
 
+    # the settings of `distributed` are loaded: what is set before would take them along when it is put back
     (deadly := tmp_path / "deadly.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n")
     words = ["batch", str(FIXTURES / "sessions" / "mpu6050.mcap"), "-o", str(tmp_path / "fleet"), "--workers", "1"]
     with dask.config.set({"distributed.worker.preload": [str(deadly)]}):
