@@ -9,12 +9,11 @@ from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, ChipError
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.faults import OF_CHIP, fault_kinds
 
 ALONE = Config(rate_hz=4000)
 
 
-@pytest.mark.parametrize("model", ["mpu6500", "mpu6880", "clone98", "icm20602"])
+@pytest.mark.parametrize("model", ["mpu6500", "icm20602"])
 def test_no_sample_is_lost(rig, stream, numbers, model):
     driver = rig(model).driver(ALONE)
     sensor = driver.start()
@@ -73,7 +72,7 @@ def test_a_late_host_does_not_count_as_a_slow_bus(started):
     assert driver.recording().gap.sum() == 10
 
 
-@pytest.mark.parametrize("fault", sorted(set(fault_kinds(*OF_CHIP)) - {"stuck", "unplugged", "bitflips", "high_bit"}))
+@pytest.mark.parametrize("fault", ["bit_errors", "brownout", "nack", "slip"])
 def test_a_passing_fault_leaves_valid_samples(fault, tapped):
     bus, transactions = tapped(f"sim:chip=mpu6500,hand=still,rate_error_ppm=0,fault={fault}@1.7")
     driver = Driver(bus, ALONE)

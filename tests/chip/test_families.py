@@ -13,22 +13,6 @@ from mpucal.errors import ChipError
 from mpucal.simulated.chip import models, open_simulated
 
 
-@pytest.mark.parametrize(
-    ("who_am_i", "chip", "fifo_bytes", "offsets"),
-    [
-        (0x68, "MPU-6050", 1024, (0x06, 0x08, 0x0A)),
-        (0x70, "MPU-6500", 512, (0x77, 0x7A, 0x7D)),
-        (0x71, "MPU-9250", 512, (0x77, 0x7A, 0x7D)),
-    ],
-    ids=["6050", "6500", "9250"],
-)
-def test_an_identity_names_its_part(who_am_i, chip, fifo_bytes, offsets):
-    part = part_of(who_am_i)
-    assert (part.chip, part.who_am_i) == (chip, who_am_i)
-    assert (part.family.fifo_bytes, part.family.accel_offset_h) == (fifo_bytes, offsets)
-    assert part.family.has_accel_config2 == (who_am_i != 0x68)
-
-
 @pytest.mark.parametrize("who_am_i", [0x00, 0xFF, 0x72])
 def test_an_unknown_identity_is_refused_with_the_known_ones(who_am_i):
     with pytest.raises(ChipError, match=rf"0x{who_am_i:02x}.*0x68 MPU-6050.*0x70 MPU-6500"):

@@ -145,13 +145,6 @@ def test_a_reset_before_any_sample_leaves_no_gap():
     assert not decoder.recording("x").gap.any()
 
 
-def test_an_unfinished_poll_gives_no_samples():
-    decoder = fresh()
-    decoder.set_count(0, 28)
-    decoder.add_bytes(packed(*calm(2)))
-    assert len(decoder.take()) == len(decoder.recording("x")) == 0
-
-
 def test_the_warming_die_is_no_misalignment():
     decoder = fresh()
     for n in range(1, 50):

@@ -8,11 +8,6 @@ from mpucal.chip import registers as reg
 from mpucal.errors import UsageError
 
 
-@pytest.mark.parametrize(("afs_sel", "lsb_per_g"), [(0, 16384), (1, 8192), (2, 4096), (3, 2048)])
-def test_accelerometer_scale(afs_sel, lsb_per_g):
-    assert lsb_per_g * reg.mps2_per_lsb(afs_sel) == pytest.approx(9.80665)
-
-
 @pytest.mark.parametrize(("fs_sel", "lsb_per_dps"), [(0, 131), (1, 65.5), (2, 32.8), (3, 16.4)])
 def test_gyroscope_scale(fs_sel, lsb_per_dps):
     assert lsb_per_dps * reg.rad_s_per_lsb(fs_sel) == pytest.approx(math.radians(1), rel=2e-3)
