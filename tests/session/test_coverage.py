@@ -60,15 +60,6 @@ def test_tilts_alone_stay_near_level_and_differ(flat):
     assert (between > DISTINCT_RAD).all()
 
 
-def test_the_whole_cube_is_asked_for_otherwise():
-    assert len(directions((0.0, 0.0, -1.0), tilt_only=False)) == 26
-
-
-def test_all_over_the_sphere_spread_is_one():
-    units = np.random.default_rng(0).normal(size=(5000, 3))
-    assert directions_of(units).spread() == pytest.approx(1.0, abs=0.2)
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(1, 40))
 def test_kept_directions_are_distinct_and_turning_all_changes_nothing(seed, n):
     rng = np.random.default_rng(seed)

@@ -81,15 +81,6 @@ def test_an_answer_that_is_due_and_not_done_is_late(scheduler, slow):
     assert not scheduler.late
 
 
-def test_each_sample_is_sent_once(scheduler, slow):
-    for n in (3, 4, 5):
-        scheduler.add(nothing(n))
-    scheduler.request(RequestFit(FitKind.KNOW, 0.5))
-    scheduler.add(nothing(6))
-    scheduler.request(RequestFit(FitKind.ADVISE, 0.5))
-    assert [len(task.samples) for task in slow.tasks] == [12, 6]
-
-
 def test_forgotten_requests_have_no_answer(scheduler, slow):
     scheduler.request(RequestFit(FitKind.KNOW, 0.0))
     scheduler.forget(7)
@@ -129,12 +120,6 @@ def test_an_exception_of_a_fit_is_raised_with_its_answer(poses, apart):
     with pytest.raises(ValueError) as raised:
         ask(scheduler, replace(poses, acc=poses.acc[:5]))
     assert "in the process of the fits" in raised.value.__notes__[0]
-
-
-def test_a_closed_process_is_gone(apart):
-    apart.close()
-    with pytest.raises(ProcessLookupError):
-        os.kill(apart.pid, 0)
 
 
 def test_a_process_ends_with_the_program_that_began_it():
