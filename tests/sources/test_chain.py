@@ -4,12 +4,7 @@ import pytest
 
 from mpucal.chip.access import Reply, Transaction
 from mpucal.chip.records import RESUMED, SessionEvent
-from mpucal.errors import EndOfCapture
-from mpucal.mavlink.tlog import RawPacket
-from mpucal.mavlink.transport import ReceivedBytes
-from mpucal.sources.chain import PAUSE_NS, ChainedBus, ChainedTransport, ShiftedClockBus, split_at_resumes
-from mpucal.sources.packet_replay import PacketReplay
-from mpucal.sources.replay import ReplayBus
+from mpucal.sources.chain import PAUSE_NS, ShiftedClockBus, split_at_resumes
 
 S = 1_000_000_000
 
@@ -45,64 +40,6 @@ class Young:
 
     def close(self):
         self.closed = True
-
-
-def test_each_part_ends_before_the_next_begins():
-    bus = ChainedBus([ReplayBus([read(1), key("enough")]), ReplayBus([read(2)])])
-    assert bus.read(0x75, 1).t_ns == S
-    assert [found.name for found in bus.pending_events("key")] == ["key"]
-    with pytest.raises(EndOfCapture):
-        bus.read(0x75, 1)
-    assert bus.go_on()
-    assert bus.unread() == 1
-    assert bus.read(0x75, 1).t_ns == 2 * S
-    assert bus.unread() == 0
-    assert not bus.go_on()
-
-
-def test_only_what_was_recorded_is_replayed():
-    young = Young()
-    bus = ChainedBus([ReplayBus([]), young])
-    assert bus.replaying
-    bus.go_on()
-    assert not bus.replaying
-    assert bus.pending_events("key") == []
-    assert bus.unread() == 0
-    bus.close()
-    assert young.closed
-
-
-class YoungLink:
-    """Transport whose clock was set back, and which hears a byte after each 10 ms."""
-
-    name, datagrams, outward = "young", False, True
-
-    def __init__(self):
-        self.t_ns = 5
-
-    def now_ns(self):
-        return self.t_ns
-
-    def receive(self, until_ns):
-        self.t_ns = min(self.t_ns + S // 100, until_ns)
-        return ReceivedBytes(b"x", "young", self.t_ns) if self.t_ns < until_ns else None
-
-
-def test_a_link_continues_the_time_of_the_packets_before_it():
-    packet = RawPacket(6 * S, bytes([0xFE, 0, 0, 1, 1, 0, 0, 0]))
-    link = ChainedTransport([PacketReplay([packet, event(RESUMED)], "capture"), YoungLink()], 7 * S)
-    assert link.receive(8 * S) == ReceivedBytes(packet.data, "capture", 6 * S)
-    with pytest.raises(EndOfCapture):
-        link.receive(8 * S)
-    assert (link.outward, link.replaying, link.resumes) == (False, True, True)
-    assert link.go_on()
-    assert (link.outward, link.replaying, link.name) == (True, False, "young")
-    begun_ns = link.now_ns()
-    assert begun_ns == 7 * S + PAUSE_NS
-    assert link.receive(begun_ns + S) == ReceivedBytes(b"x", "young", begun_ns + S // 100)
-    assert link.receive(begun_ns + S // 50) is None
-    assert link.now_ns() == begun_ns + S // 50
-    assert not link.go_on()
 
 
 def test_a_clock_continues_the_earlier_one():

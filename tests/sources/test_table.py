@@ -1,7 +1,5 @@
 """Table of sources, and its uses."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pkgutil import resolve_name
 
@@ -12,7 +10,7 @@ from mpucal.origin import Origin
 from mpucal.session.plan import Plan
 from mpucal.sources.kind import Option
 from mpucal.sources.opening import check_source, reopen_source
-from mpucal.sources.table import SOURCES, kinds_for, matching_kinds, source_title
+from mpucal.sources.table import SOURCES, kinds_for, matching_kinds
 
 IDS = [kind.flag for kind in SOURCES]
 
@@ -23,38 +21,11 @@ def test_all_that_a_row_names_is_there(kind):
         assert callable(resolve_name(place))
 
 
-@pytest.mark.parametrize("kind", SOURCES, ids=IDS)
-def test_a_row_is_selected_by_its_option(kind):
-    values = {kind.option.name: f"{kind.word}:a=b" if kind.word else "x"}
-    assert matching_kinds(values) == [kind]
-
-
 @pytest.mark.parametrize("word", ["sim", "ftdi", "mcp2221"])
 def test_a_word_is_taken_in_any_case(word):
     parse = next(kind.option.parse for kind in SOURCES if kind.word == word)
     assert parse(f"{word.upper()}:A=b") == f"{word}:A=b"
     assert parse("/dev/I2C:1") == "/dev/I2C:1"
-
-
-def test_none_and_several():
-    assert matching_kinds({"bus": None, "replay": None}) == []
-    assert source_title({"bus": None}) == ""
-    meant = matching_kinds({"bus": "sim", "mavlink": "x", "address": None})
-    assert [kind.flag for kind in meant] == ["--bus sim", "--mavlink"]
-
-
-@pytest.mark.parametrize(
-    ("values", "title"),
-    [
-        ({"bus": "sim:seed=1"}, "simulated chip"),
-        ({"bus": "/dev/i2c-1"}, "/dev/i2c-1"),
-        ({"bus": "simple"}, "simple"),
-        ({"mavlink": "sim"}, "simulated vehicle"),
-        ({"replay": "board/capture.mcap"}, "replay of board/capture.mcap"),
-    ],
-)
-def test_the_title_of_a_session(values, title):
-    assert source_title(values) == title
 
 
 @pytest.mark.parametrize("command", ["session", "record", "stream", "write", "show", "doctor"])
@@ -93,14 +64,6 @@ def test_options_refuse_meaningless_text():
     for name, text in {"bus": "", "address": "0x80", "seed": "-1", "system": "0", "dlpf": "7", "rate": "fast"}.items():
         with pytest.raises(ValueError, match=r"\.$"):
             options[name].parse(text)
-
-
-def test_no_library_of_a_source_is_loaded_before_it_is_opened():
-    program = (
-        "import sys, mpucal.sources.table; print(sorted({'smbus2', 'serial', 'mcap', 'pymavlink'} & set(sys.modules)))"
-    )
-    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "[]"
 
 
 @pytest.fixture

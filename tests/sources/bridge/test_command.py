@@ -5,7 +5,6 @@ import struct
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from mpucal.__main__ import run
@@ -129,33 +128,11 @@ def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
     assert "for the firmware of a bridge" in mpucal("doctor", "--bus", "sim", "--conformance").err
 
 
-def test_a_bias_goes_into_the_chip_behind_it_and_out_again(board, mpucal, tmp_path):
-    board.chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
-    truth = board.chip.truth_document()
-    Calibration(np.array(truth["D"]), np.array(truth["b_a"])).save("calibration.json")
-    before = board.chip.read(0x06, 6).data
-    written = mpucal("write", "calibration.json", "chip", "--serial", board.name, "--yes", "--json")
-    assert written.code == 0, written.err
-    assert json.loads(written.out)["applied_in_hardware"]["b_a"] == pytest.approx(truth["b_a"], abs=0.006)
-    assert board.chip.read(0x06, 6).data != before
-    kept = json.loads((tmp_path / "chip-offsets.json").read_text())
-    assert kept["where"] == f"the chip on {board.name}"
-    assert mpucal("write", "chip-offsets.json", "chip", "--serial", board.name, "--yes").code == 0
-    assert board.chip.read(0x06, 6).data == before
-
-
 @pytest.mark.parametrize(
     ("words", "code", "sentence"),
     [
         (["session", "--serial"], 2, "no serial port was named"),
         (["session", "--serial", "/dev/there-is-none"], 3, "there is no serial port /dev/there-is-none"),
-        (
-            ["session", "--serial", "x", "--seed", "1"],
-            2,
-            "--serial does not take --seed",
-        ),
-        (["session", "--serial", "x", "--system", "1"], 2, "--serial does not take --system"),
-        (["session", "--serial", "x", "--bus", "sim"], 2, "--bus and --serial were given together"),
         (["show", "--serial"], 2, "no serial port was named"),
         (["show"], 2, "nothing to show was named"),
         (["show", "x.json", "--serial", "x"], 2, "a file and --serial were given together"),

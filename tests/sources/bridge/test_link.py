@@ -6,7 +6,7 @@ from mpucal.chip import registers as reg
 from mpucal.errors import BusError
 from mpucal.sources.bridge.frame import Deframer, Frame
 from mpucal.sources.bridge.link import Link, LinkLost
-from mpucal.sources.bridge.messages import Burst, Hello, HelloReply, Read, Status, Write
+from mpucal.sources.bridge.messages import Burst, HelloReply, Read, Status
 
 WHO = Read(reg.WHO_AM_I, 1)
 
@@ -30,13 +30,6 @@ def lose(line, replies):
     line.to_host = lambda data: data if next(left, None) is None else b""
 
 
-def test_a_lost_reply_is_requested_again_with_the_same_number(link):
-    lose(link.line, 2)
-    ((answer,),) = link.link.ask(WHO)
-    assert answer.reply.data == b"\x68"
-    assert [frame.seq for frame in sent(link.line)] == [sent(link.line)[0].seq] * 3
-
-
 @pytest.mark.parametrize(
     "request_",
     [Read(reg.FIFO_R_W, 14), Read(reg.INT_STATUS, 1), Read(reg.INT_ENABLE, 3), Burst(reg.FIFO_R_W, 70)],
@@ -47,34 +40,6 @@ def test_a_destructive_read_is_never_repeated(link, request_):
     with pytest.raises(LinkLost, match="no longer answers"):
         link.link.ask(request_)
     assert len(sent(link.line)) == 1
-
-
-def test_a_bridge_that_was_reset_is_noticed_by_its_answer(link):
-    link.line.device = link.new_bridge()
-    with pytest.raises(LinkLost, match="the bridge on the emulated line was reset"):
-        link.link.ask(WHO)
-    link.link.greet()
-    assert link.link.ask(WHO)[0][0].reply.data == b"\x68"
-
-
-def test_several_requests_fly_at_once_and_no_more_than_the_bridge_takes(rig):
-    made = rig(latency_ns=16_000_000, window=3)
-    link = Link(made.line)
-    link.greet()
-    made.line.written.clear()
-    made.line.device.work()
-    before_ns = made.line.now_ns()
-    answers = link.ask(*[Write(reg.SMPLRT_DIV, bytes([n])) for n in range(9)], Read(reg.SMPLRT_DIV, 1))
-    assert answers[-1][0].reply.status == Status.OK
-    # ten one after the other would take ten latencies
-    assert made.line.now_ns() - before_ns < 5 * 20_000_000
-    assert [frame.seq for frame in sent(made.line)] == sorted(frame.seq for frame in sent(made.line))
-
-
-def test_a_boot_loader_is_waited_for(rig):
-    made = rig(boot_ns=2_000_000_000)
-    assert Link(made.line).greet().address == 0x68
-    assert 2e9 < made.clock.now() < 3e9
 
 
 @pytest.mark.parametrize(
@@ -116,12 +81,6 @@ def test_an_unknown_status_is_a_failure_and_named(rig):
     made.line.to_host = odd
     with pytest.raises(BusError, match="answers with status 99: put a newer mpucal"):
         bus.read(reg.WHO_AM_I, 1)
-
-
-def test_a_hello_asks_for_the_address(rig):
-    made = rig(address=0x69)
-    Link(made.line).greet(0x69)
-    assert Hello.decode(sent(made.line)[0].payload).address == 0x69
 
 
 @pytest.mark.parametrize("data", [b"", b"\x68\x68"], ids=["too few bytes", "too many"])

@@ -35,8 +35,7 @@ def test_a_port_and_its_rate(text, name, bauds):
     assert split_port(text) == (name, bauds)
 
 
-@pytest.mark.parametrize("kind", ["pty", "socket"])
-@pytest.mark.parametrize("rate_hz", [200, 1000])
+@pytest.mark.parametrize(("kind", "rate_hz"), [("pty", 1000), ("socket", 200)])
 def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream, kind, rate_hz):
     made = rig()
     bus = open_bridge(serve(made.line.device, made.clock, kind).name)

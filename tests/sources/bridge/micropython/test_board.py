@@ -19,7 +19,6 @@ from mpucal.sources.bridge.messages import Status
 from mpucal.sources.bridge.micropython import MicroPythonPort
 from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
-from tools.lab.bridge import EmulatedLine
 
 BLOB = (Path(__file__).parents[4] / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
 
@@ -114,12 +113,6 @@ def session(bus, chip, folder):
 
 
 @pytest.mark.slow
-def test_a_whole_session_is_good(pasted, tmp_path):
-    chip, clock = simulated()
-    found = session(BridgeBus(EmulatedLine(pasted(chip, clock.now), clock)), chip, tmp_path)
-    assert found.verdict == "good", json.dumps(found.quality["reasons"])
-
-
 def test_a_whole_session_on_micropython_is_good(board, tmp_path):
     chip, clock = simulated()
     found = session(BridgeBus(MicroPythonPort(board(chip, clock))), chip, tmp_path)

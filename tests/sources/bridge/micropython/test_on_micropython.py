@@ -10,7 +10,6 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.doctor.bridge import examine_conformance
 from mpucal.doctor.finding import Mark
-from mpucal.errors import NoAnswer
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.conformance import talks
 from mpucal.sources.bridge.link import Link
@@ -65,11 +64,6 @@ def test_it_answers_as_the_protocol_settles(board, rig):
     found = list(examine_conformance(link))
     assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
     assert {finding.topic for finding in found} == talks().keys()
-
-
-def test_no_chip(board):
-    with pytest.raises(NoAnswer, match="the bridge on the board answers, but no chip answers it at 0x68 or 0x69"):
-        BridgeBus(MicroPythonPort(board()))
 
 
 def test_a_bridge_that_a_killed_host_left_is_ended(board, rig):
