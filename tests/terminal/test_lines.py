@@ -17,11 +17,6 @@ def out():
     return io.StringIO()
 
 
-def test_a_prompt_is_a_heading_and_its_words(out):
-    Lines(out, Keys()).hear(Prompt(PromptKind.ROTATE, "Now turn it."))
-    assert out.getvalue() == "\nTURN IT\n  Now turn it.\n\n"
-
-
 def test_a_prompt_that_goes_on_is_a_line(out):
     lines = Lines(out, Keys())
     lines.hear(Prompt(PromptKind.ROTATE, "Now turn it."))
@@ -45,13 +40,6 @@ def test_progress_comes_once_a_second_at_most(out):
     for k in range(40):
         lines.hear(Progress(100.0 + 0.25 * k, k, 40, f"step {k}"))
     assert out.getvalue().split() == [word for k in range(0, 40, 4) for word in ("step", str(k))]
-
-
-def test_a_line_that_says_nothing_new_is_left_out(out):
-    lines = Lines(out, Keys())
-    for k in range(5):
-        lines.hear(Progress(float(k), 0, 12, "waiting"))
-    assert out.getvalue() == "  waiting\n"
 
 
 def test_the_same_warning_is_not_repeated_at_once(out):

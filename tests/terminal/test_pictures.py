@@ -8,7 +8,6 @@ from mpucal.session.attitude import straight
 from mpucal.session.boards import BOARDS
 from mpucal.terminal import board, letters, orientation_map
 from mpucal.terminal.canvas import Canvas
-from mpucal.terminal.view import HEADLINES
 
 DIRECTIONS = [
     (0, 0, -1),
@@ -20,14 +19,6 @@ DIRECTIONS = [
     (0.58, -0.57, 0.58),
     (-0.7, 0.1, 0.7),
 ]
-
-
-@pytest.mark.parametrize("text", [*HEADLINES.values(), "STILL 10", "HOLD 2", "+X -Y +Z DOWN", "0123456789"])
-def test_large_letters_are_as_wide_as_they_say(text):
-    for scale in (1, 2):
-        rows = letters.large(text, "#", scale)
-        assert len(rows) == letters.ROWS * scale
-        assert {len(row) for row in rows} == {letters.width(text, scale)}
 
 
 def test_large_letters_differ():
@@ -85,13 +76,6 @@ def test_the_map_shows_a_direction_on_its_own_half():
     # x is to the right.
     assert row.index("X") > 13
     assert not any("o" in row for row in lower)
-
-
-def test_points_outside_are_not_drawn():
-    canvas = Canvas(4, 2)
-    canvas.line((-100.0, 3.0), (100.0, 3.0))
-    canvas.letter((50.0, 0.0), "X", "")
-    assert [line.plain for line in canvas.lines("", unicode=True)] == ["⣀" * 4, " " * 4]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import threading
 import pytest
 from rich.text import Text
 
-from mpucal.session.events import Key, Prompt, PromptKind
+from mpucal.session.events import Prompt, PromptKind
 from mpucal.terminal.glyphs import ASCII, UNICODE, glyphs_of
 from mpucal.terminal.keys import Keys
 from mpucal.terminal.painter import Painter
@@ -108,17 +108,6 @@ def drawn(screen, out, words):
     raise AssertionError(f"{words!r} was never drawn")
 
 
-def test_a_line_of_talk_is_kept_for_the_end(out):
-    screen = Screen(out, Keys(), UNICODE)
-    screen.say("before")
-    with screen.listening():
-        screen.say("  meanwhile")
-    screen.say("after")
-    text = out.getvalue()
-    assert text.startswith("before\n" + SHOWN)
-    assert text.endswith("  meanwhile\nafter\n")
-
-
 def test_a_terminal_that_takes_nothing_stops_nobody():
     """The session goes on although, after Ctrl-S, the terminal's buffer is full."""
     person, program = pty.openpty()
@@ -158,14 +147,6 @@ def test_ctrl_z_is_refused_on_the_screen(out):
             assert screen.pressed() == []
     os.close(person)
     assert signal.getsignal(signal.SIGTSTP) is before
-
-
-@pytest.mark.usefixtures("uncollected")
-def test_ctrl_c_is_a_key(out):
-    screen = Screen(out, Keys(), UNICODE)
-    with screen.listening():
-        signal.raise_signal(signal.SIGINT)
-        assert screen.pressed() == [Key.ABORT]
 
 
 @pytest.mark.parametrize(

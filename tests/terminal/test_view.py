@@ -3,12 +3,6 @@ from dataclasses import replace
 import pytest
 
 from mpucal.session.events import Countdown, Held, Progress, Prompt, PromptKind, Seen, Use
-from mpucal.terminal.view import View
-
-
-def test_nothing_is_known_at_first():
-    view = View()
-    assert (view.headline, view.wanted, view.waiting, view.elapsed_s) == ("WAIT", None, None, 0.0)
 
 
 def test_the_headline_is_the_instruction(views):
@@ -56,21 +50,6 @@ def test_a_countdown_ends_when_the_board_moves_or_the_orientation_is_decided(vie
 
 
 @pytest.mark.parametrize(
-    ("words", "headline"),
-    [
-        ("roll it to the right", "ROLL RIGHT 125"),
-        ("tip it toward you", "TIP TO YOU 125"),
-        ("tip it away and left", "TIP AWAY AND LEFT 125"),
-        ("tip it toward you and right", "TIP TO YOU AND RIGHT 125"),
-    ],
-)
-def test_the_way_is_short_in_large_letters(views, words, headline):
-    view = views["turned"]
-    meter = replace(view.meter, turn=f"125 deg more, {words}")
-    assert replace(view, meter=meter).headline == headline
-
-
-@pytest.mark.parametrize(
     ("board", "down", "words"),
     [
         ("gy-521", (0.0, 0.1, -0.99), "Chip up, pins toward you?"),
@@ -90,15 +69,6 @@ def test_without_a_requested_orientation_the_most_helpful_one_is_wanted(views):
     view = views["turned"].after(Prompt(PromptKind.ROTATE, "Turn it."))
     assert view.wanted == view.knowledge.down
     assert view.after(Prompt(PromptKind.VERIFY, "Check it.")).wanted is None
-
-
-def test_verifications_are_among_the_final_messages(views):
-    assert views["ended"].notes[-2:] == ("orientation 1 of 2 agrees", "the calibration is good")
-
-
-def test_time_runs_from_the_first_sample(views):
-    assert views["laid"].elapsed_s == 0.0
-    assert views["turned"].elapsed_s == 15.25
 
 
 def test_orientations_are_counted_anew_when_the_board_is_turned_anew(views):
@@ -122,11 +92,6 @@ def test_an_orientation_is_ticked_as_it_is_taken(views):
         view = view.after(output)
         ticked.append(view.line)
     assert ticked == [(1, 10)] * 4 + [(2, 10)]
-
-
-def test_another_step_forgets_the_warnings_of_the_last(views):
-    assert views["turned"].caution is not None
-    assert views["checked"].caution is None
 
 
 @pytest.mark.parametrize(
