@@ -44,25 +44,18 @@ def failing(number):
 
 
 # what the kernel says where somebody opens a bus, or asks for a chip on it, and what a person is told
-OPENING = {
-    "no such bus": (errno.ENOENT, "there is no I2C bus /dev/i2c-1: "),
-    "no permission": (errno.EACCES, "no permission to use /dev/i2c-1: add yourself to its group"),
-    "no adapter": (errno.ENXIO, "no adapter is behind /dev/i2c-1: plug it in"),
-}
-ASKING = {
-    "nothing answers": (errno.EREMOTEIO, "nothing answers at 0x68 or 0x69 on /dev/i2c-1: check VCC, GND, SDA and SCL"),
-    "a wire held low": (errno.ETIMEDOUT, "the I2C bus does not become free (0x68 on /dev/i2c-1): a wire holds SDA"),
-    "a driver of the kernel": (errno.EBUSY, "a driver of the kernel holds the chip (0x68 on /dev/i2c-1): remove its"),
+BUSES = {
+    "no permission": (False, errno.EACCES, "no permission to use /dev/i2c-1: add yourself to its group"),
+    "no adapter": (False, errno.ENXIO, "no adapter is behind /dev/i2c-1: plug it in"),
+    "a wire held low": (
+        True,
+        errno.ETIMEDOUT,
+        "the I2C bus does not become free (0x68 on /dev/i2c-1): a wire holds SDA",
+    ),
 }
 
 
-@pytest.mark.parametrize(
-    ("opens", "number", "sentence"),
-    [
-        *(pytest.param(False, *case, id=name) for name, case in OPENING.items()),
-        *(pytest.param(True, *case, id=name) for name, case in ASKING.items()),
-    ],
-)
+@pytest.mark.parametrize(("opens", "number", "sentence"), BUSES.values(), ids=BUSES)
 def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypatch, opens, number, sentence):
     def open_(smbus, _):
         if not opens:

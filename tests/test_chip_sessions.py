@@ -62,6 +62,7 @@ def test_each_chip_is_named_and_its_calibration_is_good(chip):
     assert np.abs(found.D - D).max() < 2e-3
 
 
+@pytest.mark.slow
 def test_a_session_without_a_fifo_is_replayed_to_the_bit(tmp_path, capsys):
     def session(*words):
         run(["session", *words, "--yes", "--json", "--json-events"])

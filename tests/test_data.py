@@ -91,8 +91,3 @@ def test_parts_joined_are_the_whole():
     for field in fields(Samples):
         np.testing.assert_array_equal(getattr(joined, field.name), getattr(whole, field.name))
         assert getattr(joined, field.name).dtype == getattr(whole, field.name).dtype
-
-
-def test_joining_nothing_gives_nothing():
-    assert len(Samples.joined([])) == 0
-    assert Samples.empty().acc.shape == (0, 3)

@@ -41,6 +41,7 @@ def test_a_key_press_is_among_them():
     assert len(presses) == 2
 
 
+@pytest.mark.slow
 def test_the_tool_makes_them(monkeypatch, tmp_path):
     """Make one of the sessions, in which keys are pressed; all are replayed in test_session_replay.py."""
     monkeypatch.setattr(sys, "argv", ["fixtures", str(tmp_path)])

@@ -144,9 +144,8 @@ def session_of(folder, recording, poll_s=SELDOM_S):
     return outcome(folder / "board", "session", "--replay", folder / "capture.mcap")
 
 
-@pytest.mark.parametrize(
-    ("name", "most_deg"), [("mpu9150_a", 0.1), pytest.param("imucal_session", 0.15, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("name", "most_deg"), [("mpu9150_a", 0.1), ("imucal_session", 0.15)])
+@pytest.mark.slow
 def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
     """Use recordings that lie flat for less than ten seconds; those of the MPU-9150s begin with spikes to 74 m/s^2."""
     recording = RECORDINGS / f"{name}.npz"

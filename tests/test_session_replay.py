@@ -64,9 +64,10 @@ def test_a_stored_session_replays(session, name):
     np.testing.assert_allclose(replayed.b_a, stored["b_a"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chip", "model", "name"),
-    [("mpu6500", "hand", "MPU-6500"), pytest.param("clone98", "accel", "ICM-20689", marks=pytest.mark.slow)],
+    [("mpu6500", "hand", "MPU-6500"), ("clone98", "accel", "ICM-20689")],
     ids=["mpu6500-hand", "clone98-accel"],
 )
 def test_a_replay_equals_its_session_to_the_last_bit(session, chip, model, name):

@@ -27,6 +27,7 @@ def pass_by(world, seconds):
     transport._vehicle.run_until(transport._vehicle.now_us + round(seconds * 1e6))
 
 
+@pytest.mark.slow
 def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
     """Stop the session while flat, and while rotating."""
     stops_s = {10.0: 70.0, 100.0: 90.0}

@@ -306,6 +306,7 @@ def test_workers_that_are_killed_while_they_start_are_told(distributed, tmp_path
     )
 
 
+@pytest.mark.slow
 def test_a_batch_that_is_ended_while_its_workers_start_leaves_no_trace(tmp_path):
     (deadly := tmp_path / "deadly.py").write_text(
         "import os, signal, time\nos.kill(os.getppid(), signal.SIGTERM)\ntime.sleep(99)\n"

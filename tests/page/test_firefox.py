@@ -13,6 +13,8 @@ import pytest
 from mpucal.page.state import changes, state
 from mpucal.terminal.view import View
 
+# Chromium shows the same phases and the same lost connection in test_browser.py
+pytestmark = pytest.mark.slow
 BROWSER = shutil.which("firefox-esr") or shutil.which("firefox")
 # Any free port, and dark colours.
 PREFERENCES = {
