@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import subprocess
 import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -17,6 +20,7 @@ from mpucal.files.mcap import CaptureWriter
 from mpucal.files.messages import BUS, PACKETS
 from mpucal.mavlink import MAVLINK_VERSION
 from mpucal.mavlink.tlog import RawPacket
+from tools.processes import quick
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,24 @@ def session(once, process):
 
     folder = once("cli-session", make)
     return Session(folder / "board", Result(**json.loads((folder / "result.json").read_text())))
+
+
+@pytest.fixture(scope="session")
+def flown(once):
+    """Return a session on the simulated vehicle, which writes to it."""
+
+    def make(folder):
+        words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder / "flown"), "--json"]
+        with (
+            contextlib.redirect_stdout(io.StringIO()) as out,
+            contextlib.redirect_stderr(io.StringIO()) as err,
+            quick(),
+        ):
+            code = run(["session", *words, "--yes"])
+        (folder / "result.json").write_text(json.dumps({"code": code, "out": out.getvalue(), "err": err.getvalue()}))
+
+    folder = once("cli-flown", make)
+    return SimpleNamespace(folder=folder / "flown", **json.loads((folder / "result.json").read_text()))
 
 
 @pytest.fixture

@@ -103,6 +103,7 @@ def test_a_session_that_keeps_going_gets_its_result(on_a_terminal, tmp_path):
     assert "The calibration is good." in log
 
 
+@pytest.mark.slow
 def test_a_session_whose_terminal_is_closed_while_it_waits_for_its_page_goes_on(on_a_terminal, tmp_path):
     session = on_a_terminal("--page", "--bus", "sim:seed=3,pace=fast")
     session.read_until(lambda seen: b"Open the page" in seen)

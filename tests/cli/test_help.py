@@ -40,12 +40,6 @@ def test_the_help_of_each_command_has_an_example(mpucal, name):
     assert f"Example: `mpucal {name}" in " ".join(result.out.split())
 
 
-def test_no_command_shows_the_help(mpucal):
-    result = mpucal()
-    assert result.code == 2
-    assert "Commands:" in result.out + result.err
-
-
 @pytest.mark.parametrize("words", [[], ["session"]], ids=["all", "session"])
 def test_help_is_a_command_too(mpucal, words):
     result = mpucal("help", *words)
@@ -73,10 +67,6 @@ def test_wrong_usage_is_2(mpucal, words):
     assert result.code == 2
     assert "Error" in result.err
     assert "Traceback" not in result.err
-
-
-def test_says_its_version(mpucal):
-    assert mpucal("--version").out.startswith("mpucal, version ")
 
 
 def test_the_unexpected_is_a_bug_with_a_trace(mpucal, monkeypatch):

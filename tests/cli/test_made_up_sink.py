@@ -20,10 +20,10 @@ def call(served):
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory, process):
+def measured(tmp_path_factory, call):
     """A folder in which a session on a source with a logbook has written to it, asked by nobody."""
     folder = tmp_path_factory.mktemp("logbook")
-    return folder, process(folder, "session", *SIM, "-o", "board", program=(PROGRAM,))
+    return folder, call(folder, "session", *SIM, "-o", "board")
 
 
 @pytest.fixture

@@ -75,6 +75,7 @@ def test_ctrl_c_keeps_the_result_so_far(mpucal, monkeypatch):
     assert json.loads(told.out)["samples"] == sum(calls)
 
 
+@pytest.mark.slow
 def test_sigterm_keeps_the_result_so_far_too(stopped_at, tmp_path):
     told = stopped_at(tmp_path, ("noise", 5), signal.SIGTERM, "noise", "--bus", "sim:hand=still", "-o", "noise")
     assert told.code == 0, told.err

@@ -94,42 +94,57 @@ def test_errors_of_resume_name_the_problem(mpucal, words, sentence):
     assert sentence in result.err
 
 
-@pytest.mark.parametrize(
-    ("firmware", "cut_s"),
-    [("ardupilot", 25.0), pytest.param("px4", 6.0, marks=pytest.mark.slow)],
-    ids=["rotating", "flat"],
-)
-def test_a_vehicle_is_resumed_after_a_reboot(mpucal, write_capture, tmp_path, firmware, cut_s):
-    """The simulated vehicle stands where it was switched on, and its clock begins again."""
-    source = f"sim:firmware={firmware},imus=2,seed=3"
-    words = ("--mavlink", source, "--rate", "50", "--target", "quick", "--no-write", "--prepare=yes")
-    assert mpucal(*WORDS, *words, "-o", "whole").code == 0
-    whole = read_capture(tmp_path / "whole" / "capture.mcap")
-    until_ns = whole.records[0].t_ns + cut_s * 1e9
-    (tmp_path / "cut").mkdir()
-    kept = [record for record in whole.records if record.t_ns < until_ns]
-    write_capture(tmp_path / "cut" / "capture.mcap", whole.meta, kept)
+@pytest.fixture
+def cut_off(write_capture, tmp_path):
+    """Return a function that writes the first seconds of a session's capture into the folder `cut`."""
 
+    def call(folder, cut_s):
+        whole = read_capture(folder / "capture.mcap")
+        until_ns = whole.records[0].t_ns + cut_s * 1e9
+        (tmp_path / "cut").mkdir()
+        kept = [record for record in whole.records if record.t_ns < until_ns]
+        write_capture(tmp_path / "cut" / "capture.mcap", whole.meta, kept)
+
+    return call
+
+
+def resume_vehicle(mpucal, begins):
+    """Resume the session in the folder `cut`, replay it, and compare; return its recording and that of the cut part.
+
+    The simulated vehicle stands where it was switched on, and its clock begins again.
+    """
     resumed = mpucal(*WORDS, "--no-write", "--resume", "cut")
     assert resumed.code == 0, resumed.err
     assert "the session resumes where it stopped" in resumed.err
     prompts = [event["kind"] for event in events(resumed.err) if event["event"] == "prompt"]
-    assert prompts[0] == ("rotate" if cut_s > 20.0 else "lay_flat")
-    assert prompts[-1] == "rest"
-    recording = load(tmp_path / "cut")
+    assert (prompts[0], prompts[-1]) == (begins, "rest")
+    recording, first = load("cut"), load("cut/capture.mcap")
     assert recording.gap.sum() == 1
-    first = load(tmp_path / "cut" / "capture.mcap")
     assert np.array_equal(first.acc, recording.acc[: len(first)])
-    assert np.array_equal(first.others[0].gyr, recording.others[0].gyr[: len(first.others[0])])
-
-    found = Calibration.load(tmp_path / "cut" / "calibration.json")
+    found = Calibration.load("cut/calibration.json")
     again = mpucal(*WORDS, "--replay", "cut", "-o", "again")
     assert again.code == 0, again.err
-    replayed = Calibration.load(tmp_path / "again" / "calibration.json")
-    for other in (calibrate(recording), replayed, calibrate(load(tmp_path / "again"))):
-        assert np.array_equal(other.D, found.D)
-        assert np.array_equal(other.b_a, found.b_a)
+    replayed = Calibration.load("again/calibration.json")
+    assert np.array_equal(replayed.D, found.D)
+    assert np.array_equal(replayed.b_a, found.b_a)
     assert replayed.quality["verification"] == found.quality["verification"]
+    return recording, first, found
+
+
+def test_a_vehicle_is_resumed_after_a_reboot_while_rotating(mpucal, flown, cut_off):
+    cut_off(flown.folder, 25.0)
+    resume_vehicle(mpucal, "rotate")
+
+
+@pytest.mark.slow
+def test_a_vehicle_of_two_imus_is_resumed_after_a_reboot_while_flat(mpucal, cut_off, tmp_path):
+    words = ("--mavlink", "sim:firmware=px4,imus=2,seed=3", "--rate", "50", "--target", "quick", "--no-write")
+    assert mpucal(*WORDS, *words, "--prepare=yes", "-o", "whole").code == 0
+    cut_off(tmp_path / "whole", 6.0)
+    recording, first, found = resume_vehicle(mpucal, "lay_flat")
+    assert np.array_equal(first.others[0].gyr, recording.others[0].gyr[: len(first.others[0])])
+    for other in (calibrate(recording), calibrate(load("again"))):
+        assert np.array_equal(other.D, found.D)
     checked = mpucal("check", "whole/calibration.json", "--replay", "whole", "--yes")
     assert checked.code == 0, checked.err
 

@@ -37,9 +37,6 @@ def test_a_recording_of_a_vehicle_is_shown(recorded):
 @pytest.mark.parametrize(
     ("words", "what"),
     [
-        (["--bus", "sim", "--mavlink", "sim"], "--bus and --mavlink were given together"),
-        (["--bus", "sim", "--system", 1], "--bus sim does not take --system"),
-        (["--mavlink", "sim", "--address", 0x68], "--mavlink sim does not take --address"),
         (["--mavlink", "sim", "--accel-range", 8], "--mavlink sim does not take --accel-range"),
         (["--mavlink", "nonsense"], "cannot be understood"),
         (["--mavlink", "sim", "--signing-key", "/no/such/key"], "cannot be read"),

@@ -1,14 +1,10 @@
 """A session over MAVLink writes to the autopilot it was measured on, or leaves it as it was and ends with 6."""
 
-import contextlib
-import io
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mpucal.__main__ import run
 from mpucal.cli.destination import make_device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
@@ -17,7 +13,6 @@ from mpucal.sinks.choose import interrupted_writes
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import session_recorder, write_to_all
 from mpucal.sources.table import matching_kinds
-from tools.processes import quick
 
 SOURCE = {
     "bus": None,
@@ -37,24 +32,6 @@ WORDS = {
     "gravity": 9.80665,
     "model": "auto",
 }
-
-
-@pytest.fixture(scope="session")
-def flown(once):
-    """Return a session on the simulated vehicle, which writes to it."""
-
-    def make(folder):
-        words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder / "flown"), "--json"]
-        with (
-            contextlib.redirect_stdout(io.StringIO()) as out,
-            contextlib.redirect_stderr(io.StringIO()) as err,
-            quick(),
-        ):
-            code = run(["session", *words, "--yes"])
-        (folder / "result.json").write_text(json.dumps({"code": code, "out": out.getvalue(), "err": err.getvalue()}))
-
-    folder = once("cli-flown", make)
-    return SimpleNamespace(folder=folder / "flown", **json.loads((folder / "result.json").read_text()))
 
 
 def test_the_new_parameters_are_there_and_the_files_say_so(flown):

@@ -52,11 +52,5 @@ def test_a_refusal_is_exit_code_6_and_one_sentence(mpucal, calibrated, tmp_path,
     assert not (tmp_path / "calibration-on-chip.json").exists()
 
 
-def test_a_doctor_prints_json_alone(mpucal):
-    result = mpucal("doctor", "--bus", "sim", "--json", "--seconds", "2")
-    assert result.code == 0
-    assert json.loads(result.out)["format"] == "mpucal.doctor"
-
-
 def test_a_doctor_wants_a_bus(mpucal, session):
     assert mpucal("doctor", "--replay", session.folder / "capture.mcap").code == 2
