@@ -59,7 +59,7 @@ def test_each_chip_is_named_and_its_calibration_is_good(chip):
     assert not recording.gap.any()
     found = calibrate(recording, model="hand")
     assert found.verdict == "good"
-    assert np.abs(found.D - D).max() < 2e-3
+    assert np.abs(found.D - D).max() < 3e-3
 
 
 @pytest.mark.slow

@@ -41,10 +41,6 @@ class HandDisturbance:
     wobble: float = 0.0
 
 
-# The rate is 1 deg/s over all axes.
-TYPICAL_TREMOR = HandDisturbance(tremor_mps2=0.1, tremor_rad_s=float(np.radians(1.0) / np.sqrt(3)))
-
-
 def _arm(held_mm: float, held_mrad: float, tremor_mrad: float) -> HandDisturbance:
     pulsation = np.pi * sum(ARM_HZ)
     rate = 1e-3 * tremor_mrad * pulsation
@@ -59,13 +55,15 @@ def _arm(held_mm: float, held_mrad: float, tremor_mrad: float) -> HandDisturbanc
 
 # How the arm is held, by the literature on posture and tremor: people sway by 1 to 1.5 mm and 3 to 6 mrad below 1 Hz,
 # and tremble by 0.25 to 0.8 mrad at 8 to 12 Hz; the less, the better the arm is supported.
+# A steady hand trembles by 1 deg/s over all axes, and does not sway.
 ARMS = {
-    "steady": TYPICAL_TREMOR,
+    "steady": HandDisturbance(tremor_mps2=0.1, tremor_rad_s=float(np.radians(1.0) / np.sqrt(3))),
     "braced": _arm(0.3, 1.2, 0.3),
     "seated": _arm(0.6, 2.2, 0.4),
     "standing": _arm(1.0, 3.5, 0.5),
     "raised": _arm(1.3, 4.5, 0.65),
 }
+USUAL_ARM = "seated"
 
 
 def point_acceleration(alpha: Vector, omega: Vector, r: Vector, v: Vector | float = 0.0) -> Vector:

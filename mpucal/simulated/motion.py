@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
-from .disturbance import HELD_HZ, JERK_MPS2, JERK_S, SWAY_HZ, TYPICAL_TREMOR, HandDisturbance, point_acceleration
+from .disturbance import ARMS, HELD_HZ, JERK_MPS2, JERK_S, SWAY_HZ, USUAL_ARM, HandDisturbance, point_acceleration
 from .hand import REACTION_S, Hand, HandPrompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 from .mishaps import Mishap
@@ -107,7 +107,7 @@ class Motion:
         rng: np.random.Generator,
         gravity: float,
         mishaps: Iterable[Mishap] = (),
-        disturbance: HandDisturbance = TYPICAL_TREMOR,
+        disturbance: HandDisturbance = ARMS[USUAL_ARM],
     ) -> None:
         self._hand = hand
         self.mishaps = tuple(mishap for mishap in (hand.mishap, *mishaps) if type(mishap) is not Mishap)

@@ -10,7 +10,7 @@ import pytest
 from mpucal.result.calibration import Calibration
 
 PROGRAM = Path(__file__).with_name("logbook.py")
-SIM = ("--bus", "sim:seed=3", "--rate", "25", "--target", "quick", "--yes")
+SIM = ("--bus", "sim:seed=3,arm=steady", "--rate", "25", "--target", "quick", "--yes")
 
 
 @pytest.fixture(scope="module")
@@ -37,11 +37,11 @@ def test_a_session_writes_to_the_new_sink_by_default_and_records_its_effect(meas
     folder, done = measured
     assert done.code == 0, done.err
     assert "Results are written to files and the logbook (change with --to or --no-write)." in done.err
-    assert "Done: the logbook of sim:seed=3 says b_a." in done.out
+    assert "Done: the logbook of sim:seed=3,arm=steady says b_a." in done.out
     found = Calibration.load(folder / "board" / "calibration.json")
     assert (folder / "logbook.txt").read_text() == f"b_a: {found.b_a.tolist()}\n"
     assert [(entry["to"], entry["where"]) for entry in found.extra["written"]] == [
-        ("logbook", "the logbook of sim:seed=3")
+        ("logbook", "the logbook of sim:seed=3,arm=steady")
     ]
     assert not Calibration.load(folder / "board" / "calibration-on-logbook.json").b_a.any()
     assert (folder / "board" / "logbook-old.txt").read_text() == "b_a: nothing\n"

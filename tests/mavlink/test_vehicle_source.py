@@ -195,7 +195,7 @@ def test_after_a_reboot_its_streams_are_asked_for_again_and_join(opened, words):
 
 @pytest.mark.parametrize("words", ["", ",CAL_ACC0_ID=0"], ids=["named", "named meanwhile"])
 def test_offsets_that_px4_commits_meanwhile_are_composed(opened, words):
-    to = opened(f"firmware=px4,imus=1,fault=autocal@9,hand=still{words}")
+    to = opened(f"firmware=px4,imus=1,fault=autocal@9,hand=still,arm=steady{words}")
     started(to, 10)
     assert [text for text in to.said if "was changed while it was measured" in text and "SENS_IMU_AUTOCAL" in text]
     recording = to.source.recording()

@@ -115,9 +115,9 @@ def test_in_the_hand_still_is_not_still():
         run = Run("still", (), 10.0, seed=seed)
         up = run.force.mean(axis=0)
         trembles.append((run.force - up).std(axis=0).mean())
-        assert 0.5 < np.degrees(np.sqrt((run.rate**2).sum(axis=1).mean())) < 1.5
-    # tremor of 0.05 to 0.1 m/s^2, and some tilting
-    assert 0.04 < min(trembles) < max(trembles) < 0.15
+        assert 2.0 < np.degrees(np.sqrt((run.rate**2).sum(axis=1).mean())) < 3.0
+    # a seated person's tremor of 0.08 to 0.16 m/s^2, and some tilting
+    assert 0.07 < min(trembles) < max(trembles) < 0.2
 
 
 def test_asked_for_a_direction_it_misses_by_less_than_8_degrees():

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from ...data import Vector
-from ..disturbance import ARMS
+from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_CHIP, Fault, Where
 from ..hands import HANDS
 from ..option_text import FAULT, Parser, at_least, faults, number, one_of, parse_options, whole
@@ -36,7 +36,7 @@ class ChipOptions:
     offsets: str = "2048"
     seed: int = 0
     hand: str = "guided"
-    arm: str = "steady"
+    arm: str = USUAL_ARM
     pace: str = "fast"
     rate_error_ppm: float | None = None
     D: Vector | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES
-from ..disturbance import ARMS
+from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_VEHICLE, Fault, Where
 from ..hands import HANDS
 from ..option_text import FAULT, Parser, at_least, faults, one_of, parse_options, whole
@@ -41,7 +41,7 @@ class VehicleOptions:
     highres: bool = True
     seed: int = 0
     hand: str = "guided"
-    arm: str = "steady"
+    arm: str = USUAL_ARM
     pace: str = "fast"
     rotate_at: float | None = None
     fault: tuple[Fault, ...] = ()
