@@ -48,8 +48,6 @@ def call(module: Any, words: Sequence[str]) -> int | None:
     """Call `main` of a program with what the command line gives; return the exit code."""
     if not inspect.isfunction(module.main):
         return module.main(words)
-    if not inspect.signature(module.main).parameters:
-        return module.main()
     return module.main(**parsed(module.__doc__, words, module.main))
 
 

@@ -25,7 +25,7 @@ from mpucal.cli.options import parse_gravity
 from mpucal.errors import MpucalError, UsageError
 from mpucal.export.forms import FORMS
 from mpucal.files import load
-from mpucal.files.hints import NO_HINTS, Hints, parse_columns, parse_units
+from mpucal.files.hints import Hints, parse_columns, parse_units
 from mpucal.files.mcap import FORMAT, read_capture
 from mpucal.iio.devices import Devices
 from mpucal.mavlink.parameters.text import read_parameters_file
@@ -46,7 +46,7 @@ from mpucal.sources.bridge.frame import Frame
 from mpucal.sources.chain import split_at_resumes
 from mpucal.sources.table import SOURCES
 
-from ..lab.dialects import dialects, walk
+from ..lab.dialects import dialects, walk, written
 from . import fuzz_peers as peers
 from .fuzz_peers import joined, pieces, tlog
 
@@ -203,7 +203,10 @@ def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:
         "tlog's packets": (lambda data: of_file(load, place, "p.tlog")(tlog(data)), peers.vehicle_says()),
         "dataflash": (of_file(load, place, "r.bin"), [b"\xa3\x95\x80" + bytes(range(86)) * 9, blobs[0]]),
         "dataflash of a flight": (of_file(load, place, "r.bin"), [flight()]),
-        **{name: of_dialect(place, *written) for name, written in written_dialects(place).items()},
+        **{
+            name: (of_file(load, place, f"r{path.suffix}", hints), [path.read_bytes()])
+            for name, (path, hints) in written_dialects(place).items()
+        },
     }
 
 
@@ -241,11 +244,10 @@ def flight() -> bytes:
 def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
     """Return a file of some 60 samples of each dialect by name; an archive of a folder, and the data file of a bag."""
     found, short = {}, walk().part(2000, 2060)
-    ns = np.rint(short.t * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
-    for number, (name, (_, write, hints)) in enumerate(dialects().items()):
+    for number, (name, (*_, hints)) in enumerate(dialects().items()):
         folder = place / str(number)
         folder.mkdir()
-        path = write(folder, short, ns)
+        path = written(name, folder, short)
         children = sorted(path.iterdir()) if path.is_dir() else []
         if path / "metadata.yaml" in children:
             path = next(child for child in children if child.suffix != ".yaml")
@@ -256,8 +258,3 @@ def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
                     archive.write(child, child.name)
         found[name] = path, hints
     return found
-
-
-def of_dialect(place: Path, path: Path, hints: Hints = NO_HINTS) -> tuple[Run, list[bytes]]:
-    """Return a dialect's reader, and its file as the corpus."""
-    return of_file(load, place, f"r{path.suffix}", hints), [path.read_bytes()]

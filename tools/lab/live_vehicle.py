@@ -14,7 +14,6 @@ that level at the end [deg].
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import socket
@@ -28,7 +27,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -199,45 +198,43 @@ def _opened(url: str) -> Transport:
     return open_transport(parse_url(url))
 
 
-def main() -> int:
+def main(
+    words: Annotated[list[str], "for mpucal session"] = (),
+    *,
+    mavlink: Annotated[str, "URL of the session"],
+    parameters: Annotated[str, "another URL of the same SITL"],
+    port: Annotated[int, "where the SITL looks for its JSON model"] = 9002,
+    hand: Annotated[str, HANDS] = "guided",
+    seed: Annotated[int, "of the hand"] = 0,
+    killed_at: Annotated[int | None, "prompt at which it is killed, and then resumed"] = None,
+    cross_axis: Annotated[float, "standard deviation, of the accelerometers"] = 0.0,
+    own: Annotated[bool, "ArduPilot calibrates itself"] = False,
+) -> int:
     """Run one session, and print its line; return its exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--mavlink", required=True, metavar="URL", help="of the session")
-    parser.add_argument("--parameters", required=True, metavar="URL", help="another one of the same SITL")
-    parser.add_argument("--port", type=int, default=9002, help="where the SITL looks for its JSON model")
-    parser.add_argument("--hand", choices=HANDS, default="guided")
-    parser.add_argument("--seed", type=int, default=0, help="of the hand")
-    parser.add_argument("--killed-at", type=int, metavar="N", help="prompt at which it is killed, and then resumed")
-    parser.add_argument("--cross-axis", type=float, default=0.0, metavar="SD", help="of the accelerometers")
-    parser.add_argument("--own", action="store_true", help="ArduPilot calibrates itself")
-    parser.add_argument("-o", "--folder", type=Path, help="of the session's files")
-    parser.add_argument("words", nargs="*", help="for mpucal session")
-    arguments = parser.parse_args()
-    body = Body(arguments.port, arguments.hand, arguments.seed, arguments.cross_axis)
-    before = held(arguments.parameters)
+    body = Body(port, hand, seed, cross_axis)
+    before = held(parameters)
     R_b = mounting(ARDUPILOT, ardupilot_slot(1), before.parameters)
     if R_b is not None:
         body.mounting = R_b
-    if arguments.own:
-        with closing(_locked(arguments.mavlink)) as link:
+    if own:
+        with closing(_locked(mavlink)) as link:
             done, took_s, level = own_calibration.calibrate(link, body)
             angle = own_calibration.attitude_error_deg(link, body, level, reboot=True)
-        result = Result(int(not done), None, took_s, angle)
-        print(line(result, before, held(arguments.parameters), body.skew))
+        print(line(int(not done), None, took_s, angle, before, held(parameters), body.skew))
         return int(not done)
-    with closing(_locked(arguments.mavlink)) as link:
+    with closing(_locked(mavlink)) as link:
         level = own_calibration.set_level(link, body)
     with tempfile.TemporaryDirectory() as temporary:
-        folder = arguments.folder or Path(temporary) / "session"
-        code = session(body, ["--mavlink", arguments.mavlink, "-o", str(folder), *arguments.words], arguments.killed_at)
-        if arguments.killed_at:
-            code = session(body, ["--resume", str(folder), *arguments.words])
+        folder = Path(temporary) / "session"
+        code = session(body, ["--mavlink", mavlink, "-o", str(folder), *words], killed_at)
+        if killed_at:
+            code = session(body, ["--resume", str(folder), *words])
         file = folder / "calibration.json"
         document = json.loads(file.read_text()) if file.exists() else None
-    with closing(_locked(arguments.mavlink)) as link:
+    with closing(_locked(mavlink)) as link:
         angle = own_calibration.attitude_error_deg(link, body, level, reboot=False)
     took_s = document["fit"]["seconds"] if document else math.nan
-    print(line(Result(code, document, took_s, angle), before, held(arguments.parameters), body.skew))
+    print(line(code, document, took_s, angle, before, held(parameters), body.skew))
     return code
 
 
@@ -263,21 +260,19 @@ def session(body: Body, words: list[str], killed_at: int | None = None) -> int:
     return process.returncode
 
 
-class Result(NamedTuple):
-    """Outcome of a calibration; document : calibration.json of a session. angle_deg : of the attitude afterwards."""
-
-    code: int
-    document: Mapping[str, Any] | None
-    took_s: float
-    angle_deg: float
-
-
-def line(result: Result, before: Held, after: Held, skew: Vector) -> str:
-    """Return the result in a line."""
-    document = result.document
+def line(
+    code: int,
+    document: Mapping[str, Any] | None,
+    took_s: float,
+    angle_deg: float,
+    before: Held,
+    after: Held,
+    skew: Vector,
+) -> str:
+    """Return the result in a line; document : calibration.json of a session. angle_deg : of the attitude afterwards."""
     imus = [document, *document.get("others", [])] if document else []
     z = rms([each for one in imus if "accelerometer" in one for each in before.z(one, skew)])
     verdict = document["quality"]["verdict"] if document else "none"
     was, now = max(before.off()), ", ".join(after.off())
-    end = f"took {result.took_s:.0f} s, attitude off {result.angle_deg:.2f} deg"
-    return f"exit {result.code} {verdict}: was {was}, is {now}, z {z:.2f}, {end}"
+    end = f"took {took_s:.0f} s, attitude off {angle_deg:.2f} deg"
+    return f"exit {code} {verdict}: was {was}, is {now}, z {z:.2f}, {end}"

@@ -9,7 +9,6 @@ it. vectors/ are those of vectors.py.
 from __future__ import annotations
 
 import json
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -158,9 +157,8 @@ def make_faults(folder: Path) -> None:
         (folder / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
 
 
-def main() -> None:
+def main(folder: Path = FOLDER) -> None:
     """Make all fixtures."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     for name in ("sessions", "faults"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*/*.mcap"):  # a capture replaces no file

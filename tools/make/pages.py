@@ -5,12 +5,12 @@ python -m tools.make pages [--check]
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 from mpucal.chip.families import FAMILIES
 from mpucal.export.forms import FORMS
@@ -189,11 +189,9 @@ def outdated() -> Iterator[tuple[Path, str]]:
             yield path, new
 
 
-def main() -> int:
+def main(*, check: Annotated[bool, "write nothing"] = False) -> int:
     """Write or check; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--check", action="store_true", help="write nothing")
-    check, found = parser.parse_args().check, list(outdated())
+    found = list(outdated())
     for path, new in found:
         print(f"{path} is outdated" if check else f"{path} is written", file=sys.stderr)
         if not check:

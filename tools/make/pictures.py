@@ -1,13 +1,12 @@
 """Pictures of a session's screen, from tmux, and of a report as a browser shows it; PNGs need a Chromium.
 
-python -m tools.make pictures -o /tmp/screens                           80x24, at three times of a simulated session
-python -m tools.make pictures -o /tmp/screens --size 160x50             another size
-python -m tools.make pictures -o /tmp/pictures board7/report.html       on a desk and on a phone, in light and dark
+python -m tools.make pictures --output /tmp/screens                        80x24, at three times of a session
+python -m tools.make pictures --output /tmp/screens --size 160x50          another size
+python -m tools.make pictures --output /tmp/pictures board7/report.html    on a desk and a phone, in light and dark
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import shlex
@@ -18,6 +17,7 @@ import tempfile
 import time
 from html import escape
 from pathlib import Path
+from typing import Annotated
 
 from rich.console import CONSOLE_SVG_FORMAT, Console
 from rich.terminal_theme import MONOKAI
@@ -97,7 +97,7 @@ def screen(folder: Path, size: str, at_s: str) -> None:
             tmux.close()
 
 
-def report(browser: str, file: Path, folder: Path) -> None:
+def of_report(browser: str, file: Path, folder: Path) -> None:
     """Take pictures of a report in each width and light."""
     light = file.read_text(encoding="utf-8")
     for place, width in WIDTHS.items():
@@ -111,21 +111,21 @@ def report(browser: str, file: Path, folder: Path) -> None:
             print(target)
 
 
-def main() -> int:
+def main(
+    report: Annotated[Path | None, "a report, in place of a session"] = None,
+    *,
+    output: Annotated[Path, "folder of the pictures"],
+    size: Annotated[str, "columns x rows"] = "80x24",
+    at: Annotated[str, "after how many seconds pictures are taken"] = "8,30,45",
+) -> int:
     """Take all pictures."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("report", type=Path, nargs="?", help="a report, in place of a session")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where the pictures go")
-    parser.add_argument("--size", default="80x24", help="columns x rows")
-    parser.add_argument("--at", default="8,30,45", help="after how many seconds pictures are taken")
-    asked = parser.parse_args()
-    folder = asked.output.resolve()
+    folder = output.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    if asked.report is None:
-        screen(folder, asked.size, asked.at)
+    if report is None:
+        screen(folder, size, at)
     elif (browser := chromium()) is None:
         print("there is no Chromium here: install one, or open the report in your browser", file=sys.stderr)
         return 1
     else:
-        report(browser, asked.report, folder)
+        of_report(browser, report, folder)
     return 0

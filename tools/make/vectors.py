@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import math
 import struct
-import sys
 import zlib
 from dataclasses import asdict, replace
 from fractions import Fraction
@@ -424,8 +423,8 @@ def write(folder: Path) -> None:
         (folder / f"slots_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
 
 
-def main() -> None:
+def main(folder: Path = FOLDER) -> None:
     """Write them into FOLDER and the talks into the package, too; or all into the folder that is named."""
-    write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)
-    if len(sys.argv) == 1:
+    write(folder)
+    if folder == FOLDER:
         TALKS_FILE.write_text(json.dumps(talks(), indent=1) + "\n")
