@@ -9,7 +9,6 @@ import pytest
 
 from mpucal import load
 from mpucal.calibration import calibrate, estimate
-from mpucal.calibration.evidence import Evidence
 from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
 from mpucal.calibration.rotation import rotation
@@ -217,12 +216,6 @@ def test_a_known_range_is_named(in_hand):
     recording = replace(in_hand.recording, gyr=0.5 * in_hand.recording.gyr)
     sensor = replace(recording.sensor, gyro_range_dps=250.0, message="a log")
     usable_by_rests(replace(recording, sensor=sensor), "than assumed: ±500 deg/s, read as ±250")
-
-
-def test_slow_rates_in_degrees(ideal):
-    slow = ideal(0, turn_s=40.0, rate_hz=20).recording
-    assert np.rad2deg(np.abs(slow.gyr).max()) < 30
-    refused_for("units_suspect", replace(slow, gyr=np.rad2deg(slow.gyr)), "in deg/s;")
 
 
 def test_rates_in_counts(in_hand):
@@ -520,12 +513,6 @@ def test_a_gyroscopes_bias_that_steps_is_followed(hand):
     assert error < 3.0 * stepped.quality["error_std"]["rms"]
 
 
-def test_a_mount_that_slips_between_rests(in_hand):
-    recording = in_hand.recording
-    slipped = np.concatenate([recording.acc[:3000], recording.acc[3000:] @ rotation(np.radians([0.0, 3.0, 0.0])).T])
-    assert judged(replace(recording, acc=slipped)).reasons.keys() & {"inconsistent", "zero_moved"}
-
-
 def test_a_motor_that_starts_is_named(in_hand):
     recording = in_hand.recording
     acc = recording.acc.copy()
@@ -542,12 +529,6 @@ def test_clipping_is_not_reported_as_a_slip(hand):
     clipped = np.zeros(len(acc), bool)
     clipped[2000:2003] = True
     assert list(judged(replace(recording, acc=acc, acc_clipped=clipped)).reasons) == ["accel_clipped"]
-
-
-def test_without_a_flat_segment_only_that_is_reported(good):
-    quality = judge(Evidence(good, G, None, None, "auto"))
-    assert quality["verdict"] == "refused"
-    assert [reason["code"] for reason in quality["reasons"]] == ["never_still"]
 
 
 @pytest.mark.parametrize(
@@ -571,12 +552,6 @@ def test_a_real_gyroscope_that_clipped_is_named(real):
 
 def test_a_real_board_that_lay_still_is_not_calibrated(real):
     refused_for("few_orientations", real("mpu6050_static"), "hardly turned")
-
-
-def test_a_real_single_turn_is_not_enough(real):
-    result = judged(real("mpu6050_turn90"))
-    assert result.verdict == "refused"
-    assert "x up" in result.reasons["few_orientations"]
 
 
 def test_a_mirrored_axis_of_a_real_sensor_is_named(real):
