@@ -64,6 +64,7 @@ def test_a_bus_that_a_chip_holds_is_freed_in_time(bridge, fault, greeted):
     assert link.ask(wire.Read(reg.WHO_AM_I, 1))[0][0].reply.data == b"\x68"
 
 
+@pytest.mark.parametrize("bridge", ["firmware", pytest.param("sketch", marks=pytest.mark.slow)], indirect=True)
 def test_a_session_continues_after_the_bus_was_held(bridge, fault, started):
     board, port = bridge
     driver = started(board, port, 200)

@@ -76,8 +76,8 @@ CTAGS = {
     "pattern": '"{cmd.path}" -u --language-force=c++ -f - --c++-kinds=svpf --fields=KSTtzns --line-directives'
     ' "{source_file}"',
 }
-# a LittleFS and none, in a gate that is to be quick
-ONCE = ("esp32", "megaavr")
+# in a gate that is to be quick
+ONCE = ("esp32",)
 
 
 def _put(path, text):

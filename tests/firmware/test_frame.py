@@ -15,7 +15,7 @@ from mpucal.sources.bridge.frame import MAX_CONTENT, MAX_ENCODED, MAX_PAYLOAD, D
 
 VECTORS = sorted((Path(__file__).parents[2] / "fixtures" / "vectors").glob("line_*.bin"))
 # a sanitizer has seen all of it long before
-RANDOM_FRAMES = 200_000 if "MPUCAL_SANITIZE" in os.environ else 3_000_000
+RANDOM_FRAMES = 200_000 if "MPUCAL_SANITIZE" in os.environ else 1_000_000
 
 
 class Incoming(ctypes.Structure):

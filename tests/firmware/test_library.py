@@ -11,12 +11,12 @@ from urllib.parse import urlsplit
 import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "mpucal" / "firmware"
-# of the others, test_matrix.py compiles the sketches with the same core and more warnings
-OTHERS = ("nano-atmega328old", "mega-atmega2560", "leonardo")
-BOARDS = ("uno", *(pytest.param(board, marks=pytest.mark.slow) for board in OTHERS))
+# test_matrix.py compiles the sketches with the same core and more warnings, test_discovery.py finds the library
+BOARDS = ("uno", "nano-atmega328old", "mega-atmega2560", "leonardo")
 SKETCHES = ("mpucal_bridge", "mpucal_corrected")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("board", BOARDS)
 @pytest.mark.parametrize("sketch", SKETCHES)
 def test_a_stock_ide_compiles_it_without_a_warning(stock_sketches, board, sketch):

@@ -36,6 +36,7 @@ def test_the_core_passes_its_tests_under_sanitizers(sanitized):
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
 
 
+@pytest.mark.slow
 def test_and_the_sanitizers_are_awake(sanitized, host, monkeypatch, tmp_path):
     monkeypatch.setenv("MPUCAL_SANITIZE", "1")
     host.compile_core(tmp_path)

@@ -77,15 +77,6 @@ def test_lies_in_memory_as_the_protocol_says(host, slots):
     assert second[SEAL_BYTES : SEAL_BYTES + len(NEW)] == NEW
 
 
-def test_a_generation_wraps_around_to_one(host, slots):
-    content = bytearray(holding(host, slots, OLD))
-    content[:SEAL_BYTES] = bytes.fromhex("ffffffff00000000")
-    eeprom = host.Eeprom(content)
-    assert slots.stored(eeprom).generation == 0xFFFFFFFF
-    assert slots.store(eeprom, NEW) == 1
-    assert slots.read(eeprom) == NEW
-
-
 def writes_of(host, slots, content, change):
     eeprom = host.Eeprom(content)
     change(eeprom)
