@@ -38,11 +38,6 @@ def test_they_arrive_as_they_were(way, recording, calibration):
     assert [way(value) for value in (imu, calibration)] == [imu, calibration]
 
 
-def test_a_calibration_read_back_equals_the_one_saved(calibration, tmp_path):
-    calibration.save(tmp_path / "calibration.json")
-    assert mpucal.Calibration.load(tmp_path / "calibration.json") == calibration
-
-
 def test_they_differ_by_a_single_value(recording, calibration):
     acc = recording.acc.copy()
     acc[7, 1] = np.nextafter(acc[7, 1], 99.0)

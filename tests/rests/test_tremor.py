@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
-from mpucal.rests.limits import ANY_HAND, QUIET, learned
+from mpucal.rests.limits import QUIET
 from mpucal.rests.tremor import fit_lambda, level_rests, mean_variance
 
 RATE_HZ, REST_S, NOISE_MPS2 = 100.0, 3.0, 0.02
@@ -74,21 +74,6 @@ def test_a_turn_that_the_gyroscope_sees_is_carried_away():
     still = level_rests(recording, flat, np.array([[0, n]]))
     assert np.ptp(acc, axis=0).max() > 0.5
     assert np.ptp(still, axis=0).max() < 0.01
-
-
-def test_the_limits_are_those_of_the_recordings_rests():
-    rng = np.random.default_rng(1)
-
-    def of(typical):
-        spread = np.concatenate([typical * np.exp(0.2 * rng.standard_normal(400)), np.full(300, 1.0)])
-        return learned(spread, np.zeros(len(spread)), 0.0, 0.0)
-
-    assert of(0.005) == QUIET
-    shaky = of(0.04)
-    assert shaky.gyro_sd == pytest.approx(0.04 * np.exp(0.4), rel=0.1)
-    assert shaky.acc_sd / QUIET.acc_sd == pytest.approx(shaky.gyro_sd / QUIET.gyro_sd)
-    assert of(0.1).gyro_sd == pytest.approx(ANY_HAND.gyro_sd, rel=0.1)
-    assert learned(np.full(10, 0.1), np.zeros(10), 0.0, 50.0) == QUIET
 
 
 def test_a_hand_that_trembles_by_two_degrees_a_second_rests():
