@@ -40,11 +40,12 @@ SIDES = 0
 
 
 class Hypothesis(NamedTuple):
-    """Hypothesis: the quantity, how it is distributed, and over how many stretches of time, or SIDES."""
+    """Hypothesis: the quantity, how it is distributed, over how many stretches of time, or SIDES, and how often."""
 
     what: What
     shape: Literal["step", "walk", "pulse", "each"]
     groups: int
+    prior: float = 1.0
 
     @property
     def is_change(self) -> bool:
@@ -59,12 +60,14 @@ class Hypothesis(NamedTuple):
         return "change" if self.is_change and self.what != "gyroscope" else "time"
 
 
+# Every gyroscope's bias walks, and few step or drift steadily.
+RARELY = 0.1
 HYPOTHESES = (
     Hypothesis("accelerometer", "step", 48),
     Hypothesis("scale", "step", 48),
     Hypothesis("mount", "step", 48),
     Hypothesis("accelerometer", "walk", 16),
-    Hypothesis("gyroscope", "step", 48),
+    Hypothesis("gyroscope", "step", 48, RARELY),
     Hypothesis("gyroscope", "walk", 16),
     Hypothesis("accelerometer", "pulse", 48),
     Hypothesis("accelerometer", "each", 16),
@@ -112,7 +115,7 @@ class Explanation(NamedTuple):
     @property
     def log_share(self) -> float:
         """Log of its probability as a multiple of that of nothing; beforehand nothing is as likely as all together."""
-        return self.evidence - float(np.log(len(HYPOTHESES)))
+        return self.evidence + float(np.log(self.hypothesis.prior / sum(each.prior for each in HYPOTHESES)))
 
     @property
     def size(self) -> float:
@@ -147,7 +150,7 @@ def explain(parts: Parts, D: Vector) -> list[Explanation]:
     found = [_explain(each, groups[each.groups], parts, D) for each in HYPOTHESES if len(groups[each.groups].start) > 1]
     total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # with nothing, whose share is 1
     found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
-    found.sort(key=lambda each: -each.evidence)
+    found.sort(key=lambda each: -each.weight)
     changes = [each for each in found if each.hypothesis.kind == "change"]
     if sum(each.weight for each in changes) > 1.0 - 1.0 / SURE:
         of_sure = changes[0]._replace(weight=1.0, away=changes[0].farthest, is_sure=True)

@@ -172,7 +172,8 @@ def test_the_variance_with_a_walk_removed_is_that_of_the_joint_gaussian():
 def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
     _, _, parts = linear_parts()
     found = explain(parts, np.eye(3))
-    odds = np.exp([each.evidence for each in found]) / len(HYPOTHESES)
+    priors = np.array([each.hypothesis.prior for each in found])
+    odds = np.exp([each.evidence for each in found]) * priors / sum(each.prior for each in HYPOTHESES)
     np.testing.assert_allclose([each.weight for each in found], odds / (1.0 + odds.sum()))
 
 
