@@ -18,7 +18,8 @@ from .imu import MESSAGE_ID, Reading, Stream, decode_reading
 from .link import Link, S
 from .request import send_command
 
-WINDOW_NS, PATIENCE_NS = 2 * S, 30 * S
+# A stream that fills no window in SLOW_NS does not come at all.
+WINDOW_NS, PATIENCE_NS, SLOW_NS = 2 * S, 30 * S, 60 * S
 FEWEST = 20
 INTERVAL_US = 20_000
 LONGEST_STEP_S = 1.0
@@ -71,24 +72,30 @@ class RestMonitor:
         detectors = {stream: Detector(QUIET, bias=np.zeros(3)) for stream in self._streams}
         before: list[int | None] | None = None
         while True:
-            self._window = {stream: [] for stream in self._streams}
-            list(self._link.messages(self._link.now_ns() + WINDOW_NS))
-            missing = [stream for stream in self._streams if len(self._window[stream]) < FEWEST]
-            runs = None if missing else [_rest_number(detectors[s], self._window[s]) for s in self._streams]
-            now = None if runs is None or None in runs else self._means()
+            self._listen()
+            runs = [_rest_number(detectors[stream], self._window[stream]) for stream in self._streams]
+            now = None if None in runs else self._means()
             if now is not None and runs == before:
                 return now
             before = runs
-            if self._link.now_ns() < end_ns:
-                if missing:
-                    self._request()
-                continue
-            if not missing:
+            if self._link.now_ns() >= end_ns:
                 return None
-            raise LinkError(
-                f"{self._link.vehicle} does not send {missing[0].name} though it was asked for",
-                "check the link, and that no other ground station lowers its rates",
-            )
+
+    def _listen(self) -> None:
+        """Fill a window, which takes longer where the vehicle is slow, or has forgotten the request in a reboot."""
+        self._window = {stream: [] for stream in self._streams}
+        end_ns = self._link.now_ns() + SLOW_NS
+        while True:
+            list(self._link.messages(self._link.now_ns() + WINDOW_NS))
+            fewest = min(self._streams, key=lambda stream: len(self._window[stream]))
+            if len(self._window[fewest]) >= FEWEST:
+                return
+            if self._link.now_ns() >= end_ns:
+                raise LinkError(
+                    f"{self._link.vehicle} does not send {fewest.name} though it was asked for",
+                    "check the link, and that no other ground station lowers its rates",
+                )
+            self._request()
 
     def _request(self) -> None:
         set_interval = dialect().MAV_CMD_SET_MESSAGE_INTERVAL

@@ -9,7 +9,7 @@ session is to find. The vehicle takes its level before. Words after `--` go to `
 calibrates itself in the same hand instead. The line at the end: exit code, verdict, how far the vehicle's parameters
 were from the truth at worst and how far those of each IMU are now (offset [m/s^2], scale), the rms over D and b_a of
 all IMUs of (estimate - truth) / standard uncertainty, the time that was measured [s], and how far the attitude is off
-that level at the end [deg].
+that level once the vehicle has been rebooted [deg].
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parame
 from mpucal.mavlink.transport import Transport
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
+from mpucal.simulated.disturbance import ARMS
 from mpucal.simulated.hands import HANDS
 from mpucal.simulated.motion import Motion
 from mpucal.simulated.rotation import up_in_board
@@ -68,7 +69,8 @@ class Body:
 
     Parameters
     ----------
-    port : of UDP, where the SITL sends its steps. hand : its kind. seed : of the hand and of the skew.
+    port : of UDP, where the SITL sends its steps. hand, arm : its kind, and how it is held.
+    seed : of the hand and of the skew.
     cross_axis : standard deviation of the accelerometers' cross-axis sensitivities.
 
     Attributes
@@ -76,10 +78,10 @@ class Body:
     t_s : time of the motion. up : (3,) unit vector in the vehicle's axes. skew : (3, 3) of the accelerometers.
     """
 
-    def __init__(self, port: int, hand: str, seed: int, cross_axis: float) -> None:
+    def __init__(self, port: int, hand: str, arm: str, seed: int, cross_axis: float) -> None:
         of_hand, of_motion, of_skew = np.random.default_rng(seed).spawn(3)
         self.skew = np.where(np.eye(3, dtype=bool), 1.0, of_skew.normal(0.0, cross_axis, (3, 3)))
-        self._motion = Motion(HANDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
+        self._motion = Motion(HANDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2, disturbance=ARMS[arm])
         self._lock = threading.Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
@@ -205,13 +207,14 @@ def main(
     parameters: Annotated[str, "another URL of the same SITL"],
     port: Annotated[int, "where the SITL looks for its JSON model"] = 9002,
     hand: Annotated[str, HANDS] = "guided",
+    arm: Annotated[str, ARMS] = "steady",
     seed: Annotated[int, "of the hand"] = 0,
     killed_at: Annotated[int | None, "prompt at which it is killed, and then resumed"] = None,
     cross_axis: Annotated[float, "standard deviation, of the accelerometers"] = 0.0,
     own: Annotated[bool, "ArduPilot calibrates itself"] = False,
 ) -> int:
     """Run one session, and print its line; return its exit code."""
-    body = Body(port, hand, seed, cross_axis)
+    body = Body(port, hand, arm, seed, cross_axis)
     before = held(parameters)
     R_b = mounting(ARDUPILOT, ardupilot_slot(1), before.parameters)
     if R_b is not None:
@@ -219,7 +222,7 @@ def main(
     if own:
         with closing(_locked(mavlink)) as link:
             done, took_s, level = own_calibration.calibrate(link, body)
-            angle = own_calibration.attitude_error_deg(link, body, level, reboot=True)
+            angle = own_calibration.attitude_error_deg(link, body, level)
         print(line(int(not done), None, took_s, angle, before, held(parameters), body.skew))
         return int(not done)
     with closing(_locked(mavlink)) as link:
@@ -232,7 +235,7 @@ def main(
         file = folder / "calibration.json"
         document = json.loads(file.read_text()) if file.exists() else None
     with closing(_locked(mavlink)) as link:
-        angle = own_calibration.attitude_error_deg(link, body, level, reboot=False)
+        angle = own_calibration.attitude_error_deg(link, body, level)
     took_s = document["fit"]["seconds"] if document else math.nan
     print(line(code, document, took_s, angle, before, held(parameters), body.skew))
     return code

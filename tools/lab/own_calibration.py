@@ -16,6 +16,8 @@ from mpucal.mavlink.request import send_command
 from mpucal.session.aims import SIDES
 
 PATIENCE_NS, LISTEN_NS = 600 * S, S // 5
+# level, left, right, nose down, nose up, back
+ORDER = SIDES[[0, 1, 4, 2, 5, 3]]
 # A person presses the key once the vehicle rests as it should.
 HELD_S, NEAR = 1.0, 0.97
 PUT_DOWN_S = 5.0
@@ -59,8 +61,8 @@ def calibrate(link: Link, body: Turned) -> tuple[bool, float, Vector]:
             if 0 < asked != side:
                 side = asked
                 if side > 1:
-                    body.hear("rotate", tuple(SIDES[side - 1].tolist()))
-        if side > confirmed and body.still_s > HELD_S and -body.up @ SIDES[side - 1] > NEAR:
+                    body.hear("rotate", tuple(ORDER[side - 1].tolist()))
+        if side > confirmed and body.still_s > HELD_S and -body.up @ ORDER[side - 1] > NEAR:
             level = tilt_deg(body.up) if side == 1 else level
             confirmed = side
             send_command(link, command, side)
@@ -74,23 +76,19 @@ def set_level(link: Link, body: Turned) -> Vector:
     ------
     LinkError : it refuses.
     """
-    body.hear("lay_flat", None)
-    begun_s = body.t_s
-    while body.t_s - begun_s < PUT_DOWN_S or body.still_s < HELD_S:
-        list(link.messages(link.now_ns() + LISTEN_NS))
+    _put_down(link, body)
     if send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 2, timeout_s=30.0):
         raise LinkError("the vehicle does not take its level", "look what it says")
     return tilt_deg(body.up)
 
 
-def attitude_error_deg(link: Link, body: Turned, level_deg: Vector, reboot: bool) -> float:
-    """Return how far roll and pitch [deg] of the vehicle at rest are from the truth, less `level_deg`, at worst."""
-    if reboot:
-        Horizon(link).reboot()
-    body.hear("lay_flat", None)
+def attitude_error_deg(link: Link, body: Turned, level_deg: Vector) -> float:
+    """Reboot the vehicle; return how far roll and pitch [deg] are from the truth, less `level_deg`, at worst."""
+    _put_down(link, body)
+    Horizon(link).reboot()
     heard: list[tuple[float, float]] = []
     begun_s = body.t_s
-    while body.t_s - begun_s < SETTLED_S or body.still_s < HELD_S or len(heard) < AVERAGED:
+    while body.t_s - begun_s < SETTLED_S or len(heard) < AVERAGED:
         if not heard:
             send_command(link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, 30, ATTITUDE_US)
         for message in link.messages(link.now_ns() + S):
@@ -98,3 +96,10 @@ def attitude_error_deg(link: Link, body: Turned, level_deg: Vector, reboot: bool
                 heard.append((message.roll, message.pitch))
     found = np.degrees(np.mean(heard[-AVERAGED:], axis=0))
     return float(np.abs(found - (tilt_deg(body.up) - level_deg)).max())
+
+
+def _put_down(link: Link, body: Turned) -> None:
+    body.hear("lay_flat", None)
+    begun_s = body.t_s
+    while body.t_s - begun_s < PUT_DOWN_S or body.still_s < HELD_S:
+        list(link.messages(link.now_ns() + LISTEN_NS))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mpucal.mavlink.dialect import dialect
-from mpucal.session.aims import SIDES
 from tools.lab import own_calibration
+from tools.lab.own_calibration import ORDER
 
 
 class Body:
@@ -19,7 +19,7 @@ class Body:
 
     def hear(self, kind, down):
         self.prompts.append((kind, down))
-        self.up = -np.array(down or SIDES[0]) + [0.0, 0.02, 0.0]
+        self.up = -np.array(down or ORDER[0]) + [0.0, 0.02, 0.0]
 
 
 class Vehicle:
@@ -51,6 +51,6 @@ def test_each_side_is_confirmed_where_it_was_asked_for(monkeypatch, end, succeed
     monkeypatch.setattr(own_calibration, "send_command", vehicle.command)
     done, took_s, level = own_calibration.calibrate(vehicle, body)
     assert done is succeeds
-    assert vehicle.confirmed == [(k + 1, tuple(side)) for k, side in enumerate(SIDES)]
+    assert vehicle.confirmed == [(k + 1, tuple(side)) for k, side in enumerate(ORDER)]
     assert took_s == pytest.approx(7 * 0.2)
     np.testing.assert_allclose(level, [-np.degrees(0.02), 0.0], atol=0.01)
