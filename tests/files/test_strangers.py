@@ -191,7 +191,7 @@ def test_one_recording_in_ten_forms_gives_one_calibration(tmp_path):
     [
         ({"acc": np.zeros((5, 3))}, "which is not gravity"),
         ({"note": "nothing"}, "holds no columns of numbers"),
-        ({"data": np.random.default_rng(0).normal(size=(900, 7))}, "holds no columns that are known"),
+        ({"data": np.random.default_rng(0).normal(size=(900, 7))}, "holds no three columns as long as gravity"),
     ],
 )
 def test_arrays_that_are_no_recording(arrays, says, tmp_path):
@@ -349,7 +349,7 @@ def test_lines_without_times_that_repeat_a_sample_are_left_out(even_walk, tmp_pa
 
 def test_three_columns_of_an_unknown_sensor_name_the_command(even_walk, tmp_path):
     (tmp_path / "field.txt").write_text(text(even_walk.acc, ","))
-    with pytest.raises(RecordingError, match="three columns of numbers") as error:
+    with pytest.raises(RecordingError, match="holds no columns that are known") as error:
         mpucal.load(tmp_path / "field.txt")
     read = mpucal.load(tmp_path / "field.txt", columns=error.value.options.split()[1])
     np.testing.assert_allclose(read.acc, even_walk.acc)
@@ -513,11 +513,31 @@ def lines_of_json(walk):
     return "".join(json.dumps(row) + "\n" for row in found)
 
 
+def echoed(walk):
+    """Write messages as `ros2 topic echo` prints them."""
+    axes = "  x: {}\n  y: {}\n  z: {}\n"
+    record = (
+        "header:\n  stamp:\n    sec: {}\n    nanosec: {}\n  frame_id: imu\norientation:\n  x: 0.0\n  w: 1.0\n"
+        f"angular_velocity:\n{axes}angular_velocity_covariance: [0.0, 0.0]\nlinear_acceleration:\n{axes}---\n"
+    )
+    ns = np.rint(walk.t * 1e9).astype(np.int64).tolist()
+    numbers = zip(ns, walk.gyr.tolist(), walk.acc.tolist(), strict=True)
+    return "".join(record.format(at // 10**9, at % 10**9, *w, *a) for at, w, a in numbers)
+
+
+def of_a_satellite(walk):
+    """Write a time under a name that no list holds, beside an index, of which one sample has that before."""
+    t = np.where(np.arange(len(walk)) == 500, walk.t[499], walk.t) + 390884.272
+    rows = np.column_stack([np.arange(len(walk)), t, si(walk)])
+    return "N,GPST,Ax,Ay,Az,Gx,Gy,Gz\n" + text(rows, ",")
+
+
 def rows_of(walk):
     return zip(walk.t.tolist(), si(walk).tolist(), strict=True)
 
 
 FURTHER = [vectornav, axes_by_words, names_over_lines, minutes_of_a_spreadsheet, a_bag_in_text, lines_of_json]
+FURTHER += [echoed, of_a_satellite]
 
 
 @pytest.mark.parametrize("form", FURTHER)
@@ -651,3 +671,36 @@ def test_json_without_samples_is_refused(text, tmp_path):
     (tmp_path / "walk.json").write_text(text)
     with pytest.raises(RecordingError, match="holds no columns that are known"):
         mpucal.load(tmp_path / "walk.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "head"), [("avAccelerometer.csv", "t,X,Y,Z"), ("a.csv", "t,X (m/s^2),Y (m/s^2),Z (m/s^2)")]
+)
+def test_three_axes_are_those_of_their_unit_or_of_the_files_name(name, head, even_walk, tmp_path):
+    (tmp_path / name).write_text(head + "\n" + text(np.column_stack([even_walk.t, even_walk.acc]), ","))
+    np.testing.assert_array_equal(mpucal.load(tmp_path / name).acc, even_walk.acc)
+
+
+def driven(order):
+    """Return an index, times, rates, accelerations in that order, and a magnetic field: of a car, without names."""
+    rng = np.random.default_rng(8)
+    acc, rates = np.array([0.0, 0.0, G]) + rng.normal(0.0, 6.0, (900, 3)), rng.normal(0.0, 0.1, (900, 3))
+    sensors = {"acc": acc, "gyr": rates, "mag": np.array([20.0, -4.0, 40.0]) + rng.normal(0.0, 1.0, (900, 3))}
+    n = np.arange(900)
+    return np.column_stack([14953 + n, 4908.696 + n / HZ, *(sensors[of] for of in order.split())])
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [("gyr acc", "-,t,gx,gy,gz,ax,ay,az"), ("acc mag gyr", "-,t,ax,ay,az,-,-,-,gx,gy,gz"), ("gyr mag", None)],
+)
+def test_the_command_for_unknown_columns_works_at_once(order, said, tmp_path):
+    (tmp_path / "drive.txt").write_text(text(driven(order)))
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(tmp_path / "drive.txt")
+    if said is None:
+        assert "holds no three columns as long as gravity" in str(refused.value)
+        return
+    assert refused.value.options == f"--columns {said} --units acc=m/s^2"
+    read = mpucal.load(tmp_path / "drive.txt", columns=said, units="acc=m/s^2")
+    assert "times in s, accelerations in m/s^2 and rates" in read.taken

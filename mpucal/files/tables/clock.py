@@ -119,7 +119,7 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
     n = len(stamps)
     number = np.arange(n) if number is None else number
     period, steps = sample_period(stamps, number), np.diff(stamps)
-    own = Clock(stamps, are_gaps(stamps), 1.0 / period if period else 0.0)
+    own = Clock(make_increasing(stamps, EVEN * period), are_gaps(stamps), 1.0 / period if period else 0.0)
     off = steps - period * np.diff(number)
     if n < FEWEST or not period > 0.0 or (np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period):
         return own

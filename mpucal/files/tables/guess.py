@@ -26,6 +26,7 @@ from .units import (
     QUANTITIES,
     acceleration_unit,
     are_counts,
+    time_unit,
     to_signed,
     turning,
 )
@@ -37,6 +38,8 @@ ONE_G = 0.04
 MOST_SCATTER = 0.75
 # factor by which the speed may differ from a unit's
 NEAR = 2.0
+# correlation of a clock with the number of its samples, even if a logger paused for a tenth of the time
+EVEN = 0.99
 # a correlation that is less by as much is no worse
 ALIKE = 0.1
 # more samples add nothing
@@ -56,7 +59,7 @@ def guess_columns(table: Vector, hints: Hints, sensors: Sequence[int] = ()) -> d
         if len(varies) < table.shape[1]:
             return {role: int(varies[at]) for role, at in guess_columns(table[:, varies], hints).items()}
     n, width = table.shape
-    if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND).all():
+    if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND**2).all():
         return {}
     clocks = [place for place in range(width) if place not in sensors and is_clock(table[:, place])]
     # an index increases, too
@@ -80,9 +83,9 @@ def _accelerometer_alone(table: Vector, clocks: list[int]) -> dict[str, int]:
     places = [place for place in range(table.shape[1]) if place not in clocks[:1]]
     triples = [places[first : first + 3] for first in range(0, len(places) - 2, 3)]
     found = [triple for triple in triples if _is_one_g(table[:, triple])]
-    return (
-        dict(zip(ROLES[1:4], found[0], strict=True)) | dict(zip("t", clocks, strict=False)) if len(found) == 1 else {}
-    )
+    if len(found) != 1:
+        return {}
+    return dict(zip(ROLES[1:4], found[0], strict=True)) | dict(zip("t", clocks, strict=False))
 
 
 def _is_one_g(acc: Vector) -> bool:
@@ -104,6 +107,14 @@ def is_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase, and do not only repeat."""
     steps = np.diff(column[np.isfinite(column)])
     return len(steps) > 0 and bool((steps >= 0).all() and (steps > 0).mean() > 0.01)
+
+
+def is_even_clock(column: Vector) -> bool:
+    """Return True if (n,) numbers increase with the samples, at a sensor's rate in some unit, and do not count them."""
+    if not is_clock(column) or (np.diff(column) == 1.0).all():
+        return False
+    correlation = float(np.corrcoef(column, np.arange(len(column)))[0, 1])
+    return correlation > EVEN and bool(time_unit(sample_period(column)))
 
 
 def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:

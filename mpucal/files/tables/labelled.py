@@ -24,6 +24,8 @@ _THREE = re.compile(
     rf"(?<!\w)([A-Za-z_]\w{{0,40}})\s?(?:[:=]\s?[(\[]{_CELL},{_CELL},{_CELL}[)\]]"
     rf"|[:=]?\s?X[:=]{_CELL},\s?Y[:=]{_CELL},\s?Z[:=](?=[\s\d.+-]))"
 )
+# as `rostopic echo` and `ros2 topic echo` print messages
+_BETWEEN_RECORDS = "\n---\n"
 # a line for each sensor, as in Adafruit's examples
 _TWO_LINES = re.compile(r"^(Acceleration_x=[^\n]{1,90})\n(?=Rotation_x=)", re.MULTILINE)
 
@@ -69,6 +71,7 @@ def marked_table(text: str, name: str) -> TextTable | None:
 
 def labelled_table(text: str, name: str) -> TextTable | None:
     """Return the table in lines that name each number, without the text between; None if none names all six axes."""
+    text = _join_records(text) if _BETWEEN_RECORDS in text else text
     text, threes = _THREE.subn(_name_axes, _AT.sub("time=", text))
     text = _TWO_LINES.sub(r"\1, ", text)
     searched = MOST_SEARCHED if threes > PREAMBLE else PREAMBLE
@@ -87,6 +90,21 @@ def labelled_table(text: str, name: str) -> TextTable | None:
                     lines.append(i)
             return TextTable(name, header, rows, lines, ":")
     return None
+
+
+def _join_records(text: str) -> str:
+    """Return a line for each record of YAML, with `stamp_secs=..` for `secs` below `stamp`."""
+    lines = []
+    for record in text.split(_BETWEEN_RECORDS):
+        of, cells = "", []
+        for line in record.split("\n"):
+            key, _, value = line.partition(":")
+            if value.strip():
+                cells.append(f"{of}_{key.strip()}={value.strip()}" if key[:1].isspace() else line)
+            else:
+                of = key.strip()
+        lines.append(", ".join(cells))
+    return "\n".join(lines)
 
 
 def _name_axes(found: re.Match[str]) -> str:

@@ -36,7 +36,7 @@ ACC_STEMS = _stems(
     " acce acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
 )
 GYR_STEMS = _stems(
-    "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w:rad/s"
+    "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
     " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate gyroadc:deg/s rotationrate"
     " motionrotationrate rotation"
 )
@@ -155,8 +155,8 @@ def parse_column_name(name: str, place: int) -> Column | None:
     text, axis, unit = name.strip().lstrip("#%").strip(), -1, ""
     while match := _BRACKETS.fullmatch(text):
         text, inside = match.groups()
-        if inside in ("0", "1", "2"):
-            axis = int(inside)
+        if (at := "012xyz".find(inside.lower())) >= 0 and len(inside) == 1:
+            axis = at % 3
         elif _OF_DAY(inside.lower()):
             continue
         elif inside.lower().replace("°", "").removeprefix("deg ").strip() in ("c", "degc", "celsius", "℃"):

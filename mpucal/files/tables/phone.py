@@ -30,7 +30,7 @@ from .array_table import ArrayTable, columns_of_arrays, stated_rate
 from .names import ACC, GYR, TIME, Column, Table, first_triple, parse_axis_name, parse_header
 from .streams import join_streams
 from .table import SNIFFED, columns_by_hint, sensor_stream, stated_rate_hz
-from .text import decode_text, find_numeric_table, find_table
+from .text import TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
 from .units import QUANTITIES, acceleration_unit, are_counts, to_signed
 
@@ -230,7 +230,11 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
         raise RecordingError(
             f"{name} holds the columns {', '.join(table.header)}, but no {quantity}", "record both sensors"
         )
-    return sensor_stream(table, columns, of)
+    stream = sensor_stream(table, columns, of)
+    # of a phone, by the convention of Android and iOS, where a line above names the columns
+    named = isinstance(table, TextTable) and table.lines[0] > 1
+    is_phones = quantity == GYR and named and not _are_counts(stream)
+    return replace(stream, unit="rad/s") if is_phones and not stream.unit else stream
 
 
 def _hinted_columns(hints: Hints, quantity: str) -> dict[str, str | int]:

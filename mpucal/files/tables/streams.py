@@ -177,7 +177,7 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     seen = units.acceleration_unit(values)
     if said == COUNTS or (not said and units.are_counts(values) and (not seen or hints.accel_range_g)):
         return _scale_counts(values, hints, name, size)
-    near = "" if seen or said else units.acceleration_unit(_averaged(values))
+    near = "" if seen or said else mean_acceleration_unit(values)
     if near:
         raise RecordingError(
             f"{name}: |a| varies too much to show its unit; on average it would be gravity in {near}",
@@ -194,6 +194,12 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     seen = hints.units.get("acc", (seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
     return values * QUANTITIES["acc"][unit], f"in {unit}", np.zeros(len(values), bool)
+
+
+def mean_acceleration_unit(values: Vector) -> str:
+    """Return the unit in which (n, 3) accelerations are gravity on average; empty if there is none."""
+    whole = values[np.isfinite(values).all(axis=1)]
+    return units.acceleration_unit(_averaged(whole)) if len(whole) > 1 else ""
 
 
 def _averaged(values: Vector) -> Vector:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ...data import Recording
+from ...data import Recording, Vector
 from ...errors import RecordingError
 from ..budget import HELD, check_size
 from ..csv import COLUMNS
@@ -17,7 +18,7 @@ from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import first_bytes, reading
 from .app_metadata import FLIPPED
 from .clock import FEWEST
-from .guess import guess_columns, is_clock
+from .guess import guess_columns, is_clock, is_even_clock
 from .labelled import labelled_table, marked_table
 from .names import (
     ACC,
@@ -32,13 +33,14 @@ from .names import (
     axis_triples,
     first_triple,
     ignored_sensors,
+    parse_axis_name,
     parse_column_name,
     plausible_celsius,
 )
-from .streams import index_with_gravity, join_streams
+from .streams import index_with_gravity, join_streams, mean_acceleration_unit
 from .text import HEAD, PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
-from .units import acceleration_unit, are_counts
+from .units import BEYOND, QUANTITIES, acceleration_unit, are_counts
 
 SNIFFED = 1 << 16
 # with a larger share of empty lines, these lines are another sensor's and not lost
@@ -54,6 +56,7 @@ RATE = re.compile(
 )
 # m/s^2: whole numbers that are larger are counts
 LARGEST_OF_SI = 300.0
+NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
 # accelerations from which a program has taken gravity
 WITHOUT_GRAVITY = re.compile(r"\s*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
 # stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
@@ -82,9 +85,25 @@ def _begun(path: Path) -> TextTable | None:
 def _find(text: str, name: str) -> TextTable | None:
     """Return the table of named columns, or else of numbers; three are called after the file."""
     found = marked_table(text, name) or labelled_table(text, name) or find_table(text, name)
-    if found or not (found := find_numeric_table(text, name, 3)) or found.header or len(found.rows[0]) > 3:
+    if found:
         return found
-    return replace(found, header=axes_of(Path(name).stem))
+    found = find_table(text, name, bare=True) or find_numeric_table(text, name, 3)
+    return None if found is None else replace(found, header=_with_sensor(found))
+
+
+def _with_sensor(table: TextTable) -> list[str]:
+    """Return the header of a table whose columns x, y, z, or three numbers, are those of one sensor; or its own.
+
+    The sensor is that of their unit, or of the file's name.
+    """
+    axes = [parse_axis_name(name) for name in table.header]
+    of_file = axes_of(Path(table.name).stem)
+    if not any(axes):
+        return of_file if not table.header and len(table.rows[0]) == len("xyz") else table.header
+    units = {axis[1] for axis in axes if axis}
+    of = next((of for of in (ACC, GYR) if units & set(QUANTITIES[of])), of_file[0].removesuffix("x") if of_file else "")
+    named = zip(table.header, axes, strict=True)
+    return [f"{of} {name}" if of and axis else name for name, axis in named]
 
 
 def _may_be_si(table: TextTable) -> bool:
@@ -168,15 +187,17 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if known and (table.clocks(columns) or hints.rate_hz):
         return columns, ""
-    places = table.numeric_places()
-    try:
-        numbers = table.numbers([Column("", place, "") for place in places])
-    except RecordingError:
-        return columns, ""
-    sensors = [places.index(c.place) for c in known if c.place in places]
+    of = _numbers(table, columns)
+    places, sensors = list(of), [list(of).index(c.place) for c in known if c.place in of]
+    numbers = np.column_stack(list(of.values())) if of else np.zeros((0, 0))
     found = {role: places[i] for role, i in guess_columns(numbers, hints, sensors).items()}
-    if not found or (known and "t" not in found):
+    if "t" not in found and (known or found):
+        found |= dict(zip("t", (place for place in of if is_even_clock(of[place])), strict=False))
+    if not found:
         return columns, ""
+    if known:
+        clock = Column(table.header[found["t"]], found["t"], TIME) if "t" in found else None
+        return [*columns, *([clock] if clock else [])], f"{clock.name.strip()} is taken for the time" if clock else ""
     words = ["-"] * (max(found.values()) + 1)
     for role, place in found.items():
         words[place] = role
@@ -199,35 +220,58 @@ def _missing_sensors(table: Table, columns: list[Column]) -> RecordingError:
             f"{table.name} holds no columns of an accelerometer; its columns are {_list_names(table.header)}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
         )
-    if len(table.numeric_places()) == 3:
+    options = _likely_options(table, columns)
+    if options is None:
         return RecordingError(
-            f"{table.name} holds three columns of numbers, and nothing says of which sensor",
-            "if they are an accelerometer's, name them with --columns ax,ay,az",
-            "--columns ax,ay,az",
+            f"{table.name} holds no three columns as long as gravity; its columns are {_list_names(table.header)}",
+            "export the accelerometer's own values and the rates of the gyroscope",
         )
-    order = _likely_order(table, columns)
     return RecordingError(
         f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are"
         f" {_list_names(table.header)}",
-        f"name its columns in their order with --columns {order or ','.join(ROLES)}, and - for one to leave out",
-        order and f"--columns {order}",
+        f"name its columns in their order with {options or NAMED_BY_ORDER}, and - for one to leave out",
+        options,
     )
 
 
-def _likely_order(table: Table, columns: list[Column]) -> str:
-    """Return the roles of the columns if their order is the usual one; empty if they are too few."""
+def _likely_options(table: Table, columns: list[Column]) -> str | None:
+    """Return options if triples of the columns are the sensors'; empty if they are too few, None without gravity."""
+    of = _numbers(table, columns)
+    increasing = [place for place in of if is_clock(of[place])]
+    clocks = [c.place for c in table.clocks(columns)] or [place for place in increasing if is_even_clock(of[place])]
+    sensors = [place for place in of if place not in {*clocks, *increasing}]
+    triples = [sensors[first : first + 3] for first in range(0, len(sensors) - 2, 3)]
+    values = [np.column_stack([of[place] for place in triple]) for triple in triples]
+    if not triples:
+        return ""
+    acc = next((i for i, each in enumerate(values) if are_counts(each) or mean_acceleration_unit(each)), None)
+    if acc is None:
+        return None
+    # rates are none at times, other than a magnetic field
+    others = sorted((i for i in range(len(triples)) if i != acc), key=lambda i: _steadiness(values[i]))
+    found = [place for i in (acc, *others[:1]) for place in triples[i]]
+    roles = dict(zip(found, ROLES[1:], strict=False)) | dict(zip(clocks[:1], "t", strict=False))
+    order = ",".join(roles.get(place, "-") for place in range(max(roles) + 1))
+    unit = "" if are_counts(values[acc]) or acceleration_unit(values[acc]) else mean_acceleration_unit(values[acc])
+    return f"--columns {order}" + (f" --units acc={unit}" if unit else "")
+
+
+def _numbers(table: Table, columns: list[Column]) -> dict[int, Vector]:
+    """Return place -> (n,) of the columns of numbers in whole lines, without the clocks where these hold dates."""
     places = table.numeric_places()
-    try:
-        numbers = table.numbers([Column("", place, "") for place in places])
-    except RecordingError:
-        return ""
-    increasing = [place for place, column in zip(places, numbers.T, strict=True) if is_clock(column)]
-    clocks = [c.place for c in table.clocks(columns)] or increasing
-    sensors = [place for place in places if place not in {*clocks, *increasing}]
-    if len(sensors) < len(ROLES[1:]):
-        return ""
-    roles = dict(zip(sensors, ROLES[1:], strict=False)) | dict(zip(clocks[:1], "t", strict=False))
-    return ",".join(roles.get(place, "-") for place in range(max(roles) + 1))
+    for left_out in (set[int](), {c.place for c in table.clocks(columns)}):
+        kept = [place for place in places if place not in left_out]
+        with suppress(RecordingError):
+            numbers = table.numbers([Column("", place, "") for place in kept])
+            whole = (np.abs(numbers) < BEYOND**2).all(axis=1)
+            return dict(zip(kept, numbers[whole].T, strict=True)) if whole.any() else {}
+    return {}
+
+
+def _steadiness(values: Vector) -> float:
+    """Return the first quartile of the lengths of (n, 3) over their median."""
+    low, size = np.percentile(np.linalg.norm(values, axis=1), [25, 50]).tolist()
+    return low / size if size else 0.0
 
 
 def _list_names(header: Sequence[str]) -> str:
@@ -255,7 +299,7 @@ def sensor_stream(
     values[~np.isfinite(values)] = np.nan
     empty = np.isnan(values).all(axis=1)
     clocks = [c for c in table.clocks(columns) if c.clock_of in ("", axes[0].quantity)]
-    clock = min(clocks, key=lambda c: (not c.clock_of, c.rank), default=None)
+    clock = min(clocks, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit), default=None)
     others = np.count_nonzero(empty) > ANOTHERS * len(values)
     timed = np.ones(len(values), bool) if clock is None else table.has(clock)
     kept = np.asarray(~empty if others else ~empty | timed)
