@@ -200,8 +200,7 @@ def test_linear_acceleration_from_a_fusion_filter_is_not_raw(in_hand):
     refused_for("not_raw", replace(in_hand.recording, acc=linear), "no gravity in it")
 
 
-@pytest.mark.parametrize("factor", [0.25, 2.0])
-@pytest.mark.parametrize("motion", ["pose12", "turns"])
+@pytest.mark.parametrize(("motion", "factor"), [("pose12", 2.0), ("turns", 0.25)])
 def test_a_gyroscope_of_another_range_is_named_before_the_mount_is_blamed(hand, motion, factor):
     recording = hand(1, motion).recording
     recording = replace(recording, gyr=factor * recording.gyr, sensor=replace(recording.sensor, gyro_range_dps=None))

@@ -88,7 +88,7 @@ def test_the_period_is_that_of_the_samples_and_not_of_the_bursts():
     assert sample_period(TRUE) == pytest.approx(1 / HZ, rel=1e-9)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".npz", ".txt"])
+@pytest.mark.parametrize("ending", [".csv", ".npz"])
 def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
     """The estimated clock is needed: with a gap at every other step no rest would be found."""
     # in bursts of four as well, each with one stamp

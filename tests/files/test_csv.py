@@ -6,7 +6,7 @@ from hypothesis.extra.numpy import arrays
 
 from mpucal.data import Recording
 from mpucal.errors import OutputError, RecordingError
-from mpucal.files import load
+from mpucal.files import load, open_rows
 
 finite = st.floats(-1e9, 1e9)
 HEADER = "t,ax,ay,az,gx,gy,gz\n"
@@ -35,6 +35,8 @@ def test_reads_the_same_numbers_that_were_saved(save, path, values, temperature_
         pytest.param("gz,t,gx,note,ay,ax,az,gy\n6,0,4,a,2,1,3,5\n6,1,4,b,2,1,3,5\n", id="another order, one more"),
         pytest.param("\ufeffT, Ax, AY ,az,gx,gy,gz\r\n0,1,2,3,4,5,6\r\n\r\n1, 1,2,3,4,5,6", id="a spreadsheet's"),
         pytest.param('"t","ax","ay","az","gx","gy","gz"\n"0",1,2,3,4,5,6\n"1",1,2,3,4,5,6\n,,,,,,\n', id="quoted"),
+        pytest.param("t,ax,ay,az,gx,gy,gz\r0,1,2,3,4,5,6\r1,1,2,3,4,5,6\r", id="an old Macintosh's"),
+        pytest.param("t,ax,ay,az,gx,gy,gz\n  \n0,1,2,3,4,5,6\n \t\n1,1,2,3,4,5,6\n  ", id="lines of blanks"),
     ],
 )
 def test_columns_go_by_their_names(path, text):
@@ -44,6 +46,8 @@ def test_columns_go_by_their_names(path, text):
     np.testing.assert_array_equal(read.acc, [[1, 2, 3]] * 2)
     np.testing.assert_array_equal(read.gyr, [[4, 5, 6]] * 2)
     assert np.isnan(read.temperature_c).all()
+    (rows,) = open_rows(path).runs
+    np.testing.assert_array_equal(np.column_stack([rows.t, rows.acc, rows.gyr]), [[0, *range(1, 7)], [1, *range(1, 7)]])
 
 
 @pytest.mark.parametrize(

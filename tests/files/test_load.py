@@ -6,10 +6,9 @@ import pytest
 import mpucal
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording
-from mpucal.errors import CaptureError, RecordingError
-from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.errors import RecordingError
+from mpucal.files.mcap import CaptureWriter
 from mpucal.simulated.chip import open_simulated
-from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
 
 
@@ -46,25 +45,6 @@ def test_a_capture_gives_what_the_driver_gave(measured):
     assert mpucal.load(folder).recovered is None
 
 
-def test_the_same_driver_runs_on_the_capture(measured):
-    folder, recording = measured
-    bus = ReplayBus(read_capture(folder / "capture.mcap").records)
-    same(measure(bus, 150), recording)
-    assert bus.unread() == 0
-    assert [event.name for event in bus.pending_events("key")] == ["key"]
-
-
-def test_a_capture_that_was_cut_gives_its_beginning(measured, tmp_path):
-    folder, recording = measured
-    whole = (folder / "capture.mcap").read_bytes()
-    cut = tmp_path / "cut.mcap"
-    cut.write_bytes(whole[: len(whole) // 2])
-    read = mpucal.load(cut)
-    assert 100 < len(read) < len(recording)
-    np.testing.assert_array_equal(read.acc, recording.acc[: len(read)])
-    assert "cut.mcap is cut short" in read.recovered
-
-
 def test_a_capture_cut_before_its_first_sample_is_no_recording(measured, tmp_path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes((measured[0] / "capture.mcap").read_bytes()[:600])
@@ -98,9 +78,3 @@ def test_what_is_no_recording(tmp_path, name, says):
     with pytest.raises(RecordingError, match=says) as raised:
         mpucal.load(tmp_path / name)
     assert str(tmp_path / name) in str(raised.value)
-
-
-def test_text_by_the_name_of_a_capture(tmp_path):
-    (tmp_path / "a.mcap").write_text("t,ax,ay,az\n")
-    with pytest.raises(CaptureError, match="not an MCAP file"):
-        mpucal.load(tmp_path / "a.mcap")

@@ -1,11 +1,10 @@
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mpucal.data import Recording, Sensor
-from mpucal.errors import OutputError, RecordingError
+from mpucal.data import Sensor
+from mpucal.errors import RecordingError
 from mpucal.files import load
 
 N = 50
@@ -20,26 +19,6 @@ def arrays():
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "made.npz"
-
-
-def test_reads_what_was_saved(save, arrays, path):
-    mask = np.arange(N) % 7 == 0
-    sensor = Sensor("MPU-6050", 0x68, 4.0, 500.0, 200.0, 31.5)
-    recording = Recording.from_arrays(
-        **arrays,
-        flat=(3, 20),
-        temperature_c=np.linspace(20, 30, N),
-        gap=mask,
-        acc_clipped=~mask,
-        gyr_clipped=mask,
-        sensor=sensor,
-    )
-    save(recording, path)
-    read = load(path)
-    for field in fields(Recording):
-        if field.name != "name":
-            np.testing.assert_array_equal(getattr(read, field.name), getattr(recording, field.name), field.name)
-    assert read.name == "made.npz"
 
 
 def test_what_is_not_there_is_unknown(arrays, path):
@@ -59,11 +38,6 @@ def test_what_is_not_there_is_unknown(arrays, path):
 def test_the_flat_part(arrays, path, extra, flat):
     np.savez(path, **arrays, **extra)
     assert load(path).flat == flat
-
-
-def test_temperature_by_its_short_name(arrays, path):
-    np.savez(path, **arrays, temperature=np.full(N, 25.0))
-    assert (load(path).temperature_c == 25.0).all()
 
 
 @pytest.mark.parametrize(
@@ -109,13 +83,6 @@ def test_an_archive_of_objects_runs_no_code(arrays, path):
     np.savez(path, **(arrays | {"t": np.array([Trap()], dtype=object)}))
     with pytest.raises(RecordingError, match="allow_pickle=False"):
         load(path)
-
-
-def test_places_that_cannot_be_read_or_written(save, arrays, tmp_path):
-    with pytest.raises(RecordingError, match="there is no file"):
-        load(tmp_path / "none.npz")
-    with pytest.raises(OutputError):
-        save(Recording.from_arrays(**arrays), tmp_path / "none" / "made.npz")
 
 
 def test_real_and_simulated_recordings_of_others_are_read():

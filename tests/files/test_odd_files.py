@@ -138,13 +138,6 @@ def test_a_nan_that_signals_is_a_nan(tmp_path):
     assert len(mpucal.load(tmp_path / "a.parquet", units="gyr=rad/s")) == N - 1
 
 
-def test_rows_of_an_archive_with_what_no_number_holds(tmp_path):
-    huge = np.full((N, 3), np.longdouble("1e400"))
-    np.savez(tmp_path / "a.npz", t=TIMES, acc=huge, gyr=AT_REST[:, 3:])
-    with pytest.raises(RecordingError, match="lacks a number in every sample"):
-        list(open_rows(tmp_path / "a.npz").runs)
-
-
 def test_a_time_of_day_beyond_any_number_is_left_out(tmp_path, walk):
     (tmp_path / "meta").mkdir()
     (tmp_path / "meta" / "time.csv").write_text('"event","experiment time","system time"\n"START",0,9e999999\n')

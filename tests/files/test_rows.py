@@ -1,7 +1,6 @@
 """Samples that pass through a run at a time: what goes in comes out, of every kind; of a failure nothing is left."""
 
 import csv
-import struct
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mpucal.chip.access import Transaction
 from mpucal.chip.fifo import Run
 from mpucal.data import Recording, Samples, Sensor
-from mpucal.errors import OutputError, RecordingError
+from mpucal.errors import RecordingError
 from mpucal.files import capture as capture_module
 from mpucal.files import csv as csv_module
 from mpucal.files import load, open_rows, open_writer
@@ -39,6 +38,8 @@ def recording(n=N, warm=True):
         (5, 200),
         temperature_c=rng.normal(30.0, 1.0, n) if warm else None,
         gap=np.arange(n) == 77,
+        acc_clipped=np.arange(n) % 7 == 0,
+        gyr_clipped=np.arange(n) % 5 == 0,
         sensor=Sensor(chip="MPU-6050", who_am_i=0x68, accel_offsets=(1, 2, 3)),
     )
 
@@ -70,17 +71,6 @@ def test_an_archive_comes_out_as_it_went_in(archive, tmp_path):
     # numpy's own reader agrees, and reads no pickle
     with np.load(tmp_path / "out.npz", allow_pickle=False) as arrays:
         assert set(arrays.files) >= {"t", "acc", "gyr", "done"}
-
-
-@pytest.mark.parametrize("warm", [True, False])
-def test_a_table_comes_out_as_it_went_in(save, warm, tmp_path):
-    before = recording(300, warm)
-    save(before, tmp_path / "in.npz")
-    through(tmp_path / "in.npz", tmp_path / "out.csv")
-    through(tmp_path / "out.csv", tmp_path / "again.csv")
-    after = load(tmp_path / "again.csv")
-    for name in ("t", "acc", "gyr", "temperature_c"):
-        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
 
 
 @pytest.mark.parametrize("kind", [".csv", ".npz"])
@@ -147,13 +137,6 @@ def test_an_array_of_another_shape_is_named(more, tmp_path):
         through(tmp_path / "in.npz", tmp_path / "out.npz")
 
 
-@pytest.mark.parametrize("cell", ["0.1", '"0.1"'])
-def test_a_line_of_blanks_is_an_empty_one(cell, tmp_path):
-    path = tmp_path / "in.csv"
-    path.write_text(f"t,ax,ay,az,gx,gy,gz\n  \n0,{cell},0,9.8,0,0,0\n \t\n1,{cell},0,9.8,0,0,0\n  ")
-    assert sum(map(len, open_rows(path).runs)) == len(load(path)) == 2
-
-
 @given(hnp.arrays(float, st.tuples(st.integers(1, 4), st.integers(1, 3)), elements=st.floats(allow_subnormal=True)))
 def test_text_gives_back_each_number_that_there_is(table):
     text = lines(table)
@@ -201,21 +184,6 @@ def test_the_end_of_a_line_within_quotation_marks_is_none(block, tmp_path, monke
     np.testing.assert_array_equal(load(tmp_path / "a.csv").acc, [[1, 2, 3]] * 2)
 
 
-def test_lines_may_end_as_on_an_old_macintosh(tmp_path):
-    (tmp_path / "old.csv").write_bytes(b"t,ax,ay,az,gx,gy,gz\r0,1,2,3,4,5,6\r1,7,8,9,10,11,12\r")
-    (samples,) = open_rows(tmp_path / "old.csv").runs
-    np.testing.assert_array_equal(samples.acc, load(tmp_path / "old.csv").acc)
-
-
-def test_a_table_with_everything_that_load_takes(tmp_path):
-    text = '\ufeffGz,note,t,ax,ay,az,gx,gy\r\n6,"a, b",0,1,2,3,4,5\r\n\r\n12,,1,7,8,9,10,11\r\n'
-    (tmp_path / "odd.csv").write_text(text, encoding="utf-8")
-    (samples,) = open_rows(tmp_path / "odd.csv").runs
-    whole = load(tmp_path / "odd.csv")
-    for name in ("t", "acc", "gyr"):
-        np.testing.assert_array_equal(getattr(samples, name), getattr(whole, name))
-
-
 @pytest.mark.parametrize("line", [2, 250])
 def test_a_bad_line_is_named(line, tmp_path, monkeypatch):
     monkeypatch.setattr(csv_module, "BLOCK", 1000)
@@ -227,49 +195,6 @@ def test_a_bad_line_is_named(line, tmp_path, monkeypatch):
         list(open_rows(tmp_path / "bad.csv").runs)
 
 
-def cdr(data):
-    """sensor_msgs/Imu read number by number, as its definition says."""
-    at = 4
-
-    def take(kind):
-        nonlocal at
-        size = struct.calcsize(kind)
-        at += -(at - 4) % size
-        (value,) = struct.unpack_from("<" + kind, data, at)
-        at += size
-        return value
-
-    stamp = take("i"), take("I")
-    length = take("I")
-    frame_id = data[at : at + length].rstrip(b"\0").decode()
-    at += length
-    numbers = [take("d") for _ in range(4 + 9 + 3 + 9 + 3 + 9)]
-    assert at == len(data)
-    assert data[:4] == b"\0\1\0\0"
-    return stamp, frame_id, numbers
-
-
-def test_ros_reads_what_was_written(save, tmp_path):
-    before = recording(500)
-    save(before, tmp_path / "in.npz")
-    through(tmp_path / "in.npz", tmp_path / "out.mcap")
-    with (tmp_path / "out.mcap").open("rb") as file:
-        reader = make_reader(file)
-        assert reader.get_header().profile == "ros2"
-        messages = list(reader.iter_messages())
-    assert len(messages) == 500
-    for i, (schema, channel, message) in enumerate(messages):
-        assert (schema.name, schema.encoding) == ("sensor_msgs/msg/Imu", "ros2msg")
-        assert (channel.topic, channel.message_encoding) == ("/imu/data", "cdr")
-        (sec, nanosec), frame_id, numbers = cdr(message.data)
-        assert sec * 1_000_000_000 + nanosec == message.log_time == round(before.t[i] * 1e9)
-        assert frame_id == "imu"
-        assert numbers[:4] == [0.0, 0.0, 0.0, 1.0]
-        assert numbers[4] == -1.0
-        assert numbers[13:16] == before.gyr[i].tolist()
-        assert numbers[25:28] == before.acc[i].tolist()
-
-
 def test_the_index_of_an_mcap_leads_to_its_messages(save, tmp_path):
     n = 2 * MESSAGES + 5
     before = recording(n)
@@ -279,6 +204,10 @@ def test_the_index_of_an_mcap_leads_to_its_messages(save, tmp_path):
     with (tmp_path / "out.mcap").open("rb") as file:
         indexed = make_reader(file, validate_crcs=True)
         summary = indexed.get_summary()
+        assert indexed.get_header().profile == "ros2"
+        assert {(schema.name, schema.encoding) for schema in summary.schemas.values()} == {
+            ("sensor_msgs/msg/Imu", "ros2msg")
+        }
         assert summary.statistics.message_count == n
         assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (t_ns[0], t_ns[-1])
         assert len(summary.chunk_indexes) == 3
@@ -310,22 +239,9 @@ def columns(runs):
 def assert_the_same_as_loaded(path):
     rows, whole = open_rows(path), load(path)
     for name, column in columns(rows.runs).items():
-        there = np.asarray(getattr(whole, name))
-        # a flipped bit in the last frame of a poll is set right only where the whole is read
-        mended = (
-            np.abs(np.nan_to_num(column.astype(float) - there.astype(float))) > 1e-9
-            if path.stem == "bit_errors"
-            else np.zeros(there.shape, bool)
-        )
-        assert mended.mean() < 0.01
-        np.testing.assert_allclose(column[~mended], there[~mended], rtol=0, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(column, getattr(whole, name), rtol=0, atol=1e-9, err_msg=name)
     assert rows.sensor == whole.sensor
     assert (rows.recovered, rows.name) == (whole.recovered, whole.name)
-
-
-@pytest.mark.parametrize("path", sorted(FIXTURES.rglob("*.mcap")), ids=lambda path: path.stem)
-def test_a_capture_gives_what_loading_it_whole_gives(path):
-    assert_the_same_as_loaded(path)
 
 
 def test_a_cut_capture_gives_what_is_whole(tmp_path):
@@ -385,11 +301,6 @@ def test_memory_is_that_of_a_run_however_many_there_are(source, target, tmp_path
     peak(1)  # loads the modules
     # the samples of the runs between take 3 MB
     assert peak(5) - peak(2) < 600_000
-
-
-def test_other_endings_are_refused(archive, tmp_path):
-    with pytest.raises(OutputError, match=r"\.npz, \.csv, \.mcap"):
-        open_writer(tmp_path / "out.txt", open_rows(archive), "")
 
 
 def test_a_cut_archive_is_refused(archive, tmp_path):

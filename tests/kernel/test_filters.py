@@ -67,7 +67,7 @@ def test_the_hand_filter_equals_its_numpy_twin(hand_problem, theta, huber, tail,
 
 
 @pytest.mark.parametrize("without", ["r_scale", "q_scale", "q_extra"])
-def test_a_missing_series_of_the_exact_filter_has_its_neutral_value(exact_problem, theta, without, instruction_set):
+def test_a_missing_series_of_the_exact_filter_has_its_neutral_value(exact_problem, theta, without):
     part = replace(exact_problem, series=replace(exact_problem.series, **{without: None}))
     assert_equal(evaluate(part, theta, IMU), evaluate_reference(part, theta, IMU))
 
