@@ -17,9 +17,9 @@ from mpucal.chip.config import Config
 from mpucal.cli.running import open_runner
 from mpucal.files import load
 from mpucal.session.plan import Plan
-from mpucal.simulated.chip import open_recorded
 from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
+from tools.lab.recorded_chip import open_recorded
 
 PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"

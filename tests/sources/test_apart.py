@@ -13,11 +13,12 @@ from mpucal.chip.driver import Driver
 from mpucal.chip.registers import FIFO_COUNT_H, USER_CTRL
 from mpucal.errors import BusError, EndOfCapture, NoAnswer
 from mpucal.session.events import Prompt, PromptKind
-from mpucal.simulated.chip import open_recorded, open_simulated
+from mpucal.simulated.chip import open_simulated
 from mpucal.sources.apart import CAN_FORK, SourceApart
 from mpucal.sources.chain import ChainedBus, ShiftedClockBus
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
+from tools.lab.recorded_chip import open_recorded
 
 pytestmark = pytest.mark.skipif(not CAN_FORK, reason="only Linux forks here")
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ..disturbance import ARMS
@@ -18,14 +17,14 @@ from ..motion import Motion
 from ..sensor import SensorTruth
 from .bus import SimulatedBus
 from .chip import Chip
-from .clock import CLOCKS, FastClock, SimulatedClock
+from .clock import CLOCKS, SimulatedClock
 from .factory import FactoryTrim
 from .fault_injector import FaultInjector
-from .feed import Feed, RecordedFeed, SensorFeed
+from .feed import Feed, SensorFeed
 from .models import MODELS, OFFSETS
 from .options import ChipOptions
 
-__all__ = ["Chip", "Feed", "RecordedFeed", "SensorTruth", "SimulatedBus", "open_recorded", "open_simulated"]
+__all__ = ["Chip", "Feed", "SensorTruth", "SimulatedBus", "open_simulated"]
 
 
 def open_simulated(
@@ -61,28 +60,6 @@ def open_simulated(
     clock = clock or CLOCKS[options.pace]()
     faults = FaultInjector(options.fault, chip, clock, of_faults) if options.fault else None
     return SimulatedBus(chip, clock, motion, truth, faults, options.khz)
-
-
-def open_recorded(
-    acc_counts: ArrayLike,
-    gyr_counts: ArrayLike,
-    rate_hz: float,
-    accel_range_g: float,
-    gyro_range_dps: float,
-    *,
-    rate_error_ppm: float = 0.0,
-    chip: str = "mpu6050",
-) -> SimulatedBus:
-    """Return a simulated chip that serves the int16 counts (n, 3) of a recording, then raises EndOfCapture.
-
-    Its sample clock is `rate_error_ppm` faster than `rate_hz`, which the driver must set.
-
-    Raises
-    ------
-    RecordingError : counts that are not int16, or different numbers of them.
-    """
-    feed = RecordedFeed(acc_counts, gyr_counts, rate_hz, accel_range_g, gyro_range_dps)
-    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm), FastClock())
 
 
 def _truth(options: ChipOptions, gravity: float) -> SensorTruth:

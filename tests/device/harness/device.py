@@ -18,15 +18,18 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 from adapter import Adapter
 from spi import SpiDevice
 from umockdev import Testbed
 
 from mpucal.chip.access import Reply
-from mpucal.simulated.chip import Chip, RecordedFeed, SimulatedBus, open_simulated
+from mpucal.data import Vector
+from mpucal.simulated.chip import Chip, SimulatedBus, open_simulated
 from mpucal.simulated.chip.clock import CLOCKS, SimulatedClock
 from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.sensor import Counts, Setting
 
 NODE, SPI_NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "/dev/spidev0.0", "still", "DS3231"
 DEVICES = """\
@@ -88,14 +91,21 @@ class ClockChip:
         return 0
 
 
+class StillFeed:
+    """A feed of one sample, again and again, at 25 C."""
+
+    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
+        """Return (n, 7) int16 between (n + 1,) times."""
+        temperature = round((25.0 - setting.zero_c) * setting.lsb_per_c)
+        return np.tile(np.array([12, -34, 4096, temperature, 56, -78, 90], np.int16), (len(edges_s) - 1, 1))
+
+
 def open_bus(text: str, clock: Path) -> SimulatedBus | ClockChip:
     """The bus that `text` names, in the time of `clock`."""
     if text == CLOCK_CHIP:
         return ClockChip()
     if text == STILL:
-        counts = [(12, -34, 4096)] * 10_000, [(56, -78, 90)] * 10_000
-        feed = RecordedFeed(*counts, rate_hz=200.0, accel_range_g=8.0, gyro_range_dps=500.0)
-        return SimulatedBus(Chip(MODELS["mpu6050"], feed, 2500.0, FactoryTrim()), SharedClock(clock))
+        return SimulatedBus(Chip(MODELS["mpu6050"], StillFeed(), 2500.0, FactoryTrim()), SharedClock(clock))
 
     def shared() -> SimulatedClock:
         return SharedClock(clock)

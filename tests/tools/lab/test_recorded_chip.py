@@ -9,7 +9,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Samples
 from mpucal.errors import EndOfCapture, RecordingError, UsageError
-from mpucal.simulated.chip import open_recorded
+from tools.lab.recorded_chip import open_recorded
 
 G0 = 9.80665
 
