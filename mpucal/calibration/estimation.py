@@ -14,6 +14,7 @@ from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
 from .checks import find_gyroscope_fault, find_reasons, is_unusable
+from .checks.sensor import gyro_contradicts, is_trustworthy
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
 from .fit import Fit
@@ -61,7 +62,15 @@ def estimate(
     if refusing := tuple(reason for reason in find_reasons(of_rests) if reason.refuse):
         # other faults of the gyroscope can be mended, and then the rests need not be enough
         return (replace(whole[0], against_rests=refusing) if no_gyroscope(before) else whole[0]), whole[1]
+    if at_fault == gyro_contradicts(whole[0]) and _is_known_better(whole[0], of_rests):
+        return whole
     return of_rests, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
+
+
+def _is_known_better(evidence: Evidence, other: Evidence) -> bool:
+    """Return True for a trustworthy estimate that claims a smaller uncertainty than the other."""
+    own, others = (np.inf if of.uncertainty is None else of.uncertainty.rms_mps2 for of in (evidence, other))
+    return is_trustworthy(evidence) and own < others
 
 
 def _before_clipping(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:

@@ -37,15 +37,22 @@ from .rotation import cross
 What = Literal["accelerometer", "scale", "mount", "gyroscope"]
 Kind = Literal["change", "time", "side"]
 SIDES = 0
+# stretches of time by shape: a change is looked for in each, and the others have numbers in each
+GROUPS = {"step": 48, "walk": 16, "pulse": 48, "each": 16}
 
 
 class Hypothesis(NamedTuple):
-    """Hypothesis: the quantity, how it is distributed, over how many stretches of time, or SIDES, and how often."""
+    """Hypothesis: the quantity, how it is distributed, if over the sides instead of stretches of time, how often."""
 
     what: What
     shape: Literal["step", "walk", "pulse", "each"]
-    groups: int
+    by_side: bool = False
     prior: float = 1.0
+
+    @property
+    def groups(self) -> int:
+        """Number of stretches of time, or SIDES."""
+        return SIDES if self.by_side else GROUPS[self.shape]
 
     @property
     def is_change(self) -> bool:
@@ -55,7 +62,7 @@ class Hypothesis(NamedTuple):
     @property
     def kind(self) -> Kind:
         """Kind of the hypothesis, for messages: a change is one of the accelerometer."""
-        if self.groups == SIDES:
+        if self.by_side:
             return "side"
         return "change" if self.is_change and self.what != "gyroscope" else "time"
 
@@ -63,18 +70,18 @@ class Hypothesis(NamedTuple):
 # Every gyroscope's bias walks, and few step or drift steadily.
 RARELY = 0.1
 HYPOTHESES = (
-    Hypothesis("accelerometer", "step", 48),
-    Hypothesis("scale", "step", 48),
-    Hypothesis("mount", "step", 48),
-    Hypothesis("accelerometer", "walk", 16),
-    Hypothesis("gyroscope", "step", 48, RARELY),
-    Hypothesis("gyroscope", "walk", 16),
-    Hypothesis("accelerometer", "pulse", 48),
-    Hypothesis("accelerometer", "each", 16),
-    Hypothesis("scale", "each", 16),
-    Hypothesis("mount", "each", 16),
-    Hypothesis("accelerometer", "each", SIDES),
-    Hypothesis("scale", "each", SIDES),
+    Hypothesis("accelerometer", "step"),
+    Hypothesis("scale", "step"),
+    Hypothesis("mount", "step"),
+    Hypothesis("accelerometer", "walk"),
+    Hypothesis("gyroscope", "step", prior=RARELY),
+    Hypothesis("gyroscope", "walk"),
+    Hypothesis("accelerometer", "pulse"),
+    Hypothesis("accelerometer", "each"),
+    Hypothesis("scale", "each"),
+    Hypothesis("mount", "each"),
+    Hypothesis("accelerometer", "each", by_side=True),
+    Hypothesis("scale", "each", by_side=True),
 )
 # Standard deviations of x are tried from a 10,000th of these up to them: m/s^2, 1, rad, rad/s.
 LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1, "gyroscope": 0.03}

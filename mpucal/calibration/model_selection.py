@@ -33,9 +33,9 @@ from .static import fit_static
 from .theta import Prior, Theta
 from .tilt import fit_tilt
 
-# The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
-EXPLAINED_NIS = 4.0
-EXPLAINED_BY_ERRORS_NIS = 3.3  # errors of the most likely size leave 3 if they are those of the sensors
+# The mean ||e||^2 of white noise is 3, and by chance so many standard deviations more at most; a hand, or a
+# gyroscope's scale, makes it tens to thousands.
+WHITE_NIS, MOST_STD = 3.0, 5.0
 HOPELESS_NIS = 10.0  # of means over blocks, which reduce white noise and not a hand's
 
 # With more block means than so many, means at 10 Hz show first whether a search converges.
@@ -106,7 +106,7 @@ def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoic
         for parameters in (ACCEL, IMU):
             minimum, errors = in_place.explain(parameters, erring)
             least = min(least, minimum.nis)
-            if minimum.nis >= (EXPLAINED_BY_ERRORS_NIS if erring else EXPLAINED_NIS):
+            if minimum.nis >= in_place.most_nis:
                 continue
             if parameters == ACCEL:
                 imu = in_place.fit_matrix(minimum, errors)
@@ -225,11 +225,17 @@ class InPlaceFits:
             coarse = minimise(
                 _problem(*self._means(COARSE_HZ), self._gravity), theta, parameters, self._prior, until=ROUGHLY
             )
-            if coarse.nis < EXPLAINED_NIS:
+            if coarse.nis < self.most_nis:
                 theta, iterations = coarse.theta, coarse.iterations
                 most = MOST_ITERATIONS if coarse.converged else 0
         minimum = minimise(self._thin, theta, parameters, self._prior, until=ROUGHLY, most=most)
         return replace(minimum, iterations=iterations + minimum.iterations)
+
+    @cached_property
+    def most_nis(self) -> float:
+        """Largest mean ||e||^2 of white noise, by chance of as many samples and of those that tell its variance."""
+        variance = 2.0 * WHITE_NIS * (1.0 / len(self._problem.series) + 1.0 / self._flat.n)
+        return WHITE_NIS + MOST_STD * float(np.sqrt(variance))
 
     @cached_property
     def _first(self) -> Theta:

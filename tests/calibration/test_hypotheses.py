@@ -9,7 +9,6 @@ from mpucal.calibration import calibrate, estimate
 from mpucal.calibration.hypotheses import (
     HYPOTHESES,
     LARGEST,
-    SIDES,
     VARIANCES,
     Explanation,
     Hypothesis,
@@ -44,7 +43,7 @@ def test_a_step_of_the_bias_is_found_where_it_was(hand, share):
     acc = recording.acc.copy()
     acc[at:] += [0.1, -0.1, 0.1]
     step = likeliest(replace(recording, acc=acc))
-    assert step.hypothesis == Hypothesis("accelerometer", "step", 48)
+    assert step.hypothesis == Hypothesis("accelerometer", "step")
     assert step.size == pytest.approx(0.17, rel=0.5)
     begin, end = step.span
     flat_s = 10.0
@@ -107,7 +106,7 @@ def test_the_evidence_is_that_of_the_joint_gaussian(shape):
 
     A, y, parts = linear_parts()
     k, m, p = A.shape
-    hypothesis = Hypothesis("accelerometer", shape, 5)
+    hypothesis = Hypothesis("accelerometer", shape)
     told = _explain(hypothesis, _Groups.of(parts, 5), parts, np.eye(3))
     flat = np.zeros((1, k + 1))
     flat[0, 0] = 1.0
@@ -137,7 +136,7 @@ def test_the_estimate_is_as_far_away_as_the_other_posterior_says():
     """Compare with theta where each part has a bias of its own, by the joint normal equations."""
     A, y, parts = linear_parts()
     k, m, p = A.shape
-    told = _explain(Hypothesis("accelerometer", "each", 5), _Groups.of(parts, 5), parts, np.eye(3))
+    told = _explain(Hypothesis("accelerometer", "each"), _Groups.of(parts, 5), parts, np.eye(3))
     design = A.reshape(k * m, p)
     of_x = np.einsum("ks,kmi->kmsi", np.eye(k), A[:, :, PLACES["b_a"]]).reshape(k * m, -1)
     both = np.hstack([design, of_x])
@@ -156,7 +155,7 @@ def test_the_estimate_is_as_far_away_as_the_other_posterior_says():
 def test_the_variance_with_a_walk_removed_is_that_of_the_joint_gaussian():
     A, y, parts = linear_parts()
     k, m, p = A.shape
-    told = _explain(Hypothesis("gyroscope", "walk", 5), _Groups.of(parts, 5), parts, np.eye(3))
+    told = _explain(Hypothesis("gyroscope", "walk"), _Groups.of(parts, 5), parts, np.eye(3))
     design, y = A.reshape(k * m, p), y.ravel()
     walked = np.einsum("ks,kmi->kmsi", np.tri(k), A[:, :, PLACES["b_omega"]]).reshape(k * m, -1)
     logs, variances = [], []
@@ -179,7 +178,7 @@ def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
 
 def test_a_walk_is_drawn_straight_from_where_the_turning_begins():
     delta, none = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.zeros(15)
-    hypothesis, times = Hypothesis("gyroscope", "walk", 2), (np.array([0.0, 2.0]), np.array([2.0, 4.0]))
+    hypothesis, times = Hypothesis("gyroscope", "walk"), (np.array([0.0, 2.0]), np.array([2.0, 4.0]))
     walk = Explanation(hypothesis, 30.0, delta, *times, none, none, none)
     np.testing.assert_allclose(walk.at(np.array([0.0, 0.5, 1.0, 2.0, 9.0]))[:, 2], [0.0, 0.1, 0.2, 0.3, 0.4])
 
@@ -219,8 +218,8 @@ def test_with_too_few_sides_to_compare_the_models_uncertainty_is_doubled(hand):
     one_side = replace(fit, parts=replace(fit.parts, side=alike))
     sides = [claim_uncertainty(of, G, [], np.zeros(12)) for of in (fit, one_side)]
     assert sides[1].floored == 2.0 * sides[0].floored
-    assert {each.hypothesis.groups for each in explain(one_side.parts, fit.D)} == {
-        each.groups for each in HYPOTHESES if each.groups != SIDES
+    assert {each.hypothesis for each in explain(one_side.parts, fit.D)} == {
+        each for each in HYPOTHESES if not each.by_side
     }
 
 

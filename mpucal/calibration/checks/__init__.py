@@ -48,9 +48,7 @@ CHECKS: tuple[Check, ...] = (
     sensor.sensors_lag,
     estimate.not_converged,
     estimate.inconsistent,
-    estimate.changed_midway,
-    estimate.zero_moved,
-    estimate.parts_disagree,
+    estimate.contradiction,
 )
 
 # An estimate from the rests alone does not use the gyroscope, and gaps do not spoil it.

@@ -7,15 +7,14 @@ import numpy as np
 from ...data import STANDARD_GRAVITY_MPS2
 from ...reasons import Reason, reason
 from ..evidence import Evidence
-from ..hypotheses import Explanation
 from ..tilt import CONE_RAD
 from ..uncertainty import MOST_NIS
 
 # Claimed uncertainty, 1 sigma, of a good and of a usable calibration: errors above 0.1 m/s^2 are then rare.
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
 SLOW_HZ = 20.0  # at a lower sample rate, a hand turns too much from sample to sample
-# Errors of readings by a change of the bias or of the mount: smaller ones are not reported, larger ones refused.
-LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "scale": 0.004, "mount": 0.02}, 0.2
+# Errors of readings by a change of the sensor: smaller ones are not reported, larger ones of its matrix refused.
+LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 
 
 def few_orientations(e: Evidence) -> Reason | None:
@@ -71,46 +70,19 @@ def inconsistent(e: Evidence) -> Reason | None:
     return reason("inconsistent", "innovations", refuse, nis=e.fit.nis)
 
 
-def changed_midway(e: Evidence) -> Reason | None:
-    """Find a mount that slipped or scale factors that changed, where no other reason explains it."""
-    change = _change_of(e, "mount") or _change_of(e, "scale")
-    if change is None or e.claim is None:
+def contradiction(e: Evidence) -> Reason | None:
+    """Find a sensor that changed midway, or times or sides that contradict the others beyond the model's noise."""
+    claim, worst = e.claim, None if e.claim is None else e.claim.worst
+    if claim is None or e.uncertainty is None or inconsistent(e) is not None:
         return None
-    begin, end = _since_the_start(e, change.span)
-    return reason("inconsistent", "change", e.claim.error("change") > CHANGED_MPS2, begin=begin, end=end)
-
-
-def zero_moved(e: Evidence) -> Reason | None:
-    """Find an accelerometer whose bias stepped or drifted while the board was turned."""
-    change = _change_of(e, "accelerometer")
-    if change is None:
-        return None
-    begin, end = _since_the_start(e, change.span)
-    size = 1e3 * change.size / STANDARD_GRAVITY_MPS2
-    return reason("zero_moved", "walk", _is_useless(e), size=size, begin=begin, end=end)
-
-
-def _change_of(e: Evidence, what: str) -> Explanation | None:
-    """Return the change of that kind, None where it is too small to report.
-
-    Lost and clipped samples pull at an estimate, too, and have reasons of their own.
-    """
-    change = None if e.claim is None else e.claim.change
-    if e.claim is None or change is None or change.hypothesis.what != what or _is_explained(e):
-        return None
-    known = e.claim.floored <= USABLE_RMS_MPS2
-    return change if known and e.claim.error("change") > LEAST_CHANGE_MPS2[what] else None
-
-
-def parts_disagree(e: Evidence) -> Reason | None:
-    """Find times or sides of the recording that contradict the others by more than the model's noise."""
-    worst = None if e.claim is None else e.claim.worst
-    if e.claim is None or worst is None or e.uncertainty is None or inconsistent(e) is not None:
-        return None
-    if any(_change_of(e, what) for what in LEAST_CHANGE_MPS2) or (_is_explained(e) and not _is_useless(e)):
-        return None
-    rms = e.uncertainty.rms_mps2
-    if not rms > GOOD_RMS_MPS2 >= e.claim.floored:
+    rms, change, disturbed = e.uncertainty.rms_mps2, claim.change, _is_disturbed(e)
+    if change is not None and not disturbed and claim.error("change") > LEAST_CHANGE_MPS2:
+        begin, end = _since_the_start(e, change.span)
+        if change.hypothesis.what != "accelerometer":
+            return reason("inconsistent", "change", claim.error("change") > CHANGED_MPS2, begin=begin, end=end)
+        size = 1e3 * change.size / STANDARD_GRAVITY_MPS2
+        return reason("zero_moved", "walk", _is_useless(e), size=size, begin=begin, end=end)
+    if worst is None or (disturbed and not _is_useless(e)) or not rms > GOOD_RMS_MPS2 >= claim.floored:
         return None
     if worst.hypothesis.kind == "side":
         if e.recording.rate_hz < SLOW_HZ:
@@ -124,12 +96,10 @@ def _is_useless(e: Evidence) -> bool:
     return e.uncertainty is None or e.uncertainty.rms_mps2 > USABLE_RMS_MPS2
 
 
-def _is_explained(e: Evidence) -> bool:
-    """Return True if another reason explains that the parts disagree."""
-    if e.fit is None or not e.fit.converged or inconsistent(e) is not None:
-        return True
+def _is_disturbed(e: Evidence) -> bool:
+    """Return True if samples are lost or clipped, or nothing settled: parts disagree then, too."""
     r = e.recording
-    return bool(r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any())
+    return bool(e.fit is None or not e.fit.converged or r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any())
 
 
 def _since_the_start(e: Evidence, span: tuple[float, float]) -> tuple[float, float]:
