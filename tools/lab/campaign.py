@@ -4,21 +4,19 @@
     python -m tools.lab campaign --recordings 10000
     python -m tools.lab campaign --case 739000123.4 --keep /tmp/struck
 
-A session runs once without a fault; at each instant at which faults begin it forks, and the child suffers them (one to
-four, drawn by the seed, of all kinds of campaign_worlds.py) to the end of the whole command, files and exit code
-included. Wrong is: a good or usable calibration that is farther from the truth than it claims, a trace, a hang, an exit
-code that does not fit, no sentence, a file in part. A table counts verdicts by kind of fault; a wrong case comes with
-the command that repeats it. Seeds begin with the day's number. Exit code 1 where one was wrong.
+Each session suffers one to four faults, drawn by the seed, of all kinds of campaign_worlds.py, to the end of the whole
+command, files and exit code included. Wrong is: a good or usable calibration that is farther from the truth than it
+claims, a trace, a hang, an exit code that does not fit, no sentence, a file in part. A table counts verdicts by kind of
+fault; a wrong case comes with the command that repeats it. Seeds begin with the day's number. Exit code 1 where one was
+wrong.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import date
 from functools import partial
@@ -30,7 +28,7 @@ import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.session import results
-from tools.processes import Child, Died, Ended, Task, Tell, become, ended, forked, limit_cpu, quick, ready
+from tools.processes import Child, Died, Task, Tell, forked, quick, ready
 from tools.programs import PROCESSORS, Jobs
 
 from .campaign_judge import FOLDER, Outcome, judged, show_outcomes
@@ -45,6 +43,8 @@ CHIPS = ("mpu6050", "mpu6500", "clone98")
 HANDS = (*("guided",) * 6, "wandering", "placing", "random")
 RATES = (50, 25, 100, 25)
 FIRMWARES = ("ardupilot", "px4")
+# left where the first fault begins
+BEGUN = Path("begun")
 # one session in this many makes a report
 REPORTS = 8
 # the chip alone is cheapest, and comes most often
@@ -53,7 +53,7 @@ WORLDS = (*(CHIP,) * 15, BRIDGE, VEHICLE)
 
 @dataclass(frozen=True)
 class Case:
-    """Session with faults: `number` of its prefix, `k` of the case, and the faults, the earliest first."""
+    """Session with faults: `number` of the undisturbed one, `k` of the case, and the faults, the earliest first."""
 
     number: int
     k: int
@@ -66,7 +66,7 @@ class Case:
 
 
 def kind_of(number: int) -> tuple[str, str]:
-    """Return the kind of world of a prefix, and the target."""
+    """Return the kind of world of a session, and the target."""
     return WORLDS[number % len(WORLDS)], TARGETS[number // 2 % len(TARGETS)]
 
 
@@ -80,7 +80,7 @@ def drawn(number: int, k: int) -> Case:
 
 
 def words(number: int) -> list[str]:
-    """Return the command of a prefix."""
+    """Return the command of a session."""
     world, target = kind_of(number)
     to = ["--to", "chip"] if number % 3 == 0 else []
     if world == VEHICLE:
@@ -92,102 +92,52 @@ def words(number: int) -> list[str]:
     return ["session", *source, *to, "--target", target, "-o", FOLDER, "--yes"]
 
 
-class Prefix:
-    """Session without faults, from which sessions with faults are forked."""
+def suffer(case: Case, world: World) -> int:
+    """Run a session that the faults strike from the first on; return its exit code."""
 
-    def __init__(self, number: int, cases: Sequence[Case], place: Path, keep: bool) -> None:
-        self._number, self._place, self._keep = number, place, keep
-        self._world = World(kind_of(number)[0])
-        self._child, self._left = False, not cases
-        for case in cases:
-            self._world.moments.add(case.blows[0].at_s, partial(self._leave, case))
+    def begin() -> None:
+        BEGUN.touch()
+        world.begin_faults(case.blows)
 
-    def run(self, tell: Tell) -> None:
-        """Run the session to its end and end this process; pass the outcome of each case to `tell`."""
-        self._tell = tell
-        here = self._place / "prefix"
-        here.mkdir(parents=True)
-        become(here, here / "err")
-        with self._world.opened(), quick():
-            code = run(words(self._number))
-        with suppress(OSError):
-            sys.stdout.flush()
-        if not self._child:
-            if not self._left:
-                self._tell(Outcome(f"{self._number}.-1", self._world.kind, wrong=("no fault began",)))
-            self._judge(Case(self._number, -1), here, Ended(code, (here / "err").read_text("utf-8", "replace")))
-            code = 0
-        os._exit(code)
-
-    def _leave(self, case: Case) -> None:
-        if self._child:
-            return
-        self._left = True
-        place = self._place / str(case.k)
-        pid = os.fork()
-        if pid == 0:
-            self._child = True
-            limit_cpu()
-            if case.k % REPORTS:
-                results.report = lambda _: None
-            self._move(place)
-            self._world.moments.due.clear()
-            self._world.begin_faults(case.blows)
-            return
-        self._judge(case, place, ended(pid, place / "err"))
-        if not self._keep:
-            shutil.rmtree(place)
-
-    def _judge(self, case: Case, place: Path, done: Ended) -> None:
-        outcome = judged(case.name, place, done, case.blows, self._world)
-        if case.blows and outcome.recorded and done.code not in (0, 5):
-            # a session that failed leaves a recording or nothing
-            (place / "after").mkdir()
-            again = partial(run, ["calibrate", FOLDER, "-o", "after/board"])
-            after = Child(again, place, place / "after" / "err").go().wait()
-            wrong = [f"calibrate afterwards: {what}" for what in after.wrong((0, 3, 5), (0, 3, 5))]
-            outcome = replace(outcome, wrong=(*outcome.wrong, *wrong))
-        self._tell(outcome)
-
-    def _move(self, place: Path) -> None:
-        """Move all files that the session has open to `place`."""
-        shutil.copytree(Path.cwd(), place)
-        here = f"{Path.cwd()}/"
-        for link in Path("/proc/self/fd").iterdir():
-            handle = int(link.name)
-            with suppress(OSError):
-                target = str(link.readlink())
-                if target.startswith(here):
-                    at, there = os.lseek(handle, 0, os.SEEK_CUR), place / target.removeprefix(here)
-                    moved = os.open(there, os.O_RDONLY if there.is_dir() else os.O_RDWR | os.O_CREAT)
-                    os.lseek(moved, at, os.SEEK_SET)
-                    os.dup2(moved, handle)
-                    os.close(moved)
-        os.chdir(place)
+    if case.k % REPORTS:
+        results.report = lambda _: None
+    world.moments.add(case.blows[0].at_s, begin)
+    with world.opened(), quick():
+        return run(words(case.number))
 
 
-def run_all(prefixes: Sequence[tuple[int, Sequence[Case]]], jobs: int, place: Path, keep: bool) -> Iterator[Outcome]:
-    """Yield the outcomes in the order in which they end."""
-    tasks: list[Task] = [Prefix(number, cases, place / str(number), keep).run for number, cases in prefixes]
-    for _, told in forked(tasks, jobs):
-        yield Outcome("?", "?", wrong=(f"a prefix ended with {told}",)) if isinstance(told, Died) else told
+def of_session(case: Case, place: Path, keep: bool, tell: Tell) -> None:
+    """Run a session with faults in a process of its own, and judge it."""
+    world, here = World(kind_of(case.number)[0]), place / case.name
+    here.mkdir(parents=True)
+    done = Child(partial(suffer, case, world), here, here / "err").go().wait()
+    blows = case.blows if (here / BEGUN).exists() else ()
+    outcome = judged(case.name, here, done, blows, world)
+    if blows and outcome.recorded and done.code not in (0, 5):
+        # a session that failed leaves a recording or nothing
+        (here / "after").mkdir()
+        again = partial(run, ["calibrate", FOLDER, "-o", "after/board"])
+        after = Child(again, here, here / "after" / "err").go().wait()
+        wrong = [f"calibrate afterwards: {what}" for what in after.wrong((0, 3, 5), (0, 3, 5))]
+        outcome = replace(outcome, wrong=(*outcome.wrong, *wrong))
+    tell(outcome)
+    if not keep:
+        shutil.rmtree(here)
 
 
 def outcomes(
     first: int, count: int, recordings: int, case: str | None, jobs: int, place: Path, keep: bool
 ) -> Iterator[Outcome]:
-    """Yield the outcomes of the sessions and recordings of the options."""
-    if case and not case.startswith("r"):
-        number, k = map(int, case.split("."))
-        yield from run_all([(number, [drawn(number, k)])], 1, place, keep)
+    """Yield the outcomes of the sessions and recordings of the options, in the order in which they end."""
+    cases = [drawn(first + n // CASES, n % CASES) for n in range(count)]
+    if case and case.startswith("r"):
+        first, recordings = int(case[1:]), 1
     elif case:
-        yield from struck_recordings(int(case[1:]), 1, jobs, place)
-    elif recordings:
-        yield from struck_recordings(first, recordings, jobs, place)
-    numbers = range(first, first + -(-count // CASES))
-    for at in range(0, len(numbers), 10 * jobs):
-        batch = [(n, [drawn(n, k) for k in range(CASES)]) for n in numbers[at : at + 10 * jobs]]
-        yield from run_all(batch, jobs, place, keep)
+        cases = [drawn(*map(int, case.split(".")))]
+    yield from struck_recordings(first, recordings, jobs, place) if recordings else ()
+    tasks: list[Task] = [partial(of_session, each, place, keep) for each in cases]
+    for _, told in forked(tasks, jobs):
+        yield Outcome("?", "?", wrong=(f"a session ended with {told}",)) if isinstance(told, Died) else told
 
 
 def main(
@@ -196,7 +146,7 @@ def main(
     recordings: int = 0,
     first: int = date.today().toordinal() * 1000,
     jobs: Jobs = PROCESSORS,
-    case: Annotated[str | None, "this one alone, PREFIX.NUMBER, or rNUMBER of a recording"] = None,
+    case: Annotated[str | None, "this one alone, NUMBER.K, or rNUMBER of a recording"] = None,
     keep: Annotated[Path | None, "where its files stay"] = None,
 ) -> int:
     """Run the campaign; return the exit code."""

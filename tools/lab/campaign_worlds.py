@@ -1,8 +1,7 @@
-"""Simulated worlds that can be left at any instant: a session goes on in a forked process, where faults strike it.
+"""Simulated worlds in which faults strike at any instant: the chip, its bus, the line, the vehicle, or the process.
 
 A world is `--bus sim`, the same chip behind the emulated bridge, or `--mavlink sim`. Whenever its time goes on,
-`Timeline.reach` hears of it. There the prefix forks a child for each case whose first fault is due, and goes on itself
-without; the child gives the faults to chip, bus, line, vehicle or its own process.
+`Timeline.reach` hears of it.
 """
 
 from __future__ import annotations
@@ -121,7 +120,7 @@ class World:
 
     def truths(self, blows: Sequence[TimedFault], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the values of (D, b_a) that count as true: before and after each fault, and amid slow ones."""
-        document = self.truth(folder)
+        document = json.loads((folder / "truth.json").read_text())
         D, b_a = np.array(document["D"], float), np.array(document["b_a"], float)
         maps = []
         for mishap in _befallen(blows):
@@ -134,14 +133,6 @@ class World:
                 A, c = turn @ A, turn @ c + shift
             found.append((D @ A, b_a + D @ c))
         return found
-
-    def truth(self, folder: Path) -> dict[str, Any]:
-        """Return the content of truth.json of a session without faults."""
-        if self.bus is not None:
-            return self.bus.truth_document() or {}
-        # a vehicle may have changed its own offsets meanwhile, and is written to afterwards
-        written = folder / "truth.json"
-        return json.loads(written.read_text()) if written.exists() else self.transport.truth
 
     def _strike(self, blow: TimedFault) -> None:
         if blow.name in SIGNALS:
@@ -212,7 +203,6 @@ class HookedTransport(SimulatedTransport):
     def __init__(self, world: World, vehicle: Any) -> None:
         super().__init__(vehicle)
         self._world = world
-        self.truth = vehicle.truth_document()
         world.transport = self
 
     def receive(self, until_ns: int) -> Any:
