@@ -60,8 +60,8 @@ def _with_spinner(findings: Iterator[Finding]) -> Iterator[Finding]:
 
 
 def _conformance(options: Mapping[str, Any]) -> Iterator[Finding]:
-    from ..doctor.bridge import examine_conformance  # noqa: PLC0415 - loads the link, which only this needs
-    from ..sources.bridge import open_link  # noqa: PLC0415
+    from ..bridge import open_link  # noqa: PLC0415
+    from ..bridge.doctor import examine_conformance  # noqa: PLC0415 - loads the link, which only this needs
 
     try:
         with open_link(options) as link:

@@ -30,7 +30,6 @@ from ..data import Sensor
 from ..errors import BoardMoved, ChipError, ChipReset, OddOffsets, SourceError
 from ..session.ports import polled
 from ..sources.chip import OpenedChip
-from .bridge import examine_bridge
 from .bus_speed import examine_speed
 from .dead_axes import DEAD_AXIS, REPLACE, STUCK_BITS, examine_bits
 from .finding import Finding, Mark
@@ -229,9 +228,3 @@ def examine_chip_alone(source: OpenedChip, seconds: float) -> Iterator[Finding]:
     """Examine a chip on an SPI bus or a USB adapter, where times of replies do not show the bus's speed."""
     with closing(source.bus):
         yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
-
-
-def examine_bridge_and_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
-    """Examine a bridge's firmware, its serial line, and the chip behind it."""
-    with closing(source.bus):
-        yield from examine(source.bus, source.plan.config, seconds, examine_bridge)

@@ -40,11 +40,11 @@ class Recorder:
 
 
 CHIP = Recorder(DRIVER_VERSION, Config, "mpucal.sources.chip:replayed")
-VEHICLE = Recorder(MAVLINK_VERSION, RateOnlyConfig, "mpucal.sources.vehicle:replayed")
+VEHICLE = Recorder(MAVLINK_VERSION, RateOnlyConfig, "mpucal.vehicle.source:replayed")
 RECORDERS = [
     CHIP,
     VEHICLE,
-    Recorder(IIO_VERSION, RateOnlyConfig, "mpucal.sources.iio:replayed", "mpucal.iio.decode:decode"),
+    Recorder(IIO_VERSION, RateOnlyConfig, "mpucal.iio_device.source:replayed", "mpucal.iio.decode:decode"),
 ]
 
 

@@ -1,1 +1,1 @@
-"""Sinks of a calibration besides files: a chip's registers, a kernel driver, a bridge's memory, an autopilot."""
+"""Write-back of a calibration: the table of sinks, what all of them share, and a chip's registers."""

@@ -1,1 +1,1 @@
-"""Sources of samples: buses to a chip, vehicles over MAVLink, and captures of both; `table` lists them."""
+"""Sources of samples: the table of all kinds, buses to a chip, and captures."""

@@ -58,7 +58,7 @@ class SourceKind:
     instead : commands that read it and take no source.
     title : title of a session on it; {} is the option's value.
     store : "module:attribute" of a context manager from the options' values to a memory for a calibration, as in
-        mpucal.sources.bridge; empty: there is none.
+        mpucal.bridge; empty: there is none.
     doctor : "module:attribute" of its examination, from an OpenedSource and seconds to findings; empty: none.
     host : "module:attribute" of the examination of this computer before it is opened, from the option's value.
     found : "module:attribute" of a function that lists those there are: (the option's value, description); empty: none.

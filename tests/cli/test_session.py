@@ -85,8 +85,8 @@ def test_without_a_source_it_lists_those_there_are_with_the_whole_command(mpucal
     (tmp_path / "iio:device1" / "in_anglvel_x_raw").unlink()
     ports = [("/dev/ttyACM0", "ArduPilot"), ("/dev/ttyUSB0", "CP2102")]
     monkeypatch.setattr("mpucal.sources.i2c.found_chips", lambda: [("/dev/i2c-1", "MPU-6050 at 0x68")])
-    monkeypatch.setattr("mpucal.sources.bridge.port_errors.ports", lambda: ports)
-    monkeypatch.setattr("mpucal.sources.iio.SYSFS", tmp_path)
+    monkeypatch.setattr("mpucal.bridge.port_errors.ports", lambda: ports)
+    monkeypatch.setattr("mpucal.iio_device.source.SYSFS", tmp_path)
     result = mpucal("session", "-o", "board 7")
     assert result.code == 2
     found = [line.partition("  ") for line in result.err.replace("\n  ", "\n").splitlines()[1:-1]]

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from mpucal.bridge.bus import BridgeBus
+from mpucal.bridge.link import Link
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.simulated.chip import open_simulated
-from mpucal.sources.bridge.bus import BridgeBus
-from mpucal.sources.bridge.link import Link
 
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "mpucal" / "firmware"

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.frame import Deframer, Frame
-from mpucal.sources.bridge.messages import Status
+from mpucal.bridge import messages as wire
+from mpucal.bridge.frame import Deframer, Frame
+from mpucal.bridge.messages import Status
 
 ROOT = Path(__file__).parents[2]
 VECTORS = ROOT / "fixtures" / "vectors"

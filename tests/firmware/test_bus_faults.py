@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from mpucal.bridge import messages as wire
+from mpucal.bridge.bus import BridgeBus
+from mpucal.bridge.link import LinkLost
+from mpucal.bridge.messages import Status
 from mpucal.chip import registers as reg
 from mpucal.errors import BusError, NoAnswer
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.bus import BridgeBus
-from mpucal.sources.bridge.link import LinkLost
-from mpucal.sources.bridge.messages import Status
 
 I2C_MS, REPLY_MS = 25, 100
 # of timer 0, which both clocks count with; in data space

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mpucal.bridge.bus import BridgeBus
+from mpucal.bridge.store import BlobStore
 from mpucal.chip import registers as reg
 from mpucal.errors import BusError
 from mpucal.result.blob import Blob
@@ -19,8 +21,6 @@ from mpucal.result.calibration import Calibration
 from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
-from mpucal.sources.bridge.bus import BridgeBus
-from mpucal.sources.bridge.store import BlobStore
 
 ROOT = Path(__file__).parents[2]
 OLD = (ROOT / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.sources.bridge.frame import MAX_CONTENT, MAX_ENCODED, MAX_PAYLOAD, Deframer, Frame, stuff
+from mpucal.bridge.frame import MAX_CONTENT, MAX_ENCODED, MAX_PAYLOAD, Deframer, Frame, stuff
 
 VECTORS = sorted((Path(__file__).parents[2] / "fixtures" / "vectors").glob("line_*.bin"))
 # a sanitizer has seen all of it long before

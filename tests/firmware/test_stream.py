@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.frame import Deframer, Frame
-from mpucal.sources.bridge.messages import Status
+from mpucal.bridge import messages as wire
+from mpucal.bridge.frame import Deframer, Frame
+from mpucal.bridge.messages import Status
 
 SEQ = 9
 BYTES = 14

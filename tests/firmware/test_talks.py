@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mpucal.bridge import board
+from mpucal.bridge import messages as wire
+from mpucal.bridge.conformance import find_difference, talks
+from mpucal.bridge.doctor import examine_conformance
+from mpucal.bridge.frame import Deframer, Frame
+from mpucal.bridge.messages import Status
+from mpucal.bridge.store import BlobStore
 from mpucal.chip.access import Reply
-from mpucal.doctor.bridge import examine_conformance
 from mpucal.doctor.finding import Mark
-from mpucal.sources.bridge import board
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.conformance import find_difference, talks
-from mpucal.sources.bridge.frame import Deframer, Frame
-from mpucal.sources.bridge.messages import Status
-from mpucal.sources.bridge.store import BlobStore
 
 VECTORS = Path(__file__).parents[2] / "fixtures" / "vectors"
 FIFO = {(0x72, 2): b"\x01\xf8"}

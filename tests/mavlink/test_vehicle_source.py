@@ -18,7 +18,7 @@ from mpucal.session.plan import Plan
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sources.packet_replay import PacketReplay
-from mpucal.sources.vehicle import OpenedVehicle
+from mpucal.vehicle.source import OpenedVehicle
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from mpucal.bridge import BridgeBus
 from mpucal.chip import registers as reg
 from mpucal.errors import EndOfCapture
-from mpucal.sources.bridge import BridgeBus
 from mpucal.sources.i2c import I2cBus
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap

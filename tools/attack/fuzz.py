@@ -63,9 +63,9 @@ def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
 
 def checked(run: Run) -> Check:
     """Return a check of bytes: it returns the traceback of an unexpected exception, or None."""
+    from mpucal.bridge.messages import MessageError  # noqa: PLC0415
     from mpucal.errors import MpucalError  # noqa: PLC0415 - as above
     from mpucal.result.blob import BlobError  # noqa: PLC0415
-    from mpucal.sources.bridge.messages import MessageError  # noqa: PLC0415
 
     def check(data: bytes) -> str | None:
         signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST_S)

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from mpucal.sources.bridge import messages as wire
+from mpucal.bridge import messages as wire
 
 from .fuzz import KEPT as BUILT
 from .fuzz import ROOT, TODAY, reached

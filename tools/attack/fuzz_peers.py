@@ -13,6 +13,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from mpucal.bridge import messages as wire
+from mpucal.bridge.bus import BridgeBus
+from mpucal.bridge.frame import MAX_PAYLOAD, Deframer, Frame
+from mpucal.bridge.port import Chunk
+from mpucal.bridge.store import BlobStore
 from mpucal.chip import registers as reg
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Parser, dialect
@@ -24,11 +29,6 @@ from mpucal.mavlink.stream_parameters import stream_parameter_names
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.page.requests import RequestFilter
 from mpucal.page.server import Handler
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.bus import BridgeBus
-from mpucal.sources.bridge.frame import MAX_PAYLOAD, Deframer, Frame
-from mpucal.sources.bridge.port import Chunk
-from mpucal.sources.bridge.store import BlobStore
 
 MS = 1_000_000
 # type, sequence number, length; if 0, type and sequence number are those that the request expects

@@ -21,6 +21,8 @@ from mcap.writer import CompressionType, Writer
 
 from mpucal import Calibration
 from mpucal.__main__ import run
+from mpucal.bridge import messages as wire
+from mpucal.bridge.frame import Frame
 from mpucal.cli.options import parse_gravity
 from mpucal.errors import MpucalError, UsageError
 from mpucal.export.forms import FORMS
@@ -41,8 +43,6 @@ from mpucal.simulated.vehicle.options import VehicleOptions
 from mpucal.sinks.chip import FORMAT as KEPT
 from mpucal.sinks.chip import REGISTERS, saved_blocks
 from mpucal.sinks.write_back import is_calibration
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.frame import Frame
 from mpucal.sources.chain import split_at_resumes
 from mpucal.sources.table import SOURCES
 

@@ -23,7 +23,7 @@ from mpucal.files import load
 from mpucal.result.journal import Journal
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.vehicle.store import ParameterStore
-from mpucal.sinks.autopilot import CORRECTION
+from mpucal.vehicle.sink import CORRECTION
 from tools.processes import Child, Ended, quick, ready
 
 SIM, VEHICLE = "sim:seed=3,chip=mpu6500,temperature_c=", "sim:seed=7,imus=1"

@@ -20,6 +20,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from mpucal.bridge.bus import BridgeBus
 from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.simulated.chip import SimulatedBus, open_simulated
 from mpucal.simulated.chip.fault_injector import FaultInjector
@@ -27,7 +28,6 @@ from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where,
 from mpucal.simulated.mishaps import Mishap, ZeroStep
 from mpucal.simulated.vehicle.line import PacketLine
 from mpucal.simulated.vehicle.transport import SimulatedTransport
-from mpucal.sources.bridge.bus import BridgeBus
 
 from .bridge import EmulatedBridge, EmulatedLine
 from .bridge.line_faults import LineFaults

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 import mpucal
+from mpucal.bridge.bus import BridgeBus
 from mpucal.chip.driver import Driver
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.sources.bridge.bus import BridgeBus
 
 from .bridge import EmulatedBridge, EmulatedLine
 from .judge import rms

@@ -17,11 +17,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from mpucal.bridge import messages as wire
+from mpucal.bridge.conformance import TALKS as TALKS_FILE
+from mpucal.bridge.frame import Frame, stuff
 from mpucal.data import GYRO_COUNTS
 from mpucal.result.blob import Blob
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.conformance import TALKS as TALKS_FILE
-from mpucal.sources.bridge.frame import Frame, stuff
 
 FOLDER = Path(__file__).parents[2] / "fixtures" / "vectors"
 

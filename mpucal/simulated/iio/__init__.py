@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...iio.devices import Devices
-from ...sources.iio import OpenedIio
+from ...iio_device.source import OpenedIio
 from ...sources.kind import Request
 from ..chip import open_simulated
 from .files import SimulatedFiles

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...sources.kind import Request
-from ...sources.vehicle import OpenedVehicle, link_identity, signing_key
+from ...vehicle.source import OpenedVehicle, link_identity, signing_key
 from . import SimulatedVehicle, VehicleOptions
 from .transport import SimulatedTransport
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from mpucal.sources.bridge.port import Chunk
+from mpucal.bridge.port import Chunk
 
 STEP_S = 0.000_25
 

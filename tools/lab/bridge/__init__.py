@@ -9,12 +9,12 @@ import errno
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from mpucal.bridge import board
+from mpucal.bridge.messages import Feature, Status
 from mpucal.chip.access import Bus
 from mpucal.clocks.bridge_clock import US, WRAP_US
 from mpucal.errors import BusError, NoAnswer
 from mpucal.result.blob import MAGIC
-from mpucal.sources.bridge import board
-from mpucal.sources.bridge.messages import Feature, Status
 
 from .line import EmulatedLine
 

@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+from mpucal.bridge.port import BAUDS, Chunk
+from mpucal.bridge.port_errors import port_gone
 from mpucal.simulated.chip.clock import SimulatedClock
-from mpucal.sources.bridge.port import BAUDS, Chunk
-from mpucal.sources.bridge.port_errors import port_gone
 
 STEP_NS = 500_000
 BITS_A_BYTE = 10

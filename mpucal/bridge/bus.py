@@ -1,0 +1,277 @@
+"""Bus to a chip behind a serial bridge.
+
+The bridge pushes the FIFO's content ahead of the driver: FIFO_COUNT and FIFO_R_W are answered from a buffer, each count
+with the time at which the bridge read it, and losses on the way show as an overflow in INT_STATUS. A FIFO that was
+started without a reset is not read ahead, so that the driver can see it fill.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+
+from ..chip import registers as reg
+from ..chip.access import Reply
+from ..clocks.sample_clock import poll_phase
+from ..errors import BusError, NoAnswer
+from .fifo_tracker import CONTROLS, FifoTracker
+from .link import MS, Link, LinkLost
+from .link_errors import no_chip, no_reply, request_failed
+from .messages import (
+    MAX_BURST,
+    MAX_READ,
+    MAX_WRITE,
+    Burst,
+    BurstReply,
+    Feature,
+    Frames,
+    Message,
+    Read,
+    ReadReply,
+    Status,
+    Stream,
+    Write,
+)
+from .pending_request import Answer
+from .port import Port
+from .read_ahead import ReadAhead
+from .reset_monitor import ResetMonitor
+
+# Four frames of 14 bytes fill one message.
+BATCH = 4
+# Time without a message, besides the line's latency, after which the bridge is lost; one that was reset says so sooner.
+GONE_NS = 1000 * MS
+REPEAT_NS = 100 * MS
+# Time for plugging a cable in again, and for a boot loader's two seconds.
+RECOVER_NS = 10_000 * MS
+# An FTDI adapter delivers its bytes every 16 ms. Requests in step with that would get equally late replies, or later
+# and later ones, as if the bridge's clock were off by 100 ppm.
+ADAPTER_NS = 16 * MS
+
+
+class BridgeBus:
+    """Chip behind the bridge on `port`; the bus has the bridge's clock.
+
+    Parameters
+    ----------
+    port : open; the bus closes it. address : of the chip; None lets the bridge try 0x68, then 0x69.
+
+    Raises
+    ------
+    BusError : no bridge answers. NoAnswer : the bridge finds no chip.
+    """
+
+    def __init__(self, port: Port, address: int | None = None) -> None:
+        self.link = Link(port, self._on_frames)
+        self._port = port
+        self._tracker = FifoTracker()
+        self._ahead: ReadAhead | None = None
+        self._lost = False
+        self._requests = 0
+        self._monitor = ResetMonitor(self.link)
+        self._dead: BusError | None = None
+        try:
+            self.address = self.link.greet(address or 0).address
+            if not self.address:
+                raise NoAnswer(*no_chip(port.name, address))
+        except BaseException:
+            port.close()
+            raise
+
+    def read(self, register: int, count: int) -> Reply:
+        """Read `count` bytes from `register` on; more than MAX_READ take several transfers."""
+        ahead = self._ahead
+        if ahead is not None and (register, count) == (reg.FIFO_COUNT_H, 2):
+            held, t_ns, host_ns = self._wait_for_count(ahead)
+            return Reply(held.to_bytes(2, "big"), t_ns, host_ns)
+        if ahead is not None and register == reg.FIFO_R_W:
+            return Reply(*ahead.pop(count))
+        if register == reg.FIFO_R_W:
+            try:
+                return self._read_now(register, count)
+            except NoAnswer as error:
+                # A bridge makes several transfers of it, and the first may have taken bytes.
+                raise BusError(error.what, error.remedy) from error
+        at = reg.INT_STATUS - register
+        if ahead is not None and register == reg.INT_ENABLE and at == count - 1:
+            return self._read_status(ahead)
+        if not 0 <= at < count:
+            return self._read_now(register, count)
+        if at == count - 1:
+            self._wait_out_of_step()
+        return self._add_overflow(self._read_now(register, count), at)
+
+    def write(self, register: int, data: bytes) -> int:
+        """Write `data` from `register` on, and return the time."""
+        if len(data) > MAX_WRITE:
+            raise BusError(f"a bridge writes at most {MAX_WRITE} bytes at once, not {len(data)}", "write less at once")
+        requests: list[Message] = []
+        controls = not CONTROLS.isdisjoint(range(register, register + len(data)))
+        if controls and self._ahead is not None:
+            self._ahead = None
+            requests.append(Stream(0, 0))
+        requests.append(Write(register, data))
+        self._tracker.on_write(register, data)
+        self._monitor.on_write(register, data)
+        has_stream = bool(self.link.bridge.features & Feature.STREAM)
+        if controls and has_stream and self._ahead is None and self._tracker.frame_bytes:
+            return self._start_stream(*requests)
+        return self._not_after_looks(self._ask(*requests)[-1][-1].t_ns)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Wait until the bridge's clock shows `t_ns`, as far as it is known, and take what it pushes."""
+        self._wait(lambda host_ns: t_ns - self.link.clock.now(host_ns))
+
+    def close(self) -> None:
+        """Stop the stream if the bridge still listens, and close the port."""
+        if self._ahead is not None and self._dead is None:
+            self._stop_stream()
+        self.link.close()
+
+    def _wait(self, left_ns: Callable[[int], int]) -> None:
+        """Take what is pushed until `left_ns` of the host's time is 0."""
+        while (left := left_ns(host_ns := self._port.now_ns())) > 0:
+            try:
+                self.link.wait(host_ns + left)
+            except BusError:
+                # The next access raises it.
+                return
+
+    def _wait_out_of_step(self) -> None:
+        """Wait a varying part of ADAPTER_NS, so that some replies are hardly delayed."""
+        self._requests += 1
+        until_ns = self._port.now_ns() + round((poll_phase(self._requests) + 0.5) * ADAPTER_NS)
+        self._wait(lambda host_ns: until_ns - host_ns)
+
+    def _read_now(self, register: int, count: int) -> Reply:
+        if count > MAX_BURST:
+            raise BusError(f"a bridge reads at most {MAX_BURST} bytes at once, not {count}", "read less at once")
+        answers = [answer for several in self._ask(*_reads(register, count)) for answer in several]
+        begun_ns, host_ns = answers[0].t_ns, answers[0].host_ns
+        shown_ns = self._not_after_looks(begun_ns)
+        return Reply(b"".join(_data(answers)), shown_ns, host_ns - (begun_ns - shown_ns))
+
+    def _read_status(self, ahead: ReadAhead) -> Reply:
+        """Return INT_ENABLE to INT_STATUS during a stream.
+
+        INT_STATUS comes from FRAMES, for which the bridge reads it. INT_ENABLE, 0 after a reset of the chip, was
+        requested one poll earlier, since its reply may be late. The reply's times give the rate of the bridge's clock.
+        """
+        t_ns = ahead.counted_ns
+        ahead_ns = self._monitor.take_answer()
+        if not self._monitor.is_waiting:
+            self._wait_out_of_step()
+            self._monitor.request()
+        overflow = reg.INT_FIFO_OFLOW * ahead.take_overflow()
+        return Reply(bytes([self._monitor.held, 0, overflow]), t_ns, None if ahead_ns is None else t_ns + ahead_ns)
+
+    def _add_overflow(self, reply: Reply, at: int) -> Reply:
+        """Return a read with INT_STATUS at `at`, in which losses on the way to the host are added as an overflow."""
+        if self._ahead is not None:
+            if reply.data[at] & reg.INT_FIFO_OFLOW:
+                # The read cleared the flag, so that the bridge does not see it.
+                self._ahead.lose(reply.t_ns, reply.host_ns or 0)
+            lost = self._ahead.take_overflow()
+        else:
+            lost, self._lost = self._lost, False
+        data = bytearray(reply.data)
+        data[at] |= reg.INT_FIFO_OFLOW * lost
+        return reply._replace(data=bytes(data))
+
+    def _not_after_looks(self, t_ns: int) -> int:
+        return t_ns if self._ahead is None else self._ahead.not_after_looks(t_ns)
+
+    def _start_stream(self, *before: Message) -> int:
+        """Send the requests `before` and start the stream; return the time of the last of `before`.
+
+        All are sent at once, since the FIFO must not fill while the host waits for a reply.
+        """
+        self._lost = False
+        self._monitor.cancel()
+        frame_bytes = self._tracker.frame_bytes
+        # Prepared before the request: the first frames may come together with its reply.
+        self._ahead = ReadAhead(self.link.seq_of(len(before)), frame_bytes)
+        try:
+            answers = self._ask(*before, Stream(frame_bytes, BATCH))
+        except BusError:
+            if self._ahead is not None:
+                self._ahead = None
+                self._stop_stream()
+            raise
+        return answers[-2][-1].t_ns
+
+    def _stop_stream(self) -> None:
+        with suppress(BusError):
+            self.link.ask(Stream(0, 0))
+
+    def _wait_for_count(self, ahead: ReadAhead) -> tuple[int, int, int]:
+        give_up_ns = self._port.now_ns() + GONE_NS + self.link.latency.most_ns
+        while not ahead.can_count:
+            try:
+                if self._port.now_ns() >= give_up_ns:
+                    raise LinkLost(*no_reply(self._port.name))
+                self._monitor.repeat_if_overdue()
+                self.link.wait(min(give_up_ns, self._port.now_ns() + REPEAT_NS))
+            except BusError as error:
+                self._recover(error)
+                raise
+        return ahead.count()
+
+    def _on_frames(self, seq: int, frames: Frames, t_ns: int, host_ns: int) -> None:
+        if self._ahead is not None and seq == self._ahead.seq:
+            self._ahead.push(frames, t_ns, host_ns)
+
+    def _ask(self, *requests: Message) -> list[list[Answer]]:
+        """Send the requests and return their answers, none of which is a failure.
+
+        Raises
+        ------
+        BusError : the bridge could not do it; or it was lost and is greeted again, after which a retry may succeed.
+        """
+        if self._dead is not None:
+            raise self._dead
+        try:
+            answers = self.link.ask(*requests)
+        except BusError as error:
+            self._recover(error)
+            raise
+        for several in answers:
+            status = several[-1].reply.status
+            if status != Status.OK:
+                kind = NoAnswer if status == Status.NO_ANSWER else BusError
+                raise kind(*request_failed(self._port.name, status))
+        return answers
+
+    def _recover(self, error: BusError) -> None:
+        """Greet the bridge again, and reopen its port if that was gone; the buffer is lost.
+
+        Raises
+        ------
+        BusError : the bridge does not come back.
+        """
+        self._ahead, self._lost = None, True
+        until_ns = self._port.now_ns() + RECOVER_NS
+        try:
+            if isinstance(error, LinkLost):
+                self._port.revive(until_ns)
+            else:
+                self._port.reopen(until_ns)
+            self.link.greet(self.address, until_ns - self._port.now_ns())
+        except BusError as still:
+            self._dead = error
+            raise error from still
+
+
+def _reads(register: int, count: int) -> Iterator[Message]:
+    """Yield the requests for `count` bytes from `register` on."""
+    if register == reg.FIFO_R_W:
+        yield Burst(register, count) if count > MAX_READ else Read(register, count)
+        return
+    for at in range(0, count, MAX_READ):
+        yield Read(register + at, min(MAX_READ, count - at))
+
+
+def _data(answers: Iterable[Answer]) -> Iterator[bytes]:
+    for answer in answers:
+        if isinstance(answer.reply, ReadReply | BurstReply):
+            yield answer.reply.data

@@ -1,0 +1,75 @@
+"""Port to a board with MicroPython: the bridge is pasted into its REPL, and runs until the port is closed."""
+
+from __future__ import annotations
+
+import ast
+from contextlib import suppress
+from pathlib import Path
+
+from ..errors import BusError
+from .frame import DELIMITER, Frame
+from .messages import Hello, Leave
+from .port import Port, SerialPort
+from .repl import RawRepl
+
+PROGRAM = Path(__file__).with_name("board.py")
+# Rate of a REPL on a UART; on USB it has no effect.
+BAUDS = (115_200,)
+ENTER_NS = 10_000_000_000
+
+
+class MicroPythonPort:
+    """Port to a bridge that runs on MicroPython; see Port.
+
+    Parameters
+    ----------
+    text : PORT[:BAUD], or a URL; or an open port. pins : SDA and SCL, numbers or names; empty: the board's own.
+
+    Raises
+    ------
+    UsageError : no port is named. BusError : no such port, no MicroPython there, or one that cannot run the bridge.
+    """
+
+    def __init__(self, text: str | Port, pins: tuple[int | str, ...] = ()) -> None:
+        self._port: Port = SerialPort(text, BAUDS) if isinstance(text, str) else text
+        self.name, self.bauds = self._port.name, self._port.bauds[:1]
+        self._pins = tuple(pins)
+        self.now_ns, self.read, self.write = self._port.now_ns, self._port.read, self._port.write
+        self.set_baud = self._port.set_baud
+        try:
+            self.revive(self.now_ns() + ENTER_NS)
+        except BaseException:
+            self._port.close()
+            raise
+
+    def reopen(self, until_ns: int) -> None:
+        """Open the port again and restart the bridge, which a board that was off has lost."""
+        self._port.reopen(until_ns)
+        self.revive(until_ns)
+
+    def revive(self, until_ns: int) -> None:
+        """Paste the bridge again, since a board that was reset shows its REPL."""
+        repl = RawRepl(self._port, _leave_bytes())
+        repl.enter(until_ns)
+        repl.run(f"{minify(PROGRAM.read_text(encoding='utf-8'))}\nmain({self._pins!r})\n")
+
+    def close(self) -> None:
+        """End the bridge, and restart the board's own programs."""
+        with suppress(BusError):
+            self.write(_leave_bytes())
+            RawRepl(self._port, b"").leave()
+        self._port.close()
+
+
+def minify(text: str) -> str:
+    """Remove a program's comments and docstrings, which take a board's memory."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            node.body = node.body[1:] or [ast.Pass()]
+    return ast.unparse(tree)
+
+
+def _leave_bytes() -> bytes:
+    """Return the bytes that end a running bridge, greeted or not."""
+    return DELIMITER + b"".join(Frame(each.TYPE, 0, each.payload()).encode() for each in (Hello(), Leave()))

@@ -1,0 +1,137 @@
+"""Config blob that a bridge stores: read, replace and check it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+from ..chip.registers import WHO_AM_I
+from ..errors import BusError, KeepsNothing
+from ..result.blob import Blob, BlobError
+from .link import Link
+from .link_errors import not_readable, request_failed, without_blob
+from .messages import (
+    MAX_CHUNK,
+    MAX_READ,
+    BlobBegin,
+    BlobCommit,
+    BlobCommitReply,
+    BlobData,
+    BlobErase,
+    BlobRead,
+    BlobReadReply,
+    BlobState,
+    BlobStateReply,
+    Feature,
+    Message,
+    Read,
+    ReadReply,
+    Reply,
+    Status,
+)
+
+R = TypeVar("R", bound=Reply)
+CRC_BYTES = 4
+
+
+@dataclass(frozen=True)
+class StoredBlob:
+    """Description of the blob that the bridge stores and has just checked."""
+
+    generation: int
+    length: int
+    crc: int
+
+
+class BlobStore:
+    """Memory of the bridge behind `link`, which was greeted.
+
+    Every method raises BusError if the bridge is lost, cannot do it, or stores no blobs.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    @property
+    def name(self) -> str:
+        """Name of the bridge's port."""
+        return self._link.port.name
+
+    @property
+    def occupied(self) -> bool:
+        """True if the memory holds other data, which `erase` gives up; until then a write is refused."""
+        return bool(self._link.bridge.features & Feature.OCCUPIED)
+
+    def greet(self) -> None:
+        """Greet the bridge again after it was lost; a write that was in progress is abandoned."""
+        self._link.greet(self._link.bridge.address)
+
+    def who_am_i(self) -> int | None:
+        """Return the answer of the bridge's chip to WHO_AM_I; None without a chip."""
+        if not self._link.bridge.address:
+            return None
+        (reply,) = self._ask(ReadReply, Read(WHO_AM_I, 1))
+        return reply.data[0]
+
+    def state(self) -> StoredBlob | None:
+        """Return the description of the valid blob; None without one."""
+        self._check_feature()
+        reply = self._link.ask(BlobState())[0][-1].reply
+        if reply.status == Status.NO_BLOB:
+            return None
+        state = self._expect(reply, BlobStateReply)
+        return StoredBlob(state.generation, state.length, state.crc)
+
+    def read(self) -> bytes | None:
+        """Read the blob's bytes; None without one."""
+        stored = self.state()
+        if stored is None:
+            return None
+        requests = [BlobRead(at, min(MAX_READ, stored.length - at)) for at in range(0, stored.length, MAX_READ)]
+        return b"".join(reply.data for reply in self._ask(BlobReadReply, *requests))
+
+    def take(self) -> tuple[int, bytes]:
+        """Read the blob's generation and bytes, and check them.
+
+        Raises
+        ------
+        BusError : no blob is stored, or it is not valid.
+        """
+        stored, blob = self.state(), self.read()
+        if stored is None or blob is None:
+            raise BusError(*request_failed(self.name, Status.NO_BLOB))
+        try:
+            Blob.decode(blob)
+        except BlobError as error:
+            raise BusError(*not_readable(self.name, str(error))) from error
+        return stored.generation, blob
+
+    def write(self, blob: bytes) -> StoredBlob:
+        """Replace the stored blob, or change nothing; return the bridge's description of the new one.
+
+        The old blob stays valid until the bridge has checked the new one.
+        """
+        self._check_feature()
+        crc = int.from_bytes(blob[-CRC_BYTES:], "little")
+        self._ask(Reply, BlobBegin(len(blob)))
+        for at in range(0, len(blob), MAX_CHUNK):
+            self._ask(Reply, BlobData(at, blob[at : at + MAX_CHUNK]))
+        (reply,) = self._ask(BlobCommitReply, BlobCommit(len(blob), crc))
+        return StoredBlob(reply.generation, len(blob), crc)
+
+    def erase(self) -> None:
+        """Erase the stored blob, and other data in its place."""
+        self._check_feature()
+        self._ask(Reply, BlobErase())
+
+    def _check_feature(self) -> None:
+        if not self._link.bridge.features & Feature.BLOB:
+            raise KeepsNothing(*without_blob(self.name))
+
+    def _ask(self, kind: type[R], *requests: Message) -> list[R]:
+        return [self._expect(answers[-1].reply, kind) for answers in self._link.ask(*requests)]
+
+    def _expect(self, reply: Reply, kind: type[R]) -> R:
+        if reply.status != Status.OK or not isinstance(reply, kind):
+            raise BusError(*request_failed(self.name, reply.status))
+        return reply

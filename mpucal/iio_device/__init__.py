@@ -1,0 +1,1 @@
+"""IIO devices of the Linux kernel as a source, with their examination and the write-back to their driver."""

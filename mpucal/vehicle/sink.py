@@ -1,0 +1,370 @@
+"""An autopilot's accelerometer parameters as a sink: set, read back, and verified in its streams, or restored."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from ..data import Vector
+from ..disk.atomic import write_atomically
+from ..errors import LinkError, RecordingError, WriteBackError
+from ..mavlink.dialect import dialect
+from ..mavlink.firmwares import ARDUPILOT, PX4
+from ..mavlink.ftp import Storage
+from ..mavlink.horizon import Horizon
+from ..mavlink.link import Link, S
+from ..mavlink.parameters.client import ParameterClient
+from ..mavlink.parameters.document import adapt_to_write, select_imu
+from ..mavlink.parameters.level import MOST_DEG, Level, Leveller, trim_names, trim_of
+from ..mavlink.parameters.plan import NOTHING, Change, plan_changes, refused_imus, select_improving, swap_slots
+from ..mavlink.parameters.slots import all_slots
+from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
+from ..mavlink.parameters.verify import SwappedSlotsError, verify
+from ..mavlink.parameters.write import NEW, OLD, Writer, is_partial_write
+from ..mavlink.prearm import ArmingMonitor, PrearmState, check_prearm
+from ..mavlink.request import send_command
+from ..mavlink.rest_monitor import RestMeans, RestMonitor
+from ..mavlink.stream_parameters import read_parameters, read_stream_parameters
+from ..result.calibration import Calibration
+from ..result.journal import AT, Journal
+from ..session.lay_flat import STAND, put_down
+from ..sinks.kind import Applied, Confirm, Device, Say, nobody
+from ..sinks.old_state import interrupting, nothing_written
+from ..sinks.table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
+from .source import OpenedVehicle
+
+FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
+CORRECTION = re.compile(r"ACC\d?(OFFS|SCAL)_[XYZ]$|ACC\d_[XYZ](OFF|SCALE)$")
+SAVE_IDS = 76
+# ArduPilot's complaint about sensors with other ids than their calibration's
+UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)
+INCONSISTENT, AGREE_NS = re.compile(r"accel\w* inconsistent", re.IGNORECASE), 13 * S
+# An estimator that has just started is not ready yet, and says so.
+READY_NS = 40 * S
+REBOOT = (
+    "Reboot {} now? Its attitude estimate keeps biases that it learnt under the old parameters until it is rebooted."
+)
+NOT_CHECKED = "look whether its horizon is level before it flies"
+NOT_REBOOTED = "reboot it before it flies: its attitude estimate keeps biases that it learnt under the old parameters"
+TILTED_DEG = 0.1
+KEPT_LEVEL = "what was level stays level"
+MEASURED_LEVEL = "it is level as it stands now"
+TOO_TILTED = "it stands too tilted for a level, so what was level stays level"
+# PX4 saves parameters late.
+SAVED_NS = 3 * S
+
+
+@contextmanager
+def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
+    """Open the parameters of the vehicle on a link, after asking the user to put it down.
+
+    Raises
+    ------
+    LinkError : the link cannot be opened, or there is no vehicle.
+    """
+    source: OpenedVehicle = device.open()
+    with source.connected(device.say) as link:
+        put_down(source.listeners, device.say, STAND)
+        journal = Journal.of(AUTOPILOT, device.name)
+        sink = AutopilotSink(link, "store" in device.flags, journal, device.say, device.confirm)
+        recovered = sink.recover()
+        if recovered is not None:
+            device.say(recovered)
+        yield sink
+
+
+class AutopilotSink:
+    """Accelerometer parameters of the vehicle on a locked link.
+
+    Parameters
+    ----------
+    link : locked to the vehicle; the sink leaves it open.
+    store : also save D and b_a, which parameters do not hold in full, as files in the vehicle's storage.
+    journal : notes a write. say : shows the user a sentence. confirm : asks the user; see Device.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        store: bool = False,
+        journal: Journal | None = None,
+        say: Say = lambda _sentence: None,
+        confirm: Confirm = nobody,
+    ) -> None:
+        self._say, self._confirm = say, confirm
+        self._stands_level: bool | None = None
+        self._link = link
+        self._journal = journal or Journal()
+        self._store = store
+        self._firmware = link.vehicle.family
+        self._watch = ArmingMonitor(link)
+
+    @property
+    def where(self) -> str:
+        """Return the name of the vehicle, for messages."""
+        return str(self._link.vehicle)
+
+    def recover(self) -> str | None:
+        """Restore the parameters of an interrupted write; return a clause for the user, or None if there was none.
+
+        Raises
+        ------
+        LinkError : the parameters cannot be read. WriteBackError : see Sink.
+        """
+        note = self._journal.interrupted()
+        if note is None:
+            return None
+        old, new = note[OLD], note[NEW]
+        slots = [slot for slot in all_slots(self._firmware) if set(slot.names) <= set(old)]
+        writer = Writer(self._link, self._watch, slots, others=[n for n in trim_names(self._firmware) if n in old])
+        held = writer.read()
+        interrupted = f"a write to this vehicle was interrupted at {note[AT]}"
+        if held == old:
+            self._journal.end()
+            return None
+        if set(held) != set(old) or not is_partial_write(held, old, new):
+            self._journal.end()
+            return f"{interrupted}; {self.where} has neither the old nor the new parameters, and they are not changed"
+        with interrupting():
+            writer.write(held, old, lambda: None)
+        self._journal.end()
+        return f"{interrupted}; the old parameters are restored and read back"
+
+    def keep(self, folder: Path) -> tuple[Path, ...]:
+        """Save all accelerometer parameters and the level of the vehicle to a file that ground stations can load.
+
+        Raises
+        ------
+        LinkError : they cannot be read. OutputError : they cannot be saved.
+        """
+        held = read_stream_parameters(self._link, self._firmware)
+        values = {name: value for name, value in held.items() if CORRECTION.search(name)}
+        values |= read_parameters(self._link, trim_names(self._firmware), self._firmware)
+        remarks = [f"Accelerometer parameters and level of {self.where} before mpucal wrote new ones"]
+        file, text = OLD_PARAM, param_text(values, remarks)
+        if self._firmware == PX4:
+            file, text = OLD_PARAMS, params_text(values, remarks, self._link.vehicle.system)
+        path = file.free_in(folder)
+        write_atomically(path, text.encode())
+        return (path,)
+
+    def put_back(self, kept: Path) -> str:
+        """Restore the parameters from the file of an earlier `keep`; see Restorable."""
+        wanted = read_parameters_file(kept)
+        slots = [slot for slot in all_slots(self._firmware) if set(slot.names) <= set(wanted)]
+        if not slots:
+            raise RecordingError(
+                f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write saved"
+            )
+        trim = [name for name in trim_names(self._firmware) if name in wanted]
+        writer = Writer(self._link, self._watch, slots, self._journal, trim)
+        with nothing_written():
+            old = writer.read()
+        writer.write(old, {name: wanted[name] for name in old}, lambda: None)
+        return f"{self.where} has the parameters of {kept.name} again, read back; {NOT_REBOOTED}"
+
+    def reason_to_keep(self, calibration: Calibration) -> str | None:
+        """See ComparableSink; residual cross-axis errors count, and one IMU with better parameters is enough."""
+        planned = plan_changes(calibration, self._firmware)
+        if any(change.improves for change in planned):
+            return None
+        old, new = (max(getattr(c, key) or 0.0 for c in planned) for key in ("residual_old_mps2", "residual_mps2"))
+        return (
+            f"the parameters of {self.where} are predicted to be as good as the new ones (error of |a| up to"
+            f" {old:.3f} m/s^2 with the old ones, {new:.3f} with the new ones)"
+        )
+
+    def write(self, calibration: Calibration) -> Applied:
+        """Set each parameter, read all back, and verify their effect in the streams; see Sink."""
+        try:
+            return self._write(calibration)
+        except WriteBackError as error:
+            other = error.__cause__
+            if not isinstance(other, SwappedSlotsError) or not self._writer.restored:
+                raise
+        return self._write(swap_slots(calibration, other.order, self._firmware))
+
+    def _write(self, calibration: Calibration) -> Applied:
+        possible = plan_changes(calibration, self._firmware)
+        planned = select_improving(possible)
+        slots = [change.slot for change in planned]
+        writer = self._writer = Writer(self._link, self._watch, slots, self._journal, trim_names(self._firmware))
+        first = possible[0]
+        monitor = RestMonitor(self._link, list(dict.fromkeys(change.stream for change in (first, *planned))))
+        with nothing_written():
+            self._check(planned)
+            before = check_prearm(self._link)
+            old = writer.read()
+            rest = _at_rest(monitor)
+            held = first.slot.correction(old) if first in planned else None
+            leveller = Leveller(self._firmware, trim_of(self._firmware, old), held, first.new, first.mounting)
+            level, of_level = leveller.keep(), KEPT_LEVEL
+            if self._does_stand_level(leveller.standing_deg(level, rest.mean[first.stream])):
+                rest = _at_rest(monitor)
+                measured = leveller.measure(rest.mean[first.stream])
+                level, of_level = (level, TOO_TILTED) if measured is None else (measured, MEASURED_LEVEL)
+        new = {name: value for change in planned for name, value in change.slot.values(change.new).items()}
+        new |= level.values()
+        now = adapt_to_write(calibration, [change.imu for change in planned], level)
+        with self._storing(now, planned) as paths:
+            writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
+        imus = " and ".join(str(change.imu) for change in planned)
+        residuals = ", ".join(change.residual for change in planned)
+        clauses = [
+            f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams; they have no"
+            f" cross-axis terms, which leaves errors of up to {residuals}",
+            _level_clause(level, of_level),
+            *self._finish(before, first, level),
+            *_unchanged_clauses(possible, planned, refused_imus(calibration)),
+        ]
+        return Applied(now, "; ".join([*clauses, *paths]))
+
+    def _does_stand_level(self, standing_deg: Vector) -> bool:
+        """Return True if the user says that the vehicle stands as it should hover."""
+        if self._stands_level is None:
+            stands = f"{self.where} stands {_tilt_words(standing_deg)} by what it calls level."
+            self._stands_level = self._confirm(f"{stands} Is this how it should hover? (No: its level stays.)", False)
+        return self._stands_level
+
+    def _finish(self, before: PrearmState, first: Change, level: Level) -> Iterator[str]:
+        """Reboot the vehicle if the user agrees, and yield clauses on its horizon and on its pre-arm check."""
+        left = NOT_REBOOTED
+        try:
+            now = self._await_prearm()
+            if not self._confirm(REBOOT.format(self.where), True):
+                yield NOT_REBOOTED
+                if self._firmware == PX4:
+                    yield f"leave it powered for {SAVED_NS // S} more seconds, as PX4 saves late"
+                if now.complaints:
+                    yield f"before, it {before}; now it {now}"
+                return
+            if self._firmware == PX4:
+                list(self._link.messages(self._link.now_ns() + SAVED_NS))
+            self._say(f"{self.where} reboots: leave it as it stands.")
+            horizon = Horizon(self._link)
+            if not horizon.reboot():
+                yield f"it refused to reboot; {left}"
+                return
+            left = NOT_CHECKED
+            yield _horizon_clause(horizon.error_deg(first.stream, level.wanted_deg))
+            yield f"before, it {before}; now it {self._await_ready(before)}"
+        except LinkError as error:
+            yield f"but {error.what}: {error.remedy}, and {left}"
+        except KeyboardInterrupt:
+            yield f"you interrupted what follows the write; {left}"
+
+    def _await_ready(self, before: PrearmState) -> PrearmState:
+        """Return the pre-arm state after a reboot, once it is ready, or has no complaints other than those before.
+
+        Accelerometers that were inconsistent before should agree now.
+        """
+        end_ns = self._link.now_ns() + READY_NS
+        stays = {complaint for complaint in before.complaints if not INCONSISTENT.search(complaint)}
+        now = self._await_prearm()
+        while not now.ready and not set(now.complaints) <= stays and self._link.now_ns() < end_ns:
+            now = check_prearm(self._link)
+        return now
+
+    @contextmanager
+    def _storing(self, now: Calibration, planned: Sequence[Change]) -> Iterator[list[str]]:
+        """Store D and b_a as files in the vehicle, and remove them if the block fails; yield clauses for the user."""
+        if not self._store:
+            yield []
+            return
+        storage = Storage(self._link)
+        files = {FILE.format(FOLDERS[self._firmware], change.imu): select_imu(now, change.imu) for change in planned}
+        with nothing_written():
+            for path, calibration in files.items():
+                storage.put(path, calibration.blob().encode())
+        try:
+            yield [f"{path} in its storage holds D and b_a, read back" for path in files]
+        except WriteBackError:
+            with suppress(LinkError):
+                for path in files:
+                    storage.remove(path)
+            raise
+
+    def _check(self, planned: Sequence[Change]) -> None:
+        """Check that the vehicle is disarmed and has the sensors that were calibrated."""
+        if self._watch.armed:
+            raise WriteBackError(f"{NOTHING}: {self.where} is armed", "disarm it, then write again")
+        known = {c.slot.sensor_id: c.sensor_id for c in planned if c.sensor_id}
+        for name, held in ParameterClient(self._link).read(tuple(known)).items():
+            # 0: the vehicle's parameters were reset
+            if held not in (0, known[name]):
+                raise WriteBackError(
+                    f"{NOTHING}: {name} is {held:.0f}, but the calibration is of sensor {known[name]:.0f}",
+                    "connect the vehicle that was calibrated, or calibrate this one",
+                )
+
+    def _await_prearm(self) -> PrearmState:
+        """Return the pre-arm state once it has settled; an ArduPilot with wrong saved ids saves those of its sensors.
+
+        ArduPilot calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
+        Its id parameters show the sensors' ids without being saved (AP_InertialSensor::register_accel).
+        """
+        now = check_prearm(self._link)
+        if self._firmware != ARDUPILOT:
+            return now
+        if any(map(UNCALIBRATED.search, now.complaints)):
+            send_command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
+            now = check_prearm(self._link)
+        until_ns = self._link.now_ns() + AGREE_NS
+        while any(map(INCONSISTENT.search, now.complaints)) and self._link.now_ns() < until_ns:
+            now = check_prearm(self._link)
+        return now
+
+
+def _at_rest(monitor: RestMonitor) -> RestMeans:
+    rest = monitor.wait()
+    if rest is None:
+        raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
+    return rest
+
+
+def _tilt_words(roll_pitch_deg: Vector) -> str:
+    """Return roll and pitch as a pilot says them, such as: 1.2 deg nose up and 0.3 deg right side down."""
+    roll, pitch = roll_pitch_deg.tolist()
+    nose, side = ("up" if pitch > 0 else "down"), ("right" if roll > 0 else "left")
+    return f"{abs(pitch):.1f} deg nose {nose} and {abs(roll):.1f} deg {side} side down"
+
+
+def _level_clause(level: Level, words: str) -> str:
+    """Return a clause on the new trim."""
+    if not level.wanted_deg[:2].any():
+        return f"its level was never set ({trim_names(level.firmware)[0]} is 0) and stays that of its autopilot's axes"
+    changes = zip(trim_names(level.firmware)[:2], level.held_deg, level.wanted_deg, strict=False)
+    listed = " and ".join(f"{name} from {old:.2f} to {new:.2f} deg" for name, old, new in changes)
+    doubt = ""
+    if np.abs(level.wanted_deg[:2]).max() > MOST_DEG:
+        doubt = (
+            ", more than a board is mounted askew: check what it calls level, and calibrate its level before it flies"
+        )
+    return f"{words} ({listed}, read back){doubt}"
+
+
+def _horizon_clause(error_deg: Vector | None) -> str:
+    """Return a clause on the error of the attitude after a reboot."""
+    if error_deg is None:
+        return "it is rebooted, but its horizon was not checked, as it did not rest"
+    apart = float(np.abs(error_deg).max())
+    if apart <= TILTED_DEG:
+        return f"it is rebooted, and its horizon is level within {max(apart, 0.01):.2f} deg"
+    return f"it is rebooted, and its horizon is tilted by {apart:.2f} deg: calibrate its level before it flies"
+
+
+def _unchanged_clauses(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:
+    """Return clauses on the IMUs that keep their old parameters, with the reason."""
+    clauses = [
+        f"IMU {change.imu} keeps its old ones, which are predicted to be as good (error of |a| up to"
+        f" {change.residual_old_mps2 or 0.0:.3f} m/s^2)"
+        for change in possible
+        if change not in planned
+    ]
+    if refused:
+        clauses.append(f"IMU {', '.join(map(str, refused))} keeps its old ones, as its calibration was refused")
+    return clauses

@@ -1,0 +1,205 @@
+"""Open vehicle over MAVLink, and the replay of another ground station's log: every packet is recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+from ..chip.records import BEGUN, END, OPENED
+from ..data import Recording
+from ..errors import EndOfCapture, LinkError
+from ..files.mcap import Capture
+from ..files.messages import PACKETS
+from ..files.recorders import DRIVER
+from ..mavlink import MAVLINK_VERSION
+from ..mavlink.link import OWN_SYSTEM, Link, Recorder
+from ..mavlink.log import read_log
+from ..mavlink.prompts import encode_prompt
+from ..mavlink.recorded_source import RecordedSource
+from ..mavlink.signing import read_key
+from ..mavlink.stream_parameters import read_stream_parameters
+from ..mavlink.tlog import RawPacket
+from ..mavlink.transports import open_transport
+from ..mavlink.url import parse_url
+from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
+from ..origin import Origin
+from ..session.events import Prompt
+from ..session.plan import Plan
+from ..sources.chain import Chain
+from ..sources.kind import Request
+from ..sources.opened_source import ActiveSource, NewRecords, OpenedSource, Say
+from ..sources.packet_replay import PacketReplay
+
+SYSTEM, PREPARE = "system", "prepare"
+
+
+@dataclass
+class OpenedVehicle(OpenedSource):
+    """Vehicle behind a transport, which is its `line`; only the rate of its plan's config applies. See OpenedSource.
+
+    Attributes
+    ----------
+    system : number of the vehicle. key : signing key, or None. own_system : MAVLink id of mpucal.
+    writes : True if the result will be written to the vehicle. prepare : True to prepare a PX4; see Preparation.
+    link : to the vehicle, while it measures.
+    """
+
+    _: KW_ONLY
+    system: int | None = None
+    key: bytes | None = None
+    own_system: int = OWN_SYSTEM
+    writes: bool = False
+    prepare: bool = False
+    link: Link | None = None
+    origin = Origin.VEHICLE
+    topic = PACKETS
+
+    @property
+    def listeners(self) -> Sequence[Callable[[Prompt], None]]:
+        """The vehicle itself, whose log then contains the prompts, and those of OpenedSource."""
+        return (self._send_prompt, *super().listeners)
+
+    def source_meta(self) -> dict[str, Any]:
+        """Return the entries for the head of a capture."""
+        return {**super().source_meta(), DRIVER: MAVLINK_VERSION, SYSTEM: self.system, PREPARE: self.prepare}
+
+    @contextmanager
+    def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
+        """See OpenedSource."""
+        link = self.link = Link(self.line, recorder.packet, self.key, self.own_system)
+
+        def note(event: str, _t_ns: int = 0, data: Mapping[str, Any] | None = None) -> None:
+            recorder.event(event, link.now_ns(), data)
+
+        def go_on() -> bool:
+            if self.parts is None or self.parts.is_last:
+                return False
+            note(END)
+            self.parts.go_on()
+            link.restart()
+            return True
+
+        rate_hz, begun = self.plan.config.rate_hz, lambda: note(BEGUN)
+        source = VehicleSource(link, rate_hz, self.system, say, name, self.writes, self.prepare, begun)
+        note(OPENED)
+        try:
+            yield ActiveSource(source, note, go_on, self.is_late)
+        finally:
+            with suppress(EndOfCapture):
+                source.stop()
+            # Nothing came after this time, so that a replay ends its last poll here.
+            note(END)
+
+    @contextmanager
+    def connected(self, say: Say, record: Recorder = lambda _t_ns, _packet: None) -> Iterator[Link]:
+        """Lock a link to the vehicle, whose packets only `record` gets.
+
+        Raises
+        ------
+        UsageError : several vehicles. NoAnswer, LinkError : see Link.
+        """
+        with closing(self.line):
+            link = self.link = Link(self.line, record, self.key, self.own_system)
+            lock_to_vehicle(link, self.system, say)
+            yield link
+
+    def contents(self) -> dict[str, Any]:
+        """Read the vehicle's identity and its accelerometer parameters; nothing is written."""
+        with self.connected(lambda _sentence: None) as link:
+            firmware = link.vehicle.family
+            return {
+                "where": str(link.vehicle),
+                "firmware": firmware,
+                "parameters": dict(read_stream_parameters(link, firmware)),
+            }
+
+    def _send_prompt(self, prompt: Prompt) -> None:
+        """Send the prompt to the vehicle, so that its log contains it."""
+        if self.link is not None:
+            # The operator gets the prompt even if the vehicle is gone.
+            with suppress(LinkError):
+                self.link.send(encode_prompt(prompt))
+
+
+@dataclass
+class OpenedLog(OpenedVehicle):
+    """Log of another ground station; see OpenedSource.
+
+    Attributes
+    ----------
+    packets : of the log. measured : its recording.
+    """
+
+    _: KW_ONLY
+    packets: Sequence[RawPacket]
+    measured: Recording
+
+    @contextmanager
+    def recorded(self, recorder: NewRecords, _name: str, _say: Say) -> Iterator[ActiveSource]:
+        """Copy the log as the capture; see OpenedSource."""
+        for packet in self.packets:
+            recorder.packet(*packet)
+        yield ActiveSource(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
+
+
+def replayed(capture: Capture, line: Chain[Any], plan: Plan, values: Mapping[str, Any], **how: Any) -> OpenedVehicle:
+    """Open the replay of a vehicle: a session of mpucal as it was, any other log until its end.
+
+    See mpucal.sources.chip.replayed; an option names one of several vehicles in a log.
+
+    Raises
+    ------
+    RecordingError : the log has no IMU.
+    """
+    how[SYSTEM], how[PREPARE] = capture.meta.get(SYSTEM, values.get(SYSTEM)), bool(capture.meta.get(PREPARE))
+    packets = [record for record in capture.records if isinstance(record, RawPacket)]
+    if len(packets) < len(capture.records):
+        return OpenedVehicle(line, plan, **how)
+    measured = read_log(packets, capture.name, how[SYSTEM])
+    return OpenedLog(PacketReplay((), capture.name), plan, **how, packets=packets, measured=measured)
+
+
+def open_source(request: Request) -> OpenedVehicle:
+    """Open the vehicle at a URL.
+
+    Raises
+    ------
+    UsageError : not a URL, or not a key. LinkError : the link cannot be opened.
+    """
+    key = signing_key(request)
+    transport = open_transport(parse_url(request.value))
+    return OpenedVehicle(transport, request.plan, words=request.words, key=key, **link_identity(request))
+
+
+class LinkIdentity(TypedDict):
+    """MAVLink ids of the vehicle and of mpucal, and its intention to write the result and to prepare the vehicle."""
+
+    system: int | None
+    own_system: int
+    writes: bool
+    prepare: bool
+
+
+def link_identity(request: Request) -> LinkIdentity:
+    """Return the LinkIdentity that the options select."""
+    own = request.values.get("source_system")
+    return {
+        "system": request.values.get("system"),
+        "own_system": OWN_SYSTEM if own is None else int(own),
+        "writes": bool(request.values.get("writes")),
+        "prepare": request.values.get("prepare") == "yes",
+    }
+
+
+def signing_key(request: Request) -> bytes | None:
+    """Read the signing key if one is named.
+
+    Raises
+    ------
+    UsageError : the key cannot be read.
+    """
+    path = request.values.get("signing_key")
+    return None if path is None else read_key(Path(path))

@@ -1,0 +1,220 @@
+"""Fixtures: a simulated chip behind an emulated bridge, on a line whose time runs only while the host waits."""
+
+import contextlib
+import os
+import select
+import socket
+import threading
+import tty
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.bridge import bus, link
+from mpucal.bridge.bus import BridgeBus
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.simulated.chip import SimulatedBus
+from mpucal.simulated.chip.chip import Chip
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.factory import FactoryTrim
+from mpucal.simulated.chip.models import MODELS
+from tools.lab.bridge import EmulatedBridge, EmulatedLine
+
+MS = 1_000_000
+
+
+class NumberedFeed:
+    """Samples 0, 1, 2, ... in accelerometer x; the other words are constant."""
+
+    def __init__(self):
+        self.next = 0
+
+    def samples(self, edges_s, setting):
+        n = len(edges_s) - 1
+        rows = np.tile(np.array([0, -34, 8192, -2000, 56, -78, 90], np.int16), (n, 1))
+        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
+        self.next += n
+        return rows
+
+
+class Rig(SimpleNamespace):
+    """Parts by name: clock, chip, line, and `bus` on demand."""
+
+    def new_chip(self):
+        """Replace the chip by one that was just switched on."""
+        self.chip = SimulatedBus(Chip(MODELS[self.model], NumberedFeed(), 2500.0, FactoryTrim()), self.clock)
+
+    def new_bridge(self, boot_ns=0, **how):
+        """Make a bridge that was just switched on, with the present chip."""
+        started_ns = self.clock.now()
+        bridge = EmulatedBridge(self.chip, lambda: self.clock.now() - started_ns, **{**self.how, **how})
+        return Booting(bridge, self.clock, started_ns + boot_ns)
+
+    def bus(self, address=None):
+        self.opened = BridgeBus(self.line, address)
+        return self.opened
+
+
+class Booting:
+    """Bridge whose boot loader takes all bytes until `ready_ns`."""
+
+    def __init__(self, bridge, clock, ready_ns):
+        self.bridge, self.clock, self.ready_ns = bridge, clock, ready_ns
+
+    def receive(self, data):
+        if self.clock.now() >= self.ready_ns:
+            self.bridge.receive(data)
+
+    def work(self):
+        return self.bridge.work()
+
+
+@pytest.fixture(scope="session")
+def rig():
+    def make(model="mpu6050", latency_ns=MS, boot_ns=0, line=None, **how):
+        made = Rig(model=model, clock=FastClock(), how=how)
+        made.new_chip()
+        made.line = EmulatedLine(
+            made.new_bridge(boot_ns), made.clock, **{"latency_ns": latency_ns, "step_ns": MS, **(line or {})}
+        )
+        return made
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def started(rig):
+    """Makes a rig and starts a driver on its bus: (rig, driver)."""
+
+    def start(model="mpu6050", latency_ns=MS, rate_hz=200, say=lambda _sentence: None, **how):
+        made = rig(model, latency_ns, **how)
+        driver = Driver(made.bus(), Config(rate_hz=rate_hz), say=say)
+        driver.start()
+        return made, driver
+
+    return start
+
+
+@pytest.fixture(scope="session")
+def numbers():
+    """Returns the numbers of the feed's samples in a recording."""
+    return lambda recording: np.rint(recording.acc[:, 0] / recording.acc[0, 2] * 8192).astype(int)
+
+
+@pytest.fixture(scope="session")
+def stream():
+    """Polls a started driver for some seconds."""
+
+    def run(driver, seconds):
+        end_ns = driver.now_ns() + round(seconds * 1e9)
+        while driver.now_ns() < end_ns:
+            driver.poll()
+
+    return run
+
+
+class Server:
+    """Thread that serves an emulated bridge on a pty or a socket, in a time that runs as fast as possible.
+
+    Attributes
+    ----------
+    name : port for the host. device : the bridge; replacing it is a reset. clock : of the bridge.
+    """
+
+    def __init__(self, device, clock, handle, name, step_ns):
+        self.device, self.clock, self.name = device, clock, name
+        self._handle, self._step_ns = handle, step_ns
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def stop(self):
+        if not self._stop.is_set():
+            self._stop.set()
+            self._thread.join()
+            self._handle.close()
+
+    def _serve(self):
+        with contextlib.suppress(OSError):
+            while not self._stop.is_set():
+                if select.select([self._handle], [], [], 0.0005)[0]:
+                    self.device.receive(self._handle.read())
+                self.clock.sleep_until(self.clock.now() + self._step_ns)
+                self._handle.write(self.device.work())
+
+
+class OnPty:
+    def __init__(self):
+        self._host, there = os.openpty()
+        tty.setraw(there)
+        self.name, self._there = os.ttyname(there), there
+
+    def fileno(self):
+        return self._host
+
+    def read(self):
+        return os.read(self._host, 4096)
+
+    def write(self, data):
+        while data:
+            if select.select([], [self._host], [], 0.1)[1]:
+                data = data[os.write(self._host, data) :]
+
+    def close(self):
+        os.close(self._host)
+        os.close(self._there)
+
+
+class OnSocket:
+    """Socket for one host after the other."""
+
+    def __init__(self):
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.name = f"socket://127.0.0.1:{self._listening.getsockname()[1]}"
+        self._host = None
+
+    def fileno(self):
+        return (self._host or self._listening).fileno()
+
+    def read(self):
+        if self._host is None:
+            self._host = self._listening.accept()[0]
+            return b""
+        try:
+            data = self._host.recv(4096)
+        except ConnectionError:
+            data = b""
+        if not data:
+            self._host.close()
+            self._host = None
+        return data
+
+    def write(self, data):
+        if self._host is not None and data:
+            with contextlib.suppress(ConnectionError):
+                self._host.sendall(data)
+
+    def close(self):
+        if self._host is not None:
+            self._host.close()
+        self._listening.close()
+
+
+@pytest.fixture
+def serve(monkeypatch):
+    """Serves a device on a "pty" or "socket", with time-outs that a busy machine does not reach."""
+    monkeypatch.setattr(link, "REPLY_NS", 20_000 * MS)
+    monkeypatch.setattr(link, "HELLO_NS", 20_000 * MS)
+    monkeypatch.setattr(bus, "GONE_NS", 20_000 * MS)
+    servers = []
+
+    def begin(device, clock, kind, step_ns=MS):
+        handle = {"pty": OnPty, "socket": OnSocket}[kind]()
+        servers.append(Server(device, clock, handle, handle.name, step_ns))
+        return servers[-1]
+
+    yield begin
+    for server in servers:
+        server.stop()

@@ -1,0 +1,186 @@
+import io
+
+import numpy as np
+import pytest
+
+from mpucal.bridge.frame import Deframer
+from mpucal.bridge.messages import Feature, Read
+from mpucal.chip import registers as reg
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.errors import BusError, NoAnswer
+from mpucal.sources.replay import ReplayBus
+from mpucal.sources.tap import Tap
+
+MS = 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("model", "rate_hz", "latency_ms"), [("mpu6050", 50, 16), ("mpu6500", 1000, 1), ("clone98", 1000, 16)]
+)
+def test_the_driver_loses_nothing(started, numbers, stream, model, rate_hz, latency_ms):
+    """An FTDI adapter holds bytes back for 16 ms by default."""
+    made, driver = started(model, latency_ms * MS, rate_hz=rate_hz)
+    stream(driver, 4)
+    driver.stop()
+    made.opened.close()
+    recording = driver.recording()
+    assert not recording.gap.any()
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 3.8 * rate_hz
+    assert recording.sensor.rate_hz == pytest.approx(rate_hz * 1.0025, rel=300e-6)
+
+
+def test_without_streaming_200_hz_work_too(started, numbers, stream):
+    _, driver = started(latency_ns=16 * MS, features=Feature(0))
+    stream(driver, 4)
+    recording = driver.recording()
+    assert not recording.gap.any()
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 3.5 * 200
+
+
+def test_many_registers_and_too_many_bytes(rig):
+    bus = rig().bus()
+    whole = bus.read(0, 114).data
+    assert len(whole) == 114
+    assert whole[reg.PWR_MGMT_1] == reg.PWR_MGMT_1_SLEEP
+    with pytest.raises(BusError, match="reads at most 4096 bytes at once, not 4097"):
+        bus.read(reg.FIFO_R_W, 4097)
+    with pytest.raises(BusError, match="writes at most 32 bytes at once, not 33"):
+        bus.write(0, bytes(33))
+
+
+def test_a_fifo_started_without_a_reset_is_not_read_ahead(rig):
+    bus = rig().bus()
+    bus.write(reg.PWR_MGMT_1, bytes([reg.CLKSEL_PLL]))
+    bus.write(reg.FIFO_EN, bytes([reg.FIFO_EN_FRAME]))
+    t_ns = bus.write(reg.USER_CTRL, bytes([reg.USER_CTRL_FIFO_EN]))
+    bus.sleep_until(t_ns + 1000 * MS)
+    assert int.from_bytes(bus.read(reg.FIFO_COUNT_H, 2).data, "big") == 1024
+    assert bus.read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW
+
+
+def test_a_host_that_was_away_catches_up_without_a_gap(started, numbers, stream):
+    """The chip's FIFO holds 73 ms at 1 kHz, but the host's buffer is larger."""
+    made, driver = started(rate_hz=1000)
+    stream(driver, 0.5)
+    # the host computes, and its port still receives
+    for _ in range(4000):
+        made.line._step()
+    stream(driver, 3)
+    recording = driver.recording()
+    assert not recording.gap.any()
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 3300
+
+
+@pytest.fixture
+def recorded(rig):
+    """Records a driver's accesses: (rig, driver, records)."""
+
+    def start(rate_hz, **how):
+        made, records = rig(**how), Records()
+        driver = Driver(Tap(made.bus(), records), Config(rate_hz=rate_hz))
+        driver.start()
+        return made, driver, records
+
+    return start
+
+
+def test_a_capture_of_it_replays(recorded, stream):
+    made, driver, records = recorded(200)
+    stream(driver, 1)
+    made.line.device = made.new_bridge()
+    stream(driver, 3)
+    driver.stop()
+    again = Driver(ReplayBus(records), Config(rate_hz=200))
+    again.start()
+    while again.now_ns() < driver.now_ns() and again.recording().t.size < driver.recording().t.size:
+        again.poll()
+    for name in ("t", "acc", "gyr", "gap"):
+        np.testing.assert_array_equal(getattr(again.recording(), name), getattr(driver.recording(), name))
+    assert driver.recording().gap.sum() == 1
+    assert any(t.error for t in records)
+
+
+def test_no_chip_or_one_at_the_other_address(rig):
+    made = rig()
+    made.chip = None
+    made.line.device = made.new_bridge()
+    with pytest.raises(NoAnswer, match="answers, but no chip answers it at 0x68 or 0x69 on its I2C bus: check"):
+        made.bus()
+    with pytest.raises(NoAnswer, match="at 0x69 on its"):
+        rig().bus(address=0x69)
+    assert rig(address=0x69).bus().address == 0x69
+
+
+def test_a_chip_that_is_disconnected_during_a_stream(started, stream):
+    made, driver = started()
+    stream(driver, 0.5)
+
+    def nothing(*_):
+        raise NoAnswer("nothing acknowledges", "look")
+
+    made.chip.read = made.chip.write = nothing
+    with pytest.raises(NoAnswer, match="the chip no longer answers the bridge on the emulated line: check the chip's"):
+        stream(driver, 5)
+    assert len(driver.recording()) > 80
+
+
+class Records(list):
+    def transaction(self, transaction):
+        self.append(transaction)
+
+
+def test_during_a_stream_only_int_enable_is_requested(started, stream):
+    """FRAMES contain the overflow of INT_STATUS; a read of it would clear the flag for the bridge."""
+    made, driver = started()
+    made.line.written.clear()
+    stream(driver, 2)
+    asked = {(frame.type, frame.payload) for frame in Deframer().feed(bytes(made.line.written))}
+    assert asked == {(Read.TYPE, bytes([reg.INT_ENABLE, 1]))}
+
+
+@pytest.mark.parametrize(
+    ("how", "lost"),
+    [({"burst_ns": 450 * MS}, 0.0), ({"latency_ns": 300 * MS}, 0.02), ({"latency_ns": 5 * MS}, 0.02)],
+    ids=["bursts of 0.45 s", "300 ms, and 2 % of the packets sent again", "the same on a quick line"],
+)
+def test_a_line_that_delays_replies_makes_no_gap(rig, numbers, stream, how, lost):
+    made, remarks = rig(line=how), []
+    rng, free_ns = np.random.default_rng(1), [0]
+    step, coming = made.line._step, made.line._coming
+
+    def sent_again():
+        """Delay the packets after a lost one, as TCP does."""
+        before = len(coming)
+        step()
+        if len(coming) > before:
+            free_ns[0] = max(free_ns[0], coming[-1].t_ns + 400 * MS * (rng.random() < lost))
+            coming[-1] = coming[-1]._replace(t_ns=free_ns[0])
+
+    made.line._step = sent_again
+    driver = Driver(made.bus(), Config(rate_hz=200), say=remarks.append)
+    driver.start()
+    stream(driver, 10)
+    recording = driver.recording()
+    assert recording.gap.sum() == 0
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 1600
+    driver.stop()
+    assert not any("failed" in sentence for sentence in remarks)
+
+
+def test_closing_stops_the_stream(rig, stream):
+    made = rig()
+    bus = made.bus()
+    driver = Driver(bus, Config(rate_hz=200))
+    driver.start()
+    stream(driver, 0.3)
+    made.opened.close()
+    sent = io.BytesIO()
+    for _ in range(2000):
+        made.clock.sleep_until(made.clock.now() + MS)
+        sent.write(made.line.device.work())
+    assert sent.getvalue() == b""

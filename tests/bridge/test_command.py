@@ -1,0 +1,147 @@
+"""The command line on a board with an emulated bridge: record, store, show."""
+
+import json
+import struct
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from mpucal.__main__ import run
+from mpucal.bridge.conformance import talks
+from mpucal.bridge.frame import Frame
+from mpucal.bridge.messages import REPLY_BIT, Hello
+from mpucal.errors import BusError, OutputError
+from mpucal.result.calibration import Calibration
+from mpucal.session.events import Prompt, PromptKind
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.clock import FastClock
+from tools.lab.bridge import EmulatedBridge, Memory
+
+BLOB = Path(__file__).parents[2] / "fixtures" / "vectors" / "blob_measured.bin"
+
+
+@pytest.fixture
+def board(serve):
+    """A bridge on a socket; its memory outlives it. Its time is never taken for a clock that is a little off."""
+    made = SimpleNamespace(memory=Memory(), clock=FastClock())
+    made.chip = open_simulated("sim:seed=5", clock=made.clock)
+    bridge = EmulatedBridge(made.chip, made.clock.now, made.memory)
+    made.server = serve(bridge, made.clock, "socket", 5_000_000)
+    made.name = made.server.name
+    return made
+
+
+@pytest.fixture
+def mpucal(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        capsys.readouterr()
+        code = run(list(words))
+        out, err = capsys.readouterr()
+        return SimpleNamespace(code=code, out=out, err=err)
+
+    return call
+
+
+def test_a_recording(board, mpucal):
+    recorded = mpucal("record", "--serial", board.name, "-o", "board.mcap", "--seconds", "1", "--rate", "1000")
+    assert recorded.code == 0, recorded.err
+    shown = json.loads(mpucal("show", "board.mcap", "--json").out)
+    # how much of the second the start takes, the load of the machine decides
+    assert (shown["gaps"], shown["samples"] > 0) == (0, True)
+
+
+def test_a_capture_without_its_suffix_is_refused_at_once(board, mpucal, tmp_path):
+    refused = mpucal("record", "--serial", board.name, "-o", "plain", "--seconds", "1")
+    assert refused.code == OutputError.exit_code
+    assert "plain does not end with .mcap" in refused.err
+    assert not (tmp_path / "plain").exists()
+
+
+def test_what_only_hosts_are_sent_a_bridge_ignores(board):
+    bridge = EmulatedBridge(board.chip, board.clock.now)
+    bridge.receive(Frame(Hello.TYPE | REPLY_BIT, 1, Hello().payload()).encode())
+    assert bridge.work() == b""
+    bridge.receive(Frame(Hello.TYPE, 1, Hello().payload()).encode())
+    assert bridge.work() != b""
+
+
+def test_into_the_memory_and_back(board, mpucal, tmp_path):
+    nothing = mpucal("show", "--serial", board.name)
+    assert nothing.code == BusError.exit_code
+    assert f"the bridge on {board.name} stores no calibration: store one: mpucal write" in nothing.err
+    made = Calibration.load(BLOB)
+    made.save("calibration.json")
+    board.memory.slots[0] = b"another sketch's"
+    stored = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "--yes")
+    assert stored.code == 0, stored.err
+    assert "holds other data, perhaps another sketch's or file system's, which a write overwrites" in stored.err
+    assert "as its blob number 1 (212 bytes, CRC-32 " in stored.out
+    # another bridge with the same memory: the power was off
+    board.server.device = EmulatedBridge(board.chip, board.clock.now, board.memory)
+    shown = mpucal("show", "--serial", board.name, "--json")
+    assert shown.code == 0, shown.err
+    kept = json.loads(shown.out)["accelerometer"]
+    assert (kept["D"], kept["b_a"]) == (made.D.tolist(), made.b_a.tolist())
+    shown = mpucal("show", "--serial", board.name)
+    assert "blob number 1 of the bridge on" in shown.out
+    assert "the unit of K" not in shown.err
+    anew = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "-o", "kept")
+    assert "bridge-blob-1.bin" in anew.err
+    assert (tmp_path / "kept" / "bridge-blob-1.bin").read_bytes() == made.blob().encode()
+
+
+def test_a_blob_of_before_says_that_its_unit_is_known(board, mpucal):
+    board.memory.slots[0] = struct.pack("<II", 1, 0xFFFFFFFE) + BLOB.read_bytes()
+    shown = mpucal("show", "--serial", board.name)
+    assert shown.code == 0, shown.err
+    assert "does not state the unit of K: 131 counts to 1 deg/s" in shown.err
+
+
+def test_the_doctor_tells_bridge_and_chip(board, mpucal):
+    board.chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    told = mpucal("doctor", "--serial", board.name, "--seconds", "2", "--json")
+    assert told.code == 0, told.out
+    found = {finding["topic"]: finding for finding in json.loads(told.out)["findings"]}
+    assert found["bridge"]["data"]["name"] == "emulated bridge"
+    assert found["bridge"]["data"]["pushes"]
+    assert found["offset registers"]["data"]["place"] == 0x06
+    # what passes through a serial line does not show the speed of the bus behind it
+    assert "serial line" in found
+    assert "bus speed" not in found
+
+
+def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
+    told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
+    assert told.code == 0, told.out
+    assert {finding["topic"]: finding["mark"] for finding in json.loads(told.out)["findings"]} == dict.fromkeys(
+        talks(), "ok"
+    )
+    board.memory.slots[0] = b"another sketch's"
+    held = list(board.memory.slots)
+    told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
+    tried = {finding["topic"]: finding["what"] for finding in json.loads(told.out)["findings"]}
+    assert "not tried, as its memory holds other data" in tried["begin_of_0"]
+    assert board.memory.slots == held
+    assert "for the firmware of a bridge" in mpucal("doctor", "--bus", "sim", "--conformance").err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "sentence"),
+    [
+        (["session", "--serial"], 2, "no serial port was named"),
+        (["session", "--serial", "/dev/there-is-none"], 3, "there is no serial port /dev/there-is-none"),
+        (["show", "--serial"], 2, "no serial port was named"),
+        (["show"], 2, "nothing to show was named"),
+        (["show", "x.json", "--serial", "x"], 2, "a file and --serial were given together"),
+        (["write", str(BLOB), "bridge", "--bus", "sim"], 2, "give --serial PORT"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_words_are_one_sentence(mpucal, words, code, sentence):
+    result = mpucal(*words)
+    assert (result.code, result.out) == (code, "")
+    assert sentence in result.err
+    assert "Traceback" not in result.err

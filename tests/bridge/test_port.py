@@ -1,0 +1,175 @@
+"""Port on the real pyserial, with a pseudo-terminal and a socket."""
+
+import contextlib
+import errno
+import os
+import socket
+from pathlib import Path
+
+import numpy as np
+import pytest
+import serial
+from serial.tools import list_ports
+
+from mpucal.bridge import open_bridge
+from mpucal.bridge.link import Link
+from mpucal.bridge.port import BAUDS, SerialPort, split_port
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.errors import BusError, UsageError
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "bauds"),
+    [
+        ("/dev/ttyUSB0", "/dev/ttyUSB0", BAUDS),
+        ("/dev/ttyUSB0:57600", "/dev/ttyUSB0", (57600,)),
+        ("COM3:1000000", "COM3", (1_000_000,)),
+        ("/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0", "/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0", BAUDS),
+        ("socket://127.0.0.1:5000", "socket://127.0.0.1:5000", BAUDS[:1]),
+        ("/dev/ttyUSB0:0", "/dev/ttyUSB0:0", BAUDS),
+    ],
+    ids=["both rates", "a rate", "Windows", "a colon in the name", "URL", "no rate"],
+)
+def test_a_port_and_its_rate(text, name, bauds):
+    assert split_port(text) == (name, bauds)
+
+
+@pytest.mark.parametrize(("kind", "rate_hz"), [("pty", 1000), ("socket", 200)])
+def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream, kind, rate_hz):
+    made = rig()
+    bus = open_bridge(serve(made.line.device, made.clock, kind).name)
+    driver = Driver(bus, Config(rate_hz=rate_hz))
+    driver.start()
+    stream(driver, 1)
+    driver.stop()
+    bus.close()
+    recording = driver.recording()
+    assert not recording.gap.any()
+    assert set(np.diff(numbers(recording))) == {1}
+    # The bridge's time goes on while this process waits for a processor.
+    assert len(recording) > 0.1 * rate_hz
+
+
+def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_path):
+    """A cable is plugged in again: the name stays, and the device behind it is new."""
+    made = rig()
+    first, name = serve(made.line.device, made.clock, "pty"), tmp_path / "ttyUSB0"
+    name.symlink_to(first.name)
+    driver = Driver(open_bridge(str(name)), Config(rate_hz=200))
+    driver.start()
+    stream(driver, 1)
+    second = serve(made.new_bridge(), made.clock, "pty")
+    name.unlink()
+    name.symlink_to(second.name)
+    first.stop()
+    stream(driver, 2)
+    recording = driver.recording()
+    assert recording.gap.sum() == 1
+    assert len(recording) > 100
+
+
+def test_two_at_once(rig, serve):
+    made = rig()
+    name = serve(made.line.device, made.clock, "pty").name
+    port = SerialPort(name)
+    with pytest.raises(BusError, match=f"another program uses {name}: close it"):
+        SerialPort(name)
+    port.close()
+    SerialPort(name).close()
+
+
+class Listed:
+    def __init__(self, device, description, hwid):
+        self.device, self.description, self.hwid = device, description, hwid
+
+    def __lt__(self, other):
+        return self.device < other.device
+
+
+@pytest.mark.parametrize(
+    ("ports", "remedy"),
+    [
+        ([], r"connect the bridge \(no serial ports found\)"),
+        (
+            [
+                Listed("/dev/ttyUSB0", "CP2102", "USB"),
+                Listed("/dev/ttyACM0", "Uno", "USB"),
+                Listed("/dev/ttyS0", "n/a", "n/a"),
+            ],
+            r"use one of /dev/ttyACM0 \(Uno\), /dev/ttyUSB0 \(CP2102\)\.$",
+        ),
+    ],
+    ids=["none", "two"],
+)
+@pytest.mark.parametrize(
+    ("text", "what", "kind"),
+    [
+        ("", "no serial port was named", UsageError),
+        ("/dev/there-is-none", "there is no serial port /dev/there-is-none", BusError),
+        ("/dev/null", r"/dev/null is not a serial port \(Inappropriate ioctl for device\)", BusError),
+        ("/", r"/ is not a serial port \(Is a directory\)", BusError),
+    ],
+    ids=["no name", "missing", "no terminal", "a folder"],
+)
+def test_the_ports_are_listed_where_the_name_is_wrong(monkeypatch, ports, remedy, text, what, kind):
+    monkeypatch.setattr(list_ports, "comports", lambda: ports)
+    with pytest.raises(kind, match=f"^{what}: {remedy}"):
+        SerialPort(text)
+
+
+@pytest.mark.parametrize(
+    ("failure", "words"),
+    [
+        (
+            serial.SerialException(errno.EACCES, "could not open port: [Errno 13] Permission denied"),
+            "no permission .*dialout",
+        ),
+        (serial.SerialException(errno.EBUSY, "could not open port: [Errno 16] busy"), "another program uses"),
+        (
+            serial.SerialException(errno.EIO, "could not open port: [Errno 5] Input/output error"),
+            r"cannot open .*\(Input/output",
+        ),
+        (ValueError("Invalid baud rate: 123"), r"is not a serial port \(Invalid baud rate: 123\)"),
+    ],
+    ids=["EACCES", "EBUSY", "EIO", "baud"],
+)
+def test_what_opening_can_say(monkeypatch, failure, words):
+    def refuse(*arguments, **how):
+        raise failure
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(BusError, match=words) as caught:
+        SerialPort("/dev/ttyUSB0")
+    assert caught.value.__cause__ is failure
+
+
+def test_nobody_serves_the_socket():
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        name = f"socket://127.0.0.1:{bound.getsockname()[1]}"
+        with pytest.raises(BusError, match=rf"cannot connect to {name} \(Connection refused\): check the address"):
+            SerialPort(name)
+
+
+def test_nothing_stays_open_where_nobody_answers(monkeypatch):
+    def nobody(link, address):
+        raise BusError("nothing answers", "plug it in")
+
+    monkeypatch.setattr(Link, "greet", nobody)
+    host, there = os.openpty()
+    name = os.ttyname(there)
+    with pytest.raises(BusError, match="nothing answers"):
+        open_bridge(name)
+    assert opened(name) == 1
+    os.close(host)
+    os.close(there)
+
+
+def opened(name):
+    """Count the handles of this process on a terminal."""
+    found = 0
+    for handle in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):
+            found += handle.readlink() == Path(name)
+    return found

@@ -1,0 +1,131 @@
+"""A calibration into an emulated bridge's memory: kept, compared, or the old one is there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.bridge.sink import BridgeSink
+from mpucal.bridge.store import StoredBlob
+from mpucal.errors import BusError, WriteBackError
+from mpucal.result.calibration import Calibration
+
+OLD = b"an old blob"
+
+
+class FakeStore:
+    """A bridge's memory, whose `fails` names the calls that lose the bridge; `spoils` changes what is stored.
+
+    `stores_first` : a write that fails has stored its blob all the same.
+    """
+
+    name = "/dev/ttyUSB0"
+    occupied = False
+
+    def __init__(self, blob=OLD, fails=(), spoils=(), stores_first=False, chip=0x68):
+        self.blob, self.fails, self.spoils = blob, list(fails), list(spoils)
+        self.stores_first, self.chip, self.generation, self.written = stores_first, chip, 7, []
+
+    def _may_fail(self, call):
+        if call in self.fails:
+            self.fails.remove(call)
+            raise BusError("the bridge was reset", "check its cable")
+
+    def greet(self):
+        self._may_fail("greet")
+
+    def who_am_i(self):
+        self._may_fail("who_am_i")
+        return self.chip
+
+    def state(self):
+        return None if self.blob is None else StoredBlob(self.generation, len(self.blob), 0x1234ABCD)
+
+    def read(self):
+        return self.blob
+
+    def write(self, blob):
+        self.written.append(blob)
+        if self.stores_first:
+            self.blob = blob
+        self._may_fail("write")
+        self.blob = self.spoils.pop(0) if self.spoils else blob
+        self.generation += 1
+
+    def erase(self):
+        self.blob, self.occupied = None, False
+
+
+@pytest.fixture
+def calibration():
+    good = Calibration(D=np.eye(3), b_a=np.zeros(3), quality={"verdict": "good"}, created="2024-05-17T09:30:00+00:00")
+    return replace(good, sensor=replace(good.sensor, who_am_i=0x68))
+
+
+def test_it_is_stored_read_back_and_found_valid(calibration):
+    store = FakeStore()
+    applied = BridgeSink(store).write(calibration)
+    assert store.blob == calibration.blob().encode()
+    assert applied.calibration is calibration
+    assert "blob number 8 (212 bytes, CRC-32 1234abcd), read back and validated" in applied.what
+
+
+def test_the_old_one_is_kept_in_a_file_of_its_number(tmp_path):
+    (path,) = BridgeSink(FakeStore()).keep(tmp_path)
+    assert (path.name, path.read_bytes()) == ("bridge-blob-7.bin", OLD)
+    assert BridgeSink(FakeStore(None)).keep(tmp_path) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "store", "words"),
+    [
+        ({"quality": {"verdict": "refused"}}, {}, "nothing was written: the calibration was refused"),
+        ({"D": np.full((3, 3), np.nan)}, {}, "nothing was written: the calibration lacks D or b_a"),
+        ({}, {"chip": 0x70}, "nothing was written: WHO_AM_I of .* is 0x70, but that of the calibrated one is 0x68"),
+        ({}, {"fails": ["who_am_i"]}, "nothing was written: the bridge was reset: check its cable"),
+    ],
+    ids=["refused", "not finite", "another chip", "lost"],
+)
+def test_what_is_refused_touches_nothing(calibration, changes, store, words):
+    held = FakeStore(**store)
+    with pytest.raises(WriteBackError, match=words):
+        BridgeSink(held).write(replace(calibration, **changes))
+    assert (held.blob, held.written) == (OLD, [])
+
+
+@pytest.mark.parametrize(
+    ("store", "words", "left"),
+    [
+        ({"fails": ["write"]}, "the bridge was reset; it still has the old calibration: check", OLD),
+        ({"fails": ["write"], "blob": None}, "the bridge was reset; it still has none", None),
+        (
+            {"fails": ["write", "greet"]},
+            "either the old calibration or the new one, whole: connect it again.*show",
+            OLD,
+        ),
+        ({"spoils": [b"x"]}, "does not read back what was stored; the old calibration is restored", OLD),
+        ({"spoils": [b"x"], "blob": None}, "what was stored; it has none, as before", None),
+        ({"spoils": [b"x", b"y"]}, "does not accept the old calibration: use another board", b"y"),
+    ],
+    ids=["reset", "reset, empty", "gone", "spoiled", "spoiled, empty", "worn out"],
+)
+def test_what_fails_leaves_the_old_one_and_says_so(calibration, store, words, left):
+    held = FakeStore(**store)
+    with pytest.raises(WriteBackError, match=words):
+        BridgeSink(held).write(calibration)
+    assert held.blob == left
+
+
+def test_other_data_are_an_objection_and_overwritten_only_by_a_write(calibration):
+    held = FakeStore(None)
+    held.occupied = True
+    assert "holds other data, perhaps another sketch's" in BridgeSink(held).reason_to_keep(calibration)
+    assert held.occupied
+    BridgeSink(held).write(calibration)
+    assert (held.occupied, held.blob) == (False, calibration.blob().encode())
+
+
+def test_a_reply_that_was_lost_behind_the_commit_is_no_failure(calibration):
+    held = FakeStore(fails=["write"], stores_first=True)
+    assert "read back and validated" in BridgeSink(held).write(calibration).what
+    assert held.blob == calibration.blob().encode()

@@ -1,0 +1,636 @@
+"""A calibration written into simulated vehicles: the new parameters or the old ones, and the exit code says which."""
+
+import copy
+import copyreg
+import os
+import re
+import signal
+from dataclasses import replace
+from functools import cache
+from struct import Struct
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.data import Autopilot
+from mpucal.errors import LinkError, RecordingError, WriteBackError
+from mpucal.mavlink import rest_monitor
+from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.horizon import Horizon
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.parameters.document import autopilot_document
+from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
+from mpucal.mavlink.request import send_command
+from mpucal.mavlink.transport import ReceivedBytes
+from mpucal.result.blob import Blob
+from mpucal.result.calibration import Calibration
+from mpucal.result.journal import Journal
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
+from mpucal.simulated.vehicle.transport import ADDRESS, SimulatedTransport
+from mpucal.sinks.table import SINKS
+from mpucal.sinks.write_back import write_to
+from mpucal.vehicle.sink import AutopilotSink
+from tools.attack import hostile_vehicle as hostile
+
+FIRMWARES = ("ardupilot", "px4")
+LEVELLED = {
+    "ardupilot": ",AHRS_TRIM_X=0.03,AHRS_TRIM_Y=-0.05,AHRS_TRIM_Z=0.01",
+    "px4": ",SENS_BOARD_X_OFF=1.7,SENS_BOARD_Y_OFF=-2.9,SENS_BOARD_Z_OFF=0.6",
+}
+SCALED = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
+REFUSED = {"verdict": "refused", "reasons": []}
+
+
+class Flying(SimulatedTransport):
+    """The simulated vehicle, where `befall` sees each PARAM_SET that is sent, and may swallow it."""
+
+    def __init__(self, vehicle):
+        super().__init__(vehicle)
+        self.vehicle, self.sets, self.befall = vehicle, 0, lambda number, message: True
+        self._parser = Parser(dialect().MAVLink(None))
+
+    def send(self, data, address):
+        for packet in self._parser.datagram(data):
+            if packet.message.get_type() == "PARAM_SET":
+                self.sets += 1
+                if not self.befall(self.sets, packet.message):
+                    return
+        super().send(data, address)
+
+
+# pymavlink's MAVLink, which is copied with a link, holds some
+copyreg.pickle(Struct, lambda packing: (Struct, (packing.format,)))
+
+
+@cache
+def settled(firmware, words):
+    vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:firmware={firmware}{words}"))
+    transport = Flying(vehicle)
+    link = Link(transport, recorded_nowhere)
+    link.lock(link.listen()[0])
+    link.send(encode_prompt(ReceivedPrompt("lay_flat", None)))
+    list(link.messages(link.now_ns() + 4_000_000_000))
+    return vehicle, transport, link
+
+
+def recorded_nowhere(t_ns, packet):
+    pass
+
+
+def vehicle_of(firmware, words=""):
+    """A vehicle that was set down, behind a locked link."""
+    return copy.deepcopy(settled(firmware, words))
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Looks at streams at rest for a fifth of the time, where how long they are looked at decides nothing."""
+    monkeypatch.setattr(rest_monitor, "WINDOW_NS", rest_monitor.WINDOW_NS // 5)
+    monkeypatch.setattr(rest_monitor, "FEWEST", rest_monitor.FEWEST // 5)
+
+
+def calibration_of(vehicle):
+    """Return the calibration of a perfect fit of its streams."""
+    firmware = vehicle.firmware
+    name = "PX4" if firmware.bytewise else "ArduPilot"
+    parameters = {key: float(firmware.store[key]) for key in firmware.store}
+    made = []
+    for imu in range(vehicle.options.imus):
+        truth = vehicle.imus.truth(imu, *firmware.correction(imu), firmware.mounting)
+        message = SCALED[imu] if firmware.bytewise or imu else "HIGHRES_IMU"
+        one = Calibration(
+            np.array(truth["D"]),
+            np.array(truth["b_a"]),
+            fit={"gravity": 9.80665},
+            quality={"verdict": "good", "reasons": []},
+        )
+        autopilot = autopilot_document(Autopilot(name, imu + 1, message, parameters), one)
+        made.append(replace(one, extra=MappingProxyType({"autopilot": autopilot})))
+    first, *others = made
+    extra = {**first.extra, "others": [other.document() for other in others]}
+    return replace(first, extra=MappingProxyType(extra))
+
+
+def stored(vehicle):
+    """Return the parameters that correct its accelerometers, and its level."""
+    pattern = re.compile(r"(OFFS|SCAL|TRIM)_[XYZ]$|[XYZ](OFF|SCALE)$|SENS_BOARD_[XYZ]_OFF$")
+    return {name: vehicle.firmware.store[name] for name in vehicle.firmware.store if pattern.search(name)}
+
+
+def error_mps2(vehicle, imu=0):
+    """Return the largest error of |a| of its stream over all attitudes."""
+    truth = vehicle.imus.truth(imu, *vehicle.firmware.correction(imu))
+    points = np.random.default_rng(1).normal(size=(500, 3))
+    f = 9.80665 * points / np.linalg.norm(points, axis=1, keepdims=True)
+    return np.abs(np.linalg.norm(f @ np.array(truth["D"]).T + truth["b_a"], axis=1) - 9.80665).max()
+
+
+def test_a_vehicle_that_is_slow_for_a_moment_is_waited_for(monkeypatch):
+    _, _, link = vehicle_of("ardupilot")
+    # It sends 4 Hz, as a simulator on a busy computer does: its windows are longer than usual.
+    monkeypatch.setattr(rest_monitor, "INTERVAL_US", 250_000)
+    begun_ns, stream = link.now_ns(), rest_monitor.Stream("HIGHRES_IMU", 1)
+    rest = rest_monitor.RestMonitor(link, [stream]).wait()
+    assert np.linalg.norm(rest.mean[stream]) == pytest.approx(9.8, abs=0.8)
+    assert 2 * rest_monitor.FEWEST / 4.0 < (link.now_ns() - begun_ns) / 1e9 < rest_monitor.PATIENCE_NS / 1e9
+
+
+@pytest.mark.parametrize(
+    ("firmware", "words"),
+    [("ardupilot", ""), ("ardupilot", ",highres=no,imus=1"), ("px4", ",imus=3"), ("px4", ",rotation=1")],
+)
+def test_every_imu_reads_gravity_better_afterwards(firmware, words, request):
+    if words:
+        request.getfixturevalue("brief")
+    vehicle, _, link = vehicle_of(firmware, words)
+    calibration = calibration_of(vehicle)
+    if "highres=no" in words:
+        calibration.extra["autopilot"]["message"] = "RAW_IMU"
+    before = [error_mps2(vehicle, imu) for imu in range(vehicle.options.imus)]
+    applied = AutopilotSink(link, confirm=yes).write(calibration)
+    said = [calibration.extra["autopilot"], *(other["autopilot"] for other in calibration.extra["others"])]
+    for imu, autopilot in enumerate(said):
+        assert error_mps2(vehicle, imu) < 0.5 * before[imu]
+        assert error_mps2(vehicle, imu) == pytest.approx(autopilot["residual_mps2"], rel=0.1, abs=0.01)
+    assert "would arm" in applied.what.rpartition("now it ")[2]
+    # what is returned is of the streams as they are now
+    truth = vehicle.truth_document()
+    np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
+    np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
+
+
+def yes(question, with_yes):
+    return with_yes
+
+
+def attitude_deg(vehicle, link):
+    """Return the mean roll and pitch of a second of ATTITUDE."""
+    send_command(link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, 30, 20_000)
+    heard = [m for m in link.messages(link.now_ns() + 1_000_000_000) if m.get_type() == "ATTITUDE"]
+    return np.degrees(np.mean([(m.roll, m.pitch) for m in heard], axis=0))
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmware):
+    vehicle, _, link = vehicle_of(firmware, ",imus=1")
+    assert send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 2) == 0
+    # what it learnt of the old offsets
+    vehicle.firmware.bias = np.array([0.2, -0.3, 0.1])
+    old_deg = vehicle.firmware.trim_deg
+    questions, tilted = [], []
+
+    def agree(question, with_yes):
+        questions.append(question)
+        if question.startswith("Reboot"):
+            tilted.append(attitude_deg(vehicle, link))
+        return with_yes
+
+    applied = AutopilotSink(link, confirm=agree).write(calibration_of(vehicle))
+    assert np.abs(vehicle.firmware.trim_deg - old_deg).max() > 0.5
+    assert np.abs(tilted[0]).max() > 1
+    assert np.abs(attitude_deg(vehicle, link)).max() < 0.2
+    assert [q.split()[0] for q in questions] == ["system", "Reboot"]
+    said = r"what was level stays level .* horizon is level within 0\.0\d deg.* now it would arm"
+    assert re.search(said, applied.what)
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_it_is_level_as_it_stands_where_the_person_says_so(firmware):
+    vehicle, _, link = vehicle_of(firmware, ",imus=1" + LEVELLED[firmware])
+    applied = AutopilotSink(link, confirm=lambda question, with_yes: True).write(calibration_of(vehicle))
+    assert np.abs(attitude_deg(vehicle, link)).max() < 0.1
+    assert "it is level as it stands now" in applied.what
+    truth = vehicle.truth_document()
+    np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
+    np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
+
+
+@pytest.mark.usefixtures("brief")
+def test_a_vehicle_whose_horizon_cannot_be_checked_after_its_reboot_need_not_reboot_again(monkeypatch):
+    def silent(*_):
+        raise LinkError("it is silent", "look")
+
+    monkeypatch.setattr(Horizon, "error_deg", silent)
+    vehicle, _, link = vehicle_of("ardupilot", ",imus=1")
+    applied = AutopilotSink(link, confirm=lambda question, with_yes: with_yes).write(calibration_of(vehicle))
+    assert "it is silent: look, and look whether its horizon is level before it flies" in applied.what
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_a_level_that_nobody_set_is_not_made_of_old_offsets_and_a_vehicle_reboots_only_on_request(firmware):
+    vehicle, _, link = vehicle_of(firmware, ",imus=1")
+    applied = AutopilotSink(link).write(calibration_of(vehicle))
+    assert not vehicle.firmware.trim_deg.any()
+    assert "its level was never set" in applied.what
+    assert "reboot it before it flies" in applied.what
+    assert "would arm" not in applied.what
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_a_second_write_changes_nothing(firmware):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    sink = AutopilotSink(link)
+    applied = sink.write(calibration_of(vehicle))
+    once, sets = stored(vehicle), transport.sets
+    sink.write(applied.calibration)
+    assert (stored(vehicle), transport.sets) == (once, sets)
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_what_was_kept_is_put_back(firmware, tmp_path):
+    vehicle, _, link = vehicle_of(firmware, LEVELLED[firmware])
+    sink = AutopilotSink(link)
+    old = stored(vehicle)
+    (kept,) = sink.keep(tmp_path)
+    sink.write(calibration_of(vehicle))
+    (later,) = sink.keep(tmp_path)
+    assert stored(vehicle) != old
+    assert later != kept
+    assert "reboot it" in sink.put_back(kept)
+    assert stored(vehicle) == old
+
+
+def test_another_file_is_not_put_back(tmp_path):
+    _, _, link = vehicle_of("ardupilot")
+    (tmp_path / "x.param").write_text("ATC_RAT_RLL_P,0.135\n")
+    with pytest.raises(RecordingError, match="no accelerometer parameters"):
+        AutopilotSink(link).put_back(tmp_path / "x.param")
+
+
+def unchanged(calibration):
+    return calibration
+
+
+def refused(calibration):
+    return replace(calibration, quality=MappingProxyType(REFUSED))
+
+
+def of_a_chip(calibration):
+    return replace(calibration, extra=MappingProxyType({}))
+
+
+def beyond_limits(calibration):
+    new = calibration.extra["autopilot"]["params_new"]
+    new[next(name for name in new if "SCAL" in name)] = 7.5
+    return calibration
+
+
+def of_another_sensor(calibration):
+    old = calibration.extra["autopilot"]["params_old"]
+    old[next(name for name in old if name.endswith("_ID") and old[name] > 1000)] += 8
+    return calibration
+
+
+def of_px4(calibration):
+    return calibration_of(vehicle_of("px4", ",imus=1")[0])
+
+
+@pytest.mark.parametrize(
+    ("firmware", "words", "change", "why"),
+    [
+        *((firmware, ",imus=1", refused, "refused") for firmware in FIRMWARES),
+        *((firmware, ",imus=1", of_a_chip, "of no vehicle") for firmware in FIRMWARES),
+        *((firmware, ",imus=1", beyond_limits, "beyond") for firmware in FIRMWARES),
+        *((firmware, ",imus=1", of_another_sensor, "of sensor") for firmware in FIRMWARES),
+        ("ardupilot", ",imus=1", of_px4, "PX4"),
+        ("ardupilot", ",fault=arm@3", unchanged, "armed"),
+        ("ardupilot", ",imus=1,hand=restless", unchanged, "still"),
+        ("ardupilot", ",fault=no_storage", unchanged, "card"),
+    ],
+    ids=lambda value: getattr(value, "__name__", None),
+)
+@pytest.mark.usefixtures("brief")
+def test_nothing_is_written_that_does_not_belong_there(firmware, words, change, why):
+    vehicle, transport, link = vehicle_of(firmware, words)
+    with pytest.raises(WriteBackError, match=rf"nothing was written.*{why}"):
+        AutopilotSink(link, store="storage" in words).write(change(calibration_of(vehicle)))
+    assert transport.sets == 0
+
+
+@pytest.mark.usefixtures("brief")
+def test_an_imu_whose_fit_was_refused_keeps_its_parameters():
+    vehicle, _, link = vehicle_of("ardupilot")
+    calibration = calibration_of(vehicle)
+    calibration.extra["others"][0]["quality"] = REFUSED
+    old = stored(vehicle)
+    applied = AutopilotSink(link).write(calibration)
+    assert {name: value for name, value in stored(vehicle).items() if "ACC2" in name} == {
+        name: value for name, value in old.items() if "ACC2" in name
+    }
+    assert "IMU 2 keeps" in applied.what
+
+
+@pytest.mark.parametrize("ids", ["INS_ACC_ID=0,INS_ACC2_ID=0", "INS_ACC2_ID=4711"], ids=["none", "another's"])
+@pytest.mark.usefixtures("brief")
+def test_sensors_without_ids_of_their_own_are_given_theirs(ids):
+    vehicle, _, link = vehicle_of("ardupilot", f",{ids}")
+    assert vehicle.firmware.complaints() == ["PreArm: 3D Accel calibration needed"]
+    AutopilotSink(link).write(calibration_of(vehicle))
+    assert vehicle.firmware.complaints() == []
+
+
+@pytest.mark.usefixtures("brief")
+def test_px4_uses_what_it_stores_though_the_change_is_small():
+    # 0.004 m/s^2 from what is in use: PX4 would store it and go on as before
+    vehicle, _, link = vehicle_of("px4", ",imus=1")
+    calibration = calibration_of(vehicle)
+    sink = AutopilotSink(link)
+    applied = sink.write(calibration)
+    new = applied.calibration.extra["autopilot"]["params_new"]
+    new["CAL_ACC0_XOFF"] += 0.004
+    sink.write(applied.calibration)
+    offset, _ = vehicle.firmware.correction(0)
+    assert offset[0] == pytest.approx(new["CAL_ACC0_XOFF"], abs=1e-6)
+    vehicle.firmware.start()
+    np.testing.assert_allclose(vehicle.firmware.correction(0)[0], offset)
+
+
+def test_px4_is_not_asked_to_hold_what_it_ignores_after_a_start():
+    words = ",imus=1,CAL_ACC0_XSCALE=1.004"
+    vehicle, _, _ = vehicle_of("px4", words)
+    # the stored 1.004 is not in use: the stream is uncorrected, and its calibration must not count it
+    calibration = calibration_of(vehicle)
+    np.testing.assert_allclose(
+        [calibration.extra["autopilot"]["params_new"][f"CAL_ACC0_{axis}SCALE"] for axis in "XYZ"],
+        np.diag(np.linalg.inv(vehicle.imus.truths[0].D)),
+        atol=1e-9,
+    )
+
+
+def strike(transport, number, fault):
+    """Call `fault` with the nth PARAM_SET, before the vehicle has it."""
+
+    def befall(count, message):
+        if count == number:
+            fault(message)
+        return True
+
+    transport.befall = befall
+
+
+def lose(transport, number):
+    """Lose the nth PARAM_SET and five more."""
+    transport.befall = lambda count, message: not number <= count < number + 6
+
+
+def arm(transport, number):
+    """Arm the vehicle at the nth PARAM_SET."""
+    strike(transport, number, lambda message: setattr(transport.vehicle.firmware, "armed", True))
+
+
+def refuse(transport, number):
+    """Refuse the next new parameter from the nth PARAM_SET on."""
+    seen, names = set(), []
+
+    def befall(count, message):
+        if count >= number and not names and message.param_id not in seen:
+            names.append(message.param_id)
+        seen.add(message.param_id)
+        return message.param_id not in names
+
+    transport.befall = befall
+
+
+def spoil(transport, number):
+    """Write another value from elsewhere just before the nth PARAM_SET."""
+
+    def change_other(message):
+        store = transport.vehicle.firmware.store
+        other = next(name for name in stored(transport.vehicle) if name[:8] == message.param_id[:8])
+        store[other] = float(store[other]) + 0.3
+
+    strike(transport, number, change_other)
+
+
+def reboot(transport, number):
+    """Reboot the vehicle at the nth PARAM_SET."""
+    strike(transport, number, lambda message: transport.vehicle.reboot())
+
+
+@pytest.mark.usefixtures("brief")
+@settings(max_examples=10)
+@given(
+    firmware=st.sampled_from(FIRMWARES),
+    fault=st.sampled_from([lose, arm, refuse, spoil, reboot]),
+    number=st.integers(1, 18),
+)
+def test_whatever_happens_at_whichever_step_it_holds_the_old_or_the_new(firmware, fault, number):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1" + LEVELLED[firmware])
+    calibration = calibration_of(vehicle)
+    old = stored(vehicle)
+    new = {name: np.float32(value) for name, value in calibration.extra["autopilot"]["params_new"].items()}
+    fault(transport, number)
+    try:
+        AutopilotSink(link).write(calibration)
+    except WriteBackError as error:
+        assert error.exit_code == 6
+        assert "old parameters are back" in error.what
+        assert stored(vehicle) == old
+    else:
+        held = stored(vehicle)
+        assert {name: held[name] for name in new} == new
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_a_vehicle_that_is_gone_cannot_be_put_back_and_that_is_said(firmware):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    calibration = calibration_of(vehicle)
+    strike(transport, 4, lambda message: vehicle.fall_silent())
+    with pytest.raises(WriteBackError, match="could not be put back"):
+        AutopilotSink(link).write(calibration)
+
+
+@pytest.mark.parametrize(("firmware", "words"), [("ardupilot", ",imus=1,fault=loss"), ("px4", "")])
+@pytest.mark.usefixtures("brief")
+def test_the_whole_d_is_kept_in_the_vehicles_storage(firmware, words):
+    vehicle, _, link = vehicle_of(firmware, words)
+    applied = AutopilotSink(link, store=True).write(calibration_of(vehicle))
+    paths = re.findall(r"(\S+) in its storage", applied.what)
+    truth = vehicle.truth_document()
+    for path, expected in zip(paths, (truth, *truth["others"]), strict=True):
+        blob = Blob.decode(vehicle.card.files[path])
+        np.testing.assert_allclose(np.array(blob.D).reshape(3, 3), expected["D"], atol=1e-5)
+
+
+@pytest.mark.usefixtures("brief")
+def test_a_failed_write_leaves_no_file_behind():
+    vehicle, _, link = vehicle_of("ardupilot", ",refuse=INS_ACCSCAL_Y")
+    with pytest.raises(WriteBackError, match="old parameters are back"):
+        AutopilotSink(link, store=True).write(calibration_of(vehicle))
+    assert vehicle.card.files == {}
+
+
+@pytest.mark.parametrize("words", ["", ",CAL_ACC0_XOFF=0.3,CAL_ACC1_ZSCALE=1.05"], ids=["new", "calibrated before"])
+@pytest.mark.usefixtures("brief")
+def test_px4s_slots_in_another_order_are_found_by_their_effect(words):
+    ids = ",CAL_ACC0_ID=1310996,CAL_ACC1_ID=1310988"
+    vehicle, _, link = vehicle_of("px4", ids + words)
+    calibration = calibration_of(vehicle)
+    applied = AutopilotSink(link).write(calibration)
+    for imu in range(2):
+        offset, scale = vehicle.firmware.correction(imu)
+        np.testing.assert_allclose(offset, vehicle.imus.truths[imu].b_a, atol=1e-6)
+        np.testing.assert_allclose(scale, np.diag(np.linalg.inv(vehicle.imus.truths[imu].D)), atol=1e-6)
+    truth = vehicle.truth_document()
+    np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
+    assert "CAL_ACC1_XOFF" in applied.calibration.extra["autopilot"]["params_new"]
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_an_imu_that_would_not_become_better_keeps_its_parameters(firmware):
+    vehicle, _, link = vehicle_of(firmware)
+    sink = AutopilotSink(link)
+    once = sink.write(calibration_of(vehicle)).calibration
+    vehicle.firmware.store[next(name for name in stored(vehicle) if "ACC" in name and "2" not in name)] = 0.3
+    if firmware == "px4":
+        vehicle.firmware.start()
+    again = calibration_of(vehicle)
+    assert sink.reason_to_keep(again) is None
+    old = stored(vehicle)
+    applied = sink.write(again)
+    second = "ACC2" if firmware == "ardupilot" else "ACC1"
+    changed = {name for name, value in stored(vehicle).items() if value != old[name]}
+    assert changed
+    assert not any(second in name for name in changed)
+    assert "IMU 2 keeps its old ones, which are predicted to be as good" in applied.what
+    # and a whole vehicle that is calibrated already is left to a person
+    assert "as good as the new ones" in sink.reason_to_keep(once)
+
+
+def test_px4_is_not_said_to_hold_what_lies_in_its_dead_band():
+    vehicle, _, link = vehicle_of("px4")
+    vehicle.imus.truths = (vehicle.imus.truths[0], replace(vehicle.imus.truths[1], D=np.eye(3), b_a=np.full(3, 0.004)))
+    calibration = calibration_of(vehicle)
+    applied = AutopilotSink(link).write(calibration)
+    assert "has the new parameters of IMU 1, read back" in applied.what
+    assert "IMU 2 keeps" in applied.what
+
+
+class Killed(BaseException):
+    """End of the program as by kill -9."""
+
+
+def kill(message):
+    raise Killed
+
+
+@pytest.mark.parametrize(("firmware", "name"), [("ardupilot", "SIGTERM"), ("px4", "SIGHUP"), ("ardupilot", "SIGINT")])
+@pytest.mark.usefixtures("brief", "uncollected")
+def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    old, numbers = stored(vehicle), []
+
+    def befall(count, message):
+        numbers.append(count)
+        # the second one comes while the old parameters are put back
+        if (count in (4, 6) and name != "SIGINT") or count == 4:
+            os.kill(os.getpid(), getattr(signal, name))
+        return True
+
+    transport.befall = befall
+    journal = Journal(tmp_path / "note.json")
+    sink = AutopilotSink(link, journal=journal)
+    before = signal.getsignal(getattr(signal, name))
+    with pytest.raises(WriteBackError, match="interrupted; the old parameters are back") as raised:
+        write_to(SINKS["autopilot"], sink, calibration_of(vehicle), tmp_path, lambda kind, now: now, print)
+    assert raised.value.exit_code == 6
+    assert len(numbers) > 6
+    assert stored(vehicle) == old
+    assert journal.interrupted() is None
+    assert signal.getsignal(getattr(signal, name)) == before
+
+
+@pytest.mark.parametrize("number", [1, 3, 5, 6])
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
+def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_path):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    old, journal = stored(vehicle), Journal(tmp_path / "note.json")
+    calibration = calibration_of(vehicle)
+    strike(transport, number, kill)
+    with pytest.raises(Killed):
+        AutopilotSink(link, journal=journal).write(calibration)
+    assert journal.interrupted() is not None
+    transport.befall = lambda count, message: True
+    assert (stored(vehicle) == old) is (number == 1)
+    said = AutopilotSink(link, journal=journal).recover()
+    assert stored(vehicle) == old
+    assert journal.interrupted() is None
+    assert said is None if number == 1 else "the old parameters are restored" in said
+    assert AutopilotSink(link, journal=journal).recover() is None
+
+
+@pytest.mark.usefixtures("brief")
+def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_off(tmp_path):
+    vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
+    journal = Journal(tmp_path / "note.json")
+    strike(transport, 3, kill)
+    with pytest.raises(Killed):
+        AutopilotSink(link, journal=journal).write(calibration_of(vehicle))
+    other, sets, link = vehicle_of("ardupilot", ",imus=1,seed=9,INS_ACCOFFS_X=0.7")
+    assert "not changed" in AutopilotSink(link, journal=journal).recover()
+    assert sets.sets == 0
+    assert other.firmware.store["INS_ACCOFFS_X"] == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("kind", "attacker"),
+    [
+        ("mixed", "a stranger"),
+        ("mixed", "against signing"),
+        ("parameters", "the address forged"),
+        ("values", "the address forged"),
+        ("ftp", "the address forged"),
+    ],
+)
+@pytest.mark.usefixtures("brief")
+def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
+    key = hostile.KEY if attacker == hostile.SIGNED else None
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1"), key=key)
+    attack = hostile.Attack(kind, attacker, "ardupilot", 0, 40.0)
+    attack.draw("write")
+    monkeypatch.setattr(hostile.HostileTransport, "attack", attack, raising=False)
+    link = Link(hostile.HostileTransport(vehicle), lambda t_ns, data: None, key)
+    link.lock(link.listen()[0])
+    link.send(encode_prompt(ReceivedPrompt("lay_flat", None)))
+    list(link.messages(link.now_ns() + 4_000_000_000))
+    calibration = calibration_of(vehicle)
+    new, old = calibration.extra["autopilot"]["params_new"], stored(vehicle)
+    try:
+        AutopilotSink(link, store=True).write(calibration)
+    except WriteBackError:
+        assert attacker == hostile.FORGED
+        assert stored(vehicle) == old
+    else:
+        assert {name: stored(vehicle)[name] for name in new} == pytest.approx(new)
+    assert attack.sent > 100
+    for name, value, before in attack.sets:
+        assert value in (before, pytest.approx(new[name]))
+
+
+@pytest.mark.usefixtures("brief")
+def test_who_answers_in_the_vehicles_place_is_told_by_its_answers():
+    vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
+    impostor = dialect().MAVLink(None, 1, 1)
+    send = transport.send
+
+    def also_answered(data, address):
+        answer = impostor.param_value_encode(b"INS_ACCOFFS_Y", 0.3, 9, 9, 1)
+        transport._queue.append(ReceivedBytes(bytes(answer.pack(impostor)), ADDRESS, link.now_ns()))
+        impostor.seq = (impostor.seq + 1) % 256
+        send(data, address)
+
+    transport.send = also_answered
+    with pytest.raises(WriteBackError, match=r"nothing was written.*INS_ACCOFFS_Y = 0.001 and 0.3"):
+        AutopilotSink(link).write(calibration_of(vehicle))
+    assert transport.sets == 0
