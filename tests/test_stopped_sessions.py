@@ -49,7 +49,8 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
     assert said.index("Reading paused for 70 s") < said.index("TURN IT") < said.index("Reading paused for 90 s")
 
 
-@pytest.mark.parametrize(("kind", "stopped_s"), [pytest.param("CHIP", 5.0, marks=pytest.mark.slow), ("BRIDGE", 300.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "stopped_s"), [("CHIP", 5.0), ("BRIDGE", 300.0)])
 def test_a_chip_is_turned_on_after_a_stop(tmp_path, capsys, kind, stopped_s):
     world = worlds.World(getattr(worlds, kind))
     world.moments.add(30.0, lambda: world.bus._clock.spend(round(stopped_s * 1e9)))

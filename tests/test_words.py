@@ -4,6 +4,7 @@ import ast
 import re
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 
 from mpucal.__main__ import run
@@ -78,6 +79,7 @@ def test_the_screen():
     assert retired(drawn) == []
 
 
+@pytest.mark.slow
 def test_a_session_its_summary_and_its_report(tmp_path, capsys):
     assert run(["session", "--replay", str(CAPTURE), "-o", str(tmp_path)]) == 0
     said = capsys.readouterr()

@@ -72,19 +72,6 @@ def test_behaviour_decides(who_am_i, seen, chip, family):
     assert part.accel_sensitivity == (0.5 if chip.endswith("C") else 1.0)
 
 
-@pytest.mark.parametrize(
-    ("who_am_i", "sizes", "fifo_bytes"),
-    [
-        (0x78, (4096,), 4096),
-        (0x12, (1008, 1008), 1008),
-        (0x70, (512, 512), 512),
-        (0x70, (512, 4096), 4096),
-    ],
-)
-def test_the_size_of_a_fifo_is_the_one_it_showed(who_am_i, sizes, fifo_bytes):
-    assert evidence(*sizes).part(who_am_i).fifo_bytes == fifo_bytes
-
-
 def test_a_size_that_still_changes_does_not_count():
     seen = evidence(512)
     for count in (600, 3000, 1200):

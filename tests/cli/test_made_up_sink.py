@@ -88,13 +88,6 @@ def test_a_write_that_cannot_be_recorded_is_undone(call, board):
     assert (board / "logbook.txt").read_text() == before
 
 
-@pytest.mark.parametrize("command", ["session", "write"])
-def test_the_help_names_it(call, tmp_path, command):
-    said = " ".join(call(tmp_path, command, "--help").out.split())
-    assert {"session": "the logbook of --bus", "write": "--ink logbook: write it in ink."}[command] in said
-    assert "autopilot|logbook" in said
-
-
 @pytest.mark.parametrize(
     ("words", "says"),
     [

@@ -1,9 +1,7 @@
 """A source that is one module and one row is known to every command that takes a source."""
 
-import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from mpucal.files.mcap import read_capture
@@ -44,34 +42,6 @@ def test_a_session_that_broke_off_goes_on_with_it(call, measured, write_capture,
     done = call(tmp_path, "session", "--resume", "board", "--yes")
     assert done.code == 0, done.err
     assert read_capture(tmp_path / "board" / "capture-2.mcap").meta["source"] == whole.meta["source"]
-
-
-def test_the_new_source_is_recorded(call, tmp_path):
-    done = call(tmp_path, "record", *TURNTABLE, "--seconds", "3", "-o", "walk.mcap")
-    assert done.code == 0, done.err
-    assert call(tmp_path, "show", "walk.mcap").out.startswith("walk.mcap: a recording.")
-
-
-def test_the_new_source_is_streamed(call, measured, tmp_path):
-    calibration = measured / "board" / "calibration.json"
-    done = call(tmp_path, "stream", *TURNTABLE, "--apply", calibration, "--seconds", "2", "--json")
-    assert done.code == 0, done.err
-    at_rest = np.array([json.loads(line)["a"] for line in done.out.splitlines()])
-    assert np.linalg.norm(at_rest.mean(axis=0)) == pytest.approx(9.80665, abs=0.03)
-
-
-def test_its_chip_is_shown_and_written_to(call, measured, tmp_path):
-    shown = json.loads(call(tmp_path, "show", *TURNTABLE, "--json").out)
-    assert (shown["where"], shown["chip"]) == ("the chip on round", "MPU-6050")
-    written = call(tmp_path, "write", measured / "board" / "calibration.json", "chip", *TURNTABLE, "-o", ".", "--json")
-    assert written.code == 0, written.err
-    assert json.loads(written.out)["written"][0]["where"] == "the chip on round"
-
-
-def test_the_doctor_examines_it(call, tmp_path):
-    page = json.loads(call(tmp_path, "doctor", *TURNTABLE, "--seconds", "2", "--json").out)
-    assert page["source"] == "round"
-    assert {"chip", "self test"} <= {finding["topic"] for finding in page["findings"]}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
