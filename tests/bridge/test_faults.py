@@ -14,7 +14,7 @@ from mpucal.bridge.sink import BridgeSink
 from mpucal.bridge.store import BlobStore
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.errors import BusError, MpucalError, NoAnswer, WriteBackError
+from mpucal.errors import BusError, NoAnswer, WriteBackError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.simulated.chip.clock import FastClock
@@ -268,49 +268,10 @@ def blob(x):
     return Blob(0x68, 4.0, 500.0, D, (x, 0.0, 0.0), 9.81, 25.0, "", (0.0,) * 3, D, (0.0,) * 3).encode()
 
 
-def succeeds(store, new):
-    try:
-        store.write(new)
-    except MpucalError:
-        return False
-    return True
-
-
 def store_on(line):
     link = Link(line)
     link.greet()
     return BlobStore(link)
-
-
-@settings(max_examples=25)
-@given(writes=st.integers(0, 3), bytes_left=st.integers(0, 230))
-def test_power_that_fails_at_any_byte_leaves_the_old_blob_or_the_new_one(rig, writes, bytes_left):
-    made, memory = rig(), Memory()
-    for n in range(writes):
-        made.line.device = made.new_bridge(memory=memory)
-        store_on(made.line).write(blob(float(n)))
-    old, new = (blob(float(writes - 1)) if writes else None), blob(100.0)
-    made.line.device = Mortal(made.new_bridge(memory=Shaky(memory.slots, bytes_left)))
-    store = store_on(made.line)
-    done = succeeds(store, new)
-    made.line.device = made.new_bridge(memory=memory)
-    held = store_on(made.line).read()
-    assert held == new if done else held in (old, new)
-
-
-@settings(max_examples=25)
-@given(to_host=faults, to_device=faults)
-def test_spoiled_bytes_never_leave_a_part_of_a_blob(rig, to_host, to_device):
-    made, memory = rig(), Memory()
-    made.line.device = made.new_bridge(memory=memory)
-    old, new = blob(1.0), blob(2.0)
-    store = store_on(made.line)
-    store.write(old)
-    spoil(made.line, to_host, to_device, shorter=(16, 10))
-    done = succeeds(store, new)
-    made.line.to_host = made.line.to_device = bytes
-    store.greet()
-    assert store.read() == new if done else store.read() in (old, new)
 
 
 class Reset(Mortal):

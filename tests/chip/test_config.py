@@ -9,12 +9,6 @@ from mpucal.chip.families import part_of
 from mpucal.errors import UsageError
 
 
-def test_the_default_is_200_hz_at_4_g_and_500_deg_per_s():
-    settings = Config().settings(part_of(0x68))
-    assert (settings.smplrt_div, settings.dlpf_cfg, settings.fs_sel, settings.afs_sel) == (4, 3, 1, 1)
-    assert Config(rate_hz=1000).settings(part_of(0x70)).nominal_rate_hz == 1000
-
-
 @pytest.mark.parametrize(
     ("chosen", "allowed"),
     [

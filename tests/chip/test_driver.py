@@ -109,26 +109,6 @@ def test_times_across_a_gap_are_those_of_the_chip(started, stream, numbers):
     assert np.abs(off_s).max() < 0.2 / 200
 
 
-def overflow_in_read(rig):
-    rig.before["read", reg.FIFO_R_W] = lambda: (rig.before.clear(), rig.stall(1.0))
-
-
-@pytest.mark.parametrize(
-    "disturb",
-    [
-        pytest.param(overflow_in_read, id="overflow while the FIFO is read"),
-        pytest.param(lambda rig: rig.slip(3), id="misaligned frames"),
-        pytest.param(lambda rig: rig.fail("read", reg.FIFO_COUNT_H, 3 * 30), id="bus gone for a second"),
-    ],
-)
-def test_a_passing_fault_is_one_gap(started, stream, check, disturb):
-    rig, driver = started()
-    stream(driver, 0.5)
-    disturb(rig)
-    stream(driver, 3)
-    check(driver.recording(), gaps=1)
-
-
 def test_a_count_read_while_the_chip_writes_is_read_again(started, stream):
     rig, driver = started()
     odd = iter([5])
@@ -202,16 +182,6 @@ def test_a_chip_that_does_not_start(rig, register, answer, message, wakes):
     assert bool(rig.writes()) == bool(wakes)
 
 
-@pytest.mark.parametrize("model", ["mpu6050", "clone98"])
-def test_a_chip_that_was_reset_is_set_up_again(started, stream, check, model):
-    rig, driver = started(model)
-    stream(driver, 0.5)
-    rig.inner.write(reg.PWR_MGMT_1, b"\x80")
-    stream(driver, 2)
-    check(driver.recording(), gaps=1)
-    assert np.diff(driver.recording().t).max() < 1.0
-
-
 @pytest.mark.parametrize(
     ("register", "answer", "message"),
     [
@@ -233,18 +203,6 @@ def test_a_reset_chip_that_cannot_be_set_up_again(started, stream, register, ans
     rig.before["answer", register] = answer
     with pytest.raises(ChipError, match=message):
         stream(driver, 20)
-
-
-def test_a_sensor_that_repeats_itself_is_set_up_again(started, stream, check):
-    rig, driver = started()
-    stream(driver, 0.5)
-    frozen = bytes.fromhex("1234 5678 2000 f830 0038 ffb2 005a")
-    rig.before["answer", reg.FIFO_R_W] = lambda data: frozen * (len(data) // 14)
-    stream(driver, 0.5)
-    del rig.before["answer", reg.FIFO_R_W]
-    stream(driver, 1)
-    check(driver.recording(), gaps=1)
-    assert (reg.PWR_MGMT_1, b"\x80") in rig.writes()[1:]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import math
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.errors import UsageError
 
 
 @pytest.mark.parametrize(("fs_sel", "lsb_per_dps"), [(0, 131), (1, 65.5), (2, 32.8), (3, 16.4)])
@@ -26,20 +25,3 @@ def test_gyroscope_scale(fs_sel, lsb_per_dps):
 def test_divider_of_a_rate_and_back(rate_hz, dlpf_cfg, divider):
     assert reg.sample_rate_divider(rate_hz, dlpf_cfg) == divider
     assert reg.sample_rate_hz(divider, dlpf_cfg) == pytest.approx(rate_hz)
-
-
-@pytest.mark.parametrize(
-    ("rate_hz", "dlpf_cfg", "nearest"),
-    [
-        pytest.param(210, 3, "200 Hz", id="between two"),
-        pytest.param(2000, 3, "1000 Hz", id="too fast"),
-        pytest.param(8000, 0, "1000 Hz", id="too fast from 8 kHz"),
-        pytest.param(1, 3, "3.90625 Hz", id="too slow"),
-        pytest.param(0, 3, "3.90625 Hz", id="none"),
-        pytest.param(-5, 3, "3.90625 Hz", id="negative"),
-        pytest.param(math.nan, 3, "3.90625 Hz", id="not a number"),
-    ],
-)
-def test_an_impossible_rate_is_refused_with_the_nearest(rate_hz, dlpf_cfg, nearest):
-    with pytest.raises(UsageError, match=nearest):
-        reg.sample_rate_divider(rate_hz, dlpf_cfg)

@@ -264,13 +264,6 @@ def test_recording_of_a_source_that_falls_silent_is_an_error(first):
     assert runner.samples == (first - 1) * POLL
 
 
-def test_recording_of_a_source_that_fails_is_an_error():
-    runner = runner_of(Source({150: NOT_THERE}), plan=Plan(until_end=True))
-    with pytest.raises(NoAnswer):
-        runner.record(None)
-    assert runner.samples == 149 * POLL
-
-
 @pytest.mark.slow
 def test_poses_of_the_turning_shown_again_verify_nothing():
     bus = open_simulated("sim:hand=repeating", seed=0)

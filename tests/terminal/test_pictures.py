@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.session.attitude import straight
 from mpucal.session.boards import BOARDS
-from mpucal.terminal import board, letters, orientation_map
+from mpucal.terminal import board, orientation_map
 from mpucal.terminal.canvas import Canvas
 
 DIRECTIONS = [
@@ -19,11 +19,6 @@ DIRECTIONS = [
     (0.58, -0.57, 0.58),
     (-0.7, 0.1, 0.7),
 ]
-
-
-def test_large_letters_differ():
-    drawn = {"".join(letters.large(letter, "#")) for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+- "}
-    assert len(drawn) == 39
 
 
 def held(down):

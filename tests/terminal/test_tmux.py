@@ -108,12 +108,3 @@ def test_no_color_has_no_colour_and_the_q_key_stops_too_and_is_not_left_for_the_
     tmux.type("q")
     after = tmux.wait_for("left with 4", "that was all")
     assert not after.rstrip().endswith("q")
-
-
-def test_a_dumb_terminal_gets_lines(terminal):
-    tmux = terminal(TERM="dumb")
-    tmux.run("env", "TERM=dumb", *SESSION)
-    tmux.wait_for("LAY FLAT", "Lay the board flat")
-    assert not tmux.is_on_the_second_screen()
-    tmux.type("C-c")
-    tmux.wait_for("left with 4")

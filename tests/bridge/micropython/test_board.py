@@ -83,14 +83,6 @@ def test_a_transfer_that_failed_says_how(failure, status, pasted):
     assert [ask(bridge, wire.Read(0x75, 1)).status, ask(bridge, wire.Burst(0x74, 99)).status] == [status, status]
 
 
-def test_its_clock_is_as_wide_as_the_protocols(pasted):
-    seen = [0]
-    bridge = pasted(None, lambda: seen[0])
-    for t_s in range(0, 5000, 500):
-        seen[0] = t_s * 1_000_000_000
-        assert ask(bridge, wire.Read(0x75, 1)).t_us == t_s * 1_000_000 % 2**32
-
-
 def test_a_write_that_power_cuts_leaves_the_old_blob(pasted, tmp_path):
     bridge = pasted(None, lambda: 0)
     for blob in (BLOB, BLOB):
