@@ -1,7 +1,6 @@
 """Files of fixtures/: complete, small, and equal to what the tool makes."""
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -44,9 +43,8 @@ def test_a_key_press_is_among_them():
 @pytest.mark.slow
 def test_the_tool_makes_them(monkeypatch, tmp_path):
     """Make one of the sessions, in which keys are pressed; all are replayed in test_session_replay.py."""
-    monkeypatch.setattr(sys, "argv", ["fixtures", str(tmp_path)])
     monkeypatch.setattr(fixtures, "SESSIONS", {MADE: fixtures.SESSIONS[MADE]})
-    fixtures.main()
+    fixtures.main(tmp_path)
     made = sorted(path.relative_to(tmp_path) for path in tmp_path.glob("*/*"))
     stored = (path.relative_to(FIXTURES) for path in FIXTURES.glob("*/*"))
     assert made == sorted(path for path in stored if path.parent.name != "sessions" or path.stem == MADE)
