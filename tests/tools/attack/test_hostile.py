@@ -43,7 +43,7 @@ def fuzzed(targets, monkeypatch):
 
 
 def test_readers_refuse_mutated_bytes(fuzzed, capsys):
-    for seed in range(1, 9):
+    for seed in range(1, 5):
         assert fuzzed(seed) == 0, capsys.readouterr().out
 
 

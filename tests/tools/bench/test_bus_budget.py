@@ -31,4 +31,4 @@ def test_a_host_that_is_too_late_loses_samples_and_the_tool_sees_it(model, late_
 
 @pytest.mark.parametrize(("rate_hz", "rms_ppm"), [(1000, 20), (200, 60)])
 def test_the_rate_is_known_after_ten_seconds(rate_hz, rms_ppm):
-    assert budget.rate_error_ppm(rate_hz, 10, 4) < rms_ppm
+    assert budget.rate_error_ppm(rate_hz, 10, 2) < rms_ppm
