@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..calibration.rotation import shortest_turn
 from ..data import Vector
 from . import rotation
 from .legs import STEP_HZ, Hold, Leg, Move, steps
@@ -156,7 +157,7 @@ class Hand:
     def turn_to(self, now: Stance, down: Vector, twist_rad: float = 0.0) -> Vector:
         """Return the rotation vector (3,) [rad] that points `down` (3,) down, with a twist about the vertical."""
         up = -down / np.linalg.norm(down)
-        tilt = -rotation.shortest_turn(rotation.up_in_board(now.attitude), up)
+        tilt = -shortest_turn(rotation.up_in_board(now.attitude), up)
         return rotation.log(rotation.product(rotation.exp(tilt), rotation.exp(up * twist_rad)))
 
     def inaccurate(self, down: Vector) -> Vector:

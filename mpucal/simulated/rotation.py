@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..calibration.rotation import cross
 from ..data import Vector
-
-SMALL_RAD = 1e-8
 
 
 def product(p: Vector, q: Vector) -> Vector:
@@ -46,12 +43,6 @@ def cross_rows(a: Vector, b: Vector) -> Vector:
     return np.stack(axes, axis=1)
 
 
-def board_from_world(q: Vector) -> Vector:
-    """Return R(x) of equation (3), (..., 3, 3), from the world's axes to the board's."""
-    V = cross(q[..., 1:])
-    return np.asarray(np.eye(3) + 2.0 * (V @ V - q[..., 0, None, None] * V))
-
-
 def conjugate(q: Vector) -> Vector:
     """Return the inverse of each of (..., 4)."""
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
@@ -79,15 +70,3 @@ def up_in_board(q: Vector) -> Vector:
     """Return the world's up in the board's axes: (..., 3), the last row of R(q)."""
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z), axis=-1)
-
-
-def shortest_turn(a: Vector, b: Vector) -> Vector:
-    """Return the shortest rotation vector (3,) [rad] from unit vector a to unit vector b."""
-    axis = np.cross(a, b)
-    sine = float(np.linalg.norm(axis))
-    if sine < SMALL_RAD:
-        if a @ b > 0:
-            return np.zeros(3)
-        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
-        return np.pi * axis / np.linalg.norm(axis)
-    return axis / sine * np.arctan2(sine, a @ b)

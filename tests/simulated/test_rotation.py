@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mpucal.calibration.rotation import shortest_turn
 from mpucal.simulated import rotation
 
 
@@ -24,6 +25,6 @@ def matrix(q):
 )
 def test_the_shortest_turn(a, b):
     a, b = (np.array(v) / np.linalg.norm(v) for v in (a, b))
-    turn = rotation.shortest_turn(a, b)
+    turn = shortest_turn(a, b)
     np.testing.assert_allclose(matrix(rotation.exp(turn)) @ a, b, atol=1e-9)
     assert np.linalg.norm(turn) == pytest.approx(np.arccos(np.clip(a @ b, -1, 1)), abs=1e-7)

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mpucal.calibration.rotation import cross, shortest_turn
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from mpucal.errors import UsageError
 from mpucal.simulated import rotation
@@ -60,7 +61,7 @@ def three_orientations(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vec
         axis = rng.standard_normal((3, 3))
         axis[0, 2] = 0.0  # a turn about the vertical is none
         turns = np.radians(rng.uniform(40, 110, 3))[:, None] * axis / np.linalg.norm(axis, axis=1, keepdims=True)
-        board = rotation.board_from_world(rotation.running_product(np.array([1.0, 0, 0, 0]), rotation.exp(turns)))
+        board = board_from_world(rotation.running_product(np.array([1.0, 0, 0, 0]), rotation.exp(turns)))
         up = board[..., 2]
         if (up @ up.T - 2.0 * np.eye(4)).max() < np.cos(APART_RAD):
             return moves(t, turns, np.full(3, 1.6), FLAT_S + CHECK_S / 3 * np.arange(3))
@@ -69,7 +70,7 @@ def three_orientations(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vec
 def as_asked(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vector]:
     """Draw the three that a check asks for, each missed by some degrees: two edges of a box, and one across both."""
     up = np.array([[0, 0, 1], [1, 1, 0], [-1, 1, 0], [0, -1, -1]]) / np.sqrt([[1], [2], [2], [2]])
-    turns = np.array([rotation.shortest_turn(after, before) for before, after in pairwise(up)])
+    turns = np.array([shortest_turn(after, before) for before, after in pairwise(up)])
     turns += rng.uniform(-SLOPPY_RAD, SLOPPY_RAD, (3, 3))
     return moves(t, turns, np.full(3, 1.6), FLAT_S + CHECK_S / 3 * np.arange(3))
 
@@ -101,13 +102,19 @@ def continuous(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vector]:
     return omega * np.radians(80.0) / rms, moving
 
 
+def board_from_world(q: Vector) -> Vector:
+    """Return R(x) of equation (3), (..., 3, 3), from the world's axes to the board's, of quaternions (..., 4)."""
+    V = cross(q[..., 1:])
+    return np.asarray(np.eye(3) + 2.0 * (V @ V - q[..., 0, None, None] * V))
+
+
 def attitude(omega: Vector, step_s: float, start_rad: Vector | None = None) -> Vector:
     """Return R(x_t) of equation (3) before each step of step_s with omega (n, 3), and after the last: (n + 1, 3, 3).
 
     start_rad : (3,) the turn that took the world's axes to the board's at first; None: none.
     """
     start = rotation.exp(np.zeros(3) if start_rad is None else start_rad)
-    return rotation.board_from_world(rotation.running_product(start, rotation.exp(step_s * omega)))
+    return board_from_world(rotation.running_product(start, rotation.exp(step_s * omega)))
 
 
 TRUTH_HZ = 2000.0
