@@ -187,7 +187,7 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(distributed, sta
     journal.close()
 
 
-def test_a_worker_that_comes_back_late_is_waited_for():
+def test_a_worker_that_comes_back_late_is_waited_for(distributed):
     """Wait longer than dask does by default, which is 0 s here."""
     import dask
 
