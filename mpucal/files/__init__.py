@@ -13,7 +13,7 @@ from ..errors import RecordingError
 from .budget import limit_memory
 from .formats import find_format, written_format
 from .hints import NO_HINTS, Hints
-from .rows import Rows, Write, cut_span, describe, drop_incomplete, shown_units, to_si
+from .rows import Rows, Write, arrival_clock, cut_span, describe, drop_incomplete, shown_units, to_si, with_times
 
 
 def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
@@ -56,10 +56,12 @@ def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
         found = find_format(path, hints)
         rows = found.read_rows(path, hints=hints)
     if rows.plain:
-        # read twice: its last samples may show the units of its first
+        # read before: its last samples may show the units of its first, and all stamps the clock
         units = shown_units(found.read_rows(path, hints=hints).runs, rows.sensor)
-        taken = " ".join(filter(None, (rows.taken, describe(rows.name, units)))) or None
-        rows = replace(rows, runs=(to_si(samples, units) for samples in rows.runs), taken=taken)
+        clock = arrival_clock(found.read_rows(path, hints=hints).runs, rows.sensor)
+        taken = " ".join(filter(None, (rows.taken, describe(rows.name, units, clock.remark if clock else "")))) or None
+        runs = with_times(rows.runs, clock) if clock else rows.runs
+        rows = replace(rows, runs=(to_si(samples, units) for samples in runs), taken=taken)
     return rows if hints.span is None else replace(rows, runs=cut_span(rows.runs, hints.span, rows.name))
 
 

@@ -106,6 +106,22 @@ def _clock(samples: Samples, sensor: Sensor) -> Clock:
     return fit_clock(samples.t)
 
 
+def arrival_clock(runs: Iterator[Samples], sensor: Sensor) -> Clock | None:
+    """Return the clock behind the stamps of all runs, if those of the first are of arrival; otherwise None."""
+    first = next(runs, None)
+    if first is None or not _clock(first, sensor).jitter_s:
+        return None
+    return fit_clock(np.concatenate([first.t, *(samples.t for samples in runs)]))
+
+
+def with_times(runs: Iterable[Samples], clock: Clock) -> Iterator[Samples]:
+    """Yield the samples of all runs with the times of their clock."""
+    at = 0
+    for samples in runs:
+        part = slice(at, at := at + len(samples))
+        yield replace(samples, t=clock.t[part], gap=samples.gap | clock.gap[part])
+
+
 def shown_units(runs: Iterable[Samples], sensor: Sensor) -> dict[str, str]:
     """Return the units of `acc` and `gyr` in the first of the runs that shows them; empty if SI, or if none does."""
     seen = dict.fromkeys(SI, "")

@@ -336,3 +336,15 @@ def test_the_time_of_day_is_kept(suffix, utc_ns, tmp_path):
     else:
         # an .mcap's times begin with its first sample; a float64 of seconds has 0.2 us
         assert abs(read.utc_ns - utc_ns - (500_000_000 if suffix == ".mcap" else 0)) <= 300
+
+
+def test_stamps_of_arrival_are_replaced_in_runs_as_in_the_whole(walk, tmp_path):
+    """Read a table of the own format with late stamps, as apply does and as calibrate does."""
+    t = np.arange(len(walk)) / 100.0
+    late = np.maximum.accumulate(t + np.random.default_rng(2).exponential(4e-3, len(t)))
+    rows = np.column_stack([late, walk.acc, walk.gyr])
+    np.savetxt(tmp_path / "walk.csv", rows, "%.9f", ",", header="t,ax,ay,az,gx,gy,gz", comments="")
+    read, runs = load(tmp_path / "walk.csv"), open_rows(tmp_path / "walk.csv")
+    assert "arrival stamps" in read.taken
+    assert runs.taken == read.taken
+    np.testing.assert_array_equal(np.concatenate([samples.t for samples in runs.runs]), read.t)

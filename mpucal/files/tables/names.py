@@ -241,6 +241,12 @@ def parse_axis_name(name: str) -> tuple[int, str] | None:
     return ("xyz".index(found[1]), find_unit(found[2] or "")) if found else None
 
 
+def with_sensor(header: Sequence[str], sensor: str) -> list[str]:
+    """Return a header whose columns x, y, z are called after a sensor."""
+    axes = zip(header, map(parse_axis_name, header), strict=True)
+    return [f"{sensor} {'xyz'[axis[0]]} ({axis[1]})".removesuffix(" ()") if axis else name for name, axis in axes]
+
+
 def parse_header(header: list[str]) -> list[Column]:
     """Return the columns of a header whose names are known."""
     return [column for place, name in enumerate(header) if (column := parse_column_name(name, place)) is not None]

@@ -27,12 +27,12 @@ from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import first_bytes, reading
 from .app_metadata import is_app_metadata, read_app_metadata
 from .array_table import ArrayTable, columns_of_arrays, stated_rate
-from .names import ACC, GYR, TIME, Column, Table, first_triple, parse_axis_name, parse_header
+from .names import ACC, GYR, TIME, Table, first_triple, parse_header, with_sensor
 from .streams import join_streams
 from .table import SNIFFED, columns_by_hint, sensor_stream, stated_rate_hz
 from .text import TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
-from .units import QUANTITIES, acceleration_unit, are_counts, to_signed
+from .units import acceleration_unit, are_counts, to_signed
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
@@ -225,7 +225,7 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
             "name its columns in its first line (time, x, y, z), or give their order with --columns t,ax,ay,az",
         )
     columns = columns_by_hint(table.header, replace(hints, columns=hinted)) if hinted else table.columns
-    of = first_triple(columns, quantity) or _columns_without_sensor(table, quantity)
+    of = first_triple(columns, quantity) or first_triple(parse_header(with_sensor(table.header, quantity)), quantity)
     if not of:
         raise RecordingError(
             f"{name} holds the columns {', '.join(table.header)}, but no {quantity}", "record both sensors"
@@ -264,15 +264,3 @@ def _array_table(data: bytes, name: str) -> Table | None:
     if not columns:
         return None
     return ArrayTable(name, header, dict(zip(header, columns.values(), strict=True)), rate_hz=rate_hz)
-
-
-def _columns_without_sensor(table: Table, quantity: str) -> tuple[Column, ...]:
-    """Return the columns x, y, z of a table whose file name alone names the sensor; empty if there are none."""
-    found = {axis[0]: (place, axis[1]) for place, name in enumerate(table.header) if (axis := parse_axis_name(name))}
-    if set(found) != {0, 1, 2}:
-        return ()
-    return tuple(
-        Column(table.header[place], place, quantity, i, unit)
-        for i, (place, unit) in sorted(found.items())
-        if unit in ("", *QUANTITIES[quantity])
-    )

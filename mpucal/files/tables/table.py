@@ -36,6 +36,7 @@ from .names import (
     parse_axis_name,
     parse_column_name,
     plausible_celsius,
+    with_sensor,
 )
 from .streams import index_with_gravity, join_streams, mean_acceleration_unit
 from .text import HEAD, PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
@@ -102,8 +103,7 @@ def _with_sensor(table: TextTable) -> list[str]:
         return of_file if not table.header and len(table.rows[0]) == len("xyz") else table.header
     units = {axis[1] for axis in axes if axis}
     of = next((of for of in (ACC, GYR) if units & set(QUANTITIES[of])), of_file[0].removesuffix("x") if of_file else "")
-    named = zip(table.header, axes, strict=True)
-    return [f"{of} {name}" if of and axis else name for name, axis in named]
+    return with_sensor(table.header, of) if of else table.header
 
 
 def _may_be_si(table: TextTable) -> bool:
@@ -191,13 +191,13 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
     places, sensors = list(of), [list(of).index(c.place) for c in known if c.place in of]
     numbers = np.column_stack(list(of.values())) if of else np.zeros((0, 0))
     found = {role: places[i] for role, i in guess_columns(numbers, hints, sensors).items()}
-    if "t" not in found and (known or found):
-        found |= dict(zip("t", (place for place in of if is_even_clock(of[place])), strict=False))
-    if not found:
+    even = [] if "t" in found else [place for place in of if is_even_clock(of[place])]
+    if known and even:
+        clock = Column(table.header[even[0]], even[0], TIME)
+        return [*columns, clock], f"{clock.name.strip()} is taken for the time"
+    if not found or (known and "t" not in found):
         return columns, ""
-    if known:
-        clock = Column(table.header[found["t"]], found["t"], TIME) if "t" in found else None
-        return [*columns, *([clock] if clock else [])], f"{clock.name.strip()} is taken for the time" if clock else ""
+    found |= dict(zip("t", even, strict=False))
     words = ["-"] * (max(found.values()) + 1)
     for role, place in found.items():
         words[place] = role
