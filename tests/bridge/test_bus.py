@@ -9,8 +9,6 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer
-from mpucal.sources.replay import ReplayBus
-from mpucal.sources.tap import Tap
 
 MS = 1_000_000
 
@@ -75,35 +73,6 @@ def test_a_host_that_was_away_catches_up_without_a_gap(started, numbers, stream)
     assert len(recording) > 3300
 
 
-@pytest.fixture
-def recorded(rig):
-    """Records a driver's accesses: (rig, driver, records)."""
-
-    def start(rate_hz, **how):
-        made, records = rig(**how), Records()
-        driver = Driver(Tap(made.bus(), records), Config(rate_hz=rate_hz))
-        driver.start()
-        return made, driver, records
-
-    return start
-
-
-def test_a_capture_of_it_replays(recorded, stream):
-    made, driver, records = recorded(200)
-    stream(driver, 1)
-    made.line.device = made.new_bridge()
-    stream(driver, 3)
-    driver.stop()
-    again = Driver(ReplayBus(records), Config(rate_hz=200))
-    again.start()
-    while again.now_ns() < driver.now_ns() and again.recording().t.size < driver.recording().t.size:
-        again.poll()
-    for name in ("t", "acc", "gyr", "gap"):
-        np.testing.assert_array_equal(getattr(again.recording(), name), getattr(driver.recording(), name))
-    assert driver.recording().gap.sum() == 1
-    assert any(t.error for t in records)
-
-
 def test_no_chip_or_one_at_the_other_address(rig):
     made = rig()
     made.chip = None
@@ -126,11 +95,6 @@ def test_a_chip_that_is_disconnected_during_a_stream(started, stream):
     with pytest.raises(NoAnswer, match="the chip no longer answers the bridge on the emulated line: check the chip's"):
         stream(driver, 5)
     assert len(driver.recording()) > 80
-
-
-class Records(list):
-    def transaction(self, transaction):
-        self.append(transaction)
 
 
 def test_during_a_stream_only_int_enable_is_requested(started, stream):

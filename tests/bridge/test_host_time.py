@@ -104,7 +104,9 @@ def test_a_bridge_that_was_reset_keeps_its_rate(recorded):
 
 
 def test_a_capture_keeps_it(recorded):
-    recording, path = recorded(8, 5000, burst_ms=4)
+    """The bridge is reset meanwhile."""
+    recording, path = recorded(8, 5000, burst_ms=4, reset_s=3)
+    assert recording.gap.sum() == 1
     again = load(path)
     assert np.array_equal(again.t, recording.t)
     assert again.sensor == recording.sensor
@@ -113,4 +115,5 @@ def test_a_capture_keeps_it(recorded):
     replayed.start()
     while len(replayed.recording()) < len(recording):
         replayed.poll()
-    assert np.array_equal(replayed.recording().t, recording.t)
+    for name in ("t", "acc", "gyr", "gap"):
+        assert np.array_equal(getattr(replayed.recording(), name), getattr(recording, name))
