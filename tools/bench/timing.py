@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import subprocess
 import sys
@@ -38,20 +37,14 @@ def used(children_s: Callable[[], float] = lambda: 0.0) -> Iterator[Used]:
         found.children_s = children_s() - of_children_s
 
 
-def ended_children_s() -> float:
-    """Return the processor's time [s] of the processes started from here that have ended."""
-    spent = os.times()
-    return spent.children_user + spent.children_system
-
-
-def median_s(call: Callable[[], Any], runs: int, clock: Callable[[], float] = time.process_time) -> float:
-    """Return the median time of `runs` calls [s], after one that warms up."""
+def median_s(call: Callable[[], Any], runs: int) -> float:
+    """Return the median processor time of `runs` calls [s], after one that warms up."""
     call()
     times = []
     for _ in range(runs):
-        began = clock()
+        began = time.process_time()
         call()
-        times.append(clock() - began)
+        times.append(time.process_time() - began)
     return statistics.median(times)
 
 
