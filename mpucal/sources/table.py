@@ -7,6 +7,7 @@ kind is opened.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -105,122 +106,109 @@ ACCEL_RANGE = Option("accel_range", "±g.", choices=tuple(map(str, ACCEL_RANGES_
 GYRO_RANGE = Option("gyro_range", "±deg/s.", choices=tuple(map(str, GYRO_RANGES_DPS)), default="500")
 CHIP_SETTINGS = (RATE, DLPF, ACCEL_RANGE, GYRO_RANGE)
 
+CHIP = partial(SourceKind, origin=Origin.CHIP, settings=CHIP_SETTINGS)
+DEVICE = partial(
+    SourceKind,
+    option=IIO,
+    origin=Origin.DEVICE,
+    settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
+    doctor="mpucal.iio_device.doctor:examine_iio",
+)
+VEHICLE = partial(
+    SourceKind,
+    option=MAVLINK,
+    origin=Origin.VEHICLE,
+    options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
+    settings=(RATE,),
+    doctor="mpucal.vehicle.doctor:examine_vehicle",
+)
+
 SOURCES = [
-    SourceKind(
+    CHIP(
         what="a chip on an I2C bus of this computer",
         option=BUS,
         forms="/dev/i2c-N or N",
         opener="mpucal.sources.i2c:open_source",
-        origin=Origin.CHIP,
         options=(ADDRESS,),
-        settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.examine:examine_chip",
         host="mpucal.doctor.host:examine_host",
         found="mpucal.sources.i2c:found_chips",
     ),
-    SourceKind(
+    CHIP(
         what="the simulated chip",
         option=BUS,
         word="sim",
         forms="sim[:key=value,...] for the simulated chip",
         opener="mpucal.simulated.chip.source:open_source",
-        origin=Origin.CHIP,
         options=(SEED,),
-        settings=CHIP_SETTINGS,
         title="simulated chip",
         doctor="mpucal.doctor.examine:examine_chip",
     ),
-    SourceKind(
+    CHIP(
         what="a chip on a USB adapter",
         option=BUS,
         word="ftdi",
         forms="ftdi://..., a URL of pyftdi (FT232H); needs the extra usb",
         opener="mpucal.sources.usb_i2c:open_ftdi",
-        origin=Origin.CHIP,
         options=(ADDRESS,),
-        settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.examine:examine_chip_alone",
         host="mpucal.doctor.host:examine_adapters",
         found="mpucal.sources.usb_i2c:adapters",
     ),
-    SourceKind(
+    CHIP(
         what="a chip on a USB adapter",
         option=BUS,
         word="mcp2221",
         forms="mcp2221 or mcp2221:SERIAL; needs the extra usb",
         opener="mpucal.sources.usb_i2c:open_mcp2221",
-        origin=Origin.CHIP,
         options=(ADDRESS,),
-        settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.examine:examine_chip_alone",
         host="mpucal.doctor.host:examine_adapters",
     ),
-    SourceKind(
+    CHIP(
         what="a chip behind a microcontroller with the bridge's firmware",
         option=SERIAL,
         forms="a board with the bridge's firmware: /dev/ttyX or COMn, or a URL such as socket://HOST:PORT",
         opener="mpucal.bridge:open_source",
-        origin=Origin.CHIP,
         options=(ADDRESS, MICROPYTHON),
-        settings=CHIP_SETTINGS,
         store="mpucal.bridge:open_store",
         doctor="mpucal.bridge.doctor:examine_bridge_and_chip",
         found="mpucal.bridge.port_errors:boards",
     ),
-    SourceKind(
+    CHIP(
         what="a chip on an SPI bus of this computer",
         option=SPI,
         forms="/dev/spidevB.C[:HZ]; needs the extra spi",
         opener="mpucal.sources.spi:open_source",
-        origin=Origin.CHIP,
-        settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.examine:examine_chip_alone",
     ),
-    SourceKind(
+    DEVICE(
         what="a sensor with a Linux kernel (IIO) driver",
-        option=IIO,
         forms="iio:deviceN, or accel=iio:deviceN,gyro=iio:deviceM",
         opener="mpucal.iio_device.source:open_source",
-        origin=Origin.DEVICE,
         options=(TRIGGER,),
-        settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
-        doctor="mpucal.iio_device.doctor:examine_iio",
         found="mpucal.iio_device.source:found_devices",
     ),
-    SourceKind(
+    DEVICE(
         what="a simulated sensor with a kernel driver",
-        option=IIO,
         word="sim",
         forms="sim[:key=value,...] for the simulated chip with a simulated driver",
         opener="mpucal.simulated.iio:open_source",
-        origin=Origin.DEVICE,
         options=(TRIGGER, SEED),
-        settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
         title="simulated sensor of the kernel",
-        doctor="mpucal.iio_device.doctor:examine_iio",
     ),
-    SourceKind(
+    VEHICLE(
         what="a vehicle over MAVLink",
-        option=MAVLINK,
         forms="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD]",
         opener="mpucal.vehicle.source:open_source",
-        origin=Origin.VEHICLE,
-        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
-        settings=(RATE,),
-        doctor="mpucal.vehicle.doctor:examine_vehicle",
         found="mpucal.bridge.port_errors:autopilots",
     ),
-    SourceKind(
+    VEHICLE(
         what="the simulated vehicle",
-        option=MAVLINK,
         word="sim",
         forms="sim[:key=value,...] for the simulated vehicle",
         opener="mpucal.simulated.vehicle.source:open_source",
-        origin=Origin.VEHICLE,
-        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
-        settings=(RATE,),
         title="simulated vehicle",
-        doctor="mpucal.vehicle.doctor:examine_vehicle",
     ),
     SourceKind(
         what="the replay of a capture",
