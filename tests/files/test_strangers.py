@@ -687,3 +687,12 @@ def test_the_command_for_unknown_columns_works_at_once(order, said, tmp_path):
     assert refused.value.options == f"--columns {said} --units acc=m/s^2"
     read = mpucal.load(tmp_path / "drive.txt", columns=said, units="acc=m/s^2")
     assert "times in s, accelerations in m/s^2 and rates" in read.taken
+
+
+def test_the_range_of_counts_is_not_misled_by_large_biases(even_walk, tmp_path):
+    """Read a sensor whose |a| varies with its orientation, by biases of half of 1 g."""
+    biased = replace(even_walk, acc=even_walk.acc + 0.45 * G * np.array([1.0, -0.6, 0.8]))
+    size = np.linalg.norm(biased.acc, axis=1)
+    assert np.ptp(np.percentile(size, [25, 75])) > 0.25 * np.median(size)
+    (tmp_path / "walk.csv").write_text("ax,ay,az,gx,gy,gz\n" + text(counts(biased, 16), ","))
+    assert "accelerations in counts of ±16 g (by |a|)" in mpucal.load(tmp_path / "walk.csv", rate=HZ).taken

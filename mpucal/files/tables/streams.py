@@ -212,7 +212,7 @@ def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple
     """Return the same of (n, 3) counts, whose median magnitude is `size`."""
     low, high = np.percentile(np.linalg.norm(values, axis=1), [25, 75]).tolist()
     if high - low > SHAKING * size:
-        size = float(np.percentile(np.linalg.norm(_averaged(values), axis=1), 90))
+        size = float(np.median(np.linalg.norm(_averaged(values), axis=1)))
     per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
     scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
