@@ -111,14 +111,12 @@ class Autopilot:
     ----------
     firmware : ArduPilot or PX4. imu : number of the IMU, from 1. message : MAVLink name of the stream.
     parameters : all known ones, by name.
-    mounting : rows of the rotation matrix from the sensor's axes to those of the stream; empty if it is not known.
     """
 
     firmware: str
     imu: int
     message: str
     parameters: Mapping[str, float]
-    mounting: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

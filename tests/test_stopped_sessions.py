@@ -30,7 +30,7 @@ def pass_by(world, seconds):
 @pytest.mark.slow
 def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
     """Stop the session while flat, and while rotating."""
-    stops_s = {5.0: 70.0, 100.0: 90.0}
+    stops_s = {10.0: 70.0, 100.0: 90.0}
     world = worlds.World(worlds.VEHICLE)
     for at_s, stopped_s in stops_s.items():
         world.moments.add(at_s, lambda stopped_s=stopped_s: pass_by(world, stopped_s))

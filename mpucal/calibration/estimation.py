@@ -17,12 +17,10 @@ from .checks import find_gyroscope_fault, find_reasons, is_unusable
 from .checks.sensor import gyro_contradicts, is_trustworthy
 from .checks.unusable import no_gyroscope
 from .evidence import Evidence
-from .fit import Fit
 from .hypotheses import SURE, Explanation, explain, gyroscope_change, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, choose_model
 from .parameters import ACCELEROMETER
-from .perfect_sensors import weigh_perfect_sensors
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
 from .words import correct_signed_bytes
@@ -132,9 +130,6 @@ def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[
         if not choice.fit.V - np.log(SURE) > without.fit.V:
             break
         choice, found = without._replace(freed=without.freed + choice.freed + change.freed[ACCELEROMETER]), left
-    if recording.autopilot is not None and recording.autopilot.mounting:
-        fit = weigh_perfect_sensors(choice.fit, np.array(recording.autopilot.mounting))
-        choice, found = choice._replace(fit=fit), _explained(fit)
     return choice, found
 
 
@@ -143,8 +138,5 @@ def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> t
         choice = choose_model(recording, flat, gravity)
     else:
         choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
-    return choice, _explained(choice.fit)
-
-
-def _explained(fit: Fit) -> list[Explanation]:
-    return [] if fit.parts is None else explain(fit.parts, fit.D)
+    fit = choice.fit
+    return choice, [] if fit.parts is None else explain(fit.parts, fit.D)

@@ -14,8 +14,6 @@ from ..clocks.vehicle_clock import VehicleClock
 from ..data import Autopilot, Recording, Samples, Sensor, Vector
 from .firmwares import accel_lag_s
 from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream
-from .parameters.mounting import mounting
-from .parameters.slots import find_slot
 
 US_PER_S = 1e6
 MS_US = 1000
@@ -157,10 +155,7 @@ class StreamBuffers:
         exact_us = next((b.rows()[0] for b in chosen if b.stream.name not in SCALED), None)
         made = []
         for buffer in chosen:
-            slot = find_slot(firmware, buffer.stream.imu, parameters)
-            R_b = None if slot is None else mounting(firmware, slot, parameters)
-            rows = () if R_b is None else tuple(map(tuple, R_b.tolist()))
-            autopilot = Autopilot(firmware, buffer.stream.imu, buffer.stream.name, parameters, rows)
+            autopilot = Autopilot(firmware, buffer.stream.imu, buffer.stream.name, parameters)
             made.append(_recording(buffer, exact_us, autopilot, name))
         return made
 

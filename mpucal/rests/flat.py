@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Recording, Sensor, Vector
-from ..origin import Origin
 from .limits import QUIET
 from .stillness import Detector, still_windows
 from .windows import WINDOW_S, cut
@@ -16,8 +15,7 @@ from .windows import WINDOW_S, cut
 FEWEST = 4  # samples of a window, which is longer than WINDOW_S below 8 Hz
 SHORTEST_FLAT_S = 1.0
 SHORTEST_GIVEN_S = 0.25  # the block means that a fit starts from have no variance in a shorter one
-# An autopilot has estimated the gyroscope's bias when it started, and each rest shows what is left of it.
-ENOUGH_FLAT_S, ENOUGH_OF_VEHICLE_S = 5.0, 2.0
+ENOUGH_FLAT_S = 5.0
 
 # With less variance at rest than this [steps^2], the readings stay on one step or two, and no mean makes them finer.
 UNVARIED = 0.3
@@ -64,9 +62,8 @@ class Flat:
 def find_flat(recording: Recording) -> tuple[int, int] | None:
     """Return (first, last + 1) of the flat segment, or None where the board never lies still.
 
-    It is the earliest still run of five seconds (a vehicle's: two), or else of half the length of the longest.
-    Stillness is that of a session on a table, except that the gyroscope's bias may have any size and that a bump ends a
-    run.
+    It is the earliest still run of five seconds, or else of half the length of the longest. Stillness is that of a
+    session on a table, except that the gyroscope's bias may have any size and that a bump ends a run.
     """
     n = samples_of_window(recording)
     windows = cut(with_rates(recording), n)
@@ -81,8 +78,7 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     lengths = [last - first for _, first, last in runs]
     if max(lengths, default=0) < SHORTEST_FLAT_S * recording.rate_hz:
         return None
-    enough_s = ENOUGH_OF_VEHICLE_S if recording.sensor.origin is Origin.VEHICLE else ENOUGH_FLAT_S
-    enough = max(min(max(lengths) / 2, enough_s * recording.rate_hz), SHORTEST_FLAT_S * recording.rate_hz)
+    enough = max(min(max(lengths) / 2, ENOUGH_FLAT_S * recording.rate_hz), SHORTEST_FLAT_S * recording.rate_hz)
     _, first, last = next(run for run, length in zip(runs, lengths, strict=True) if length >= enough)
     # The outermost windows may hold the end of one movement and the beginning of the next.
     trim = n if last - first >= 6 * n else 0

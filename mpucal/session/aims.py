@@ -12,7 +12,6 @@ import numpy as np
 
 from ..data import Sensor, Vector
 from ..origin import Origin
-from ..rests.flat import ENOUGH_OF_VEHICLE_S
 from .events import Direction, Target
 
 _corners = np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)])
@@ -56,10 +55,11 @@ AIMS: Mapping[str, Aim] = MappingProxyType(
 NORMAL = "normal"
 # A vehicle's samples are filtered, rounded, or taken at other times than they say: they need more orientations.
 LEAST_OF_VEHICLE = 14
-# Directions that point down on the six sides of a vehicle: level, left, nose down, back, right, nose up, each a quarter
-# turn from the last, about another axis. One that rests on things needs no more, as no hand moves it, and one new
-# orientation for its verification.
-SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0)], np.float64)
+# An autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows what is left of it.
+FLAT_OF_VEHICLE_S = 5.0
+# Directions that point down on the six sides of a vehicle, as a pilot takes them: level, left, right, nose down, nose
+# up, back. One that rests on things needs no more, as no hand moves it, and one new orientation for its verification.
+SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1)], np.float64)
 VERIFY_PLACED = 1
 
 
@@ -69,7 +69,7 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
     least = LEAST_OF_VEHICLE if target == NORMAL else aim.least
-    return replace(aim, least=least, sides=len(SIDES), flat_s=ENOUGH_OF_VEHICLE_S)
+    return replace(aim, least=least, sides=len(SIDES), flat_s=FLAT_OF_VEHICLE_S)
 
 
 def unseen_rad(tilt_only: bool) -> float:

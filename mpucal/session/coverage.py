@@ -69,7 +69,7 @@ class Coverage:
 
     Attributes
     ----------
-    placed : True while it is put down in each orientation, and nobody touches it there.
+    placed : True if nobody touched it in the pauses so far: it is put down in each orientation.
     """
 
     placed = False

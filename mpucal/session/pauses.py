@@ -19,8 +19,9 @@ from .step import Step
 WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
-# A board that is put down has no tremor to average. The newest windows show that nobody touches it.
-PLACED_S, NEWEST = 1.0, 2
+# A vehicle that is put down is left there for longer: no tremor moves its readings over the steps of its streams. The
+# newest windows show that nobody touches it.
+PLACED_S, NEWEST = 3.0, 2
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0
 # A check and a verification end after this time without a new orientation.
@@ -40,7 +41,7 @@ class Pause:
 
     Attributes
     ----------
-    acc : (3,) mean acceleration [m/s^2]. touched : somebody holds it. hold_s : time for which it is to be held.
+    acc : (3,) mean acceleration [m/s^2]. hold_s : time for which it is to be held, longer where nobody touches it.
     countdown : to the end of the hold; None once that is past.
     """
 
@@ -48,8 +49,7 @@ class Pause:
     seconds: float
     acc: Vector
     run: int
-    touched: bool
-    hold_s: float
+    hold_s: float = HOLD_S
     countdown: Countdown | None = None
 
 
@@ -88,7 +88,7 @@ class PoseStep(Step):
     flat : the flat rest. hold_s, placed_s : see PauseDetector.
     """
 
-    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float = HOLD_S) -> None:
+    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
         self._pauses = PauseDetector(flat, hold_s, placed_s)
         self._begun_s: float | None = None
         self._prompted_s = 0.0
@@ -114,11 +114,11 @@ class PauseDetector:
     Parameters
     ----------
     flat : the flat rest, which gives the gyroscope's bias. hold_s : time for which each orientation is to be held.
-    placed_s : the same where nobody touches the board.
+    placed_s : the same where nobody touches the board; None: `hold_s`.
     """
 
-    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float = HOLD_S) -> None:
-        self._hold_s, self._placed_s = hold_s, placed_s
+    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+        self._hold_s, self._placed_s = hold_s, placed_s or hold_s
         silent = np.zeros(3)
         self._hands = Detector(UNTOUCHED, (silent, silent), bias=np.array(flat.gyr))
         self._touched: deque[bool] = deque(maxlen=NEWEST)
@@ -144,10 +144,9 @@ class PauseDetector:
                 self._last_run = sight.run if isinstance(sight, Still) else -1
             if not isinstance(sight, Still) or sight.run <= self._last_run:
                 continue
-            touched, remaining = any(self._touched), None
-            hold_s = self._hold_s if touched else self._placed_s
+            hold_s, remaining = self._hold_s if any(self._touched) else self._placed_s, None
             if sight.seconds < hold_s + WINDOW_S - 1e-6:
                 remaining = Countdown(window.end_s, max(hold_s - sight.seconds, 0.0), hold_s, paused=False)
             acc = np.asarray(sight.acc)
-            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, touched, hold_s, remaining))
+            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, hold_s, remaining))
         return pauses

@@ -70,9 +70,8 @@ class Rotate(PoseStep):
     """
 
     def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
-        # A vehicle is taken to be put down until a pause shows that somebody holds it.
-        coverage.placed = bool(aim.sides) and not (plan.tilt_only or plan.until_end)
-        super().__init__(flat, placed_s=PLACED_S if coverage.placed else HOLD_S)
+        asks = not (plan.tilt_only or plan.until_end)
+        super().__init__(flat, placed_s=PLACED_S if asks and aim.sides else None)
         self._aim, self._plan, self._coverage = aim, plan, coverage
         self._passes = Windows(PASS_WINDOW_S, spread=False)
         acc = np.array(flat.acc)
@@ -85,8 +84,7 @@ class Rotate(PoseStep):
         self._advised_run = -1
         self._held: tuple[Pause, Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
-        first = SIDES[1] if coverage.placed and coverage.paused.near(-SIDES[0]) else None
-        self.prompt = self._prompt_for(coverage.paused.farthest_down(self._directions) if first is None else first)
+        self.prompt = self._prompt_for(self._coverage.paused.farthest_down(self._directions))
 
     def add(self, samples: Samples) -> list[Output | Turned]:
         """Return the outputs for `samples`; Turned comes last and ends the step."""
@@ -174,14 +172,14 @@ class Rotate(PoseStep):
         outputs: list[Output | Turned] = [*countdown(pause, self._held[1])] if self._requested or not advised else []
         if pause.seconds >= REST_S - 1e-6:
             self._coverage.rested.add(pause.acc)
-        least_s = PAUSE_S if pause.touched else pause.hold_s - WAIT_S
-        if pause.seconds >= least_s - 1e-6 and self._coverage.paused.add(pause.acc):
+        if pause.seconds >= PAUSE_S - 1e-6 and self._coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
             outputs.append(Seen(pause.t_s, len(self._coverage.paused), down_of(pause.acc), paused=True))
         if self._plan.until_end or self._requested or advised:
             return outputs
         if pause.seconds >= pause.hold_s - WAIT_S - 1e-6:
-            self._coverage.placed &= not pause.touched
+            first = len(self._coverage.paused) <= 2  # the flat rest, and this one
+            self._coverage.placed = pause.hold_s > HOLD_S and (self._coverage.placed or first)
             self._requested, self._advised_run, self._known_s = True, pause.run, pause.t_s
             outputs.append(RequestFit(FitKind.ADVISE, WAIT_S))
         return outputs
@@ -234,14 +232,11 @@ class Rotate(PoseStep):
         return max((left + verify) * pace_s - since_s, verify * pace_s)
 
     def _is_certain(self) -> bool:
-        known = self._knowledge
-        if known is None or not self._coverage.placed:
-            return known is not None and known.overall >= 1.0
-        # Sides leave the angles between the axes to the gyroscope, and an autopilot has no parameters for them.
-        return min(known.gain + known.bias) >= 1.0
+        return self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _is_enough(self) -> bool:
         if self._coverage.placed:
+            # Sides are not varied: they leave the angles between the axes to the gyroscope.
             return len(self._coverage.paused) >= self._least and self._is_certain()
         if self._coverage.number < self._least or self._plan.tilt_only:
             return self._coverage.number >= self._least

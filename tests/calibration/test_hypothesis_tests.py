@@ -29,7 +29,7 @@ def test_the_thresholds_are_quantiles_of_chi_squared():
 
 
 def test_a_sensor_beside_its_pivot_is_in_a_hand(ideal):
-    run = ideal(1, rate_hz=100, turn_s=3.0)
+    run = ideal(2, rate_hz=100, turn_s=3.0)
     recording = beside_the_pivot(run, [0.015, -0.01, 0.008])
     chosen, in_place = calibrate(recording, "auto", G), calibrate(recording, "imu", G)
     assert chosen.fit["model"] == "hand"

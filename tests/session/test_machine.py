@@ -226,32 +226,32 @@ def placed(make_board, tremor, target="normal"):
     board.up = np.array([0.0, 0.0, -1.0])
     session.machine = Machine(Plan(target=target))
     session.said = session.machine.handle(Connected(Sensor(message="RAW_IMU")))
-    assert "still for 2 s" in session.of(Prompt)[-1].text
-    session.feed(board.still(2.6))
+    assert "still for 5 s" in session.of(Prompt)[-1].text
+    session.feed(board.still(5.6))
     session.overall = 1.0
     held = []
     while session.state is State.ROTATE and len(held) < 6:
         held.append(session.of(Prompt)[-1].text.split(": ")[1].split(" (")[0])
         session.feed(board.turn_to(-np.array(session.of(Prompt)[-1].down)))
-        session.feed(board.shaken(2.1, tremor) if tremor else board.still(1.6))
+        session.feed(board.shaken(3.6, tremor) if tremor else board.still(3.6))
     return session, held
 
 
 @pytest.mark.parametrize("target", ["quick", "best"])
 def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board, target):
     session, held = placed(make_board, 0.0, target)
-    assert held == ["on its left side", "nose down", "on its back", "on its right side", "nose up"]
+    assert held == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
     assert session.state is State.VERIFY
     assert "Verification 1 of 1" in session.of(Prompt)[-1].text
-    # Each side is left alone for a second before the next is asked for.
+    # Each side is left alone for three seconds before the next is asked for.
     asked_s = [output.t_s for output in session.said if type(output).__name__ == "Held"]
-    assert all(after - before == pytest.approx(1.6 + 1.6, abs=0.3) for before, after in pairwise(asked_s))
+    assert all(after - before == pytest.approx(1.6 + 3.6, abs=0.3) for before, after in pairwise(asked_s))
 
 
 def test_a_vehicle_in_a_hand_is_turned_to_more_orientations(make_board):
     session, held = placed(make_board, 0.15)
     assert len(held) == 6 and session.state is State.ROTATE
-    assert held[1] != "nose down"
+    assert held[1] != "on its left side"
     assert session.of(Progress)[-1].of == 14
 
 
