@@ -8,6 +8,7 @@ from ...iio.devices import Devices
 from ...iio_device.source import OpenedIio
 from ...sources.kind import Request
 from ..chip import open_simulated
+from ..chip.source import polled_seldom
 from .files import SimulatedFiles
 
 __all__ = ["SimulatedFiles", "open_source"]
@@ -20,7 +21,7 @@ def open_source(request: Request) -> OpenedIio:
     files: Any = SimulatedFiles(bus)
     return OpenedIio(
         files,
-        request.plan,
+        polled_seldom(request.plan, bus.real_time),
         (bus.hear,),
         bus.truth_document,
         words=request.words,
