@@ -57,7 +57,7 @@ NO_ERRORS = Errors()
 ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
 ERROR_PASSES, ERRING_NIS = 2, 30.0
 MOST_CHANGES = 2
-NOTHING = np.zeros(len(range(ACCEL)[ACCELEROMETER]))
+UNCHANGED = np.zeros(len(range(ACCEL)[ACCELEROMETER]))
 PROMISING = WALD_99 / 3.0  # least decrement for a search with K: twice the decrement estimates the statistic
 
 
@@ -71,7 +71,7 @@ class ModelChoice(NamedTuple):
     model: str
     why: str
     recording: Recording
-    freed: Vector = NOTHING
+    freed: Vector = UNCHANGED
 
 
 def fit_accel(recording: Recording, flat: Flat, gravity: float) -> Fit:
@@ -139,7 +139,7 @@ def _chosen(in_place: InPlaceFits, minimum: Minimum, errors: Errors) -> ModelCho
 class InPlaceFits:
     """Fits of a sensor that turns in place, by the exact filter, to one recording."""
 
-    def __init__(self, recording: Recording, flat: Flat, gravity: float, freed: Vector = NOTHING) -> None:
+    def __init__(self, recording: Recording, flat: Flat, gravity: float, freed: Vector = UNCHANGED) -> None:
         self.recording, self._flat, self._gravity, self.freed = recording, flat, gravity, freed
         self._prior = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}

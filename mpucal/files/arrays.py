@@ -108,7 +108,8 @@ def _json_arrays(name: str, value: Any) -> Arrays:
     if isinstance(value, dict):
         if {"sensors", "values"} <= value.keys():
             # Edge Impulse's data acquisition format
-            named = [f"{sensor['name']} ({sensor['units']})" for sensor in value["sensors"]]
+            of = value["sensors"]
+            named = [f"{each['name']} ({each['units']})" if each.get("units") else each["name"] for each in of]
             yield from zip(named, np.asarray(value.pop("values"), float).T, strict=False)
         for key, each in value.items():
             yield from _json_arrays(f"{name}.{key}".removeprefix("."), each)

@@ -558,13 +558,20 @@ def edge_impulse(walk):
     return {"payload": {"interval_ms": 1000 / HZ, "sensors": sensors, "values": si(walk).tolist()}}
 
 
+def edge_impulse_without_units(walk):
+    document = edge_impulse(walk)
+    for sensor in document["payload"]["sensors"]:
+        del sensor["units"]
+    return document
+
+
 def at_a_frequency(walk):
     """Write many more values of another sensor, at another rate."""
     data = [{"gyroscope": row[3:], "acceleration": row[:3]} for _, row in rows_of(walk)]
     return {"at": "26/06/20", "emg": {"data": [[0] * 8] * 4000}, "imu": {"frequency": HZ, "data": data}}
 
 
-@pytest.mark.parametrize("form", [objects, columns_of_json, edge_impulse, at_a_frequency])
+@pytest.mark.parametrize("form", [objects, columns_of_json, edge_impulse, edge_impulse_without_units, at_a_frequency])
 def test_samples_in_json_are_read_at_the_first_try(form, even_walk, tmp_path):
     (tmp_path / "walk.json").write_text(json.dumps(form(even_walk)))
     read = mpucal.load(tmp_path / "walk.json")

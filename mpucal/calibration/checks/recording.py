@@ -19,8 +19,9 @@ INTERRUPTED_S = 10.0
 # where it is at rest more than that of any sensor.
 VIBRATING_MPS2, LOUDER_THAN_FLAT, VIBRATING_SHARE = 0.2, 2.5, 0.2
 SHAKING_MPS2 = 0.5
-# Below this rate, a tremor of up to 12 Hz looks like noise, and only more than any sensor's is vibration.
-SLOW_HZ = 48.0
+# Below this rate, fourth differences do not separate a tremor of up to 12 Hz from noise: only what is larger than the
+# noise of any sensor is vibration.
+SEPARABLE_HZ = 48.0
 
 
 def moved_while_still(e: Evidence) -> Reason | None:
@@ -74,7 +75,7 @@ def vibrating(e: Evidence) -> Reason | None:
     if e.flat is None or e.fit is None:
         return None
     std = np.sqrt(noise_variance(e.recording) @ np.full(3, 1.0 / 3.0))
-    least = SHAKING_MPS2 if e.recording.rate_hz < SLOW_HZ else VIBRATING_MPS2
+    least = SHAKING_MPS2 if e.recording.rate_hz < SEPARABLE_HZ else VIBRATING_MPS2
     share = float(np.mean(std > np.maximum(least, LOUDER_THAN_FLAT * np.sqrt(e.flat.Sigma_a.mean()))))
     at_rest = float(np.median(std[e.flat.first : e.flat.last]))
     if share < VIBRATING_SHARE and at_rest < SHAKING_MPS2:
