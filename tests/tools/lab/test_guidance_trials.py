@@ -1,4 +1,3 @@
-import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -66,12 +65,3 @@ def test_contradictions_in_a_transcript_are_counted():
         "said twice": 1,
         "shown for less than a second": 1,
     }
-
-
-@pytest.mark.parametrize(
-    ("t_s", "turned_rad", "taken_back"), [(1.5, 0.1, True), (2.1, 0.1, False), (1.5, 0.3, False)], ids=str
-)
-def test_a_headline_may_follow_the_hand_but_not_turn_back_by_itself(t_s, turned_rad, taken_back):
-    meter = Meter(1.0, 0.5, False, "", (0.0, 0.0, -1.0), 5.0, 200.0, None, (1.0, 0.0, 0.0, 0.0), 9.0, "10 deg more")
-    turned = replace(meter, attitude=(math.cos(turned_rad / 2), math.sin(turned_rad / 2), 0.0, 0.0))
-    assert trials.is_taken_back(View(meter=meter, now_s=1.0), View(meter=turned, now_s=t_s)) == taken_back

@@ -1,8 +1,5 @@
-import io
-
 import numpy as np
 import pytest
-from rich.console import Console
 
 from tools.lab import monte_carlo
 from tools.lab.judge import Judgement
@@ -24,11 +21,6 @@ def test_a_failure_is_named_and_not_among_the_successful():
     assert column("models, failures", *runs) == "hand 2, not converged 1"
 
 
-def test_runs_that_all_failed_have_no_mean():
-    failed = Judgement("refused").row(scene="12 poses", failure="refused")
-    assert [column(name, failed) for name in ("error, m/s²", "rms z, median", "largest |z|")] == [None] * 3
-
-
 @pytest.mark.parametrize(
     ("error", "failure", "met"),
     [(0.0039, None, True), (0.0041, None, False), (0.0039, "not converged", False)],
@@ -36,14 +28,6 @@ def test_runs_that_all_failed_have_no_mean():
 )
 def test_what_is_wanted_is_met_by_the_mean_of_runs_that_all_succeed(error, failure, met):
     assert monte_carlo.met([run(error), run(error, failure)]) is met
-
-
-def test_the_papers_tilts_stand_beside_its_own():
-    stream = io.StringIO()
-    of = run(0.06, scene="paper", roll_deg=(15.0, 0.2, 0.33), pitch_deg=(9.0, 0.2, 0.27))
-    Console(file=stream, width=200).print(monte_carlo.tilt_table([of]))
-    for words in ("0.33 (0)", "8.3 (7.1)", "0.265", "0.33 (0.43)"):
-        assert words in stream.getvalue()
 
 
 def test_a_simulated_sensor_is_found_as_well_as_is_claimed():

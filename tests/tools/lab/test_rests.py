@@ -1,4 +1,4 @@
-"""Live and offline find the same rests, in a dozen of the recordings of which the program takes hundreds."""
+"""Live and offline find the same rests, in some of the recordings of which the program takes hundreds."""
 
 import numpy as np
 import pytest
@@ -7,13 +7,10 @@ from mpucal.data import Recording
 from tools.lab import rests
 from tools.lab.table import Row
 
-KINDS = ("poses", "poses trembling", "poses of a session", "six poses", "phone poses", "two decimals")
 
-
-@pytest.mark.parametrize("seed", [100, 101])
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_session_and_the_recording_have_the_same_rests(kind, seed):
-    found = rests.of_seed((kind, seed))
+@pytest.mark.parametrize("kind", ["poses trembling", "six poses", "phone poses", "two decimals"])
+def test_the_session_and_the_recording_have_the_same_rests(kind):
+    found = rests.of_seed((kind, 100))
     assert found.held >= 5
     assert found.agrees, found
 

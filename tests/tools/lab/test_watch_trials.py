@@ -3,6 +3,7 @@ import pytest
 from tools.lab import watch_trials as trials
 
 
+@pytest.mark.slow
 def test_a_right_calibration_is_not_warned_of_and_a_wrong_one_is():
     """A few minutes of use, of which the campaign simulates hours."""
     unchanged = trials.of_use(("nothing", 4), hours=0.03)

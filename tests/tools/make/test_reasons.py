@@ -39,9 +39,17 @@ def test_merging_what_is_merged_already_shows_its_reason(capsys, tmp_path):
     assert "calibrations 1 and 2 were made of the same recording" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("code", [code for code in KINDS if code not in {*SESSION, "same_data"}])
-def test_a_spoilt_recording_shows_its_reason(code):
-    r = mpucal.load(SESSIONS / "mpu6050.mcap")
+@pytest.fixture(scope="module")
+def r():
+    """A good recording."""
+    return mpucal.load(SESSIONS / "mpu6050.mcap")
+
+
+def test_a_good_recording_shows_none(r):
     assert mpucal.calibrate(r).verdict == "good"
+
+
+@pytest.mark.parametrize("code", [code for code in KINDS if code not in {*SESSION, "same_data"}])
+def test_a_spoilt_recording_shows_its_reason(r, code):
     found = eval(KINDS[code].reproduce, {"mpucal": mpucal, "numpy": np, "replace": replace, "r": r})
     assert code in codes(found.quality)

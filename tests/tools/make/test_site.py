@@ -11,20 +11,19 @@ from mpucal.cli import commands
 
 PROJECT = Path(__file__).parents[3]
 DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
-PAGES = ("index", "notebook", "reference/commands", "reference/python")
+
+
+def built(folder, notebook):
+    """Build the site as `make docs` does, where a warning is an error; without the notebook, whose cells take long."""
+    words = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", folder]
+    how = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "RUN_NOTEBOOK": notebook}
+    done = subprocess.run(words, cwd=PROJECT, env=how, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.fixture(scope="session")
 def site(once):
-    """The site as `make docs` builds it; a warning is an error."""
-
-    def make(folder):
-        words = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", folder]
-        quiet = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
-        done = subprocess.run(words, cwd=PROJECT, env=quiet, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-
-    return once("site", make)
+    return once("site", lambda folder: built(folder, "false"))
 
 
 @pytest.fixture(scope="module")
@@ -42,14 +41,26 @@ def from_elsewhere(page):
     return [url for url in page.fetched if not url.startswith(("file:", "data:"))]
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_a_page_fits_and_fetches_nothing_from_elsewhere(site, page, name):
-    page.goto((site / f"{name}.html").as_uri())
+def fits(page, file):
+    page.goto(file.as_uri())
     for size in (DESKTOP, PHONE):
         page.set_viewport_size(size)
         assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
         assert page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth > 0)")
     assert from_elsewhere(page) == []
+
+
+@pytest.mark.parametrize("name", ["index", "reference/commands", "reference/python"])
+def test_a_page_fits_and_fetches_nothing_from_elsewhere(site, page, name):
+    fits(page, site / f"{name}.html")
+
+
+@pytest.mark.slow
+def test_the_notebook_runs_and_its_page_fits(page, tmp_path):
+    built(tmp_path, "true")
+    text = (tmp_path / "notebook.html").read_text(encoding="utf-8")
+    assert text.count("<img") >= 3 and "<table>" in text
+    fits(page, tmp_path / "notebook.html")
 
 
 def test_the_search_finds(site, page):
@@ -64,7 +75,7 @@ def test_the_search_finds(site, page):
 
 def test_no_link_begins_at_the_root_of_a_server(site):
     pages = list(site.rglob("*.html"))
-    assert len(pages) > len(PAGES)
+    assert len(pages) > 20
     assert [page.name for page in pages if 'href="/' in page.read_text(encoding="utf-8")] == []
 
 
