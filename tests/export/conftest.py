@@ -15,7 +15,6 @@ from mpucal.result.calibration import Calibration
 
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
 LIBRARY = Path(__file__).parents[2] / "mpucal" / "firmware" / "src"
-APPLIED = np.array([0.25, -0.2, 1.0])
 
 
 @pytest.fixture
@@ -36,7 +35,7 @@ def calibration():
     )
 
 
-@pytest.fixture(params=[np.zeros(3), APPLIED], ids=["nothing applied", "applied in hardware"])
+@pytest.fixture(params=[np.zeros(3), np.array([0.25, -0.2, 1.0])], ids=["nothing applied", "applied in hardware"])
 def calibrated(request, calibration):
     return replace(calibration, applied_in_hardware=request.param)
 

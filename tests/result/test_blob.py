@@ -29,8 +29,6 @@ from tools.make.vectors import sealed
 VECTORS = vectors.FOLDER
 PROTOCOL = (Path(__file__).parents[2] / "firmware_protocol.md").read_text().split("\n## The config blob\n")[1]
 
-# each draws some sixty numbers
-some = settings(max_examples=40)
 floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
 ranges = st.floats(0.0, 2.0**100, width=32)
 small = st.floats(-0.25, 0.25, width=32)
@@ -76,21 +74,12 @@ def plain(blob):
     return repr(asdict(blob))
 
 
-@some
-@given(sloped(), st.sampled_from(["b_a_slope", "temperature_range_c", "temperature_c"]))
-def test_a_slope_that_cannot_be_used_is_none(blob, name):
-    spoilt = (math.nan,) * 3 if name == "b_a_slope" else (math.inf, 0.0) if name == "temperature_range_c" else math.nan
-    read = Blob.decode(replace(blob, **{name: spoilt}).encode())
-    assert not any(read.b_a_slope)
-    assert (read.D, read.b_a) == (blob.D, blob.b_a)
-
-
 @pytest.fixture
 def blob():
     return Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
 
 
-@settings(max_examples=80)
+@settings(max_examples=60)
 @given(blobs() | sloped(), st.none() | ranges.filter(bool))
 def test_decode_is_the_inverse_of_encode(blob, counts):
     blob = replace(blob, gyro_counts=counts)
@@ -101,63 +90,35 @@ def test_decode_is_the_inverse_of_encode(blob, counts):
     assert plain(Blob.decode(data)) == plain(blob)
 
 
-@some
-@given(blobs(), st.data())
-def test_no_changed_byte_goes_unnoticed(blob, data):
+def test_no_damaged_byte_and_no_shorter_blob_is_accepted(blob):
     good = blob.encode()
-    at, bits = data.draw(st.integers(0, len(good) - 1)), data.draw(st.integers(1, 255))
-    # `reserved` is under the checksum too
-    with pytest.raises(BlobError):
-        Blob.decode(good[:at] + bytes([good[at] ^ bits]) + good[at + 1 :])
-
-
-@given(st.binary(max_size=300))
-def test_junk_is_rejected(junk):
-    with pytest.raises(BlobError):
-        Blob.decode(junk)
-
-
-def test_every_shorter_blob_is_rejected(blob):
-    data = blob.encode()
-    for size in range(len(data)):
-        with pytest.raises(BlobError):
-            Blob.decode(data[:size])
-
-
-@given(st.binary(max_size=MAX_LENGTH - LENGTH_WITH_COUNTS))
-def test_appended_fields_of_a_newer_minor_version_are_skipped(appended):
-    blob = Blob.decode((VECTORS / "blob_counted.bin").read_bytes())
-    body = bytearray(blob.encode()[:-4] + appended)
-    body[5] += 1
-    assert Blob.decode(sealed(body)) == blob
+    for at in range(len(good)):
+        # `reserved` is under the checksum too
+        for damaged in (good[:at], good[:at] + bytes([good[at] ^ 0x10]) + good[at + 1 :]):
+            with pytest.raises(BlobError):
+                Blob.decode(damaged)
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("name", "at", "format", "bad"),
     [
-        pytest.param(lambda body: sealed(b"XXXX" + body[4:]), "begins with", id="magic"),
-        pytest.param(lambda body: sealed(body[:4] + b"\2" + body[5:]), "major version 2", id="newer major"),
-        pytest.param(lambda body: sealed(body[:4] + b"\0" + body[5:]), "major version 0", id="major 0"),
-        pytest.param(lambda body: sealed(body[:-4]), "length field is 184", id="fields missing"),
-        pytest.param(lambda body: sealed(body + bytes(80)), "length field is 268", id="too long"),
-        pytest.param(lambda body: sealed(body, length=190), "is 190, but it has 188 bytes", id="wrong length"),
-        pytest.param(lambda body: body + bytes(4), "checksum", id="no checksum"),
+        ("b_a", 96, "<f", math.nan),
+        ("applied_b_a", 124, "<f", math.inf),
+        ("gyro_range_dps", 56, "<f", -4.0),
+        ("gyro_range_dps", 56, "<f", math.inf),
+        ("gyro_counts", 204, "<f", math.nan),
+        ("created", 112, "<Q", 2**64 - 1),
     ],
 )
-def test_a_wrong_header_is_named(blob, change, says):
-    with pytest.raises(BlobError, match=says):
-        Blob.decode(change(blob.encode()[:-4]))
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize(("name", "at"), [("D", 60), ("b_a", 96), ("applied_b_a", 124)])
-def test_unusable_numbers_are_refused_on_both_sides(blob, name, at, bad):
-    values = (bad, *getattr(blob, name)[1:])
-    with pytest.raises(BlobError, match=f"{name} holds"):
-        replace(blob, **{name: values}).encode()
-    body = bytearray(blob.encode()[:-4])
-    struct.pack_into("<f", body, at, bad)
-    with pytest.raises(BlobError, match=f"{name} holds"):
+def test_unusable_numbers_are_refused_on_both_sides(blob, name, at, format, bad):
+    counted = replace(blob, gyro_counts=32750.0)
+    if name != "created":
+        value = getattr(blob, name)
+        with pytest.raises(BlobError, match=f"{name} (holds|is)"):
+            replace(blob, **{name: (bad, *value[1:]) if isinstance(value, tuple) else bad}).encode()
+    body = bytearray(counted.encode()[:-4])
+    struct.pack_into(format, body, at, bad)
+    with pytest.raises(BlobError, match=f"{name} (holds|is)|out of range"):
         Blob.decode(sealed(body))
 
 
@@ -176,24 +137,6 @@ def test_values_that_do_not_fit_are_refused(blob, change):
         replace(blob, **change).encode()
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -4.0])
-@pytest.mark.parametrize(("name", "at"), [("accel_range_g", 52), ("gyro_range_dps", 56), ("gyro_counts", 204)])
-def test_ranges_that_are_none_are_refused_on_both_sides(blob, name, at, bad):
-    with pytest.raises(BlobError, match=f"{name} is"):
-        replace(blob, **{name: bad}).encode()
-    body = bytearray(replace(blob, gyro_counts=32750.0).encode()[:-4])
-    struct.pack_into("<f", body, at, bad)
-    with pytest.raises(BlobError, match=f"{name} is"):
-        Blob.decode(sealed(body))
-
-
-def test_a_time_out_of_range_is_rejected(blob):
-    body = bytearray(blob.encode()[:-4])
-    struct.pack_into("<Q", body, 112, 2**64 - 1)
-    with pytest.raises(BlobError, match="out of range"):
-        Blob.decode(sealed(body))
-
-
 @pytest.mark.parametrize(
     ("created", "read"),
     [
@@ -208,20 +151,13 @@ def test_created_is_kept_in_whole_seconds_of_utc(blob, created, read):
     assert Blob.decode(replace(blob, created=created).encode()).created == read
 
 
-# The document and the codec
-
-
 def from_json(value):
     if isinstance(value, list):
         return tuple(map(from_json, value))
     return math.nan if value is None else value
 
 
-def vector_names():
-    return sorted(path.stem for path in VECTORS.glob("blob_*.bin"))
-
-
-@pytest.mark.parametrize("name", vector_names())
+@pytest.mark.parametrize("name", sorted(path.stem for path in VECTORS.glob("blob_*.bin")))
 def test_golden_vector(name):
     data = (VECTORS / f"{name}.bin").read_bytes()
     expected = json.loads((VECTORS / f"{name}.json").read_text())
@@ -259,13 +195,6 @@ def test_the_documents_table_is_the_codecs_format():
         expected, at = f"{expected} {code}", int(last or first) + 1
     assert expected.replace("< ", "<") == f"{FIELDS.format} {SLOPE.format[1:]} {COUNTS.format[1:]}"
     assert at + 4 == LENGTH_WITH_COUNTS
-
-
-def test_every_number_of_the_table_is_naturally_aligned():
-    sizes = {"u8": 1, "u16": 2, "u64": 8, "f32": 4}
-    rows = re.findall(r"^\| (\d+)(?:-\d+)? \| (\w+) \| (u8|u16|u64|f32)", PROTOCOL, re.M)
-    assert len(rows) == 18
-    assert [name for first, name, kind in rows if int(first) % sizes[kind]] == []
 
 
 def test_the_documents_example_is_the_blob_of_its_numbers(blob):

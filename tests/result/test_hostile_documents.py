@@ -13,7 +13,6 @@ from mpucal.data import Sensor
 from mpucal.errors import RecordingError, UsageError
 from mpucal.result.calibration import Calibration
 from mpucal.result.correction import make_correction
-from mpucal.strict_json import parse_json
 
 ONE = Calibration(
     np.eye(3) * 1.01,
@@ -40,42 +39,25 @@ def loaded(folder, text):
     ("where", "wrong"),
     [
         ("accelerometer D", [[1, 1, 1], [1, 1, 1], [1, 1, 1]]),
-        ("accelerometer D", "identity"),
-        ("accelerometer D", None),
         ("accelerometer b_a 0", True),
         ("accelerometer b_a 0", 1e300),
         ("accelerometer D_std 0 0", -1e-3),
         ("accelerometer D 0", [None] * 3),
-        ("accelerometer b_a_slope", [1e300] * 3),
-        ("sensor temperature_c", None),
         ("accelerometer temperature_range_c", [50.0, 20.0]),
-        ("gyroscope K", [[0, 0, 0]] * 3),
         ("applied_in_hardware b_a", [None] * 3),
         ("correlation", [0.0] * 209),
         ("correlation 7", 1.5),
-        ("quality reasons", 5),
         ("quality reasons", [{"code": "\x1b[2J", "message": ""}]),
-        ("quality verdict", "excellent"),
-        ("fit gravity", "9.81"),
         ("fit gravity", -9.81),
-        ("fit", []),
-        ("sensor accel_range_g", "four"),
         ("sensor accel_range_g", -4),
         ("sensor accel_offsets", [10**18] * 3),
-        ("sensor chip", "x" * 60_000),
         ("sensor chip", "\ud800"),
         ("created", "yesterday"),
-        ("autopilot", [1]),
         ("autopilot params_old INS_ACCOFFS_X", "1"),
-        ("autopilot residual_old_mps2", "x"),
         ("later", 1e300),
         ("others 0 accelerometer D", [[0, 0, 0]] * 3),
-        ("others", {}),
-        ("written", [5]),
-        ("version", "1"),
         ("later", reduce(lambda inner, _: [inner], range(100), 0)),
         ("later", "x" * 70_000),
-        ("later", "\u202eevil"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(tmp_path, where, wrong):
@@ -92,29 +74,12 @@ def test_what_is_wrong_is_one_sentence(tmp_path, where, wrong):
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "[" * 100_000,
-        '{"a":' * 100_000,
-        '{"a": 1' + "0" * 5000 + "}",
-        '{"a": 1e999}',
-        '{"a": NaN}',
-        '{"a": -Infinity}',
-        '{"a": 1, "a": 2}',
-        b'"\xff"',
-        b"\x00",
-    ],
-    ids=["arrays", "objects", "digits", "1e999", "NaN", "Infinity", "twice", "no UTF-8", "a zero"],
+    ['{"a":' * 100_000, '{"a": 1' + "0" * 5000 + "}", '{"a": NaN}', '{"a": 1, "a": 2}', b'"\xff"'],
+    ids=["objects", "digits", "NaN", "twice", "no UTF-8"],
 )
 def test_no_json_is_one_sentence(tmp_path, text):
     with pytest.raises(RecordingError, match="holds no calibration"):
         loaded(tmp_path, text)
-
-
-def test_keys_that_are_not_known_are_no_reason(tmp_path):
-    document = json.loads(ONE.json())
-    document["later"] = {"a": [1, "two", None, True]}
-    assert parse_json(json.dumps(document)) == document
-    assert loaded(tmp_path, json.dumps(document)) == ONE
 
 
 def test_a_file_without_digest_is_read_and_doubted_and_one_whose_numbers_read_the_same_is_not(tmp_path):
@@ -125,11 +90,12 @@ def test_a_file_without_digest_is_read_and_doubted_and_one_whose_numbers_read_th
     assert as_others != ONE.json()
     assert not loaded(tmp_path, as_others).doubt
     del document["digest"]
+    document["later"] = {"a": [1, "two", None, True]}  # a key that is not known is no reason either
     assert "no digest" in loaded(tmp_path, json.dumps(document)).doubt
     assert loaded(tmp_path, json.dumps(document)) == ONE
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(at=st.integers(0, 8 * len(ONE.json()) - 1))
 def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at):
     data = bytearray(ONE.json().encode())
@@ -141,7 +107,7 @@ def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at)
     assert read.doubt or replace(read, created=ONE.created) == ONE  # when it was made is no number
 
 
-@pytest.mark.parametrize("unknown", ["D", "b_a", "K"])
+@pytest.mark.parametrize("unknown", ["D", "K"])
 def test_what_is_not_known_is_not_applied(tmp_path, unknown):
     read = loaded(tmp_path, replace(ONE, **{unknown: np.full_like(getattr(ONE, unknown), np.nan)}).json())
     assert read.verdict == "good"
@@ -150,8 +116,7 @@ def test_what_is_not_known_is_not_applied(tmp_path, unknown):
 
 
 def test_a_pipe_or_device_is_no_file(tmp_path):
-    for name in ("calibration.json", "capture.mcap", "calibration.bin"):
-        (tmp_path / name).symlink_to("/dev/zero")
     for name in ("calibration.json", "calibration.bin"):
+        (tmp_path / name).symlink_to("/dev/zero")
         with pytest.raises(RecordingError, match="is a pipe or device, not a file"):
             Calibration.load(tmp_path / name)

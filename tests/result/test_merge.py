@@ -31,12 +31,11 @@ def session(T, rng, slope=SLOPE, curve=0.0, D_slope=0.0, **changes):
     return replace(made, **changes)
 
 
-@pytest.mark.parametrize("temperatures", [(10.0, 30.0), (5.0, 20.0, 31.0), (8.0, 8.5, 20.0, 30.0)], ids=len)
-def test_a_slope_is_found_to_its_own_uncertainty(temperatures):
+def test_a_slope_is_found_to_its_own_uncertainty():
     z = []
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        made = merge([session(T, rng) for T in temperatures]).calibration
+        made = merge([session(T, rng) for T in (5.0, 20.0, 31.0)]).calibration
         assert made.follows_temperature
         z.append((made.b_a_slope - SLOPE) / made.b_a_slope_std)
     # rms of 180 numbers that should be standard normal
@@ -47,11 +46,9 @@ def test_the_merged_one_corrects_at_every_temperature(tmp_path):
     rng = np.random.default_rng(1)
     made = merge([session(T, rng) for T in (5.0, 20.0, 31.0)]).calibration
     s = np.array([1.0, -3.0, 9.0])
-    for T in (7.0, 18.0, 30.0):
-        truth = session(T, np.random.default_rng(0))
+    for T in (7.0, 30.0):
         y = np.diag([1.02, 0.99, 1.0]) @ s + np.array([0.3, -0.2, 1.1]) + SLOPE * (T - 25.0)
         assert made.apply(y, temperature_c=T) == pytest.approx(s, abs=0.03)
-        assert np.abs(truth.b_a_at(T) - truth.b_a).max() == 0.0
     # beyond what was seen it stays as at the end
     assert np.array_equal(made.apply(s, temperature_c=80.0), made.apply(s, temperature_c=31.0))
     assert np.array_equal(made.apply(s, temperature_c=np.nan), made.apply(s))
@@ -107,28 +104,21 @@ def test_what_does_not_belong_together_is_refused(others, error, says):
         merge([session(10.0, RNG), *others])
 
 
-def digested(T, digest):
-    return session(T, np.random.default_rng(int(T)), fit={"gravity": 9.80665, "recording_digest": digest})
-
-
 def test_a_recording_counts_once():
-    a, b, again = digested(10.0, "a"), digested(11.0, "b"), digested(10.0, "a")
-    merge([a, b])
+    """Know it by its digest, also one that was merged before, and without a digest by the numbers."""
+
+    def made_of(T, digest):
+        return session(T, np.random.default_rng(0), fit={"gravity": 9.80665, "recording_digest": digest})
+
+    a, b, c, again = (made_of(T, digest) for T, digest in ((10.0, "a"), (11.0, "b"), (12.0, "c"), (13.0, "a")))
     with pytest.raises(RefusedError, match=r"calibrations 1 and 3 were made of the same recording.*each once"):
         merge([a, b, again])
-
-
-def test_a_recording_that_was_merged_already_counts_no_more():
-    a, b, c = (digested(T, digest) for T, digest in ((10.0, "a"), (11.0, "b"), (12.0, "c")))
     both = merge([a, b]).calibration
     assert [part["recording_digest"] for part in both.extra["merged"]] == ["a", "b"]
     merge([both, c])
     with pytest.raises(RefusedError, match="calibrations 1 and 2 were made of the same recording"):
         merge([both, b])
-
-
-def test_a_calibration_that_names_no_recording_is_known_by_its_numbers():
-    one, other = (session(T, np.random.default_rng(0)) for T in (10.0, 30.0))
-    merge([one, other])
+    nameless = made_of(10.0, None)
+    merge([nameless, made_of(30.0, None)])
     with pytest.raises(RefusedError, match="the same recording"):
-        merge([one, one])
+        merge([nameless, nameless])

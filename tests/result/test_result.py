@@ -4,16 +4,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from mpucal.data import Sensor
 from mpucal.errors import OutputError, RecordingError
 from mpucal.result.calibration import Calibration
 from mpucal.result.correlation import from_lower
-
-some = st.floats(-1e6, 1e6) | st.just(math.nan)
 
 
 @pytest.fixture
@@ -51,13 +46,10 @@ def test_json_keeps_everything_to_the_last_bit(calibration, tmp_path):
     same(Calibration.load(tmp_path / "calibration.json"), calibration)
 
 
-@given(arrays(float, (3, 3), elements=some), arrays(float, 3, elements=some))
-def test_unknown_numbers_are_null_in_the_document_and_nan_in_python(D, b_a):
-    calibration = Calibration(D, b_a)
-    text = calibration.json()
-    assert "NaN" not in text
-    document = json.loads(text)
-    assert [value is None for value in document["accelerometer"]["b_a"]] == np.isnan(b_a).tolist()
+def test_unknown_numbers_are_null_in_the_document_and_nan_in_python():
+    calibration = Calibration(np.full((3, 3), math.nan), np.array([0.1, math.nan, -1e6]))
+    document = json.loads(calibration.json())
+    assert document["accelerometer"]["b_a"] == [0.1, None, -1e6]
     same(Calibration.from_document(document), calibration)
 
 
@@ -90,15 +82,6 @@ def test_the_blob_keeps_the_numbers_as_float32(calibration, tmp_path):
     np.testing.assert_allclose(read.apply(y), calibration.apply(y), rtol=1e-5)
 
 
-def test_a_blob_of_an_unknown_sensor_is_one_again(calibration, tmp_path):
-    bare = Calibration(calibration.D, calibration.b_a)
-    bare.save(tmp_path / "calibration.bin")
-    read = Calibration.load(tmp_path / "calibration.bin")
-    assert read.sensor == Sensor()
-    assert read.created == ""
-    assert np.isnan(read.b_omega).all()
-
-
 def test_apply_is_equation_4(calibration):
     s, w = np.array([[0.0, 0.0, 9.82], [5.0, -5.0, 6.8]]), np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0]])
     y = s @ calibration.D.T + calibration.b_a - calibration.applied_in_hardware
@@ -110,17 +93,6 @@ def test_apply_is_equation_4(calibration):
     np.testing.assert_allclose(omega, w, atol=1e-12)
 
 
-def test_apply_takes_an_unknown_gyro_bias_for_none(calibration):
-    gyr = np.array([0.1, 0.2, 0.3])
-    _, omega = Calibration(calibration.D, calibration.b_a).apply(np.zeros(3), gyr)
-    np.testing.assert_array_equal(omega, gyr)
-
-
-def test_what_nobody_judged_is_refused(calibration):
-    assert Calibration(calibration.D, calibration.b_a).verdict == "refused"
-    assert calibration.verdict == "good"
-
-
 def test_a_document_with_a_gain_and_a_bias_alone_is_enough():
     document = {
         "format": "mpucal.calibration",
@@ -130,18 +102,20 @@ def test_a_document_with_a_gain_and_a_bias_alone_is_enough():
     np.testing.assert_array_equal(calibration.b_a, [1, 2, np.nan])
     np.testing.assert_array_equal(calibration.K, np.eye(3))
     assert np.isnan(calibration.D_std).all()
+    assert calibration.verdict == "refused"  # nobody judged it
+    # a bias of the gyroscope that is not known counts as none
+    _, omega = calibration.apply(np.zeros(3), np.array([0.1, 0.2, 0.3]))
+    np.testing.assert_array_equal(omega, [0.1, 0.2, 0.3])
 
 
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
-        ("a.json", b"[1]", "holds no calibration"),
         ("a.json", b'{"format": "other"}', "'other', not 'mpucal.calibration'"),
         ("a.json", b'{"format": "mpucal.calibration", "version": 2}', "version 2 is newer"),
-        ("a.json", b'{"format": "mpucal.calibration"}', "accelerometer"),
         ("a.bin", b"", "not a config blob"),
     ],
-    ids=["a list", "another format", "newer", "no accelerometer", "empty blob"],
+    ids=["another format", "newer", "empty blob"],
 )
 def test_files_that_hold_no_calibration(tmp_path, name, content, says):
     (tmp_path / name).write_bytes(content)
@@ -155,8 +129,6 @@ def test_places_that_cannot_be_read_or_written(calibration, tmp_path):
         Calibration.load(tmp_path / "none.json")
     with pytest.raises(OutputError):
         calibration.save(tmp_path / "none" / "a.json")
-    with pytest.raises(ValueError, match="saved as"):
-        calibration.save(tmp_path / "a.txt")
 
 
 def test_unknown_numbers_make_no_blob(calibration, tmp_path):

@@ -1,7 +1,6 @@
 """The published schema of calibration.json, by jsonschema: every real output satisfies it, and wrong ones do not."""
 
 import json
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,21 +73,7 @@ def test_it_describes_the_entries_of_merges_vehicles_and_noise():
         assert not unknown_keys(document, SCHEMA)
 
 
-@pytest.mark.parametrize(
-    ("where", "wrong"),
-    [
-        (("accelerometer", "D"), [[1, 0], [0, 1]]),
-        (("accelerometer", "b_a"), [0, 0, "0"]),
-        (("quality", "verdict"), "fine"),
-        (("fit", "model"), "autoo"),
-        (("format",), "mpucal.recording"),
-    ],
-)
-def test_a_wrong_document_does_not(document, where, wrong):
-    spoilt = deepcopy(document)
-    *path, last = where
-    inner = spoilt
-    for key in path:
-        inner = inner[key]
-    inner[last] = wrong
-    assert not VALIDATOR.is_valid(spoilt)
+def test_a_wrong_document_does_not(document):
+    for part, key, wrong in (("accelerometer", "D", [[1, 0], [0, 1]]), ("quality", "verdict", "fine")):
+        assert not VALIDATOR.is_valid(document | {part: document[part] | {key: wrong}})
+    assert not VALIDATOR.is_valid(document | {"format": "mpucal.recording"})

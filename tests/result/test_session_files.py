@@ -1,8 +1,12 @@
-"""Names of a session's files: numbered, and known again."""
+"""Files of a session: their names, what is kept where one does not fit, and the note of a write."""
+
+from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
 from mpucal.errors import OutputError
+from mpucal.result.journal import Journal
 from mpucal.result.session_files import CAPTURE
 from mpucal.session.results import save
 
@@ -14,13 +18,8 @@ def test_each_one_is_free_until_it_is_there(tmp_path):
         path.write_bytes(b"")
         names.append(path.name)
     assert names == ["capture.mcap", "capture-2.mcap", "capture-3.mcap"]
-    assert names == [CAPTURE.numbered(number) for number in (1, 2, 3)]
-    assert all(map(CAPTURE.matches, names))
-
-
-@pytest.mark.parametrize("name", ["capture.tlog", "capture-.mcap", "capture-x.mcap", "my-capture.mcap", "captureXmcap"])
-def test_another_file_is_none(name):
-    assert not CAPTURE.matches(name)
+    others = ["capture.tlog", "capture-.mcap", "capture-x.mcap", "my-capture.mcap", "captureXmcap"]
+    assert list(filter(CAPTURE.matches, names + others)) == names
 
 
 def test_a_report_that_does_not_fit_costs_nothing_else(tmp_path):
@@ -30,3 +29,16 @@ def test_a_report_that_does_not_fit_costs_nothing_else(tmp_path):
         save(tmp_path, files)
     assert (tmp_path / "calibration.json").read_bytes() == b"{}"
     assert (tmp_path / "calibration.bin").read_bytes() == b"blob"
+
+
+@pytest.mark.parametrize("fails", [False, True], ids=["a good disk", "a bad disk"])
+def test_the_note_of_a_write_counts_until_its_end(tmp_path, fails):
+    journal = Journal(tmp_path / "state" / "write.json")
+    journal.begin({"old": {"A": 1.0}})
+    assert journal.interrupted()["old"] == {"A": 1.0}
+    with patch.object(
+        Path, "unlink", autospec=True, side_effect=OSError("Input/output error") if fails else Path.unlink
+    ):
+        journal.end()
+    assert journal.interrupted() is None
+    assert fails or list((tmp_path / "state").iterdir()) == []
