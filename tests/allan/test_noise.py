@@ -8,9 +8,8 @@ import pytest
 
 import mpucal
 from mpucal.allan import NoiseMeter, noise_of
-from mpucal.allan.model import design_matrix, fit_coefficients
+from mpucal.allan.model import fit_coefficients
 from mpucal.allan.octaves import Octaves
-from mpucal.allan.trace import Spectrum
 from mpucal.data import Recording, Sensor
 from mpucal.export.forms import form
 from mpucal.result.noise import Noise, with_noise
@@ -43,14 +42,14 @@ def found(lying):
 
 def test_the_deviation_is_that_of_allantools(lying):
     allantools = pytest.importorskip("allantools")
-    values = lying.acc[:20_000]
-    octaves = Octaves(3)
+    values = lying.acc[:12_000, :2]
+    octaves = Octaves(2)
     for part in np.array_split(values, 37):
         octaves.add(part)
     sizes, variances, counts = octaves.variances()
-    for axis in range(3):
+    for axis in range(2):
         _, theirs, _, n = allantools.oadev(
-            values[:, axis], rate=1.0, data_type="freq", taus=sizes[sizes <= 4096].astype(int)
+            values[:, axis], rate=1.0, data_type="freq", taus=sizes[sizes <= 2048].astype(int)
         )
         ours = np.sqrt(variances[: len(theirs), axis])
         every = sizes[: len(theirs)] <= 16
@@ -89,26 +88,16 @@ def test_the_coefficients_are_those_that_were_simulated(found):
     assert np.sum(inside) >= 15
 
 
-def test_what_is_simulated_walks_as_it_should_for_long():
-    """Test at an eighth of the time, too, where a period of the simulation would show."""
-    drawn = np.stack([noise(np.random.default_rng(seed), 1024, 1.0, 0.0, 0.0, 1.0) for seed in range(1500)], axis=1)
-    octaves = Octaves(drawn.shape[1])
-    octaves.add(drawn)
-    sizes, variances, _ = octaves.variances()
-    ratio = variances[sizes == 128].mean() / design_matrix(np.array([128.0]))[0, 2]
-    assert ratio == pytest.approx(1.0, abs=0.04)
-
-
 def test_intervals_hold_the_truth_at_their_rate():
     """40 rests at once, of coefficients that their octaves hardly tell apart."""
     truth, n = np.array([1.0, 0.35, 0.01]), 2**15
     octaves = Octaves(40)
     octaves.add(np.stack([noise(np.random.default_rng(seed), n, 1.0, *truth) for seed in range(40)], axis=1))
     sizes, variances, _ = octaves.variances()
-    for confidence in (0.68, 0.95):
-        of = [fit_coefficients(sizes, each, n, 1.0, confidence) for each in variances.T]
-        inside = np.mean([(one.low[:3] <= truth) & (truth <= one.high[:3]) for one in of])
-        assert inside == pytest.approx(confidence, abs=2.5 * np.sqrt(confidence * (1.0 - confidence) / len(of)))
+    confidence = 0.68
+    of = [fit_coefficients(sizes, each, n, 1.0, confidence) for each in variances.T]
+    inside = np.mean([(one.low[:3] <= truth) & (truth <= one.high[:3]) for one in of])
+    assert inside == pytest.approx(confidence, abs=2.5 * np.sqrt(confidence * (1.0 - confidence) / len(of)))
     values = np.mean([one.value[:3] for one in of], axis=0)
     np.testing.assert_allclose(values / truth, 1.0, atol=0.1)
 
@@ -136,15 +125,6 @@ def test_what_is_suspicious(lying):
     assert "gyroscope z" in said["temperature"]
 
 
-def test_a_short_rest_has_no_tones():
-    """Use one segment, white or with drift."""
-    rng = np.random.default_rng(5)
-    for walk in (0.0, 1e-3):
-        spectrum = Spectrum(50)
-        spectrum.add(np.stack([noise(rng, 5000, 200.0, 2e-3, 0.0, walk) for _ in range(50)], axis=1))
-        assert spectrum.tones(200.0) == []
-
-
 def test_a_board_that_was_turned_has_no_tones(lying):
     t, about_x = lying.t, np.radians(8.0)
     turned = (t > 300.0) & (t < 420.0)
@@ -167,33 +147,24 @@ def test_a_board_that_was_turned_has_no_tones(lying):
     assert moved["code"] == "moved"
 
 
-def test_the_time_still_needed_falls_as_it_goes_on(lying):
-    meter, needed = NoiseMeter(SENSOR, RATE_HZ), []
-    for first in range(0, len(lying), 2**15):
-        meter.add(lying.part(first, first + 2**15))
-        needed.append(meter.needed_s(0.01))
-    known = [s for s in needed if s is not None]
-    assert known
-    assert known[-1] > 0.0
+def test_the_time_still_needed_depends_on_the_accuracy(lying):
+    meter = NoiseMeter(SENSOR, RATE_HZ)
+    meter.add(lying.part(0, 100))
+    assert meter.needed_s(0.01) is None
+    meter.add(lying.part(100, 2**15))
+    assert meter.needed_s(0.01) > meter.needed_s(0.02) > 0.0
+    assert meter.needed_s(100.0) == 0.0
 
 
-def test_it_is_read_as_it_was_written(found, tmp_path):
+def test_a_file_is_read_as_it_was_written_and_no_other(found, tmp_path):
     found.save(tmp_path / "noise.json")
-    again = Noise.load(tmp_path / "noise.json")
-    assert again.document() == found.document()
-    json.dumps(again.document(), allow_nan=False)
-
-
-def test_too_little_is_refused(lying):
+    assert Noise.load(tmp_path / "noise.json").document() == found.document()
+    for text in ("[" * 10**5, '{"format": NaN}', '{"format": "mpucal.noise"}'):
+        (tmp_path / "noise.json").write_text(text)
+        with pytest.raises(mpucal.MpucalError, match="holds no noise"):
+            Noise.load(tmp_path / "noise.json")
     with pytest.raises(mpucal.MpucalError, match="are too few to measure noise"):
-        mpucal.noise(lying.part(0, 100))
-
-
-@pytest.mark.parametrize("text", ["[" * 10**5, '{"format": NaN}', '{"format": "mpucal.noise"}', "5"])
-def test_what_is_no_noise_is_a_sentence(tmp_path, text):
-    (tmp_path / "noise.json").write_text(text)
-    with pytest.raises(mpucal.MpucalError, match="holds no noise"):
-        Noise.load(tmp_path / "noise.json")
+        mpucal.noise(rest(2**10).part(0, 100))
 
 
 def test_exports_take_it(found):

@@ -22,58 +22,27 @@ A_CALIBRATION = Calibration(np.eye(3), np.zeros(3))
 
 WRONG = {
     "no recording": (lambda: mpucal.calibrate(ACC), TypeError, "ndarray is not a recording: give a mpucal.Recording"),
-    "no such file": (lambda: mpucal.calibrate("no.csv"), MpucalError, "there is no file no.csv"),
     "no model": (lambda: mpucal.calibrate(A_RECORDING, "autoo"), ValueError, "there is no model 'autoo': choose one"),
     "no gravity": (lambda: mpucal.calibrate(A_RECORDING, gravity=-1), ValueError, "gravity is -1"),
-    "gravity a word": (lambda: mpucal.calibrate(A_RECORDING, gravity="9.8"), TypeError, "gravity is '9.8': give"),
     "load no path": (lambda: mpucal.load(5), TypeError, "a recording is given as int: give the path of its file"),
     "columns": (lambda: A_CALIBRATION.apply(ACC.T), ValueError, r"acc has shape \(3, 40\), not .*: give acc.T, in m/s"),
-    "rates of others": (lambda: A_CALIBRATION.apply(ACC, GYR[1:]), ValueError, r"gyr has shape \(39, 3\)"),
     "D a number": (
         lambda: Calibration(1.0, np.zeros(3)),
         ValueError,
         r"D has shape \(\): give numbers of shape \(3, 3",
     ),
     "days before": (lambda: mpucal.check(A_CALIBRATION, A_RECORDING, -7), ValueError, "days is -7: give"),
-    "plot of a number": (lambda: A_CALIBRATION.plot(5), TypeError, "int is not a recording"),
     "no range": (
         lambda: mpucal.load("no.csv", accel_range=0),
         ValueError,
         "accel_range is 0: give the full scale in g",
     ),
-    "columns no text": (lambda: mpucal.load("no.csv", columns=["t"]), TypeError, "columns is .*: give text"),
-    "sensor a word": (lambda: arrays(T, ACC, GYR, sensor="MPU-6050"), TypeError, "sensor is 'MPU-6050': give a Sensor"),
-    "save where": (
-        lambda: A_CALIBRATION.save("c.txt"),
-        ValueError,
-        "cannot be saved as c.txt: end its name with .json",
-    ),
     "save no path": (lambda: A_CALIBRATION.save(None), TypeError, "the file of a calibration is given as NoneType"),
-    "ragged": (
-        lambda: arrays([[1], [1, 2]], ACC, GYR),
-        ValueError,
-        "t holds values that are not numbers",
-    ),
     "dates as acc": (
         lambda: arrays(T, np.tile(DATES, (3, 1)).T, GYR),
         ValueError,
         "acc .*they are times",
     ),
-    "no date": (
-        lambda: arrays(np.append(DATES[:-1], np.datetime64("NaT")), ACC, GYR),
-        ValueError,
-        "t is",
-    ),
-    "complex acc": (lambda: arrays(T, ACC * 1j, GYR), ValueError, "acc .*they are complex"),
-    "no file's name": (lambda: Calibration.load("a\0b"), ValueError, "a calibration is given as"),
-    "document a word": (
-        lambda: Calibration.from_document("{}"),
-        TypeError,
-        "document of a calibration is given as str",
-    ),
-    "document of nothing": (lambda: Calibration.from_document({}), ValueError, "not a document of a calibration"),
-    "no blob": (lambda: Calibration.from_blob(b""), TypeError, "a blob is given as bytes"),
-    "flat a word": (lambda: arrays(T, ACC, GYR, "flat"), ValueError, "flat is 'flat', not two whole"),
     "no data frame": (lambda: Recording.from_dataframe(ACC), TypeError, "ndarray is not a data frame"),
     "other frames": (lambda: A_RECORDING.to_dataframe("excel"), ValueError, "data frames of 'excel' are not supported"),
 }
@@ -93,9 +62,8 @@ def test_a_path_does_for_a_recording():
     assert replace(by_path, created="") == replace(by_name, created="") == replace(of_recording, created="")
 
 
-@pytest.mark.parametrize("unit", ["us", "ns", "ms"])
-def test_dates_are_seconds_since_the_first(unit):
-    np.testing.assert_allclose(Recording.from_arrays(DATES.astype(f"datetime64[{unit}]"), ACC, GYR).t, T, atol=1e-9)
+def test_dates_are_seconds_since_the_first():
+    np.testing.assert_allclose(Recording.from_arrays(DATES.astype("datetime64[ms]"), ACC, GYR).t, T, atol=1e-9)
     np.testing.assert_allclose(Recording.from_arrays((DATES - DATES[0]), ACC, GYR).t, T, atol=1e-9)
 
 

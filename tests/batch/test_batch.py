@@ -8,12 +8,9 @@ import shutil
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
 
-import cloudpickle
 import numpy as np
 import pytest
 
@@ -33,88 +30,11 @@ SETTINGS = Settings("accel", 9.80665)
 LONG_S = 60
 
 
-# loads dask once, and becomes a scheduler or a worker as often as it is told to
-PROCESSES = """
-import json, os, signal, sys
-
-import dask
-from distributed.cli import dask_scheduler, dask_worker
-
-import mpucal.batch.row
-from mpucal.calibration import calibrate
-
-children = []
-for line in sys.stdin:
-    kind, words, config = json.loads(line)
-    child = os.fork()
-    if not child:
-        dask.config.set({"distributed.worker.profile.enabled": False, **config})
-        {"scheduler": dask_scheduler, "worker": dask_worker}[kind].main(words)
-    children.append(child)
-    print(child, flush=True)
-for child in children:
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-"""
-
-
-@dataclass
-class Cluster:
-    """Address of a scheduler, and process ids of its workers."""
-
-    address: str
-    workers: list[int]
-
-
 @pytest.fixture(scope="module")
-def distributed():
-    """Return dask's package, whose import takes longer than most tests."""
-    import distributed
-
-    return distributed
-
-
-@pytest.fixture(scope="module")
-def process():
-    """Start a scheduler or a worker, and give its process; all of them end with the tests."""
-    words = [sys.executable, "-c", PROCESSES]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen(words, text=True, **pipes) as parent:
-
-        def start(kind, *words, **config):
-            print(json.dumps([kind, list(map(str, words)), config]), file=parent.stdin, flush=True)
-            return int(parent.stdout.readline())
-
-        yield start
-
-
-@pytest.fixture(scope="module")
-def started(process):
-    """A scheduler and workers, each a process, in a folder of their own."""
-
-    @contextmanager
-    def call(folder, count=2, **config):
-        folder.mkdir(exist_ok=True)
-        file = folder / "scheduler.json"
-        here = ("--scheduler-file", file, "--no-dashboard")
-        scheduler = process("scheduler", "--port", 0, *here, **config)
-        options = ("--nthreads", 1, "--no-nanny", "--local-directory", folder)
-        workers = [process("worker", *here, *options) for _ in range(count)]
-        begun = monotonic()
-        while not (file.exists() and file.stat().st_size) and monotonic() - begun < LONG_S:
-            sleep(0.05)
-        yield Cluster(json.loads(file.read_text())["address"], workers)
-        for child in (scheduler, *workers):
-            os.kill(child, signal.SIGKILL)
-
-    return call
-
-
-@pytest.fixture(scope="module")
-def cluster(started, tmp_path_factory):
-    """Start a cluster for all tests."""
-    with started(tmp_path_factory.mktemp("cluster")) as cluster:
-        yield cluster
+def client():
+    """Two workers, each a process, and a client of their scheduler."""
+    with local_client(2) as client:
+        yield client
 
 
 @pytest.fixture
@@ -139,46 +59,57 @@ def test_a_row_for_which_there_is_no_space_ends_in_a_sentence(tmp_path):
     journal.close()
 
 
-def test_a_worker_is_killed_and_then_the_scheduler(distributed, started, cluster, captures, tmp_path):
+def test_a_worker_is_killed_and_then_the_program(client, captures, tmp_path):
     expected = make_table(make_row(path, SETTINGS) for path in captures)
     errors = [error for error in expected["error"].to_pylist() if error]
     assert len(errors) >= 2
     assert not any("bug" in error for error in errors)
     journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
-    with started(tmp_path / "first") as first, distributed.Client(first.address, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=LONG_S)
-        for progress in run_batch(captures, client, journal, SETTINGS):
-            if progress.done == 2:
-                os.kill(first.workers[0], signal.SIGKILL)
+    first = min(client.run(os.getpid).values())
+    for progress in run_batch(captures, client, journal, SETTINGS):
+        if progress.done == 2:
+            os.kill(first, signal.SIGKILL)
     assert (progress.done, progress.kept) == (len(captures), 0)
     assert make_table(journal.rows(captures)).equals(expected)
     journal.close()
-    # another scheduler, and a line that a kill of the program has cut
+    # a line that a kill of the program has cut, and a capture that changed since
     with (tmp_path / "rows.jsonl").open("ab") as file:
         file.write(b'{"settings": "')
     journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
     Path(captures[0]).write_bytes(Path(captures[1]).read_bytes())
-    with distributed.Client(cluster.address, set_as_default=False) as client:
-        *_, progress = run_batch(captures, client, journal, SETTINGS)
+    *_, progress = run_batch(captures, client, journal, SETTINGS)
     # what changed and what could not be read is done again
     assert progress.kept == len(captures) - 1 - errors.count(expected["error"][-1].as_py())
     again = make_table(journal.rows(captures))
     assert again.slice(1).equals(expected.slice(1))
     assert again["digest"][0] == again["digest"][1]
     journal.close()
+    table = mpucal.batch.calibrate_many(captures[-3:], client, model="accel")
+    assert table.equals(expected.slice(len(captures) - 3))
+
+
+# loaded by each worker: it dies of one path
+MORTAL = """
+import os
+from mpucal.batch import row
+
+compute_digest = row.compute_digest
+row.compute_digest = lambda path: os._exit(1) if path.stem == "deadly" else compute_digest(path)
+"""
 
 
 # one run in eight of all tests lost the connection to the scheduler here, where the worker died amid an answer
 @pytest.mark.slow
-def test_the_one_that_workers_die_of_is_told_of_those_beside_it(distributed, started, tmp_path):
+def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path):
     """Several recordings make a task; each is tried alone after that."""
+    import dask
+
     paths = [f"/none/{i}.mcap" for i in range(100)]
     paths[40] = "/none/deadly.mcap"
     journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
-    mortal = started(tmp_path / "three", 3, **{"distributed.scheduler.allowed-failures": 0})
-    with mortal as three, distributed.Client(three.address, set_as_default=False) as client:
-        client.wait_for_workers(3, timeout=LONG_S)
-        client.run(_mortal)
+    (mortal := tmp_path / "mortal.py").write_text(MORTAL)
+    config = {"distributed.scheduler.allowed-failures": 0, "distributed.worker.preload": [str(mortal)]}
+    with dask.config.set(config), local_client(3) as client:
         *_, progress = run_batch(paths, client, journal, SETTINGS)
     assert (progress.done, progress.failed) == (100, 100)
     errors = [row["error"] for row in journal.rows(paths)]
@@ -187,7 +118,8 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(distributed, sta
     journal.close()
 
 
-def test_a_worker_that_comes_back_late_is_waited_for(distributed):
+@pytest.mark.slow  # those that are killed while they start are told in the gate
+def test_a_worker_that_comes_back_late_is_waited_for():
     """Wait longer than dask does by default, which is 0 s here."""
     import dask
 
@@ -200,23 +132,12 @@ def test_a_worker_that_comes_back_late_is_waited_for(distributed):
         client.wait_for_workers(1, timeout=1)
 
 
-def _mortal():
-    """Have a worker die of one path."""
-    from mpucal.batch import row
-
-    compute_digest = row.compute_digest
-    row.compute_digest = lambda path: os._exit(1) if path.stem == "deadly" else compute_digest(path)
-
-
-cloudpickle.register_pickle_by_value(sys.modules[__name__])
-
-
-def test_the_command_writes_a_table_and_a_page(cluster, captures, tmp_path, capsys, monkeypatch):
+def test_the_command_writes_a_table_and_a_page(client, captures, tmp_path, capsys, monkeypatch):
     import pyarrow.parquet as pq
 
     monkeypatch.chdir(tmp_path)
     words = ["batch", str(tmp_path / "line-3" / "*.mcap"), "-o", "fleet", "--model", "accel", "--reports"]
-    assert call([*words, "--scheduler", cluster.address]) == 0
+    assert call([*words, "--scheduler", client.scheduler.address]) == 0
     told = capsys.readouterr()
     assert re.search(r"4 of 4, .* a second, 1 unreadable", told.err)
     columns = pq.read_table("fleet/results.parquet").to_pydict()
@@ -264,21 +185,13 @@ def test_the_page_names_what_is_odd(tmp_path):
     for board in range(200):
         b_a = rng.normal(0.0, 0.1, 3) + (2.0 if board == 77 else 0.0)
         for again in range(2):
-            row = {
-                "path": f"b{board}-{again}.mcap",
-                "batch": f"day-{again}",
-                "digest": f"{board}-{again}",
-                "sensor": f"{board}",
-                "report": f"r{board}-{again}.html",
-            }
-            row |= {
-                "verdict": "refused" if board == 3 else "good",
-                "who_am_i": 0x68,
-                "temperature_c": 20.0 + 10 * again,
-            }
-            row |= {f"D_{i}{j}": float(i == j) for i in "xyz" for j in "xyz"} | {
-                "reasons": "never_still" if board == 3 else ""
-            }
+            row = {"path": f"b{board}-{again}.mcap", "digest": f"{board}-{again}"}
+            row |= {"batch": f"day-{again}", "sensor": f"{board}", "report": f"r{board}-{again}.html"}
+            row |= {"who_am_i": 0x68, "temperature_c": 20.0 + 10 * again}
+            row |= (
+                {"verdict": "refused", "reasons": "never_still"} if board == 3 else {"verdict": "good", "reasons": ""}
+            )
+            row |= {f"D_{i}{j}": float(i == j) for i in "xyz" for j in "xyz"}
             row |= {f"b_a_{axis}": b_a[k] + rng.normal(0.0, 0.01) for k, axis in enumerate("xyz")}
             row |= {f"b_a_std_{axis}": 0.01 for axis in "xyz"}
             rows.append(row)
@@ -293,8 +206,9 @@ def test_the_page_names_what_is_odd(tmp_path):
     assert 0.9 < float(rms) < 1.1
 
 
-def test_workers_that_are_killed_while_they_start_are_told(distributed, tmp_path, capfd):
+def test_workers_that_are_killed_while_they_start_are_told(tmp_path, capfd):
     import dask
+    import distributed  # noqa: F401 - see below
 
     # the settings of `distributed` are loaded: what is set before would take them along when it is put back
     (deadly := tmp_path / "deadly.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n")
@@ -319,16 +233,6 @@ def test_a_batch_that_is_ended_while_its_workers_start_leaves_no_trace(tmp_path)
     assert (done.returncode, done.stderr.strip()) == (4, "mpucal: interrupted.")
 
 
-@pytest.mark.parametrize(
-    ("value", "shown"),
-    [("=1+1.mcap", "'=1+1.mcap"), ("@x", "'@x"), ("a=1", "a=1"), ("a\u202eb", "a\\u202eb"), (-1.5, -1.5), (None, None)],
-)
-def test_a_spreadsheet_only_shows_a_cell(value, shown):
-    assert escape_cell(value) == shown
-
-
-def test_in_python(distributed, cluster, captures):
-    with distributed.Client(cluster.address, set_as_default=False) as client:
-        table = mpucal.batch.calibrate_many(captures[-3:], client, model="accel")
-    assert table["path"].to_pylist() == captures[-3:]
-    assert table.equals(make_table(make_row(path, SETTINGS) for path in captures[-3:]))
+def test_a_spreadsheet_only_shows_a_cell():
+    values = ("=1+1.mcap", "@x", "a=1", "a\u202eb", -1.5, None)
+    assert [*map(escape_cell, values)] == ["'=1+1.mcap", "'@x", "a=1", "a\\u202eb", -1.5, None]

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mpucal.result.blob import (
     COUNTS,
@@ -16,8 +14,6 @@ from mpucal.result.blob import (
     FORMULA,
     LENGTH,
     LENGTH_WITH_COUNTS,
-    LENGTH_WITH_SLOPE,
-    MAX_LENGTH,
     SLOPE,
     Blob,
     BlobError,
@@ -29,45 +25,6 @@ from tools.make.vectors import sealed
 VECTORS = vectors.FOLDER
 PROTOCOL = (Path(__file__).parents[2] / "firmware_protocol.md").read_text().split("\n## The config blob\n")[1]
 
-floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
-ranges = st.floats(0.0, 2.0**100, width=32)
-small = st.floats(-0.25, 0.25, width=32)
-maybe = floats | st.just(math.nan)
-times = st.integers(min_value=1, max_value=253_402_300_799)  # to the end of the year 9999
-
-
-def several(count, values=floats):
-    return st.tuples(*[values] * count)
-
-
-# the diagonal is more than all else of a row
-gains = several(9, small).map(lambda d: tuple((np.float32(d) + np.eye(3, dtype=np.float32).ravel()).tolist()))
-
-
-@st.composite
-def blobs(draw):
-    return Blob(
-        who_am_i=draw(st.integers(0, 255)),
-        accel_range_g=draw(ranges),
-        gyro_range_dps=draw(ranges),
-        D=draw(gains),
-        b_a=draw(several(3)),
-        gravity=draw(maybe),
-        temperature_c=draw(maybe),
-        created=np.datetime64(draw(times), "s").item().isoformat() + "+00:00",
-        applied_b_a=draw(several(3)),
-        K=draw(several(9, maybe)),
-        b_omega=draw(several(3, maybe)),
-    )
-
-
-@st.composite
-def sloped(draw):
-    """Draw a blob with b_a(T), which needs a temperature within its range."""
-    low, at, high = sorted(draw(several(3)))
-    slope = draw(several(3).filter(any))
-    return replace(draw(blobs()), temperature_c=at, b_a_slope=slope, temperature_range_c=(low, high))
-
 
 def plain(blob):
     """Values that compare equal where NaN stands for NaN."""
@@ -77,17 +34,6 @@ def plain(blob):
 @pytest.fixture
 def blob():
     return Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
-
-
-@settings(max_examples=60)
-@given(blobs() | sloped(), st.none() | ranges.filter(bool))
-def test_decode_is_the_inverse_of_encode(blob, counts):
-    blob = replace(blob, gyro_counts=counts)
-    data = blob.encode()
-    minor = 2 if counts else 1 if any(blob.b_a_slope) else 0
-    assert (len(data), data[5]) == ((LENGTH, LENGTH_WITH_SLOPE, LENGTH_WITH_COUNTS)[minor], minor)
-    assert len(data) <= MAX_LENGTH
-    assert plain(Blob.decode(data)) == plain(blob)
 
 
 def test_no_damaged_byte_and_no_shorter_blob_is_accepted(blob):
@@ -168,6 +114,9 @@ def test_golden_vector(name):
     blob = Blob.decode(data)
     values = {key: from_json(value) for key, value in expected["blob"].items()}
     assert plain(blob) == plain(Blob(**values))
+    # fields that a newer minor version appended, or that cannot be used, are skipped
+    assert name in ("blob_appended", "blob_slope_cut", "blob_slope_not_finite") or blob.encode() == data
+    assert plain(Blob.decode(blob.encode())) == plain(blob)
     a = np.linalg.inv(np.reshape(blob.D, (3, 3))) @ (np.array(expected["y"]) - blob.b_a + blob.applied_b_a)
     np.testing.assert_allclose(a, expected["a"], rtol=1e-12)
     unit = np.radians(blob.gyro_range_dps or 500.0) / 32750

@@ -1,7 +1,7 @@
 """b_a in a chip's offset registers: where it lands, what it does, and that no failure leaves anything in between."""
 
-import json
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -52,11 +52,11 @@ class Board:
     fails : by number of the access, whether it is done nonetheless.
     """
 
-    def __init__(self, model="mpu6050", offsets="2048", who_am_i=None, feed=None):
+    def __init__(self, model="mpu6050", offsets="2048", who_am_i=None, feed=None, trim=TRIM):
         self.model = replace(MODELS[model], **OFFSETS[offsets])
         if who_am_i is not None:
             self.model = replace(self.model, who_am_i=who_am_i)
-        self.chip = Chip(self.model, feed or AtRest(), 0.0, FactoryTrim(TRIM))
+        self.chip = Chip(self.model, feed or AtRest(), 0.0, FactoryTrim(trim))
         self.inner = SimulatedBus(self.chip, FastClock())
         self.accesses, self.fails = 0, {}
 
@@ -110,17 +110,20 @@ def corrected(lsb_per_g):
     )
 
 
-@pytest.mark.parametrize("model", HIGH)
-@pytest.mark.parametrize("scale", ["2048", "4096"])
-@pytest.mark.parametrize("who_am_i", [None, 0x68], ids=["honest", "as_6050"])
-def test_the_bias_lands_where_it_belongs(calibration, model, scale, who_am_i):
+@pytest.mark.parametrize(
+    ("model", "scale", "who_am_i"),
+    [("mpu6050", "2048", None), ("mpu6050", "4096", None), ("mpu6500", "2048", 0x68), ("clone98", "4096", 0x68)],
+)
+def test_the_bias_lands_where_it_belongs_and_all_else_stays(calibration, model, scale, who_am_i):
     board = Board(model, scale, who_am_i)
+    before = board.inner.read(reg.SMPLRT_DIV, 5).data, board.inner.read(reg.PWR_MGMT_1, 2).data
     applied = board.sink().write(calibration())
     assert board.words() == corrected(float(scale))
     hardware_mg = applied.calibration.applied_in_hardware / STANDARD_GRAVITY_MPS2 * 1000
     assert hardware_mg == pytest.approx(BIAS_G * 1000, abs=0.5)
     assert f"0x{HIGH[model][0]:02x}" in applied.what
     assert "volatile" in applied.what
+    assert (board.inner.read(reg.SMPLRT_DIV, 5).data, board.inner.read(reg.PWR_MGMT_1, 2).data) == before
 
 
 def test_the_bias_is_removed_once(calibration):
@@ -144,33 +147,19 @@ def test_writing_twice_is_writing_once(calibration, known):
         assert board.words() == corrected(2048.0)
 
 
-def test_what_else_the_chip_held_stays(calibration):
-    board = Board()
-    before = board.inner.read(reg.SMPLRT_DIV, 5).data, board.inner.read(reg.PWR_MGMT_1, 2).data
-    board.sink().write(calibration())
-    assert (board.inner.read(reg.SMPLRT_DIV, 5).data, board.inner.read(reg.PWR_MGMT_1, 2).data) == before
-
-
 def test_the_old_words_come_back_from_their_file(calibration, tmp_path):
     board = Board("mpu6500")
     (kept,) = board.sink().keep(tmp_path)
     board.sink().write(calibration())
     assert board.words() != TRIM
+    # what was kept is not written over
+    assert board.sink().keep(tmp_path) != (kept,)
     assert CHIP_OFFSETS.name in board.sink().put_back(kept)
     assert board.words() == TRIM
 
 
-def test_what_was_kept_is_not_written_over(tmp_path):
-    sink = Board().sink()
-    first, second = sink.keep(tmp_path) + sink.keep(tmp_path)
-    assert first != second
-    assert json.loads(first.read_text()) == json.loads(second.read_text())
-
-
 @pytest.mark.parametrize(
-    "text",
-    ["", "[]", '{"format": "other"}', '{"format": "mpucal.chip_offsets", "registers": {"0x06": "00"}}'],
-    ids=["empty", "list", "other", "short"],
+    "text", ["[]", '{"format": "mpucal.chip_offsets", "registers": {"0x06": "00"}}'], ids=["list", "short"]
 )
 def test_another_file_is_not_put_back(tmp_path, text):
     board, path = Board(), tmp_path / CHIP_OFFSETS.name
@@ -184,42 +173,29 @@ def test_another_file_is_not_put_back(tmp_path, text):
     ("board", "changes", "words"),
     [
         (Board(offsets="readonly"), {}, "does not respond to its offset registers"),
-        (Board(), {"accel_offsets": (1, 2, 3)}, "factory trim of this chip is .* but .1, 2, 3. in the one"),
+        (
+            Board(),
+            {"sensor": Sensor(accel_offsets=(1, 2, 3))},
+            "factory trim of this chip is .* but .1, 2, 3. in the one",
+        ),
         (Board(), {"quality": {"verdict": REFUSED}}, "nothing was written: the calibration was refused"),
         (Board(), {"extra": {"autopilot": {}}}, "nothing was written: .*autopilot"),
         (Board(feed=AtRest(shakes_g=0.3)), {}, "the board moves"),
+        (Board(), {"sensor": Sensor(who_am_i=0x70)}, "WHO_AM_I of this chip is 0x68, but 0x70 of the calibrated one"),
+        (Board(), {"b_a": np.array([0.0, 0.0, 1.5])}, "not 9.81"),
     ],
-    ids=["read_only", "other_piece", "refused", "autopilot", "moves"],
+    ids=["read_only", "other_piece", "refused", "autopilot", "moves", "who_am_i", "gravity"],
 )
 def test_a_refusal_leaves_all_as_it_was(calibration, board, changes, words):
     with pytest.raises(WriteBackError, match=words):
-        board.sink().write(calibration(**changes))
-    assert board.words() == TRIM
-
-
-@pytest.mark.parametrize(
-    ("sensor", "words"),
-    [
-        (Sensor(who_am_i=0x70), "WHO_AM_I of this chip is 0x68, but 0x70 of the calibrated one"),
-        (Sensor(), "not 9.81"),
-    ],
-    ids=["who_am_i", "gravity"],
-)
-def test_the_calibration_of_another_chip_is_refused(calibration, sensor, words):
-    board = Board()
-    other = replace(calibration(), sensor=sensor, b_a=np.array([0.0, 0.0, 1.5]))
-    with pytest.raises(WriteBackError, match=words):
-        board.sink().write(other)
+        board.sink().write(replace(calibration(), **changes))
     assert board.words() == TRIM
 
 
 def test_a_bias_that_does_not_fit_is_refused(calibration):
-    board = Board()
-    board.chip = Chip(board.model, AtRest(), 0.0, FactoryTrim((32000, 0, 0)))
-    board.inner = SimulatedBus(board.chip, FastClock())
-    far = replace(calibration(accel_offsets=None), b_a=np.array([-9.0, 0.0, 0.0]))
+    board = Board(trim=(32000, 0, 0))
     with pytest.raises(WriteBackError, match="cannot hold"):
-        board.sink().write(far)
+        board.sink().write(replace(calibration(accel_offsets=None), b_a=np.array([-9.0, 0.0, 0.0])))
     assert board.words() == (32000, 0, 0)
 
 
@@ -227,7 +203,7 @@ def test_a_bias_that_does_not_fit_is_refused(calibration):
 ACCESSES = 700
 
 
-@settings(max_examples=60)
+@settings(max_examples=45)
 @given(
     model=st.sampled_from(["mpu6050", "mpu6500"]),
     corrected_before=st.booleans(),
@@ -279,9 +255,7 @@ def test_an_interrupted_write_is_undone(calibration):
 
 
 def test_a_chip_that_is_gone_is_told_before_anything_is_written(calibration):
-    class Gone(Board):
-        def read(self, register, count):
-            raise NoAnswer("nothing answers at 0x68 on the bus", "check VCC, GND, SDA and SCL")
-
+    board = Board()
+    board.read = Mock(side_effect=NoAnswer("nothing answers at 0x68 on the bus", "check VCC, GND, SDA and SCL"))
     with pytest.raises(WriteBackError, match="nothing was written: nothing answers"):
-        Gone().sink().write(calibration())
+        board.sink().write(calibration())

@@ -17,12 +17,9 @@ def source(name):
     ("asked", "no_write", "name", "names"),
     [
         ((), False, "bus", []),
-        ((), False, "serial", ["bridge"]),
         ((), False, "mavlink", ["autopilot"]),
-        ((), False, "replay", []),
         ((), True, "mavlink", []),
         (("file",), False, "serial", []),
-        (("chip",), False, "bus", ["chip"]),
         (("bridge", "chip"), False, "serial", ["chip", "bridge"]),
     ],
 )
@@ -39,7 +36,6 @@ def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, name, 
     [
         (("chip",), True, "bus", "leave one of them out"),
         (("bridge",), False, "bus", "--bus has no bridge: give --serial PORT[:BAUD], or leave it out"),
-        (("autopilot",), False, "bus", "give --mavlink"),
         (("chip",), False, "mavlink", "--mavlink has no chip: give exactly one of --bus BUS"),
         (("chip",), False, "replay", "--replay has no sensor to write to"),
     ],
