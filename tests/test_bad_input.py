@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -73,39 +74,78 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["session", "--bus", "sim", "--gravity", "-9.81"], "'-9.81' is not a local gravity"),
-        (["session", "--bus", "sim", "--gravity", "nan"], "'nan' is not a local gravity"),
-        (["session", "--bus", "sim", "--gravity", "981"], "In cm/s² it is `mpucal session --bus sim --gravity 9.81`."),
-        (["session", "--bus", "sim", "--gravity", "1"], "`mpucal session --bus sim --gravity 9.80665`. To use"),
-        (["calibrate", "walk.npz", "--gravity", "much"], "'much' is not a local gravity"),
-        (["session", "--bus", "sim", "--address", "0x68"], "--bus sim does not take --address"),
-        (["session", "--bus", "sim", "--rate", "3"], "use 3.90625 Hz"),
-        (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
-        (["stream", "--bus", "sim", "--seconds", "nan"], "'nan' is not a finite number"),
-        (["doctor", "--bus", "sim", "--seconds", "inf"], "'inf' is not a finite number"),
-        (["record"], "no source was given"),
-        (["doctor", "--bus", ""], "no bus was named"),
-        (["sesion", "--bus", "sim"], "did you mean session?"),
-        (["session", "--bus", "simm"], "did you mean sim?"),
-        (["session", "--bus", "sim:hnd=guided"], "did you mean hand?"),
-        (["session", "--mavlink", "sim:hand=gided"], "did you mean guided?"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_words_that_cannot_be_meant_are_2_before_anything_is_measured(mpucal, tmp_path, words, sentence):
-    code, said = mpucal(*words)
-    assert code == 2
-    assert sentence in said
+# Words that contradict each other or name nothing, and a part of what is said.
+WRONG = """
+session --bus sim --gravity -9.81                   | '-9.81' is not a local gravity
+session --bus sim --gravity nan                     | 'nan' is not a local gravity
+session --bus sim --gravity 981                     | In cm/s² it is `mpucal session --bus sim --gravity 9.81`.
+session --bus sim --gravity 1                       | `mpucal session --bus sim --gravity 9.80665`. To use
+calibrate walk.npz --gravity much                   | 'much' is not a local gravity
+session --bus sim --address 0x68                    | --bus sim does not take --address
+session --bus sim --rate 3                          | use 3.90625 Hz
+record --bus sim --dlpf 7                           | --dlpf
+record --serial socket://localhost:1 --rate 4000    | a bridge cannot carry 4000 samples a second
+record --bus sim --seconds 0                        | --seconds
+record --mavlink sim --rate 5000                    | 5000
+stream --bus sim --seconds nan                      | 'nan' is not a finite number
+stream --replay capture.mcap --apply c.json         | mpucal apply
+doctor --bus sim --seconds inf                      | 'inf' is not a finite number
+doctor --replay capture.mcap                        | --replay
+record                                              | no source was given: give exactly one of --bus BUS,
+doctor --bus ''                                     | no bus was named
+sesion --bus sim                                    | did you mean session?
+session --bus simm                                  | did you mean sim?
+session --bus sim:hnd=guided                        | did you mean hand?
+session --mavlink sim:hand=gided                    | did you mean guided?
+session --mavlink sim --accel-range 8               | --mavlink sim does not take --accel-range
+session --mavlink nonsense                          | cannot be understood
+session --mavlink sim --signing-key nothing         | cannot be read
+session --bus sim --replay x.mcap                   | --bus and --replay were given together
+session --replay x.mcap --rate 100                  | --replay does not take --rate, which the capture fixes
+session --bus /dev/i2c-99 --seed 1                  | --bus does not take --seed
+session --bus sim --tilt-only --model hand          | --tilt-only does not take --model hand
+session --bus sim --to diary                        | 'chip'
+session --resume nowhere                            | nowhere does not hold a session
+session --resume x --bus sim                        | --resume does not take --bus
+session --resume x -o y                             | --resume does not take -o
+write c.json diary --bus sim                        | 'chip'
+write c.json bridge --mavlink sim                   | --mavlink sim has no bridge
+write c.json chip --bus sim --store                 | --store was given, and the chip's offset registers
+show                                                | nothing to show was named: give a file
+show x.json --bus sim                               | a file and --bus were given together
+show --bus sim --columns t,ax,ay,az,gx,gy,gz        | --columns say how a file is read, and a device was given
+check c.json                                        | neither a recording nor a source was given
+check c.json walk.npz --bus sim                     | a file and a source were given together
+check c.json walk.npz --to chip                     | --to was given without -o and a source
+noise                                               | neither a recording nor a source was given
+noise lying.npz --bus sim                           | a file and a source were given together
+firmware                                            | takes one of -o DIR and --flash PORT
+firmware -o x --flash y                             | takes one of -o DIR and --flash PORT
+"""
+
+
+def test_words_that_cannot_be_meant_are_2_before_anything_is_measured(mpucal, tmp_path):
+    for line in WRONG.strip().splitlines():
+        words, _, sentence = line.partition("|")
+        code, said = mpucal(*shlex.split(words))
+        assert (code, sentence.strip() in " ".join(said.split())) == (2, True), (words, said)
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["nothing", "nothing.npz", "nothing.mcap", "nothing/there.csv"])
-@pytest.mark.parametrize("verb", ["calibrate", "show"])
-def test_a_file_that_is_not_there_is_called_that(mpucal, verb, name):
-    assert mpucal(verb, name) == (3, f"mpucal: there is no file {name}: check the path.\n")
+def test_files_that_cannot_be_read_are_3_and_a_sentence(mpucal, tmp_path):
+    for name in ("text.mcap", "text.npz", "text.docx", "c.bin"):
+        (tmp_path / name).write_text("hello")
+    (tmp_path / "c.json").write_text('{"format": "other"}')
+    for verb in ("calibrate", "show"):
+        for name in ("nothing", "nothing.npz", "nothing.mcap", "nothing/there.csv"):
+            assert mpucal(verb, name) == (3, f"mpucal: there is no file {name}: check the path.\n")
+        for name, sentence in (("text.mcap", "text.mcap is not an MCAP file"), (".", "capture.mcap")):
+            code, said = mpucal(verb, name)
+            assert (code, sentence in said) == (3, True)
+        for name in ("text.npz", "text.docx", "c.bin", "c.json"):
+            code, said = mpucal(verb, name)
+            assert (code, name in said) == (3, True)
+    assert mpucal("session", "--bus", "sim", "-o", "text.mcap/results")[0] == 3
 
 
 def interrupted(times, function):
@@ -128,8 +168,9 @@ STATES = {
 }
 
 
-@pytest.mark.parametrize(("owner", "name"), STATES.values(), ids=STATES.keys())
-@pytest.mark.parametrize("times", [1, 2], ids=["once", "twice"])
+@pytest.mark.parametrize(
+    ("owner", "name", "times"), [(*of, 1 + i % 2) for i, of in enumerate(STATES.values())], ids=STATES.keys()
+)
 @pytest.mark.usefixtures("uncollected")
 def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, walk, tmp_path, monkeypatch, owner, name, times):
     monkeypatch.setattr(owner, name, interrupted(times, getattr(owner, name)))
@@ -139,7 +180,10 @@ def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, walk, tmp_path, monkeyp
     capture = tmp_path / "board" / "capture.mcap"
     if capture.exists():
         assert read_capture(capture).recovered is None
-    assert capture.exists() == (name != "start" or times == 1)
+    assert capture.exists()
+    if name == "add":
+        again = mpucal("session", "--replay", capture, "-o", "again")
+        assert (again[0], "the session was interrupted" in again[1]) == (4, times == 1)
 
 
 def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, walk, tmp_path, monkeypatch):

@@ -64,9 +64,9 @@ def add(path, row):
         raise ValueError(path)
 
 
-blocks = json.loads(Path("recipe.json").read_text())
-known = {Path(path).stem: load(path) for path, text in blocks.items() if text.startswith('\"\"\"')}
-for path, text in blocks.items():
+blocks = json.loads(Path("recipes.json").read_text())
+known = {Path(path).stem: load(path) for path, text in blocks if text.startswith('\"\"\"')}
+for path, text in blocks:
     if not text.startswith('\"\"\"'):
         add(path, text)
 for line in sys.stdin:
@@ -76,29 +76,30 @@ for line in sys.stdin:
 """
 
 
-@pytest.fixture
-def follow(tmp_path):
-    """Return follow(recipe)(words): the output of a command after the recipe, beside two calibrations."""
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with two calibrations, and with the modules of all recipes."""
+    folder = tmp_path_factory.mktemp("followed")
     made = Calibration(np.diag([1.1, 1.0, 0.9]), np.array([0.5, 0.0, -0.5]))
-    made.save(tmp_path / "c.json")
-    replace(made, quality={"verdict": "refused"}).save(tmp_path / "refused.json")
-    begun = []
+    made.save(folder / "c.json")
+    replace(made, quality={"verdict": "refused"}).save(folder / "refused.json")
+    recipes = [RECIPES[title] for title in ("A sink", "A source", "An export form", "A reader", "A chip")]
+    blocks = [block for recipe in recipes for block in recipe.items()]
+    for path, text in blocks:
+        assert (ROOT / path).exists() != text.startswith('"""')
+        if text.startswith('"""'):
+            (folder / Path(path).name).write_text(text)
+    (folder / "recipes.json").write_text(json.dumps(blocks))
+    (folder / "program.py").write_text(PROGRAM)
+    return folder
 
-    def follow(recipe):
-        blocks = RECIPES[recipe]
-        for path, text in blocks.items():
-            if text.startswith('"""'):
-                assert not (ROOT / path).exists()
-                (tmp_path / Path(path).name).write_text(text)
-            else:
-                assert (ROOT / path).exists()
-        (tmp_path / "recipe.json").write_text(json.dumps(blocks))
-        (tmp_path / "program.py").write_text(PROGRAM)
 
-        program = subprocess.Popen(
-            [sys.executable, "program.py"], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        begun.append(program)
+@pytest.fixture(scope="module")
+def call(folder):
+    """Return a function that runs a command after all recipes, and returns what it printed."""
+    with subprocess.Popen(
+        [sys.executable, "program.py"], cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as program:
 
         def call(*words, code=0):
             print(json.dumps(words), file=program.stdin, flush=True)
@@ -106,31 +107,30 @@ def follow(tmp_path):
             assert ended == code, err
             return err if code else out
 
-        return call
-
-    yield follow
-    for program in begun:
-        program.communicate()
+        yield call
 
 
-def test_a_sink(follow, tmp_path):
-    call = follow("A sink")
+def test_a_sink(call, folder):
     assert "notebook.txt has b_a" in call("write", "c.json", "notebook", "--bus", "sim")
-    assert (tmp_path / "notebook.txt").read_text() == "[0.5, 0.0, -0.5] m/s^2\n"
+    assert (folder / "notebook.txt").read_text() == "[0.5, 0.0, -0.5] m/s^2\n"
     assert all("notebook" in call(command, "--help") for command in ("session", "write"))
+    wrong = UsageError.exit_code
+    assert "has no notebook: give exactly one of --bus BUS" in call("session", "--mavlink", "sim", "--to", "notebook", code=wrong)
+    assert "'notebook'" in call("write", "c.json", "diary", "--bus", "sim", code=wrong)
 
 
-def test_a_source(follow):
-    call = follow("A source")
+def test_a_source(call):
     shown = json.loads(call("show", "--shelf", "0x68", "--json"))
     assert (shown["who_am_i"], shown["chip"]) == (0x68, "MPU-6050")
     assert all("--shelf WHO_AM_I" in call(command, "--help") for command in ("session", "record", "stream", "write"))
+    wrong = UsageError.exit_code
+    assert " and --shelf WHO_AM_I." in call("session", code=wrong)
+    assert "--bus and --shelf were given together" in call("session", "--shelf", "0x68", "--bus", "sim", code=wrong)
 
 
-def test_an_export_form(follow, tmp_path):
-    call = follow("An export form")
+def test_an_export_form(call, folder):
     call("export", "c.json", "--to", "octave", "-o", "c.m")
-    script = (tmp_path / "c.m").read_text()
+    script = (folder / "c.m").read_text()
     D, b_a = (re.search(rf"^{name} = \[(.*)\]", script, re.MULTILINE).group(1) for name in ("D", "b_a"))
     np.testing.assert_array_equal(np.array([row.split() for row in D.split(";")], float), np.diag([1.1, 1.0, 0.9]))
     assert json.loads(f"[{b_a}]") == [0.5, 0.0, -0.5]
@@ -142,16 +142,14 @@ def test_an_export_form(follow, tmp_path):
     call("export", "refused.json", "--to", "octave", code=RefusedError.exit_code)
 
 
-def test_a_reader(follow, tmp_path):
-    call = follow("A reader")
+def test_a_reader(call, folder):
     t = np.arange(400) * 0.01
-    np.savetxt(tmp_path / "walk.words", np.column_stack([t, np.full((400, 3), 5.7), np.zeros((400, 3))]))
+    np.savetxt(folder / "walk.words", np.column_stack([t, np.full((400, 3), 5.7), np.zeros((400, 3))]))
     assert json.loads(call("show", "walk.words", "--json"))["samples"] == 400
     assert all("a page of words (.words)" in " ".join(call(name, "--help").split()) for name in ("calibrate", "apply"))
 
 
-def test_a_chip(follow):
-    call = follow("A chip")
+def test_a_chip(call):
     shown = json.loads(call("show", "--bus", "sim:chip=mpu6555,temperature_c=31,hand=still", "--json"))
     assert (shown["who_am_i"], shown["chip"]) == (0x7C, "MPU-6555")
     assert shown["temperature_c"] == pytest.approx(31, abs=0.1)

@@ -1,9 +1,9 @@
-from dataclasses import FrozenInstanceError, fields
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
-from mpucal.data import Recording, Samples, Sensor
+from mpucal.data import Recording, Samples
 from mpucal.errors import RecordingError
 
 N = 6
@@ -27,16 +27,6 @@ def test_keeps_the_arrays_as_float64_copies():
     recording = made(t=t)
     t[0] = 99
     assert recording.t[0] == 0
-
-
-def test_what_was_not_given_is_unknown():
-    recording = made()
-    assert recording.flat is None
-    assert recording.sensor == Sensor()
-    assert np.isnan(recording.temperature_c).all()
-    assert not (recording.gap | recording.acc_clipped | recording.gyr_clipped).any()
-    with pytest.raises(FrozenInstanceError):
-        recording.name = "another"
 
 
 @pytest.mark.parametrize(
@@ -65,10 +55,6 @@ def test_arrays_that_are_no_recording(change, says):
     with pytest.raises(RecordingError, match=says) as raised:
         made(name="x.npz", **change)
     assert str(raised.value).startswith("x.npz: ")
-
-
-def test_the_rate_is_the_median_one():
-    assert made(t=[0, 0.01, 0.02, 0.03, 0.04, 9]).rate_hz == pytest.approx(100)
 
 
 @pytest.mark.parametrize(

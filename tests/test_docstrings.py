@@ -32,11 +32,19 @@ def is_wrong(text):
     return re.split(r"\W", text)[0] in RIDDLES or text.startswith("The same") or len(sentence) > LONGEST
 
 
+def definitions(node):
+    """Yield a node and those that it holds, statements only: expressions define nothing."""
+    yield node
+    for name in ("body", "orelse", "handlers", "finalbody"):
+        for inner in getattr(node, name, ()):
+            yield from definitions(inner)
+
+
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_docstrings_begin_with_a_verb_or_a_noun_and_no_retired_name_comes_back(folder):
     wrong = []
     for path in (PROJECT / folder).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in definitions(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, DOCUMENTED):
                 continue
             where = f"{path.relative_to(PROJECT)}:{getattr(node, 'lineno', 1)}"

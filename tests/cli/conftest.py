@@ -45,19 +45,6 @@ def mpucal(capsys, tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def process():
-    """Return a function that calls mpucal, or another program, in a process of its own."""
-
-    def call(folder: Path, *words, program=("-m", "mpucal")):
-        done = subprocess.run(
-            [sys.executable, *program, *map(str, words)], cwd=folder, capture_output=True, text=True, check=False
-        )
-        return Result(done.returncode, done.stdout, done.stderr)
-
-    return call
-
-
-@pytest.fixture(scope="session")
 def write_capture():
     """Return a function that writes a capture of these records, and returns its path."""
 
@@ -76,37 +63,43 @@ def write_capture():
     return call
 
 
-@dataclass(frozen=True)
-class Session:
-    folder: Path
-    result: Result
+def called(folder, *words):
+    """Run a command in a folder, whose result.json then holds what it said."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = run(list(words))
+    (folder / "result.json").write_text(json.dumps(asdict(Result(code, out.getvalue(), err.getvalue()))))
 
 
 @pytest.fixture(scope="session")
-def session(once, process):
+def session(once):
     """Return a whole session on the simulated chip; tests must not change its folder."""
-
-    def make(folder):
-        words = ("session", "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "board")
-        (folder / "result.json").write_text(json.dumps(asdict(process(folder, *words))))
-
-    folder = once("cli-session", make)
-    return Session(folder / "board", Result(**json.loads((folder / "result.json").read_text())))
+    words = ("session", "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "board")
+    folder = once("cli-session", lambda folder: called(folder, *words))
+    result = Result(**json.loads((folder / "result.json").read_text()))
+    return SimpleNamespace(folder=folder / "board", result=result)
 
 
 @pytest.fixture(scope="session")
 def flown(once):
     """Return a session on the simulated vehicle, which writes to it."""
+    words = (
+        "session",
+        "--mavlink",
+        "sim:imus=1",
+        "--rate",
+        "50",
+        "--target",
+        "quick",
+        "-o",
+        "flown",
+        "--json",
+        "--yes",
+    )
 
     def make(folder):
-        words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder / "flown"), "--json"]
-        with (
-            contextlib.redirect_stdout(io.StringIO()) as out,
-            contextlib.redirect_stderr(io.StringIO()) as err,
-            quick(),
-        ):
-            code = run(["session", *words, "--yes"])
-        (folder / "result.json").write_text(json.dumps({"code": code, "out": out.getvalue(), "err": err.getvalue()}))
+        with quick():
+            called(folder, *words)
 
     folder = once("cli-flown", make)
     return SimpleNamespace(folder=folder / "flown", **json.loads((folder / "result.json").read_text()))
@@ -120,36 +113,6 @@ def spoilt(session, tmp_path):
     path = tmp_path / "spoilt.json"
     path.write_text(json.dumps(document))
     return path
-
-
-class Served:
-    """Process of a program of this folder that adds to mpucal's tables; it runs one command line after another."""
-
-    def __init__(self, program: str) -> None:
-        words = [sys.executable, Path(__file__).with_name("served.py"), program]
-        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-    def __call__(self, folder: Path, *words) -> Result:
-        assert self._process.stdin and self._process.stdout
-        print(json.dumps([str(folder), *map(str, words)]), file=self._process.stdin, flush=True)
-        return Result(*json.loads(self._process.stdout.readline()))
-
-    def end(self) -> None:
-        self._process.communicate()
-
-
-@pytest.fixture(scope="module")
-def served():
-    """Return a function that starts a Served."""
-    begun = []
-
-    def call(program):
-        begun.append(Served(program))
-        return begun[-1]
-
-    yield call
-    for each in begun:
-        each.end()
 
 
 # Time that a busy machine may need for a step of a second or two.

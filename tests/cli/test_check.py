@@ -64,9 +64,3 @@ def test_of_another_sensor(mpucal, calibration, tmp_path):
     assert told.code == 5
     assert told.out.startswith("Another sensor: its offset registers hold")
     assert not (tmp_path / "other" / "calibration.json").exists()
-
-
-def test_check_takes_exactly_one_recording_or_source(mpucal, calibration):
-    assert mpucal("check", calibration).code == 2
-    assert mpucal("check", calibration, "walk.npz", "--bus", "sim").code == 2
-    assert mpucal("check", calibration, "walk.npz", "--to", "chip").code == 2

@@ -65,7 +65,7 @@ def test_a_board_that_was_not_written_is_said(installed, programs, capsys):
     assert "could not write to the board on /dev/ttyX" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("board", firmware.NAMES)
+@pytest.mark.parametrize("board", ["mega", "pico"])
 def test_other_boards_are_left_to_arduino_cli(installed, programs, capsys, board):
     assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 3
     command = capsys.readouterr().err.partition("then: ")[2].strip().rstrip(".")
@@ -81,8 +81,3 @@ def test_without_avrdude_the_command_is_given(installed, programs, capsys):
     assert (
         f"avrdude -p atmega328p -c arduino -b 115200 -P /dev/ttyX -D -U flash:w:{installed}" in capsys.readouterr().err
     )
-
-
-@pytest.mark.parametrize("words", [[], ["-o", "x", "--flash", "y"]])
-def test_one_of_both_is_asked_for(words, capsys):
-    assert run(["firmware", *words]) == 2

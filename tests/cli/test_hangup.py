@@ -112,6 +112,7 @@ def test_a_session_whose_terminal_is_closed_while_it_waits_for_its_page_goes_on(
     assert "The calibration is good." in (tmp_path / "board" / "session.log").read_text()
 
 
+@pytest.mark.slow
 def test_a_measurement_of_noise_keeps_its_result(on_a_terminal, tmp_path):
     measurement = on_a_terminal("--bus", "sim:hand=still", held=("noise", 5), command=("noise", "-o", "noise"))
     measurement.read_until_held()

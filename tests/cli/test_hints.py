@@ -11,8 +11,9 @@ import pytest
 import mpucal as package
 from mpucal.batch.row import Settings, make_row
 from mpucal.cli.recording_options import read_hints_file
+from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.errors import UsageError
-from mpucal.files.hints import Hints, parse_span
+from mpucal.files.hints import Hints
 from mpucal.result.calibration import Calibration
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
@@ -30,28 +31,14 @@ def table(recording, tmp_path):
     r = recording
     columns = [r.t, *r.acc[:, [0, 2]].T, r.gyr[:, 1], r.acc[:, 1], *r.gyr[:, [0, 2]].T]
     np.savetxt(tmp_path / "odd.csv", np.column_stack(columns), delimiter=",", header="a,b,c,d,e,f,g", comments="")
-    Calibration(np.eye(3), np.zeros(3), quality={"verdict": "good", "reasons": []}).save(tmp_path / "c.json")
     return tmp_path / "odd.csv"
 
 
-@pytest.mark.parametrize(
-    "words",
-    [("show", "odd.csv", "--json"), ("apply", "c.json", "odd.csv", "-o", "out.npz", "--json")],
-    ids=lambda w: w[0],
-)
-def test_every_command_takes_columns_and_span(words, mpucal, table, recording):
-    assert mpucal(*words).code == 3
-    done = mpucal(*words, *SAID)
-    assert done.code == 0, done.err
-    assert json.loads(done.out)["samples"] == len(recording)
-    cut = mpucal(*words, *SAID, "--span", "2:7")
+def test_a_command_takes_columns_and_span(mpucal, table, recording):
+    assert mpucal("show", "odd.csv").code == 3
+    assert json.loads(mpucal("show", "odd.csv", "--json", *SAID).out)["samples"] == len(recording)
+    cut = mpucal("show", "odd.csv", "--json", *SAID, "--span", "2:7")
     assert json.loads(cut.out)["samples"] == pytest.approx(5 * recording.rate_hz, abs=1)
-
-
-def test_a_device_needs_no_columns(mpucal):
-    done = mpucal("show", "--bus", "sim", "--columns", "t,ax,ay,az,gx,gy,gz", "--rate", "100")
-    assert done.code == 2
-    assert "--columns and --rate say how a file is read, and a device was given" in done.err
 
 
 def test_a_batch_takes_hints_by_pattern(table, recording, tmp_path):
@@ -66,13 +53,10 @@ def test_a_batch_takes_hints_by_pattern(table, recording, tmp_path):
     row = make_row(str(table), pickle.loads(pickle.dumps(settings)))
     assert row["samples"] == len(recording)
     assert "its columns are a, b, c, d, e, f, g" in make_row(str(table), Settings("accel", 9.80665))["error"]
-
-
-@pytest.mark.parametrize("line", ["*.csv --units acc=feet", "*.csv --rate", "*.csv 'open", "*.csv more"])
-def test_a_bad_line_of_hints_is_named(line, tmp_path):
-    (tmp_path / "hints").write_text(f"*.txt --rate 100\n{line}\n")
-    with pytest.raises(UsageError, match="line 2 is not a pattern with options"):
-        read_hints_file(tmp_path / "hints")
+    for line in ("*.csv --units acc=feet", "*.csv --rate", "*.csv 'open", "*.csv more"):
+        (tmp_path / "hints").write_text(f"*.txt --rate 100\n{line}\n")
+        with pytest.raises(UsageError, match="line 2 is not a pattern with options"):
+            read_hints_file(tmp_path / "hints")
 
 
 def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording):
@@ -85,19 +69,11 @@ def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording):
     command = refused.err.splitlines()[-1].removeprefix("mpucal: try `").removesuffix("`")
     assert command == "mpucal apply c.json in.csv -o out.npz --units gyr=deg/s"
     assert mpucal(*shlex.split(command)[1:]).code == 0
-    assert mpucal("show", "in.csv").err.endswith("mpucal: try `mpucal show in.csv --units gyr=deg/s`\n")
-
-
-def test_a_refused_recording_ends_with_the_command_that_reads_it(mpucal, recording):
-    names, rows = "t,ax,ay,az,gx,gy,gz", (recording.t, recording.acc / 9.80665, recording.gyr)
-    np.savetxt("in.csv", np.column_stack(rows), delimiter=",", header=names, comments="")
+    # A recording that is read, but refused, ends with the command that reads it right.
+    rows = (recording.t, recording.acc / STANDARD_GRAVITY_MPS2, recording.gyr)
+    np.savetxt("in.csv", np.column_stack(rows), delimiter=",", header="t,ax,ay,az,gx,gy,gz", comments="")
     found = mpucal("calibrate", "in.csv", "--units", "t=s,acc=m/s^2")
     assert found.out.endswith("and run\n  mpucal calibrate in.csv --units t=s,acc=g\n")
-    np.savetxt("in.csv", np.column_stack([rows[0], rows[2], recording.acc]), delimiter=",", header=names, comments="")
-    found = mpucal("calibrate", "in.csv")
-    assert found.code == 5
-    assert "one is in the place of the other" in " ".join(found.out.split())
-    assert mpucal("calibrate", "in.csv", *found.out.split()[-2:]).code != 5
 
 
 TAKEN, HAS_NONE = "x/y/board", "192.0.2.1:9"  # a folder that cannot be made, and an address of no computer
@@ -131,12 +107,6 @@ def test_a_part_of_any_recording_is_read(recording):
     assert part.t[-1] - whole.t[0] < 7.0
     with pytest.raises(package.MpucalError, match="give a --span within that"):
         package.load(FIXTURE, span="2000:")
-    with pytest.raises(package.MpucalError, match="is not a span"):
-        package.load(FIXTURE, span="7")
-
-
-@pytest.mark.parametrize("text", ["7", "7:2", "-1:3", "a:b", "nan:3", ""])
-def test_spans_that_are_none(text):
-    with pytest.raises(ValueError, match="is not a span"):
-        parse_span(text)
-    assert parse_span(":3") == (0.0, 3.0)
+    for text in ("7", "7:2", "-1:3", "a:b", "nan:3"):
+        with pytest.raises(package.MpucalError, match="is not a span"):
+            package.load(FIXTURE, span=text)

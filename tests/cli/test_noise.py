@@ -1,7 +1,6 @@
 """`mpucal noise`: from a recording and from a sensor, and what other commands take of it."""
 
 import json
-import signal
 
 import numpy as np
 import pytest
@@ -75,21 +74,9 @@ def test_ctrl_c_keeps_the_result_so_far(mpucal, monkeypatch):
     assert json.loads(told.out)["samples"] == sum(calls)
 
 
-@pytest.mark.slow
-def test_sigterm_keeps_the_result_so_far_too(stopped_at, tmp_path):
-    told = stopped_at(tmp_path, ("noise", 5), signal.SIGTERM, "noise", "--bus", "sim:hand=still", "-o", "noise")
-    assert told.code == 0, told.err
-    assert 3.0 < json.loads((tmp_path / "noise" / "noise.json").read_text())["seconds"] < 6.0
-
-
 def test_a_sensor_that_fails_keeps_the_result_so_far(mpucal):
     told = mpucal("noise", "--bus", "sim:hand=still,fault=unplugged@20", "--rate", "100", "--json")
     assert told.code == 3
     assert 10.0 < json.loads(told.out)["seconds"] < 20.0
     assert "mpucal: nothing answers at 0x68" in told.err
     assert "; the noise is that of the 1" in told.err
-
-
-def test_noise_takes_exactly_one_recording_or_source(mpucal):
-    assert mpucal("noise").code == 2
-    assert mpucal("noise", "lying.npz", "--bus", "sim").code == 2

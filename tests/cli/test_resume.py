@@ -14,7 +14,6 @@ from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 
 STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
-OLD_VEHICLE = Path(__file__).parents[1] / "mavlink" / "data" / "px4_turned.tlog"
 WORDS = ("session", "--json-events", "--yes")
 
 
@@ -79,21 +78,6 @@ def test_a_resumed_session_has_the_bits_of_an_unbroken_one(mpucal, stopped_at, w
     assert replayed.quality["verification"] == found.quality["verification"]
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["--resume", "nowhere"], "nowhere does not hold a session"),
-        (["--resume", "x", "--bus", "sim"], "--resume does not take --bus"),
-        (["--resume", "x", "-o", "y"], "--resume does not take -o"),
-    ],
-    ids=["no session", "another source", "another folder"],
-)
-def test_errors_of_resume_name_the_problem(mpucal, words, sentence):
-    result = mpucal("session", *words)
-    assert result.code == 2
-    assert sentence in result.err
-
-
 @pytest.fixture
 def cut_off(write_capture, tmp_path):
     """Return a function that writes the first seconds of a session's capture into the folder `cut`."""
@@ -109,7 +93,7 @@ def cut_off(write_capture, tmp_path):
 
 
 def resume_vehicle(mpucal, begins):
-    """Resume the session in the folder `cut`, replay it, and compare; return its recording and that of the cut part.
+    """Resume the session in the folder `cut`; return its recording, that of the cut part, and its calibration.
 
     The simulated vehicle stands where it was switched on, and its clock begins again.
     """
@@ -121,14 +105,7 @@ def resume_vehicle(mpucal, begins):
     recording, first = load("cut"), load("cut/capture.mcap")
     assert recording.gap.sum() == 1
     assert np.array_equal(first.acc, recording.acc[: len(first)])
-    found = Calibration.load("cut/calibration.json")
-    again = mpucal(*WORDS, "--replay", "cut", "-o", "again")
-    assert again.code == 0, again.err
-    replayed = Calibration.load("again/calibration.json")
-    assert np.array_equal(replayed.D, found.D)
-    assert np.array_equal(replayed.b_a, found.b_a)
-    assert replayed.quality["verification"] == found.quality["verification"]
-    return recording, first, found
+    return recording, first, Calibration.load("cut/calibration.json")
 
 
 def test_a_vehicle_is_resumed_after_a_reboot_while_rotating(mpucal, flown, cut_off):
@@ -142,18 +119,14 @@ def test_a_vehicle_of_two_imus_is_resumed_after_a_reboot_while_flat(mpucal, cut_
     assert mpucal(*WORDS, *words, "--prepare=yes", "-o", "whole").code == 0
     cut_off(tmp_path / "whole", 6.0)
     recording, first, found = resume_vehicle(mpucal, "lay_flat")
+    again = mpucal(*WORDS, "--replay", "cut", "-o", "again")
+    assert again.code == 0, again.err
+    assert Calibration.load("again/calibration.json").quality["verification"] == found.quality["verification"]
     assert np.array_equal(first.others[0].gyr, recording.others[0].gyr[: len(first.others[0])])
     for other in (calibrate(recording), calibrate(load("again"))):
         assert np.array_equal(other.D, found.D)
     checked = mpucal("check", "whole/calibration.json", "--replay", "whole", "--yes")
     assert checked.code == 0, checked.err
-
-
-def test_a_vehicles_session_of_an_earlier_version_cannot_be_resumed(mpucal, tmp_path):
-    (tmp_path / "capture.tlog").write_bytes(OLD_VEHICLE.read_bytes())
-    result = mpucal("session", "--resume", str(tmp_path))
-    assert result.code == 2
-    assert "does not name its source" in result.err
 
 
 def test_a_capture_without_a_source_cannot_be_resumed(mpucal, write_capture, tmp_path):
@@ -181,10 +154,6 @@ def test_a_board_that_was_never_still_is_laid_flat_again(mpucal, write_capture, 
     resumed = mpucal("session", "--resume", "calm")
     assert resumed.code == 0, resumed.err
     assert resumed.err.count("LAY FLAT") == 1
-    found = Calibration.load(tmp_path / "calm" / "calibration.json")
-    again = mpucal("session", "--replay", "calm", "-o", "again")
-    assert again.code == 0, again.err
-    assert np.array_equal(Calibration.load(tmp_path / "again" / "calibration.json").D, found.D)
 
 
 @pytest.mark.parametrize(

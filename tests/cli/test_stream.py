@@ -36,13 +36,6 @@ def test_a_stream_is_calibrated(mpucal, made):
     np.testing.assert_allclose([float(v) for v in table[1].split(",")[1:4]], rows[0]["a"], atol=1e-12)
 
 
-def test_a_capture_does_not_stream(mpucal, made):
-    words = ("--replay", "capture.mcap", "--apply", made)
-    done = mpucal("stream", *words)
-    assert done.code == 2
-    assert "mpucal apply" in done.err
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     path = tmp_path_factory.mktemp("made") / "calibration.json"
@@ -66,23 +59,17 @@ class Weighing(io.StringIO):
         self.weights.append(tracemalloc.get_traced_memory()[0])
 
 
-@pytest.mark.parametrize(
-    ("source", "seconds", "kept"),
-    [(("--bus", "sim:seed=3"), 20, 170_000), (("--mavlink", "sim"), 5, 500_000)],
-    ids=["chip", "vehicle"],
-)
-def test_memory_does_not_grow(made, monkeypatch, source, seconds, kept):
-    """Kept, the second half's samples would weigh as much as `kept`, a share of which is left to chance."""
+def test_memory_does_not_grow(made, monkeypatch):
+    """Kept, the second half's samples would weigh 170 kB, a third of which is left to chance."""
     listener = Weighing()
     monkeypatch.setattr(sys, "stdout", listener)
-    words = ["stream", *source, "--apply", str(made), "--seconds", str(seconds)]
     try:
-        assert run(words) == 0
+        assert run(["stream", "--bus", "sim:seed=3", "--apply", str(made), "--seconds", "20"]) == 0
     finally:
         tracemalloc.stop()
     weights = listener.weights
     assert len(weights) > 20
-    assert max(weights[len(weights) // 2 :]) - max(weights[: len(weights) // 2]) < kept / 3
+    assert max(weights[len(weights) // 2 :]) - max(weights[: len(weights) // 2]) < 170_000 / 3
 
 
 def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
@@ -103,16 +90,14 @@ def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
 
 
 def test_rests_that_contradict_the_calibration_are_reported_once(mpucal, session):
-    right = session.folder / "calibration.json"
-    calibration = Calibration.load(right)
+    calibration = Calibration.load(session.folder / "calibration.json")
     replace(calibration, b_a=calibration.b_a + np.array([0.0, 0.0, 0.3])).save("wrong.json")
-    words = ("stream", "--bus", "sim:seed=3,hand=still", "--rate", "25", "--seconds", "60", "--watch", "--apply")
-    assert "contradict" not in mpucal(*words, right).err
+    words = ("stream", "--bus", "sim:seed=3,hand=still", "--rate", "25", "--seconds", "30", "--watch", "--apply")
+    assert "contradict" not in mpucal(*words, session.folder).err
     told = mpucal(*words, "wrong.json")
-    assert told.code == 0
-    assert told.err.count("rests contradict the calibration (|a| is wrong by up to") == 1
-    assert told.out.count("\n") > 1450
+    assert (told.code, told.err.count("rests contradict the calibration (|a| is wrong by up to")) == (0, 1)
+    assert told.out.count("\n") > 700
     (event,) = map(json.loads, mpucal(*words, "wrong.json", "--json-events").err.splitlines())
     assert (event["event"], event["code"]) == ("caution", "accelerometer_contradicted")
-    assert 0.0 < event["t_s"] < 60.0
+    assert 0.0 < event["t_s"] < 30.0
     assert f"{event['what']}: {event['do']}" in told.err

@@ -9,7 +9,6 @@ from click.testing import CliRunner
 
 from mpucal.cli import commands
 from mpucal.cli.page import choose_board
-from mpucal.errors import UsageError
 from mpucal.origin import Origin
 from mpucal.sources.opened_source import SOURCE
 from mpucal.sources.opening import open_source, reopen_source
@@ -28,40 +27,13 @@ def recorded(tmp_path_factory):
     return path
 
 
-def test_a_recording_of_a_vehicle_is_shown(recorded):
-    result = run("show", recorded)
-    assert "ArduPilot-IMU1" in result.output
-    assert "200.00 Hz" in result.output
-
-
-@pytest.mark.parametrize(
-    ("words", "what"),
-    [
-        (["--mavlink", "sim", "--accel-range", 8], "--mavlink sim does not take --accel-range"),
-        (["--mavlink", "nonsense"], "cannot be understood"),
-        (["--mavlink", "sim", "--signing-key", "/no/such/key"], "cannot be read"),
-    ],
-)
-def test_options_of_another_source_are_refused(words, what, tmp_path):
-    result = run("session", *words, "-o", tmp_path / "out", "--yes")
-    assert isinstance(result.exception, UsageError)
-    assert what in str(result.exception)
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_capture_of_mpucal_fixes_its_options(recorded, tmp_path):
-    result = run("session", "--replay", recorded, "--gravity", 9.8, "-o", tmp_path / "out", "--yes")
-    assert isinstance(result.exception, UsageError)
-    assert "which the capture fixes" in str(result.exception)
-
-
 def test_a_vehicle_takes_rates_that_a_chip_does_not(tmp_path):
     path = tmp_path / "capture.mcap"
     result = run("record", "--mavlink", "sim:imus=1", "--rate", 300, "--seconds", 4, "-o", path)
     assert result.exception is None, result.output
-    assert float(re.search(r"at ([\d.]+) Hz", run("show", path).output).group(1)) > 299
-    result = run("record", "--mavlink", "sim:imus=1", "--rate", 5000, "--seconds", 4, "-o", tmp_path / "x.mcap")
-    assert isinstance(result.exception, UsageError)
+    shown = run("show", path).output
+    assert "ArduPilot-IMU1" in shown
+    assert float(re.search(r"at ([\d.]+) Hz", shown).group(1)) > 299
 
 
 def test_a_source_says_what_it_is_and_the_drawn_board_follows_from_it(recorded):

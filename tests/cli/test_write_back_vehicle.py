@@ -3,34 +3,15 @@
 import json
 
 import numpy as np
-import pytest
 
-from mpucal.cli.destination import make_device
-from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
 from mpucal.sinks.choose import interrupted_writes
-from mpucal.sinks.table import SINKS
-from mpucal.sinks.write_back import session_recorder, write_to_all
 from mpucal.sources.table import matching_kinds
 
-SOURCE = {
-    "bus": None,
-    "serial": None,
-    "replay": None,
-    "system": None,
-    "signing_key": None,
-    "address": None,
-    "seed": None,
-}
-WORDS = {
-    **SOURCE,
-    "rate": 200.0,
-    "accel_range": "4",
-    "gyro_range": "500",
-    "dlpf": 3,
-    "gravity": 9.80665,
-    "model": "auto",
+OPTIONS = {
+    **dict.fromkeys(("bus", "serial", "replay", "system", "signing_key", "address", "seed")),
+    **{"rate": 200.0, "accel_range": "4", "gyro_range": "500", "dlpf": 3, "gravity": 9.80665, "model": "auto"},
 }
 
 
@@ -64,19 +45,8 @@ def test_a_recording_before_the_write_takes_the_calibration_before_it(flown, mpu
     assert "while these samples were taken" in other.err
 
 
-def test_a_vehicle_that_refuses_keeps_its_parameters(flown, tmp_path):
-    measured = Calibration.load(flown.folder / "calibration.json")
-    record = session_recorder(tmp_path, measured, None, None)
-    vehicle = make_device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"}, yes=True)
-    with pytest.raises(WriteBackError) as raised:
-        list(write_to_all((SINKS["autopilot"],), measured, vehicle, tmp_path, record, lambda question: None))
-    assert raised.value.exit_code == 6
-    # No file claims that something was written.
-    assert not (tmp_path / "calibration.json").exists()
-
-
 def test_a_write_that_was_killed_is_told_before_the_next_session():
-    options = {**WORDS, "mavlink": "sim:imus=1,seed=77"}
+    options = {**OPTIONS, "mavlink": "sim:imus=1,seed=77"}
     kind = matching_kinds(options)[0]
     assert list(interrupted_writes(kind, options)) == []
     journal = Journal.of("autopilot", "sim:imus=1,seed=77")

@@ -1,8 +1,16 @@
-"""`mpucal write ... chip` and `mpucal doctor` on the simulated chip."""
+"""`mpucal write ... chip`, a session that writes to the chip it calibrated, and the question before a write."""
 
 import json
+from pathlib import Path
 
+import numpy as np
 import pytest
+
+from mpucal.cli import person
+from mpucal.errors import WriteBackError
+from mpucal.files import load
+from mpucal.result.calibration import Calibration
+from tools.processes import quick
 
 
 @pytest.fixture(scope="module")
@@ -18,6 +26,10 @@ def test_the_written_calibration_states_what_the_chip_subtracts(mpucal, calibrat
     left = {path.name for path in tmp_path.iterdir()}
     assert left >= {"chip-offsets.json", "calibration-on-chip.json", "calibration-on-chip.bin"}
     assert json.loads((tmp_path / "calibration-on-chip.json").read_text()) == json.loads(written.out)
+    # The registers are volatile, which is said; the old state is restored from its file.
+    again = mpucal("write", tmp_path / "chip-offsets.json", "chip", "--bus", "sim:seed=3", "-o", tmp_path)
+    assert (again.code, again.out[:6]) == (0, "Done: ")
+    assert "volatile" in mpucal("write", calibrated, "chip", "--bus", "sim:seed=3", "-o", tmp_path).out
 
 
 def test_numbers_that_changed_since_are_written_only_by_force(mpucal, spoilt, tmp_path):
@@ -30,27 +42,44 @@ def test_numbers_that_changed_since_are_written_only_by_force(mpucal, spoilt, tm
     assert (shown.code, "its digest does not match" in shown.err) == (0, True)
 
 
-def test_a_write_to_volatile_registers_is_announced(mpucal, calibrated, tmp_path):
-    result = mpucal("write", calibrated, "chip", "--bus", "sim:seed=3", "-o", tmp_path)
-    assert "volatile" in result.out
-
-
-@pytest.mark.parametrize(
-    ("bus", "words"),
-    [
-        ("sim:seed=4", "the old state of the offset registers is restored"),
-        ("sim:seed=3,offsets=readonly", "does not respond to its offset registers"),
-        ("sim:seed=3,chip=mpu6500", "nothing was written"),
-    ],
-    ids=["other_piece", "read_only", "other_chip"],
-)
-def test_a_refusal_is_exit_code_6_and_one_sentence(mpucal, calibrated, tmp_path, bus, words):
-    result = mpucal("write", calibrated, "chip", "--bus", bus, "-o", tmp_path)
+def test_a_refusal_is_exit_code_6_and_says_what_the_chip_holds(mpucal, calibrated, tmp_path):
+    result = mpucal("write", calibrated, "chip", "--bus", "sim:seed=4", "-o", tmp_path)
     assert result.code == 6
-    assert words in result.err
-    assert "Traceback" not in result.err
+    assert "the old state of the offset registers is restored" in result.err
     assert not (tmp_path / "calibration-on-chip.json").exists()
 
 
-def test_a_doctor_wants_a_bus(mpucal, session):
-    assert mpucal("doctor", "--replay", session.folder / "capture.mcap").code == 2
+@pytest.mark.parametrize("answer", ["y\n", "n\n", None], ids=["yes", "no", "no terminal"])
+def test_a_question_is_asked_on_a_terminal_only(monkeypatch, answer):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: answer is not None, raising=False)
+    asked = []
+    monkeypatch.setattr("click.confirm", lambda question, err: asked.append(question) or answer == "y\n")
+    if answer == "n\n":
+        with pytest.raises(WriteBackError, match="you declined"):
+            person.ask("Write?", yes=False)
+    else:
+        person.ask("Write?", yes=False)
+    person.ask("Write?", yes=True)
+    assert len(asked) == (answer is not None)
+
+
+def test_a_session_writes_to_the_chip_and_says_so(mpucal):
+    source = ("--bus", "sim", "--seed", "3", "--rate", "50", "--target", "quick")
+    with quick():
+        result = mpucal("session", *source, "--to", "chip", "-o", "board", "--json", "--yes")
+    assert result.code == 0, result.err
+    made = Calibration.load("board/calibration.json")
+    assert result.out == made.json()
+    (entry,) = made.extra["written"]
+    assert (entry["to"], entry["where"]) == ("chip", "the chip on sim")
+    # A word of the register is 0.5 mg, and only even words are written.
+    np.testing.assert_allclose(made.applied_in_hardware, made.b_a, atol=0.0055)
+    np.testing.assert_array_equal(
+        Calibration.load("board/calibration.bin").applied_in_hardware, np.float32(made.applied_in_hardware)
+    )
+    assert "offset registers" in Path("board/report.html").read_text()
+    assert "Results are written to files and the chip's offset registers" in result.err
+    # The capture was recorded before the write, so all of b_a is subtracted from its samples.
+    mpucal("apply", "board/calibration.json", "board", "-o", "out.npz")
+    acc = (load("board").acc - made.b_a) @ np.linalg.inv(made.D).T
+    np.testing.assert_allclose(load("out.npz").acc, acc, atol=1e-12)
