@@ -24,10 +24,10 @@ def sigmas(calibration, D, b_a):
     return np.append((calibration.D - symmetric) / calibration.D_std, (calibration.b_a - b_a) / calibration.b_a_std)
 
 
-@pytest.mark.parametrize("seed", range(60, 63))
-def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, seed):
-    made = hand(seed, "pose12")
-    calibration = calibrate(replace(made.recording, gyr=np.zeros_like(made.recording.gyr)), "auto", G)
+@pytest.mark.parametrize("rate", [0.0, np.nan], ids=["a dead gyroscope", "no gyroscope"])
+def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, rate):
+    made = hand(60, "pose12")
+    calibration = calibrate(replace(made.recording, gyr=np.full_like(made.recording.gyr, rate)), "auto", G)
     assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
     assert np.abs(sigmas(calibration, made.truth.D, made.truth.b_a)).max() < 4.0
     assert calibration.quality["error_std"]["rms"] < 0.03
@@ -35,7 +35,7 @@ def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, seed):
 
 
 def test_it_is_an_ellipsoid_through_the_rests(hand):
-    recording = hand(66, "pose12").recording
+    recording = hand(60, "pose12").recording
     calibration = calibrate(recording, "static", G)
     runs = RestFinder(recording, flat_statistics(recording, find_flat(recording))).typical()
     means = statistics(recording.acc, runs)[0]
@@ -50,14 +50,13 @@ def test_it_is_an_ellipsoid_through_the_rests(hand):
     assert np.abs(away / std).max() < 1.0
 
 
-@pytest.mark.parametrize("gap_s", [0.0, 3.0])
-def test_six_faces_that_were_joined_give_biases_and_scale_factors(gap_s):
+def test_six_faces_that_were_joined_give_biases_and_scale_factors():
     rng = np.random.default_rng(7)
     D, b_a = np.diag([1.015, 0.985, 1.01]), np.array([0.3, -0.2, 0.4])
     n = 500
     acc = np.concatenate([G * D @ face + b_a + rng.normal(0.0, 0.03, (n, 3)) for face in FACES[[5, *range(5)]]])
     gyr = rng.normal(0.0, 0.002, acc.shape)
-    t = 0.01 * np.arange(len(acc)) + gap_s * (np.arange(len(acc)) // n)
+    t = 0.01 * np.arange(len(acc)) + 3.0 * (np.arange(len(acc)) // n)
     calibration = calibrate(Recording.from_arrays(t, acc, gyr), "auto", G)
     assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
     assert calibration.fit["at_prior"] == ["D_xy", "D_xz", "D_yx", "D_yz", "D_zx", "D_zy"]
@@ -66,22 +65,14 @@ def test_six_faces_that_were_joined_give_biases_and_scale_factors(gap_s):
     assert {reason["code"] for reason in calibration.quality["reasons"]} == {"gyro_off", "few_orientations"}
 
 
-def test_an_accelerometer_alone_is_calibrated_by_its_rests(hand):
-    made = hand(67, "pose12")
-    alone = replace(made.recording, gyr=np.full_like(made.recording.gyr, np.nan))
-    calibration = calibrate(alone, "auto", G)
-    assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
-    assert np.abs(sigmas(calibration, made.truth.D, made.truth.b_a)).max() < 4.0
-
-
 def test_rests_that_differ_little_are_refused(hand):
-    recording = hand(68, "turns").recording.part(0, 2000)
+    recording = hand(1, "turns").recording.part(0, 2000)
     calibration = calibrate(replace(recording, gyr=np.zeros_like(recording.gyr)), "auto", G)
     assert calibration.verdict == "refused"
 
 
 def test_it_is_compared_and_checked_in_the_accelerometers_own_axes(hand):
-    made = hand(69, "pose12")
+    made = hand(60, "pose12")
     with_gyroscope = calibrate(made.recording, "auto", G)
     dead = replace(made.recording, gyr=np.zeros_like(made.recording.gyr))
     alone = calibrate(dead, "auto", G)

@@ -1,4 +1,4 @@
-"""Words of a logger that takes the low byte for a signed number, and of those that do not."""
+"""Words of a chip: bits that never change, and a low byte taken for a signed number; whole and damaged counts."""
 
 from dataclasses import replace
 
@@ -6,21 +6,141 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.words import correct_signed_bytes, words_of
-from mpucal.data import Sensor
+from mpucal.calibration.words import correct_signed_bytes
+from mpucal.data import Recording, Sensor
 from mpucal.recheck.observed import observe
 
 G = 9.82
 LSB, GYRO_LSB = 4.0 * 9.80665 / 32768, np.deg2rad(500.0 / 32750)
+KNOWN, UNKNOWN = Sensor(accel_range_g=4.0, gyro_range_dps=500.0), Sensor()
 
 
 @pytest.fixture(scope="module")
-def sound(in_hand):
-    """Recording of whole counts, as its file may hold it."""
+def counted(in_hand):
+    """Return a function that makes counts of a good recording; `spoil` changes them in place."""
+
+    def make(sensor=KNOWN, spoil=lambda acc, gyr: None):
+        r = in_hand.recording
+        acc, gyr = np.rint(r.acc / LSB).astype(int), np.rint(r.gyr / GYRO_LSB).astype(int)
+        spoil(acc, gyr)
+        return replace(r, acc=acc * LSB, gyr=gyr * GYRO_LSB, sensor=sensor)
+
+    return make
+
+
+def against(recording, model="hand"):
+    """Return the sentence about bits that never move; None where there is none."""
+    said = calibrate(recording, model, G).quality["reasons"]
+    return next((reason["message"] for reason in said if reason["code"] == "bits_stuck"), None)
+
+
+def low_byte(acc, gyr):
+    acc[:, 0] &= ~0xFF
+
+
+def low_byte_of_the_gyroscope(acc, gyr):
+    gyr[:, 2] &= ~0xFF
+
+
+def low_byte_later(acc, gyr):
+    acc[len(acc) * 2 // 3 :, 1] &= ~0xFF
+
+
+def low_byte_of_all(acc, gyr):
+    acc &= ~0xFF
+
+
+def low_byte_on_a_bad_bus(acc, gyr):
+    low_byte(acc, gyr)
+    acc[::60] ^= 1
+
+
+def middle_bit(acc, gyr):
+    acc[:, 0] |= 1 << 6
+
+
+def high_bit(acc, gyr):
+    acc[:, 1] |= 1 << 13
+
+
+def sign(acc, gyr):
+    acc[:, 2] &= 0x7FFF
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sensor", "what"),
+    [
+        (low_byte, KNOWN, "the low 8 bits of the accelerometer's x never move: it reads in steps of 0.31 m/s^2"),
+        (low_byte, UNKNOWN, "the low 8 bits of the accelerometer's x never move"),
+        (low_byte_of_the_gyroscope, KNOWN, "the low 8 bits of the gyroscope's z never move: it reads in steps of 0.06"),
+        (low_byte_later, KNOWN, "the low 8 bits of the accelerometer's y never move from "),
+        (low_byte_of_all, KNOWN, "the low 8 bits of the accelerometer's"),
+        (low_byte_on_a_bad_bus, KNOWN, "the low 8 bits of the accelerometer's x never move"),
+        (middle_bit, UNKNOWN, "bit 6 of the accelerometer's x never moves"),
+        (high_bit, KNOWN, "bit 13 of the accelerometer's y never moves"),
+        (sign, KNOWN, "bit 15 of the accelerometer's z never moves"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_bits_that_never_move_are_named(counted, spoil, sensor, what):
+    assert against(counted(sensor, spoil)).startswith(what)
+
+
+def test_a_bit_that_died_midway_is_named_across_gaps_and_errors(hand):
+    r = hand(3, "continuous").recording
+    counts = np.rint(r.acc / LSB).astype(int)
+    counts[len(r) // 3 :, 1] &= ~(1 << 12)
+    counts[::2000, 1] |= 1 << 12
+    recording = replace(r, acc=counts * LSB, gap=np.arange(len(r)) == len(r) * 3 // 4, sensor=KNOWN)
+    assert against(recording).startswith("bit 12 of the accelerometer's y never moves")
+
+
+def test_an_axis_is_judged_beside_axes_as_fine_as_a_float(counted):
+    recording = counted(UNKNOWN, low_byte)
+    acc = 1.001 * recording.acc
+    acc[:2, 1:] = [[0.0, 0.0], [5e-324, 5e-324]]
+    assert against(replace(recording, acc=acc)).startswith("the low 15 bits of the accelerometer's x")
+
+
+@pytest.mark.parametrize("sensor", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_an_honest_sensor_is_not_accused(counted, sensor):
+    def twelve_bits(acc, gyr):
+        acc &= ~0xF
+
+    for recording in (counted(sensor), counted(sensor, twelve_bits)):
+        assert against(recording) is None
+
+
+@pytest.mark.parametrize("step", [9.80665e-3, 1e-2], ids=["an autopilot's mG", "two digits"])
+def test_a_stream_in_coarse_units_is_not_accused(in_hand, step):
     r = in_hand.recording
-    return replace(
-        r, acc=np.rint(r.acc / LSB) * LSB, gyr=np.rint(r.gyr / GYRO_LSB) * GYRO_LSB, sensor=Sensor(accel_range_g=4.0)
-    )
+    for sensor in (KNOWN, UNKNOWN):
+        coarse = replace(r, acc=np.rint(r.acc / step) * step, gyr=np.rint(r.gyr / 1e-3) * 1e-3, sensor=sensor)
+        assert against(coarse) is None
+
+
+@pytest.mark.parametrize(("bits", "verdict"), [(3, "usable"), (8, "refused")])
+def test_an_axis_coarser_than_the_calibrations_uncertainty_is_refused(counted, bits, verdict):
+    def dead(acc, gyr):
+        acc[:, 0] &= -(1 << bits)
+
+    quality = calibrate(counted(spoil=dead), "hand", G).quality
+    assert quality["verdict"] == verdict
+    assert quality["reasons"][0]["code"] == "bits_stuck"
+
+
+def test_single_faces_that_were_joined_are_not_accused():
+    """A bit is the same in all six by chance, and no value between two faces was passed."""
+    faces = np.repeat([[60, -8100, 250], [6200, 400, 300], [-7900, 500, 200], [80, 8200, 350], [90, 70, 8300]], 400, 0)
+    acc = (faces + np.rint(20.0 * np.random.default_rng(4).standard_normal(faces.shape))) * LSB
+    gap = np.arange(len(faces)) % 400 == 0
+    gyr = GYRO_LSB * np.rint(0.002 * np.random.default_rng(5).standard_normal(acc.shape) / GYRO_LSB)
+    joined = replace(Recording.from_arrays(0.01 * np.arange(len(acc)), acc, gyr), sensor=KNOWN)
+    assert against(replace(joined, gap=gap), "static") is None
+    assert against(joined, "static") is None
+
+
+# ---- a low byte that was taken for a signed number
 
 
 def read_signed(recording, axes=slice(None)):
@@ -36,17 +156,18 @@ def read_signed(recording, axes=slice(None)):
     return replace(recording, acc=misread(recording.acc, LSB), gyr=misread(recording.gyr, GYRO_LSB))
 
 
-def test_words_read_with_a_signed_low_byte_are_corrected_exactly(sound):
-    corrected, axes = correct_signed_bytes(read_signed(sound))
-    assert axes == "the accelerometer's x, y, z and the gyroscope's x, y, z"
+@pytest.fixture(scope="module")
+def sound(counted):
+    """Recording of whole counts, as its file may hold it."""
+    return counted(Sensor(accel_range_g=4.0))
+
+
+@pytest.mark.parametrize(("axes", "names"), [(slice(None), "x, y, z"), (slice(1, 2), "y")], ids=["all", "y"])
+def test_words_read_with_a_signed_low_byte_are_corrected_exactly(sound, axes, names):
+    corrected, said = correct_signed_bytes(read_signed(sound, axes))
+    assert said == f"the accelerometer's {names} and the gyroscope's {names}"
     np.testing.assert_allclose(corrected.acc, sound.acc, rtol=1e-12)
     np.testing.assert_allclose(corrected.gyr, sound.gyr, rtol=1e-12)
-
-
-def test_only_the_axes_that_were_misread_are_corrected(sound):
-    corrected, axes = correct_signed_bytes(read_signed(sound, slice(1, 2)))
-    assert axes == "the accelerometer's y and the gyroscope's y"
-    np.testing.assert_allclose(corrected.acc, sound.acc, rtol=1e-12)
 
 
 def torn(recording):
@@ -73,23 +194,12 @@ def test_at_rest_an_axis_follows_the_others(sound):
     np.testing.assert_allclose(corrected.acc, resting.acc, rtol=1e-12)
 
 
-@pytest.mark.parametrize("counts", [32750, 32768], ids=["of the data sheet", "of 16 bits"])
-def test_counts_of_both_conventions_are_known(sound, counts):
-    gyr = np.deg2rad(500.0 / counts) * np.rint(sound.gyr / GYRO_LSB)
-    found = words_of(replace(sound, gyr=gyr))[1]
-    np.testing.assert_array_equal(found.counts, np.rint(sound.gyr / GYRO_LSB))
-
-
-def test_the_calibration_is_that_of_the_true_words_and_says_so(sound):
+def test_the_calibration_is_that_of_the_true_words_and_says_so_and_a_check_sees_them_too(sound):
     expected, found = (calibrate(recording, "hand", G) for recording in (sound, read_signed(sound)))
     np.testing.assert_allclose(found.D, expected.D, atol=1e-8)
     np.testing.assert_allclose(found.b_a, expected.b_a, atol=1e-7)
     assert found.verdict == "usable"
     assert [reason["code"] for reason in found.quality["reasons"]] == ["low_byte_signed"]
     assert "(uint8_t)low" in found.quality["reasons"][0]["remedy"]
-
-
-def test_a_check_sees_the_true_words_too(sound):
-    calibration = calibrate(sound, "hand", G)
-    expected, found = (observe(recording, calibration) for recording in (sound, read_signed(sound)))
-    np.testing.assert_allclose(found.r, expected.r, atol=1e-9)
+    seen = [observe(recording, expected).r for recording in (sound, read_signed(sound))]
+    np.testing.assert_allclose(seen[0], seen[1], atol=1e-9)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy
-from scipy.spatial.transform import Rotation
 
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
@@ -16,7 +15,7 @@ from mpucal.rests.tremor import fit_lambda, level_rests, mean_variance
 RATE_HZ, REST_S, NOISE_MPS2 = 100.0, 3.0, 0.02
 
 
-@pytest.mark.parametrize("x", [0.1, 1.0, 5.0, 20.0, 80.0])
+@pytest.mark.parametrize("x", [0.1, 5.0, 80.0])
 def test_the_variance_of_a_mean_is_the_integral_of_the_autocovariance(x):
     def integrand(u):
         return 2.0 / x**2 * (x - u) * np.exp(-u) * (1.0 - 5.0 * u / 3.0 + u * u / 3.0)
@@ -49,57 +48,22 @@ def held(lam, sigma, seed, rests=14):
     return recording, flat_statistics(recording, (0, n)), np.array([(k * n, (k + 1) * n) for k in range(1, rests + 1)])
 
 
-@pytest.mark.parametrize("lam", [6.0, 12.0, 25.0])
+@pytest.mark.parametrize("lam", [6.0, 25.0])
 def test_lambda_is_found(lam):
     found = [
         fit_lambda(level_rests(recording, flat, runs), recording, flat, runs, 1.0)
-        for recording, flat, runs in (held(lam, 0.1, seed) for seed in range(4))
+        for recording, flat, runs in (held(lam, 0.1, seed) for seed in range(3))
     ]
     assert np.exp(np.mean(np.log(found))) == pytest.approx(lam, rel=0.25)
 
 
-def test_a_board_that_lies_has_no_law():
-    recording, flat, runs = held(10.0, 1e-6, 0)
-    assert fit_lambda(level_rests(recording, flat, runs), recording, flat, runs, 17.0) == 17.0
-
-
-def test_a_turn_that_the_gyroscope_sees_is_carried_away():
-    n = 300
-    rate = np.radians(3.0) * np.array([0.6, -0.8, 0.2])
-    attitude = Rotation.from_rotvec(np.outer(np.arange(n) / RATE_HZ, rate))
-    acc = attitude.inv().apply([0.0, 0.0, 9.81])
-    recording = Recording.from_arrays(np.arange(n) / RATE_HZ, acc, np.tile(rate, (n, 1)), flat=(0, 2))
-    flat = flat_statistics(recording, (0, 2))
-    flat = type(flat)(**{**vars(flat), "b_omega": np.zeros(3)})
-    still = level_rests(recording, flat, np.array([[0, n]]))
-    assert np.ptp(acc, axis=0).max() > 0.5
-    assert np.ptp(still, axis=0).max() < 0.01
-
-
-def test_a_hand_that_trembles_by_two_degrees_a_second_rests():
-    rng = np.random.default_rng(2)
-    t = np.arange(4000) / RATE_HZ
-    gyr = 0.001 * rng.standard_normal((4000, 3))
-    gyr[1000:] += np.radians(2.0) * np.sqrt(2.0) * np.sin(2.0 * np.pi * 8.0 * t[1000:, None] + [0.0, 1.0, 2.0])
-    moves = (t > 10.0) & (t % 5.0 < 1.0)
-    gyr[moves, 1] += 1.0
-    acc = [0.0, 0.0, 9.81] + 0.05 * rng.standard_normal((4000, 3))
-    recording = Recording.from_arrays(t, acc, gyr, flat=(0, 900))
-    flat = flat_statistics(recording, (0, 900))
-    runs = RestFinder(recording, flat).typical()
-    assert np.sum(runs[:, 1] - runs[:, 0] > 3.0 * RATE_HZ) == 7
-    assert len(RestFinder(recording, flat).within(QUIET)) == 1
-
-
-@pytest.mark.parametrize(("rate_hz", "share"), [(20.0, 0.8), (50.0, 0.85), (100.0, 0.9)])
-def test_a_table_that_is_quieter_than_the_flat_segment_has_no_tremor(rate_hz, share):
+def test_a_table_that_is_quieter_than_the_flat_segment_has_no_tremor():
     for seed in range(8):
         rng = np.random.default_rng(seed)
-        n = int(60.0 * rate_hz)
-        gyr = 0.004 * np.sqrt(share) * rng.standard_normal((n, 3))
-        gyr[: n // 6] /= np.sqrt(share)
-        gyr[n // 2 : n // 2 + int(2.0 * rate_hz)] += 0.5
-        acc = [0.0, 0.0, 9.81] + 0.03 * rng.standard_normal((n, 3))
-        recording = Recording.from_arrays(np.arange(n) / rate_hz, acc, gyr, flat=(0, n // 6))
-        flat = flat_statistics(recording, recording.flat)
-        np.testing.assert_array_equal(RestFinder(recording, flat).typical(), RestFinder(recording, flat).within(QUIET))
+        gyr = 0.004 * np.sqrt(0.85) * rng.standard_normal((3000, 3))
+        gyr[:500] /= np.sqrt(0.85)
+        gyr[1500:1600] += 0.5
+        acc = [0.0, 0.0, 9.81] + 0.03 * rng.standard_normal((3000, 3))
+        recording = Recording.from_arrays(np.arange(3000) / 50.0, acc, gyr, flat=(0, 500))
+        finder = RestFinder(recording, flat_statistics(recording, recording.flat))
+        np.testing.assert_array_equal(finder.typical(), finder.within(QUIET))

@@ -1,0 +1,192 @@
+"""Estimators without a hand, and what they are made of, compared with the truth, with the EKF, and with each other."""
+
+import importlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate, likelihood, model_selection, parameters
+from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
+from mpucal.calibration.initial_estimate import initialise
+from mpucal.calibration.levenberg_marquardt import MOST_ITERATIONS, minimise
+from mpucal.calibration.model_selection import METHODS, choose_model, fit_accel
+from mpucal.calibration.paper import expand
+from mpucal.calibration.parameters import ACCEL, B_A_NAMES, D_NAMES, K_NAMES
+from mpucal.calibration.problem import Problem, Series
+from mpucal.calibration.theta import Prior
+from mpucal.kernel import _kernel
+from mpucal.rests.flat import flat_statistics
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import paper_scenario
+
+G = 9.82
+THETA_A = (*D_NAMES, *B_A_NAMES)
+
+
+def by(method, recording):
+    return method(recording, flat_statistics(recording, recording.flat), G)
+
+
+def theta_a(fit):
+    return np.concatenate([fit.D.ravel(), fit.b_a])
+
+
+def problem_of(recording):
+    flat = flat_statistics(recording, recording.flat)
+    return Problem(Series.after(recording, flat), flat, G)
+
+
+def ekf_of(problem, theta):
+    """Return the quaternion EKF over a problem of the 3-state filter, with the same samples, turns and start.
+
+    The flat mean counts n times in the 3-state filter, so it is measured n times at rest here. The EKF does not
+    estimate b_omega and the starting orientation, and takes them from that filter.
+    """
+    series, flat = problem.series, problem.flat
+    n = flat.n
+    delta = np.concatenate([np.zeros(n - 1), series.dt, [0.0]])[:, None]
+    rates = np.concatenate([np.zeros((n - 1, 3)), series.omega - theta.b_omega, np.zeros((1, 3))])
+    return Ekf(
+        y=np.concatenate([np.tile(flat.y, (n, 1)), series.y]),
+        F=product(exponential(0.5 * delta * rates)),
+        sigma_phi=0.5 * delta * np.sqrt(flat.Sigma_omega),
+        Sigma_a=np.diag(flat.Sigma_a),
+        x_0=orientation_of(theta.u),
+        P_0=np.zeros((4, 4)),
+        gravity=problem.gravity,
+    )
+
+
+def test_the_3_state_filter_equals_the_quaternion_ekf(other_simulator):
+    """Compare D and b_a by both filters from the same samples: within a tenth of a standard deviation.
+
+    From the 3-state filter's optimum over all parameters, a Gauss-Newton step of the EKF leads to the EKF's own optimum
+    over D and b_a, and this step is compared (a second one is a hundred times smaller).
+    """
+    problem = problem_of(other_simulator("paper_2").recording)
+    flat = problem.flat
+    known = Prior.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)))
+    minimum = minimise(problem, initialise(problem, flat.b_omega), ACCEL, known, until=1e-8)
+    theta = minimum.theta
+    ekf = ekf_of(problem, theta)
+    at = expand(ekf, theta_a(theta))
+    given_the_rest = np.sqrt(np.diag(np.linalg.inv(at.H)))
+    assert np.abs(at.direction() / given_the_rest).max() < 0.1
+    assert at.nis * len(ekf.y) == pytest.approx(minimum.nis * len(problem.series), rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def paper_runs():
+    """Return thirty sensors of the paper's section 4.3, and their fits by `accel` and `imu`."""
+    runs = [paper_scenario(seed, rate_hz=50) for seed in range(30)]
+    return runs, {model: [by(METHODS[model], run.recording) for run in runs] for model in ("accel", "imu")}
+
+
+def test_accel_needs_few_iterations_and_its_standard_deviations_are_right(paper_runs):
+    runs, fits = paper_runs[0], paper_runs[1]["accel"]
+    assert all(fit.converged for fit in fits)
+    assert np.mean([fit.iterations for fit in fits]) <= 3.2
+    z = [(theta_a(fit) - theta_a(run.truth)) / fit.std(*THETA_A) for run, fit in zip(runs, fits, strict=True)]
+    assert 0.85 < np.sqrt(np.mean(np.square(z))) < 1.15
+    # Thirty runs estimate each of the twelve within these limits.
+    assert (np.abs(np.sqrt(np.mean(np.square(z), axis=0)) - 1.0) < 0.45).all()
+
+
+def test_with_a_perfect_gyroscope_imu_agrees_with_accel_and_auto_keeps_it_perfect(paper_runs):
+    runs, fits = paper_runs
+    for fit, plain in zip(fits["imu"], fits["accel"], strict=True):
+        assert fit.converged
+        assert (np.abs(theta_a(fit) - theta_a(plain)) < 5.0 * fit.std(*THETA_A)).all()
+        assert (fit.std(*THETA_A) > 0.95 * plain.std(*THETA_A)).all()
+    for run in runs[:5]:
+        chosen = by(choose_model, run.recording)
+        assert chosen.model == "accel"
+        assert "perfect gyroscope" in chosen.why
+        np.testing.assert_array_equal(chosen.fit.K, np.eye(3))
+
+
+def wrong_gyro(seed):
+    """Return the inverse K and K of a gyroscope with errors up to 3 % of scale and 1 % across axes."""
+    rng = np.random.default_rng(seed)
+    off = np.triu(rng.uniform(-0.01, 0.01, (3, 3)), 1)
+    K = np.eye(3) + np.diag(rng.choice([-0.03, 0.03], 3)) + off + off.T
+    return np.linalg.inv(K), K
+
+
+def test_auto_finds_a_gyroscope_that_is_off_with_right_standard_deviations(ideal):
+    z = []
+    for seed in range(8):
+        G_gyro, K = wrong_gyro(seed)
+        made = ideal(seed, G_gyro=G_gyro, rate_hz=100)
+        chosen = by(choose_model, made.recording)
+        assert chosen.model == "imu", seed
+        assert "not perfect" in chosen.why
+        error = np.append(theta_a(chosen.fit) - theta_a(made.truth), (chosen.fit.K - K)[np.triu_indices(3)])
+        z.append(error / chosen.fit.std(*THETA_A, *K_NAMES))
+    assert np.abs(z).max() < 4.0
+    assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.3
+
+
+def test_a_long_recording_is_searched_by_coarser_means_to_the_same_end(monkeypatch):
+    recording = paper_scenario(4, rate_hz=50, turn_s=20.0).recording
+    at_once = by(fit_accel, recording)
+    monkeypatch.setattr(model_selection, "MANY_MEANS", 100)
+    by_coarser = by(fit_accel, recording)
+    assert by_coarser.converged
+    assert not np.array_equal(by_coarser.D, at_once.D)  # the search took another way
+    np.testing.assert_array_less(np.abs(by_coarser.D - at_once.D).ravel(), 0.05 * at_once.std(*D_NAMES))
+
+
+# ---- a lever arm
+
+
+def beside_the_pivot(run, r):
+    """Return the recording of a sensor at r (3,) [m] from the point about which it turned."""
+    recording = run.recording
+    rate = _kernel.moving_mean((recording.gyr - run.truth.b_omega) @ run.truth.K.T, 5)
+    alpha = np.gradient(rate, recording.t, axis=0)
+    force = np.cross(alpha, r) + np.cross(rate, np.cross(rate, r))
+    return replace(recording, acc=recording.acc + force @ run.truth.D.T)
+
+
+def test_a_sensor_beside_its_pivot_is_in_a_hand_and_one_at_it_is_not(ideal):
+    run = ideal(2, rate_hz=100, turn_s=3.0)
+    recording = beside_the_pivot(run, [0.015, -0.01, 0.008])
+    chosen, in_place = calibrate(recording, "auto", G), calibrate(recording, "imu", G)
+    assert chosen.fit["model"] == "hand"
+    assert "the data show a lever arm of 1" in chosen.fit["why"]
+    error, without = (sph_rms(run.truth, c.D, c.b_a) for c in (chosen, in_place))
+    assert error < 0.7 * without
+    assert calibrate(beside_the_pivot(ideal(0), [3e-4, 0.0, -3e-4]), "auto", G).fit["model"] in ("accel", "imu")
+
+
+# ---- the first estimate, the minimiser and the kernel's table
+
+
+def test_many_gaps_do_not_lead_to_a_wrong_optimum(hand, pick):
+    simulated, rng = hand(4, "pose12"), np.random.default_rng(4)
+    t = simulated.recording.t - simulated.recording.t[0]
+    kept, at = np.ones(len(t), bool), 10.5
+    while at < t[-1] - 1.0:
+        last = at + rng.uniform(0.1, 0.5)
+        kept &= (t < at) | (t >= last)
+        at = last + rng.uniform(0.5, 5.0)
+    found = calibrate(replace(pick(simulated.recording, kept), flat=simulated.recording.flat))
+    assert found.fit["converged"]
+    np.testing.assert_array_less(np.abs(found.b_a - simulated.truth.b_a), 4.0 * found.b_a_std)
+
+
+def test_a_valley_without_an_end_is_left_soon():
+    recording = paper_scenario(0, rate_hz=10, turn_s=330.0).recording
+    slow = problem_of(recording)
+    prior = Prior.of_sensor(slow.flat, recording.sensor)
+    minimum = minimise(slow, initialise(slow, slow.flat.b_omega), ACCEL, prior, most=1000)
+    assert not minimum.converged
+    assert minimum.iterations < MOST_ITERATIONS
+
+
+def test_a_kernel_of_another_table_is_refused(monkeypatch):
+    monkeypatch.setattr(parameters, "LAYOUT", "another")
+    with pytest.raises(ImportError, match="build it again"):
+        importlib.reload(likelihood)
