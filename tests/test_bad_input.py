@@ -105,6 +105,8 @@ session --replay x.mcap --rate 100                  | --replay does not take --r
 session --bus /dev/i2c-99 --seed 1                  | --bus does not take --seed
 session --bus sim --tilt-only --model hand          | --tilt-only does not take --model hand
 session --bus sim --to diary                        | 'chip'
+session --bus sim --page host:70000                 | is not an address for a page
+session --bus sim --page 8000                       | is not an address for a page
 session --resume nowhere                            | nowhere does not hold a session
 session --resume x --bus sim                        | --resume does not take --bus
 session --resume x -o y                             | --resume does not take -o

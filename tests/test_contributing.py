@@ -115,7 +115,8 @@ def test_a_sink(call, folder):
     assert (folder / "notebook.txt").read_text() == "[0.5, 0.0, -0.5] m/s^2\n"
     assert all("notebook" in call(command, "--help") for command in ("session", "write"))
     wrong = UsageError.exit_code
-    assert "has no notebook: give exactly one of --bus BUS" in call("session", "--mavlink", "sim", "--to", "notebook", code=wrong)
+    refused = call("session", "--mavlink", "sim", "--to", "notebook", code=wrong)
+    assert "--mavlink sim has no notebook: give exactly one of --bus BUS" in refused
     assert "'notebook'" in call("write", "c.json", "diary", "--bus", "sim", code=wrong)
 
 

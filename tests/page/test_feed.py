@@ -11,7 +11,6 @@ from contextlib import closing
 
 import pytest
 
-from mpucal.errors import OutputError
 from mpucal.page.address import Address
 from mpucal.page.feed import Feed
 from mpucal.session.events import Key, Prompt, PromptKind
@@ -87,9 +86,3 @@ def test_the_process_ends_with_a_killed_session():
         while time.monotonic() < until:
             urllib.request.urlopen(url, timeout=60.0).close()
             time.sleep(0.02)
-
-
-def test_an_address_in_use_is_an_output_error(feed):
-    port = int(feed.url.split(":")[2].split("/")[0])
-    with pytest.raises(OutputError, match=f"no page can be served at 127.0.0.1:{port}"):
-        Feed(Address(port=port), {})

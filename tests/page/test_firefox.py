@@ -30,11 +30,6 @@ PREFERENCES = {
     "services.settings.server": "data:,",
     "toolkit.telemetry.enabled": False,
 }
-# Returns true if anything is drawn in the canvas.
-DRAWN = """
-const canvas = document.getElementById('now');
-return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((v) => v > 0);
-"""
 
 
 class Firefox:
@@ -139,18 +134,3 @@ def test_a_session_is_followed_to_its_end_in_the_dark(firefox, server, phases):
     firefox.wait("return document.body.innerText.includes('The calibration is good.')")
     assert luminance(firefox.run("return getComputedStyle(document.body).backgroundColor")) < 0.1
     assert luminance(firefox.run("return getComputedStyle(document.body).color")) > 0.9
-
-
-def test_a_lost_connection_is_shown_and_reopened(firefox, serve):
-    server, board = serve(), {"t_s": 1.0, "rate_hz": 200.0, "temperature_c": None, "attitude": [1, 0, 0, 0]}
-    server.latest.update({"title": "a chip", "board": "gy-521", "headline": "Before", "meter": board})
-    firefox.call("WebDriver:Navigate", url=server.url)
-    firefox.wait("return document.body.innerText.includes('Before')")
-    firefox.wait(DRAWN)
-    port = server.server_port
-    server.stop()
-    firefox.wait("return document.getElementById('lost').checkVisibility()")
-    again = serve(port)
-    again.latest.update({"title": "a chip", "headline": "After"})
-    firefox.wait("return document.body.innerText.includes('After')")
-    assert firefox.run("return document.getElementById('lost').hidden")

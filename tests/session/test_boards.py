@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.session.aims import ALL_AROUND, directions
-from mpucal.session.boards import BOARD, BOARDS, PLAIN, VEHICLE, describe, describe_tilt, flat_description
+from mpucal.session.boards import BOARD, BOARDS, PLAIN, VEHICLE, describe, describe_tilt
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,3 @@ def test_a_tilt_is_described_by_what_is_lower():
     assert describe_tilt((-0.35, 0.35, -0.87), BOARD) == "lower at its left edge and far edge (−X +Y)"
     assert describe_tilt((0.5, 0.0, 0.87), VEHICLE) == "lower at its nose (+X)"
     assert describe_tilt((0.0, 0.87, 0.5), PLAIN) == "lower at its chip face (+Z)"
-
-
-def test_a_tilted_vehicle_is_no_board():
-    assert flat_description((0.7, 0.0, 0.7), VEHICLE) == "It is tilted now."

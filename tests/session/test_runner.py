@@ -223,19 +223,6 @@ def test_a_replay_presses_the_keys_and_waits_where_its_session_did(polls, ends_a
     assert not pending
 
 
-def test_ctrl_c_does_not_wait_for_a_late_answer():
-    source = Source()
-    with pytest.raises(Abandoned, match="interrupted"):
-        Runner(source, Person({150: [Key.ABORT]}), Notes(), start_worker=partial(Late, source, 1000)).measure()
-    assert source.polls == 148
-
-
-def test_a_viewer_may_abort_a_replay_but_not_press_other_keys():
-    watcher = Person({3: [Key.ENOUGH], 5: [Key.ABORT]})
-    replayed = ReplayedOperator(watcher, lambda _name: [])
-    assert [list(replayed.pressed()) for _ in range(5)] == [[], [], [], [], [Key.ABORT]]
-
-
 @pytest.mark.parametrize(
     ("person", "seconds", "polls", "key"),
     [

@@ -11,22 +11,6 @@ from mpucal.session.turn_guide import TURN_WORDS, TurnGuide
 STRAIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize(
-    ("axis", "words"),
-    [
-        ((0, 1, 0), "roll it to the right"),
-        ((0, -1, 0), "roll it to the left"),
-        ((-1, 0, 0), "tip it away from you"),
-        ((1, 0, 0), "tip it toward you"),
-        ((1, -1, 0), "tip it toward you and left"),
-    ],
-)
-def test_the_words_name_the_direction_of_the_top(axis, words):
-    phi = np.array(axis) / np.linalg.norm(axis) * math.radians(61.0)
-    down = Rotation.from_rotvec(-phi).apply((0, 0, -1))
-    assert TurnGuide().turn_to(tuple(down), STRAIGHT).words == f"60 deg more, {words}"
-
-
 def test_the_missing_turn_leads_to_the_wanted_orientation():
     attitude = Rotation.random(random_state=3)
     for down in ALL_AROUND.tolist():

@@ -5,7 +5,6 @@ import sys
 
 import pytest
 
-from mpucal.session.events import Prompt, PromptKind
 from mpucal.terminal.console import console
 from mpucal.terminal.lines import JsonLines, Lines
 from mpucal.terminal.screen import Screen
@@ -42,10 +41,3 @@ def test_a_cell_of_a_notebook_has_a_terminal_without_a_screen(monkeypatch):
     monkeypatch.setenv("TERM", "xterm-color")
     monkeypatch.setenv("JPY_PARENT_PID", "1")
     assert type(console(quiet=False)) is Lines
-
-
-@pytest.mark.parametrize(("beep", "rings"), [(None, 0), (True, 1), (False, 0)])
-def test_lines_ring_only_when_asked(monkeypatch, beep, rings):
-    monkeypatch.setattr(sys, "stderr", io.StringIO())
-    console(quiet=True, beep=beep).hear(Prompt(PromptKind.ROTATE, "Turn it."))
-    assert sys.stderr.getvalue().count("\a") == rings

@@ -61,16 +61,6 @@ def test_the_first_signal_is_a_key_and_the_second_interrupts(number):
     assert signal.getsignal(number) is before
 
 
-@pytest.mark.usefixtures("uncollected")
-def test_a_signal_that_is_not_taken_interrupts():
-    keys = Keys()
-    with keys.listening():
-        signal.raise_signal(signal.SIGINT)
-        with pytest.raises(KeyboardInterrupt):
-            signal.pause()
-    assert keys.pressed() == []
-
-
 @pytest.fixture
 def terminal():
     """Yield a terminal's two ends: the person's and the program's."""

@@ -23,15 +23,6 @@ def test_the_screen_is_filled_and_never_overflows(any_view, glyphs):
         assert max(map(len, drawn)) <= columns, (columns, rows)
 
 
-def test_ascii_is_ascii(any_view):
-    assert "".join(text_of(any_view, glyphs=ASCII)).isascii()
-
-
-@pytest.mark.parametrize("columns", [60, 80, 160])
-def test_the_clock_is_whole_in_ascii(views, columns):
-    assert text_of(views["turned"], columns, 24, ASCII)[0].endswith("200.0 Hz   31.2 deg C   0:15 ")
-
-
 @pytest.mark.parametrize("size", [(80, 24), (160, 50)], ids=["80x24", "160x50"])
 def test_all_that_a_person_needs_is_there(views, size):
     drawn = "\n".join(text_of(views["turned"], *size))
@@ -57,13 +48,6 @@ def test_all_that_a_person_needs_is_there(views, size):
     ):
         assert words in drawn
     assert BRAILLE.search(drawn)
-
-
-@pytest.mark.parametrize("size", [(40, 15), (80, 24), (160, 50)], ids=str)
-def test_the_flat_orientation_is_to_be_confirmed(views, size):
-    drawn = " ".join("".join(text_of(views["laid"], *size)).split())
-    for word in ("Chip", "pins", "Then leave it."):
-        assert word in drawn
 
 
 def test_on_a_low_screen_the_words_are_left(views):
@@ -114,9 +98,3 @@ def test_a_warning_grows_quiet(views):
     quiet = [line for line in lines(later.after(view.meter), 80, 24, UNICODE) if "480 deg/s" in line.plain]
     assert "(25 s ago)" in quiet[0].plain
     assert "reverse" not in str(quiet[0].spans)
-
-
-def test_a_small_screen_keeps_clock_values_and_keys(views):
-    drawn = "\n".join(text_of(views["turned"], 40, 15))
-    for words in ("0:15", "y ±0.31 %", "z not observable", "q: stop", "ROLL LEFT 60"):
-        assert words in drawn

@@ -1,13 +1,11 @@
 import contextlib
 import io
 import json
-import math
 import os
-from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Caution, Decision, Progress, Prompt, PromptKind
+from mpucal.session.events import Caution, Decision, Prompt, PromptKind
 from mpucal.terminal.keys import Keys
 from mpucal.terminal.lines import JsonLines, Lines
 
@@ -15,14 +13,6 @@ from mpucal.terminal.lines import JsonLines, Lines
 @pytest.fixture
 def out():
     return io.StringIO()
-
-
-def test_a_prompt_that_goes_on_is_a_line(out):
-    lines = Lines(out, Keys())
-    lines.hear(Prompt(PromptKind.ROTATE, "Now turn it."))
-    lines.hear(Prompt(PromptKind.ROTATE, "Turn it: +X down.", (1.0, 0.0, 0.0)))
-    assert out.getvalue().endswith("\n\n  Turn it: +X down.\n")
-    assert out.getvalue().count("TURN IT") == 1
 
 
 def test_the_bell_rings_at_new_prompts_only(out):
@@ -33,13 +23,6 @@ def test_the_bell_rings_at_new_prompts_only(out):
     silent = io.StringIO()
     Lines(silent, Keys()).hear(Prompt(PromptKind.ROTATE, "Now turn it."))
     assert "\a" not in silent.getvalue()
-
-
-def test_progress_comes_once_a_second_at_most(out):
-    lines = Lines(out, Keys())
-    for k in range(40):
-        lines.hear(Progress(100.0 + 0.25 * k, k, 40, f"step {k}"))
-    assert out.getvalue().split() == [word for k in range(0, 40, 4) for word in ("step", str(k))]
 
 
 def test_the_same_warning_is_not_repeated_at_once(out):
@@ -71,15 +54,6 @@ def test_a_whole_session_is_told(out, session):
     assert "\x1b" not in said
 
 
-def test_keys_are_explained_once_if_there_is_a_keyboard(keyboard):
-    for lines_of, times in ((None, 0), (keyboard[1], 1)):
-        out = io.StringIO()
-        lines = Lines(out, Keys(lines_of))
-        for kind in (PromptKind.LAY_FLAT, PromptKind.ROTATE):
-            lines.hear(Prompt(kind, "Do it."))
-        assert out.getvalue().count("Enter: skip ahead") == times
-
-
 def test_every_event_is_a_line_of_json(out, session):
     lines = JsonLines(out, Keys())
     for output in session:
@@ -99,12 +73,6 @@ def test_every_event_is_a_line_of_json(out, session):
         "why": "enough",
         "remedy": "start again",
     }
-
-
-def test_json_knows_no_infinity(out, session):
-    told = next(output for output in session if type(output).__name__ == "Knowledge")
-    JsonLines(out, Keys()).hear(replace(told, gain_pct=(math.inf, math.nan, 0.1)))
-    assert json.loads(out.getvalue())["gain_pct"] == [None, None, 0.1]
 
 
 def test_a_session_whose_listener_left_goes_on():

@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 from mpucal.session.attitude import straight
 from mpucal.session.boards import BOARDS
 from mpucal.terminal import board, orientation_map
-from mpucal.terminal.canvas import Canvas
 
 DIRECTIONS = [
     (0, 0, -1),
@@ -71,14 +70,3 @@ def test_the_map_shows_a_direction_on_its_own_half():
     # x is to the right.
     assert row.index("X") > 13
     assert not any("o" in row for row in lower)
-
-
-@pytest.mark.parametrize(
-    ("line", "drawn"),
-    [(((0, 0), (0, 3)), "|"), (((0, 0), (1, 3)), "\\"), (((1, 0), (0, 3)), "/"), (((0, 2), (1, 2)), "_")],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_ascii_strokes_lie_as_the_lines_do(line, drawn):
-    canvas = Canvas(1, 1)
-    canvas.line(*line)
-    assert canvas.lines("", unicode=False)[0].plain == drawn

@@ -10,7 +10,7 @@ import pytest
 from rich.text import Text
 
 from mpucal.session.events import Prompt, PromptKind
-from mpucal.terminal.glyphs import ASCII, UNICODE, glyphs_of
+from mpucal.terminal.glyphs import UNICODE
 from mpucal.terminal.keys import Keys
 from mpucal.terminal.painter import Painter
 from mpucal.terminal.screen import Screen
@@ -49,25 +49,6 @@ def test_only_rows_that_changed_are_sent(out):
     assert painter.paint([Text("one"), Text("TWO"), Text("three")], (80, 24)) == 0
 
 
-def test_a_terminal_of_another_size_is_painted_anew(out):
-    painter = Painter(out)
-    painter.paint([Text("one"), Text("two")], (80, 24))
-    out.taken()
-    painter.paint([Text("one"), Text("two")], (100, 24))
-    assert "one" in out.getvalue()
-
-
-def test_colours_follow_no_color(out, monkeypatch):
-    line = Text("green", style="bold green")
-    Painter(out).paint([line], (80, 24))
-    assert COLOUR.search(out.taken())
-    monkeypatch.setenv("NO_COLOR", "1")
-    Painter(out).paint([line], (80, 24))
-    text = out.taken()
-    assert not COLOUR.search(text)
-    assert "\x1b[1m" in text
-
-
 @pytest.mark.parametrize("error", [None, KeyboardInterrupt, ZeroDivisionError], ids=["ends", "Ctrl-C", "fails"])
 def test_the_terminal_is_restored_and_the_decisions_are_printed(out, error, session):
     before = threading.active_count()
@@ -87,15 +68,6 @@ def test_the_terminal_is_restored_and_the_decisions_are_printed(out, error, sess
     assert "flat and still for 10 s" in after
     assert "the calibration is good" in after
     assert threading.active_count() == before
-
-
-def test_the_bell_rings_when_something_else_is_to_be_done(out):
-    for bell, times in ((True, 1), (False, 0)):
-        screen = Screen(out, Keys(), UNICODE, bell)
-        with screen.listening():
-            screen.hear(Prompt(PromptKind.ROTATE, "Turn it."))
-            drawn(screen, out, "Turn it.")
-        assert out.taken().count("\a") == times
 
 
 def drawn(screen, out, words):
@@ -147,20 +119,3 @@ def test_ctrl_z_is_refused_on_the_screen(out):
             assert screen.pressed() == []
     os.close(person)
     assert signal.getsignal(signal.SIGTSTP) is before
-
-
-@pytest.mark.parametrize(
-    ("encoding", "term", "glyphs"),
-    [
-        ("utf-8", "xterm", UNICODE),
-        ("UTF8", "tmux-256color", UNICODE),
-        ("utf-8", "linux", ASCII),
-        ("ascii", "xterm", ASCII),
-        ("latin-1", "xterm", ASCII),
-        ("nonsense", "xterm", ASCII),
-    ],
-)
-def test_glyphs_are_those_of_the_terminal(encoding, term, glyphs):
-    out = Terminal()
-    out.encoding = encoding
-    assert glyphs_of(out, term) is glyphs

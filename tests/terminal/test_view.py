@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Countdown, Held, Progress, Prompt, PromptKind, Seen, Use
+from mpucal.session.events import Countdown, Held, Progress, Seen, Use
 
 
 def test_the_headline_is_the_instruction(views):
@@ -63,19 +63,6 @@ def test_the_flat_orientation_is_described(views, board, down, words):
     view = replace(views["laid"], board=board)
     assert words in replace(view, meter=replace(view.meter, down=down)).confirming
     assert views["turned"].confirming == ""
-
-
-def test_without_a_requested_orientation_the_most_helpful_one_is_wanted(views):
-    view = views["turned"].after(Prompt(PromptKind.ROTATE, "Turn it."))
-    assert view.wanted == view.knowledge.down
-    assert view.after(Prompt(PromptKind.VERIFY, "Check it.")).wanted is None
-
-
-def test_orientations_are_counted_anew_when_the_board_is_turned_anew(views):
-    assert [s.number for s in views["turned"].seen if s.paused] == [1, 2, 3, 4]
-    again = views["turned"].after(Seen(50.0, 2, (1.0, 0.0, 0.0), True))
-    assert [s.number for s in again.seen if s.paused] == [1, 2]
-    assert [s.number for s in again.seen if not s.paused] == [1]
 
 
 def test_an_orientation_is_ticked_as_it_is_taken(views):

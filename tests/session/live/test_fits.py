@@ -92,18 +92,6 @@ def test_orientations_that_the_fit_has_seen_may_refute_it(fits, poses):
     assert "|a| is +0.3" in checked.reason.what
 
 
-def test_nothing_is_known_of_a_board_that_never_lay_still(fits, poses):
-    rates = np.random.default_rng(1).normal(scale=2.0, size=(2000, 3))
-    assert fits.do(Task(replace(part(poses, 0, 10), gyr=rates), FitKind.KNOW)) is None
-
-
-def test_forgotten_samples_are_not_fitted(fits, poses):
-    fits.do(Task(part(poses, 0, 30), FitKind.KNOW))
-    fits.do(Task(NONE, forget=2200))
-    learnt = fits.do(Task(part(poses, 30, 34), FitKind.KNOW))
-    assert learnt.knowledge.overall < 0.2
-
-
 @pytest.mark.parametrize(("rate_hz", "size"), [(50.0, 1), (200.0, 1), (1000.0, 5), (500.0, 2)])
 def test_faster_samples_are_averaged(rate_hz, size):
     n = 1003

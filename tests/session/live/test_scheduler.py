@@ -72,15 +72,6 @@ def test_an_answer_is_brought_after_the_asked_number_of_samples_and_no_sooner(sc
     assert not scheduler.due
 
 
-def test_an_answer_that_is_due_and_not_done_is_late(scheduler, slow):
-    scheduler.request(RequestFit(FitKind.TRY, 3.0))
-    assert not scheduler.late
-    scheduler.add(nothing(600))
-    assert scheduler.late
-    slow.answers[0].set_result("tried")
-    assert not scheduler.late
-
-
 def test_forgotten_requests_have_no_answer(scheduler, slow):
     scheduler.request(RequestFit(FitKind.KNOW, 0.0))
     scheduler.forget(7)

@@ -79,20 +79,6 @@ def test_the_likeliest_reason_is_given(rests, data, contradiction, code, words):
     assert len(checked.verifications) == len(rests)
 
 
-def test_a_direction_that_nothing_shows_is_called_not_judged():
-    lost, whole = (rest(direction=0.02, clipped=clipped) for clipped in (True, False))
-    shown = judge_verification([lost, whole], [lost, whole], 2, recording(), None).verifications
-    assert ["(not judged: on the way samples were lost" in one.text for one in shown] == [True, False]
-    assert "direction error 1.15 deg (1 sigma 0.10)" in shown[1].text
-
-
-def test_turns_that_miss_samples_blame_no_range_and_verify_nothing():
-    checked = judge_verification([rest(clipped=True)] * 3, [rest(clipped=True)] * 3, 3, recording(), None)
-    assert checked.agrees is None
-    assert checked.reason.what.startswith("samples are missing in every turn")
-    assert not checked.reason.refuse
-
-
 MOVED = Reason("verification_failed", "it moved", "fasten it", True)
 
 
