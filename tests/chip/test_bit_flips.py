@@ -4,9 +4,6 @@ import numpy as np
 import pytest
 
 from mpucal.chip.bit_flips import BitFlipFilter, until_jumps
-from mpucal.chip.config import Config
-from mpucal.chip.driver import Driver
-from mpucal.simulated.chip import open_simulated
 
 NONE = np.zeros((0, 7), np.int16)
 
@@ -49,31 +46,6 @@ def test_motion_a_step_and_a_blow_are_left_alone():
     passed, repaired = filtered(true, 8)
     assert repaired == 0
     assert np.array_equal(passed, true)
-
-
-def driven(words, config, seconds):
-    driver = Driver(open_simulated(words), config)
-    driver.start()
-    while driver.now_ns() < seconds * 1e9:
-        driver.poll()
-    return driver
-
-
-def test_a_knock_is_left_alone():
-    assert driven("sim:seed=5,fault=knock@6/knock@8", Config(rate_hz=1000, dlpf=1), 10).repaired == 0
-
-
-def test_a_bus_with_bit_errors_gives_the_samples_of_one_without():
-    def outliers(fault):
-        driver = driven(f"sim:seed=3,hand=still{fault}", Config(), 30)
-        acc = driver.recording().acc
-        return np.abs(acc[1:-1] - (acc[:-2] + acc[2:]) / 2).max(), driver.repaired
-
-    clean, none = outliers("")
-    flipped, found = outliers(",fault=bit_errors@0")
-    assert none == 0
-    assert found > 10
-    assert flipped < 10 * clean
 
 
 @pytest.mark.parametrize(("ends", "medians"), [([9], 7), ([1], 7), ([6, 4], 7), ([8], 6)])

@@ -40,8 +40,7 @@ def test_it_knows_what_the_bridge_shows_now(fast_ppm):
             assert clock.now(host_ns + late_ns) == pytest.approx(bridge_ns + late_ns, abs=4 * MS)
 
 
-@pytest.mark.parametrize("shows_s", [0.0, 0.2, 2.0, 4000.0], ids=lambda value: f"{value:g} s")
-@pytest.mark.parametrize("away_s", [0.3, 3.0, 600.0], ids=lambda value: f"away {value:g} s")
+@pytest.mark.parametrize(("away_s", "shows_s"), [(0.3, 0.0), (0.3, 4000.0), (3.0, 0.2), (600.0, 2.0)])
 def test_a_reset_takes_no_time_away(shows_s, away_s):
     clock = BridgeClock()
     for i in range(100):
@@ -56,10 +55,6 @@ def test_a_clock_that_went_on_is_followed():
     clock.bus_time(shown(10 * S), S)
     clock.on_greeting(shown(13 * S), 4 * S + 16 * MS)
     assert clock.bus_time(shown(14 * S), 5 * S) == 14 * S
-
-
-def test_it_shows_nothing_before_it_was_seen():
-    assert BridgeClock().now(5 * S) == 0
 
 
 def test_a_bridge_that_runs_at_half_speed_is_followed():

@@ -1,7 +1,6 @@
 """Piecewise lines against those of which the points were made."""
 
 import numpy as np
-import pytest
 
 from mpucal.clocks.piecewise_rate import find_breaks
 from mpucal.clocks.sample_clock import SampleClock
@@ -29,18 +28,6 @@ def test_a_steady_clock_has_no_break():
         assert find_breaks(*counted([198.6], each_s=120.0, seed=seed, late_s=0.02)) == [], seed
 
 
-@pytest.mark.parametrize("step", [0.999, 1.01])
-def test_a_break_is_found_at_its_place(step):
-    t_s, y = counted([200.0, 200.0 * step])
-    (at,) = find_breaks(t_s, y)
-    assert t_s[at] == pytest.approx(20.0, abs=0.004 / abs(step - 1))
-
-
-def test_few_points_have_no_break():
-    assert find_breaks(np.arange(10.0), np.array([0.0] * 5 + [100.0] * 5)) == []
-    assert find_breaks(np.zeros(0), np.zeros(0)) == []
-
-
 def test_final_times_follow_a_clock_that_changes():
     clock, index, segment = clock_of(*counted((200.0, 202.0), late_s=0.0))
     true = np.interp(index + 1.0, [0, 4000, 8040], [0, 20, 40])
@@ -48,8 +35,3 @@ def test_final_times_follow_a_clock_that_changes():
     assert np.abs(off_s).max() < 0.004
     assert np.abs(off_s[np.abs(index - 4000) > 100]).max() < 0.0005
     assert np.abs(clock.times_s(segment, index) - true).max() > 0.02
-
-
-def test_final_times_of_a_steady_clock_are_those_of_one_line():
-    clock, index, segment = clock_of(*counted([199.0]))
-    np.testing.assert_allclose(clock.final()(segment, index), clock.times_s(segment, index), rtol=0, atol=1e-9)

@@ -54,12 +54,6 @@ def test_a_clock_continues_the_earlier_one():
     assert young.slept_ns == [105 + 1000]
 
 
-def test_a_clock_that_is_later_by_itself_stays():
-    young = Young()
-    young.t_ns = 100 * S
-    assert ShiftedClockBus(young, 7 * S).read(0x75, 1).t_ns == young.t_ns
-
-
 @pytest.mark.parametrize(
     ("captures", "more", "lengths"),
     [

@@ -7,7 +7,7 @@ import pytest
 from mpucal.chip import registers as reg
 from mpucal.chip.driver import SAMPLE_BYTES, STATUS_BYTES
 from mpucal.errors import LateRead
-from mpucal.sources.read_timer import LATE_NS, TRIES, ReadTimer
+from mpucal.sources.read_timer import TRIES, ReadTimer
 
 USUAL_NS = 400_000
 
@@ -34,20 +34,6 @@ def read(host):
     read = lambda register=reg.FIFO_COUNT_H, count=2: stamp.read(register, count, host.transfer)  # noqa: E731
     read()
     return read
-
-
-def test_a_read_as_usual_is_one(host, read):
-    host.takes_ns = [USUAL_NS + LATE_NS]
-    assert read() == (b"\1", USUAL_NS, None)
-    assert next(host.read) == 2
-
-
-@pytest.mark.parametrize("pauses", [1, 2])
-def test_after_a_pause_it_is_read_again(host, read, pauses):
-    host.takes_ns = [14_000_000] * pauses
-    reply = read()
-    assert reply.data == bytes([1 + pauses])
-    assert host.now_ns - reply.t_ns == USUAL_NS
 
 
 def test_of_nothing_but_pauses_no_time_is_known(host, read):

@@ -2,7 +2,6 @@
 
 import builtins
 import errno
-import json
 import os
 import sys
 from types import ModuleType, SimpleNamespace
@@ -10,18 +9,14 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from mpucal.__main__ import run
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.doctor.examine import examine_chip_alone
-from mpucal.doctor.finding import Mark
 from mpucal.errors import BusError, UsageError
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.sources import host_bus, spi
-from mpucal.sources.chip import OpenedChip
+from mpucal.sources import host_bus
 from mpucal.sources.spi import SpiBus
 
 
@@ -140,41 +135,11 @@ def test_the_driver_measures_and_i2c_stays_off(opened, chip):
         assert all(value & 0x10 for value in controls)
 
 
-@pytest.mark.slow
-def test_a_session_ends_good_and_replays_to_the_bit(opened, monkeypatch, tmp_path, capsys):
-    bus, _ = opened("chip=mpu6500,hand=guided")
-
-    def open_source(request):
-        return OpenedChip(bus, request.plan, (bus._device.chip.hear,), words=request.words, real_time=False)
-
-    monkeypatch.setattr(spi, "open_source", open_source)
-
-    def session(*words):
-        code = run(["session", *words, "--yes", "--json", "--json-events"])
-        return code, {key: value for key, value in json.loads(capsys.readouterr().out).items() if key != "created"}
-
-    made = tmp_path / "made"
-    words = ("--rate", "50", "--target", "quick", "--model", "hand")
-    code, found = session("--spi", "/dev/spidev0.0", *words, "-o", str(made))
-    assert (code, found["quality"]["verdict"], found["sensor"]["chip"]) == (0, "good", "MPU-6500")
-    assert session("--replay", str(made), "-o", str(tmp_path / "again")) == (code, found)
-
-
-def test_the_doctor_examines_it(opened):
-    bus, _ = opened()
-    source = SimpleNamespace(bus=bus, plan=SimpleNamespace(config=Config()))
-    told = {finding.topic: finding for finding in examine_chip_alone(source, 3.0)}
-    assert [topic for topic, finding in told.items() if finding.mark is Mark.BAD] == []
-    assert told["genuine?"].mark is Mark.OK
-
-
 @pytest.mark.parametrize(
     ("number", "says"),
     [
         (errno.ENOENT, "there is no SPI device /dev/spidev0.0: enable SPI"),
         (errno.EACCES, "no permission to use /dev/spidev0.0: add yourself"),
-        (errno.ENOTTY, "is not an SPI device"),
-        (errno.ENODEV, "is gone"),
         (errno.EIO, "a transfer with /dev/spidev0.0 failed"),
     ],
 )

@@ -21,13 +21,6 @@ def test_all_that_a_row_names_is_there(kind):
         assert callable(resolve_name(place))
 
 
-@pytest.mark.parametrize("word", ["sim", "ftdi", "mcp2221"])
-def test_a_word_is_taken_in_any_case(word):
-    parse = next(kind.option.parse for kind in SOURCES if kind.word == word)
-    assert parse(f"{word.upper()}:A=b") == f"{word}:A=b"
-    assert parse("/dev/I2C:1") == "/dev/I2C:1"
-
-
 @pytest.mark.parametrize("command", ["session", "record", "stream", "write", "show", "doctor"])
 def test_a_command_takes_what_its_help_names_and_refuses_the_rest(command):
     for kind in SOURCES:

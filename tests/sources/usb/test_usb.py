@@ -134,11 +134,6 @@ def test_none_is_listed_where_hidapi_is_missing(plugged, monkeypatch):
     assert [spelled for spelled, _ in adapters()] == ["ftdi://ftdi:ft232h:FT232H/1"]
 
 
-def test_none_is_listed_where_none_is(monkeypatch):
-    monkeypatch.setattr(usb_i2c, "find_spec", lambda _name: None)
-    assert adapters() == []
-
-
 @pytest.mark.parametrize("name", SPELLED)
 def test_the_doctor_lists_adapters_and_examines_the_chip(name, plugged, capsys, monkeypatch):
     def examine(bus, *_):
