@@ -1,5 +1,6 @@
-"""The parser: streams that are cut anywhere, junk, damage and signatures."""
+"""The parser: streams that are cut anywhere, junk and damage; IMU messages in SI units."""
 
+import math
 from itertools import pairwise
 
 import pytest
@@ -7,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, decode_reading
 
 
 @pytest.fixture(scope="module")
@@ -63,11 +65,22 @@ def test_a_cut_datagram_leaves_nothing_to_the_next(packets):
     assert data_of(parse.datagram(bytes(packets[1]))) == [bytes(packets[1])]
 
 
-def test_a_wrong_signature_is_refused_and_counted(station):
-    signed = station(key=b"k" * 32).heartbeat()
-    for key, accepted in ((b"k" * 32, 1), (b"x" * 32, 0)):
-        mav = dialect().MAVLink(None)
-        mav.signing.secret_key = key
-        parse = Parser(mav)
-        assert len(parse.datagram(signed)) == accepted
-        assert parse.refused == 1 - accepted
+@given(mg=st.floats(-16000, 16000), mrad_s=st.floats(-32000, 32000))
+def test_a_truncated_value_is_centred(station, decoded, mg, mrad_s):
+    content = decode_reading(decoded(station().raw(1, (int(mg), 0, -1000), (0, int(mrad_s), 0))))
+    assert content.acc[0] == pytest.approx(mg * ACC_LSB_MPS2, abs=(0.5 if int(mg) else 1.0) * ACC_LSB_MPS2 + 1e-9)
+    assert content.gyr[1] == pytest.approx(
+        mrad_s * GYRO_LSB_RAD_S, abs=(0.5 if int(mrad_s) else 1.0) * GYRO_LSB_RAD_S + 1e-9
+    )
+    assert content.acc[2] == pytest.approx(-9.80665 - 0.5 * ACC_LSB_MPS2)
+
+
+def highres(station, decoded, acc=(0.1, 0.2, -9.8), updated=0xFFFF, id_=1):
+    fields = (77, *acc, 0.01, 0.02, 0.03, 0, 0, 0, 0, 0, 0, 25.5, updated, id_)
+    return decode_reading(decoded(station().message("highres_imu", *fields)))
+
+
+def test_a_message_without_new_values_is_none(station, decoded):
+    for how in ({"updated": 0x38}, {"updated": 0x07}, {"acc": (math.nan, 0, 0)}):
+        assert highres(station, decoded, **how) is None
+    assert decode_reading(decoded(station().heartbeat())) is None

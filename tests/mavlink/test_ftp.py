@@ -24,8 +24,7 @@ def test_a_payload_has_pymavlinks_layout():
     assert Payload(513, 3, 7, b"data", 1000).encode().startswith(bytes(theirs))
 
 
-@pytest.mark.parametrize("words", ["", "fault=loss", "fault=reorder,fault=duplicate"], ids=str)
-@pytest.mark.parametrize("size", [0, 1, MOST_DATA, 1000])
+@pytest.mark.parametrize(("words", "size"), [("", 0), ("fault=loss", MOST_DATA), ("fault=reorder", 1000)])
 def test_a_file_arrives_whole(simulated, words, size):
     to = simulated(words)
     storage, files, data = Storage(to.link), to.vehicle.card.files, bytes(n % 251 for n in range(size))

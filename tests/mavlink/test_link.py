@@ -4,7 +4,7 @@ import pytest
 
 from mpucal.errors import BusError, LinkError, NoAnswer, UsageError
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S
-from mpucal.mavlink.request import ask, send_command
+from mpucal.mavlink.request import send_command
 from mpucal.mavlink.vehicle_source import choose_vehicle
 
 KEY = b"k" * 32
@@ -44,13 +44,10 @@ def test_it_only_reads_until_it_is_locked_and_then_beats_once_a_second(script, s
     assert (beat.get_type(), beat.type, beat.get_srcSystem()) == ("HEARTBEAT", 6, OWN_SYSTEM)
 
 
-def test_a_partner_that_was_named_is_spoken_to_at_once(script, station):
-    transport = script(heartbeats(station(), HOME), outward=True)
-    unlocked(transport).listen()
-    assert [(t, address) for t, address, _ in transport.sent] == [(0.0, None), (1.0, None)]
-
-
-def test_a_flood_of_strangers_is_named_and_ends_no_later(script, station):
+def test_a_flood_is_named_and_ends_no_later(script, station):
+    noise = [(k / 120, HOME, bytes([k % 256]) * 1000) for k in range(600)]
+    with pytest.raises(BusError, match=r"is flooded.*within 6 s"):
+        unlocked(script(noise, outward=True, datagrams=False)).listen()
     junk = [(k / 1000, f"10.0.{k % 200}.1:{k}", b"no packet") for k in range(60_000)]
     link = unlocked(script(junk))
     with pytest.raises(LinkError, match=r"a script is flooded: \d+ pieces came within 6 s that are no vehicle's"):
@@ -59,14 +56,6 @@ def test_a_flood_of_strangers_is_named_and_ends_no_later(script, station):
     link, _ = locked(script(in_order(heartbeats(station(), HOME), junk)))
     heard = list(link.messages(4 * S))
     assert (len(heard), link.now_ns()) == (2, 4 * S)
-
-
-@pytest.mark.parametrize(("kB", "words"), [(60, "no autopilot's heartbeat came"), (600, "is flooded")])
-def test_noise_on_a_serial_line_is_a_flood_where_it_is_more_than_a_line_carries(script, kB, words):
-    noise = [(5 * k / kB, HOME, bytes([k % 256]) * 1000) for k in range(kB)]
-    link = unlocked(script(noise, outward=True, datagrams=False))
-    with pytest.raises(BusError, match=f"{words}.*within 6 s"):
-        link.listen()
 
 
 def test_several_vehicles_end_with_their_list(script, station):
@@ -81,6 +70,18 @@ def test_several_vehicles_end_with_their_list(script, station):
         with pytest.raises(UsageError, match=words):
             choose_vehicle(given, system)
     assert choose_vehicle(vehicles, 7).address == STRANGER
+    twice = in_order(heartbeats(station(), HOME), heartbeats(station(), STRANGER))
+    with pytest.raises(UsageError, match="stop the other"):
+        choose_vehicle(unlocked(script(twice)).listen(), 1)
+
+
+@pytest.mark.parametrize("stations", [False, True], ids=["nobody", "ground stations"])
+def test_a_partner_that_was_named_is_spoken_to_at_once_and_no_vehicle_there_is_one_sentence(script, station, stations):
+    beat = station(255, 190).message("heartbeat", 6, 8, 0, 0, 4)
+    transport = script([(0.5 + k, HOME, beat) for k in range(9)] if stations else [], outward=True)
+    with pytest.raises(NoAnswer, match="no autopilot's heartbeat came over a script within 6 s: power the vehicle"):
+        unlocked(transport).listen()
+    assert [(t, address) for t, address, _ in transport.sent[:2]] == [(0.0, None), (1.0, None)]
 
 
 def test_a_second_vehicle_is_heard_where_the_first_comes_late(script, station):
@@ -106,12 +107,6 @@ def test_a_vehicle_that_comes_back_at_another_port_is_found_there_once_it_is_sou
     assert {decoded(data).get_srcSystem() for _, data in record} == {1, OWN_SYSTEM}
 
 
-def test_one_system_at_two_addresses_is_not_guessed_at(script, station):
-    transport = script(in_order(heartbeats(station(), HOME), heartbeats(station(), STRANGER)))
-    with pytest.raises(UsageError, match="stop the other"):
-        choose_vehicle(unlocked(transport).listen(), 1)
-
-
 @pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
 def test_a_stranger_changes_nothing(script, station, key):
     vehicle, forger = station(key=key), station(key=key)
@@ -119,12 +114,16 @@ def test_a_stranger_changes_nothing(script, station, key):
     own = heartbeats(vehicle, HOME, 2) + [(2 + 0.02 * k, HOME, vehicle.raw(20_000 * k)) for k in range(100)]
     forged = [(2 + 0.02 * k, STRANGER, forger.raw(20_000 * k, acc=(9, 9, 9))) for k in range(100)]
     cut = [(2.01 + 0.02 * k, STRANGER, forger.raw(k)[:-4]) for k in range(100)]
+    # These are kept in the capture, but they are not heard.
+    gimbal = [(3.1, HOME, station(1, component=154, key=key).raw(1)), (3.2, HOME, station(3, key=key).raw(1))]
     heard = []
-    for arriving in (own, in_order(own, forged, cut)):
+    for arriving in (own, in_order(own, forged, cut, gimbal)):
         link, record = locked(script(arriving), key)
-        heard.append(([m.to_dict() for m in link.messages(5 * S)], [data for _, data in record if data[5] == 1]))
-    assert len(heard[0][0]) == 100
+        heard.append([m.to_dict() for m in link.messages(5 * S)])
+    assert len(heard[0]) == 100
     assert heard[0] == heard[1]
+    assert {(data[5], data[6]) for _, data in record} == {(1, 1), (1, 154), (3, 1), (OWN_SYSTEM, OWN_COMPONENT)}
+    assert [t_ns for t_ns, _ in record] == sorted(t_ns for t_ns, _ in record)
 
 
 def test_a_forged_signature_of_a_later_time_outdates_no_true_one(script, station):
@@ -132,30 +131,11 @@ def test_a_forged_signature_of_a_later_time_outdates_no_true_one(script, station
     forger.mav.signing.timestamp = 1 << 47
     begun = heartbeats(vehicle, HOME, 2)
     own = [(2 + 0.02 * k, HOME, vehicle.raw(20_000 * k)) for k in range(100)]
-    forged = [(2.01, HOME, forger.raw(1, acc=(9, 9, 9)))]
+    forged = [*heartbeats(forger, STRANGER, 2), (2.01, HOME, forger.raw(1, acc=(9, 9, 9)))]
     link, _ = locked(script(in_order(begun, own, forged)), KEY)
+    assert link.vehicle.address == HOME
     heard = [message for message in link.messages(5 * S) if message.get_type() == "RAW_IMU"]
     assert [message.time_usec for message in heard] == [20_000 * k for k in range(100)]
-
-
-def test_others_at_the_vehicles_address_are_kept_but_not_heard(script, station):
-    vehicle, gimbal, other = station(), station(1, component=154), station(3)
-    arriving = in_order(heartbeats(vehicle, HOME, 4), [(3.1, HOME, gimbal.raw(1)), (3.2, HOME, other.raw(1))])
-    link, record = locked(script(arriving))
-    assert {message.get_type() for message in link.messages(5 * S)} == {"HEARTBEAT"}
-    assert {(data[5], data[6]) for _, data in record} == {(1, 1), (1, 154), (3, 1), (OWN_SYSTEM, OWN_COMPONENT)}
-    assert [t_ns for t_ns, _ in record] == sorted(t_ns for t_ns, _ in record)
-
-
-@pytest.mark.parametrize("stations", [False, True], ids=["nobody", "ground stations"])
-def test_no_vehicle_there_is_one_sentence(script, station, stations):
-    beat = station(255, 190).message("heartbeat", 6, 8, 0, 0, 4)
-    with pytest.raises(NoAnswer, match="no autopilot's heartbeat came over a script within 6 s: power the vehicle"):
-        unlocked(script([(0.5 + k, HOME, beat) for k in range(9)] if stations else [])).listen()
-
-
-def test_a_first_heartbeat_may_take_six_seconds(script, station):
-    assert len(unlocked(script([(5.5, HOME, station().heartbeat())])).listen()) == 1
 
 
 def test_a_wrong_signing_key_is_named(script, station):
@@ -181,19 +161,6 @@ def test_we_sign_no_earlier_than_the_vehicle(script, station, decoded):
     assert all(decoded(data).get_header().incompat_flags & 1 for _, _, data in transport.sent)
     # MAVLink 2 signing: link id, 6 bytes of time, 6 of signature at the packet's end
     assert all(int.from_bytes(data[-12:-6], "little") >= ahead for _, _, data in transport.sent)
-
-
-def test_forged_signatures_do_not_silence_the_vehicle(script, station):
-    vehicle, forger = station(key=KEY), station(key=b"x" * 32)
-    forger.mav.signing.timestamp = 1 << 47
-    both = in_order(heartbeats(vehicle, HOME), heartbeats(forger, STRANGER, 4))
-    assert [each.address for each in unlocked(script(both), KEY).listen()] == [HOME]
-
-
-def test_a_vehicle_that_signs_is_noticed_where_we_do_not(script, station):
-    link, _ = locked(script(heartbeats(station(key=KEY), HOME)))
-    list(link.messages(5 * S))
-    assert link.signed_only
 
 
 def test_a_loop_that_is_left_early_loses_no_message(script, station):
@@ -236,12 +203,3 @@ def test_a_request_is_repeated_until_its_own_answer(script, station, decoded):
     link, _ = locked(transport)
     assert send_command(link, 511, 27, 10_000) == 4
     assert len(asked) == 3
-
-
-def test_a_request_that_nobody_answers_gives_none(script, station):
-    transport = script(heartbeats(station(), HOME, 20))
-    link, _ = locked(transport)
-    before_ns = link.now_ns()
-    request = link.encode("param_request_read", b"NO_SUCH", -1)
-    assert ask(link, request, lambda message: None, timeout_s=0.5, tries=4) is None
-    assert link.now_ns() - before_ns == 2 * S

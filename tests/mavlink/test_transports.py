@@ -95,20 +95,6 @@ def test_the_kernel_turns_strangers_away_once_the_vehicle_is_known(other):
             assert soon(transport).data == b"whoever"
 
 
-def test_udpout_speaks_first(other):
-    with closing(open_transport(Url(Kind.UDPOUT, HOST, other.getsockname()[1]))) as transport:
-        transport.send(b"hello", None)
-        data, address = other.recvfrom(99)
-        other.sendto(data + b" you", address)
-        assert soon(transport).data == b"hello you"
-
-
-def test_a_partner_that_is_not_there_yet_is_waited_for():
-    with closing(open_transport(Url(Kind.UDPOUT, HOST, free_udp()))) as transport:
-        transport.send(b"hello", None)
-        assert transport.receive(transport.now_ns() + 20_000_000) is None
-
-
 def test_tcp_moves_bytes_and_is_connected_again():
     server = socket.create_server((HOST, 0))
     where = server.getsockname()

@@ -5,22 +5,16 @@ import pytest
 
 from mpucal.errors import UsageError
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.hands import HANDS
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
         ("sim:colour=red", "does not know 'colour=red'"),
-        ("sim:chip", "does not know 'chip'"),
         ("sim:chip=mpu9999", "one of mpu6050, mpu6050c, mpu6500, "),
-        ("sim:hand=robot", "hand=robot is not one of guided, "),
-        ("sim:pace=slow", "one of fast, real"),
         ("sim:seed=-1", "a whole number from 0 on"),
-        ("sim:seed=x", "a whole number from 0 on"),
         ("sim:seed=1,seed=2", "seed is given twice"),
         ("sim:b_a=1/2", "three numbers"),
-        ("sim:b_a=1/2/nan", "three numbers"),
         ("sim:D=1/0/0/0/1/0/0/0/0", "that can be inverted"),
         ("sim:who_am_i=0x168", "a byte"),
         ("sim:noise=-1", "from 0 on"),
@@ -30,18 +24,6 @@ def test_options_that_make_no_sense(text, says):
     with pytest.raises(UsageError, match=r"^sim: ") as caught:
         open_simulated(text)
     assert str(caught.value).count(says) == 1
-
-
-@pytest.mark.parametrize("kind", HANDS)
-def test_every_hand_can_be_chosen(kind):
-    assert open_simulated(f"sim:hand={kind}", seed=4).truth_document()["seed"] == 4
-
-
-def test_a_seed_beside_the_text():
-    assert open_simulated("sim", seed=5).truth_document()["seed"] == 5
-    assert open_simulated("sim:seed=5", seed=5).truth_document()["seed"] == 5
-    with pytest.raises(UsageError, match="seed=4 and --seed 5 differ"):
-        open_simulated("sim:seed=4", seed=5)
 
 
 def test_options_become_the_truth():

@@ -15,13 +15,3 @@ def test_each_row_is_filtered_by_its_own_cutoff():
     found = np.concatenate([low(steps[begin : begin + 7]) for begin in range(0, 49, 7)])
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-12)
     np.testing.assert_array_equal(found[:, 1], steps[:, 1])
-
-
-def test_values_that_come_again_replace_the_earlier_ones():
-    steps = np.random.default_rng(2).normal(size=(12, 1, 3))
-    low = LowPass((20.0,), 200.0, 12)
-    expected = low(steps)
-    low = LowPass((20.0,), 200.0, 12)
-    low(np.concatenate((steps[:8], steps[:4])))
-    low(steps[8:10] + 1.0, 4)
-    np.testing.assert_allclose(np.concatenate((low(steps[8:10], 2), low(steps[10:]))), expected[8:], atol=1e-12)

@@ -7,11 +7,11 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from mpucal.errors import NoAnswer, UsageError
+from mpucal.errors import NoAnswer
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.imu import MESSAGE_ID
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.encoding import from_wire, name_bytes, to_wire
+from mpucal.mavlink.parameters.encoding import name_bytes, to_wire
 from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
 from mpucal.mavlink.request import send_command
 from mpucal.mavlink.transports import open_transport
@@ -66,14 +66,10 @@ class Station:
 @pytest.mark.parametrize(
     ("words", "name", "asked_hz", "result", "got_hz"),
     [
-        ("imus=1", "HIGHRES_IMU", 10, ACCEPTED, 10),
-        ("imus=1", "HIGHRES_IMU", 100, ACCEPTED, 100),
         ("imus=1", "HIGHRES_IMU", 300, ACCEPTED, 333),
         ("imus=1", "HIGHRES_IMU", 400, DENIED, 50),
         ("highres=no", "HIGHRES_IMU", 100, DENIED, 0),
-        ("highres=no", "RAW_IMU", 100, ACCEPTED, 100),
         ("firmware=px4", "RAW_IMU", 100, FAILED, 0),
-        ("firmware=px4", "HIGHRES_IMU", 125, ACCEPTED, 125),
         ("firmware=px4", "SCALED_IMU", 200, ACCEPTED, 125),
     ],
 )
@@ -82,27 +78,6 @@ def test_each_firmware_has_its_messages_and_rates(words, name, asked_hz, result,
     station.interval(MESSAGE_ID[name], 50)
     assert station.interval(MESSAGE_ID[name], asked_hz) == result
     assert station.rates().get(name, 0) == pytest.approx(got_hz, rel=0.02)
-
-
-def test_a_second_station_slows_raw_imu_and_not_highres_imu():
-    station = Station("fault=second_station@3")
-    station.interval(HIGHRES, 100)
-    station.interval(RAW, 100)
-    before = station.rates()
-    station.hear(1.5)
-    after = station.rates()
-    assert (before["RAW_IMU"], before["HIGHRES_IMU"]) == pytest.approx((100, 100), rel=0.03)
-    assert (after["RAW_IMU"], after["HIGHRES_IMU"]) == pytest.approx((4, 100), rel=0.15)
-
-
-def test_a_parameter_list_slows_the_streams():
-    station = Station("imus=1")
-    station.interval(HIGHRES, 100)
-    station.say("param_request_list", 1, 1)
-    messages = station.hear(0.05)
-    values = [m for m in messages if m.get_type() == "PARAM_VALUE"]
-    assert len(values) == 20
-    assert len(messages) - len(values) <= 3
 
 
 def test_whole_milli_g_are_truncated_toward_zero():
@@ -120,7 +95,7 @@ def test_whole_milli_g_are_truncated_toward_zero():
             assert getattr(raw, f"{axis}gyro") == int(getattr(float_, f"{axis}gyro") * 1000)
 
 
-@pytest.mark.parametrize("words", ["fault=reboot@2", "firmware=px4,fault=autocal@2", "rotate_at=0"], ids=str)
+@pytest.mark.parametrize("words", ["rotate_at=0,fault=reboot@2", "firmware=px4,fault=autocal@2"], ids=str)
 def test_how_its_time_is_moved_on_changes_nothing(words):
     sent = []
     for stops_us in (range(2_500_000, 2_500_001), range(3000, 2_500_001, 1000), (700_000, 710_100, 2_500_000)):
@@ -133,7 +108,7 @@ def test_how_its_time_is_moved_on_changes_nothing(words):
     assert len(sent[0]) > 300
 
 
-@pytest.mark.parametrize("words", ["", "firmware=px4", "rotation=1", "firmware=px4,rotation=12"], ids=str)
+@pytest.mark.parametrize("words", ["rotation=1", "firmware=px4,rotation=12"], ids=str)
 def test_the_truth_it_tells_is_that_of_its_streams(words):
     station = Station(words)
     station.rest()
@@ -151,7 +126,7 @@ def test_the_truth_it_tells_is_that_of_its_streams(words):
 
 def test_px4s_highres_imu_lacks_the_biases_that_the_estimator_learns():
     shift, turn = {}, {}
-    for control in (7, 6, 5, 4):
+    for control in (7, 4):
         station = Station(f"firmware=px4,imus=1,EKF2_IMU_CTRL={control}")
         station.rest()
         station.interval(HIGHRES, 10)
@@ -164,11 +139,11 @@ def test_px4s_highres_imu_lacks_the_biases_that_the_estimator_learns():
         )
         hidden = exact - whole * [9.80665e-3, 1e-3, 1e-3, 1e-3]
         shift[control], turn[control] = abs(hidden[0]), np.linalg.norm(hidden[1:])
-    assert min(shift[7], shift[6]) > 0.2
-    assert max(shift[5], shift[4]) < 0.05
+    assert shift[7] > 0.2
+    assert shift[4] < 0.05
     # what is left of an estimated gyroscope's bias after 35 s of rest
     bias = np.linalg.norm(station.vehicle.imus.truths[0].b_omega)
-    assert min(turn[7], turn[5]) > 0.5 * bias > max(turn[6], turn[4])
+    assert turn[7] > 0.5 * bias > turn[4]
 
 
 def test_ardupilot_echoes_a_vectors_other_axes_and_is_silent_on_unknown_names():
@@ -178,29 +153,6 @@ def test_ardupilot_echoes_a_vectors_other_axes_and_is_silent_on_unknown_names():
     assert station.vehicle.firmware.store["INS_ACCOFFS_Y"] == 0.25
     assert station.set("INS_NO_SUCH", 1.0) == []
     assert station.set("INS_ACCOFFS_X", float("nan")) == []
-
-
-def test_ardupilots_scale_of_zero_is_a_stream_of_zero():
-    station = Station("imus=1,INS_ACCSCAL_X=0,INS_ACCSCAL_Y=0,INS_ACCSCAL_Z=0")
-    station.interval(HIGHRES, 50)
-    assert {m.zacc for m in station.hear(0.5) if m.get_type() == "HIGHRES_IMU"} == {0.0}
-    assert "calibration needed" in station.vehicle.firmware.complaints()[0]
-
-
-@pytest.mark.parametrize(
-    ("name", "kind", "error"), [("CAL_NO_SUCH", REAL32, 1), ("CAL_ACC0_XOFF", INT32, 7)], ids=["unknown", "type"]
-)
-def test_px4_answers_with_an_error(name, kind, error):
-    (answer,) = [m for m in Station("firmware=px4").set(name, 1, kind) if m.get_type() == "PARAM_ERROR"]
-    assert (answer.param_id, answer.error) == (name, error)
-
-
-def test_px4s_integers_travel_by_their_bytes():
-    station = Station("firmware=px4,imus=1")
-    station.say("param_request_read", 1, 1, b"CAL_ACC1_PRIO", -1)
-    (value,) = [m for m in station.hear(0.01) if m.get_type() == "PARAM_VALUE"]
-    assert np.isnan(value.param_value)
-    assert from_wire(value, True).value == -1
 
 
 @pytest.mark.parametrize(("value", "used"), [(0.009, 0.0), (0.011, 0.011)], ids=["too little", "enough"])
@@ -213,38 +165,8 @@ def test_px4_stores_and_ignores_a_small_change(value, used):
         station.vehicle.firmware.start()
 
 
-def test_it_arms_reboots_and_falls_silent_at_the_given_times():
-    station = Station("fault=arm@2,fault=reboot@4,fault=silence@8")
-    assert [m.base_mode & 128 for m in station.hear(3.9) if m.get_type() == "HEARTBEAT"] == [0, 128, 128]
-    assert station.hear(2.0) == []
-    assert station.hear(2.0) != []
-    assert station.hear(5.0) == []
-
-
-def test_the_hand_obeys_prompts():
-    station = Station("imus=1")
-    station.rest()
-    station.interval(HIGHRES, 50)
-
-    def down():
-        last = [m for m in station.hear(4.0) if m.get_type() == "HIGHRES_IMU"][-1]
-        f = np.array([last.xacc, last.yacc, last.zacc])
-        return -f / np.linalg.norm(f)
-
-    assert down() @ [0, 0, 1] > 0.98
-    station.vehicle.receive(bytes(encode_prompt(ReceivedPrompt("rotate", (1.0, 0.0, 0.0))).pack(station.mav)))
-    assert down() @ [1, 0, 0] > 0.9
-
-
-@pytest.mark.parametrize("words", ["imus=9", "firmware=betaflight", "fault=arm", "nonsense", "seed=1,seed=2"], ids=str)
-def test_unknown_words_are_refused(words):
-    with pytest.raises(UsageError):
-        VehicleOptions.parse("sim:" + words)
-
-
-@pytest.mark.parametrize(("port", "firmware"), [("tcp:127.0.0.1:0", "px4"), ("pty", "ardupilot")])
-def test_the_tool_puts_it_on_a_real_port(program, port, firmware):
-    command = program("lab", "sim_vehicle", port, f"firmware={firmware}", "--speed", "4")
+def test_the_tool_puts_it_on_a_real_port(program):
+    command = program("lab", "sim_vehicle", "tcp:127.0.0.1:0", "firmware=px4", "--speed", "4")
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         try:
             url = running.stdout.readline().strip()
@@ -254,7 +176,7 @@ def test_the_tool_puts_it_on_a_real_port(program, port, firmware):
                 with suppress(NoAnswer):
                     (vehicle,) = link.listen()
                     break
-            assert vehicle.family.lower() == firmware
+            assert vehicle.family == "PX4"
             link.close()
         finally:
             running.terminate()
