@@ -9,14 +9,6 @@ from mpucal.disk.atomic import remove_file, write_atomically, write_together
 from mpucal.errors import OutputError
 
 
-def test_writes_a_new_file_and_replaces_an_old_one(tmp_path):
-    path = tmp_path / "a.json"
-    for content in (b"first", b"second, longer", b""):
-        write_atomically(path, content)
-        assert path.read_bytes() == content
-    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
-
-
 class Failing:
     """The system's calls that make it, bring it to the disk, and give it its rights and name; number `at` fails."""
 
@@ -77,17 +69,15 @@ def test_a_fault_at_any_step_leaves_all_old_files_or_all_new_ones(tmp_path_facto
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == expected
 
 
-def test_a_folder_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(OutputError, match=r"none/a\.json.*No such file") as raised:
-        write_atomically(tmp_path / "none" / "a.json", b"")
+@pytest.mark.parametrize(
+    ("name", "says"), [("none/a.json", r"none/a\.json.*No such file"), ("there", "Is a directory")]
+)
+def test_a_place_where_no_file_can_be_is_named(tmp_path, name, says):
+    (tmp_path / "there").mkdir()
+    with pytest.raises(OutputError, match=says) as raised:
+        write_atomically(tmp_path / name, b"")
     assert "-o" in raised.value.remedy
-
-
-def test_a_folder_in_the_files_place_is_an_output_error(tmp_path):
-    (tmp_path / "a.json").mkdir()
-    with pytest.raises(OutputError, match="Is a directory"):
-        write_atomically(tmp_path / "a.json", b"")
-    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+    assert [p.name for p in tmp_path.iterdir()] == ["there"]
 
 
 def test_a_new_file_has_the_rights_of_the_umask_and_an_old_one_keeps_its_own(tmp_path):

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import mpucal
-from mpucal.files import load
-from mpucal.files.hints import NO_HINTS
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 EPOCH_NS = 1_403_636_579_758_555_392
@@ -19,10 +17,16 @@ BOTH = (("/imu/data_raw", True, True),)
 
 @pytest.fixture(scope="session")
 def walk():
-    """A recording in which a hand turns the board, from t = 0 on, in steps of whole ns, 14 s of it."""
+    """A recording in which a hand turns the board, from t = 0 on, at an even 100 Hz, 14 s of it."""
     whole = mpucal.load(FIXTURE).part(1000, 2400)
-    t_ns = np.rint((whole.t - whole.t[0]) * 1e9).astype(np.int64)
-    return mpucal.Recording.from_arrays(t_ns * 1e-9, whole.acc, whole.gyr, name="walk")
+    return mpucal.Recording.from_arrays(np.arange(len(whole)) / 100, whole.acc, whole.gyr, name="walk")
+
+
+@pytest.fixture(scope="session")
+def stored_calibration():
+    """The first 50 s of a stored session, and their calibration."""
+    whole = mpucal.load(FIXTURE, span=":50")
+    return whole, mpucal.calibrate(whole)
 
 
 @pytest.fixture(scope="session")
@@ -42,17 +46,6 @@ def assert_same():
         np.testing.assert_allclose(read.gyr, walk.gyr, rtol=0, atol=gyr)
 
     return check
-
-
-@pytest.fixture
-def load_table(tmp_path):
-    """Return a function that writes a table as walk.csv, with words for pandas, and loads it."""
-
-    def load_table(table, hints=NO_HINTS, **written):
-        table.to_csv(tmp_path / "walk.csv", index=False, **written)
-        return load(tmp_path / "walk.csv", hints)
-
-    return load_table
 
 
 @cache

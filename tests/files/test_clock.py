@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import mpucal
-from mpucal.files.tables.clock import fit_clock, sample_period
+from mpucal.files import open_rows
+from mpucal.files.tables.clock import fit_clock
 
 HZ, N = 199.7, 8000
 TRUE = np.arange(N) / HZ
@@ -83,14 +84,9 @@ def test_true_times_stay(times):
     np.testing.assert_array_equal(found.gap[1:], np.diff(times) > 2.5 * np.median(np.diff(times)))
 
 
-def test_the_period_is_that_of_the_samples_and_not_of_the_bursts():
-    assert sample_period(in_bursts(10)) == pytest.approx(1 / HZ, rel=1e-2)
-    assert sample_period(TRUE) == pytest.approx(1 / HZ, rel=1e-9)
-
-
 @pytest.mark.parametrize("ending", [".csv", ".npz"])
-def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
-    """The estimated clock is needed: with a gap at every other step no rest would be found."""
+def test_a_recording_by_radio_is_the_one_by_wire_also_in_runs(ending, walk, tmp_path):
+    """Estimate the clock as `calibrate` does and as `apply` does: with a gap at each step no rest would be found."""
     # in bursts of four as well, each with one stamp
     last = np.minimum((np.arange(len(walk)) // 4 + 1) * 4 - 1, len(walk) - 1)
     stamps = np.maximum.accumulate(walk.t + np.random.default_rng(6).exponential(4e-3, len(walk)))[last]
@@ -99,7 +95,9 @@ def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
     else:
         table, names = np.column_stack([stamps, walk.acc, walk.gyr]), "t,ax,ay,az,gx,gy,gz"
         np.savetxt(tmp_path / f"walk{ending}", table, delimiter=",", header=names, comments="")
-    read = mpucal.load(tmp_path / f"walk{ending}")
+    read, runs = mpucal.load(tmp_path / f"walk{ending}"), open_rows(tmp_path / f"walk{ending}")
     off = read.t - walk.t
     assert np.abs(off - np.median(off)).max() < 2e-3
     assert "arrival stamps" in read.taken
+    assert runs.taken == read.taken
+    np.testing.assert_array_equal(np.concatenate([samples.t for samples in runs.runs]), read.t)

@@ -30,14 +30,6 @@ def table(walk):
     return made
 
 
-def archive(walk, folder):
-    with zipfile.ZipFile(folder / "a.zip", "w", zipfile.ZIP_DEFLATED) as file:
-        for name, values in (("Accelerometer", walk.acc), ("Gyroscope", walk.gyr)):
-            made = pd.DataFrame(values, columns=["x", "y", "z"])
-            made.insert(0, "seconds_elapsed", walk.t)
-            file.writestr(f"{name}.csv", made.to_csv(index=False))
-
-
 @pytest.fixture(scope="module")
 def files(walk, write_bag, tmp_path_factory):
     """suffix -> the bytes of a whole file."""
@@ -50,7 +42,10 @@ def files(walk, write_bag, tmp_path_factory):
     table(some).to_json(folder / "a.jsonl", orient="records", lines=True)
     counts = np.rint(np.column_stack([some.acc / 9.80665 * 16384, np.degrees(some.gyr) * 131])).astype(int)
     (folder / "a.txt").write_text("".join("a/g:\t" + "\t".join(map(str, row)) + "\n" for row in counts.tolist()))
-    archive(some, folder)
+    with zipfile.ZipFile(folder / "a.zip", "w", zipfile.ZIP_DEFLATED) as file:
+        for name, values in (("Accelerometer", some.acc), ("Gyroscope", some.gyr)):
+            made = pd.DataFrame(np.column_stack([some.t, values]), columns=["seconds_elapsed", "x", "y", "z"])
+            file.writestr(f"{name}.csv", made.to_csv(index=False))
     for kind in ("mcap", "db3", "bag"):
         bag = write_bag(folder / ("a.bag" if kind == "bag" else kind), some, np.rint(some.t * S).astype(int), kind)
         if kind != "bag":
@@ -85,8 +80,9 @@ def damaged(data, kind, place, with_):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-@settings(max_examples=40)
-@given(damage=st.lists(DAMAGE, min_size=1, max_size=3))
+@settings(max_examples=30)
+@given(damage=st.lists(DAMAGE, max_size=3))
+@example(damage=[])
 @example(damage=[("twice", 0.015625, b"\0"), ("gone", 0.5, b"\0")])  # of .mcap: no message is left
 @example(damage=[("cut", 0.015625, b""), ("set", 0.0625, b"\0")])  # of .csv: one line is left, and no name of times
 def test_a_damaged_file_is_refused_or_read(suffix, damage, files, tmp_path):
@@ -99,16 +95,11 @@ def test_a_damaged_file_is_refused_or_read(suffix, damage, files, tmp_path):
         try:
             read = mpucal.load(path, rate=100 if suffix == ".txt" else None)
         except mpucal.MpucalError as error:
+            assert damage
             assert str(error).endswith(".")
             return
-    assert len(read) >= 2
+    assert len(read) >= (2 if damage else N)
     assert (np.diff(read.t) > 0).all()
     assert np.isfinite(read.acc).all()
     # rates that nothing confirms are left out as a whole
     assert np.isfinite(read.gyr).all() or np.isnan(read.gyr).all()
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_the_whole_file_is_read(suffix, files, tmp_path):
-    (tmp_path / f"a{suffix}").write_bytes(files[suffix])
-    assert len(mpucal.load(tmp_path / f"a{suffix}", rate=100 if suffix == ".txt" else None)) == N

@@ -7,12 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import mpucal
-from mpucal.cli import commands
 from mpucal.errors import RecordingError
 from mpucal.mavlink.calibrate_vehicle import calibrate_vehicle
 
@@ -20,30 +19,19 @@ D = np.array([[1.02, 0.003, 0.0], [0.0, 0.99, -0.004], [0.002, 0.0, 0.97]])
 B_A = np.array([-0.2, 0.3, 0.25])
 
 
-@pytest.fixture(scope="session")
-def turned():
-    """turned(n, hz): t [s], acc, gyr of a sensor with known D and b_a, flat first and then turned about varied axes."""
-
-    def make(D, b_a, seconds=60.0, hz=50.0):
-        t = np.arange(round(seconds * hz)) / hz
-        moving = np.clip((t - 12.0) / 1.0, 0.0, 1.0)
-        w = moving[:, None] * np.stack(
-            [1.1 * np.sin(0.9 * t), 0.9 * np.sin(0.53 * t + 1.0), 0.8 * np.cos(0.31 * t)], axis=1
-        )
-        R, down = np.eye(3), np.zeros((len(t), 3))
-        for k in range(len(t)):
-            down[k] = R.T @ [0.0, 0.0, -9.80665]
-            turn = 0.5 * (w[k] + w[min(k + 1, len(t) - 1)]) / hz
-            angle = np.linalg.norm(turn)
-            if angle:
-                x, y, z = turn / angle
-                K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-                R = R @ (np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
-        noise = np.random.default_rng(4)
-        acc = down @ np.asarray(D).T + b_a + noise.normal(0.0, 0.02, (len(t), 3))
-        return t, acc, w + noise.normal(0.0, 0.001, (len(t), 3)) + [0.004, -0.003, 0.002]
-
-    return make
+def turned(D, b_a, seconds=40.0, hz=50.0):
+    """Return t [s], acc, gyr of a sensor with known D and b_a, flat first and then turned about varied axes."""
+    t = np.arange(round(seconds * hz)) / hz
+    moving = np.clip((t - 8.0) / 1.0, 0.0, 1.0)[:, None]
+    w = moving * np.stack([1.1 * np.sin(0.9 * t), 0.9 * np.sin(0.53 * t + 1.0), 0.8 * np.cos(0.31 * t)], axis=1)
+    turns = Rotation.from_rotvec(0.5 * (w + np.vstack([w[1:], w[-1:]])) / hz)
+    R, down = Rotation.identity(), np.zeros((len(t), 3))
+    for k in range(len(t)):
+        down[k] = R.apply([0.0, 0.0, -9.80665], inverse=True)
+        R = R * turns[k]
+    noise = np.random.default_rng(4)
+    acc = down @ np.asarray(D).T + b_a + noise.normal(0.0, 0.02, (len(t), 3))
+    return t, acc, w + noise.normal(0.0, 0.001, (len(t), 3)) + [0.004, -0.003, 0.002]
 
 
 class Dataflash:
@@ -81,7 +69,7 @@ def dataflash() -> Dataflash:
 
 
 @pytest.fixture
-def flight(dataflash, turned, tmp_path):
+def flight(dataflash, tmp_path):
     """A log of two IMUs, the second a perfect one, and the offsets that the first one holds already."""
     t, acc, gyr = turned(D, B_A)
     _, perfect, _ = turned(np.eye(3), np.zeros(3))
@@ -99,19 +87,13 @@ def test_every_imu_of_a_flight_is_calibrated(flight):
     recording = mpucal.load(flight)
     assert recording.autopilot.parameters["INS_ACCOFFS_X"] == pytest.approx(0.05)
     assert recording.sensor.temperature_c == pytest.approx(31.5)
-    assert len(recording) == len(recording.others[0]) == 3000
+    assert len(recording) == len(recording.others[0]) == 2000
     calibration = calibrate_vehicle(recording)
     np.testing.assert_allclose(calibration.D, D, atol=1e-3)
     np.testing.assert_allclose(calibration.b_a, B_A, atol=5e-3)
     (other,) = calibration.extra["others"]
     np.testing.assert_allclose(other["accelerometer"]["D"], np.eye(3), atol=1e-3)
     assert calibration.extra["autopilot"]["params_old"]["INS_ACCOFFS_X"] == pytest.approx(0.05)
-
-
-def test_the_commands_take_a_log_for_what_it_is(flight):
-    shown = CliRunner().invoke(commands, ["show", str(flight)])
-    assert shown.exit_code == 0
-    assert "3000 in 60.0 s" in shown.output
 
 
 def test_a_log_with_a_message_for_each_imu_is_read(dataflash, tmp_path):
@@ -127,17 +109,18 @@ def test_a_log_with_a_message_for_each_imu_is_read(dataflash, tmp_path):
     assert recording.others[0].acc[0, 2] == pytest.approx(-9.9)
 
 
-def test_a_log_without_imu_messages_says_what_to_set(dataflash, tmp_path):
+def test_files_that_hold_no_imu_say_what_to_do(dataflash, tmp_path):
     dataflash.add("PARM", 0, b"INS_ACCOFFS_X", 0.05, 0.0)
-    (tmp_path / "empty.bin").write_bytes(dataflash.bytes())
-    with pytest.raises(RecordingError, match="holds no IMU messages: have LOG_BITMASK"):
-        mpucal.load(tmp_path / "empty.bin")
-
-
-def test_a_blob_is_no_log(tmp_path):
-    (tmp_path / "calibration.bin").write_bytes(b"MPUC" + bytes(100))
-    with pytest.raises(RecordingError, match="not a dataflash log"):
-        mpucal.load(tmp_path / "calibration.bin")
+    packets = np.random.default_rng(5).integers(0, 256, (900, 106), np.uint8)
+    packets[:, :60] = np.arange(60)
+    for content, says in (
+        (dataflash.bytes(), "holds no IMU messages: have LOG_BITMASK"),
+        (b"MPUC" + bytes(100), "not a dataflash log"),
+        (packets.tobytes(), "packets of 106 bytes"),
+    ):
+        (tmp_path / "x.bin").write_bytes(content)
+        with pytest.raises(RecordingError, match=says):
+            mpucal.load(tmp_path / "x.bin")
 
 
 @settings(max_examples=25)

@@ -1,43 +1,32 @@
 """A format is one row: one that is made up here is known to everything that reads or writes recordings."""
 
-import json
-import re
-import subprocess
-import sys
+from contextlib import contextmanager
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mpucal
-from mpucal.data import Recording
-from mpucal.errors import RecordingError
-from mpucal.files import formats, open_rows
+from mpucal.chip.driver import Driver
+from mpucal.data import Recording, Samples
+from mpucal.errors import OutputError, RecordingError
+from mpucal.files import formats, open_rows, open_writer
+from mpucal.files.csv import csv_rows
 from mpucal.files.formats import FORMATS, Format, readable_formats, writable_formats
+from mpucal.files.mcap import CaptureWriter
+from mpucal.files.rows import Rows
+from mpucal.simulated.chip import open_simulated
+from mpucal.sources.tap import Tap
 
 ROOT = Path(__file__).parents[2]
-FIXTURE = ROOT / "fixtures" / "sessions" / "mpu6050.mcap"
-
-# a format of a suffix of its own, both ways, and a dialect of tables, whose times are in ms; then a command
-MADE_UP = """
-import sys
-from contextlib import contextmanager
-from dataclasses import replace
-from pathlib import Path
-
-import numpy as np
-
-from mpucal.data import Samples
-from mpucal.files import formats
-from mpucal.files.csv import csv_rows
-from mpucal.files.rows import Rows
 
 
 def words_rows(path):
-    table = np.array([line.split() for line in path.read_text().splitlines()], float)
+    table = np.loadtxt(path)
     no = np.zeros(len(table), bool)
-    unknown = np.full(len(table), np.nan)
-    return Rows(iter([Samples(table[:, 0], table[:, 1:4], table[:, 4:7], unknown, no, no, no)]), name=path.name)
+    samples = Samples(table[:, 0], table[:, 1:4], table[:, 4:7], np.full(len(table), np.nan), no, no, no)
+    return Rows(iter([samples]), name=path.name)
 
 
 @contextmanager
@@ -51,124 +40,49 @@ def is_milliseconds(path):
 
 
 def milliseconds_rows(path):
-    path.with_suffix(".plain").write_text(path.read_text().partition("\\n")[2])
+    path.with_suffix(".plain").write_text(path.read_text().partition("\n")[2])
     rows = csv_rows(path.with_suffix(".plain"))
     return replace(rows, runs=(replace(samples, t=samples.t / 1000.0) for samples in rows.runs))
-
-
-def register():
-    formats.FORMATS = (
-        formats.Format(".csv", "a table in ms", rows="made_up:milliseconds_rows", recognises="made_up:is_milliseconds"),
-        *formats.FORMATS,
-        formats.Format(".words", "a page of words", rows="made_up:words_rows", writer="made_up:words_file"),
-    )
-
-
-if __name__ == "__main__":
-    import io
-    import json
-    from contextlib import redirect_stderr, redirect_stdout
-
-    import made_up
-    from mpucal.__main__ import run
-
-    made_up.register()
-    said = []
-    for words in json.loads(sys.argv[1]):
-        with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
-            said.append((run(words), out.getvalue(), err.getvalue()))
-    print(json.dumps(said))
-"""
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Write the made-up formats to a folder, with a recording and its calibration."""
-    folder = tmp_path_factory.mktemp("formats")
-    (folder / "made_up.py").write_text(MADE_UP)
-    (folder / "notes.odt").write_text("hello")
-    whole = mpucal.load(FIXTURE)
-    table = np.column_stack([whole.t, whole.acc, whole.gyr])
-    np.savetxt(folder / "walk.words", table)
-    table[:, 0] *= 1000.0
-    text = "".join(",".join(map(repr, row)) + "\n" for row in table.tolist())
-    (folder / "walk.csv").write_text(f"# ms\nt,ax,ay,az,gx,gy,gz\n{text}")
-    return folder
-
-
-CALLS = (
-    ("calibrate", "walk.words", "-o", "results", "--json"),
-    ("calibrate", str(FIXTURE), "--json"),
-    ("show", "walk.words", "--json"),
-    ("show", "walk.csv", "--json"),
-    ("show", "notes.odt"),
-    ("apply", "results/calibration.json", "walk.words", "-o", "out.words"),
-    ("apply", "results/calibration.json", "walk.csv", "-o", "ms.words"),
-    ("apply", "results/calibration.json", "walk.words", "-o", "out.txt"),
-    *((command, "--help") for command in ("calibrate", "show", "apply")),
-)
-
-
-@pytest.fixture(scope="module")
-def call(folder):
-    """Run CALLS one after the other in a process that knows the made-up formats: exit codes and messages."""
-    words = [sys.executable, "made_up.py", json.dumps(CALLS)]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=True)
-    said = dict(zip(CALLS, json.loads(done.stdout), strict=True))
-    return lambda *words: said[words]
-
-
-def test_it_is_calibrated(call):
-    found = json.loads(call("calibrate", "walk.words", "-o", "results", "--json")[1])
-    wanted = json.loads(call("calibrate", str(FIXTURE), "--json")[1])
-    assert found["fit"]["samples"] == wanted["fit"]["samples"]
-    np.testing.assert_allclose(found["accelerometer"]["D"], wanted["accelerometer"]["D"], atol=1e-3)
-
-
-@pytest.mark.parametrize("name", ["walk.words", "walk.csv"])
-def test_it_is_shown(call, name):
-    shown, whole = json.loads(call("show", name, "--json")[1]), mpucal.load(FIXTURE)
-    assert shown["samples"] == len(whole)
-    assert shown["seconds"] == pytest.approx(whole.t[-1] - whole.t[0])
-
-
-@pytest.mark.parametrize(("source", "target"), [("walk.words", "out.words"), ("walk.csv", "ms.words")])
-def test_it_is_applied_to_and_written(call, folder, source, target):
-    code, _, error = call("apply", "results/calibration.json", source, "-o", target)
-    assert code == 0, error
-    acc = mpucal.Calibration.load(folder / "results" / "calibration.json").apply(mpucal.load(FIXTURE).acc)
-    np.testing.assert_allclose(np.loadtxt(folder / target)[:, 1:4], acc, atol=1e-9)
-
-
-@pytest.mark.parametrize("command", ["calibrate", "show", "apply"])
-def test_the_help_names_it(call, command):
-    said = " ".join(call(command, "--help")[1].split())
-    assert "a page of words (.words)" in said
-    assert ("a table in ms (.csv)" in said) == (command != "apply")
-
-
-def test_errors_name_it(call):
-    assert re.search(r"give a [^:]*\.words file or the folder", call("show", "notes.odt")[2])
-    code, _, error = call("apply", "results/calibration.json", "walk.words", "-o", "out.txt")
-    assert code == 3
-    assert re.search(r"end its name with .*\.words", error)
 
 
 def two(path):
     return Recording.from_arrays([0.0, 1.0], np.ones((2, 3)), np.zeros((2, 3)), name=path.name)
 
 
-def test_a_format_that_is_loaded_whole_has_rows_too(tmp_path, monkeypatch):
-    monkeypatch.setattr(formats, "FORMATS", (*FORMATS, Format(".two", "two samples", load=f"{__name__}:two")))
+@pytest.fixture
+def made_up(monkeypatch):
+    """Know a format of a suffix of its own, both ways, a dialect of tables whose times are in ms, and two samples."""
+    here = __name__
+    dialect = Format(".csv", "a table in ms", rows=f"{here}:milliseconds_rows", recognises=f"{here}:is_milliseconds")
+    words = Format(".words", "a page of words", rows=f"{here}:words_rows", writer=f"{here}:words_file")
+    rows = (dialect, *FORMATS, words, Format(".two", "two samples", load=f"{here}:two"))
+    monkeypatch.setattr(formats, "FORMATS", rows)
+
+
+def test_a_format_is_read_written_and_named(made_up, walk, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with open_writer(Path("walk.words"), Rows.of(walk), "") as write:
+        write(walk)
+    table = np.column_stack([walk.t * 1000, walk.acc, walk.gyr])
+    np.savetxt("walk.csv", table, delimiter=",", header="# ms\nt,ax,ay,az,gx,gy,gz", comments="")
+    for name in ("walk.words", "walk.csv"):
+        rows = open_rows(Path(name))
+        np.testing.assert_allclose(np.concatenate([samples.t for samples in rows.runs]), walk.t, atol=1e-12)
+    Path("notes.odt").touch()
+    with pytest.raises(RecordingError, match=r"give a .*, \.words, \.two file or the folder"):
+        mpucal.load("notes.odt")
+    with pytest.raises(OutputError, match=r"end its name with .*\.words"):
+        open_writer(Path("out.txt"), Rows.of(walk), "")
+
+
+def test_a_format_that_is_loaded_whole_has_rows_too(made_up, tmp_path):
     (tmp_path / "a.two").touch()
     rows = open_rows(tmp_path / "a.two")
     assert rows.name == "a.two"
     np.testing.assert_array_equal(rows.recording().acc, mpucal.load(tmp_path / "a.two").acc)
 
 
-def test_what_no_dialect_recognises_is_told_by_the_last_of_its_suffix(tmp_path, monkeypatch):
-    dialect = Format(".csv", "a dialect", load="nowhere:nothing", recognises="builtins:callable")
-    monkeypatch.setattr(formats, "FORMATS", (dialect, *FORMATS))
+def test_what_no_dialect_recognises_is_told_by_the_last_of_its_suffix(made_up, tmp_path):
     (tmp_path / "a.csv").write_text("one,two\n")
     with pytest.raises(RecordingError, match="names no columns of"):
         mpucal.load(tmp_path / "a.csv")
@@ -178,3 +92,42 @@ def test_the_page_names_each():
     text = " ".join((ROOT / "docs" / "recordings.md").read_text(encoding="utf-8").split())
     read, written = readable_formats(), writable_formats()
     assert f"`mpucal calibrate`, `show` and `apply` read {read}; `apply -o` writes {written}." in text
+
+
+def test_a_capture_gives_what_the_driver_gave(save, tmp_path):
+    """Read three seconds of the simulated chip from the folder of its session, its capture, and an archive."""
+    with CaptureWriter(tmp_path / "capture.mcap") as writer:
+        writer.start({"source": "sim"})
+        driver = Driver(Tap(open_simulated("sim", seed=1), writer))
+        driver.start()
+        for _ in range(150):
+            driver.poll()
+    recording = driver.recording()
+    assert len(recording) > 500
+    save(recording, tmp_path / "A.NPZ")
+    for path in (tmp_path / "capture.mcap", tmp_path, str(tmp_path), tmp_path / "A.NPZ"):
+        read = mpucal.load(path)
+        for field in fields(Recording):
+            if field.name != "name":
+                np.testing.assert_array_equal(getattr(read, field.name), getattr(recording, field.name), field.name)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes((tmp_path / "capture.mcap").read_bytes()[:600])
+    with pytest.raises(RecordingError, match="0 samples"):
+        mpucal.load(cut)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("none.npz", "there is no file"),
+        ("none", "there is no file"),
+        ("no_ending", "not a recording"),
+        ("folder", r"holds no capture\.mcap"),
+    ],
+)
+def test_what_is_no_recording(tmp_path, name, says):
+    (tmp_path / "no_ending").write_text("hello")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(RecordingError, match=says) as raised:
+        mpucal.load(tmp_path / name)
+    assert str(tmp_path / name) in str(raised.value)

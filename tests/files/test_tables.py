@@ -1,9 +1,8 @@
-"""Tables in the dialects of loggers, data sets and sketches, written by pandas, and read."""
+"""Tables of text as programs and people write them: each form is a row of data, and gives the walk's samples back."""
 
-import zipfile
+from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import mpucal
@@ -11,283 +10,369 @@ from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError, UsageError
 from mpucal.files import load
 from mpucal.files.hints import Hints, parse_columns, parse_units
-from mpucal.files.tables.names import parse_column_name
-from mpucal.files.tables.units import find_unit, rate_factor
 
-COUNTS_A, COUNTS_G = 32768 / (4 * G), 32750 / np.radians(500)
-
-
-def frame(names, *columns):
-    table = np.column_stack(columns)
-    return pd.DataFrame({name: table[:, i] for i, name in enumerate(names.split("|"))})
-
-
-def timed(name, times, names, *columns):
-    made = frame(names, *columns)
-    made.insert(0, name, times)
-    return made
-
-
-DIALECTS = {
-    "EuRoC": lambda w, ns: timed(
-        "#timestamp [ns]",
-        ns,
-        "w_RS_S_x [rad s^-1]|w_RS_S_y [rad s^-1]|w_RS_S_z [rad s^-1]"
-        "|a_RS_S_x [m s^-2]|a_RS_S_y [m s^-2]|a_RS_S_z [m s^-2]",
-        w.gyr,
-        w.acc,
-    ),
-    "Kalibr": lambda w, ns: timed("timestamp", ns, "omega_x|omega_y|omega_z|alpha_x|alpha_y|alpha_z", w.gyr, w.acc),
-    "rostopic echo -p": lambda w, ns: timed(
-        "%time",
-        ns + 1000,
-        "field.header.stamp|field.orientation.x|field.angular_velocity.x|field.angular_velocity.y"
-        "|field.angular_velocity.z|field.linear_acceleration.x|field.linear_acceleration.y|field.linear_acceleration.z",
-        w.t * 0,
-        w.t * 0,
-        w.gyr,
-        w.acc,
-    ).assign(**{"field.header.stamp": ns}),
-    "ulog2csv": lambda w, ns: timed(
-        "timestamp",
-        (ns - ns[0]) // 1000,
-        "gyro_rad[0]|gyro_rad[1]|gyro_rad[2]|gyro_integral_dt"
-        "|accelerometer_m_s2[0]|accelerometer_m_s2[1]|accelerometer_m_s2[2]",
-        w.gyr,
-        w.t,
-        w.acc,
-    ),
-    "AndroSensor": lambda w, ns: frame(
-        "ACCELEROMETER X (m/s²)|ACCELEROMETER Y (m/s²)|ACCELEROMETER Z (m/s²)|GRAVITY X (m/s²)"
-        "|LINEAR ACCELERATION X (m/s²)|LINEAR ACCELERATION Y (m/s²)|LINEAR ACCELERATION Z (m/s²)"
-        "|GYROSCOPE X (rad/s)|GYROSCOPE Y (rad/s)|GYROSCOPE Z (rad/s)|Time since start in ms ",
-        w.acc,
-        w.t,
-        w.acc * 0,
-        w.gyr,
-        w.t * 1000,
-    ),
-    "Physics Toolbox": lambda w, ns: frame("time|gFx|gFy|gFz|wx|wy|wz", w.t, w.acc / G, w.gyr),
-    "SensorLog": lambda w, ns: frame(
-        "accelerometerTimestamp_sinceReboot(s)|accelerometerAccelerationX(G)|accelerometerAccelerationY(G)"
-        "|accelerometerAccelerationZ(G)|gyroTimestamp_sinceReboot(s)|gyroRotationX(rad/s)|gyroRotationY(rad/s)"
-        "|gyroRotationZ(rad/s)|motionUserAccelerationX(G)|motionUserAccelerationY(G)|motionUserAccelerationZ(G)",
-        w.t,
-        -w.acc / G,
-        w.t,
-        w.gyr,
-        w.acc * 0,
-    ),
-    "a sketch in g and deg/s": lambda w, ns: frame(
-        "millis|AccX|AccY|AccZ|GyroX|GyroY|GyroZ", w.t * 1000, w.acc / G, np.degrees(w.gyr)
-    ),
-    "units in names": lambda w, ns: frame(
-        "time_us|acc_x_mg|acc_y_mg|acc_z_mg|gyro_x_dps|gyro_y_dps|gyro_z_dps",
-        w.t * 1e6,
-        w.acc / G * 1000,
-        np.degrees(w.gyr),
-    ),
-    "MARS logger": lambda w, ns: timed(
-        "Timestamp[nanosec]", ns, " gx[rad/s]| gy[rad/s]| gz[rad/s]| ax[m/s^2]| ay[m/s^2]| az[m/s^2]", w.gyr, w.acc
-    ),
-    "Physics Toolbox with linear accelerations": lambda w, ns: frame(
-        "time|gFx|gFy|gFz|ax|ay|az|wx|wy|wz",
-        w.t,
-        w.acc / G,
-        w.gyr * 0.3,
-        w.gyr,
-    ),
-    "WitMotion": lambda w, ns: timed(
-        "Time(s)",
-        pd.to_datetime(ns).strftime("%H:%M:%S.%f"),
-        "ax(g)|ay(g)|az(g)|wx(deg/s)|wy(deg/s)|wz(deg/s)|T(°)",
-        w.acc / G,
-        np.degrees(w.gyr),
-        w.t * 0 + 25,
-    ),
-    "axes first": lambda w, ns: frame("t|xacc|yacc|zacc|xgyro|ygyro|zgyro", w.t, w.acc, w.gyr),
-}
-
-
-SEPARATORS = {",": "", ";": "separated by semicolons", "\t": "by tabs"}
-# each dialect with its commas; the others where there are blanks in names, brackets, dates
-SEPARATED = [(d, s) for d in DIALECTS for s in SEPARATORS if s == "," or d in ("EuRoC", "AndroSensor", "WitMotion")]
-
-
-@pytest.mark.parametrize(("dialect", "separator"), SEPARATED)
-def test_dialects_give_the_samples_that_were_written(dialect, separator, walk, walk_ns, assert_same, load_table):
-    read = load_table(DIALECTS[dialect](walk, walk_ns), sep=separator)
-    assert_same(read, walk, 1e-9, 1e-9, 1e-6 if dialect in ("ulog2csv", "WitMotion") else 1e-9)
-    assert read.taken.startswith("walk.csv was read with times in ")
-    assert SEPARATORS[separator] in read.taken
-
-
-@pytest.mark.parametrize("ending", [".tsv", ".log"])
-def test_other_endings(ending, walk, walk_ns, assert_same, tmp_path):
-    DIALECTS["axes first"](walk, walk_ns).to_csv(tmp_path / f"walk{ending}", sep="\t", index=False)
-    assert_same(load(tmp_path / f"walk{ending}"), walk, 1e-9, 1e-9, 1e-9)
-
-
-@pytest.mark.parametrize("written", [{"sep": ";", "decimal": ","}, {"encoding": "cp1252"}])
-def test_decimal_commas_and_an_encoding_of_windows(written, walk, walk_ns, assert_same, load_table):
-    assert_same(load_table(DIALECTS["AndroSensor"](walk, walk_ns), **written), walk, 1e-9, 1e-9, 1e-9)
-
-
-def test_lines_before_the_header(walk, walk_ns, assert_same, tmp_path):
-    table = DIALECTS["a sketch in g and deg/s"](walk, walk_ns).to_csv(index=False)
-    (tmp_path / "walk.csv").write_text(f"sep=,\nMPU6050 found!\n\n{table}")
-    assert_same(load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
-
-
-def test_dates_are_times(walk, walk_ns, assert_same, load_table):
-    read = load_table(DIALECTS["axes first"](walk, walk_ns).assign(t=pd.to_datetime(walk_ns, utc=True)))
-    assert_same(read, walk, 1e-9, 1e-9, 1e-6)
-    assert abs(read.utc_ns - walk_ns[0]) < 1000
-
-
-def test_ios_counts_gravity_the_other_way(walk, walk_ns, load_table):
-    assert "the opposite sign, as on iOS" in load_table(DIALECTS["SensorLog"](walk, walk_ns)).taken
-
-
-@pytest.mark.parametrize(
-    ("names", "scale", "units", "says"),
-    [
-        (
-            "time [s]|ax [m s^-2]|ay [m s^-2]|az [m s^-2]|gx|gy|gz",
-            (1, 1 / G, 1),
-            "acc=g",
-            r"acc is said to be in m/s\^2, but .* suggests g",
-        ),
-        (
-            "time [s]|ax|ay|az|omega_x|omega_y|omega_z",
-            (1, 1, np.degrees(1)),
-            "gyr=deg/s",
-            "gyr is said to be in rad/s, but the turning of gravity suggests deg/s",
-        ),
-        ("time [s]|ax|ay|az|gx|gy|gz", (1000, 1, 1), "t=ms", r"t is said to be in s, but the step of .* suggests ms"),
-    ],
-)
-def test_doubtful_units_are_refused_and_can_be_said(names, scale, units, says, walk, assert_same, load_table):
-    table = frame(names, walk.t * scale[0], walk.acc * scale[1], walk.gyr * scale[2])
-    with pytest.raises(RecordingError, match=says):
-        load_table(table)
-    assert_same(load_table(table, Hints(units=parse_units(units))), walk, 1e-9, 1e-9, 1e-9)
-
-
-def test_rates_of_a_sensor_at_rest_need_a_unit(load_table):
-    rng = np.random.default_rng(3)
-    acc, gyr = rng.normal([0, 0, G], 0.02, (500, 3)), rng.normal(0, 0.3, (500, 3))
-    table = timed("time", np.arange(500) * 5, "accX|accY|accZ|gyroX|gyroY|gyroZ", acc, gyr)
-    read = load_table(table)
-    assert np.isnan(read.gyr).all()
-    assert "rates left out, because nothing shows their unit (--units gyr=UNIT)" in read.taken
-    assert np.isfinite(load_table(table, Hints(units=parse_units("gyr=deg/s"))).gyr).all()
-
-
-def test_linear_acceleration_is_none_that_can_be_calibrated(walk, walk_ns, load_table):
-    made = DIALECTS["Kalibr"](walk, walk_ns)
-    made.iloc[:, 4:] = np.random.default_rng(1).normal(0, 0.3, (len(walk), 3))
-    with pytest.raises(RecordingError, match="gravity is not in it"):
-        load_table(made)
+COUNTS = np.r_[[32768 / (4 * G)] * 3, [32750 / np.radians(500)] * 3]
+STAMPS = np.datetime64("2025-10-04T16:35:12")
 
 
 def counts(walk):
-    return np.rint(np.column_stack([walk.acc * COUNTS_A, walk.gyr * COUNTS_G])).astype(int)
+    """Return the samples in counts of ±4 g and ±500 deg/s, (n, 6)."""
+    return np.rint(np.column_stack([walk.acc, walk.gyr]) * COUNTS).astype(int)
 
 
-def even(walk):
-    """The walk at a steady rate, as a sketch without times has it."""
-    rate = 1 / np.median(np.diff(walk.t))
-    return type(walk).from_arrays(np.arange(len(walk)) / rate, walk.acc, walk.gyr), rate
+def dates(walk):
+    return STAMPS + np.rint(walk.t * 1e6).astype("m8[us]")
 
 
-def test_counts_need_their_ranges_and_a_rate(walk, assert_same, load_table):
-    table, (steady, rate) = frame("ax|ay|az|gx|gy|gz", counts(walk)), even(walk)
-    alone = load_table(table)
-    assert "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|) and without rates; this sample" in alone.taken
-    np.testing.assert_allclose(alone.acc, walk.acc, atol=0.5 / COUNTS_A)
-    assert np.isnan(alone.gyr).all()
-    seen = load_table(table, Hints(rate_hz=rate))
-    assert "counts of ±4 g (by |a|) and rates in counts of ±500 deg/s (by how gravity turns)" in seen.taken
-    assert_same(seen, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
-    read = load_table(table, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=500))
-    assert_same(read, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
-    assert (read.sensor.accel_range_g, read.sensor.gyro_range_dps) == (4, 500)
-    with pytest.raises(RecordingError, match="which is not gravity"):
-        load_table(table, Hints(rate_hz=rate, accel_range_g=2, gyro_range_dps=500))
-    with pytest.raises(RecordingError, match=r"gravity turns .* as fast"):
-        load_table(table, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=2000))
+def minutes(walk):
+    """Return times as a spreadsheet writes them that takes one of them for a date."""
+    at = [f"{int(t) // 60 + 34}:{t % 60:05.2f}" for t in walk.t.tolist()]
+    return [*at[:500], "6/25/2022 14:05", *at[501:]]
 
 
-def test_counts_at_the_end_of_the_range_are_clipped(walk, load_table):
-    made = counts(walk)
-    made[7, 1], made[9, 5] = 32767, -32768
-    read = load_table(
-        frame("ax|ay|az|gx|gy|gz", made), Hints(rate_hz=even(walk)[1], accel_range_g=4, gyro_range_dps=500)
-    )
-    assert np.flatnonzero(read.acc_clipped).tolist() == [7]
-    assert np.flatnonzero(read.gyr_clipped).tolist() == [9]
+# word of a form -> its columns of the walk, (n,) or (n, k)
+COLUMNS = {
+    "i": lambda w, ns: np.arange(len(w)),
+    "t": lambda w, ns: w.t,
+    "later": lambda w, ns: w.t + 390884.272,
+    "ms": lambda w, ns: w.t * 1000,
+    "us": lambda w, ns: w.t * 1e6,
+    "ns": lambda w, ns: ns,
+    "sec": lambda w, ns: ns // 10**9,
+    "nanosec": lambda w, ns: ns % 10**9,
+    "ticks": lambda w, ns: 10259826 + np.rint(w.t * 1e4).astype(int),
+    "date": lambda w, ns: dates(w).astype(str),
+    "utc": lambda w, ns: [f"{date}Z" for date in dates(w).astype(str)],
+    "clock": lambda w, ns: [f"{date}".partition("T")[2][:8] for date in dates(w)],
+    "micros": lambda w, ns: dates(w).astype(int) % 10**6,
+    "minutes": lambda w, ns: minutes(w),
+    "a": lambda w, ns: w.acc,
+    "zyx": lambda w, ns: w.acc[:, ::-1],
+    "g": lambda w, ns: w.acc / G,
+    "mg": lambda w, ns: w.acc / G * 1000,
+    "-g": lambda w, ns: -w.acc / G,
+    "-gzyx": lambda w, ns: -w.acc[:, ::-1] / G,
+    "w": lambda w, ns: w.gyr,
+    "wzyx": lambda w, ns: w.gyr[:, ::-1],
+    "dps": lambda w, ns: np.degrees(w.gyr),
+    "field": lambda w, ns: 0.01 * w.acc,
+    "jerk": lambda w, ns: 0.3 * w.gyr,
+    "000": lambda w, ns: 0.0 * w.acc,
+    "counts": lambda w, ns: counts(w),
+    "unsigned": lambda w, ns: counts(w) % 65536,
+    "upward": lambda w, ns: counts(w) + 32768,
+}
+
+
+def lines(line, spec, walk, ns):
+    """Return lines with the columns of `spec`, whose other words all lines repeat.
+
+    Parameters
+    ----------
+    line : a separator, or a line with {} for each column.
+    """
+    cells = []
+    for word in spec.split():
+        made = np.asarray(COLUMNS[word](walk, ns) if word in COLUMNS else [word] * len(walk))
+        cells += [column.tolist() for column in (made.T if made.ndim == 2 else (made,))]
+    line = line if "{" in line else line.join(["{}"] * len(cells)) + "\n"
+    return "".join(line.format(*row) for row in zip(*cells, strict=True))
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of a table.
+
+    Attributes
+    ----------
+    head : the text above. line, spec : see lines. file : its name. says : text of the recording's `taken`.
+    hints : words of mpucal.load. atol : of accelerations and rates. edit : of the whole text.
+    """
+
+    head: str
+    spec: str
+    line: str = ","
+    file: str = "walk.csv"
+    says: str = "times in"
+    hints: dict = None
+    atol: float = 1e-9
+    edit: tuple = ()
+
+    def text(self, walk, ns):
+        """Return the whole text."""
+        text = self.head + lines(self.line, self.spec, walk, ns)
+        return text.replace(*self.edit) if self.edit else text
+
+    def write(self, path, walk, ns):
+        """Write it."""
+        path.write_text(self.text(walk, ns), encoding="utf-8")
+
+
+AT_100_HZ = {"rate": 100.0}
+IN_COUNTS = 1.01 / COUNTS[0]
+AXES = "ax,ay,az,gx,gy,gz\n"
+ANDROSENSOR = (
+    "ACCELEROMETER X (m/s²);ACCELEROMETER Y (m/s²);ACCELEROMETER Z (m/s²);GRAVITY X (m/s²);LINEAR ACCELERATION X (m/s²)"
+    ";LINEAR ACCELERATION Y (m/s²);LINEAR ACCELERATION Z (m/s²);GYROSCOPE X (rad/s);GYROSCOPE Y (rad/s)"
+    ";GYROSCOPE Z (rad/s);Time since start in ms \n"
+)
+A_LOG = "ESP-ROM:esp32c3-api1-20210207\r\nself_test accel=(17020,-1262) baseline_gyro=(645,315,-309)\r\n"
+MT_MANAGER = "// General information:\n//  MT Manager version: 2022.0.0\n// Coordinate system: ENU\n"
+ECHO = (
+    "header:\n  stamp:\n    sec: {}\n    nanosec: {}\n  frame_id: imu\norientation:\n  x: 0.0\n  w: 1.0\n"
+    "angular_velocity:\n  x: {}\n  y: {}\n  z: {}\nangular_velocity_covariance: [0.0, 0.0]\n"
+    "linear_acceleration:\n  x: {}\n  y: {}\n  z: {}\n---\n"
+)
+OVER_LINES = '"Date\n(YY:MM:DD)","Time\n(HH:MM:SS)","Time\n(µs)",' + ",".join(
+    f'"{of}{axis}\n({unit})"' for of, unit in (("A", "m/s^2"), ("G", "rad/s")) for axis in "xyz"
+)
+SKETCH = "millis,AccX,AccY,AccZ,GyroX,GyroY,GyroZ\n"
+SENSOR_LOGGER = "seconds_elapsed," + ",".join(
+    f"{of}_{axis}" for of in ("accelerometer", "totalAcceleration", "gyroscope") for axis in "zyx"
+)
+BY_GRAVITY = "its columns were guessed from how gravity turns: --columns "
+FORMS = {
+    "EuRoC": Form(
+        "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1]"
+        ",a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n",
+        "ns w a",
+    ),
+    "Kalibr": Form("timestamp,omega_x,omega_y,omega_z,alpha_x,alpha_y,alpha_z\n", "ns w a"),
+    "rostopic echo -p": Form(
+        "%time,field.header.stamp,field.orientation.x,field.angular_velocity.x,field.angular_velocity.y"
+        ",field.angular_velocity.z,field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z\n",
+        "0 ns 0 w a",
+    ),
+    "ulog2csv": Form(
+        "timestamp,gyro_rad[0],gyro_rad[1],gyro_rad[2],gyro_integral_dt"
+        ",accelerometer_m_s2[0],accelerometer_m_s2[1],accelerometer_m_s2[2]\n",
+        "us w 5000 a",
+    ),
+    "AndroSensor": Form(ANDROSENSOR.replace(";", ","), "a 0 000 w ms"),
+    "AndroSensor, `;` and decimal commas": Form(
+        ANDROSENSOR, "a 0 000 w ms", ";", edit=(".", ","), says="separated by semicolons"
+    ),
+    "Physics Toolbox": Form("time,gFx,gFy,gFz,ax,ay,az,wx,wy,wz\n", "t g jerk w"),
+    "SensorLog": Form(
+        "accelerometerTimestamp_sinceReboot(s),accelerometerAccelerationX(G),accelerometerAccelerationY(G)"
+        ",accelerometerAccelerationZ(G),gyroTimestamp_sinceReboot(s),gyroRotationX(rad/s),gyroRotationY(rad/s)"
+        ",gyroRotationZ(rad/s),motionUserAccelerationX(G),motionUserAccelerationY(G),motionUserAccelerationZ(G)\n",
+        "t -g t w 000",
+        says="the opposite sign, as on iOS",
+    ),
+    "a sketch in g and deg/s": Form(f"sep=,\nMPU6050 found!\n\n{SKETCH}", "ms g dps"),
+    "units in names": Form("time_us,acc_x_mg,acc_y_mg,acc_z_mg,gyro_x_dps,gyro_y_dps,gyro_z_dps\n", "us mg dps"),
+    "MARS logger": Form(
+        "Timestamp[nanosec], gx[rad/s], gy[rad/s], gz[rad/s], ax[m/s^2], ay[m/s^2], az[m/s^2]\n", "ns w a"
+    ),
+    "WitMotion": Form(
+        "Time(s)\tax(g)\tay(g)\taz(g)\twx(deg/s)\twy(deg/s)\twz(deg/s)\tT(°)\n", "date g dps 25", "\t", says="by tabs"
+    ),
+    "axes first": Form("t\txacc\tyacc\tzacc\txgyro\tygyro\tzgyro\n", "t a w", "\t", "walk.tsv"),
+    "poses in TUM's style": Form("# time tx ty tz wx wy wz mx my mz\n", "later a w field", " ", "poses.txt"),
+    "two lines of names": Form(
+        "Time;Reference;;;;IMU Acceleration;;;IMU Gyroscope;;\ns;W;X;Y;Z;X;Y;Z;X;Y;Z\n", "t .5 .5 .5 .5 a w", ";"
+    ),
+    "units below the names": Form(
+        "time\tS_ax_CAL\tS_ay_CAL\tS_az_CAL\tS_gx_CAL\tS_gy_CAL\tS_gz_CAL\n"
+        "ms\tm/(s^2)\tm/(s^2)\tm/(s^2)\trad/s\trad/s\trad/s\n",
+        *("ms a w", "\t"),
+        hints={"columns": "t=time," + ",".join(f"{name}=S_{name}_CAL" for name in AXES.strip().split(","))},
+    ),
+    "a log of a board": Form(
+        *(A_LOG, "counts", "RAW 0x68: accel=({}, {}, {}) temp_raw=4000 gyro=({}, {}, {})\r\nadvanced fifo_end\r\n"),
+        *("board.log", "counts of ±4 g (by |a|)", AT_100_HZ, IN_COUNTS),
+    ),
+    "MT Manager": Form(
+        f"{MT_MANAGER}PacketCounter\tSampleTimeFine\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tRoll\n",
+        *("i ticks a w 1.0", "\t", "MT Manager.txt"),
+    ),
+    "zeros and a second header": Form(
+        "timestamp_us," + AXES + "\0" * 400 + "timestamp_us," + AXES, "us counts", atol=IN_COUNTS, says="counts"
+    ),
+    "counts without a sign": Form("", "ms unsigned 3 0 4", "\t", "walk.txt", says="counts", atol=IN_COUNTS),
+    "counts from the lowest on": Form("", "t upward", " ", "walk.txt", says="counts", atol=IN_COUNTS),
+    "a sketch's counts": Form(AXES, "counts", hints=AT_100_HZ, atol=IN_COUNTS, says="±500 deg/s (by how gravity"),
+    "a rocket's": Form(
+        "state,timestamp_seconds,temperature_celsius,raw_acceleration_x_gs,raw_acceleration_y_gs,raw_acceleration_z_gs"
+        ",raw_angular_rate_x_deg_per_s,raw_angular_rate_y_deg_per_s,raw_angular_rate_z_deg_per_s\n",
+        "S t 26.3 g dps",
+    ),
+    "RaceBox": Form(
+        "Record,Time,Latitude,Altitude,GForceX,GForceY,GForceZ,Lap,GyroX,GyroY,GyroZ\n", "i t 53.3 133.0 g 0 dps"
+    ),
+    "VectorNav": Form(
+        "",
+        "a w",
+        "$VNIMU,+00.1,+00.2,+00.3" + ",{:+.9f}" * 6 + ",+26.8,+096.5*67\n",
+        says="rates in rad/s",
+        hints=AT_100_HZ,
+    ),
+    "MPU6050_raw": Form(
+        *("Initializing I2C devices...\r\n", "counts", "a/g:\t{}\t{}\t{}\t{}\t{}\t{}\r\n", "walk.txt", "±4 g"),
+        *({"rate": 100.0, "accel_range": 4.0, "gyro_range": 500.0}, IN_COUNTS),
+    ),
+    "axes by words": Form(
+        *("", "date w a"),
+        "{},EULER(deg): R=1.7,GYRO: X={},Y={},Z={},ACCEL: X={},Y={},Z={},GPS: FIX,SAT=4\n",
+        edit=("T", " "),
+    ),
+    "names over lines": Form(f"{OVER_LINES}\n", "2021-09-22 clock micros a w"),
+    "minutes of a spreadsheet": Form("accX,accY,accZ,gyroX,gyroY,gyroZ,timestamp,Activity\n", "a w minutes 1"),
+    "a bag in text": Form(
+        "bagTimestamp,frame_id,orientation,xav,yav,zav,cov,xla,yla,zla\n",
+        *("t w a", '{},base,"[1.0, 0.0]",{},{},{},0.25,{},{},{}\n'),
+    ),
+    "lines of JSON": Form(
+        *("", "t a w"), '{{"mac_timestamp": {}, "ax": {}, "ay": {}, "az": {}, "gx": {}, "gy": {}, "gz": {}}}\n'
+    ),
+    "ros2 topic echo": Form("", "sec nanosec w a", ECHO),
+    "a satellite's time beside an index": Form(
+        "N,GPST,Ax,Ay,Az,Gx,Gy,Gz\n", "i later a w", edit=("390886.272", "390886.262")
+    ),
+    "Sensor Logger on iOS, one table": Form(
+        f"{SENSOR_LOGGER},{','.join(f'accelerometerUncalibrated_{axis}' for axis in 'zyx')}\n",
+        *("t field -gzyx wzyx -gzyx", ","),
+        says="the opposite sign, as on iOS",
+    ),
+    "Sensor Logger without a sign": Form(
+        f"{SENSOR_LOGGER}\n", "t field zyx wzyx", says="if an iPhone recorded them, it is the opposite one"
+    ),
+    "lines that name each number": Form(
+        *("MPU6050 Found!\n", "a w t", "AccelX:{},AccelY:{},AccelZ:{}, GyroX:{},GyroY:{},GyroZ:{},t:{}\n", "walk.txt")
+    ),
+    "lines with = and |": Form(
+        *("", "a w t", "AcX = {} | AcY = {} | AcZ = {} | Tmp = 25.31 | GyX = {} | GyY = {} | GyZ = {} | t = {}\n")
+    ),
+    "lines with units, seen on a serial monitor": Form(
+        *("", "a w t"),
+        "12:34:56.789 -> acc x: {} m/s^2 acc y: {} acc z: {} m/s^2 gyro x: {} rad/s gyro y: {} gyro z: {} t: {}\n",
+    ),
+    "a line for each sensor": Form(
+        *("MPU6050 Found!\r\n", "a w"),
+        "Acceleration X: {:.4f}, Y: {:.4f}, Z: {:.4f} m/s^2\r\n"
+        "Rotation X: {:.5f}, Y: {:.5f}, Z: {:.5f} rad/s\r\nTemperature: 25.00 degC\r\n\r\n",
+        hints=AT_100_HZ,
+        says="a rate of 100 Hz",
+        atol=1e-4,
+    ),
+    "a table on a serial monitor": Form(
+        f"12:34:56.789 -> time,{AXES}", "t a w", "12:34:56.789 -> {},{},{},{},{},{},{}\n"
+    ),
+    "seconds and nanoseconds": Form(f"header.stamp.sec,header.stamp.nanosec,{AXES}", "sec nanosec a w"),
+    "a time under an unknown name": Form(f"Line,Ticks,{AXES}", "i t a w", says=f"{BY_GRAVITY}-,t,ax,ay,az,gx,gy,gz"),
+    "a rate above the names": Form(
+        f"# Config: data_rate = 100.0 Hz, filter = 488 Hz, acc_range = 4 g\nLogging Type,1\nWaiting time,3\n{AXES}",
+        *("counts", ",", "walk.csv", "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|)", None, IN_COUNTS),
+    ),
+    "a sampling rate in brackets": Form(f"Sample rate (Hz): 100\n{AXES}", "a w", says="a rate of 100 Hz"),
+    "Fs": Form(f"Fs,100\n{AXES}", "a w", says="a rate of 100 Hz"),
+    "an output rate": Form(f"OutputRate:,100Hz,,,\n{AXES}", "a w", says="a rate of 100 Hz"),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_each_form_gives_the_samples_that_were_written(name, walk, walk_ns, tmp_path):
+    form = FORMS[name]
+    form.write(tmp_path / form.file, walk, walk_ns)
+    read = mpucal.load(tmp_path / form.file, **form.hints or {})
+    np.testing.assert_allclose(read.t - read.t[0], walk.t, atol=2e-3)
+    kept = ~(read.acc_clipped | read.gyr_clipped)
+    np.testing.assert_allclose(read.acc[kept], walk.acc[kept], atol=form.atol)
+    np.testing.assert_allclose(read.gyr[kept], walk.gyr[kept], atol=form.atol)
+    assert form.says in read.taken
 
 
 @pytest.mark.parametrize(
-    ("names", "said"),
+    ("encoding", "end"), [("utf-16", "\n"), ("utf-8-sig", "\r\n"), ("utf-8", "\r"), ("cp1252", "\n")]
+)
+def test_text_as_other_systems_write_it(encoding, end, walk, walk_ns, assert_same, tmp_path):
+    text = FORMS["AndroSensor"].text(walk, walk_ns)
+    (tmp_path / "walk.csv").write_text(text, encoding=encoding, newline=end)
+    assert_same(load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
+
+
+@pytest.fixture
+def read(walk, walk_ns, tmp_path):
+    """Return a function that writes a table (see Form) and loads it."""
+
+    def call(head, spec, line=",", of=walk, file="walk.csv", edit=(), **hints):
+        Form(head, spec, line, edit=edit).write(tmp_path / file, of, walk_ns[: len(of)])
+        return mpucal.load(tmp_path / file, **hints)
+
+    return call
+
+
+@pytest.mark.parametrize(("spec", "utc_ns"), [("date", None), ("utc", 1759595712 * 10**9)])
+def test_a_date_without_a_zone_is_no_time_of_day(spec, utc_ns, read, walk, assert_same):
+    found = read(f"time,{AXES}", f"{spec} a w")
+    assert_same(found, walk, 1e-9, 1e-9, 1e-6)
+    assert found.utc_ns == utc_ns
+
+
+@pytest.mark.parametrize(
+    ("head", "spec", "units", "says"),
     [
-        ("a|b|c|d|e|f|g", "t,ax,ay,az,gx,gy,gz"),
-        ("a|b|c|d|e|f|g", "t=a,ax=b,ay=c,az=d,gx=e,gy=f,gz=g"),
-        ("a|b|c|d|e|f|g", "gx=5,gy=6,gz=7,t=1,ax=2,ay=3,az=4"),
+        ("time [s],ax [m s^-2],ay [m s^-2],az [m s^-2],gx,gy,gz\n", "t g w", "acc=g", r"in m/s\^2, but .* suggests g"),
+        ("time [s],ax,ay,az,omega_x,omega_y,omega_z\n", "t a dps", "gyr=deg/s", "turning of gravity suggests deg/s"),
+        (f"time [s],{AXES}", "ms a w", "t=ms", r"t is said to be in s, but the step of .* suggests ms"),
+    ],
+)
+def test_doubtful_units_are_refused_and_can_be_said(head, spec, units, says, read, walk, assert_same):
+    with pytest.raises(RecordingError, match=says) as refused:
+        read(head, spec)
+    assert refused.value.options == f"--units {units}"
+    assert_same(read(head, spec, units=units), walk, 1e-9, 1e-9, 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("a,b,c,d,e,f,g\n", "t,ax,ay,az,gx,gy,gz"),
+        ("a,b,c,d,e,f,g\n", "t=a,ax=b,ay=c,az=d,gx=5,gy=6,gz=7"),
         ("", "t,ax,ay,az,gx,gy,gz"),
     ],
 )
-def test_columns_are_named(names, said, walk, assert_same, load_table):
-    table = frame(names or "0|1|2|3|4|5|6", walk.t * 1000, walk.acc, walk.gyr)
-    seen = load_table(table, header=bool(names))
-    assert "how gravity turns: --columns t,ax,ay,az,gx,gy,gz" in seen.taken
-    assert_same(seen, walk, 1e-9, 1e-9, 1e-9)
-    read = load_table(table, Hints(columns=parse_columns(said)), header=bool(names))
-    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
+def test_columns_are_named_or_guessed(head, said, read, walk, assert_same):
+    guessed = read(head, "ms g dps")
+    assert f"{BY_GRAVITY}t,ax,ay,az,gx,gy,gz" in guessed.taken
+    assert_same(guessed, walk, 1e-9, 1e-9, 1e-9)
+    named = read(head, "ms g dps", columns=said, units="t=ms,acc=g,gyr=deg/s")
+    assert_same(named, walk, 1e-9, 1e-9, 1e-9)
 
 
-@pytest.mark.parametrize("names", ["t,{0}x,{0}y,{0}z,{1}x,{1}y,{1}z", "time,imu_{0}x,imu_{0}y,imu_{0}z,{1}x,{1}y,{1}z"])
-def test_columns_of_a_second_imu_are_said_to_be_left_out(names, walk, assert_same, tmp_path):
-    first = names.format("a", "g")
-    second = ",".join(f"imu2_{sensor}{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
-    rows = np.column_stack([walk.t, walk.acc, walk.gyr, -walk.acc, walk.gyr])
-    np.savetxt(tmp_path / "two.csv", rows, "%.17g", ",", header=f"{first},{second}", comments="")
-    read = load(tmp_path / "two.csv")
-    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
-    assert "columns of another IMU were not read (--columns chooses): imu2_accx, imu2_accy" in read.taken
+@pytest.mark.parametrize("said", ["t=when,ax=AccX(g),ay=AccY(g),az=AccZ,gx=wx,gy=wy,gz=wz", "-,t,ax,ay,az,gx,gy,gz"])
+def test_named_columns_beside_columns_of_words(said, read, walk, assert_same):
+    found = read("device,when,AccX(g),AccY(g),AccZ(g),wx,wy,wz\n", "WT901 t g w", columns=said)
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
 
 
-def test_fractions_of_a_second_are_no_milliseconds(walk, load_table):
-    slow = walk.part(0, 1400)
-    read = load_table(timed("time", slow.t * 40, "ax|ay|az|gx|gy|gz", slow.acc, slow.gyr / 40))
-    assert read.rate_hz == pytest.approx(2.5, rel=0.01)
-
-
-def test_a_column_that_is_not_there(walk, load_table):
-    hints = Hints(columns=parse_columns("t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g"))
+def test_what_physics_does_not_confirm_is_not_guessed(read, walk):
+    turned_otherwise = replace(walk, gyr=np.roll(walk.gyr, 700, axis=0))
+    with pytest.raises(RecordingError, match="name its columns in their order"):
+        read("", "t a w", " ", turned_otherwise)
     with pytest.raises(RecordingError, match="there is no column h for t: name one of a, b, c, d, e, f, g"):
-        load_table(frame("a|b|c|d|e|f|g", walk.t, walk.acc, walk.gyr), hints)
+        read("a,b,c,d,e,f,g\n", "t a w", columns="t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g")
 
 
-def test_the_public_name_takes_words(walk, assert_same, tmp_path):
-    path = tmp_path / "walk.csv"
-    frame("a|b|c|d|e|f|g", walk.t * 1000, walk.acc / G, walk.gyr).to_csv(path, index=False)
-    assert_same(mpucal.load(path, columns="t,ax,ay,az,gx,gy,gz", units="t=ms,acc=g,gyr=rad/s"), walk, 1e-9, 1e-9, 1e-9)
-    with pytest.raises(mpucal.MpucalError, match="is not a unit"):
-        mpucal.load(path, units="acc=feet")
+def test_columns_of_a_second_imu_are_said_to_be_left_out(read, walk, assert_same):
+    second = ",".join(f"imu2_{sensor}{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
+    found = read(f"time,{AXES.strip()},{second}\n", "t a w field w")
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert "columns of another IMU were not read (--columns chooses): imu2_accx, imu2_accy" in found.taken
 
 
-@pytest.mark.parametrize("text", ["t=a,t=b", "velocity=a", "t,ax,ax", "ax="])
-def test_columns_that_say_nothing(text):
-    with pytest.raises(ValueError, match="is not a column"):
-        parse_columns(text)
-
-
-@pytest.mark.parametrize("text", ["acc=rad/s", "speed=m/s", "g", "acc="])
-def test_units_that_are_none(text):
-    with pytest.raises(ValueError, match="is not a unit"):
-        parse_units(text)
+@pytest.mark.parametrize(
+    ("parse", "texts"),
+    [
+        (parse_columns, ["t=a,t=b", "velocity=a", "t,ax,ax", "ax="]),
+        (parse_units, ["acc=rad/s", "speed=m/s", "g", "acc="]),
+    ],
+)
+def test_hints_that_say_nothing(parse, texts):
+    for text in texts:
+        with pytest.raises(ValueError, match="is not a"):
+            parse(text)
 
 
 def test_hints_for_a_file_that_needs_none(tmp_path):
@@ -296,170 +381,269 @@ def test_hints_for_a_file_that_needs_none(tmp_path):
         load(tmp_path / "walk.tlog", Hints(rate_hz=100))
 
 
-def test_a_bad_line_is_named(walk, walk_ns, tmp_path):
-    lines = DIALECTS["Kalibr"](walk, walk_ns).to_csv(index=False).splitlines()
-    lines[40] = lines[40].replace(",", ",x", 1)
-    (tmp_path / "walk.csv").write_text("\n".join(lines))
-    assert "1 samples that lack a number were left out" in load(tmp_path / "walk.csv").taken
-    lines[60:] = [line.replace(",", ",x", 1) for line in lines[60:]]
-    (tmp_path / "walk.csv").write_text("\n".join(lines))
+def test_counts_need_a_rate_and_their_ranges_must_fit(read, walk):
+    alone = read(AXES, "counts")
+    assert "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|) and without rates; this sample" in alone.taken
+    assert np.isnan(alone.gyr).all()
+    given = read(AXES, "counts", rate=100, accel_range=4, gyro_range=500)
+    assert (given.sensor.accel_range_g, given.sensor.gyro_range_dps) == (4, 500)
+    with pytest.raises(RecordingError, match="which is not gravity"):
+        read(AXES, "counts", rate=100, accel_range=2, gyro_range=500)
+    with pytest.raises(RecordingError, match=r"gravity turns .* as fast"):
+        read(AXES, "counts", rate=100, accel_range=4, gyro_range=2000)
+
+
+def test_counts_at_the_end_of_the_range_are_clipped(walk, tmp_path):
+    made = counts(walk)
+    made[7, 1], made[9, 5] = 32767, -32768
+    np.savetxt(tmp_path / "walk.csv", made, "%d", ",", header=AXES.strip(), comments="")
+    found = mpucal.load(tmp_path / "walk.csv", rate=100, accel_range=4, gyro_range=500)
+    assert np.flatnonzero(found.acc_clipped).tolist() == [7]
+    assert np.flatnonzero(found.gyr_clipped).tolist() == [9]
+
+
+def test_the_range_of_counts_is_not_misled_by_large_biases(read, walk):
+    """Read a sensor whose |a| varies with its orientation, by biases of half of 1 g."""
+    biased = replace(walk, acc=(walk.acc + 0.45 * G * np.array([1.0, -0.6, 0.8])) / 4)
+    size = np.linalg.norm(biased.acc, axis=1)
+    assert np.ptp(np.percentile(size, [25, 75])) > 0.25 * np.median(size)
+    assert "accelerations in counts of ±16 g (by |a|)" in read(AXES, "counts", of=biased, rate=100).taken
+
+
+def test_a_rate_is_found_by_how_gravity_turns_and_must_fit(read, walk):
+    found = read(AXES, "a dps")
+    assert found.rate_hz == pytest.approx(100.0, rel=0.15)
+    assert "this sample rate is that at which its rates turn gravity" in found.taken
+    for units in ("", "acc=m/s^2"):
+        with pytest.raises(RecordingError, match=r"gravity turns 0\.\d+ times as fast .* for the times --rate \d"):
+            read(AXES, "a w", rate=25, units=units)
+    opposite = read(f"time,{AXES}", "t a w", of=replace(walk, gyr=-walk.gyr))
+    assert "gravity turns the other way" in opposite.taken
+
+
+def test_gravity_that_is_missing_or_hidden_is_told(read, walk):
+    none = replace(walk, acc=np.random.default_rng(1).normal(0, 0.3, walk.acc.shape))
+    with pytest.raises(RecordingError, match="gravity is not in it"):
+        read(f"time,{AXES}", "t a w", of=none)
+    with pytest.raises(RecordingError, match=r"without gravity \(FreeAcc_X, FreeAcc_Y, FreeAcc_Z\)"):
+        read("SampleTimeFine,Euler_X,Euler_Y,Euler_Z,FreeAcc_X,FreeAcc_Y,FreeAcc_Z\n", "ticks w a", of=none)
+    shaken = replace(walk, acc=walk.acc * np.random.default_rng(4).uniform(0.2, 3, (len(walk), 1)))
+    with pytest.raises(RecordingError, match="would be gravity in g") as refused:
+        read(AXES, "g dps", of=shaken)
+    assert refused.value.options == "--units acc=g"
+    with pytest.raises(RecordingError, match="the unit of acc is not known"):
+        read(f"time,{AXES}", "t a w", of=replace(walk, acc=np.round(walk.acc * 512 / G)), units="gyr=rad/s,t=s")
+
+
+@pytest.mark.parametrize(
+    ("file", "head"), [("2021-acceldata.txt", ""), ("acc.csv", ""), ("a.csv", "X (g),Y (g),Z (g)\n")]
+)
+def test_three_columns_are_an_accelerometers_by_the_files_name_or_their_unit(file, head, read, walk):
+    found = read(head, "g", file=file)
+    np.testing.assert_allclose(found.acc, walk.acc)
+    assert np.isnan(found.gyr).all()
+
+
+def test_three_columns_of_an_unknown_sensor_name_the_command(read, walk):
+    with pytest.raises(RecordingError, match="holds no columns that are known") as error:
+        read("", "a", file="field.txt")
+    found = read("", "a", file="field.txt", columns=error.value.options.split()[1])
+    np.testing.assert_allclose(found.acc, walk.acc)
+
+
+def driven(order, acc_at_rest, spread):
+    """Return an index, times, and sensors in that order, of a car or a runner, without names."""
+    rng, n = np.random.default_rng(8), np.arange(900)
+    sensors = {
+        "acc": np.array(acc_at_rest) + rng.normal(0.0, spread, (900, 3)),
+        "gyr": rng.normal(0.0, 0.1, (900, 3)),
+        "mag": np.array([20.0, -4.0, 40.0]) + rng.normal(0.0, 1.0, (900, 3)),
+    }
+    return np.column_stack([14953 + n, 4908.696 + n / 100, *(sensors[of] for of in order.split())])
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [("gyr acc", "-,t,gx,gy,gz,ax,ay,az"), ("acc mag gyr", "-,t,ax,ay,az,-,-,-,gx,gy,gz"), ("gyr mag", None)],
+)
+def test_the_command_for_unknown_columns_works_at_once(order, said, tmp_path):
+    np.savetxt(tmp_path / "drive.txt", driven(order, [0.0, 0.0, G], 6.0))
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(tmp_path / "drive.txt")
+    if said is None:
+        assert "holds no three columns as long as gravity" in str(refused.value)
+        return
+    assert refused.value.options == f"--columns {said} --units acc=m/s^2"
+    found = mpucal.load(tmp_path / "drive.txt", columns=said, units="acc=m/s^2")
+    assert "times in s, accelerations in m/s^2 and rates" in found.taken
+
+
+def test_counts_of_a_runner_have_their_range_by_their_mean(tmp_path):
+    rows = driven("acc gyr", [0.0, 4000.0, 7150.0], 6000.0)[:, 1:]
+    rows[:, 4:] *= 9000
+    rows[:, 0] = 100 + 20 * np.arange(900)
+    np.savetxt(tmp_path / "running.csv", np.rint(rows.clip(-32768, 32767)), "%d", ",")
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(tmp_path / "running.csv")
+    assert refused.value.options == "--columns t,ax,ay,az,gx,gy,gz"
+    found = mpucal.load(tmp_path / "running.csv", columns="t,ax,ay,az,gx,gy,gz")
+    assert "times in ms, accelerations in counts of ±4 g (by |a|)" in found.taken
+
+
+def shaken(shaking_mps2):
+    """Return accelerations and rates of a board that is shaken, or lies still, and hardly turns."""
+    rng = np.random.default_rng(3)
+    rates = np.radians(rng.normal((0.3, -0.5, 0.2), 0.05, (900, 3)))
+    rates[300:] += rng.normal(0.0, 0.2, (600, 3))
+    return np.array([0.1, -0.2, G]) + rng.normal(0, shaking_mps2, (900, 3)), rates
+
+
+@pytest.mark.parametrize(("unit", "si"), [("rad/s", 1.0), ("deg/s", np.radians(1)), (None, 0.3)])
+def test_the_unit_of_rates_that_turn_nothing_is_one_of_a_gyroscope(unit, si, tmp_path):
+    acc, rates = shaken(0.5)
+    rates = rates if unit else np.random.default_rng(3).normal(0, 0.3, rates.shape) * si
+    rows = np.column_stack([np.arange(900) / 100, acc, rates / si])
+    head = "time,accX,accY,accZ,gyroX,gyroY,gyroZ"
+    np.savetxt(tmp_path / "shaken.csv", rows, delimiter=",", header=head, comments="")
+    found = mpucal.load(tmp_path / "shaken.csv")
+    if unit is None:
+        assert "rates left out, because nothing shows their unit (--units gyr=UNIT)" in found.taken
+        assert np.isfinite(mpucal.load(tmp_path / "shaken.csv", units="gyr=deg/s").gyr).all()
+        return
+    assert f"rates in {unit} (by their noise and bias, as gravity hardly turns)" in found.taken
+    np.testing.assert_allclose(found.gyr, rates)
+
+
+def test_a_board_that_never_turned_has_an_accelerometer_all_the_same(tmp_path):
+    rng = np.random.default_rng(7)
+    acc, rates = np.array([9.85, 0.1, -0.3]) + rng.normal(0, 0.05, (900, 3)), rng.normal(0, 0.004, (900, 3))
+    np.savetxt(tmp_path / "x_up.txt", np.column_stack([254500 + np.arange(900) / 100, rates, acc]))
+    found = mpucal.load(tmp_path / "x_up.txt")
+    assert "its columns were guessed from the length of gravity: --columns t,-,-,-,ax,ay,az" in found.taken
+    np.testing.assert_allclose(found.acc, acc)
+    assert np.isnan(found.gyr).all()
+
+
+def test_lines_that_repeat_a_sample_are_left_out(read, walk, walk_ns, assert_same, tmp_path):
+    repeated = "".join(f"{line}\n" * 5 for line in lines(" ", "a", walk, walk_ns).splitlines())
+    (tmp_path / "acc.txt").write_text(repeated)
+    found = mpucal.load(tmp_path / "acc.txt")
+    np.testing.assert_allclose(found.acc, walk.acc)
+    np.testing.assert_allclose(found.t, walk.t * 5, atol=1e-9)
+    assert not found.gap.any()
+    assert f"{4 * len(walk)} repeated samples were left out" in found.taken
+    some = lines(",", "ns a w", walk, walk_ns).splitlines(keepends=True)
+    (tmp_path / "walk.csv").write_text(
+        f"time,{AXES}" + "".join(line * (1 + (i % 7 == 0)) for i, line in enumerate(some))
+    )
+    found = mpucal.load(tmp_path / "walk.csv")
+    assert_same(found, walk)
+    assert f"{-(-len(walk) // 7)} repeated samples were left out" in found.taken
+
+
+@pytest.mark.parametrize("odd", ["", "nan", "inf"])
+def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, walk_ns, tmp_path):
+    some = lines(",", "a w", walk, walk_ns).splitlines()
+    some[100] = f"{odd},{some[100].partition(',')[2]}"
+    timed = [f"{t!r},{line}" for t, line in zip(walk.t.tolist(), some, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([f"time,{AXES.strip()}", *timed, "99.0,1.0,2.0"]))
+    found = mpucal.load(tmp_path / "a.csv")
+    np.testing.assert_allclose(found.acc, np.delete(walk.acc, 100, axis=0), atol=1e-9)
+    assert "1 lines that lack a number" in found.taken, "the line that was torn at the end"
+    assert "1 samples that lack a number were left out" in found.taken
+    (tmp_path / "b.csv").write_text("\n".join([AXES.strip(), *some, "1.0,2.0"]))
+    found = mpucal.load(tmp_path / "b.csv", rate=100)
+    assert found.t[100] - found.t[99] == pytest.approx(0.02), "its time passed all the same"
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_labelled_lines_that_lack_a_number_are_said(timed, walk, walk_ns, tmp_path):
+    """Count the samples left out, whose time passes all the same; where several in a row are missing, is a gap."""
+    line = FORMS["lines that name each number"].line
+    line = line if timed else line.replace(",t:{}", "")
+    some = lines(line, "a w t" if timed else "a w", walk, walk_ns).splitlines()
+    # one has not a number, three are torn, below a line that measures nothing
+    some[60], some[80:83] = line.format("nan", *range(6)).strip(), [torn[:30] for torn in some[80:83]]
+    (tmp_path / "walk.txt").write_text("\n".join([*some[:40], "Temperature: 25.1 degC", *some[40:]]))
+    found = mpucal.load(tmp_path / "walk.txt", rate=None if timed else 100)
+    assert f"4 {'lines' if timed else 'samples'} that lack a number were left out" in found.taken
+    assert np.flatnonzero(found.gap).tolist() == [79]
+    np.testing.assert_allclose(found.t - found.t[0], np.delete(walk.t, [60, 80, 81, 82]), atol=1e-9)
+
+
+def test_many_bad_lines_are_named(walk, walk_ns, tmp_path):
+    some = FORMS["Kalibr"].text(walk, walk_ns).splitlines()
+    some[40:60] = [line.replace(",", ",x", 1) for line in some[40:60]]
+    (tmp_path / "walk.csv").write_text("\n".join(some))
     with pytest.raises(RecordingError, match=r"line 41: omega_x is 'x.*', which is not a number"):
         load(tmp_path / "walk.csv")
 
 
-def phyphox(walk, walk_ns, folder, later=0.0, sep=",", decimal="."):
-    timed("Time (s)", walk.t, "Acceleration x (m/s^2)|Acceleration y (m/s^2)|Acceleration z (m/s^2)", walk.acc).to_csv(
-        folder / "Accelerometer.csv", index=False, quoting=1, sep=sep, decimal=decimal
-    )
-    timed("Time (s)", walk.t + later, "Gyroscope x (rad/s)|Gyroscope y (rad/s)|Gyroscope z (rad/s)", walk.gyr).to_csv(
-        folder / "Gyroscope.csv", index=False, quoting=1, sep=sep, decimal=decimal
-    )
+@pytest.mark.parametrize("text", ["a" * 30_000, "a_" * 15_000, "ab " * 10_000, "ax:" * 10_000, "ax:1 " * 6_000])
+def test_a_long_line_of_letters_is_no_table(text, tmp_path):
+    """Refuse it at once: the time that a pattern takes must not grow with the square of a line's length."""
+    (tmp_path / "walk.txt").write_text(text)
+    with pytest.raises(RecordingError, match="names no columns of an accelerometer"):
+        load(tmp_path / "walk.txt")
 
 
-def sensor_logger(walk, walk_ns, folder):
-    for name, values in (
-        ("Accelerometer", walk.acc * 0.001),
-        ("TotalAcceleration", walk.acc),
-        ("AccelerometerUncalibrated", walk.acc / G),
-        ("Gyroscope", walk.gyr + 0.1),
-        ("GyroscopeUncalibrated", walk.gyr),
-    ):
-        made = timed("time", walk_ns, "seconds_elapsed|z|y|x", walk.t, values[:, ::-1])
-        made.to_csv(folder / f"{name}.csv", index=False)
-
-
-@pytest.mark.parametrize("written", [phyphox, sensor_logger])
-@pytest.mark.parametrize("archived", [False, True])
-def test_a_phones_tables(written, archived, walk, walk_ns, assert_same, tmp_path):
-    folder = tmp_path / "phone"
-    folder.mkdir()
-    written(walk, walk_ns, folder)
-    path = folder
-    if archived:
-        (folder / "meta").mkdir()
-        (folder / "meta" / "device.csv").write_text("property,value\n")
-        path = tmp_path / "phone.zip"
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            for child in sorted(folder.rglob("*.csv")):
-                archive.write(child, child.relative_to(folder))
-    read = load(path)
-    assert_same(read, walk)
-    of = "Uncalibrated" if written is sensor_logger else ""
-    assert f"from Accelerometer{of}.csv and Gyroscope{of}.csv" in read.taken
-
-
-def test_two_tables_are_joined_by_time(walk, walk_ns, tmp_path):
-    phyphox(walk, walk_ns, tmp_path, later=0.0123, sep=";", decimal=",")
-    read = load(tmp_path)
-    assert "the gyroscope begins +12.30 ms after the accelerometer" in read.taken
-    wanted = np.column_stack([np.interp(read.t, walk.t + 0.0123, rate) for rate in walk.gyr.T])
-    np.testing.assert_allclose(read.gyr, wanted, atol=1e-9)
-
-
-def test_two_tables_of_different_times_are_none(walk, walk_ns, tmp_path):
-    phyphox(walk, walk_ns, tmp_path, later=1e4)
-    with pytest.raises(RecordingError, match="not recorded at the same time"):
-        load(tmp_path)
-
-
-@pytest.mark.parametrize("given", ["Accelerometer.csv", "Gyroscope.csv"])
-def test_one_table_of_two_is_read_with_the_other(given, walk, walk_ns, assert_same, tmp_path):
-    phyphox(walk, walk_ns, tmp_path)
-    read = load(tmp_path / given)
-    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
-    assert "from Accelerometer.csv and Gyroscope.csv" in read.taken
-
-
-def test_one_table_without_the_other(walk, walk_ns, tmp_path):
-    phyphox(walk, walk_ns, tmp_path)
-    (tmp_path / "Accelerometer.csv").rename(tmp_path / "walk.csv")
-    read = load(tmp_path / "walk.csv")
-    np.testing.assert_allclose(read.acc, walk.acc, atol=1e-9)
-    assert np.isnan(read.gyr).all()
-    assert "and without rates" in read.taken
-    with pytest.raises(RecordingError, match=r"no columns of an accelerometer.*give the folder"):
-        load(tmp_path / "Gyroscope.csv")
-
-
-def test_pairs_of_tables_are_told_apart_by_their_names(walk, walk_ns, assert_same, tmp_path):
-    for name, part in (("run1", walk), ("run2", walk.part(0, 900))):
-        (tmp_path / name).mkdir()
-        phyphox(part, walk_ns, tmp_path / name)
-        for sensor in ("Accelerometer", "Gyroscope"):
-            (tmp_path / name / f"{sensor}.csv").rename(tmp_path / f"{name}_{sensor}.csv")
-        (tmp_path / name).rmdir()
-    first = load(tmp_path)
-    assert_same(first, walk, 1e-9, 1e-9, 1e-9)
-    assert "of 2 pairs of tables, it is the first" in first.taken
-    assert len(load(tmp_path / "run2_Gyroscope.csv")) == 900
-
-
-def test_lines_that_hold_one_sensor_each(walk, load_table):
+def test_lines_that_hold_one_sensor_each(walk, walk_ns, tmp_path):
     """Read what a logger writes that has one line for each event."""
-    nothing = np.full((len(walk), 3), np.nan)
-    of_acc = timed("time", walk.t, "ax|ay|az|wx|wy|wz", walk.acc, nothing)
-    of_gyr = timed("time", walk.t + 0.002, "ax|ay|az|wx|wy|wz", nothing, walk.gyr)
-    read = load_table(pd.concat([of_acc, of_gyr]).sort_values("time"))
-    np.testing.assert_allclose(read.acc, walk.acc[1:], atol=1e-9)
-    assert "+2.00 ms after" in read.taken
+    later = replace(walk, t=walk.t + 0.002)
+    of_acc = lines("{},{},{},{},,,\n", "t a", walk, walk_ns).splitlines()
+    of_gyr = lines("{},,,,{},{},{}\n", "t w", later, walk_ns).splitlines()
+    both = [line for pair in zip(of_acc, of_gyr, strict=True) for line in pair]
+    (tmp_path / "walk.csv").write_text("\n".join(["time,ax,ay,az,wx,wy,wz", *both, ""]))
+    found = load(tmp_path / "walk.csv")
+    np.testing.assert_allclose(found.acc, walk.acc[1:], atol=1e-9)
+    assert "+2.00 ms after" in found.taken
 
 
-def a_g(walk):
-    scale = 16384 / G, 32750 / np.radians(250)
-    rows = np.rint(np.column_stack([walk.acc * scale[0], walk.gyr * scale[1]])).clip(-32768, 32767).astype(int)
-    return "".join("a/g:\t" + "\t".join(map(str, row)) + "\r\n" for row in rows.tolist())
+def test_times_that_begin_anew_are_an_interruption(walk, walk_ns, tmp_path):
+    """Tell a sketch that is started again from a clock that is set back a little."""
+    half = len(walk) // 2
+    t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
+    t[half + 300] -= 0.02
+    (tmp_path / "walk.csv").write_text(f"time,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
+    found = mpucal.load(tmp_path / "walk.csv", units="acc=m/s^2,gyr=rad/s")
+    assert "times in s, which begin anew 1 times," in found.taken
+    np.testing.assert_array_equal(found.acc, walk.acc)
+    assert np.flatnonzero(found.gap).tolist() == [half]
+    assert np.diff(found.t)[half - 1] == pytest.approx(15.0, abs=0.02)
 
 
-@pytest.mark.parametrize("ending", [".txt", ".csv"])
-def test_what_i2cdevlibs_example_prints(ending, walk, assert_same, tmp_path):
-    steady, rate = even(walk)
-    text = "Initializing I2C devices...\r\nMPU6050 connection successful\r\n" + a_g(walk) + "a/g:\t1\t2"
-    (tmp_path / f"walk{ending}").write_text(text)
-    read = load(tmp_path / f"walk{ending}", Hints(rate_hz=rate))
-    kept = ~read.gyr_clipped & ~read.acc_clipped
-    np.testing.assert_allclose(read.acc[kept], steady.acc[kept], atol=0.5 * G / 16384 * 1.001)
-    np.testing.assert_allclose(read.gyr[kept], steady.gyr[kept], atol=0.5 * np.radians(250) / 32750 * 1.001)
-    assert kept.mean() > 0.5
-    assert "MPU6050::initialize()" in read.taken
-    assert "this sample rate is" in load(tmp_path / f"walk{ending}").taken
+def test_fractions_of_a_second_are_no_milliseconds(read, walk):
+    found = read(f"time,{AXES}", "t a w", of=replace(walk, t=walk.t * 40, gyr=walk.gyr / 40))
+    assert found.rate_hz == pytest.approx(2.5, rel=0.01)
+    (reason,) = [r for r in mpucal.calibrate(found).quality["reasons"] if r["code"] == "units_suspect"]
+    assert "0.4 s apart (2.5 Hz), too far to follow a turn" in reason["message"]
 
 
-@pytest.mark.parametrize(
-    ("name", "quantity", "axis", "unit"),
-    [
-        ("Gyroscope z (rad/s)", "gyr", 2, "rad/s"),
-        ("AcX", "acc", 0, ""),
-        ("gx_raw", "gyr", 0, ""),
-        ("ax (LSB)", "acc", 0, "counts"),
-        ("imu0.gyro.y", "gyr", 1, ""),
-        ("GyroY[°/s]", "gyr", 1, "deg/s"),
-        ("acceleration_z_m_s2", "acc", 2, "m/s^2"),
-        ("timestamp_ms", "t", 0, "ms"),
-        ("Timestamp (µs)", "t", 0, "us"),
-        ("temperature_c", "temperature_c", 0, ""),
-    ],
-)
-def test_names(name, quantity, axis, unit):
-    found = parse_column_name(name, 3)
-    assert (found.quantity, found.axis, found.unit, found.place) == (quantity, axis, unit, 3)
+def test_a_temperature_is_kept_everywhere(walk, tmp_path):
+    warm = np.linspace(30.0, 32.0, len(walk))
+    np.savez(tmp_path / "a.npz", t=walk.t, acc=walk.acc, gyr=walk.gyr, temperature=warm)
+    rows = np.column_stack([walk.t, walk.acc, walk.gyr, warm])
+    for name, last in (("own", "temperature_c"), ("other", "Temp (°C)"), ("counts", "temp")):
+        rows[:, 7] = 4000 if name == "counts" else warm
+        head = f"{'time' if name == 'counts' else 't'},{AXES.strip()},{last}"
+        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header=head, comments="", encoding="utf-8")
+    for name in ("a.npz", "own.csv", "other.csv"):
+        assert mpucal.load(tmp_path / name).sensor.temperature_c == pytest.approx(31.0)
+    assert mpucal.calibrate(tmp_path / "own.csv").sensor.temperature_c == pytest.approx(31.0)
+    assert mpucal.load(tmp_path / "counts.csv").sensor.temperature_c is None
 
 
-@pytest.mark.parametrize("name", ["x", "roll", "GRAVITY X (m/s²)", "motionUserAccelerationX(G)", "mag_x", "w", "q_w"])
-def test_names_of_something_else(name):
-    assert parse_column_name(name, 0) is None
+def test_what_was_read_without_rates_is_used_for_what_needs_none(stored_calibration, tmp_path):
+    """Calibrate statically, report and check a table of counts without a rate, of which `noise` asks for one."""
+    from mpucal.report import render
 
-
-@pytest.mark.parametrize(
-    ("text", "unit"), [("m/s²", "m/s^2"), ("m s^-2", "m/s^2"), ("°/s", "deg/s"), ("µs", "us"), ("G", "g"), ("Hz", "")]
-)
-def test_units_as_people_spell_them(text, unit):
-    assert find_unit(text) == unit
-
-
-def test_gravity_turns_as_the_rates_say():
-    """A vector that stands still, seen by a body that turns at a known rate: Rodrigues' formula."""
-    t = np.arange(0, 20, 0.005)
-    axis = np.array([0.6, -0.48, 0.64])
-    angle, g = 2 * np.sin(t)[:, None], np.array([0.0, 0.0, G])
-    acc = g * np.cos(angle) - np.cross(axis, g) * np.sin(angle) + axis * (axis @ g) * (1 - np.cos(angle))
-    assert rate_factor(t, acc, 2 * np.cos(t)[:, None] * axis) == pytest.approx(1.0, rel=0.02)
+    whole, calibration = stored_calibration
+    np.savetxt(tmp_path / "walk.csv", counts(whole), "%d", ",", header=AXES.strip(), comments="")
+    found = mpucal.load(tmp_path / "walk.csv")
+    assert np.isnan(found.gyr).all()
+    static = mpucal.calibrate(found)
+    assert (static.verdict, static.fit["model"]) == ("usable", "static")
+    assert 'id="accelerometer"' in render(static, found)
+    assert mpucal.check(calibration, found).verdict == "still good"
+    with pytest.raises(RecordingError, match=r"was read without rates: .*--rate HZ"):
+        mpucal.noise(tmp_path / "walk.csv")

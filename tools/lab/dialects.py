@@ -17,7 +17,7 @@ import numpy as np
 
 import mpucal
 from mpucal.files import load, open_writer
-from mpucal.files.hints import NO_HINTS, Hints
+from mpucal.files.hints import NO_HINTS, Hints, parse_columns
 from mpucal.files.rows import Rows
 
 from .runner import Trial, names_of
@@ -50,42 +50,18 @@ def dialects() -> dict[str, tuple[str, str, Write, Hints]]:
 
     An empty name is the folder itself, which is then what is read. The functions are those of the tests.
     """
-    tables, fixtures, logs, loggers, strangers = (
+    tables, arrays, folders, px4, fixtures = (
         run_path(str(ROOT / "tests" / "files" / f"{name}.py"))
-        for name in ("test_tables", "conftest", "test_logs", "test_loggers", "test_strangers")
+        for name in ("test_tables", "test_arrays", "test_folders", "test_px4", "conftest")
     )
-    counts, at_100_hz = Hints(rate_hz=100.0, accel_range_g=4.0, gyro_range_dps=500.0), Hints(rate_hz=100.0)
-
-    def table(name: str, **how: Any) -> Write:
-        return lambda path, w, ns: tables["DIALECTS"][name](w, ns).to_csv(path, index=False, **how)
 
     def bag(kind: str) -> Write:
         return lambda path, w, ns: fixtures["write_bag_file"](path, w, ns, kind)
 
     def ulog(path: Path, w: Walk, ns: Any) -> None:
         t_us = (ns - ns[0]) // 1000 + 5_000_000
-        sensors = [(f"sensor_{name}", 0, logs["imu"](t_us, of)) for name, of in (("accel", w.acc), ("gyro", w.gyr))]
-        logs["ulog"](path, *sensors)
-
-    def raw(path: Path, w: Walk, _ns: Any) -> None:
-        lines = ["\t".join(["a/g:", *map(str, row)]) for row in tables["counts"](w).tolist()]
-        path.write_text("\n".join([*lines, ""]))
-
-    def sketch(path: Path, w: Walk, _ns: Any) -> None:
-        np.savetxt(path, tables["counts"](w), "%d", ",", header="ax,ay,az,gx,gy,gz", comments="")
-
-    def labelled(path: Path, w: Walk, _ns: Any) -> None:
-        line = loggers["LINES"][".txt"]
-        path.write_text("\n".join(line.format(*a, *g, t) for a, g, t in zip(w.acc, w.gyr, w.t, strict=True)))
-
-    def one_table(path: Path, w: Walk, _ns: Any) -> None:
-        loggers["sensor_loggers_one_table"](w, -1, in_g=True).to_csv(path, index=False)
-
-    def parquet(path: Path, w: Walk, ns: Any) -> None:
-        logs["parquet_of"](w, timestamp=ns).to_parquet(path)
-
-    def in_folder(write: Callable[[Walk, Any, Path], Any]) -> Write:
-        return lambda folder, w, ns: write(w, ns, folder)
+        sensors = [(f"sensor_{name}", 0, px4["imu"](t_us, of)) for name, of in (("accel", w.acc), ("gyro", w.gyr))]
+        px4["ulog"](path, *sensors)
 
     return {
         "ROS 2, .mcap": ("rosbags", "walk", bag("mcap"), NO_HINTS),
@@ -93,31 +69,25 @@ def dialects() -> dict[str, tuple[str, str, Write, Hints]]:
         "ROS 1, .bag": ("rosbags", "walk.bag", bag("bag"), NO_HINTS),
         "what `mpucal apply` wrote": ("mpucal", "walk.mcap", own, NO_HINTS),
         "PX4, .ulg": ("pyulog", "walk.ulg", ulog, NO_HINTS),
-        "Parquet": ("pandas, pyarrow", "walk.parquet", parquet, NO_HINTS),
-        **{name: ("pandas", "walk.csv", table(name), NO_HINTS) for name in tables["DIALECTS"]},
-        "AndroSensor, `;` and decimal commas": (
-            *("pandas", "walk.csv"),
-            *(table("AndroSensor", sep=";", decimal=","), NO_HINTS),
-        ),
-        "phyphox, a folder": ("pandas", "", in_folder(tables["phyphox"]), NO_HINTS),
-        "Sensor Logger, a folder": ("pandas", "", in_folder(tables["sensor_logger"]), NO_HINTS),
-        "Sensor Logger on iOS, one table": ("pandas", "walk.csv", one_table, NO_HINTS),
-        "two tables without names": ("pandas", "", loggers["pair"], NO_HINTS),
-        "lines that name each number": ("Python", "walk.txt", labelled, NO_HINTS),
-        "MPU6050_raw": ("Python", "walk.txt", raw, counts),
-        "a sketch's counts": ("NumPy", "walk.csv", sketch, counts),
-        "a matrix of MATLAB without names": (
-            *("SciPy", "walk.mat"),
-            *(lambda path, w, _: strangers["as_matlabs_matrix"](w, path), NO_HINTS),
-        ),
         **{
-            Path(name).stem: (
-                *("Python", name),
-                *(lambda path, w, _, form=form: path.write_text(form(w)), at_100_hz if "board" in name else NO_HINTS),
-            )
-            for name, form in strangers["FORMS"].items()
+            name: (WRITERS.get(file[-4:], "Python"), file, how, NO_HINTS)
+            for name, (file, how, _) in arrays["WRITTEN"].items()
+        },
+        **{name: ("pandas", "", how, NO_HINTS) for name, (how, _) in folders["WRITTEN"].items()},
+        **{
+            name: ("Python", form.file, form.write, hints_of(form.hints or {}))
+            for name, form in tables["FORMS"].items()
         },
     }
+
+
+WRITERS = {".npy": "NumPy", ".npz": "NumPy", ".mat": "SciPy", "quet": "pandas, pyarrow"}
+
+
+def hints_of(words: dict[str, Any]) -> Hints:
+    """Return the hints of words of mpucal.load."""
+    scales = (words.get(key) for key in ("accel_range", "gyro_range", "rate"))
+    return Hints(None, parse_columns(words["columns"]) if "columns" in words else {}, {}, *scales)
 
 
 def written(name: str, folder: Path, w: Walk) -> Path:

@@ -1,0 +1,290 @@
+"""Arrays as programs and people keep them, in NumPy's, MATLAB's, Parquet's and JSON's files, read at the first try."""
+
+import json
+import struct
+import sys
+import zlib
+from contextlib import suppress
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+import mpucal
+from mpucal.data import STANDARD_GRAVITY_MPS2 as G
+from mpucal.errors import RecordingError
+
+
+def si(walk):
+    return np.column_stack([walk.acc, walk.gyr])
+
+
+def as_fields(path, walk, ns):
+    names = ("time_ms", "accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z", "temperature")
+    rows = np.column_stack([walk.t * 1000, si(walk), np.full(len(walk), 31.5)])
+    np.save(path, np.array([tuple(row) for row in rows], [(name, "f8") for name in names]))
+
+
+def as_matlabs_matrix(path, walk, ns):
+    counts = np.rint(si(walk) * np.r_[[32768 / (4 * G)] * 3, [32750 / np.radians(500)] * 3])
+    savemat(path, {"cal_data": np.column_stack([walk.t, counts, counts[:, :3] * 0.1])})
+
+
+def frame(walk, **more):
+    of = {f"acc_{axis}": walk.acc[:, i] / G for i, axis in enumerate("xyz")}
+    return pd.DataFrame({**more, **of, **{f"gyr_{axis}": walk.gyr[:, i] for i, axis in enumerate("xyz")}})
+
+
+def rows_of(walk):
+    return zip(walk.t.tolist(), si(walk).tolist(), strict=True)
+
+
+def edge_impulse(walk, **units):
+    sensors = [
+        {"name": f"{of}{axis}"} | ({"units": units[of]} if units else {}) for of in ("acc", "gyr") for axis in "XYZ"
+    ]
+    return {"payload": {"interval_ms": 10.0, "sensors": sensors, "values": si(walk).tolist()}}
+
+
+def at_a_frequency(walk):
+    """Hold many more values of another sensor, at another rate."""
+    data = [{"gyroscope": row[3:], "acceleration": row[:3]} for _, row in rows_of(walk)]
+    return {"at": "26/06/20", "emg": {"data": [[0] * 8] * 4000}, "imu": {"frequency": 100.0, "data": data}}
+
+
+def in_json(document):
+    return lambda path, walk, ns: path.write_text(json.dumps(document(walk)))
+
+
+# the file's name, what writes it there, and text of the recording's `taken`
+WRITTEN = {
+    "a matrix": ("a.npy", lambda p, w, ns: np.save(p, np.column_stack([w.t, si(w)])), "how gravity turns"),
+    "fields": ("a.npy", as_fields, "times in ms"),
+    "other names": (
+        *("a.npz", lambda p, w, ns: np.savez(p, timestamps=w.t * 1e6, accel=w.acc.T / G, gyro=w.gyr, serial=[1, 2])),
+        "accelerations in g",
+    ),
+    "a structure of MATLAB": (
+        *("a.mat", lambda p, w, ns: savemat(p, {"imu": {"time": w.t, "acc": w.acc, "gyro": w.gyr}, "Fs": 100.0})),
+        "times in s",
+    ),
+    "a matrix of MATLAB without names": ("a.mat", as_matlabs_matrix, "counts of ±4 g"),
+    "Parquet": ("a.parquet", lambda p, w, ns: frame(w, timestamp=ns).to_parquet(p), "accelerations in g"),
+    "Parquet with dates": (
+        *("a.parquet", lambda p, w, ns: frame(w, timestamp=pd.to_datetime(ns, utc=True)).to_parquet(p)),
+        "times in ns",
+    ),
+    "Parquet with dates of no zone": (
+        *("a.parquet", lambda p, w, ns: frame(w, timestamp=pd.to_datetime(ns)).to_parquet(p)),
+        "times in ns",
+    ),
+    "Parquet with an index of dates": (
+        *("a.parquet", lambda p, w, ns: frame(w).set_index(pd.to_datetime(ns, utc=True)).to_parquet(p)),
+        "times in ns",
+    ),
+    "JSON's objects": (
+        "a.json",
+        in_json(
+            lambda w: [{"t": t, "acc": dict(zip("xyz", r[:3], strict=True)), "gyro": r[3:]} for t, r in rows_of(w)]
+        ),
+        "times in s",
+    ),
+    "JSON's columns": (
+        "a.json",
+        in_json(
+            lambda w: {"imu": {"timestamp": w.t.tolist(), "accel": w.acc.tolist(), "gyro": w.gyr.tolist()}, "n": 3}
+        ),
+        "times in s",
+    ),
+    "Edge Impulse": ("a.json", in_json(lambda w: edge_impulse(w, acc="m/s2", gyr="rad/s")), "a rate of 100 Hz"),
+    "Edge Impulse without units": ("a.json", in_json(edge_impulse), "a rate of 100 Hz"),
+    "JSON at a frequency": ("a.json", in_json(at_a_frequency), "a rate of 100 Hz"),
+    "an object on each line, of which the last is torn": (
+        "a.jsonl",
+        lambda p, w, ns: p.write_text(
+            frame(w, t=w.t).to_json(orient="records", lines=True, double_precision=15) + '{"t'
+        ),
+        "times in s",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_arrays_are_read_at_the_first_try(name, walk, walk_ns, tmp_path):
+    file, write, says = WRITTEN[name]
+    write(tmp_path / file, walk, walk_ns)
+    read = mpucal.load(tmp_path / file)
+    np.testing.assert_allclose(read.t - read.t[0], walk.t, atol=1e-9)
+    np.testing.assert_allclose(si(read), si(walk), atol=1.3e-3 if "counts" in read.taken else 1e-9)
+    assert says in read.taken
+    assert read.sensor.temperature_c == (31.5 if name == "fields" else None)
+    assert (read.utc_ns == walk_ns[0]) == (name in ("Parquet", "Parquet with dates", "Parquet with an index of dates"))
+
+
+def test_its_columns_are_named(walk, walk_ns, assert_same, tmp_path):
+    made = frame(walk, when=walk.t)
+    made.columns = ["when", *"abcdef"]
+    made[["when", *"adbecf"]].to_parquet(tmp_path / "walk.parquet")
+    with pytest.raises(RecordingError, match="its columns are when, a, d, b, e, c, f"):
+        mpucal.load(tmp_path / "walk.parquet")
+    assert_same(mpucal.load(tmp_path / "walk.parquet", columns="t=when,ax=a,ay=b,az=c,gx=d,gy=e,gz=f"), walk)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"acc": np.zeros((5, 3))}, "which is not gravity"),
+        ({"note": "nothing"}, "holds no columns of numbers"),
+        ({"data": np.random.default_rng(0).normal(size=(900, 7))}, "holds no three columns as long as gravity"),
+    ],
+)
+def test_arrays_that_are_no_recording(arrays, says, tmp_path):
+    savemat(tmp_path / "a.mat", arrays)
+    with pytest.raises(RecordingError, match=says):
+        mpucal.load(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        *((name, b"") for name in ("a.mat", "a.npy", "a.npz", "a.parquet")),
+        ("a.mat", b"MATLAB 5.0 MAT-file"),
+        ("a.mat", b"PK\x03\x04 and no more"),
+        ("a.npy", b"\x93NUMPY\x01\x00"),
+        ("a.npz", b"PK\x03\x04 and no more"),
+        ("a.parquet", b"PAR1 and no more"),
+        ("a.json", b"[1, 2" + b"," * 300),
+        ("a.json", b"[" * 9000 + b"," * 300),
+        ("a.json", b'{"rates": [1.0, "a", null]}'),
+        ("a.json", b'{"acc": [' + b"1," * 300),
+        ("a.json", b'{"values": [' + b",".join([b"[NaN,Infinity,1,2,3,4]"] * 300) + b"]}"),
+    ],
+)
+def test_files_of_arrays_that_are_none(name, content, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RecordingError):
+        mpucal.load(tmp_path / name)
+
+
+def test_a_calibration_is_no_recording(stored_calibration, tmp_path):
+    stored_calibration[1].save(tmp_path / "calibration.json")
+    with pytest.raises(RecordingError, match="is not a recording that mpucal knows"):
+        mpucal.load(tmp_path / "calibration.json")
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_damaged_file_of_matlab_is_an_error_or_a_recording(compressed, walk, tmp_path):
+    """SciPy's reader crashes on some."""
+    savemat(tmp_path / "a.mat", {"imu": {"acc": walk.acc[:50], "t": 1}, "m": [1, 2]}, do_compression=compressed)
+    whole, rng = (tmp_path / "a.mat").read_bytes(), np.random.default_rng(2)
+    for _ in range(100):
+        damaged = bytearray(whole[: rng.integers(130, len(whole))] if rng.random() < 0.3 else whole)
+        for at in rng.integers(100, min(len(damaged), 600), 3):
+            damaged[at] = rng.integers(256)
+        (tmp_path / "a.mat").write_bytes(damaged)
+        with suppress(mpucal.MpucalError):
+            mpucal.load(tmp_path / "a.mat")
+
+
+HEAD_OF_7_3 = b"MATLAB 7.3 MAT-file, Platform: PCWIN64".ljust(124) + b"\0\2IM" + bytes(384)
+
+
+def test_files_of_matlab_7_3_are_read_by_h5py(walk, assert_same, tmp_path):
+    """Read two buffers of four rows, as a Simulink model keeps them."""
+    h5py = pytest.importorskip("h5py")
+    for name, values in (("accelerometer", walk.acc / G), ("gyroscope", np.degrees(walk.gyr))):
+        path = tmp_path / f"mpu6050_{name}.mat"
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file[f"{name}Buffer"] = np.vstack([walk.t, values.T]).T.copy()
+        path.write_bytes(HEAD_OF_7_3 + path.read_bytes()[512:])
+    for given in ("mpu6050_gyroscope.mat", "."):
+        read = mpucal.load(tmp_path / given)
+        assert "accelerations in g and rates in deg/s" in read.taken
+        assert_same(read, walk)
+    (tmp_path / "a.mat").write_bytes(HEAD_OF_7_3)
+    with pytest.raises(RecordingError, match="is not a whole file of arrays"):
+        mpucal.load(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "extra"),
+    [
+        ("log.ulg", b"", "px4"),
+        ("walk.parquet", b"", "parquet"),
+        ("walk.bag", b"", "ros"),
+        ("walk.db3", b"", "ros"),
+        ("a.mat", HEAD_OF_7_3, "matlab"),
+    ],
+)
+def test_a_library_that_is_missing_is_named(name, content, extra, tmp_path, monkeypatch):
+    for module in ("pyulog", "pyarrow", "rosbags.highlevel", "h5py"):
+        monkeypatch.setitem(sys.modules, module, None)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RecordingError, match=rf"pip install 'mpucal\[{extra}\]'"):
+        mpucal.load(tmp_path / name)
+
+
+def element(kind, data):
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8 if kind != 15 else 0)
+
+
+def matrix(of, shape, name, *parts):
+    """Return a matrix of the class `of`; see MAT-File Format."""
+    said = element(6, struct.pack("<II", of, 0)) + element(5, struct.pack(f"<{len(shape)}i", *shape))
+    return element(14, said + element(1, name) + b"".join(parts))
+
+
+def numbers(values):
+    return matrix(6, (len(values), 1), b"", element(9, np.asarray(values, float).tobytes()))
+
+
+def cells(*parts):
+    return matrix(1, (len(parts), 1), b"", *parts)
+
+
+def fields(**values):
+    names = b"".join(name.encode().ljust(16, b"\0") for name in values)
+    head = element(5, struct.pack("<i", 16)) + element(1, names)
+    return matrix(2, (1, 1), b"", head, *values.values())
+
+
+def thing(name, kind, value):
+    said = element(6, struct.pack("<II", 17, 0)) + b"".join(element(1, word) for word in (name, b"MCOS", kind))
+    return element(14, said + value)
+
+
+HEAD_OF_5 = b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM"
+
+
+def as_timetables(path, **sensors):
+    """Write tables {X, Y, Z} with their times in ms as MATLAB Mobile saves a phone's sensors."""
+    contents = [numbers([])]
+    for t_ms, values in sensors.values():
+        names = [matrix(4, (1, 1), b"", element(16, axis)) for axis in (b"X", b"Y", b"Z")]
+        columns = [numbers(column) for column in values.T]
+        contents += [numbers(t_ms), fields(data=cells(*columns), varNames=cells(*names))]
+    inner = b"\0\1IM\0\0\0\0" + fields(MCOS=thing(b"", b"FileWrapper__", cells(*contents)))
+    named = [thing(name.encode(), b"timetable", numbers([1.0, 2.0])) for name in sensors]
+    last = matrix(9, (1, len(inner)), b"", element(2, inner))
+    path.write_bytes(HEAD_OF_5 + b"".join(element(15, zlib.compress(each)) for each in (*named, last)))
+
+
+def test_timetables_of_matlab_mobile_are_read(walk, tmp_path):
+    t_ms, later = walk.t * 1000 + 1.6e12, slice(7, None)
+    as_timetables(
+        tmp_path / "sensorlog.mat",
+        Acceleration=(t_ms, walk.acc),
+        Orientation=(t_ms, walk.acc * 10),
+        AngularVelocity=(t_ms[later], walk.gyr[later]),
+    )
+    read = mpucal.load(tmp_path / "sensorlog.mat")
+    assert "from Acceleration and AngularVelocity" in read.taken
+    np.testing.assert_allclose(si(read), si(walk)[later], atol=1e-6)
+    assert read.utc_ns is not None
+
+
+def test_objects_of_matlab_are_named(tmp_path):
+    (tmp_path / "log.mat").write_bytes(HEAD_OF_5 + thing(b"log", b"table", numbers([1.0, 2.0])))
+    with pytest.raises(RecordingError, match=r"objects of MATLAB \(table\)"):
+        mpucal.load(tmp_path / "log.mat")

@@ -1,0 +1,191 @@
+"""Tables of one sensor each in a folder, beside each other or in an archive, and folders of recordings."""
+
+import json
+import zipfile
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+import mpucal
+from mpucal.data import STANDARD_GRAVITY_MPS2 as G
+from mpucal.errors import RecordingError
+
+
+def put(folder, name, t, values, columns, of_t="Time (s)", **how):
+    """Write a table of one sensor: its times, then a column for each axis."""
+    made = pd.DataFrame(values, columns=columns)
+    made.insert(0, of_t, t)
+    made.to_csv(folder / name, index=False, **how)
+
+
+def phyphox(folder, walk, ns, later=0.0, prefix="", **how):
+    for name, of, values, unit in (
+        ("Accelerometer", "Acceleration", walk.acc, "m/s^2"),
+        ("Gyroscope", "Gyroscope", walk.gyr, "rad/s"),
+    ):
+        columns = [f"{of} {axis} ({unit})" for axis in "xyz"]
+        put(folder, f"{prefix}{name}.csv", walk.t + later * (name == "Gyroscope"), values, columns, quoting=1, **how)
+
+
+def sensor_logger(folder, walk, ns, metadata=None, sign=1):
+    for name, values in (
+        ("Accelerometer", walk.acc * 0.001),
+        ("TotalAcceleration", sign * walk.acc),
+        ("AccelerometerUncalibrated", sign * walk.acc / G),
+        ("Gyroscope", walk.gyr + 0.1),
+        ("GyroscopeUncalibrated", walk.gyr),
+    ):
+        put(folder, f"{name}.csv", ns, values[:, ::-1], list("zyx"), "time")
+    if metadata:
+        pd.DataFrame([metadata]).to_csv(folder / "Metadata.csv", index=False)
+
+
+def metawear(folder, walk, ns):
+    """Call the tables by a word of longer names, beside one without gravity."""
+    for name, values, unit in (("Accelerometer", walk.acc / G, "g"), ("Gyroscope", np.degrees(walk.gyr), "deg/s")):
+        columns = [f"{axis}-axis ({unit})" for axis in "xyz"]
+        put(folder, f"MetaWear_C8_{name}_100.000Hz_1.4.4.csv", ns / 1e6, values, columns, "epoch (ms)")
+    put(folder, "Linear Accelerometer.csv", walk.t, 0 * walk.acc, list("xyz"))
+
+
+def pair(folder, walk, ns, order=(0, 1, 2, 3)):
+    """Write two tables without names, as data sets have them: time, x, y, z."""
+    for name, values in (("acce.txt", walk.acc), ("gyro.txt", walk.gyr)):
+        columns = [ns, *values.T]
+        table = pd.DataFrame({k: columns[place] for k, place in enumerate(order)})
+        table.to_csv(folder / name, sep=" ", header=False, index=False)
+
+
+def marked(folder, walk, ns):
+    """Begin each line with the sensor's name, and name no units."""
+    for name, values in (("acceleration", walk.acc / G), ("gyroscope", np.degrees(walk.gyr))):
+        made = pd.DataFrame(np.column_stack([walk.t * 1e3, values]))
+        made.insert(0, "of", name)
+        made.to_csv(folder / f"{name}_20180927.csv", header=False, index=False)
+
+
+WRITTEN = {
+    "phyphox, a folder": (phyphox, "from Accelerometer.csv and Gyroscope.csv"),
+    "Sensor Logger, a folder": (sensor_logger, "from AccelerometerUncalibrated.csv and GyroscopeUncalibrated.csv"),
+    "MetaWear, a folder": (metawear, "accelerations in g and rates in deg/s"),
+    "two tables without names": (pair, "from acce.txt and gyro.txt"),
+    "two tables of marked lines": (marked, "accelerations in g and rates in deg/s"),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_the_tables_of_two_sensors_are_one_recording(name, walk, walk_ns, assert_same, tmp_path):
+    write, says = WRITTEN[name]
+    (tmp_path / "phone").mkdir()
+    write(tmp_path / "phone", walk, walk_ns)
+    read = mpucal.load(tmp_path / "phone")
+    assert_same(read, walk, 1e-9, 1e-9, 1e-6)
+    assert says in read.taken
+
+
+@pytest.mark.parametrize("write", [phyphox, sensor_logger])
+def test_an_archive_of_them_is_read_as_the_folder(write, walk, walk_ns, assert_same, tmp_path):
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta" / "device.csv").write_text("property,value\n")
+    write(tmp_path, walk, walk_ns)
+    with zipfile.ZipFile(tmp_path / "phone.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        for child in sorted(tmp_path.rglob("*.csv")):
+            archive.write(child, child.relative_to(tmp_path))
+    assert_same(mpucal.load(tmp_path / "phone.zip"), walk)
+
+
+def test_sensor_logger_says_by_its_metadata_which_sign_it_has(walk, walk_ns, assert_same, tmp_path):
+    for said, sign in (
+        ({"version": 3, "device name": "a, b", "platform": "ios"}, -1),
+        ({"platform": "android"}, 1),
+        ({"platform": "ios", "standardisation": "true"}, 1),
+    ):
+        sensor_logger(tmp_path, walk, walk_ns, said, sign)
+        read = mpucal.load(tmp_path)
+        assert_same(read, walk)
+        assert ("accelerations have the opposite sign, as on iOS" in read.taken) == (sign < 0)
+
+
+@pytest.mark.parametrize(
+    ("events", "utc_ns"),
+    [
+        ([["START", 0.0, 1.7e9]], 1_700_000_000 * 10**9),
+        ([["START", 0.0, 1.7e9], ["PAUSE", 30.0, 1.7e9 + 30]] * 2, None),
+        ([["START", 0, "9e999999"]], None),
+    ],
+)
+def test_phyphox_says_the_time_of_day_in_a_file_beside_its_tables(events, utc_ns, walk, walk_ns, tmp_path):
+    phyphox(tmp_path, walk, walk_ns)
+    (tmp_path / "meta").mkdir()
+    columns = ["event", "experiment time", "system time"]
+    pd.DataFrame(events, columns=columns).to_csv(tmp_path / "meta" / "time.csv", index=False)
+    read = mpucal.load(tmp_path)
+    assert read.utc_ns == utc_ns
+    assert ("paused 1 times" in read.taken) == (len(events) > 1)
+
+
+def test_two_tables_are_joined_by_time(walk, walk_ns, tmp_path):
+    phyphox(tmp_path, walk, walk_ns, later=0.0123, sep=";", decimal=",")
+    read = mpucal.load(tmp_path)
+    assert "the gyroscope begins +12.30 ms after the accelerometer" in read.taken
+    wanted = np.column_stack([np.interp(read.t, walk.t + 0.0123, rate) for rate in walk.gyr.T])
+    np.testing.assert_allclose(read.gyr, wanted, atol=1e-9)
+    phyphox(tmp_path, walk, walk_ns, later=1e4)
+    with pytest.raises(RecordingError, match="not recorded at the same time"):
+        mpucal.load(tmp_path)
+
+
+def test_one_table_of_two_is_read_with_the_other_if_that_is_there(walk, walk_ns, assert_same, tmp_path):
+    phyphox(tmp_path, walk, walk_ns)
+    for given in ("Accelerometer.csv", "Gyroscope.csv"):
+        assert_same(mpucal.load(tmp_path / given), walk, 1e-9, 1e-9, 1e-9)
+    (tmp_path / "Accelerometer.csv").rename(tmp_path / "walk.csv")
+    read = mpucal.load(tmp_path / "walk.csv")
+    np.testing.assert_allclose(read.acc, walk.acc, atol=1e-9)
+    assert np.isnan(read.gyr).all()
+    assert "and without rates" in read.taken
+    with pytest.raises(RecordingError, match=r"no columns of an accelerometer.*give the folder"):
+        mpucal.load(tmp_path / "Gyroscope.csv")
+
+
+def test_pairs_of_tables_are_told_apart_by_their_names(walk, walk_ns, assert_same, tmp_path):
+    phyphox(tmp_path, walk, walk_ns, prefix="run1_")
+    phyphox(tmp_path, walk.part(0, 900), walk_ns, prefix="run2_")
+    first = mpucal.load(tmp_path)
+    assert_same(first, walk, 1e-9, 1e-9, 1e-9)
+    assert "of 2 pairs of tables, it is the first" in first.taken
+    assert len(mpucal.load(tmp_path / "run2_Gyroscope.csv")) == 900
+
+
+@pytest.mark.parametrize("said", ["ax,ay,az,t", "t=4,ax=1,ay=2,az=3,gx=1,gy=2,gz=3"])
+def test_two_tables_without_names_whose_columns_are_said(said, walk, walk_ns, assert_same, tmp_path):
+    pair(tmp_path, walk, walk_ns, (1, 2, 3, 0))
+    with pytest.raises(RecordingError):
+        mpucal.load(tmp_path)
+    assert_same(mpucal.load(tmp_path, columns=said), walk)
+
+
+def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_path):
+    for name, part in (("b", walk.part(700, 1400)), ("a", walk.part(0, 700))):
+        np.save(tmp_path / f"{name}.npy", np.column_stack([part.t, part.acc, part.gyr]))
+    (tmp_path / "notes.txt").write_text("turned by hand\n")
+    (tmp_path / "settings.json").write_text(json.dumps({"rate": 100}))
+    savemat(tmp_path / "results.mat", {"accel_bias": np.zeros((3, 1)), "M_a": 0.005 * np.eye(3)})
+    read = mpucal.load(tmp_path)
+    np.testing.assert_allclose(read.acc, walk.acc, atol=1e-9)
+    assert np.flatnonzero(read.gap).tolist() == [700]
+    assert "how the board turned between them is unknown: a.npy, b.npy." in read.taken
+    assert "Left out were results.mat (" in read.taken
+
+
+def test_pairs_of_tables_of_sides_are_one_recording_at_the_rate_that_they_state(walk, tmp_path):
+    for k, side in enumerate(("x_up", "y_down")):
+        part = walk.part(700 * k, 700 * (k + 1))
+        savemat(tmp_path / f"{side}_accel.mat", {"accel": part.acc, "Fs": 50})
+        savemat(tmp_path / f"{side}_gyro.mat", {"gyro": part.gyr, "Fs": 50})
+    read = mpucal.load(tmp_path, units="gyr=rad/s", rate=100)
+    np.testing.assert_allclose(read.acc, walk.acc)
+    assert np.flatnonzero(read.gap).tolist() == [700]
+    assert mpucal.load(tmp_path / "x_up_accel.mat", units="gyr=rad/s").rate_hz == pytest.approx(50.0)
