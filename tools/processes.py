@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
-import multiprocessing
 import os
 import pkgutil
 import resource
+import shutil
 import signal
 import sys
+import tempfile
 import time
 import traceback
-from collections import Counter
 from collections.abc import Callable, Container, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
-from multiprocessing.connection import wait
 from pathlib import Path
-from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import mpucal
@@ -32,8 +32,6 @@ from mpucal.session import rotate
 CODES = (0, 3, 4, 5, 6)
 CPU_S, WALL_S = 120, 600.0
 POLL_S, KNOW_EVERY_S, SELDOM = 0.5, 3.0, 8.0
-Tell = Callable[[Any], None]
-Task = Callable[[Tell], None]
 
 
 @dataclass(frozen=True)
@@ -72,11 +70,9 @@ class Ended:
 
 
 class Child:
-    """Process for a function that returns an exit code; it waits until `go`.
+    """Process for a function that returns an exit code; it waits until `go`, and the kernel ends it after `cpu_s`.
 
-    Parameters
-    ----------
-    folder : it runs there. said : the file that becomes its stderr. cpu_s : limit of its processor time.
+    It continues as a command that was started in `folder`, with stderr in the file `said` and no input.
     """
 
     def __init__(self, call: Callable[[], int], folder: Path, said: Path, cpu_s: int = CPU_S) -> None:
@@ -88,8 +84,11 @@ class Child:
             os.read(hold, 1)
             code = 1
             try:
-                limit_cpu(cpu_s)
-                become(folder, said)
+                resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
+                os.chdir(folder)
+                for number, path in enumerate((os.devnull, os.devnull, said)):
+                    os.dup2(os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC * (number == 2), 0o644), number)
+                _keep_streams()
                 code = call()
                 if sys.stdout is not None:
                     sys.stdout.flush()
@@ -110,22 +109,6 @@ class Child:
         return ended(self._pid, self._said, wall_s)
 
 
-def limit_cpu(cpu_s: int = CPU_S) -> None:
-    """Have the kernel end this process after this processor time [s]; `ended` reports that as a hang."""
-    resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
-
-
-def become(folder: Path, said: Path) -> None:
-    """Continue as a command that was started in `folder`, with stderr in the file `said` and no input."""
-    os.chdir(folder)
-    nothing, file = os.open(os.devnull, os.O_RDWR), os.open(said, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o644)
-    for number, handle in enumerate((nothing, nothing, file)):
-        os.dup2(handle, number)
-    os.close(nothing)
-    os.close(file)
-    _keep_streams()
-
-
 def ended(pid: int, said: Path, wall_s: float = WALL_S) -> Ended:
     """Wait for a child, for at most `wall_s`, and return how it ended, with its output in the file `said`."""
     until, done, hung = time.monotonic() + wall_s, 0, False
@@ -141,59 +124,16 @@ def ended(pid: int, said: Path, wall_s: float = WALL_S) -> Ended:
     return Ended(None if hung else code, text, used.ru_utime + used.ru_stime, used.ru_maxrss >> 10)
 
 
-class Report:
-    """Outcomes by kind: their numbers, and what was wrong."""
-
-    def __init__(self) -> None:
-        self._told: dict[str, list[str]] = {}
-
-    def tell(self, kind: str, wrong: str = "") -> None:
-        """Count an outcome of this kind, and what was wrong, if anything was."""
-        self._told.setdefault(kind, []).append(wrong)
-
-    def shown(self) -> int:
-        """Print a line for each kind; return 1 if something was wrong."""
-        for kind, told in self._told.items():
-            wrong = Counter(filter(None, told))
-            print(f"{kind:32} {len(told):7} {f'{wrong.total()} wrong' if wrong else 'as they ought to be'}")
-            for what, count in wrong.most_common(8):
-                print(f"    WRONG {count} x {what}", flush=True)
-        return int(any(map(any, self._told.values())))
+def lasting_folder() -> Path:
+    """Return a new folder that lasts as long as this program."""
+    folder = Path(tempfile.mkdtemp()).resolve()
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
-class Died(NamedTuple):
-    """Premature end of a task: its exit code, or below 0 the signal."""
-
-    code: int
-
-
-def forked(tasks: list[Task], jobs: int) -> Iterator[tuple[Task, Any]]:
-    """Run tasks in processes of their own, which may crash, hang or be killed.
-
-    Yields a task with each of its messages, and a Died after a premature end. Tasks may be added to the list meanwhile.
-    """
-    fork, running = multiprocessing.get_context("fork"), {}
-    while tasks or running:
-        while tasks and len(running) < jobs:
-            hear, tell = fork.Pipe(duplex=False)
-            process = fork.Process(target=tasks[0], args=(tell.send,))
-            running[hear] = process, tasks.pop(0)
-            process.start()
-            tell.close()
-        for hear in wait(running):
-            process, task = running[hear]
-            try:
-                yield task, hear.recv()
-            except EOFError:
-                process.join()
-                del running[hear]
-                hear.close()
-                if process.exitcode:
-                    yield task, Died(process.exitcode)
-
-
+@cache
 def ready() -> None:
-    """Load all modules of mpucal before processes are forked."""
+    """Load all modules of mpucal, once, before processes are forked."""
     for module in pkgutil.walk_packages(mpucal.__path__, "mpucal."):
         with suppress(ImportError):
             import_module(module.name)

@@ -181,17 +181,20 @@ class Attack:
     heard: Sequence[bytes] = ()
     sent: int = 0
     sets: list[tuple[str, float, float]] = field(default_factory=list)
-    early: bool = False
     begin_s: float = 0.0
     lasts_s: float = math.inf
     hz: float = 0.0
+
+    @property
+    def early(self) -> bool:
+        """True if it begins with the link."""
+        return bool(self.rate) and self.seed % EARLY == 1
 
     def draw(self, command: str) -> None:
         """Draw begin, duration and rate for the next command."""
         self.sets, self.hz = [], self.rate
         if self.seed and self.rate:
             rng = random.Random(f"{self.seed} {command}")
-            self.early = self.seed % EARLY == 1
             self.begin_s = 0.0 if self.early else rng.uniform(0.0, LATEST_S[command])
             self.lasts_s = math.exp(rng.uniform(*map(math.log, LASTS_S)))
             self.hz = math.exp(rng.uniform(math.log(LEAST_HZ), math.log(2 * self.rate)))

@@ -1,13 +1,13 @@
 """Hostile MAVLink packets beside a vehicle, during a session that writes back and during `mpucal write --store`.
 
-    python -m tools.attack hostile_vehicle                          # every kind, until 100,000 packets of it were heard
-    python -m tools.attack hostile_vehicle --packets 2000 --runs 1 ids ftp
+    python -m tools.attack hostile_vehicle --seeds 9                # a few hours; 18 runs of each kind and attacker
+    python -m tools.attack hostile_vehicle --seeds 1 --kinds ids ftp
 
 The simulated vehicle and the attacker share one link, and the packets go through the code that those of a socket do.
 The attacker sends as a stranger (an address of its own), as the vehicle (its address forged, nothing signed) and
-against signing (the address forged, both sides sign, and it has no key, but packets of an earlier session). Each run
-is a process of its own: both commands, the first with a thousand packets a second of the vehicle's time from the lock
-on, the others with bursts of any rate and length at any time, some from before the lock on.
+against signing (the address forged, both sides sign, and it has no key, but packets of an earlier session). Seed 0
+sends a thousand packets a second of the vehicle's time from the lock on, the others bursts of any rate and length at
+any time, some from before the lock on.
 
 Of a stranger, and against signing, the calibration must be the undisturbed one to the bit, and be written. Always
 wrong is an exit code that says nothing, a trace, a hang, no sentence, a file in part, a parameter set that is neither
@@ -20,27 +20,25 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import tempfile
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from mpucal.__main__ import run
-from mpucal.errors import MpucalError
 from mpucal.files.mcap import read_capture
 from mpucal.mavlink.parameters.write import DETOUR
 from mpucal.mavlink.tlog import RawPacket
 from mpucal.result.calibration import Calibration
-from tools.lab.campaign_judge import false, partial_files
+from tools.lab.campaign_judge import partial_files
 from tools.lab.judge import judged
-from tools.processes import CODES, Died, Ended, Report, Tell, become, forked, limit_cpu, ready
-from tools.programs import PROCESSORS, Jobs
+from tools.lab.runner import Trial
+from tools.lab.table import Column, Row, count, frequencies
+from tools.processes import CODES, Child, lasting_folder, ready
 
 from .hostile_link import ATTACKERS, FORGED, KINDS, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
 
@@ -48,63 +46,76 @@ KEY = bytes(range(32))
 FIRMWARES = ("ardupilot", "px4")
 # kinds that may pass for the vehicle's samples if the address is forged and nothing is signed
 OF_SAMPLES = ("values", "time", "replayed", "junk", "mixed")
-MOST_RUNS = 60
 # packets a second of the vehicle's time
 RATE = 1000.0
-CPU_S, WALL_S = 300, 1200
+CPU_S, WALL_S = 300, 1200.0
 NO_VEHICLE = 2
 QUICK = ("--rate", "50", "--target", "quick")
 NUMBER = re.compile(r"-?\d[\d.e+-]*|nan|inf")
 
 
-def commands(attack: Attack, clean: Path | None) -> Iterator[tuple[str, list[str]]]:
-    """Yield each command, and the file whose parameters it may set."""
-    vehicle = [f"sim:firmware={attack.firmware}"]
-    signing = ["--signing-key", "key"] if attack.attacker == SIGNED else []
-    yield "out/calibration.json", ["session", "--mavlink", *vehicle, *signing, *QUICK, "-o", "out", "--yes"]
-    if clean is not None:
-        words = ["write", str(clean), "autopilot", "--mavlink", *vehicle, *signing, "--store", "--yes", "-o", "written"]
-        yield str(clean), words
+class Case(NamedTuple):
+    """An attack to run, and the results of an undisturbed session; without these, it is that session."""
+
+    attack: Attack
+    clean: Path | None = None
 
 
-def run_attack(attack: Attack, clean: Path | None, place: Path) -> dict[str, Any]:
-    """Run the commands in this process, and judge them."""
-    place.mkdir(parents=True)
-    become(place, place / "said")
-    Path("key").write_bytes(KEY)
-    os.environ["XDG_STATE_HOME"] = str(place / "state")
-    codes, wrong, ends, unasked = [], [], [], 0
-    allowed = (*CODES, NO_VEHICLE) if attack.early else CODES
+def commands(case: Case) -> Iterator[tuple[Path, list[str]]]:
+    """Yield each command, and before it the file whose parameters it may set."""
+    link = ["--mavlink", f"sim:firmware={case.attack.firmware}"]
+    link += ["--signing-key", "key"] if case.attack.attacker == SIGNED else []
+    yield Path("out/calibration.json"), ["session", *link, *QUICK, "-o", "out", "--yes"]
+    if case.clean is not None:
+        clean = case.clean / "calibration.json"
+        yield clean, ["write", str(clean), "autopilot", *link, "--store", "--yes", "-o", "written"]
+
+
+def under_attack(attack: Attack, words: list[str]) -> int:
+    """Run a command in this process, and leave what it was sent and set, and the truth of the vehicle."""
+    os.environ["XDG_STATE_HOME"] = str(Path("state").resolve())
+    attack.draw(words[0])
     with hostile(attack):
-        for file, words in commands(attack, clean):
-            attack.draw(words[0])
-            done = Ended(run(words), Path("said").read_text("utf-8", "replace"))
-            codes.append(done.code)
-            ends += [f"exit {done.code}: {NUMBER.sub('N', done.last)}"] if done.code else []
-            extra = not_asked(attack.sets, Path(file))
-            unasked += len(extra)
-            wrong += [f"{words[0]} set {extra[0]}"] if extra else []
-            wrong += done.wrong(allowed)
-    wrong += partial_files(Path("out"), codes[0])
-    if attack.attacker == SIGNED or (attack.attacker == STRANGER and not attack.early):
-        undisturbed = clean is None or same(Path("out/calibration.json"), clean)
-        wrong += [f"not as without: exit codes {codes}"] if any(codes) or not undisturbed else []
-    fooled, lies = judge_samples(attack)
-    wrong += lies
-    return {"sent": attack.sent, "codes": codes, "wrong": wrong, "unasked": unasked, "fooled": fooled, "ends": ends}
+        code = run(words)
+    told = {"sent": attack.sent, "sets": attack.sets, "truth": HostileTransport.truths[0]}
+    Path("told").write_text(json.dumps(told))
+    return code
 
 
-def judge_samples(attack: Attack) -> tuple[int, list[str]]:
-    """Return 1 if the error of the calibration exceeds its claim, and why that is wrong (not of forged samples)."""
-    try:
-        calibration = Calibration.load(Path("out/calibration.json"))
-    except MpucalError:
-        return 0, []
-    truth = HostileTransport.truths[0]
-    found = judged(calibration, (np.array(truth["D"]), np.array(truth["b_a"])))
-    lies = [f"{lie}: {found.error:.3f} m/s^2, {found.claims:.1f} claims" for lie in false(found)]
-    forged = attack.attacker == FORGED and attack.kind in OF_SAMPLES
-    return len(lies), [] if forged else lies
+def run_attack(case: Case, place: Path) -> Row:
+    """Run the commands, and judge them."""
+    ready()
+    attack, signed = case.attack, case.attack.attacker == SIGNED
+    (place / "key").write_bytes(KEY)
+    row = Row(kind=attack.kind, attacker=attack.attacker, codes=[], wrong=[], ends=[], sent=0, unasked=0, fooled=0)
+    for file, words in commands(case):
+        done = Child(partial(under_attack, attack, words), place, place / "said", CPU_S).go().wait(WALL_S)
+        row.codes.append(done.code)
+        row.ends += [f"exit {done.code}: {NUMBER.sub('N', done.last)[:80]}"] if done.code else []
+        row.wrong += [*done.wrong((*CODES, NO_VEHICLE) if attack.early else CODES), *_told(row, place, file, words[0])]
+    out = place / "out" / "calibration.json"
+    row.wrong += partial_files(place / "out", row.codes[0])
+    if signed or (attack.attacker == STRANGER and not attack.early):
+        undisturbed = case.clean is None or same(out, case.clean / "calibration.json")
+        row.wrong += [f"not as without: exit codes {row.codes}"] if any(row.codes) or not undisturbed else []
+    return row
+
+
+def _told(row: Row, place: Path, file: Path, command: str) -> Iterator[str]:
+    """Yield what is wrong with the parameters that a command set, and with the calibration of a session."""
+    if not (told := place / "told").exists():
+        return
+    found = json.loads(told.read_text())
+    told.unlink()
+    extra = not_asked(found["sets"], place / file)
+    row.sent, row.unasked = row.sent + found["sent"], row.unasked + len(extra)
+    yield from [f"{command} set {extra[0]}"] if extra else []
+    if command == "session" and (place / file).exists():
+        truth = found["truth"]
+        of = judged(Calibration.load(place / file), (np.array(truth["D"]), np.array(truth["b_a"])))
+        row.fooled += of.false
+        if of.false and not (row.attacker == FORGED and row.kind in OF_SAMPLES):
+            yield f"called {of.verdict}: {of.error:.3f} m/s^2, {of.claims:.1f} claims"
 
 
 def not_asked(sets: list[tuple[str, float, float]], file: Path) -> list[tuple[str, float]]:
@@ -129,76 +140,49 @@ def same(file: Path, clean: Path) -> bool:
     return bool(np.array_equal(one.D, other.D) and np.array_equal(one.b_a, other.b_a))
 
 
-def outcomes(attacks: Sequence[tuple[Attack, Path | None, Path]], jobs: int) -> Iterator[dict[str, Any]]:
-    """Run each attack in a process of its own, and yield the outcomes, as they end."""
-    for _, told in forked([partial(alone, *each) for each in attacks], jobs):
-        died = {"sent": 0, "codes": ["?"], "unasked": 0, "fooled": 0, "ends": []}
-        yield {**died, "wrong": [f"it hung, or was ended ({told.code})"]} if isinstance(told, Died) else told
+@cache
+def undisturbed(attacker: str, firmware: str) -> tuple[Path, tuple[bytes, ...]]:
+    """Return the results of a session without an attack, and packets of it."""
+    place = lasting_folder()
+    row = run_attack(Case(Attack("ids", attacker, firmware, 0, 0.0)), place)
+    if row.wrong or any(row.codes):
+        raise SystemExit(f"{firmware} undisturbed: {row}")
+    records = read_capture(place / "out" / "capture.mcap").records
+    packets = [record.data for record in records if isinstance(record, RawPacket)]
+    return place / "out", tuple(packets[-MOST_HEARD // 2 :])
 
 
-def alone(attack: Attack, clean: Path | None, place: Path, tell: Tell) -> None:
-    """Run an attack, and report its outcome; the kernel ends a process that hangs."""
-    limit_cpu(CPU_S)
-    signal.alarm(WALL_S)
-    tell(run_attack(attack, clean, place))
-    # skips the orderly close of what the session has open
-    os._exit(0)
+def of_attack(case: Case) -> Row:
+    """Run an attack in a folder of its own."""
+    with tempfile.TemporaryDirectory() as place:
+        return run_attack(case, Path(place).resolve())
 
 
-def main(
-    kinds: Annotated[list[str], KINDS, "default: all"] = tuple(KINDS),
-    *,
-    packets: Annotated[int, "of each kind and attacker, at least"] = 100_000,
-    runs: Annotated[int, "of each kind, attacker and firmware, at least"] = 3,
-    jobs: Jobs = PROCESSORS,
-) -> int:
-    """Run the attacks and print a line for each kind and attacker; return the exit code."""
-    ready()
-    wrong = False
-    with tempfile.TemporaryDirectory() as temporary:
-        place = Path(temporary).resolve()
-        for kind, attacker in product(kinds, ATTACKERS):
-            report = Report()
-            done = attacked(place, kind, attacker, packets, runs, jobs)
-            for outcome in done:
-                report.tell(f"{kind}, {attacker}", "; ".join(outcome["wrong"]))
-            wrong |= bool(report.shown())
-            sent, unasked, fooled = (sum(outcome[key] for outcome in done) for key in ("sent", "unasked", "fooled"))
-            ends = Counter(end for outcome in done for end in outcome["ends"]).most_common()
-            exits = ", ".join(f"{count} x {end}" for end, count in ends)
-            print(
-                f"    {sent} packets, {unasked} sets not asked for, {fooled} fooled; {exits or 'all exit 0'}",
-                flush=True,
-            )
-    return int(wrong)
+def scenarios(*, seeds: range, kinds: Annotated[list[str], KINDS] = tuple(KINDS)) -> Iterator[Case]:
+    """Yield the attacks of each kind, attacker, seed and firmware."""
+    for kind, attacker, seed, firmware in product(kinds, ATTACKERS, seeds, FIRMWARES):
+        clean, heard = undisturbed(SIGNED if attacker == SIGNED else STRANGER, firmware)
+        yield Case(Attack(kind, attacker, firmware, seed, RATE, heard), clean)
 
 
-def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
-    """Return the folder of a session without an attack."""
-    signed = SIGNED if attacker == SIGNED else STRANGER
-    folder = place / f"{firmware} {signed}"
-    if not folder.exists():
-        [outcome] = outcomes([(Attack("ids", signed, firmware, 0, 0.0), None, folder)], 1)
-        if outcome["wrong"] or any(outcome["codes"]):
-            raise SystemExit(f"{firmware} undisturbed: {outcome}")
-    return folder / "out"
+def total(name: str) -> Column:
+    """Return a column: the sum over the runs."""
+    return lambda rows: sum(getattr(row, name) for row in rows)
 
 
-def attacked(place: Path, kind: str, attacker: str, packets: int, runs: int, jobs: int) -> list[dict[str, Any]]:
-    """Run attacks until enough packets of a kind were heard; return their outcomes."""
-    clean = {firmware: undisturbed(place, attacker, firmware) for firmware in FIRMWARES}
-    heard = {}
-    for firmware in FIRMWARES:
-        records = read_capture(clean[firmware] / "capture.mcap").records
-        heard[firmware] = tuple(r.data for r in records if isinstance(r, RawPacket))[-MOST_HEARD // 2 :]
-    done: list[dict[str, Any]] = []
-    for seed in range(MOST_RUNS):
-        if seed >= runs and sum(outcome["sent"] for outcome in done) >= packets:
-            break
-        tasks = []
-        for firmware in FIRMWARES:
-            here = place / f"{kind}-{attacker.replace(' ', '-')}-{firmware}-{seed}"
-            attack = Attack(kind, attacker, firmware, seed, RATE, heard[firmware])
-            tasks.append((attack, clean[firmware] / "calibration.json", here))
-        done += outcomes(tasks, jobs)
-    return done
+COLUMNS: dict[str, Column] = {
+    "runs": len,
+    "packets": total("sent"),
+    "sets not asked for": total("unasked"),
+    "fooled": total("fooled"),
+    "wrong": count("wrong"),
+    "exits": lambda rows: frequencies(end for row in rows for end in row.ends) or "all 0",
+}
+
+
+def line(row: Row) -> str:
+    """Return what was wrong; empty if nothing was."""
+    return f"WRONG {row.kind}, {row.attacker}: {'; '.join(row.wrong)}" if row.wrong else ""
+
+
+main = Trial(__doc__, of_attack, scenarios, COLUMNS, ("kind", "attacker"), seeds="0:3", line=line)

@@ -18,7 +18,6 @@ import shutil
 import stat
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -30,6 +29,8 @@ import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.cli import COMMANDS, commands
+from tools.lab.runner import Trial
+from tools.lab.table import Column, Row, frequencies
 from tools.processes import Child, Ended, ready
 
 QUICK = ("--rate", "25", "--target", "quick", "--yes")
@@ -135,27 +136,18 @@ def _disk(options: str, here: Path) -> Iterator[Path]:
             subprocess.run(["umount", "-l", place], check=True)
 
 
-def on_full_disk(words: tuple[str, ...], here: Path) -> str:
-    """Run a command whose output lies on a disk without a free page."""
-    with _disk("size=64k", here) as place:
-        if not os.geteuid():
+def on_bad_disk(words: tuple[str, ...], here: Path, full: bool) -> str:
+    """Run a command whose output lies on a disk without a free page, or where nothing may be written."""
+    with _disk("size=64k" if full else "ro", here) as place:
+        if not full and os.geteuid():
+            place.chmod(0o555)
+        elif full and not os.geteuid():
             with suppress(OSError), (place / "filler").open("wb", buffering=0) as filler:
                 while filler.write(bytes(4096)):
                     pass
-        return _refused(_run(words, here, place, longest=1 if os.geteuid() else None), place)
-
-
-def on_read_only_disk(words: tuple[str, ...], here: Path) -> str:
-    """Run a command whose output lies where nothing may be written."""
-    with _disk("ro", here) as place:
-        if os.geteuid():
-            place.chmod(0o555)
-        return _refused(_run(words, here, place), place)
-
-
-def _refused(done: Ended, place: Path) -> str:
-    odd = _odd(done, place) or ("" if done.code not in (0, 5) else f"exit code {done.code}")
-    return f"WRONG: {odd}" if odd else "refused"
+        done = _run(words, here, place, longest=1 if full and os.geteuid() else None)
+        odd = _odd(done, place) or ("" if done.code not in (0, 5) else f"exit code {done.code}")
+        return f"WRONG: {odd}" if odd else "refused"
 
 
 def _run(words: tuple[str, ...], here: Path, place: Path, longest: int | None = None) -> Ended:
@@ -176,38 +168,46 @@ def _odd(done: Ended, place: Path) -> str:
     return "; ".join([*odd, *(f"{path.name} is left" for path in place.rglob(".*"))])
 
 
-def main(commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS)) -> int:
-    """Run each command with each obstacle, and print the table; return 1 if an outcome was wrong."""
-    if lacks := check_rows():
-        sys.exit(lacks)
-    wrong = False
+def of_command(name: str) -> list[Row]:
+    """Run a command with each obstacle: a row for each output."""
     ready()
     with TemporaryDirectory() as base:
         (here := Path(base) / "here").mkdir()
         (here / "a").mkdir()
         shutil.copy(SESSION, here / RECORDED)
         _run(("calibrate", RECORDED, "-o", "a"), here, here)
-        if "merge" in commands:
+        if name == "merge":
             _run((*WORDS["session"], "--bus", "sim:seed=1,temperature_c=45", "-o", "b"), here, here)
         np.savez(here / TABLE, t=np.arange(9) / 9, acc=np.full((9, 3), 9.0), gyr=np.zeros((9, 3)))
-        for name in commands:
-            for kind, cells in tried(WORDS[name], here, name):
-                print(f"  {kind:17} {', '.join(f'{count} {what}' for what, count in cells.items())}", flush=True)
-                wrong |= any("WRONG" in what for what in cells)
-    return int(wrong)
+        return [
+            Row(name=name, kind=kind, outcome=outcome, wrong=outcome.startswith("WRONG"))
+            for kind, outcome in tried(WORDS[name], here)
+        ]
 
 
-def tried(words: tuple[str, ...], here: Path, name: str) -> Iterator[tuple[str, Counter[str]]]:
-    """Print which files a command writes, and yield by obstacle how often which outcome comes."""
+def tried(words: tuple[str, ...], here: Path) -> Iterator[tuple[str, str]]:
+    """Yield each obstacle with the outcome for each file that a command writes, and for their folder."""
     with TemporaryDirectory(dir=here.parent) as place:
         done = _run(words, here, Path(place))
         files = sorted(path.relative_to(place) for path in Path(place).rglob("*") if path.is_file())
-    print(f"{name} writes {', '.join(map(str, files))}", flush=True)
     if done.code or not files:
         sys.exit(f"exit code {done.code}: {done.last}")
-    folder = {Path("out")} if files[0].parts[0] == "out" and len(files[0].parts) > 1 else set()
+    yield "nothing", f"{len(files)} files"
+    in_folder = files[0].parts[0] == "out" and len(files[0].parts) > 1
     for kind in OBSTACLES:
-        cells = Counter(obstructed(words, here, file, kind) for file in files[:MOST_FILES])
-        yield kind, cells + Counter(f"the folder {obstructed(words, here, file, kind)}" for file in folder)
-    yield "full disk", Counter([on_full_disk(words, here)])
-    yield "read-only", Counter([on_read_only_disk(words, here)])
+        yield from ((kind, obstructed(words, here, file, kind)) for file in files[:MOST_FILES])
+        if in_folder:
+            yield f"{kind}, of the folder", obstructed(words, here, Path("out"), kind)
+    for full, kind in ((True, "full disk"), (False, "read-only disk")):
+        yield kind, on_bad_disk(words, here, full)
+
+
+def scenarios(commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS)) -> list[str]:
+    """Return the commands, if there is a row for each of the command line's."""
+    if lacks := check_rows():
+        sys.exit(lacks)
+    return commands
+
+
+COLUMNS: dict[str, Column] = {"outcomes": lambda rows: frequencies(row.outcome for row in rows)}
+main = Trial(__doc__, of_command, scenarios, COLUMNS, ("name", "kind"))

@@ -5,8 +5,8 @@
 A race forks so many processes, which begin together: sessions and recordings of a simulated chip into one -o, and into
 none. Ending sends KILL, TERM, HUP or ALRM to a batch and to a session at any time, and counts the processes that are
 left of it after ten seconds. It is judged whether one process at most ends well for each capture that is there, whether
-each capture is whole and the results beside it are its own, and whether all others end with a sentence. Exit code 1:
-what is said last was not so.
+each capture is whole and the results beside it are its own, and whether all others end with a sentence. Exit code 1
+where one was not so.
 """
 
 from __future__ import annotations
@@ -24,16 +24,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
 
+import psutil
+
 from mpucal.__main__ import run
 from mpucal.calibration import recording_digest
 from mpucal.errors import MpucalError
 from mpucal.files import load
 from mpucal.result.calibration import Calibration
-from tools.processes import Child, Ended, Report, ready
+from tools.lab.runner import Trial
+from tools.lab.table import Column, Row, count, frequencies
+from tools.processes import Child, Ended, ready
 
 SESSION = ("session", "--rate", "25", "--target", "quick", "--yes", "--no-write")
 RECORD = ("record", "--seconds", "2")
 RECORDED = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
+ENDS = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
 # largest time between two starts [s]
 APART_S = 0.02
 # A process that waits for others on a busy computer does not hang; one that computes ends by its processor time.
@@ -63,10 +68,12 @@ def wrong(ends: Sequence[Ended], here: Path, most: int) -> str:
     return "" if well else "none ended well"
 
 
-def race(of: int, draw: random.Random, report: Report) -> None:
+def race(of: int, draw: random.Random) -> list[Row]:
     """Run races of `of` processes, which begin at nearly the same time."""
+    ready()
     seeds = [draw.randrange(1 << 20) for _ in range(of)]
     named = [(*SESSION, "--bus", f"sim:seed={seed}") for seed in seeds]
+    rows = []
     for what, words, most in (
         ("sessions, one -o", [(*each, "-o", "board") for each in named], 1),
         ("sessions, no -o", named, of),
@@ -74,64 +81,70 @@ def race(of: int, draw: random.Random, report: Report) -> None:
     ):
         with TemporaryDirectory() as place:
             (here := Path(place) / "here").mkdir()
-            children = [
-                Child(partial(run, list(each)), here, Path(place) / f"said-{number}")
-                for number, each in enumerate(words)
-            ]
+            said = [Path(place) / f"said-{number}" for number in range(of)]
+            children = [Child(partial(run, list(each)), here, file) for each, file in zip(words, said, strict=True)]
             for child in children:
                 child.go()
                 time.sleep(draw.choice((0.0, draw.uniform(0.0, APART_S))))
-            report.tell(f"{of} {what}", wrong([child.wait(ENDS_S) for child in children], here, most))
+            ends = [child.wait(ENDS_S) for child in children]
+            rows.append(Row(name=f"{of} {what}", wrong=wrong(ends, here, most)))
+    return rows
 
 
-def end(number: int, draw: random.Random, report: Report) -> None:
+def end(number: int, draw: random.Random) -> Row:
     """Run a command that starts processes, and end it by a signal."""
-    kind = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)[number // 2 % 4]
+    kind = ENDS[number // 2 % 4]
     what, words = (
         # a session with a page outlives its terminal
         ("session", (*SESSION, "--bus", "sim:pace=real", *(["--page"] if kind != signal.SIGHUP else []))),
         ("batch", ("batch", str(RECORDED), "-o", "fleet", "--workers", "2")),
     )[number % 2]
-    with TemporaryDirectory(ignore_cleanup_errors=True) as place, Path(os.devnull).open("r+") as null:
-        command = [sys.executable, "-m", "mpucal", *words]
+    with TemporaryDirectory(ignore_cleanup_errors=True) as place:
+        null, command = subprocess.DEVNULL, [sys.executable, "-m", "mpucal", *words]
         process = subprocess.Popen(command, cwd=place, stdin=null, stdout=null, stderr=null, start_new_session=True)
         time.sleep(draw.uniform(0.2, LONGEST_START_S))
         process.send_signal(kind)
         until_s = time.monotonic() + LEFT_S
-        while (process.poll() is None or _of_session(process.pid)) and time.monotonic() < until_s:
+        while (process.poll() is None or of_session(process.pid)) and time.monotonic() < until_s:
             time.sleep(0.1)
-        left = _of_session(process.pid)
-        for each in left:
-            with suppress(ProcessLookupError):
-                os.kill(each, signal.SIGKILL)
+        for each in (left := of_session(process.pid)):
+            with suppress(psutil.NoSuchProcess):
+                each.kill()
         process.wait()
-        report.tell(f"{kind.name} to {what}", f"{len(left)} processes are left" if left else "")
+    return Row(name=f"{kind.name} to {what}", wrong=f"{len(left)} processes are left" if left else "")
 
 
-def _of_session(leader: int) -> list[int]:
-    """Return the ids of the processes in the session of `leader` that still run, by proc(5)."""
+def of_session(leader: int) -> list[psutil.Process]:
+    """Return the processes in the session of `leader` that still run."""
     found = []
-    for stat_file in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            words = stat_file.read_text().rpartition(")")[2].split()
-            if int(words[3]) == leader and words[0] != "Z":
-                found.append(int(stat_file.parent.name))
+    for each in psutil.process_iter():
+        with suppress(ProcessLookupError, psutil.NoSuchProcess):
+            if os.getsid(each.pid) == leader and each.status() != psutil.STATUS_ZOMBIE:
+                found.append(each)
     return found
 
 
-def main(
+def of_item(item: tuple[int, int]) -> list[Row] | Row:
+    """Run races of so many processes, or end a command if they are none, as the number draws."""
+    of, number = item
+    draw = random.Random(f"{of} {number}")
+    return race(of, draw) if of else end(number, draw)
+
+
+def scenarios(
     *,
     pairs: Annotated[int, "races of two"] = 10,
     eights: Annotated[int, "races of eight"] = 2,
     ended: Annotated[int, "commands that a signal ends"] = 0,
-    seed: int = 1,
-) -> int:
-    """Run the trials; return 1 if something was wrong."""
-    draw, report = random.Random(seed), Report()
-    ready()
-    for of, count in ((2, pairs), (8, eights)):
-        for _ in range(count):
-            race(of, draw, report)
-    for number in range(ended):
-        end(number, draw, report)
-    return report.shown()
+    first: int = 0,
+) -> list[tuple[int, int]]:
+    """Return how many processes each race has, and its number."""
+    return [(of, first + k) for of, times in ((2, pairs), (8, eights), (0, ended)) for k in range(times)]
+
+
+COLUMNS: dict[str, Column] = {
+    "all": len,
+    "wrong": count("wrong"),
+    "what": lambda rows: frequencies(row.wrong for row in rows if row.wrong),
+}
+main = Trial(__doc__, of_item, scenarios, COLUMNS)

@@ -26,21 +26,26 @@ import re
 import shutil
 import subprocess
 import sys
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from mpucal.errors import MpucalError
 from mpucal.files import load
 from mpucal.result.blob import Blob
+from tools.lab.runner import Trial
+from tools.lab.table import Column, Row, count, frequencies
+from tools.processes import ready
 
 from .disk_model import Call, Disk, logged
-from .fuzz import TODAY
+from .fuzz import ROOT, TODAY
 from .syscalls_commands import STATE, WORDS, Failed, Failing, prepared, run_failing
 
+Each = Annotated[bool, "fail every call, and cut the power after each"]
+Most = Annotated[int | None, "fail so many calls of a command at most, drawn by the seed"]
+More = Annotated[int, "fail so many, too"]
 SHIM = Path(__file__).with_suffix(".c")
 DISK = (errno.EIO, errno.ENOSPC, errno.EDQUOT)
 REFUSED = (errno.EROFS, errno.EACCES)
@@ -124,14 +129,14 @@ def has_write_note(found: Files) -> bool:
     )
 
 
-class Trial:
+class Command:
     """Trial of a command on copies of the folder `start`."""
 
     def __init__(self, name: str, start: Path) -> None:
-        self._words, self._start, self._here = WORDS[name], start, start.parent / "here"
+        self._words, self._start, self._here = WORDS[name], start, start.parent / f"of {name}" / "here"
         self._anew()
         self.old = files(self._here)
-        with (start.parent / "log").open("w+b", buffering=0) as log:
+        with self._here.with_name("log").open("w+b", buffering=0) as log:
             done = run_failing(self._words, self._here, Failing(least=LEAST_BYTES, log=log.fileno()))
             log.seek(0)
             self.log = list(logged(log.read(), str(self._here)))
@@ -208,58 +213,59 @@ def sampled(calls: Sequence[Call], each: bool) -> list[int]:
     return list(range(len(calls))) if each else sorted(set().union(*some))
 
 
-def tried(name: str, start: Path, seed: int, each: bool, most: int | None, allocations: int) -> Iterator[str]:
-    """Try a command, print its line of the table, and yield what was wrong."""
+def of_command(
+    item: tuple[str, Path, int], *, each: Each = False, most: Most = None, allocations: More = 0
+) -> list[Row]:
+    """Try a command: a row for each call, allocation and cut of the power."""
+    ready()
+    name, start, seed = item
     rng = random.Random(f"{name} {seed}")
-    trial = Trial(name, start)
+    command, rows = Command(name, start), []
     failures = []
-    for i in sampled(trial.calls, each):
-        call = trial.calls[i]
+    for i in sampled(command.calls, each):
+        call = command.calls[i]
         failing = Failing(i + 1, rng.choice(ERRORS[call.op]))
         failures.append((f"call {i + 1} ({call.op} {call.path}) {errno.errorcode[failing.error]}", failing))
     failures = rng.sample(failures, min(most or len(failures), len(failures)))
-    of = trial.allocations
+    of = command.allocations
     drawn = sorted({1, of, *(rng.randint(1, of) for _ in range(allocations))}) if allocations else ()
     for n, since in product(drawn, (False, True)):
         failing = Failing(least=LEAST_BYTES, allocation=n, since=since)
         failures.append((f"allocation {n}{' on' if since else ''}", failing))
-    ends, wrong = Counter[str](), []
     for what, failing in failures:
-        end, bad = trial.failed(failing)
-        ends[f"{what.partition(' ')[0]} failed, {end}"] += 1
-        wrong += [f"{name}: {what}: {each}" for each in bad]
-    cuts, worse = trial.cut_off(rng, [*sampled(trial.log, each), len(trial.log) - 1])
-    wrong += [f"{name}: {each}" for each in worse]
-    said = "; ".join(f"{end}: {n}" for end, n in sorted(ends.items()))
-    print(
-        f"{name:<21} {len(trial.calls)} calls, {of} allocations; {said}; {cuts} power cuts: {len(wrong)} wrong",
-        flush=True,
-    )
-    yield from wrong
+        end, wrong = command.failed(failing)
+        kind, calls = what.partition(" ")[0], len(command.calls)
+        rows.append(
+            Row(command=f"{name}, {calls} calls", kind=kind, end=end, wrong=[f"{what}: {bad}" for bad in wrong])
+        )
+    cuts, wrong = command.cut_off(rng, [*sampled(command.log, each), len(command.log) - 1])
+    return [*rows, Row(command=f"{name}, {len(command.calls)} calls", kind="power", end=f"{cuts} cuts", wrong=wrong)]
 
 
-def main(
-    commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS),
-    *,
-    each: Annotated[bool, "fail every call, and cut the power after each"] = False,
-    most: Annotated[int | None, "fail so many calls of a command at most, drawn by the seed"] = None,
-    allocations: Annotated[int, "fail so many, too"] = 0,
-    seed: int = TODAY,
-) -> int:
-    """Run the trials; return the exit code."""
+def scenarios(
+    commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS), *, seed: int = TODAY
+) -> list[tuple[str, Path, int]]:
+    """Return the commands, with a folder of their inputs; start this program again, if need be, with syscalls.c."""
     if "LD_PRELOAD" not in os.environ:
-        return preloaded()
-    print(f"seed {seed}", flush=True)
-    with prepared() as start:
-        wrong = [what for name in commands for what in tried(name, start, seed, each, most, allocations)]
-    print(*wrong, f"{len(wrong)} wrong", sep="\n")
-    return int(bool(wrong))
-
-
-def preloaded() -> int:
-    """Run this program again with syscalls.c preloaded."""
-    with TemporaryDirectory() as place:
-        library = Path(place) / "syscalls.so"
+        library = ROOT / "build" / "syscalls.so"
+        library.parent.mkdir(exist_ok=True)
         subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-o", library, SHIM, "-ldl"], check=True)
-        again = [sys.executable, "-m", "tools.attack", "syscalls", *sys.argv[1:]]
-        return subprocess.run(again, env={**os.environ, "LD_PRELOAD": str(library)}, check=False).returncode
+        os.execve(sys.executable, sys.orig_argv, {**os.environ, "LD_PRELOAD": str(library)})
+    print(f"seed {seed}", flush=True)
+    start = prepared()
+    return [(name, start, seed) for name in commands]
+
+
+COLUMNS: dict[str, Column] = {
+    "failed": len,
+    "ends": lambda rows: frequencies(row.end for row in rows),
+    "wrong": count("wrong"),
+}
+
+
+def line(row: Row) -> str:
+    """Return what was wrong; empty if nothing was."""
+    return "\n".join(f"{row.command}: {wrong}" for wrong in row.wrong)
+
+
+main = Trial(__doc__, of_command, scenarios, COLUMNS, ("command", "kind"), line=line)

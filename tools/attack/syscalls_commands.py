@@ -11,7 +11,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 from unittest.mock import patch
 
@@ -24,7 +23,7 @@ from mpucal.result.journal import Journal
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.vehicle.store import ParameterStore
 from mpucal.vehicle.sink import CORRECTION
-from tools.processes import Child, Ended, quick, ready
+from tools.processes import Child, Ended, lasting_folder, quick, ready
 
 SIM, VEHICLE = "sim:seed=3,chip=mpu6500,temperature_c=", "sim:seed=7,imus=1"
 QUICK = ["--target", "quick", "--yes"]
@@ -165,26 +164,24 @@ def _armed(words: Sequence[str], folder: Path, failing: Failing, tell: int) -> i
     return code
 
 
-@contextmanager
-def prepared() -> Iterator[Path]:
-    """Yield a folder with the inputs of the commands and an older result; load all of mpucal before the children."""
+def prepared() -> Path:
+    """Return a folder with the inputs of the commands and an older result; load all of mpucal before the children."""
     ready()
-    with TemporaryDirectory() as temporary:
-        place = Path(temporary).resolve()
-        start = place / "start"
-        start.mkdir()
-        warm = [word.replace(f"{SIM}20", f"{SIM}45,hand=placing") for word in SESSION]
-        for name, words in (("a", SESSION), ("b", warm), ("v", FLIGHT)):
-            folder = place / name
-            made = run_failing([*words, str(folder)], start)
-            assert made.code == 0, made.said
-            shutil.copy(folder / "calibration.json", start / f"{name}.json")
-        written = run_failing([*WORDS["write"][:-3], "-o", str(place / "a"), "--yes"], start)
-        assert written.code == 0, written.said
-        shutil.copy(place / "a" / "chip-offsets.json", start)
-        shutil.copy(place / "a" / "capture.mcap", start / "in.mcap")
-        recording = load(start / "in.mcap")
-        np.savez(start / "in.npz", t=recording.t, acc=recording.acc, gyr=recording.gyr)
-        shutil.copytree(place / "b", start / "board", ignore=shutil.ignore_patterns("capture*"))
-        shutil.rmtree(start / STATE, ignore_errors=True)
-        yield start
+    place = lasting_folder()
+    start = place / "start"
+    start.mkdir()
+    warm = [word.replace(f"{SIM}20", f"{SIM}45,hand=placing") for word in SESSION]
+    for name, words in (("a", SESSION), ("b", warm), ("v", FLIGHT)):
+        folder = place / name
+        made = run_failing([*words, str(folder)], start)
+        assert made.code == 0, made.said
+        shutil.copy(folder / "calibration.json", start / f"{name}.json")
+    written = run_failing([*WORDS["write"][:-3], "-o", str(place / "a"), "--yes"], start)
+    assert written.code == 0, written.said
+    shutil.copy(place / "a" / "chip-offsets.json", start)
+    shutil.copy(place / "a" / "capture.mcap", start / "in.mcap")
+    recording = load(start / "in.mcap")
+    np.savez(start / "in.npz", t=recording.t, acc=recording.acc, gyr=recording.gyr)
+    shutil.copytree(place / "b", start / "board", ignore=shutil.ignore_patterns("capture*"))
+    shutil.rmtree(start / STATE, ignore_errors=True)
+    return start

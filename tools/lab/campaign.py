@@ -1,39 +1,38 @@
-"""Thousands of sessions that faults strike, each judged against the simulated truth.
+"""Thousands of sessions that faults strike, and of damaged recordings, each judged against the simulated truth.
 
     python -m tools.lab campaign --sessions 1000
     python -m tools.lab campaign --recordings 10000
     python -m tools.lab campaign --case 739000123.4 --keep /tmp/struck
 
 Each session suffers one to four faults, drawn by the seed, of all kinds of campaign_worlds.py, to the end of the whole
-command, files and exit code included. Wrong is: a good or usable calibration that is farther from the truth than it
-claims, a trace, a hang, an exit code that does not fit, no sentence, a file in part. A table counts verdicts by kind of
-fault; a wrong case comes with the command that repeats it. Seeds begin with the day's number. Exit code 1 where one was
-wrong.
+command, files and exit code included. Recordings are damaged as in campaign_recordings.py, and calibrated. Wrong is: a
+good or usable calibration that is farther from the truth than it claims, a trace, a hang, an exit code that does not
+fit, no sentence, a file in part. A table counts verdicts by kind of fault; a wrong case comes with the command that
+repeats it. Seeds begin with the day's number. Exit code 1 where one was wrong.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from datetime import date
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.session import results
-from tools.processes import Child, Died, Task, Tell, forked, quick, ready
-from tools.programs import PROCESSORS, Jobs
+from tools.processes import Child, quick, ready
 
-from .campaign_judge import FOLDER, Outcome, judged, show_outcomes
-from .campaign_recordings import struck_recordings
+from .campaign_judge import FOLDER, judge_files
+from .campaign_recordings import Damaged, of_recording, originals
 from .campaign_worlds import BRIDGE, CHIP, KINDS, VEHICLE, TimedFault, World
+from .judge import MOST_CLAIMS
+from .runner import Trial
+from .table import VERDICTS, Column, Row, count, over, show, table
 
 CASES = 16
 # targets of sessions: how often each comes, and the last time [s] at which faults begin; a lower target ends sooner
@@ -51,18 +50,12 @@ REPORTS = 8
 WORLDS = (*(CHIP,) * 15, BRIDGE, VEHICLE)
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """Session with faults: `number` of the undisturbed one, `k` of the case, and the faults, the earliest first."""
 
     number: int
     k: int
     blows: tuple[TimedFault, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Return the case as --case takes it."""
-        return f"{self.number}.{self.k}"
 
 
 def kind_of(number: int) -> tuple[str, str]:
@@ -99,6 +92,7 @@ def suffer(case: Case, world: World) -> int:
         BEGUN.touch()
         world.begin_faults(case.blows)
 
+    os.environ["XDG_STATE_HOME"] = str(Path("state").resolve())
     if case.k % REPORTS:
         results.report = lambda _: None
     world.moments.add(case.blows[0].at_s, begin)
@@ -106,63 +100,88 @@ def suffer(case: Case, world: World) -> int:
         return run(words(case.number))
 
 
-def of_session(case: Case, place: Path, keep: bool, tell: Tell) -> None:
+def of_session(case: Case, here: Path) -> Row:
     """Run a session with faults in a process of its own, and judge it."""
-    world, here = World(kind_of(case.number)[0]), place / case.name
-    here.mkdir(parents=True)
+    world = World(kind_of(case.number)[0])
     done = Child(partial(suffer, case, world), here, here / "err").go().wait()
     blows = case.blows if (here / BEGUN).exists() else ()
-    outcome = judged(case.name, here, done, blows, world)
-    if blows and outcome.recorded and done.code not in (0, 5):
+    row = judge_files(f"{case.number}.{case.k}", here, done, blows, world)
+    if blows and row.recorded and done.code not in (0, 5):
         # a session that failed leaves a recording or nothing
         (here / "after").mkdir()
         again = partial(run, ["calibrate", FOLDER, "-o", "after/board"])
         after = Child(again, here, here / "after" / "err").go().wait()
-        wrong = [f"calibrate afterwards: {what}" for what in after.wrong((0, 3, 5), (0, 3, 5))]
-        outcome = replace(outcome, wrong=(*outcome.wrong, *wrong))
-    tell(outcome)
-    if not keep:
-        shutil.rmtree(here)
+        row.wrong += [f"calibrate afterwards: {what}" for what in after.wrong((0, 3, 5), (0, 3, 5))]
+    return row
 
 
-def outcomes(
-    first: int, count: int, recordings: int, case: str | None, jobs: int, place: Path, keep: bool
-) -> Iterator[Outcome]:
-    """Yield the outcomes of the sessions and recordings of the options, in the order in which they end."""
-    cases = [drawn(first + n // CASES, n % CASES) for n in range(count)]
-    if case and case.startswith("r"):
-        first, recordings = int(case[1:]), 1
-    elif case:
-        cases = [drawn(*map(int, case.split(".")))]
-    yield from struck_recordings(first, recordings, jobs, place) if recordings else ()
-    tasks: list[Task] = [partial(of_session, each, place, keep) for each in cases]
-    for _, told in forked(tasks, jobs):
-        yield Outcome("?", "?", wrong=(f"a session ended with {told}",)) if isinstance(told, Died) else told
+def of_case(item: Case | Damaged, *, keep: Annotated[Path | None, "where its files stay"] = None) -> Row:
+    """Run a session with faults, or calibrate a damaged recording, and judge it."""
+    ready()
+    with TemporaryDirectory() as temporary:
+        here = (keep or Path(temporary)).resolve() / f"{item.number}.{item[1]}"
+        here.mkdir(parents=True)
+        return of_session(item, here) if isinstance(item, Case) else of_recording(item, here)
 
 
-def main(
+def scenarios(
     *,
     sessions: int = 0,
     recordings: int = 0,
     first: int = date.today().toordinal() * 1000,
-    jobs: Jobs = PROCESSORS,
     case: Annotated[str | None, "this one alone, NUMBER.K, or rNUMBER of a recording"] = None,
-    keep: Annotated[Path | None, "where its files stay"] = None,
-) -> int:
-    """Run the campaign; return the exit code."""
+) -> Sequence[Case | Damaged]:
+    """Return the recordings and sessions of the options."""
     print(f"seeds from {first} on", flush=True)
-    ready()
-    begun, found = time.monotonic(), list[Outcome]()
-    with TemporaryDirectory() as temporary:
-        place = keep or Path(temporary)
-        os.environ["XDG_STATE_HOME"] = str(place / "state")
-        for outcome in outcomes(first, sessions, recordings, case, jobs, place, bool(keep)):
-            found.append(outcome)
-            if outcome.wrong or case:
-                print(outcome, flush=True)
-    struck = [outcome for outcome in found if outcome.blows]
-    show_outcomes(struck)
-    took_s, cpu_s = time.monotonic() - begun, sum(outcome.cpu_s for outcome in struck)
-    wrong = sum(bool(outcome.wrong) for outcome in found)
-    print(f"{len(struck)} struck of {len(found)} in {took_s:.0f} s ({cpu_s:.0f} s of processor time): {wrong} wrong")
+    if case and not case.startswith("r"):
+        return [drawn(*map(int, case.split(".")))]
+    numbers = range(int(case[1:]), int(case[1:]) + 1) if case else range(first, first + recordings)
+    return [
+        *(originals(numbers) if numbers else ()),
+        *(drawn(first + n // CASES, n % CASES) for n in range(0 if case else sessions)),
+    ]
+
+
+def line(row: Row) -> str:
+    """Return what was wrong with the command that repeats it; empty if nothing was."""
+    again = f"python -m tools.lab campaign --case {row.case} --keep /tmp/struck"
+    return "\n".join([shown(row), *(f"    WRONG {wrong}: {again}" for wrong in row.wrong)]) if row.wrong else ""
+
+
+def shown(row: Row) -> str:
+    """Return how a case ended, in a few lines."""
+    errors = f"error {row.error:.4f} m/s^2, {row.claims:.2f} claims, an element {row.farthest:.2f} off"
+    return f"{row.world} {' '.join(row.blows) or 'no fault'}: exit {row.code} {row.verdict}\n    {errors}; {row.said}"
+
+
+def largest(name: str) -> Column:
+    """Return a column: the largest figure of the calibrations that were not refused."""
+    return lambda rows: over(name, max)([row for row in rows if row.verdict in MOST_CLAIMS]) or 0.0
+
+
+COLUMNS: dict[str, Column] = {
+    "all": len,
+    **VERDICTS,
+    "ended": count("verdict", ""),
+    "worst m/s²": largest("error"),
+    "claims": largest("claims"),
+    "element": largest("farthest"),
+    "wrong": count("wrong"),
+}
+
+
+def report(found: list[Row]) -> int:
+    """Print by kind of fault, alone or with others, the exits and the largest error of those that were not refused."""
+    struck, kinds = [row for row in found if row.blows], dict[tuple[str, str], list[Row]]()
+    for row in struck:
+        for name in {blow.partition("@")[0] for blow in row.blows}:
+            kinds.setdefault((row.world, name), []).append(row)
+    show(table(dict(sorted(kinds.items())), COLUMNS))
+    if len(found) == 1:
+        print(shown(found[0]))
+    cpu_s, wrong = sum(row.cpu_s for row in struck), sum(bool(row.wrong) for row in found)
+    print(f"{len(struck)} struck of {len(found)} in {cpu_s:.0f} s of processor time: {wrong} wrong")
     return int(wrong > 0)
+
+
+main = Trial(__doc__, of_case, scenarios, report=report, line=line)

@@ -5,27 +5,24 @@ from __future__ import annotations
 import io
 import json
 import resource
-import shutil
-import signal
-import time
-from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from collections.abc import Callable, Iterable
+from contextlib import redirect_stderr, redirect_stdout
 from functools import cache, partial
 from pathlib import Path
-from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 
-from mpucal import Recording
 from mpucal.__main__ import run
 from mpucal.files import load, open_writer
 from mpucal.files.rows import Rows
 from mpucal.files.tlog import tlog_of
-from tools.processes import Died, Ended, Task, Tell, forked
+from tools.processes import Child, lasting_folder
 
-from .campaign_judge import FOLDER, Outcome, judged
+from .campaign_judge import FOLDER, judge_files
+from .table import Row
 
-SECONDS, MEMORY = 120, 4 << 30
+MEMORY = 4 << 30
 MOST_BLOWS = 4
 SOURCES = {
     "mcap": ["--bus", "sim:seed=4", "--rate", "25"],
@@ -125,31 +122,37 @@ OF_BYTES = (bits, some_bytes, cut, hole, moved)
 OF_ROWS = (lost, twice, swapped, odd, spikes, stuck, shifted)
 
 
-def originals(place: Path) -> dict[str, tuple[Path, SimpleNamespace]]:
-    """Record in each format; return the file and the truth of its sensor."""
-    found = {}
-    for suffix, source in SOURCES.items():
-        folder = place / f"of_{suffix}"
+class Damaged(NamedTuple):
+    """Recording to be damaged: what `number` draws of a file, and the truth (D, b_a) of its sensor."""
+
+    number: int
+    kind: str
+    path: Path
+    truth: tuple[np.ndarray, np.ndarray]
+
+    def truths(self, *_: object) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the truth, whatever was damaged."""
+        return [self.truth]
+
+
+def originals(numbers: Iterable[int]) -> list[Damaged]:
+    """Record in each format that is asked for; return the cases."""
+    made, place = dict[str, tuple[Path, tuple[np.ndarray, np.ndarray]]](), lasting_folder()
+    kinds = [ORDER[number % len(ORDER)] for number in numbers]
+    for kind in sorted(set(kinds)):
+        folder = place / kind
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-            run(["session", *source, "-o", str(folder), "--yes", "--no-write"])
-        truth = json.loads((folder / "truth.json").read_text())
-        true = [(np.array(truth["D"]), np.array(truth["b_a"]))]
-        path = folder / "capture.mcap"
-        if suffix == "tlog":
-            (folder / "capture.tlog").write_bytes(tlog_of(path))
-            path = folder / "capture.tlog"
-        elif suffix != "mcap":
-            path = _written(load(path), folder / f"recording.{suffix}")
-        found[suffix] = path, SimpleNamespace(kind=suffix, truths=lambda *_, true=true: true)
-    return found
-
-
-def _written(recording: Recording, path: Path) -> Path:
-    rows = Rows.of(recording)
-    with open_writer(path, rows, "") as write:
-        for run_ in rows.runs:
-            write(run_)
-    return path
+            run(["session", *SOURCES[kind], "-o", str(folder), "--yes", "--no-write"])
+        truth, path = json.loads((folder / "truth.json").read_text()), folder / f"capture.{kind}"
+        if kind == "tlog":
+            path.write_bytes(tlog_of(folder / "capture.mcap"))
+        elif kind != "mcap":
+            rows = Rows.of(load(folder / "capture.mcap"))
+            with open_writer(path, rows, "") as write:
+                for samples in rows.runs:
+                    write(samples)
+        made[kind] = path, (np.array(truth["D"]), np.array(truth["b_a"]))
+    return [Damaged(number, kind, *made[kind]) for number, kind in zip(numbers, kinds, strict=True)]
 
 
 def damaged(path: Path, number: int) -> tuple[list[str], bytes]:
@@ -187,45 +190,20 @@ def _file(suffix: str, rows: np.ndarray) -> bytes:
     return made.getvalue()
 
 
-def strike(number: int, of: dict[str, tuple[Path, SimpleNamespace]], place: Path) -> Outcome:
-    """Damage a recording, calibrate and judge it."""
-    suffix = ORDER[number % len(ORDER)]
-    path, truth = of[suffix]
-    kinds, data = damaged(path, number)
-    shutil.rmtree(place, ignore_errors=True)
-    (place / FOLDER).mkdir(parents=True)
-    file = place / f"struck.{suffix}"
-    file.write_bytes(data)
-    begun = time.process_time()
-    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+def calibrated(file: Path) -> int:
+    """Calibrate within a limit of memory; return the exit code, and leave calibration.json."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    with redirect_stdout(io.StringIO()) as out:
         code = run(["calibrate", str(file), "--json"])
     if out.getvalue():
-        (place / FOLDER / "calibration.json").write_text(out.getvalue())
-    return judged(f"r{number}", place, Ended(code, err.getvalue(), time.process_time() - begun), kinds, truth)
+        Path(FOLDER, "calibration.json").write_text(out.getvalue())
+    return code
 
 
-def struck_recordings(first: int, count: int, jobs: int, place: Path) -> Iterator[Outcome]:
-    """Yield the outcomes as they end; a recording that crashes or hangs is named, and the others continue."""
-    of = originals(place)
-    left = [range(first + j, first + count, jobs) for j in range(jobs)]
-    tasks: list[Task] = [partial(work, j, left[j], of, place) for j in range(jobs)]
-    for task, told in forked(tasks, jobs):
-        j = task.args[0]  # type: ignore[attr-defined]
-        if isinstance(told, Died):
-            yield Outcome(f"r{left[j][0]}", "?", ("?",), (f"died with {told.code}",))
-            tasks.append(partial(work, j, left[j][1:], of, place))
-        elif isinstance(told, range):
-            left[j] = told
-        else:
-            yield told
-
-
-def work(j: int, numbers: range, of: dict, place: Path, tell: Tell) -> None:
-    """Damage and judge the recordings one by one; report before each which ones are left."""
-    with suppress(ValueError):
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    for n, number in enumerate(numbers):
-        tell(numbers[n:])
-        # limit of processor time, as the machine may be busy
-        signal.setitimer(signal.ITIMER_PROF, SECONDS)
-        tell(strike(number, of, place / f"job{j}"))
+def of_recording(case: Damaged, here: Path) -> Row:
+    """Damage a recording, calibrate and judge it."""
+    kinds, data = damaged(case.path, case.number)
+    (here / FOLDER).mkdir()
+    (file := here / f"struck.{case.kind}").write_bytes(data)
+    done = Child(partial(calibrated, file), here, here / "err").go().wait()
+    return judge_files(f"r{case.number}", here, done, kinds, case)

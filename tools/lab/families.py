@@ -13,7 +13,6 @@ limit is broken.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ import mpucal
 from mpucal.errors import MpucalError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
 
-from .judge import Judgement, judged, rms
+from .judge import judged, judgement, rms
 from .runner import Trial
 from .scenarios.family import GRAVITY_MPS2, Wanted, simulate
 from .scenarios.table import FAMILIES, of_families
@@ -46,18 +45,19 @@ def of_seed(item: tuple[str, int], *, model: str = "auto") -> Row:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=gravity)
     except Exception as error:  # after any error the other runs continue, and the exit code is 1
         verdict = REFUSED if isinstance(error, MpucalError) else CRASHED
-        return row(Judgement(verdict, (type(error).__name__,)), family=name, seed=seed, why=repr(error))
+        return row(judgement(verdict, (type(error).__name__,), family=name, seed=seed, why=repr(error)))
     truth, reasons = simulated.truth, result.quality["reasons"]
     D, unit = truth.D, truth.gravity
     if GRAVITY_NAMED in [reason["code"] for reason in reasons] and result.verdict != GOOD:
         D, unit = D * (unit / gravity), gravity
-    worth, why = judged(result, (D, truth.b_a), gravity=unit), [str(reason["message"]) for reason in reasons]
-    return row(worth, family=name, seed=seed, model=result.fit["model"], why=why)
+    more = {"model": result.fit["model"], "why": [str(reason["message"]) for reason in reasons]}
+    return row(judged(result, (D, truth.b_a), gravity=unit, family=name, seed=seed, **more))
 
 
-def row(worth: Judgement, **more: Any) -> Row:
-    """Return a judgement as a row; a good verdict is false of a large error, too."""
-    return worth.row(**more, false=worth.false or (worth.verdict == GOOD and not worth.error <= GOOD_MPS2))
+def row(worth: Row) -> Row:
+    """Return a judgement, of which a good verdict is false if the error is large, too."""
+    worth.false |= worth.verdict == GOOD and not worth.error <= GOOD_MPS2
+    return worth
 
 
 def used(runs: Sequence[Row]) -> list[Row]:

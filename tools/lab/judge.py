@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,53 +25,35 @@ MOST_CLAIMS = {GOOD: 3.0, USABLE: 5.0}
 MOST_Z = 5.0
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """Verdict on a calibration, and its errors.
+def judgement(
+    verdict: str = "",
+    reasons: tuple[str, ...] = (),
+    error: float = math.nan,
+    claim: float = math.nan,
+    z: tuple[float, ...] = (),
+    **more: Any,
+) -> Row:
+    """Return a row with a verdict and its errors, and `more`.
 
-    Attributes
-    ----------
     error : of a calibrated reading, rms over all directions of gravity [m/s^2]. claim : its stated value [m/s^2].
     z : (12,) errors of D row-major and of b_a in units of their standard uncertainties; 0 between the truths of a
         sensor that changed, NaN where no uncertainty is claimed.
+
+    Of these: `claims`, the error in units of the claim, infinite if it may be used but states no uncertainty;
+    `farthest`, the largest |z|, 0 where none is known; `rms_z`, 1 if the uncertainties are true; and `false`, true if
+    it is farther from the truth than a calibration of its verdict may be.
     """
-
-    verdict: str
-    reasons: tuple[str, ...] = ()
-    error: float = math.nan
-    claim: float = math.nan
-    z: tuple[float, ...] = ()
-
-    def row(self, **more: Any) -> Row:
-        """Return it as a row of a trial, with more attributes."""
-        derived = {name: getattr(self, name) for name in ("claims", "farthest", "rms_z", "false")}
-        return Row(**{**vars(self), **derived, **more})
-
-    @property
-    def claims(self) -> float:
-        """Return the error in units of the claim; infinite if it may be used but states no uncertainty."""
-        if self.claim > 0.0:
-            return self.error / self.claim
-        return math.inf if self.verdict in MOST_CLAIMS else math.nan
-
-    @property
-    def farthest(self) -> float:
-        """Return the largest |z|, 0 where none is known."""
-        return max((abs(z) for z in self.z if not math.isnan(z)), default=0.0)
-
-    @property
-    def rms_z(self) -> float:
-        """Return the rms of z: 1 if the uncertainties are true."""
-        return rms(self.z)
-
-    @property
-    def false(self) -> bool:
-        """Return True if it is farther from the truth than a calibration of its verdict may be."""
-        most = MOST_CLAIMS.get(self.verdict)
-        return most is not None and not (self.claims <= most and self.farthest <= MOST_Z)
+    most = MOST_CLAIMS.get(verdict)
+    claims = error / claim if claim > 0.0 else math.nan if most is None else math.inf
+    farthest = max((abs(each) for each in z if not math.isnan(each)), default=0.0)
+    return Row(
+        **{"verdict": verdict, "reasons": reasons, "error": error, "claim": claim, "z": z},
+        **{"claims": claims, "farthest": farthest, "rms_z": rms(z)},
+        **{"false": most is not None and not (claims <= most and farthest <= MOST_Z), **more},
+    )
 
 
-def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: float | None = None) -> Judgement:
+def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: float | None = None, **more: Any) -> Row:
     """Compare a calibration with the truths (D, b_a) of its sensor, several where it changed.
 
     One of the rests alone is in the sensor's own axes, and so are the truths then.
@@ -88,12 +69,13 @@ def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: fl
     # a refused one may claim no uncertainty
     z = (found - np.clip(found, true.min(axis=0), true.max(axis=0))) / np.where(std > 0.0, std, np.nan)
     claim = (calibration.quality.get("error_std") or {}).get("rms")
-    return Judgement(
+    return judgement(
         calibration.verdict,
         tuple(reason["code"] for reason in calibration.quality["reasons"]),
         min(sphere_rms(calibration, truth, gravity) for truth in truths),
         math.nan if claim is None else float(claim),
         tuple(z.tolist()),
+        **more,
     )
 
 
@@ -168,4 +150,5 @@ def off(where: Slot | None, parameters: Mapping[str, float], true: Correction) -
 
 def z_of(document: Mapping[str, Any], truth: Mapping[str, Any]) -> tuple[float, ...]:
     """Return (12,) of D and b_a of an IMU's document: (estimate - truth) / standard uncertainty."""
-    return judged(Calibration.from_document(document), (np.array(truth["D"]), np.array(truth["b_a"]))).z
+    z: tuple[float, ...] = judged(Calibration.from_document(document), (np.array(truth["D"]), np.array(truth["b_a"]))).z
+    return z

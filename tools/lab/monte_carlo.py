@@ -26,7 +26,7 @@ from mpucal.errors import MpucalError
 from mpucal.rests.flat import flat_statistics
 from mpucal.result.calibration import REFUSED
 
-from .judge import Judgement, followed, judged, sph_rms, tilts_deg
+from .judge import followed, judged, judgement, sph_rms, tilts_deg
 from .runner import Trial, each_seed, names_of
 from .scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
 from .scenarios.sensors import hand_sensor, paper_sensor
@@ -82,19 +82,17 @@ def of_seed(item: tuple[str, int], model: str) -> Row:
     try:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=GRAVITY_MPS2)
     except MpucalError as error:
-        return Judgement(REFUSED).row(scene=scene, seed=seed, model=model, failure=str(error))
+        return judgement(REFUSED, scene=scene, seed=seed, model=model, failure=str(error))
     ms, of_paper = 1e3 * (time.perf_counter() - began), scene.startswith("paper")
-    worth, before = judged(result, (truth.D, truth.b_a), gravity=truth.gravity), sph_rms(truth, np.eye(3), np.zeros(3))
-    failure = None
+    known_K, before = np.isfinite(result.K_std[np.triu_indices(3)]).sum(), sph_rms(truth, np.eye(3), np.zeros(3))
+    more = {"model": result.fit["model"], "failure": None, "before": before, "ms": ms, "known_K": int(known_K)}
+    row = judged(result, (truth.D, truth.b_a), gravity=truth.gravity, scene=scene, seed=seed, **more)
     if not result.fit["converged"]:
-        failure = "not converged"
+        row.failure = "not converged"
     elif of_paper and not (result.fit["nis"] or np.inf) < NIS_WRONG:
-        failure = "wrong optimum (NIS)"
-    elif not worth.error < before:
-        failure = "worse than no calibration"
-    known_K = int(np.isfinite(result.K_std[np.triu_indices(3)]).sum())
-    row = worth.row(scene=scene, seed=seed, model=result.fit["model"], failure=failure)
-    vars(row).update(before=before, ms=ms, known_K=known_K)
+        row.failure = "wrong optimum (NIS)"
+    elif not row.error < before:
+        row.failure = "worse than no calibration"
     if of_paper:
         row.roll_deg, row.pitch_deg = tilts(simulated, result)
     return row

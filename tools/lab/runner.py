@@ -32,8 +32,8 @@ class Trial:
     ----------
     judge : tries one scenario and returns a row, several, or None. scenarios : by the seeds and other options.
     columns : of the table, with a line for each value of the attributes `by`; title : of the table, by the options.
-    report : prints more of the rows, and returns the exit code.
-    seeds : without --seeds. line : text of a row that is printed as it comes.
+    report : prints more of the rows, and returns the exit code; otherwise that is 1 if a row has something `wrong`.
+    seeds : without --seeds. line : text of a row that is printed as it comes, if it is not empty.
     """
 
     doc: str | None
@@ -57,24 +57,27 @@ class Trial:
         ) -> None: ...
 
         functions = (options, self.scenarios, self.judge, *([self.report] if self.report else []))
-        # what these are about is no option
-        about = {next(iter(inspect.signature(each).parameters)) for each in functions[2:]}
-        given = parsed(self.doc, words, *functions, without=about)
+        # what these are about is no option, and not every trial draws by seeds
+        without = {next(iter(inspect.signature(each).parameters)) for each in functions[2:]}
+        without |= set() if any("seeds" in inspect.signature(each).parameters for each in functions[1:]) else {"seeds"}
+        given = parsed(self.doc, words, *functions, without=without)
         rows: list[Row] = []
         judge = partial(self.judge, **_taken(self.judge, given))
         for told in in_parallel(judge, self.scenarios(**_taken(self.scenarios, given)), given["jobs"]):
             several = told if isinstance(told, list) else [] if told is None else [told]
             rows += several
-            for row in several if self.line else ():
-                print(self.line(row), flush=True)
+            for text in filter(None, map(self.line, several)) if self.line else ():
+                print(text, flush=True)
         if self.columns:
             show(table(grouped(rows, *self.by), self.columns, self.title.format(**given) or None))
-        code = self.report(rows, **_taken(self.report, given)) if self.report else 0
+        code = int(any(getattr(row, "wrong", None) for row in rows))
+        if self.report:
+            code = self.report(rows, **_taken(self.report, given)) or 0
         if given["json"]:
             # an unknown figure is null
             text = json.dumps([vars(row) for row in rows], indent=1)
             given["json"].write_text(text.replace("NaN", "null") + "\n", encoding="utf-8")
-        return code or 0
+        return code
 
 
 def _taken(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:

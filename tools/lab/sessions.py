@@ -26,7 +26,7 @@ from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 
-from .judge import Judgement, judged
+from .judge import judged, judgement
 from .table import Row
 
 NOTHING, ABANDONED = "nothing", "abandoned"
@@ -74,21 +74,21 @@ class Session:
     code: int = 0
     said: str = ""
 
-    def judged(self) -> Judgement:
+    def judged(self, **more: Any) -> Row:
         """Compare the calibration with the truth."""
         if self.calibration is None:
-            return Judgement(ABANDONED if self.code == Abandoned.exit_code else NOTHING)
-        return judged(self.calibration, (np.array(self.truth["D"]), np.array(self.truth["b_a"])))
+            return judgement(ABANDONED if self.code == Abandoned.exit_code else NOTHING, **more)
+        return judged(self.calibration, (np.array(self.truth["D"]), np.array(self.truth["b_a"])), **more)
 
 
 def judge_session(name: str, seed: int, done: Session, wrong: str = "", **more: Any) -> Row:
     """Judge a session; a traceback is wrong in any trial, and so is a good verdict whose error exceeds its claim."""
-    judgement = done.judged()
+    row = done.judged(name=name, seed=seed, said=done.said, wrong=wrong, **more)
     if "Traceback" in done.said:
-        wrong = "a trace"
-    elif judgement.verdict == GOOD and judgement.false:
-        wrong = "called good"
-    return judgement.row(**{"name": name, "seed": seed, "said": done.said, "wrong": wrong, **more})
+        row.wrong = "a trace"
+    elif row.verdict == GOOD and row.false:
+        row.wrong = "called good"
+    return row
 
 
 def session(words: str, plan: Plan, seed: int, ear: Any) -> Session:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from tools.lab import families
-from tools.lab.judge import Judgement
+from tools.lab.judge import judgement
 from tools.lab.scenarios import around, body, course, faults, sensors
 
 STEP_S = 1.0 / 2000.0
@@ -84,8 +84,7 @@ def test_times_increase_and_stay_beside_their_samples(name):
 
 
 def verdict(*, family="poses", **values):
-    known = {"verdict": "good", "error": 0.01, "claim": 0.01, **values}
-    return families.row(Judgement(known["verdict"], error=known["error"], claim=known["claim"]), family=family)
+    return families.row(judgement(**{"verdict": "good", "error": 0.01, "claim": 0.01, "family": family, **values}))
 
 
 def test_what_is_called_false():

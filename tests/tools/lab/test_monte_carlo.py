@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from tools.lab import monte_carlo
-from tools.lab.judge import Judgement
+from tools.lab.judge import judgement
 from tools.lab.table import Row
 
 
 def run(error, failure=None, scene="12 poses", **more):
-    return Judgement("good", error=error, z=(1.0,) * 12).row(scene=scene, model="hand", failure=failure, **more)
+    return judgement("good", error=error, z=(1.0,) * 12, scene=scene, model="hand", failure=failure, **more)
 
 
 def column(name, *runs):
