@@ -320,8 +320,8 @@ def test_a_late_host_does_not_count_as_a_slow_bus(started):
     assert driver.recording().gap.sum() == 10
 
 
+def test_every_time_is_right_whatever_is_paused(rig, stream, numbers, same, monkeypatch):
     """Pause this computer between the time of a read and its transfer: times that are too early are not used."""
-    """This computer pauses between the time of a read and its transfer: times that are too early are not used."""
     made, times_s, rng = rig(), [], np.random.default_rng(1)
     timer, feed = ReadTimer(made.clock.now), made.chip._feed
     read, samples = made.inner.read, feed.samples
