@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
-from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
 from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
@@ -20,10 +20,10 @@ from .evidence import Evidence
 from .hypotheses import SURE, Explanation, explain, gyroscope_change, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, choose_model
-from .parameters import ACCELEROMETER
+from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
-from .words import correct_signed_bytes
+from .words import decode
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
@@ -46,10 +46,9 @@ def estimate(
         raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
-    recording, signed_bytes = correct_signed_bytes(recording)
-    before = Evidence(
-        with_masks(recording), gravity, None, None, model, gravity_anyway=gravity_anyway, signed_bytes=signed_bytes
-    )
+    decoded = decode(recording)
+    masked = with_masks(decoded.recording)
+    before = Evidence(masked, gravity, None, None, model, gravity_anyway=gravity_anyway, decoded=decoded)
     whole = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
     if model != "auto":
         return whole
@@ -111,32 +110,36 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     before = replace(before, recording=recording, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
-    choice, explanations = _fit(recording, flat, gravity, model)
-    claim = claim_uncertainty(choice.fit, gravity, explanations, choice.freed)
+    choice, explanations, freed = _fit(recording, flat, gravity, model)
+    claim = claim_uncertainty(choice.fit, gravity, explanations, freed)
     evidence = replace(before, fit=inflate(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 
 
-def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation]]:
-    """Return the fit without changes of the gyroscope's bias during the turning, and what explains the rest."""
-    choice, found = _fit_once(recording, flat, gravity, model)
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation], Vector]:
+    """Return the fit without changes of the gyroscope's bias during the turning, and what explains the rest.
+
+    The third value (12,) is the share of the variance that the removed changes added, see claim_uncertainty.
+    """
+    (choice, found), freed = _fit_once(recording, flat, gravity, model), np.zeros(len(D_NAMES + B_A_NAMES))
     for _ in range(MOST_CHANGES):
         change = gyroscope_change(found)
         if change is None or not choice.fit.converged:
             break
-        without, left = _fit_once(remove_change(choice.recording, flat, change), flat, gravity, model)
+        recording = remove_change(recording, flat, change)
+        without, left = _fit_once(recording, flat, gravity, model)
         # A change whose removal explains nothing is none.
         if not choice.fit.V - np.log(SURE) > without.fit.V:
             break
-        choice, found = without._replace(freed=without.freed + choice.freed + change.freed[ACCELEROMETER]), left
-    return choice, found
+        choice, found, freed = without, left, freed + change.freed[ACCELEROMETER]
+    return choice, found, freed
 
 
 def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation]]:
     if model == "auto":
         choice = choose_model(recording, flat, gravity)
     else:
-        choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
+        choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for")
     fit = choice.fit
     return choice, [] if fit.parts is None else explain(fit.parts, fit.D)

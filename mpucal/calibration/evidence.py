@@ -19,6 +19,7 @@ from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere, lengths, turned
 from .tilt import tilted_directions
 from .uncertainty import DIRECTIONS, Uncertainty, UncertaintyClaim, is_usable, propagate
+from .words import Decoded
 
 LEAST_STEP_RAD = np.deg2rad(2.0)  # turn of gravity in half a second that is above noise
 ENOUGH_STEPS = 100  # half seconds that tell a unit as well as all do
@@ -38,7 +39,7 @@ class Evidence:
 
     gravity_anyway : the caller confirms a gravity [m/s^2] outside the range found on Earth.
     gyroscope : why the estimate uses the rests alone; None where it does not, or where that was asked for.
-    signed_bytes : axes of which a low byte was taken for signed, before the recording was corrected.
+    decoded : the recording's words, before anything was masked, and how they were corrected.
     against_rests : why it cannot use the rests alone, where nothing else was recorded.
     """
 
@@ -50,7 +51,7 @@ class Evidence:
     claim: UncertaintyClaim | None = None
     gravity_anyway: bool = False
     gyroscope: Reason | None = None
-    signed_bytes: str = ""
+    decoded: Decoded | None = None
     against_rests: tuple[Reason, ...] = ()
 
     @cached_property

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +47,19 @@ class Words(NamedTuple):
     lsb: float
 
 
-def words_of(recording: Recording) -> tuple[Words | None, Words | None]:
+class Decoded(NamedTuple):
+    """Recording of true words.
+
+    words : those of the accelerometer and of the gyroscope; None where they are not known.
+    corrected : axes of which a low byte had been taken for signed.
+    """
+
+    recording: Recording
+    words: tuple[Words | None, Words | None]
+    corrected: str = ""
+
+
+def _words_of(recording: Recording) -> tuple[Words | None, Words | None]:
     """Return the words of the accelerometer and of the gyroscope; None where they are not known."""
     acc_range, gyro_range = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
     # A coarse count is no whole number of finer ones.
@@ -72,25 +85,30 @@ def _counts(values: Vector, lsb: float) -> Counts | None:
     return counts.astype(np.int64)
 
 
-def correct_signed_bytes(recording: Recording) -> tuple[Recording, str]:
-    """Return the recording with the words corrected whose low byte was taken for signed, and these words' axes."""
-    words = words_of(recording)
+def decode(recording: Recording) -> Decoded:
+    """Recover the words of a recording, and correct those whose low byte was taken for signed."""
+    words = _words_of(recording)
     odds = np.array([np.zeros(3) if each is None else _log_odds(each.counts, recording.gap) for each in words])
     sure = math.log(ODDS)
     # One program reads all words: an axis that shows nothing is taken to be as the others.
     wrong = (odds > sure) | ((odds > -sure) & (odds.sum() > sure))
     if not wrong.any():
-        return recording, ""
+        return Decoded(recording, words)
     acc, gyr = (
-        values if each is None else np.where(at, each.lsb * _corrected(each.counts), values)
-        for each, values, at in zip(words, (recording.acc, recording.gyr), wrong, strict=True)
+        None if each is None else each._replace(counts=np.where(at, _corrected(each.counts), each.counts))
+        for each, at in zip(words, wrong, strict=True)
+    )
+    corrected = replace(
+        recording,
+        acc=recording.acc if acc is None else np.where(wrong[0], acc.lsb * acc.counts, recording.acc),
+        gyr=recording.gyr if gyr is None else np.where(wrong[1], gyr.lsb * gyr.counts, recording.gyr),
     )
     names = [
-        f"the {sensor}'s " + ", ".join(axis for axis, is_wrong in zip("xyz", at, strict=True) if is_wrong)
+        f"the {sensor}'s {', '.join(compress('xyz', at))}"
         for sensor, each, at in zip(("accelerometer", "gyroscope"), words, wrong, strict=True)
         if each is not None and at.any()
     ]
-    return replace(recording, acc=acc, gyr=gyr), " and ".join(names)
+    return Decoded(corrected, (acc, gyr), " and ".join(names))
 
 
 def _corrected(counts: Counts) -> Counts:

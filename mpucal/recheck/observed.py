@@ -24,7 +24,7 @@ import numpy as np
 from ..calibration.masks import with_masks
 from ..calibration.rotation import cross, turned
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S, carried
-from ..calibration.words import correct_signed_bytes
+from ..calibration.words import decode
 from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.gyro_drift import remove_drift
@@ -98,7 +98,7 @@ def apply_errors(calibration: Calibration, theta: Vector) -> Calibration:
 def observe(recording: Recording, calibration: Calibration) -> Observations | None:
     """Return the observations of a recording; None if the board never rests."""
     gravity = calibration.gravity
-    recording = with_masks(correct_signed_bytes(recording)[0])
+    recording = with_masks(decode(recording).recording)
     segment = recording.flat or find_flat(recording)
     if segment is None or not is_long_enough(recording, segment):
         return None

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import calibrate, likelihood, model_selection, parameters
+from mpucal.calibration import calibrate, likelihood, parameters
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import MOST_ITERATIONS, minimise
-from mpucal.calibration.model_selection import METHODS, choose_model, fit_accel
+from mpucal.calibration.model_selection import METHODS, choose_model
 from mpucal.calibration.paper import expand
 from mpucal.calibration.parameters import ACCEL, B_A_NAMES, D_NAMES, K_NAMES
 from mpucal.calibration.problem import Problem, Series
@@ -126,16 +126,6 @@ def test_auto_finds_a_gyroscope_that_is_off_with_right_standard_deviations(ideal
         z.append(error / chosen.fit.std(*THETA_A, *K_NAMES))
     assert np.abs(z).max() < 4.0
     assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.3
-
-
-def test_a_long_recording_is_searched_by_coarser_means_to_the_same_end(monkeypatch):
-    recording = paper_scenario(4, rate_hz=50, turn_s=20.0).recording
-    at_once = by(fit_accel, recording)
-    monkeypatch.setattr(model_selection, "MANY_MEANS", 100)
-    by_coarser = by(fit_accel, recording)
-    assert by_coarser.converged
-    assert not np.array_equal(by_coarser.D, at_once.D)  # the search took another way
-    np.testing.assert_array_less(np.abs(by_coarser.D - at_once.D).ravel(), 0.05 * at_once.std(*D_NAMES))
 
 
 # ---- a lever arm

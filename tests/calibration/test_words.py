@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.words import correct_signed_bytes
+from mpucal.calibration.words import decode
 from mpucal.data import Recording, Sensor
 from mpucal.recheck.observed import observe
 
@@ -164,7 +164,7 @@ def sound(counted):
 
 @pytest.mark.parametrize(("axes", "names"), [(slice(None), "x, y, z"), (slice(1, 2), "y")], ids=["all", "y"])
 def test_words_read_with_a_signed_low_byte_are_corrected_exactly(sound, axes, names):
-    corrected, said = correct_signed_bytes(read_signed(sound, axes))
+    corrected, _, said = decode(read_signed(sound, axes))
     assert said == f"the accelerometer's {names} and the gyroscope's {names}"
     np.testing.assert_allclose(corrected.acc, sound.acc, rtol=1e-12)
     np.testing.assert_allclose(corrected.gyr, sound.gyr, rtol=1e-12)
@@ -183,13 +183,13 @@ def in_other_units(recording):
 @pytest.mark.parametrize("change", [lambda recording: recording, torn, in_other_units], ids=["sound", "torn", "units"])
 def test_other_words_stay_as_they_are(sound, change):
     recording = change(sound)
-    assert correct_signed_bytes(recording) == (recording, "")
+    assert (decode(recording).recording, decode(recording).corrected) == (recording, "")
 
 
 def test_at_rest_an_axis_follows_the_others(sound):
     """Infer from the others how a constant axis, which shows nothing, was read."""
     resting = replace(sound, acc=np.column_stack([sound.acc[:, :2], np.full(len(sound), 8000 * LSB + 0xC0 * LSB)]))
-    corrected, axes = correct_signed_bytes(read_signed(resting))
+    corrected, _, axes = decode(read_signed(resting))
     assert axes.startswith("the accelerometer's x, y, z")
     np.testing.assert_allclose(corrected.acc, resting.acc, rtol=1e-12)
 

@@ -16,7 +16,7 @@ import numpy as np
 from ...data import Mask, Vector
 from ...reasons import Reason, reason
 from ..evidence import Evidence
-from ..words import EXACTLY, ODDS, Counts, Words, words_of
+from ..words import EXACTLY, ODDS, Counts, Words
 from .unusable import dead_accelerometer, dead_gyroscope
 
 # Share of the changes in which a stuck bit changes, by errors, and most share of a sound one.
@@ -46,7 +46,7 @@ def bits_stuck(e: Evidence) -> Reason | None:
     """Find an axis of either sensor whose low or high bits never change."""
     if dead_accelerometer(e) is not None or dead_gyroscope(e) is not None:
         return None
-    acc, gyr = words_of(e.recording)
+    acc, gyr = (None, None) if e.decoded is None else e.decoded.words
     most = MOST_MPS2 if e.uncertainty is None else min(MOST_MPS2, HONEST_STD * e.uncertainty.rms_mps2)
     return _stuck(e, acc, e.recording.acc, "accelerometer", "m/s^2", most) or _stuck(
         e, gyr, e.recording.gyr, "gyroscope", "rad/s", USABLE_RAD_S
@@ -57,7 +57,7 @@ def _stuck(e: Evidence, words: Words | None, values: Vector, sensor: str, unit: 
     if words is None:
         low = _odd_steps(values)
     else:
-        stuck, first = _stuck_bits(words.counts, e.recording.gap)
+        stuck, first = _stuck_bits(words.counts[: len(values)], e.recording.gap)
         low = _low_bits(stuck, first, words.lsb)
         # a single bit is told from one that lacks, among the low ones, all below it
         one = np.argwhere(stuck & ~np.logical_and.accumulate(stuck, axis=0))
@@ -82,7 +82,8 @@ def _stuck(e: Evidence, words: Words | None, values: Vector, sensor: str, unit: 
 
 def low_byte_signed(e: Evidence) -> Reason | None:
     """Find words whose low byte was taken for signed; they were corrected before anything else."""
-    return reason("low_byte_signed", "corrected", axes=e.signed_bytes) if e.signed_bytes else None
+    axes = "" if e.decoded is None else e.decoded.corrected
+    return reason("low_byte_signed", "corrected", axes=axes) if axes else None
 
 
 def _stuck_bits(counts: Counts, gap: Mask) -> tuple[Mask, Counts]:
