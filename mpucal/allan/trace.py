@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
+from ..rests.limits import OF_NORMAL
 
 BLOCKS = 2048
 FIRST_S = 0.5
@@ -70,7 +71,7 @@ def find_steps(means: Vector) -> list[tuple[int, int, float]]:
     total = np.concatenate([np.zeros((1, means.shape[1])), np.cumsum(means - means[0], axis=0)])
     of = (total[BESIDE:] - total[:-BESIDE]) / BESIDE
     jumps = of[BESIDE:] - of[:-BESIDE]
-    spread = 1.4826 * np.median(np.abs(jumps - np.median(jumps, axis=0)), axis=0)
+    spread = OF_NORMAL * np.median(np.abs(jumps - np.median(jumps, axis=0)), axis=0)
     found = []
     for column, (jump, std) in enumerate(zip(jumps.T, spread, strict=True)):
         at = int(np.abs(jump).argmax())

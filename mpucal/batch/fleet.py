@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ..chip.families import PARTS
+from ..chip.families import PARTS, Family
 from ..data import Vector
+from ..rests.limits import OF_NORMAL
 from ..result.calibration import REFUSED
 from ..result.error_model import bias_mg, misalignment, scale_factor_error
 from .row import AXES
 
 # robust standard deviations from the fleet's median, beyond which a value is an outlier
 FAR = 5.0
-MAD_OF_NORMAL = 0.6745
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Parameter:
         if not len(self.known):
             return np.nan, np.nan
         median = float(np.median(self.known))
-        return median, float(np.median(np.abs(self.known - median))) / MAD_OF_NORMAL
+        return median, float(np.median(np.abs(self.known - median))) * OF_NORMAL
 
     @property
     def beyond(self) -> int:
@@ -72,26 +72,30 @@ def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
     b_a, b_omega = (_numbers(columns, [f"{name}_{i}" for i in AXES]) for name in ("b_a", "b_omega"))
     for values in (D, b_a, b_omega):
         values[refused] = np.nan
-    families = [_find_family(number) for number in columns["who_am_i"]]
-    n, made = len(refused), []
+    families = [PARTS[number].family if number in PARTS else None for number in columns["who_am_i"]]
+
+    def tolerance(of: Callable[[Family], Any]) -> Vector:
+        """Return (n, 3) of the data sheets; NaN without."""
+        rows = [np.full(3, np.nan) if family is None else np.broadcast_to(of(family), 3) for family in families]
+        return np.array(rows, float).reshape(-1, 3)
+
     known = np.isfinite(D).all(axis=(1, 2))
-    scale, angle = np.full((n, 3), np.nan), np.full(n, np.nan)
+    scale, angle = np.full((len(D), 3), np.nan), np.full(len(D), np.nan)
     for i in np.flatnonzero(known):
         scale[i] = scale_factor_error(D[i])
-        off = misalignment(D[i])
-        angle[i] = np.max(np.abs(off[~np.eye(3, dtype=bool)]))
-    for k, axis in enumerate(AXES):
-        limit = np.array([np.nan if family is None else family.scale_percent for family in families])
-        made.append(Parameter(f"scale factor error {axis}", "%", scale[:, k], limit))
-    for k, axis in enumerate(AXES):
-        limit = np.array([np.nan if family is None else family.zero_g_mg[k] for family in families])
-        made.append(Parameter(f"bias {axis}", "mg", bias_mg(b_a[:, k]), limit))
-    percent = np.array([np.nan if family is None else family.cross_axis_percent for family in families])
-    made.append(Parameter("largest misalignment", "deg", angle, np.degrees(np.arctan(percent / 100.0))))
-    limit = np.array([np.nan if family is None else family.zero_rate_dps for family in families])
-    made += [
-        Parameter(f"gyroscope's bias {axis}", "deg/s", np.degrees(b_omega[:, k]), limit) for k, axis in enumerate(AXES)
+        angle[i] = np.nanmax(np.abs(misalignment(D[i])))
+    rows = (
+        ("scale factor error {}", "%", scale, tolerance(lambda family: family.scale_percent)),
+        ("bias {}", "mg", bias_mg(b_a), tolerance(lambda family: family.zero_g_mg)),
+        ("gyroscope's bias {}", "deg/s", np.degrees(b_omega), tolerance(lambda family: family.zero_rate_dps)),
+    )
+    made = [
+        Parameter(name.format(axis), unit, values[:, k], limit[:, k])
+        for name, unit, values, limit in rows
+        for k, axis in enumerate(AXES)
     ]
+    cross = np.degrees(np.arctan(tolerance(lambda family: family.cross_axis_percent)[:, 0] / 100.0))
+    made.insert(2 * len(AXES), Parameter("largest misalignment", "deg", angle, cross))
     return made
 
 
@@ -113,11 +117,6 @@ def repeatability(columns: Mapping[str, Sequence[Any]], pairs: Sequence[tuple[in
         value, std = (_numbers(columns, [f"{what}_{place}" for place in places]) for what in (name, f"{name}_std"))
         found.append((name, np.asarray((value[second] - value[first]) / np.hypot(std[first], std[second]))))
     return found
-
-
-def _find_family(who_am_i: int | None) -> Any:
-    part = None if who_am_i is None else PARTS.get(who_am_i)
-    return None if part is None else part.family
 
 
 def _numbers(columns: Mapping[str, Sequence[Any]], names: Sequence[str]) -> Vector:

@@ -13,14 +13,13 @@ import pyarrow.parquet as pq
 
 from ..data import Vector
 from ..report.elements import document, escape, figure, paragraph, section, table
-from ..report.figure import BEFORE, Axes, X, Y, Z, legend, svg
+from ..report.figure import BEFORE, Axes, X, Y, Z
 from .fleet import FAR, Parameter, parameters, repeatability, repeated_sensors
 
 PAGE = "fleet.html"
 # rows of a table on the page; results.csv has all
 MOST = 200
 BINS = 40
-_HEIGHT = 190.0
 VERDICTS = ("good", "usable", "refused")
 Columns = Mapping[str, Sequence[Any]]
 
@@ -45,7 +44,7 @@ def make_page(results: Path) -> FleetPage:
         _outliers(columns, found),
         _groups("By batch", "batch", columns["batch"], columns, found),
         _groups("By date", "date", [each and each[:10] for each in columns["recorded"]], columns, found),
-        _temperature(columns, found),
+        _temperature(columns),
         _repeats(columns),
         _errors(columns),
         _reports(columns),
@@ -109,15 +108,14 @@ def _histograms(found: Iterable[Parameter], prefix: str) -> str:
     edges = np.linspace(values.min() - 1e-6, values.max() + 1e-6, BINS + 1)
     counts = [np.histogram(each.known, edges)[0] for each in some]
     most = 1.05 * float(np.max(counts))
-    axes = Axes(_HEIGHT, (float(edges[0]), float(edges[-1])), (0.0, most), f"[{some[0].unit}]", "boards")
+    axes = Axes((float(edges[0]), float(edges[-1])), (0.0, most), f"[{some[0].unit}]", "boards")
     at = np.repeat(edges, 2)[1:-1]
     lines = [axes.line(at, np.repeat(count, 2), colour) for count, colour in zip(counts, (X, Y, Z), strict=False)]
     for limit in (*limits, *-limits):
         lines.append(axes.line(np.array([limit, limit]), np.array([0.0, most]), BEFORE))
     sheet = (("data sheet", BEFORE),) if len(limits) else ()
-    named = legend(*((each.name[-1], colour) for each, colour in zip(some, (X, Y, Z), strict=False)), *sheet)
-    label = f"histograms: {prefix} of x, y and z"
-    return svg(prefix.replace(" ", "-"), label, _HEIGHT, *lines, axes.frame(), named)
+    named = [(each.name[-1], colour) for each, colour in zip(some, (X, Y, Z), strict=False)]
+    return axes.svg(prefix.replace(" ", "-"), f"histograms: {prefix} of x, y and z", lines, *named, *sheet)
 
 
 def _outliers(columns: Columns, found: Iterable[Parameter]) -> str:
@@ -155,23 +153,13 @@ def _median(values: Vector) -> str:
     return f"{np.median(known):+.3f}" if len(known) else ""
 
 
-def _temperature(columns: Columns, found: Iterable[Parameter]) -> str:
-    """Return the slopes of the biases of different boards over their temperatures."""
+def _temperature(columns: Columns) -> str:
     T = np.array(columns["temperature_c"], float)
-    rows = []
-    for each in found:
-        known = np.isfinite(T) & np.isfinite(each.value)
-        if each.name.startswith("bias") and known.sum() > 10 and np.ptp(T[known]) > 1.0:
-            A = np.stack((T[known] - T[known].mean(), np.ones(known.sum())), axis=1)
-            fit, residual, *_ = np.linalg.lstsq(A, each.value[known])
-            std = float(np.sqrt(residual[0] / (known.sum() - 2) / np.sum(A[:, 0] ** 2)))
-            rows.append((each.name, f"{fit[0]:+.3f} ± {std:.3f}"))
     warm = T[np.isfinite(T)]
     if not len(warm):
         return ""
-    range_c = paragraph(f"Recorded at {warm.min():.1f} to {warm.max():.1f} °C, median {np.median(warm):.1f} °C.")
-    caption = "Bias against temperature over all boards, mg per degree ± 1 sigma"
-    return section("Temperature", range_c, table("temperature", caption, ("parameter", "slope"), rows) if rows else "")
+    range_c = f"Recorded at {warm.min():.1f} to {warm.max():.1f} °C, median {np.median(warm):.1f} °C."
+    return section("Temperature", paragraph(range_c))
 
 
 def _repeats(columns: Columns) -> str:

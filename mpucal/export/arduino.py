@@ -8,7 +8,7 @@ from ..chip.families import MPU6050, family_of
 from ..chip.registers import ACCEL_RANGES_G, FULL_SCALE_SHIFT, GYRO_RANGES_DPS
 from ..data import ACCEL_COUNTS, GYRO_COUNTS
 from ..result.calibration import Calibration
-from .c_code import c_functions, c_temperature_function
+from .c_code import c_functions
 from .losses import heading
 from .templates import fill
 
@@ -28,7 +28,6 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
         "sketch.ino",
         heading="\n".join(heading(calibration, notes, "// ", "m/s^2, rad/s")),
         functions=c_functions(calibration),
-        temperature=c_temperature_function(calibration),
         accel_config=f"0x{ACCEL_CONFIG[range_g]:02x}",
         gyro_config=f"0x{GYRO_CONFIG[range_dps]:02x}",
         range_g=f"{range_g:g}",

@@ -19,7 +19,6 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
         heading="\n".join(heading(calibration, notes, " * ")),
         D=_matrix(calibration.D),
         functions=c_functions(calibration),
-        temperature=c_temperature_function(calibration),
         counts=_count_functions(calibration),
     )
 
@@ -27,8 +26,10 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
 def c_functions(c: Calibration) -> str:
     """Return constants of inv(D), b_a, K and b_omega, and functions for firmware that apply them.
 
-    Their names differ from those of mpucal_apply.h, so that a file can include both.
+    Their names differ from those of mpucal_apply.h, so that a file can include both. The function of temperature tests
+    for NaN by its bits, since -ffast-math has no NaN.
     """
+    at, start, end = map(_number, temperature_range(c))
     return fill(
         "functions.c",
         inv_D=_matrix(c.inverse),
@@ -37,13 +38,11 @@ def c_functions(c: Calibration) -> str:
         b_omega=_row(np.nan_to_num(c.b_omega)),
         about_a=_about("a", "m/s^2", c.sensor.accel_range_g, "g", STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS),
         about_w=_about("w", "rad/s", c.sensor.gyro_range_dps, "deg/s", np.radians(1) / GYRO_COUNTS),
+        slope=_row(c.b_a_slope),
+        at=at,
+        start=start,
+        end=end,
     )
-
-
-def c_temperature_function(c: Calibration) -> str:
-    """Return `mpucal_correct_at(y, temperature_c, a)`; it tests for NaN by its bits, since -ffast-math has no NaN."""
-    at, start, end = map(_number, temperature_range(c))
-    return fill("temperature.c", slope=_row(c.b_a_slope), at=at, start=start, end=end)
 
 
 def _count_functions(c: Calibration) -> str:

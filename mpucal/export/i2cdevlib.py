@@ -10,15 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..chip.offsets import shift_words
+from ..chip.offsets import Words
 from ..chip.registers import GYRO_OFFSET_LSB_PER_DPS
-from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import ChipError, WriteBackError
 from ..result.calibration import Calibration
+from .linux_iio import words_without_bias
 from .losses import format_xyz, heading
-
-LSB_PER_G = 2048.0
-WORD = 1 << 15
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -34,18 +31,8 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
         for kind, words in (("Accel", a), ("Gyro", w))
         for axis, word in zip("XYZ", words, strict=True)
     ]
-    return "\n".join(
-        [
-            *heading(calibration, notes, "// "),
-            '#include "MPU6050.h"',
-            "",
-            "void setOffsets(MPU6050 &mpu)",
-            "{",
-            *calls,
-            "}",
-            "",
-        ]
-    )
+    head = [*heading(calibration, notes, "// "), '#include "MPU6050.h"', "", "void setOffsets(MPU6050 &mpu)", "{"]
+    return "\n".join([*head, *calls, "}", ""])
 
 
 def losses(calibration: Calibration) -> tuple[str, ...]:
@@ -63,7 +50,7 @@ def losses(calibration: Calibration) -> tuple[str, ...]:
     )
 
 
-def _words(calibration: Calibration) -> tuple[tuple[int, int, int], tuple[int, ...]]:
+def _words(calibration: Calibration) -> tuple[Words, tuple[int, ...]]:
     trim = calibration.sensor.accel_offsets
     if trim is None:
         raise WriteBackError(
@@ -71,11 +58,11 @@ def _words(calibration: Calibration) -> tuple[tuple[int, int, int], tuple[int, .
             "calibrate from a capture of the chip",
         )
     try:
-        a = shift_words(trim, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G)
+        a = words_without_bias(trim, calibration.b_a)
     except ChipError as error:
         raise WriteBackError(f"nothing was exported: {error.what}", error.remedy) from error
     w = np.rint(-np.degrees(np.nan_to_num(calibration.b_omega)) * GYRO_OFFSET_LSB_PER_DPS)
-    if np.abs(w).max() >= WORD:
+    if np.abs(w).max() > np.iinfo(np.int16).max:
         raise WriteBackError(
             "nothing was exported: the gyroscope's bias does not fit into a word", "check the gyroscope"
         )

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..chip.families import MPU6050, PARTS
-from ..chip.offsets import shift_words
+from ..chip.offsets import Words, shift_words
 from ..chip.registers import ACCEL_RANGES_G
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
@@ -25,7 +25,6 @@ from .losses import format_xyz, heading
 
 AXES = "xyz"
 LSB_PER_G = 2048.0
-STEP_G = 2 / LSB_PER_G
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -45,7 +44,7 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def offset_words(calibration: Calibration) -> tuple[tuple[int, int, int] | None, str]:
+def offset_words(calibration: Calibration) -> tuple[Words | None, str]:
     """Return the words for the offset registers, or None and the reason; absolute, so that writing twice is safe."""
     sensor = calibration.sensor
     families = {part.family for part in PARTS.values() if part.chip == sensor.chip}
@@ -54,9 +53,19 @@ def offset_words(calibration: Calibration) -> tuple[tuple[int, int, int] | None,
     if sensor.accel_offsets is None:
         return None, "calibbias is not used, as the calibration lacks the factory trim"
     try:
-        return shift_words(sensor.accel_offsets, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G), ""
+        return words_without_bias(sensor.accel_offsets, calibration.b_a), ""
     except ChipError as error:
         return None, f"calibbias is not used: {error.what}"
+
+
+def words_without_bias(trim: Words, b_a: Vector) -> Words:
+    """Return the words of offset registers that subtract b_a (3,) m/s^2 besides the factory trim.
+
+    Raises
+    ------
+    ChipError : one does not fit.
+    """
+    return shift_words(trim, -b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G)
 
 
 def _scales(calibration: Calibration) -> tuple[float, float]:
@@ -81,7 +90,7 @@ def losses(calibration: Calibration) -> tuple[str, ...]:
         )
     if why:
         return (f"{why}; programs have to subtract b_a, ({format_xyz(calibration.b_a)}) m/s^2.", *scale)
-    step = STEP_G * STANDARD_GRAVITY_MPS2 / 2
+    step = STANDARD_GRAVITY_MPS2 / LSB_PER_G  # half of two counts, as bit 0 is reserved
     return (
         f"calibbias has steps of 1 mg: up to {step:.4f} m/s^2 of b_a remain; where 4096 counts of an offset register"
         " are 1 g, as in some MPU-6050, half of b_a remains (`mpucal write` measures this).",

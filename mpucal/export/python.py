@@ -17,21 +17,13 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     return fill(
         "module.py",
         heading="\n\n".join(heading(calibration, notes, "", "m/s^2, rad/s")),
-        functions=python_functions(calibration),
+        inv_D=_rows(calibration.inverse),
+        b_a=_row(calibration.b_a_to_subtract),
+        slope=_row(calibration.b_a_slope),
+        temperatures=", ".join(f"{value:.6g}" for value in temperature_range(calibration)),
         K=_rows(calibration.K),
         b_omega=_row(np.nan_to_num(calibration.b_omega)),
     )
-
-
-def python_functions(c: Calibration) -> str:
-    """Return constants and `apply` for NumPy."""
-    at, start, end = (f"{value:.6g}" for value in temperature_range(c))
-    return fill("numpy.py", constants=python_constants(c), slope=_row(c.b_a_slope), at=at, start=start, end=end)
-
-
-def python_constants(c: Calibration) -> str:
-    """Return inv(D) and b_a as arrays of NumPy."""
-    return f"INV_D = np.array([\n{_rows(c.inverse)},\n])\nB_A = np.array([{_row(c.b_a_to_subtract)}])  # m/s^2\n"
 
 
 def _rows(matrix: Vector) -> str:

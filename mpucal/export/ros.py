@@ -1,4 +1,4 @@
-"""A calibration for ROS: YAML for imu_calib's apply node, with noise covariances, and a node for ROS 2.
+"""A calibration for ROS: YAML for imu_calib's apply node, with noise covariances.
 
 imu_calib (dpkoch/imu_calib, AccelCalib::applyCalib) publishes SM raw - bias: the bias is subtracted after the matrix,
 so SM = inv(D) and bias = inv(D) b_a. Its node subtracts the mean of the gyroscope's first samples itself
@@ -14,8 +14,7 @@ import numpy as np
 from ..result.calibration import Calibration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from .losses import heading
-from .python import python_constants
-from .templates import fill, yaml_row
+from .templates import yaml_row
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -38,14 +37,6 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
         if np.isfinite(noise).all():
             lines.append(f"{key}: {yaml_row(np.diag(noise**2).ravel())}")
     return "\n".join(lines) + "\n"
-
-
-def ros_node(c: Calibration) -> str:
-    """Return a node for ROS 2 that subscribes to imu/data_raw and publishes imu/data."""
-    noise = np.diag(c.noise_std**2)
-    known = f"COVARIANCE = {noise.ravel().tolist()}\n" if np.isfinite(noise).all() else ""
-    covariance = "        imu.linear_acceleration_covariance = COVARIANCE\n" if known else ""
-    return fill("ros_node.py", constants=python_constants(c), known=known, covariance=covariance)
 
 
 def losses(calibration: Calibration) -> tuple[str, ...]:

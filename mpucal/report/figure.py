@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from ..data import Vector
 from .elements import escape
 
-# px; the page scales a picture to its column
-WIDTH = 420.0
+# px, of axes; the page scales a picture to its column
+WIDTH, HEIGHT = 420.0, 210.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 48.0, 6.0, 24.0, 32.0
 # steps between ticks, times a power of ten
 _STEPS, _FEWEST_TICKS = (10.0, 5.0, 2.0, 1.0), 4
@@ -63,24 +64,17 @@ def legend(*entries: tuple[str, str]) -> str:
 
 
 class Axes:
-    """Axes over the ranges `x` and `y` (least, greatest); values beyond `y` are drawn at its edge.
+    """Axes over the ranges `x` and `y` (least, greatest); values beyond `y` are drawn at its edge."""
 
-    Parameters
-    ----------
-    height : of the picture [px].
-    """
-
-    def __init__(
-        self, height: float, x: tuple[float, float], y: tuple[float, float], x_label: str, y_label: str
-    ) -> None:
-        self._height, self._x, self._y = height, x, y
+    def __init__(self, x: tuple[float, float], y: tuple[float, float], x_label: str, y_label: str) -> None:
+        self._x, self._y = x, y
         self._labels = x_label, y_label
 
     def place(self, x: Vector, y: Vector) -> tuple[Vector, Vector]:
         """Return the positions of values in the picture [px]."""
         (left, right), (low, high) = self._x, self._y
         across, up = (x - left) / (right - left), (np.clip(y, low, high) - low) / (high - low)
-        return _LEFT + across * (WIDTH - _LEFT - _RIGHT), self._bottom - up * (self._bottom - _TOP)
+        return _LEFT + across * (WIDTH - _LEFT - _RIGHT), HEIGHT - _BOTTOM - up * (HEIGHT - _BOTTOM - _TOP)
 
     def line(self, x: Vector, y: Vector, colour: str, width: float = 1.0) -> str:
         """Return a line through values."""
@@ -93,10 +87,14 @@ class Axes:
     def band(self, first: float, last: float) -> str:
         """Return a shaded range of x."""
         (left, right), _ = self.place(np.array([first, last]), np.array(self._y))
-        size = f'width="{right - left:.1f}" height="{self._bottom - _TOP:g}"'
+        size = f'width="{right - left:.1f}" height="{HEIGHT - _BOTTOM - _TOP:g}"'
         return f'<rect x="{left:.1f}" y="{_TOP:g}" {size} style="fill: {LINE}"/>'
 
-    def frame(self) -> str:
+    def svg(self, name: str, label: str, marks: Iterable[str], *entries: tuple[str, str]) -> str:
+        """Return the picture of the marks behind the axes, with a legend of (words, colour) entries; see svg."""
+        return svg(name, label, HEIGHT, *marks, self._frame(), legend(*entries))
+
+    def _frame(self) -> str:
         """Return the axes with their numbers and labels."""
         (left, right), (bottom, top) = self.place(np.array(self._x), np.array(self._y))
         marks = [line(np.array([left, left, right]), np.array([top, bottom, bottom]), INK)]
@@ -108,11 +106,7 @@ class Axes:
             marks.append(text(left - 5.0, y + 4.0, said, "end"))
             marks.append(line(np.array([left - 3.0, left]), np.array([y, y]), INK))
         x_label, y_label = self._labels
-        return "".join(marks) + text(right, self._height - 4.0, x_label, "end") + text(2.0, 12.0, y_label, "start")
-
-    @property
-    def _bottom(self) -> float:
-        return self._height - _BOTTOM
+        return "".join(marks) + text(right, HEIGHT - 4.0, x_label, "end") + text(2.0, 12.0, y_label, "start")
 
 
 def ticks(low: float, high: float) -> list[tuple[float, str]]:

@@ -11,9 +11,6 @@ import numpy as np
 
 from .. import __version__
 from ..data import Recording
-from ..export.c_code import c_functions
-from ..export.python import python_functions
-from ..export.ros import ros_node
 from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
@@ -25,7 +22,6 @@ from .elements import (
     document,
     escape,
     first,
-    heading,
     number,
     pair,
     paragraph,
@@ -64,7 +60,6 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
         details("The formula", sections.formula(calibration)),
         details("The gyroscope", sections.gyroscope_table(calibration), drawn["rates"]),
         details("Over time", drawn["magnitude"], drawn["temperature"]),
-        details("How to apply it", _application(calibration)),
         details("Sensor and settings", _settings(calibration, recording)),
         details("Parameters in calibration.json", sections.matrices(calibration)),
         details("How to reproduce it", _reproduction(calibration, recording)),
@@ -113,23 +108,6 @@ def _magnitudes(track: Track | None) -> str:
         rows.append([name, *(number(f(of_rests), 4) for f in (np.median, np.mean, np.std))])
     caption = f"|a| of {len(track.runs)} rests, m/s²; gravity is {track.gravity:.6g}"
     return table("magnitudes", caption, ["", "median", "mean", "standard deviation"], rows)
-
-
-def _application(calibration: Calibration) -> str:
-    if not sections.is_regular(calibration) or calibration.verdict == REFUSED:
-        return ""
-    return "".join(
-        (
-            heading("C"),
-            code(c_functions(calibration), "c"),
-            paragraph("Or read calibration.bin (format: firmware_protocol.md).", note=True),
-            heading("Python"),
-            code(python_functions(calibration), "python"),
-            paragraph('Or, with mpucal: a = mpucal.Calibration.load("calibration.json").apply(y).', note=True),
-            heading("ROS 2"),
-            code(ros_node(calibration), "ros"),
-        )
-    )
 
 
 def _settings(calibration: Calibration, recording: Recording | None) -> str:

@@ -9,12 +9,12 @@ import numpy as np
 
 from .. import __version__
 from ..data import STANDARD_GRAVITY_MPS2
-from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise
+from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise, axes_of
 from .elements import document, figure, paragraph, section, table
-from .figure import INK, Axes, X, Y, Z, legend, svg
+from .figure import INK, Axes, X, Y, Z
 
-HEIGHT = 240.0
 SENSORS = (ACCELEROMETER, GYROSCOPE)
+_XYZ = (("x", X), ("y", Y), ("z", Z))
 _UG, _DPS = 1e6 / STANDARD_GRAVITY_MPS2, math.degrees(1.0)
 # sensor -> coefficient -> (factor, unit) of the text
 UNITS = {
@@ -35,7 +35,7 @@ UNITS = {
 
 def rows(noise: Noise, sensor: str) -> Iterator[tuple[str, list[str]]]:
     """Yield name with unit, and the values of x, y, z with 95 % intervals, of each coefficient of a sensor."""
-    part = slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)
+    part = axes_of(sensor)
     for name, (factor, unit) in UNITS[sensor].items():
         cells = [
             _cell(*(float(factor * end[name][part][axis]) for end in (noise.values, noise.low, noise.high)))
@@ -85,31 +85,30 @@ def render(noise: Noise) -> str:
 
 
 def _allan(noise: Noise, sensor: str) -> str:
-    part = slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)
+    part = axes_of(sensor)
     factor, unit = UNITS[sensor][INSTABILITY]
     tau, deviations = np.log10(noise.tau_s), np.log10(np.maximum(factor * noise.deviations[:, part], 1e-300))
     share = np.log10(1.0 + 1.96 / np.sqrt(2.0 * np.maximum(noise.clusters, 1.0)))
     low, high = float((deviations.min(1) - share).min()), float((deviations.max(1) + share).max())
     labels = "log10 τ [s]", f"log10 of {sensor} [{unit}]"
-    axes = Axes(HEIGHT, (float(tau[0]), float(tau[-1])), (low, high), *labels)
+    axes = Axes((float(tau[0]), float(tau[-1])), (low, high), *labels)
     marks = []
-    for deviation, colour in zip(deviations.T, (X, Y, Z), strict=True):
+    for deviation, (_, colour) in zip(deviations.T, _XYZ, strict=True):
         marks += [axes.line(tau, deviation, colour, 1.6)]
         marks += [axes.line(tau, deviation + sign * share, colour, 0.5) for sign in (-1.0, 1.0)]
-    named = [("x", X), ("y", Y), ("z", Z)]
+    named = [*_XYZ]
     if sensor in noise.data_sheet:
         marks.append(axes.line(tau, np.log10(factor * noise.data_sheet[sensor]) - 0.5 * tau, INK, 0.8))
         named.append(("data sheet", INK))
-    return svg(f"allan-{sensor}", f"Allan deviation of the {sensor}", HEIGHT, *marks, axes.frame(), legend(*named))
+    return axes.svg(f"allan-{sensor}", f"Allan deviation of the {sensor}", marks, *named)
 
 
 def _course(noise: Noise) -> str:
     spread = np.maximum(noise.course[:, :6].std(0), 1e-300)
     scaled = (noise.course[:, :6] - noise.course[:, :6].mean(0)) / spread - 8.0 * np.arange(6)
-    axes = Axes(HEIGHT, (0.0, float(noise.course_s[-1])), (-45.0, 5.0), "time [s]", "six axes")
+    axes = Axes((0.0, float(noise.course_s[-1])), (-45.0, 5.0), "time [s]", "six axes")
     lines = [axes.line(noise.course_s, of, colour) for of, colour in zip(scaled.T, (X, Y, Z) * 2, strict=True)]
-    named = legend(("x", X), ("y", Y), ("z", Z))
-    return svg("course", "Slow course of the six axes", HEIGHT, *lines, axes.frame(), named)
+    return axes.svg("course", "Slow course of the six axes", lines, *_XYZ)
 
 
 def _cell(value: float, low: float, high: float) -> str:

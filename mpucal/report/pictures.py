@@ -9,15 +9,11 @@ import numpy as np
 from ..data import Vector
 from ..result.error_model import MG_PER_MPS2
 from .elements import figure
-from .figure import AFTER, BEFORE, INK, LINE, Axes, X, Y, Z, dots, legend, svg
+from .figure import AFTER, BEFORE, INK, LINE, Axes, X, Y, Z, dots
 from .spheres import coverage, sphere
 from .track import Track
 
 BINS = 500
-HEIGHT = 210.0
-# share of the innovations that fit into the picture; larger ones are jerks
-_MOST = 0.995
-_LEAST_SPAN_C = 1.0
 _TIME = "time [s]"
 _XYZ = (("x", X), ("y", Y), ("z", Z))
 RESIDUALS = "|a| of each rest minus gravity. After calibration all should lie at zero, apart from hand tremor."
@@ -77,10 +73,10 @@ def residuals(track: Track) -> str:
     ]
     most = 1.1 * max(float(np.abs(values).max()) for values in both) + 1e-3
     number = np.arange(1.0, len(track.runs) + 1.0)
-    axes = Axes(HEIGHT, (0.5, len(number) + 0.5), (-most, most), "rest", "|a| − gravity [mg]")
+    axes = Axes((0.5, len(number) + 0.5), (-most, most), "rest", "|a| − gravity [mg]")
     marks = [dots(*axes.place(number, v), 3.0, colour) for v, colour in zip(both, (BEFORE, AFTER), strict=True)]
-    named = legend(("before", BEFORE), ("after", AFTER))
-    return svg("residuals", "|a| minus gravity at each rest", HEIGHT, axes.level(0.0), *marks, axes.frame(), named)
+    label = "|a| minus gravity at each rest"
+    return axes.svg("residuals", label, [axes.level(0.0), *marks], ("before", BEFORE), ("after", AFTER))
 
 
 def magnitude(track: Track) -> str:
@@ -90,9 +86,9 @@ def magnitude(track: Track) -> str:
     lines = [
         axes.line(*envelope(track.t, values), colour) for values, colour in zip(both, (BEFORE, AFTER), strict=True)
     ]
-    named = legend(("before", BEFORE), ("after", AFTER), ("gravity", INK))
+    lines.append(axes.level(track.gravity))
     label = "Magnitude of the acceleration over time, before and after"
-    return svg("magnitude-over-time", label, HEIGHT, *lines, axes.level(track.gravity), axes.frame(), named)
+    return axes.svg("magnitude-over-time", label, lines, ("before", BEFORE), ("after", AFTER), ("gravity", INK))
 
 
 def innovations(track: Track) -> str:
@@ -100,12 +96,12 @@ def innovations(track: Track) -> str:
     e = track.innovations
     if e is None:
         return ""
-    most = 1.1 * float(np.quantile(np.abs(e), _MOST)) + 1e-6
+    # larger ones are jerks
+    most = 1.1 * float(np.quantile(np.abs(e), 0.995)) + 1e-6
     axes = _over_time(track, (-most, most), "innovation [m/s²]")
     bands = [axes.band(track.t[first], track.t[last - 1]) for first, last in track.runs]
     lines = [axes.line(*envelope(track.t[-len(e) :], e[:, i]), colour) for i, (_, colour) in enumerate(_XYZ)]
-    named = legend(*_XYZ, ("at rest", LINE))
-    return svg("innovations", "Innovations of the three axes over time", HEIGHT, *bands, *lines, axes.frame(), named)
+    return axes.svg("innovations", "Innovations of the three axes over time", bands + lines, *_XYZ, ("at rest", LINE))
 
 
 def rates(track: Track) -> str:
@@ -117,7 +113,7 @@ def rates(track: Track) -> str:
     axes = _over_time(track, (-most, most), "rate [deg/s]")
     lines = [axes.line(*envelope(track.t, gyr[:, i]), colour) for i, (_, colour) in enumerate(_XYZ)]
     lines += [] if limit is None else [axes.level(limit), axes.level(-limit)]
-    return svg("rates", "Rates of turn over time", HEIGHT, *lines, axes.frame(), legend(*_XYZ, ("range", INK)))
+    return axes.svg("rates", "Rates of turn over time", lines, *_XYZ, ("range", INK))
 
 
 def temperature(track: Track) -> str:
@@ -127,9 +123,9 @@ def temperature(track: Track) -> str:
         return ""
     t, values = envelope(track.t[known], track.recording.temperature_c[known])
     # a least span, so that a tenth of a degree does not look like a change
-    middle, half = 0.5 * (values.min() + values.max()), max(0.55 * float(np.ptp(values)), _LEAST_SPAN_C)
+    middle, half = 0.5 * (values.min() + values.max()), max(0.55 * float(np.ptp(values)), 1.0)
     axes = _over_time(track, (middle - half, middle + half), "temperature [°C]")
-    return svg("temperature", "Temperature over time", HEIGHT, axes.line(t, values, AFTER), axes.frame())
+    return axes.svg("temperature", "Temperature over time", [axes.line(t, values, AFTER)])
 
 
 def envelope(t: Vector, values: Vector) -> tuple[Vector, Vector]:
@@ -142,7 +138,7 @@ def envelope(t: Vector, values: Vector) -> tuple[Vector, Vector]:
 
 
 def _over_time(track: Track, y: tuple[float, float], y_label: str) -> Axes:
-    return Axes(HEIGHT, (float(track.t[0]), float(track.t[-1])), y, _TIME, y_label)
+    return Axes((float(track.t[0]), float(track.t[-1])), y, _TIME, y_label)
 
 
 def _span(values: Vector) -> tuple[float, float]:

@@ -70,12 +70,12 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
 
     def of(self, sensor: str, coefficient: str) -> float:
         """Return the rms of a coefficient over a sensor's three axes; NaN if none is known."""
-        values = self.values[coefficient][_part(sensor)]
+        values = self.values[coefficient][axes_of(sensor)]
         return float(np.sqrt(np.nanmean(values**2))) if np.isfinite(values).any() else math.nan
 
     def is_significant(self, sensor: str, coefficient: str) -> bool:
         """Return True if the coefficient is significantly non-zero on all three axes."""
-        return bool(np.all(self.low[coefficient][_part(sensor)] > 0.0))
+        return bool(np.all(self.low[coefficient][axes_of(sensor)] > 0.0))
 
     def at_least(self, sensor: Sensor, rate_hz: float) -> Sensor:
         """Return the sensor with this white noise, of a sample at `rate_hz`, as its least noise."""
@@ -87,7 +87,7 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
         """Return the content of noise.json in JSON types; NaN becomes None."""
 
         def of(sensor: str) -> dict[str, Any]:
-            part = _part(sensor)
+            part = axes_of(sensor)
             ends = {"value": self.values, "low": self.low, "high": self.high}
             found = {name: {end: of_all[name][part] for end, of_all in ends.items()} for name in COEFFICIENTS}
             data_sheet = {"data_sheet": {WHITE: self.data_sheet[sensor]}} if sensor in self.data_sheet else {}
@@ -173,7 +173,7 @@ def with_noise(calibration: Calibration, noise: Noise) -> Calibration:
     """
     entry: dict[str, Any] = {"created": noise.created, "seconds": noise.seconds, "rate_hz": noise.rate_hz}
     for sensor in (ACCELEROMETER, GYROSCOPE):
-        part, of = _part(sensor), {}
+        part, of = axes_of(sensor), {}
         unsure = [name for name in (WHITE, INSTABILITY, WALK) if not noise.is_significant(sensor, name)]
         for name in (WHITE, INSTABILITY, WALK):
             values = (noise.high if name in unsure else noise.values)[name][part]
@@ -182,5 +182,6 @@ def with_noise(calibration: Calibration, noise: Noise) -> Calibration:
     return replace(calibration, extra={**calibration.extra, KEY: entry})
 
 
-def _part(sensor: str) -> slice:
+def axes_of(sensor: str) -> slice:
+    """Return the place of a sensor among the six axes."""
     return slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)

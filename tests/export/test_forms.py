@@ -5,9 +5,7 @@ import json
 import math
 import re
 import subprocess
-import sys
 from dataclasses import replace
-from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +15,6 @@ from mpucal.chip import registers as reg
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.errors import MpucalError, RefusedError
 from mpucal.export.forms import FORMS, form
-from mpucal.export.ros import ros_node
 from mpucal.result.calibration import Calibration
 
 # what the header says of itself
@@ -203,41 +200,6 @@ def test_what_the_yaml_says_of_the_gyroscope(calibration):
     np.testing.assert_array_equal(np.reshape(found, (3, 3)), np.diag(quiet.gyro_noise_std**2))
     assert "deg/s remain" not in text
     assert "up to 2.00 % of a rate remain" in notes[0]
-
-
-def test_the_node_publishes_what_it_hears_calibrated(calibrated, samples, monkeypatch):
-    published = []
-
-    class Node:
-        def __init__(self, name):
-            self.listening = {}
-
-        def create_publisher(self, kind, topic, depth):
-            assert topic == "imu/data"
-            return SimpleNamespace(publish=published.append)
-
-        def create_subscription(self, kind, topic, hear, depth):
-            assert topic == "imu/data_raw"
-
-    for name, contents in (
-        ("rclpy", {}),
-        ("rclpy.node", {"Node": Node}),
-        ("sensor_msgs", {}),
-        ("sensor_msgs.msg", {"Imu": SimpleNamespace}),
-    ):
-        module = ModuleType(name)
-        vars(module).update(contents)
-        monkeypatch.setitem(sys.modules, name, module)
-    names = {"__name__": "node"}
-    exec(ros_node(calibrated), names)
-    node = names["Calibrated"]()
-    for x, y, z in samples.tolist():
-        node.correct(SimpleNamespace(linear_acceleration=SimpleNamespace(x=x, y=y, z=z)))
-    heard = [(m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z) for m in published]
-    np.testing.assert_allclose(heard, calibrated.apply(samples), atol=1e-6)
-    np.testing.assert_allclose(
-        np.reshape(published[0].linear_acceleration_covariance, (3, 3)), np.diag(calibrated.noise_std**2), rtol=1e-5
-    )
 
 
 def device(folder, *writable, words=(-1501, 2000, 701)):

@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 
 from mpucal.data import Sensor
-from mpucal.export.c_code import c_functions
-from mpucal.export.python import python_functions
-from mpucal.export.ros import ros_node
 from mpucal.report import render
 from mpucal.report.track import Track
 from mpucal.report.units import ParameterRow
@@ -185,11 +182,6 @@ def test_the_formula_computes_what_the_calibration_does(result, applied):
         assert re.fullmatch(r"[-+*(). \d_xyz]+", expression)
         a.append(eval(expression, {"__builtins__": {}}, y))
     np.testing.assert_allclose(a, calibration.apply(list(y.values())), atol=2e-5)
-
-
-def test_the_programs_are_those_of_the_exports(result):
-    for name, text in (("c", c_functions), ("python", python_functions), ("ros", ros_node)):
-        assert html.unescape(element(result.html, name)) == text(result.calibration)
 
 
 def test_whose_calibration_it_is_and_of_what(result):
