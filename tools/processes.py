@@ -31,7 +31,7 @@ from mpucal.session import rotate
 # documented exit codes, except that of a wrong use (2)
 CODES = (0, 3, 4, 5, 6)
 CPU_S, WALL_S = 120, 600.0
-POLL_S, KNOW_EVERY_S, SELDOM = 0.5, 3.0, 8.0
+POLL_S, KNOW_EVERY_S = 0.5, 3.0
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def quick(sync: bool = False) -> Iterator[None]:
     unsynced = patch.object(SyncThread, "__init__", lambda self, _file: setattr(self, "close", lambda: None))
     with ExitStack() as stack:
         stack.enter_context(patch.object(Config, "period_s", period_s))
-        stack.enter_context(patch.multiple(rotate, KNOW_EVERY_S=KNOW_EVERY_S, SELDOM=SELDOM))
+        stack.enter_context(patch.object(rotate, "KNOW_EVERY_S", KNOW_EVERY_S))
         if not sync:
             stack.enter_context(unsynced)
         yield

@@ -16,7 +16,7 @@ from ..data import Samples, Vector
 from .events import Direction, Quaternion
 
 # Length of an integration step, in which the rates count as constant.
-STEP_S = 0.02
+STEP_S = 0.04
 # Time constants with which gravity corrects the tilt: at rest, and among the hand's accelerations.
 STILL_S, MOVING_S = 0.2, 2.0
 # Limit of that correction: before the first rest, a turning board may have been taken for one at rest.

@@ -335,7 +335,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Knowledge:
-    """Standard uncertainties of the accelerometer's parameters so far, about once a second while the board is turned.
+    """Standard uncertainties of the accelerometer's parameters so far, after each orientation, or five seconds.
 
     Attributes
     ----------

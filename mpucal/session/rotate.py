@@ -46,10 +46,9 @@ TILTS = 6
 # Beyond these the hand's own acceleration hides the direction of gravity [m/s^2].
 LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
-# Interval of the fits and of the progress. Fits become rarer as the turning gets long: every 1/40 of its time.
+# Least interval of the fits and of the progress.
 KNOW_EVERY_S = REPORT_EVERY_S = 1.0
-SELDOM = 40.0
-# Interval of the fits where nothing is asked for, and their numbers are only shown.
+# Interval of the fits while no new orientation is seen, which tell little that is new.
 SHOW_EVERY_S = 5.0
 # Session time after which the answer of a fit is taken.
 WAIT_S = 0.5
@@ -82,6 +81,7 @@ class Rotate(PoseStep):
         self._knowledge: Knowledge | None = None
         self._requested = False
         self._advised_run = -1
+        self._known_number = 0
         self._held: tuple[Pause, Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
         self.prompt = self._prompt_for(self._coverage.paused.farthest_down(self._directions))
@@ -111,7 +111,7 @@ class Rotate(PoseStep):
         return super().enough() if self._plan.until_end else [Turned(ENOUGH)]
 
     def _learn(self, knowledge: Knowledge, advice: bool) -> list[Output | Turned]:
-        self._knowledge, self._requested = knowledge, False
+        self._knowledge, self._requested, self._known_number = knowledge, False, self._coverage.number
         outputs: list[Output | Turned] = [knowledge]
         if self._plan.until_end:
             return outputs
@@ -180,18 +180,20 @@ class Rotate(PoseStep):
         if pause.seconds >= pause.hold_s - WAIT_S - 1e-6:
             first = len(self._coverage.paused) <= 2  # the flat rest, and this one
             self._coverage.placed = pause.hold_s > HOLD_S and (self._coverage.placed or first)
-            self._requested, self._advised_run, self._known_s = True, pause.run, pause.t_s
-            outputs.append(RequestFit(FitKind.ADVISE, WAIT_S))
+            self._advised_run = pause.run
+            outputs.append(self._request(FitKind.ADVISE, pause.t_s))
         return outputs
+
+    def _request(self, kind: FitKind, t_s: float) -> RequestFit:
+        self._requested, self._known_s = True, t_s
+        return RequestFit(kind, WAIT_S)
 
     def _periodic(self, t_s: float) -> list[Output]:
         """Return the request of the next fit, the progress and the reminder, each if its time has come."""
         outputs: list[Output] = []
-        turning_s = t_s - (self._begun_s or t_s)
-        every_s = SHOW_EVERY_S if self._plan.until_end else max(KNOW_EVERY_S, turning_s / SELDOM)
-        if not self._requested and t_s - self._known_s >= every_s:
-            self._requested, self._known_s = True, t_s
-            outputs.append(RequestFit(FitKind.KNOW, WAIT_S))
+        new = self._coverage.number > self._known_number and not self._plan.until_end
+        if not self._requested and t_s - self._known_s >= (KNOW_EVERY_S if new else SHOW_EVERY_S):
+            outputs.append(self._request(FitKind.KNOW, t_s))
         if t_s - self._reported_s >= REPORT_EVERY_S:
             self._reported_s = t_s
             done = min(self._coverage.number, self._least)

@@ -236,12 +236,12 @@ def test_the_time_that_is_left_follows_the_pace_and_the_information(board, rotat
     assert rotating.of(Progress)[-1].text.startswith("orientation 8 of 10")
     assert rotating.of(Progress)[-1].left_s is None
     rotating.overall = 0.7
-    rotating.feed(board.turn_to(varied[7])).feed(board.still(1.5))
+    show(rotating, board, varied[7:8])
     # What is known is half of what is needed.
     assert rotating.of(Progress)[-1].left_s > 8 * 3.6
     rotating.overall = 1.0
-    rotating.feed(board.still(2.0))
-    assert rotating.of(Progress)[-1].left_s == pytest.approx(4 * 3.6, abs=3.6)
+    rotating.feed(board.still(6.0))
+    assert rotating.of(Progress)[-1].left_s == pytest.approx(3 * 3.6, abs=3.6)
     rotating.feed(board.still(10.0))
     assert rotating.of(Progress)[-1].left_s is None
 
