@@ -158,11 +158,9 @@ def elsewhere(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def chromium():
-    """A browser; playwright runs once in a process."""
-    from tools.make import pictures
-
-    found = pictures.chromium()
-    if found is None:
+    """A browser, of which the headless shell is twice as fast; playwright runs once in a process."""
+    names = ("chromium-headless-shell", "chromium", "google-chrome")
+    if (found := next(filter(None, map(shutil.which, names)), None)) is None:
         pytest.skip("there is no Chromium here")
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with api.sync_playwright() as p:

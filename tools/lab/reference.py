@@ -1,139 +1,97 @@
 """The filters in plain NumPy, a step at a time: slow, short, and the oracle of the kernel's tests.
 
+Derivatives are those of complex steps: each filter runs for theta + i STEP e_k, for all parameters k at once, and the
+imaginary part of what it gives, divided by STEP, is exact to the last digits. No derivative is written down.
+
 The exact filter first; then the hand's in the body frame, whose x = (s, p, v, a) (12,) and P (12, 12) are those of
 kernel/hand.hpp.
 """
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from mpucal.calibration.likelihood import Evaluation
-from mpucal.calibration.parameters import ACCEL, HAND, PLACES
+from mpucal.calibration.parameters import HAND, NAMES, PLACES, TABLE, Form
 from mpucal.calibration.problem import Problem
-from mpucal.calibration.rotation import cross, rotation, tangents
-from mpucal.calibration.theta import Theta
+from mpucal.calibration.rotation import tangents
+from mpucal.calibration.theta import Theta, from_elements
 from mpucal.data import Vector
 
-K_BASIS = np.zeros((6, 3, 3))
-for _m, (_i, _j) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
-    K_BASIS[_m, _i, _j] = K_BASIS[_m, _j, _i] = 1.0
+STEP = 1e-30
+Complex = NDArray[np.complex128]
+LONGEST_STEP_S, SPEED_OF_RESET_S = 0.2, 0.04
 
 
-def left_jacobian(phi: Vector) -> Vector:
-    """Return J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x).
-
-    Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), appendix B.
-    """
-    angle = float(np.linalg.norm(phi))
-    X = cross(phi)
-    if angle < 1e-3:
-        return np.eye(3) + X / 2 + X @ X / 6
-    return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))
-
-
-class _State(NamedTuple):
-    """s, P and their derivatives by the p parameters, (p, 3) and (p, 3, 3)."""
-
-    s: Vector
-    P: Vector
-    ds: Vector
-    dP: Vector
+def with_steps(theta: Theta, p: int) -> SimpleNamespace:
+    """Return the fields of theta with p + 1 rows each: a complex step of each of p parameters, and theta itself."""
+    steps, found = 1j * STEP * np.eye(p + 1, len(NAMES)), {}
+    steps[p] = 0.0
+    for row in TABLE:
+        value, d = getattr(theta, row.field), steps[:, PLACES[row.name]]
+        if row.form is Form.DIRECTION:
+            found[row.field] = value + d @ np.array(tangents(value))
+        elif row.form is Form.SYMMETRIC:
+            found[row.field] = value + np.array([from_elements(row.form, each) for each in d])
+        else:
+            found[row.field] = value + d.reshape(p + 1, *np.shape(value))
+    return SimpleNamespace(**found)
 
 
-class _Sums:
-    """Sums of a pass."""
+def times(M: Vector, v: Vector) -> Complex:
+    """Return the product of each matrix (..., 3, 3) with its vector (..., 3)."""
+    return np.asarray((M @ v[..., None])[..., 0])
 
-    def __init__(self, p: int) -> None:
-        self.V, self.squares, self.measurements = 0.0, 0.0, 0
-        self.gradient, self.fisher = np.zeros(p), np.zeros((p, p))
+
+def cross(v: Vector) -> Vector:
+    """Return [v]x: (..., 3) -> (..., 3, 3)."""
+    return np.cross(np.eye(3), v[..., None, :])
+
+
+def rotation(phi: Vector) -> Vector:
+    """Return exp([phi]x): (..., 3) -> (..., 3, 3), by Rodrigues' formula."""
+    X, angle = cross(phi), np.sqrt((phi * phi).sum(-1))[..., None, None] / np.pi
+    return np.asarray(np.eye(3) + np.sinc(angle) * X + 0.5 * np.sinc(0.5 * angle) ** 2 * (X @ X))
+
+
+def of_length(v: Complex, length: float) -> Complex:
+    """Return vectors (..., 3) along v; the norm is that of complex steps, without a conjugate."""
+    return np.asarray(length * v / np.sqrt((v * v).sum(-1, keepdims=True)))
 
 
 def evaluate_reference(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
-    """Evaluate as likelihood.evaluate does, derived term by term (matrix calculus, no structure used)."""
-    p, series, flat, g = parameters, problem.series, problem.flat, problem.gravity
-    sums = _Sums(p)
-    ds = np.zeros((p, 3))
-    if p:
-        ds[PLACES["tilt"]] = [g * t for t in tangents(theta.u)]
-    state = _State(g * theta.u, np.zeros((3, 3)), ds, np.zeros((p, 3, 3)))
-    state = _measure(state, flat.y, flat.Sigma_a / flat.worth, theta, g, sums)
-    sums.squares = 0.0
-    for i in range(len(series)):
-        state = _propagate(state, problem, theta, i)
-        scale = 1.0 if series.r_scale is None else series.r_scale[i]
-        state = _measure(state, series.y[i], scale * flat.Sigma_a, theta, g, sums)
-    return Evaluation(sums.V, sums.squares, sums.gradient, sums.fisher)
-
-
-def _directions(p: int) -> tuple[Vector, Vector]:
-    """Return derivatives of D (p, 3, 3) and b_a (p, 3) by the parameters."""
-    dD, db = np.zeros((p, 3, 3)), np.zeros((p, 3))
-    if p:
-        dD[PLACES["D"]] = np.eye(9).reshape(9, 3, 3)
-        db[PLACES["b_a"]] = np.eye(3)
-    return dD, db
-
-
-def _measure(state: _State, y: Vector, R: Vector, theta: Theta, g: float, sums: _Sums) -> _State:
-    """Compute innovation, cost and update; R (3,) is Sigma_a of this sample."""
-    s, P, ds, dP = state
-    D, p = theta.D, len(ds)
-    dD, db = _directions(p)
-    e = y - D @ s - theta.b_a
-    de = -(dD @ s) - ds @ D.T - db
-    S = D @ P @ D.T + np.diag(R)
-    dS = dD @ P @ D.T + D @ dP @ D.T + D @ P @ np.swapaxes(dD, 1, 2)
-    Si = np.linalg.inv(S)
-    square = float(e @ Si @ e)
-    dsquare = 2.0 * de @ Si @ e - np.einsum("a,pab,b->p", Si @ e, dS, Si @ e)
-    SidS = Si @ dS
-    sums.squares += square
-    sums.V += 0.5 * square + 0.5 * float(np.log(np.linalg.det(S)))
-    sums.gradient += 0.5 * dsquare + 0.5 * np.trace(SidS, axis1=1, axis2=2)
-    sums.fisher += de @ Si @ de.T
-    if sums.measurements % 4 == 0:  # small and slow: every fourth stands for four
-        sums.fisher += 4 * 0.5 * np.einsum("pab,qba->pq", SidS, SidS)
-    sums.measurements += 1
-    A = P @ D.T
-    dA = dP @ D.T + P @ np.swapaxes(dD, 1, 2)
-    gain, dgain = A @ Si, dA @ Si - A @ Si @ dS @ Si
-    plus, dplus = s + gain @ e, ds + dgain @ e + de @ gain.T
-    P, dP = P - gain @ A.T, dP - dgain @ A.T - gain @ np.swapaxes(dA, 1, 2)
-    norm = float(np.linalg.norm(plus))
-    unit = plus / norm
-    return _State(g * unit, P, g / norm * (dplus - (dplus @ unit)[:, None] * unit), dP)
-
-
-def _propagate(state: _State, problem: Problem, theta: Theta, i: int) -> _State:
-    """Carry s and P through the turn of step i."""
-    s, P, ds, dP = state
-    series, p = problem.series, len(ds)
-    dt, rate = series.dt[i], series.omega[i] - theta.b_omega
-    phi = -dt * theta.K @ rate
-    F = rotation(phi)
-    dphi = np.zeros((p, 3))
-    if p:
-        dphi[PLACES["b_omega"]] = dt * theta.K.T
-    if p > ACCEL:
-        dphi[PLACES["K"]] = -dt * K_BASIS @ rate
-    eta = dphi @ left_jacobian(phi).T
-    dF = cross(eta) @ F
-    turned, dturned = F @ s, ds @ F.T + dF @ s
-    Fp = F @ P @ F.T
-    dFp = F @ dP @ F.T + dF @ P @ F.T + F @ P @ np.swapaxes(dF, 1, 2)
-    q_scale = 1.0 if series.q_scale is None else series.q_scale[i]
-    q_extra = 0.0 if series.q_extra is None else series.q_extra[i]
-    c = np.diag(dt**2 * q_scale * problem.flat.Sigma_omega + q_extra)
-    X, dX = cross(turned), cross(dturned)
-    half = dX @ c @ X.T
-    return _State(turned, Fp + X @ c @ X.T, dturned, dFp + half + np.swapaxes(half, 1, 2))
-
-
-LONGEST_STEP_S, SPEED_OF_RESET_S = 0.2, 0.04
+    """Evaluate as likelihood.evaluate does, by the exact filter."""
+    p, series, flat, g, at = parameters, problem.series, problem.flat, problem.gravity, with_steps(theta, parameters)
+    D, Dt = at.D, np.swapaxes(at.D, 1, 2)
+    s, P = g * at.u, np.zeros((p + 1, 3, 3), complex)
+    V, squares, gradient, fisher = 0.0, 0.0, np.zeros(p), np.zeros((p, p))
+    for i in range(-1, len(series)):
+        y, R = flat.y, np.diag(flat.Sigma_a / flat.worth)
+        if i >= 0:
+            y, R = series.y[i], _at(series.r_scale, i, 1.0) * np.diag(flat.Sigma_a)
+            dt = series.dt[i]
+            F = rotation(-dt * times(at.K, series.omega[i] - at.b_omega))
+            c = np.diag(dt**2 * _at(series.q_scale, i, 1.0) * flat.Sigma_omega + _at(series.q_extra, i, 0.0))
+            s = times(F, s)
+            P = F @ P @ np.swapaxes(F, 1, 2) + cross(s) @ c @ np.swapaxes(cross(s), 1, 2)
+        e, S = y - times(D, s) - at.b_a, D @ P @ Dt + R
+        Si = np.linalg.inv(S)
+        square = (e * times(Si, e)).sum(-1)
+        cost = 0.5 * (square + np.log(np.linalg.det(S)))
+        V, squares = V + cost[p].real, squares + (square[p].real if i >= 0 else 0.0)
+        gradient += cost[:p].imag / STEP
+        de, SidS = e[:p].imag / STEP, Si[p].real @ (S[:p].imag / STEP)
+        fisher += de @ Si[p].real @ de.T
+        if (i + 1) % 4 == 0:  # small and slow: every fourth stands for four
+            fisher += 4 * 0.5 * np.einsum("pab,qba->pq", SidS, SidS)
+        A = P @ Dt
+        s, P = of_length(s + times(A @ Si, e), g), P - A @ Si @ np.swapaxes(A, 1, 2)
+    return Evaluation(V, squares, gradient, fisher)
 
 
 class Gain(NamedTuple):
@@ -145,24 +103,23 @@ class Gain(NamedTuple):
 
 
 class Pass:
-    """x = (s, p, v, a) (12,), P (12, 12) and dx (p, 12) on their way through the samples; gains may be given."""
+    """x (p + 1, 12) with complex steps, and P (12, 12), on their way through the samples; gains may be given."""
 
     def __init__(self, problem: Problem, theta: Theta, held: list[Gain] | None = None) -> None:
         self.problem, self.theta, self.held = problem, theta, held
+        self.at = with_steps(theta, HAND)
         self.gains: list[Gain] = []
         self.innovations: list[Vector] = []
         self.V, self.squares = 0.0, 0.0
         self.gradient, self.fisher = np.zeros(HAND), np.zeros((HAND, HAND))
-        self.x: Vector = np.zeros(12)
+        self.x: Complex = np.zeros((HAND + 1, 12), complex)
         self.P: Vector = np.zeros((12, 12))
-        self.dx: Vector = np.zeros((HAND, 12))
-        self.x[:3] = problem.gravity * theta.u
-        self.dx[PLACES["tilt"], :3] = [problem.gravity * t for t in tangents(theta.u)]
+        self.x[:, :3] = problem.gravity * self.at.u
         self._run()
 
     def _run(self) -> None:
         series, flat, zero = self.problem.series, self.problem.flat, np.zeros(3)
-        self._measure(flat.y, flat.Sigma_a / flat.worth, zero, zero, 0.0, np.inf)
+        self._measure(flat.y, flat.Sigma_a / flat.worth, zero, zero, 0.0 * self.at.tau, np.inf)
         self.squares = 0.0
         for i in range(len(series)):
             self._turn(i)
@@ -172,21 +129,16 @@ class Pass:
             scale, extra = _at(series.r_scale, i, 1.0), _at(series.r_extra, i, 0.0)
             rate = zero if series.rate is None else series.rate[i]
             alpha = zero if series.alpha is None else series.alpha[i]
-            self._measure(series.y[i], scale * flat.Sigma_a + extra, rate, alpha, self.theta.tau, self.problem.huber)
+            self._measure(series.y[i], scale * flat.Sigma_a + extra, rate, alpha, self.at.tau, self.problem.huber)
 
     def _turn(self, i: int) -> None:
         """Turn all four vectors by F, and add the gyroscope's noise to s."""
-        series, theta = self.problem.series, self.theta
-        dt, rate = series.dt[i], series.omega[i] - theta.b_omega
-        phi = -dt * theta.K @ rate
-        dphi = np.zeros((HAND, 3))
-        dphi[PLACES["b_omega"]], dphi[PLACES["K"]] = dt * theta.K.T, -dt * K_BASIS @ rate
-        F = np.kron(np.eye(4), rotation(phi))
-        dF = np.kron(np.eye(4), cross(dphi @ left_jacobian(phi).T)) @ F
-        self.x, self.dx = F @ self.x, self.dx @ F.T + dF @ self.x
+        series, at, dt = self.problem.series, self.at, self.problem.series.dt[i]
+        F = rotation(-dt * times(at.K, series.omega[i] - at.b_omega))
+        self.x = (self.x.reshape(-1, 4, 3) @ np.swapaxes(F, 1, 2)).reshape(-1, 12)
         c = dt**2 * _at(series.q_scale, i, 1.0) * self.problem.flat.Sigma_omega + _at(series.q_extra, i, 0.0)
-        s = cross(self.x[:3])
-        self.P = np.asarray(F @ self.P @ F.T)
+        s, turn = cross(self.x[-1, :3].real), np.kron(np.eye(4), F[-1].real)
+        self.P = np.asarray(turn @ self.P @ turn.T)
         self.P[:3, :3] += s @ np.diag(c) @ s.T
 
     def _travel(self, i: int) -> None:
@@ -199,37 +151,29 @@ class Pass:
         Phi[1:, 1:] = both[3:, 3:].T
         Q[1:, 1:] = _at(self.problem.series.jerk, i, 0.0) * Phi[1:, 1:] @ both[:3, 3:]
         Phi, Q = (np.asarray(np.kron(M, np.eye(3)), float) for M in (Phi, Q))
-        self.x, self.dx, self.P = Phi @ self.x, self.dx @ Phi.T, Phi @ self.P @ Phi.T + Q
+        self.x, self.P = self.x @ Phi.T, Phi @ self.P @ Phi.T + Q
 
     def _reset(self, sigma: float) -> None:
-        self.x[3:], self.dx[:, 3:], self.P[3:, :], self.P[:, 3:] = 0.0, 0.0, 0.0, 0.0
+        self.x[:, 3:], self.P[3:, :], self.P[:, 3:] = 0.0, 0.0, 0.0
         self.P[6:9, 6:9] = (SPEED_OF_RESET_S * sigma) ** 2 * np.eye(3)
         self.P[9:, 9:] = sigma**2 * np.eye(3)
 
-    def _measure(self, y: Vector, R: Vector, rate: Vector, alpha: Vector, tau: float, huber: float) -> None:
+    def _measure(self, y: Vector, R: Vector, rate: Vector, alpha: Vector, tau: Complex, huber: float) -> None:
         """Compute innovation, cost, derivatives and update; R (3,) is the diagonal of the noise."""
-        theta, g, x = self.theta, self.problem.gravity, self.x
-        E = np.eye(3) + tau * cross(rate)
+        at, x = self.at, self.x
+        E = np.eye(3) + tau[:, None, None] * cross(rate)
         L = cross(alpha) + cross(rate) @ cross(rate)
-        H = theta.D @ np.hstack([E, np.zeros((3, 6)), np.eye(3)])
-        q = E @ x[:3] + x[9:] + L @ theta.r
-        e = y - theta.D @ q - theta.b_a
-        de = -self.dx @ H.T
-        de[PLACES["D"]] -= np.kron(np.eye(3), q[:, None])
-        de[PLACES["b_a"]] -= np.eye(3)
-        de[PLACES["tau"]] -= theta.D @ cross(rate) @ x[:3]
-        de[PLACES["r"]] -= (theta.D @ L).T
-        gain = self._gain(H, e, np.diag(R), huber) if self.held is None else self.held[len(self.gains)]
+        e = y - times(at.D, times(E, x[:, :3]) + x[:, 9:] + at.r @ L.T) - at.b_a
+        H = self.theta.D @ np.hstack([E[-1].real, np.zeros((3, 6)), np.eye(3)])
+        gain = self._gain(H, e[-1].real, np.diag(R), huber) if self.held is None else self.held[len(self.gains)]
+        de = e[:-1].imag / STEP
         self.gains.append(gain)
-        self.innovations.append(e)
-        self.gradient += gain.w * de @ gain.Si @ e
+        self.innovations.append(e[-1].real)
+        self.gradient += gain.w * de @ gain.Si @ e[-1].real
         self.fisher += gain.w * de @ gain.Si @ de.T
-        self.x, self.dx = x + gain.K @ e, self.dx + de @ gain.K.T
+        self.x = x + e @ gain.K.T
         self.P = self.P - gain.K @ H @ self.P
-        norm = float(np.linalg.norm(self.x[:3]))
-        u = self.x[:3] / norm
-        self.x[:3] = g * u
-        self.dx[:, :3] = g / norm * (self.dx[:, :3] - np.outer(self.dx[:, :3] @ u, u))
+        self.x[:, :3] = of_length(self.x[:, :3], self.problem.gravity)
 
     def _gain(self, H: Vector, e: Vector, R: Vector, huber: float) -> Gain:
         S = H @ self.P @ H.T + R
