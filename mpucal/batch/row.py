@@ -19,7 +19,7 @@ from ..data import Recording
 from ..errors import MpucalError
 from ..files import load
 from ..files.hints import NO_HINTS, Hints
-from ..mavlink.calibrate_vehicle import calibrate_vehicle
+from ..mavlink.parameters.document import calibrate_vehicle
 from ..report import render
 from ..result.calibration import Calibration
 from .locations import compute_digest, fetch, write_bytes

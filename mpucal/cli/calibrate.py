@@ -12,8 +12,7 @@ from ..disk.output_folder import OutputFolder
 from ..errors import RefusedError
 from ..files import load
 from ..files.formats import readable_formats
-from ..mavlink.calibrate_vehicle import calibrate_vehicle
-from ..mavlink.parameters.document import AUTOPILOT
+from ..mavlink.parameters.document import AUTOPILOT, calibrate_vehicle
 from ..result.calibration import REFUSED
 from ..result.noise import Noise, with_noise
 from ..result.session_files import BLOB

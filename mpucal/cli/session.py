@@ -12,8 +12,7 @@ import click
 
 from ..data import Recording
 from ..errors import MpucalError, RefusedError
-from ..mavlink.calibrate_vehicle import calibrate_vehicle
-from ..mavlink.parameters.document import AUTOPILOT
+from ..mavlink.parameters.document import AUTOPILOT, calibrate_vehicle
 from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import warn_unset

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..mavlink.firmwares import ARDUPILOT, PX4
-from ..mavlink.parameters.encoding import INT32
+from ..mavlink.parameters.encoding import INT32, param_text, params_text
 from ..mavlink.parameters.plan import plan_changes, refused_imus
-from ..mavlink.parameters.text import param_text, params_text
 from ..result.calibration import Calibration
 from .losses import date_text
 

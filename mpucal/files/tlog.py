@@ -10,7 +10,7 @@ from ..data import Recording
 from ..errors import RecordingError
 from ..mavlink.dialect import Parser, dialect
 from ..mavlink.log import read_log
-from ..mavlink.session_events import NoteReader, is_own
+from ..mavlink.texts import NoteReader, is_own
 from ..mavlink.tlog import RawPacket, TlogFile, encode_tlog
 from .budget import check_size
 from .folder import captures_in

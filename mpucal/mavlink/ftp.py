@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .link import Link
-from .request import ask
+from .requests import ask
 
 PAYLOAD, MOST_DATA = 251, 239
 TIMEOUT_S, TRIES = 0.5, 10

@@ -18,14 +18,13 @@ from ..data import Recording
 from ..errors import RecordingError
 from ..rests.flat import find_flat
 from .dialect import Message, Parser, dialect, read_header
-from .firmwares import PX4, preferred_messages
+from .firmwares import PX4, Vehicle, preferred_messages, vehicle_of
 from .imu import HIGHRES, MESSAGE_ID, RAW, Reading, Stream, decode_reading
 from .parameters.encoding import decode_parameter
 from .segments import ALTERING, SETTLED_US, Segment, find_recorrection, join_segments
 from .stream_buffers import Row, StreamBuffers
 from .tlog import RawPacket
 from .transport import US
-from .vehicle import Vehicle, vehicle_of
 
 # Firmwares make names of these characters; none has so many parameters.
 NAME, MOST_PARAMETERS = re.compile(r"\w{1,16}", re.ASCII), 4096

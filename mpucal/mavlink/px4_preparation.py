@@ -13,12 +13,11 @@ from .dialect import dialect
 from .firmwares import PX4
 from .imu import HIGHRES, MESSAGE_ID, decode_reading
 from .link import Link, S
-from .parameters.client import ParameterClient
+from .parameters.client import ParameterClient, read_parameters
 from .parameters.encoding import INT32
 from .parameters.slots import all_slots
-from .prompts import ReceivedPrompt, encode_prompt
-from .request import send_command
-from .stream_parameters import read_parameters
+from .requests import send_command
+from .texts import ReceivedPrompt, encode_prompt
 
 AUTOCAL = "SENS_IMU_AUTOCAL"
 # MAV_CMD_PREFLIGHT_CALIBRATION, param5: estimate offsets from a level rest, which also stores each sensor's id.

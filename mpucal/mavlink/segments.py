@@ -12,9 +12,8 @@ import numpy as np
 
 from ..data import Vector
 from .firmwares import EKF2_IMU_CTRL, PX4
-from .parameters.compose import Correction
 from .parameters.mounting import mounting
-from .parameters.slots import Slot, Values, find_slot, px4_slot
+from .parameters.slots import Correction, Slot, Values, find_slot, px4_slot
 from .stream_buffers import StreamBuffers
 
 # Prefixes of parameters whose change alters the streams: in a way that is not transformed, or by a correction.

@@ -10,7 +10,7 @@ from .dialect import Message, dialect
 from .firmwares import PX4, preferred_messages
 from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, decode_reading
 from .link import Link, S
-from .request import encode_command, send_command
+from .requests import encode_command, send_command
 from .stream_buffers import US_PER_S
 
 # ArduPilot's rates at a loop of 400 Hz: the next lower one is requested after one that it denies.

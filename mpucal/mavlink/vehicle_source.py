@@ -8,18 +8,17 @@ from ..clocks.vehicle_clock import Jump
 from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError, WriteBackError
 from .dialect import Message
-from .firmwares import PX4
+from .firmwares import PX4, Vehicle
 from .imu import Stream
 from .link import Link, S
 from .log import Log
+from .parameters.client import read_stream_parameters
 from .parameters.slots import find_slot
-from .prearm import is_armed
 from .px4_preparation import AUTOCAL, Preparation
+from .requests import is_armed
 from .stream import Streams
 from .stream_buffers import Row, samples_of, sensor_of
-from .stream_parameters import read_stream_parameters
 from .transport import PAUSE_NS
-from .vehicle import Vehicle
 
 POLL_NS = S // 20
 SILENT_NS = 4 * S

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Self
 
 from ..chip.registers import FIFO_COUNT_H, FIFO_R_W
-from .mishaps import Knock, Mishap, Slip, Warmth, ZeroStep
+from .disturbance import Knock, Mishap, Slip, Warmth, ZeroStep
 
 
 class Where(StrEnum):

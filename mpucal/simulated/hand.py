@@ -12,8 +12,8 @@ import numpy as np
 from ..calibration.rotation import shortest_turn
 from ..data import Vector
 from . import rotation
+from .disturbance import Mishap
 from .legs import STEP_HZ, Hold, Leg, Move, steps
-from .mishaps import Mishap
 
 # Nobody reacts faster, so the motion is fixed this far ahead.
 REACTION_S = (0.5, 1.5)

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
+from .disturbance import Knock, Slip, Warmth
 from .hand import IN_THE_HAND, ON_THE_TABLE, PAUSE_S, TURN_RAD, Hand, Stance
 from .legs import Leg, Move, Tumble, steps
-from .mishaps import Knock, Slip, Warmth
 
 
 class Guided(Hand):

@@ -10,10 +10,19 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
-from .disturbance import ARMS, HELD_HZ, JERK_MPS2, JERK_S, SWAY_HZ, USUAL_ARM, HandDisturbance, point_acceleration
+from .disturbance import (
+    ARMS,
+    HELD_HZ,
+    JERK_MPS2,
+    JERK_S,
+    SWAY_HZ,
+    USUAL_ARM,
+    HandDisturbance,
+    Mishap,
+    point_acceleration,
+)
 from .hand import REACTION_S, Hand, HandPrompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
-from .mishaps import Mishap
 
 # Shorter than any reaction: a prompt never changes motion that has been computed.
 AHEAD_S = REACTION_S[0] / 2

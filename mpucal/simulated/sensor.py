@@ -1,15 +1,16 @@
-"""True parameters of a simulated sensor, and its response to a motion: counts of a chip, or values in SI units."""
+"""Simulated sensor: its true parameters, its response to a motion, and the feed of a simulated chip."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..chip.families import MPU6050, MPU6500
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
+from .motion import Motion
 
 Counts = NDArray[np.int16]
 
@@ -184,3 +185,32 @@ def to_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector,
 def density(std: Vector, rate_hz: float) -> Vector:
     """Return the noise density at which a sample at `rate_hz` has the standard deviation `std`."""
     return np.asarray(std / np.sqrt(rate_hz / 2.0))
+
+
+TEMPERATURE = 3
+
+
+class Feed(Protocol):
+    """Source of the next samples, at the chip's sample clock."""
+
+    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
+        """Return (n, 7) int16 in register order between (n + 1,) times [s]; fewer at the feed's end."""
+        ...
+
+
+class SensorFeed:
+    """Feed of a sensor of known truth in motion."""
+
+    def __init__(self, truth: SensorTruth, motion: Motion, rng: np.random.Generator) -> None:
+        self._truth, self._motion, self._rng = truth, motion, rng
+        self._set: tuple[Setting, SensorResponse] | None = None
+
+    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
+        """Return the samples between (n + 1,) times [s]; the feed never ends."""
+        if self._set is None or self._set[0] is not setting:
+            self._set = setting, self._truth.response(setting)
+        counts = self._set[1].counts(*self._motion.means(edges_s, setting.accel_lag_s), self._rng)
+        if self._motion.mishaps:
+            warmer = np.rint(self._motion.warmer_c(edges_s) * setting.lsb_per_c).astype(np.int16)
+            counts[:, TEMPERATURE] += warmer
+        return counts

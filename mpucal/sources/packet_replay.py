@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ..chip.records import SessionEvent
 from ..errors import EndOfCapture
 from ..files.mcap import Record
-from ..mavlink.session_events import is_own
+from ..mavlink.texts import is_own
 from ..mavlink.tlog import RawPacket
 from ..mavlink.transport import PAUSE_NS, ReceivedBytes
 

@@ -139,7 +139,7 @@ SOURCES = [
         option=BUS,
         word="sim",
         forms="sim[:key=value,...] for the simulated chip",
-        opener="mpucal.simulated.chip.source:open_source",
+        opener="mpucal.simulated.chip:open_source",
         options=(SEED,),
         title="simulated chip",
         doctor="mpucal.doctor.examine:examine_chip",
@@ -207,7 +207,7 @@ SOURCES = [
         what="the simulated vehicle",
         word="sim",
         forms="sim[:key=value,...] for the simulated vehicle",
-        opener="mpucal.simulated.vehicle.source:open_source",
+        opener="mpucal.simulated.vehicle:open_source",
         title="simulated vehicle",
     ),
     SourceKind(

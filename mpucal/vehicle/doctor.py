@@ -17,13 +17,11 @@ from ..mavlink.dialect import Message, Parser, dialect, read_header
 from ..mavlink.firmwares import FILTERS, PX4, accel_lag_s
 from ..mavlink.link import Link
 from ..mavlink.log import Log
-from ..mavlink.parameters.level import trim_names, trim_of
-from ..mavlink.parameters.mounting import BOARD_ROTATION, ORIENTATION, mounting
+from ..mavlink.parameters.client import read_parameters, read_stream_parameters
+from ..mavlink.parameters.mounting import BOARD_ROTATION, ORIENTATION, mounting, trim_names, trim_of
 from ..mavlink.parameters.slots import Slot, Values, find_slot
-from ..mavlink.prearm import ArmingMonitor, check_prearm
-from ..mavlink.request import ask, encode_command
+from ..mavlink.requests import ArmingMonitor, ask, check_prearm, encode_command
 from ..mavlink.stream import MOST, Streams
-from ..mavlink.stream_parameters import read_parameters, read_stream_parameters
 from ..mavlink.transport import US
 from ..mavlink.vehicle_source import LOSS_SHARE
 from ..rests.flat import flat_statistics

@@ -15,20 +15,16 @@ from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.ftp import Storage
-from ..mavlink.horizon import Horizon
 from ..mavlink.link import Link, S
-from ..mavlink.parameters.client import ParameterClient
+from ..mavlink.parameters.client import ParameterClient, read_parameters, read_stream_parameters
 from ..mavlink.parameters.document import adapt_to_write, select_imu
-from ..mavlink.parameters.level import MOST_DEG, Level, Leveller, trim_names, trim_of
+from ..mavlink.parameters.encoding import param_text, params_text, read_parameters_file
+from ..mavlink.parameters.mounting import MOST_DEG, Level, Leveller, trim_names, trim_of
 from ..mavlink.parameters.plan import NOTHING, Change, plan_changes, refused_imus, select_improving, swap_slots
 from ..mavlink.parameters.slots import all_slots
-from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
-from ..mavlink.parameters.verify import SwappedSlotsError, verify
-from ..mavlink.parameters.write import NEW, OLD, Writer, is_partial_write
-from ..mavlink.prearm import ArmingMonitor, PrearmState, check_prearm
-from ..mavlink.request import send_command
-from ..mavlink.rest_monitor import RestMeans, RestMonitor
-from ..mavlink.stream_parameters import read_parameters, read_stream_parameters
+from ..mavlink.parameters.write import NEW, OLD, SwappedSlotsError, Writer, is_partial_write, verify
+from ..mavlink.requests import ArmingMonitor, PrearmState, check_prearm, send_command
+from ..mavlink.rest import Horizon, RestMeans, RestMonitor
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.lay_flat import STAND, put_down

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from ..chip.records import BEGUN, END, OPENED
-from ..data import Recording
+from ..data import Recording, Samples, Sensor
 from ..errors import EndOfCapture, LinkError
 from ..files.mcap import Capture
 from ..files.messages import PACKETS
@@ -17,13 +17,11 @@ from ..files.recorders import DRIVER
 from ..mavlink import MAVLINK_VERSION
 from ..mavlink.link import OWN_SYSTEM, Link, Recorder
 from ..mavlink.log import read_log
-from ..mavlink.prompts import encode_prompt
-from ..mavlink.recorded_source import RecordedSource
-from ..mavlink.signing import read_key
-from ..mavlink.stream_parameters import read_stream_parameters
+from ..mavlink.parameters.client import read_stream_parameters
+from ..mavlink.texts import encode_prompt
 from ..mavlink.tlog import RawPacket
 from ..mavlink.transports import open_transport
-from ..mavlink.url import parse_url
+from ..mavlink.url import parse_url, read_key
 from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
 from ..origin import Origin
 from ..session.events import Prompt
@@ -32,6 +30,52 @@ from ..sources.chain import Chain
 from ..sources.kind import Request
 from ..sources.opened_source import ActiveSource, NewRecords, OpenedSource, Say
 from ..sources.packet_replay import PacketReplay
+
+POLL_S = 0.05
+
+
+class RecordedSource:
+    """Source of the samples of another ground station's .tlog, a twentieth of a second at a time."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._at = 0
+        self._now_s = float(recording.t[0])
+
+    def start(self) -> Sensor:
+        """Return the sensor of the recording."""
+        return self._recording.sensor
+
+    def poll(self) -> Samples:
+        """Return the next samples.
+
+        Raises
+        ------
+        EndOfCapture : there are no more.
+        """
+        if self._at == len(self._recording):
+            raise EndOfCapture
+        self._now_s += POLL_S
+        last = int(self._recording.t.searchsorted(self._now_s))
+        part = self._recording.part(self._at, last)
+        self._at = last
+        return Samples(*(getattr(part, name) for name in Samples.__dataclass_fields__))
+
+    def recording(self) -> Recording:
+        """Return the whole recording."""
+        return self._recording
+
+    def forget(self) -> None:
+        """Drop the samples that were polled."""
+        self._recording, self._at = self._recording.part(self._at, len(self._recording)), 0
+
+    def now_ns(self) -> int:
+        """Return the time of the samples' clock."""
+        return round(self._now_s * 1e9)
+
+    def stop(self) -> None:
+        """Do nothing: there is no device to stop."""
+
 
 SYSTEM, PREPARE = "system", "prepare"
 

@@ -16,10 +16,9 @@ from mpucal.bridge.bus import BridgeBus
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.simulated.chip import SimulatedBus
+from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
 MS = 1_000_000

@@ -15,7 +15,7 @@ from mpucal.errors import BusError, OutputError
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 from tools.lab.bridge import EmulatedBridge, Memory
 
 BLOB = Path(__file__).parents[2] / "fixtures" / "vectors" / "blob_measured.bin"

@@ -17,7 +17,7 @@ from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer, WriteBackError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.faults import Where, fault_kinds
 from tools.lab.bridge import EmulatedLine, Memory
 from tools.lab.bridge.line_faults import LineFaults

@@ -11,9 +11,8 @@ from mpucal.doctor.finding import Mark
 from mpucal.doctor.measure import examine_stream
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.simulated.chip import Chip, SimulatedBus
-from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.bus import FastClock
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.sources.opened_source import NewRecords
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap

@@ -11,11 +11,9 @@ from mpucal.chip.driver import Driver
 from mpucal.data import Samples
 from mpucal.errors import BusError
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.bus import SimulatedBus
+from mpucal.simulated.chip.bus import FastClock, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.sources.tap import Tap
 
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import mpucal
 from mpucal.errors import RecordingError
-from mpucal.mavlink.calibrate_vehicle import calibrate_vehicle
+from mpucal.mavlink.parameters.document import calibrate_vehicle
 
 D = np.array([[1.02, 0.003, 0.0], [0.0, 0.99, -0.004], [0.002, 0.0, 0.97]])
 B_A = np.array([-0.2, 0.3, 0.25])

@@ -19,8 +19,7 @@ from mpucal.errors import BusError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.simulated.chip import Chip, SimulatedBus
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 
 ROOT = Path(__file__).parents[2]
 OLD = (ROOT / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.simulated.chip import SimulatedBus, open_simulated
-from mpucal.simulated.chip.clock import RealClock
+from mpucal.simulated.chip.bus import RealClock
 
 DEVICE = struct.pack("<BBHBBBBHHHBBBB", 18, 1, 0x0110, 0xFF, 0, 0, 64, 0x0403, 0xC631, 0x0205, 0, 0, 0, 1)
 CONFIGURATION = struct.pack("<BBHBBBBB", 9, 2, 18, 1, 1, 0, 0x80, 50) + struct.pack("<9B", 9, 4, 0, 0, 0, 0xFF, 0, 0, 0)

@@ -4,7 +4,7 @@ import pytest
 
 from mpucal.errors import BusError, LinkError, NoAnswer, UsageError
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S
-from mpucal.mavlink.request import send_command
+from mpucal.mavlink.requests import send_command
 from mpucal.mavlink.vehicle_source import choose_vehicle
 
 KEY = b"k" * 32

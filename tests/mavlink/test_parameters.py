@@ -9,11 +9,9 @@ from scipy.spatial.transform import Rotation
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.data import Autopilot
 from mpucal.mavlink.dialect import dialect
-from mpucal.mavlink.parameters.compose import Correction, compose
 from mpucal.mavlink.parameters.document import autopilot_document
-from mpucal.mavlink.parameters.level import Leveller, tilt_deg
-from mpucal.mavlink.parameters.mounting import mounting, orientation_matrix
-from mpucal.mavlink.parameters.slots import find_slot, px4_slot
+from mpucal.mavlink.parameters.mounting import Leveller, mounting, orientation_matrix, tilt_deg
+from mpucal.mavlink.parameters.slots import Correction, compose, find_slot, px4_slot
 from mpucal.mavlink.segments import find_recorrection
 from mpucal.result.calibration import Calibration
 

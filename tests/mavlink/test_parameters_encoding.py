@@ -9,8 +9,15 @@ from hypothesis import strategies as st
 
 from mpucal.errors import RecordingError
 from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.mavlink.parameters.encoding import error_name, from_wire, name_bytes, to_wire
-from mpucal.mavlink.parameters.text import param_text, params_text, read_parameters_file
+from mpucal.mavlink.parameters.encoding import (
+    error_name,
+    from_wire,
+    name_bytes,
+    param_text,
+    params_text,
+    read_parameters_file,
+    to_wire,
+)
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
 RANGES = {INT8: 8, INT16: 16, INT32: 32}

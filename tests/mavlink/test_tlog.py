@@ -23,7 +23,7 @@ from mpucal.files.tlog import read_tlog
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM
 from mpucal.mavlink.log import Log, read_log
-from mpucal.mavlink.session_events import CHUNK, PREFIX, Note, NoteReader
+from mpucal.mavlink.texts import CHUNK, PREFIX, Note, NoteReader
 from mpucal.mavlink.tlog import RawPacket, TlogFile, encode_tlog
 from mpucal.session.plan import Plan
 from mpucal.sources.packet_replay import PacketReplay

@@ -6,8 +6,7 @@ import os
 import pytest
 
 from mpucal.errors import UsageError
-from mpucal.mavlink.signing import read_key
-from mpucal.mavlink.url import Kind, Url, parse_url
+from mpucal.mavlink.url import Kind, Url, parse_url, read_key
 
 KEY = bytes(range(32))
 

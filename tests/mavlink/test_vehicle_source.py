@@ -9,11 +9,10 @@ import scipy
 from mpucal.errors import EndOfCapture, LinkError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.client import ParameterClient
+from mpucal.mavlink.parameters.client import ParameterClient, read_stream_parameters, stream_parameter_names
 from mpucal.mavlink.parameters.mounting import mounting
 from mpucal.mavlink.parameters.slots import ardupilot_slot
-from mpucal.mavlink.prearm import check_prearm
-from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_parameter_names
+from mpucal.mavlink.requests import check_prearm
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.sources.packet_replay import PacketReplay
 

@@ -14,9 +14,8 @@ from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
 from mpucal.errors import BusError, NoAnswer, RecordingError, WriteBackError
 from mpucal.result.calibration import REFUSED, Calibration
 from mpucal.simulated.chip import Chip, SimulatedBus
-from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS, OFFSETS
+from mpucal.simulated.chip.bus import FastClock
+from mpucal.simulated.chip.models import MODELS, OFFSETS, FactoryTrim
 from mpucal.sinks.chip import ChipSink
 from mpucal.sinks.table import CHIP_OFFSETS
 

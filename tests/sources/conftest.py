@@ -11,10 +11,9 @@ from smbus2 import smbus2
 
 import mpucal.sources.host_bus
 from mpucal.simulated.chip import SimulatedBus
+from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 
 I2C_M_RD = 0x0001
 

@@ -15,7 +15,7 @@ from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, UsageError
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 from mpucal.sources import host_bus
 from mpucal.sources.spi import SpiBus
 

@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 
 from mpucal.data import Autopilot
 from mpucal.errors import LinkError, RecordingError, WriteBackError
-from mpucal.mavlink import rest_monitor
+from mpucal.mavlink import rest as rest_monitor
 from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.mavlink.horizon import Horizon
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
-from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
-from mpucal.mavlink.request import send_command
+from mpucal.mavlink.requests import send_command
+from mpucal.mavlink.rest import Horizon
+from mpucal.mavlink.texts import ReceivedPrompt, encode_prompt
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration

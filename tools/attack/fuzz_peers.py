@@ -23,9 +23,8 @@ from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.ftp import Payload, Storage
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.client import ParameterClient
-from mpucal.mavlink.prearm import ArmingMonitor
-from mpucal.mavlink.stream_parameters import stream_parameter_names
+from mpucal.mavlink.parameters.client import ParameterClient, stream_parameter_names
+from mpucal.mavlink.requests import ArmingMonitor
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.page.requests import RequestFilter
 from mpucal.page.server import Handler

@@ -30,9 +30,8 @@ from mpucal.files import load
 from mpucal.files.hints import Hints, parse_columns, parse_units
 from mpucal.files.mcap import FORMAT, read_capture
 from mpucal.iio.devices import Devices
-from mpucal.mavlink.parameters.text import read_parameters_file
-from mpucal.mavlink.signing import read_key
-from mpucal.mavlink.url import parse_url
+from mpucal.mavlink.parameters.encoding import read_parameters_file
+from mpucal.mavlink.url import parse_url, read_key
 from mpucal.page.address import parse_address
 from mpucal.result.blob import Blob
 from mpucal.result.journal import Journal

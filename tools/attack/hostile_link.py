@@ -13,8 +13,8 @@ from unittest.mock import patch
 
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.ftp import PAYLOAD
+from mpucal.mavlink.parameters.client import stream_parameter_names
 from mpucal.mavlink.parameters.encoding import from_wire
-from mpucal.mavlink.stream_parameters import stream_parameter_names
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.session import results
 from mpucal.simulated.vehicle import SimulatedVehicle
@@ -263,7 +263,7 @@ def hostile(attack: Attack) -> Iterator[None]:
     """Attack `--mavlink sim` while the block runs, and leave out slow parts that are not tested here."""
     HostileTransport.attack = attack
     with (
-        patch("mpucal.simulated.vehicle.source.SimulatedTransport", HostileTransport),
+        patch("mpucal.simulated.vehicle.SimulatedTransport", HostileTransport),
         patch.object(results, "report", lambda _: None),
         quick(),
     ):

@@ -23,11 +23,9 @@ from mpucal.chip.driver import Driver
 from mpucal.chip.families import MPU6500
 from mpucal.data import Recording, Vector
 from mpucal.files.mcap import read_capture
-from mpucal.simulated.chip.bus import SimulatedBus
+from mpucal.simulated.chip.bus import FastClock, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.simulated.sensor import Counts, Setting
 from mpucal.sources.spi import DATA, REGISTER_HZ
 from mpucal.sources.tap import Tap

@@ -23,11 +23,10 @@ import numpy as np
 from mpucal.bridge.bus import BridgeBus
 from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.simulated.chip import SimulatedBus, open_simulated
-from mpucal.simulated.chip.fault_injector import FaultInjector
+from mpucal.simulated.chip.bus import FaultInjector
+from mpucal.simulated.disturbance import Mishap, ZeroStep
 from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, begin_mishaps, fault_kinds
-from mpucal.simulated.mishaps import Mishap, ZeroStep
-from mpucal.simulated.vehicle.line import PacketLine
-from mpucal.simulated.vehicle.transport import SimulatedTransport
+from mpucal.simulated.vehicle.transport import PacketLine, SimulatedTransport
 
 from .bridge import EmulatedBridge, EmulatedLine
 from .bridge.line_faults import LineFaults
@@ -101,8 +100,8 @@ class World:
 
         with (
             patch("mpucal.simulated.chip.SimulatedBus", lambda *a: HookedBus(self, *a)),
-            patch("mpucal.simulated.vehicle.source.SimulatedTransport", lambda v: HookedTransport(self, v)),
-            patch("mpucal.simulated.chip.source.open_simulated", bridged if self.kind == BRIDGE else open_simulated),
+            patch("mpucal.simulated.vehicle.SimulatedTransport", lambda v: HookedTransport(self, v)),
+            patch("mpucal.simulated.chip.open_simulated", bridged if self.kind == BRIDGE else open_simulated),
         ):
             yield
 

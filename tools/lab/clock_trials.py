@@ -14,7 +14,7 @@ from mpucal.bridge.bus import BridgeBus
 from mpucal.chip.driver import Driver
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 
 from .bridge import EmulatedBridge, EmulatedLine
 from .judge import rms

@@ -10,8 +10,7 @@ import numpy as np
 
 from mpucal.calibration.ekf import Ekf, specific_force
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
-from mpucal.mavlink.parameters.compose import Correction
-from mpucal.mavlink.parameters.slots import Slot
+from mpucal.mavlink.parameters.slots import Correction, Slot
 from mpucal.rests.flat import Flat
 from mpucal.result.calibration import GOOD, USABLE, Calibration
 from mpucal.result.error_model import sensor_axes

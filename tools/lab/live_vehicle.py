@@ -35,11 +35,10 @@ from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
 from mpucal.errors import NoAnswer
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.compose import Correction
+from mpucal.mavlink.parameters.client import read_parameters, read_stream_parameters
 from mpucal.mavlink.parameters.mounting import mounting
-from mpucal.mavlink.parameters.slots import AXES, ardupilot_slot
-from mpucal.mavlink.prompts import ReceivedPrompt
-from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parameters
+from mpucal.mavlink.parameters.slots import AXES, Correction, ardupilot_slot
+from mpucal.mavlink.texts import ReceivedPrompt
 from mpucal.mavlink.transport import Transport
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url

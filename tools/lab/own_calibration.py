@@ -9,10 +9,10 @@ import numpy as np
 from mpucal.data import Vector
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Message, dialect
-from mpucal.mavlink.horizon import Horizon
 from mpucal.mavlink.link import Link, S
-from mpucal.mavlink.parameters.level import tilt_deg
-from mpucal.mavlink.request import send_command
+from mpucal.mavlink.parameters.mounting import tilt_deg
+from mpucal.mavlink.requests import send_command
+from mpucal.mavlink.rest import Horizon
 from mpucal.session.aims import SIDES
 
 PATIENCE_NS, LISTEN_NS = 600 * S, S // 5

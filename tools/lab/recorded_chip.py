@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from mpucal.data import Vector
 from mpucal.simulated.chip import Chip, SimulatedBus
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.sensor import FULL_SCALE, Counts, Setting
 

@@ -27,9 +27,9 @@ from typing import Annotated, Any, NoReturn
 from pymavlink import mavutil
 
 from mpucal.errors import LinkError, MpucalError, UsageError
-from mpucal.mavlink.signing import read_key
+from mpucal.mavlink.url import read_key
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
-from mpucal.simulated.vehicle.line import PacketLine
+from mpucal.simulated.vehicle.transport import PacketLine
 
 STEP_S, LONGEST_STEP_S = 0.002, 0.1
 CHUNK = 65536

@@ -1,4 +1,4 @@
-"""The entries `autopilot` and `others` of a vehicle's calibration.json."""
+"""Calibration of all IMUs of a vehicle, and the entries `autopilot` and `others` of its calibration.json."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...data import STANDARD_GRAVITY_MPS2, Autopilot
+from ...calibration import calibrate_all
+from ...data import STANDARD_GRAVITY_MPS2, Autopilot, Recording
 from ...result.calibration import Calibration
-from .compose import compose
-from .level import Level
-from .mounting import mounting
-from .slots import find_slot, slot_of
+from .mounting import Level, mounting
+from .slots import compose, find_slot, slot_of
 
 AUTOPILOT, OTHERS = "autopilot", "others"
 OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
@@ -123,3 +122,26 @@ def _turn(calibration: Calibration, level: Level) -> Calibration:
         b_omega=Q @ calibration.b_omega,
         extra={**calibration.extra, AUTOPILOT: now},
     )
+
+
+def calibrate_vehicle(
+    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2, gravity_anyway: bool = False
+) -> Calibration:
+    """Calibrate like `calibrate`, and put a vehicle's other IMUs and each one's parameters into `extra`.
+
+    Raises
+    ------
+    UsageError : see calibrate.
+    """
+    recordings = (recording, *recording.others)
+    first, *others = map(_with_parameters, calibrate_all(recording, model, gravity, gravity_anyway), recordings)
+    if not others:
+        return first
+    return replace(first, extra={**first.extra, OTHERS: [other.document() for other in others]})
+
+
+def _with_parameters(calibration: Calibration, recording: Recording) -> Calibration:
+    if recording.autopilot is None:
+        return calibration
+    extra = {**calibration.extra, AUTOPILOT: autopilot_document(recording.autopilot, calibration)}
+    return replace(calibration, extra=extra)

@@ -12,9 +12,8 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..firmwares import PX4
-from .compose import Correction
 from .mounting import BOARD_ANGLES, euler_matrix
-from .slots import AXES, Values
+from .slots import AXES, Correction, Values
 
 # Greatest trim that ArduPilot accepts of its own level calibration (HAL_INS_TRIM_LIMIT_DEG).
 MOST_DEG = 10.0

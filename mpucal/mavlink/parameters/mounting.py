@@ -1,18 +1,22 @@
-"""Mounting of a sensor: the rotation matrix R_b (3, 3) from its axes to the vehicle's, by the vehicle's parameters.
+"""Mounting of a sensor and level of a vehicle, by its parameters.
 
-scipy.spatial.transform is imported when a matrix is made.
+R_b (3, 3) is the rotation from a sensor's axes to the vehicle's. A trim is the roll, pitch and yaw [deg] by which the
+autopilot is turned in its vehicle, so that a vehicle that stands as it should hover has an attitude of zero roll and
+pitch. ArduPilot subtracts it from its attitude, and its streams stay in the autopilot's axes. PX4 turns the streams by
+it.
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...data import Vector
+from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..dialect import dialect
 from ..firmwares import PX4
-from .slots import AXES, Slot, Values
+from .slots import AXES, Correction, Slot, Values
 
 ORIENTATION, BOARD_ROTATION = "AHRS_ORIENTATION", "SENS_BOARD_ROT"
 BOARD_ANGLES = tuple(f"SENS_BOARD_{axis}_OFF" for axis in AXES)
@@ -60,3 +64,120 @@ def _rotation(name: str, values: Values) -> Vector | None:
     if not angles:
         return orientation_matrix(number)
     return euler_matrix([values[angle] for angle in angles]) if set(angles) <= set(values) else None
+
+
+# Greatest trim that ArduPilot accepts of its own level calibration (HAL_INS_TRIM_LIMIT_DEG).
+MOST_DEG = 10.0
+
+
+def trim_names(firmware: str) -> tuple[str, ...]:
+    """Return the names of the three parameters that hold the trim."""
+    return BOARD_ANGLES if firmware == PX4 else tuple(f"AHRS_TRIM_{axis}" for axis in AXES)
+
+
+def trim_of(firmware: str, values: Values) -> Vector:
+    """Return the trim (3,) [deg] in a vehicle's parameters."""
+    held = np.array([values[name] for name in trim_names(firmware)])
+    return held if firmware == PX4 else np.degrees(held)
+
+
+def trim_values(firmware: str, trim_deg: Vector) -> dict[str, float]:
+    """Return a trim as parameters by name."""
+    angles = trim_deg if firmware == PX4 else np.radians(trim_deg)
+    return dict(zip(trim_names(firmware), angles.tolist(), strict=True))
+
+
+def tilt_deg(force: Vector) -> Vector:
+    """Return roll and pitch (2,) [deg] at rest, by the specific force (3,) in axes with x forward and z down."""
+    x, y, z = force
+    return np.degrees([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))])
+
+
+def attitude_deg(firmware: str, trim_deg: Vector, mean: Vector) -> Vector:
+    """Return roll and pitch (2,) [deg] that an unbiased estimator has at rest, where a stream's mean is `mean`."""
+    return tilt_deg(mean) if firmware == PX4 else tilt_deg(mean) - trim_deg[:2]
+
+
+@dataclass(frozen=True)
+class Level:
+    """Change of a vehicle's trim that goes with a change of its first accelerometer's correction.
+
+    Attributes
+    ----------
+    held_deg, wanted_deg : (3,) before and after.
+    """
+
+    firmware: str
+    held_deg: Vector
+    wanted_deg: Vector
+
+    @property
+    def turn(self) -> Vector:
+        """Rotation (3, 3) of the streams by the change."""
+        if self.firmware != PX4:
+            return np.eye(3)
+        return euler_matrix(self.wanted_deg.tolist()) @ euler_matrix(self.held_deg.tolist()).T
+
+    def values(self) -> dict[str, float]:
+        """Return the new trim as parameters by name."""
+        return trim_values(self.firmware, self.wanted_deg)
+
+
+@dataclass(frozen=True)
+class Leveller:
+    """Choice of the new trim of a vehicle.
+
+    Attributes
+    ----------
+    held_deg : (3,) its trim. old, new : its first accelerometer's correction before and after; None: it stays.
+    mounting : R_b (3, 3) under the old trim.
+    """
+
+    firmware: str
+    held_deg: Vector
+    old: Correction | None
+    new: Correction | None
+    mounting: Vector
+
+    def keep(self) -> Level:
+        """Return the level by which what was level stays level; a trim of zero, which nobody levelled, stays zero.
+
+        Under `old`, the specific force along u was level, and `new` makes A t u + c of t u. Its length is g, which
+        gives t.
+        """
+        if not self.held_deg[:2].any():
+            return self._level(self.held_deg[:2])
+        u = self._turned.T @ [0.0, 0.0, -1.0]
+        c = self._recorrect(np.zeros(3))
+        Au = self._recorrect(u) - c
+        t = np.roots([Au @ Au, 2 * Au @ c, c @ c - STANDARD_GRAVITY_MPS2**2]).max()
+        return self._level(tilt_deg(Au * t + c))
+
+    def measure(self, mean: Vector) -> Level | None:
+        """Return the level of a vehicle that stands level, by its first stream's mean; None if it is too tilted."""
+        wanted = self._level(tilt_deg(self._recorrect(self._axes.T @ mean)))
+        return wanted if np.abs(wanted.wanted_deg[:2]).max() <= MOST_DEG else None
+
+    def standing_deg(self, level: Level, mean: Vector) -> Vector:
+        """Return roll and pitch (2,) [deg] under `level` of a vehicle whose first stream's mean was `mean`."""
+        force = self._recorrect(self._axes.T @ mean)
+        turned = euler_matrix(level.wanted_deg.tolist()) if self.firmware == PX4 else np.eye(3)
+        return attitude_deg(self.firmware, level.wanted_deg, turned @ force)
+
+    @property
+    def _turned(self) -> Vector:
+        return euler_matrix(self.held_deg.tolist())
+
+    @property
+    def _axes(self) -> Vector:
+        """Rotation (3, 3) from the autopilot's axes to those of the streams."""
+        return self._turned if self.firmware == PX4 else np.eye(3)
+
+    def _recorrect(self, force: Vector) -> Vector:
+        """Return what `force`, in the autopilot's axes and under the old correction, is under the new one."""
+        if self.old is None or self.new is None:
+            return force
+        return self.old.recorrect(self.new, self._axes.T @ self.mounting, force)
+
+    def _level(self, roll_pitch_deg: Vector) -> Level:
+        return Level(self.firmware, self.held_deg, np.append(roll_pitch_deg, self.held_deg[2]))

@@ -13,9 +13,8 @@ from ...errors import WriteBackError
 from ...result.calibration import REFUSED, Calibration
 from ...result.comparison import is_better
 from ..imu import MESSAGE_ID, SCALED, Stream
-from .compose import Correction
 from .document import AUTOPILOT, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_DEG, RESIDUAL_OLD, UNCERTAIN
-from .slots import Slot, slot_of
+from .slots import Correction, Slot, slot_of
 
 NOTHING = "nothing was written"
 

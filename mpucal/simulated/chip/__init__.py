@@ -1,4 +1,4 @@
-"""Simulated MPU-6050, MPU-6500 and relatives in a simulated hand, as a bus."""
+"""Simulated MPU-6050, MPU-6500 and relatives in a simulated hand, as a bus; `--bus sim` opens one."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from ...chip.config import MAX_FRAMES_A_POLL
 from ...data import STANDARD_GRAVITY_MPS2
-from ..disturbance import ARMS
+from ...session.plan import Plan
+from ...sources.chip import OpenedChip
+from ...sources.kind import Request
+from ..disturbance import ARMS, Mishap
 from ..faults import begin_mishaps
 from ..hands import HANDS
-from ..mishaps import Mishap
 from ..motion import Motion
-from ..sensor import SensorTruth
-from .bus import SimulatedBus
+from ..sensor import Feed, SensorFeed, SensorTruth
+from .bus import CLOCKS, FaultInjector, SimulatedBus, SimulatedClock
 from .chip import Chip
-from .clock import CLOCKS, SimulatedClock
-from .factory import FactoryTrim
-from .fault_injector import FaultInjector
-from .feed import Feed, SensorFeed
-from .models import MODELS, OFFSETS
+from .models import MODELS, OFFSETS, FactoryTrim
 from .options import ChipOptions
 
 __all__ = ["Chip", "Feed", "SensorTruth", "SimulatedBus", "open_simulated"]
@@ -73,3 +72,22 @@ def _truth(options: ChipOptions, gravity: float) -> SensorTruth:
         accel_noise_density=truth.accel_noise_density * options.noise,
         gyro_noise_density=truth.gyro_noise_density * options.noise,
     )
+
+
+# A simulation at full speed has no operator who waits for samples, and no host that is late.
+SELDOM_S = 0.12
+
+
+def polled_seldom(plan: Plan, real_time: bool) -> Plan:
+    """Return the plan of a session with a simulation that may run at full speed."""
+    config = plan.config
+    seldom = replace(config, poll_s=min(SELDOM_S, MAX_FRAMES_A_POLL / config.rate_hz))
+    return plan if real_time else replace(plan, config=seldom)
+
+
+def open_source(request: Request) -> OpenedChip:
+    """Open the chip that `sim:key=value,...` describes, in the gravity of the plan; see open_simulated."""
+    bus = open_simulated(request.value, request.plan.gravity, request.values.get("seed"))
+    plan = polled_seldom(request.plan, bus.real_time)
+    live, words = bus.real_time, request.words
+    return OpenedChip(bus, plan, (bus.hear,), bus.truth_document, words=words, real_time=live, apart=live)

@@ -1,17 +1,151 @@
-"""Bus to a simulated chip, with the duration of its transfers and their faults."""
+"""Bus to a simulated chip: its clock, the duration of its transfers, and their faults."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+import os
+import time
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
 
 from ...chip.access import Reply
 from ...sources.i2c_errors import transfer_error
+from ..faults import Fault, FaultKind, Schedule
 from ..hand import HandPrompt
 from ..motion import Motion
 from ..sensor import SensorTruth
 from .chip import Chip
-from .clock import RealClock, SimulatedClock
-from .fault_injector import FaultInjector
+
+
+class SimulatedClock(Protocol):
+    """Time in ns since the bus was opened."""
+
+    def now(self) -> int:
+        """Return the time."""
+        ...
+
+    def spend(self, ns: int) -> None:
+        """Spend `ns` on a transfer."""
+        ...
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Wait until `t_ns`."""
+        ...
+
+
+class FastClock:
+    """Clock that only waiting moves on: waits return at once, and each run is the same."""
+
+    def __init__(self) -> None:
+        self._now = 0
+
+    def now(self) -> int:
+        """Return the time."""
+        return self._now
+
+    def spend(self, ns: int) -> None:
+        """Move on by `ns`."""
+        self._now += ns
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Move on to `t_ns`."""
+        self._now = max(self._now, t_ns)
+
+
+class RealClock:
+    """Clock of the time since it was made, which sleeps."""
+
+    def __init__(self) -> None:
+        self._opened = time.monotonic_ns()
+        self._busy_until = 0
+
+    def now(self) -> int:
+        """Return the time; during a transfer, that of its end."""
+        return max(self._busy_until, self._passed())
+
+    def spend(self, ns: int) -> None:
+        """Keep the bus busy for `ns`."""
+        self._busy_until = self.now() + ns
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Sleep until `t_ns`."""
+        time.sleep(max(0, t_ns - self._passed()) * 1e-9)
+
+    def _passed(self) -> int:
+        return time.monotonic_ns() - self._opened
+
+
+CLOCKS: dict[str, type[FastClock] | type[RealClock]] = {"fast": FastClock, "real": RealClock}
+
+
+class FaultInjector:
+    """Injector of the faults of one bus.
+
+    Parameters
+    ----------
+    faults : each with its time. chip, clock : that they affect. rng : of the bits that flip.
+    """
+
+    def __init__(self, faults: Sequence[Fault], chip: Chip, clock: SimulatedClock, rng: np.random.Generator) -> None:
+        self._faults, self._chip, self._clock, self._rng = faults, chip, clock, rng
+        self._schedule = Schedule(faults)
+        self._failing = [fault for fault in faults if fault.kind.errno is not None]
+        self._flipping = [fault for fault in faults if fault.kind.flips]
+        self._altering = [fault.kind.alters for fault in faults if fault.kind.alters is not None]
+        for fault in faults:
+            if fault.kind.pins is not None:
+                chip.hold_words(*fault.kind.pins)
+
+    def before_transfer(self) -> None:
+        """Inject the faults that are due before a transfer.
+
+        Raises
+        ------
+        OSError : the transfer fails.
+        """
+        while due := self._schedule.due(self._clock.now()):
+            for fault in due:
+                self._strike(fault)
+        for kind in self._active(self._failing):
+            if kind.errno is not None and (not kind.share or self._rng.random() < kind.share):
+                self._clock.spend(round(kind.takes_s * 1e9))
+                raise OSError(kind.errno, os.strerror(kind.errno))
+
+    def flip_bits(self, data: bytes) -> bytes:
+        """Return `data`, sent in either direction, with the bits flipped that are flipped now."""
+        share = max((kind.share for kind in self._active(self._flipping)), default=0.0)
+        if not share:
+            return data
+        hit = self._rng.random(len(data)) < share
+        flipped = np.frombuffer(data, np.uint8) ^ np.where(hit, 1 << self._rng.integers(0, 8, len(data)), 0)
+        return flipped.astype(np.uint8).tobytes()
+
+    def alter_reply(self, register: int, data: bytes) -> bytes:
+        """Return the bytes that are read instead of `data` from `register` on."""
+        for alter in self._altering:
+            data = alter(register, data)
+        return data
+
+    def names(self) -> list[str]:
+        """Return each fault as in an option."""
+        return [str(fault) for fault in self._faults]
+
+    def _strike(self, fault: Fault) -> None:
+        self._clock.spend(round(fault.kind.pause_s * 1e9))
+        if fault.kind.strike is not None:
+            now_ns = self._clock.now()
+            end_ns = max(fault.end_ns, now_ns) if math.isfinite(fault.end_ns) else now_ns
+            fault.kind.strike(self._chip, now_ns, round(end_ns))
+
+    def _active(self, faults: Sequence[Fault]) -> list[FaultKind]:
+        """Return the kinds of those of `faults` that last now."""
+        if not faults:
+            return []
+        now_ns = self._clock.now()
+        return [fault.kind for fault in faults if fault.begin_ns <= now_ns < fault.end_ns]
+
 
 KHZ = 400
 NAME, ADDRESS = "the simulated bus", 0x68

@@ -12,8 +12,7 @@ from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_CHIP, Fault, Where
 from ..hands import HANDS
 from ..option_text import FAULT, Parser, at_least, faults, number, one_of, parse_options, whole
-from .bus import KHZ
-from .clock import CLOCKS
+from .bus import CLOCKS, KHZ
 from .models import MODELS, OFFSETS
 
 

@@ -7,8 +7,7 @@ from typing import Any
 from ...iio.devices import Devices
 from ...iio_device.source import OpenedIio
 from ...sources.kind import Request
-from ..chip import open_simulated
-from ..chip.source import polled_seldom
+from ..chip import open_simulated, polled_seldom
 from .files import SimulatedFiles
 
 __all__ = ["SimulatedFiles", "open_source"]

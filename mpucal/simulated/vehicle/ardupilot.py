@@ -1,7 +1,8 @@
-"""ArduPilot's treatment of accelerometers, as in Copter 4.7."""
+"""ArduPilot's treatment of accelerometers, as in Copter 4.7: correction, rotation and low pass."""
 
 from __future__ import annotations
 
+import math
 from itertools import chain
 
 import numpy as np
@@ -10,15 +11,68 @@ from ...data import Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.firmwares import ARDUPILOT, FILTERS
 from ...mavlink.parameters.encoding import INT32, REAL32, Parameter
-from ...mavlink.parameters.level import tilt_deg
-from ...mavlink.parameters.mounting import CUSTOM_ANGLES, ORIENTATION
+from ...mavlink.parameters.mounting import CUSTOM_ANGLES, ORIENTATION, tilt_deg
 from ...mavlink.parameters.slots import AXES, all_slots
-from ...mavlink.prearm import SYS_STATUS
-from .filter import LowPass
+from ...mavlink.requests import SYS_STATUS
 from .firmware import ATTITUDE, HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .imus import BLOCK
 from .options import VehicleOptions
 from .store import INT8, INT16
+
+Three = tuple[float, float, float]
+PASSES: Three = (1.0, 0.0, 0.0)
+
+
+class LowPass:
+    """Butterworth filters of order 2, one for each row of a value's last axis but one.
+
+    Parameters
+    ----------
+    cutoffs_hz : (k,) for values (..., k, 3); 0: no filter. most : number of values that come at once.
+    """
+
+    def __init__(self, cutoffs_hz: tuple[float, ...], rate_hz: float, most: int) -> None:
+        made = [butterworth(cutoff, rate_hz) if cutoff > 0 else (PASSES, PASSES) for cutoff in cutoffs_hz]
+        # Each is (3, k, 1).
+        self._b, self._a = np.array(made).transpose(1, 2, 0)[..., None]
+        # Response (most + 1, k) of all following values to one value.
+        left = [np.ones(len(made)), -self._a[1, :, 0]]
+        while len(left) <= most:
+            left.append(-self._a[1, :, 0] * left[-1] - self._a[2, :, 0] * left[-2])
+        response = np.array(left)
+        since = np.subtract.outer(np.arange(most), np.arange(most))
+        self._of_values = np.where(since[..., None] >= 0, response[since], 0.0)
+        self._of_past = np.stack((-self._a[2, :, 0] * response[:-1], response[1:]), axis=1)
+        self._states: Vector | None = None
+
+    def __call__(self, values: Vector, again: int = 0) -> Vector:
+        """Return the filtered `values` (n, ..., k, 3); the filter starts in the steady state of the first one.
+
+        Parameters
+        ----------
+        again : number of the last values that come once more, with others in their places.
+        """
+        n = len(values)
+        if self._states is None:
+            self._states, again = np.repeat(values[:1] / self._a.sum(0), 2, axis=0), 0
+        past = self._states[len(self._states) - again - 2 :][:2]
+        new = np.einsum("ijk,j...kc->i...kc", self._of_values[:n, :n], values)
+        new += np.einsum("ipk,p...kc->i...kc", self._of_past[:n], past)
+        states = self._states = np.concatenate((past, new))
+        return np.asarray(self._b[0] * states[2:] + self._b[1] * states[1:-1] + self._b[2] * states[:-2])
+
+
+def butterworth(cutoff_hz: float, rate_hz: float) -> tuple[Three, Three]:
+    """Return numerator and denominator as ArduPilot computes them (DigitalBiquadFilter).
+
+    This is the bilinear transform of 1 / (s^2 + sqrt(2) s + 1) with a warped frequency; scipy.signal, which has it,
+    takes a second to load.
+    """
+    w = math.tan(math.pi * cutoff_hz / rate_hz)
+    whole = 1.0 + math.sqrt(2.0) * w + w * w
+    share = w * w / whole
+    return (share, 2.0 * share, share), (1.0, 2.0 * (w * w - 1.0) / whole, (1.0 - math.sqrt(2.0) * w + w * w) / whole)
+
 
 LOOP_HZ = 400
 # A message comes at 0.8 of the loop's rate at most, in intervals of whole ms.

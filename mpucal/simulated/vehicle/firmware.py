@@ -11,9 +11,15 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, HIGHRES, MESSAGE_ID, RAW, SCALED
 from ...mavlink.parameters.encoding import Parameter
-from ...mavlink.parameters.level import attitude_deg, trim_of, trim_values
-from ...mavlink.parameters.mounting import CUSTOM_ANGLES, euler_matrix, orientation_matrix
-from ...mavlink.prearm import PREARM_CHECK
+from ...mavlink.parameters.mounting import (
+    CUSTOM_ANGLES,
+    attitude_deg,
+    euler_matrix,
+    orientation_matrix,
+    trim_of,
+    trim_values,
+)
+from ...mavlink.requests import PREARM_CHECK
 from .imus import Imus
 from .options import VehicleOptions
 from .store import ParameterStore

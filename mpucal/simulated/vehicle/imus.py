@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...data import Vector
-from ...mavlink.prompts import Direction, ReceivedPrompt
+from ...mavlink.texts import Direction, ReceivedPrompt
 from ..disturbance import ARMS
 from ..faults import begin_mishaps
 from ..hand import HandPrompt

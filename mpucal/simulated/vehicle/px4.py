@@ -10,11 +10,10 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.firmwares import EKF2_IMU_CTRL, PX4
 from ...mavlink.parameters.encoding import INT32, Parameter
-from ...mavlink.parameters.level import tilt_deg
-from ...mavlink.parameters.mounting import BOARD_ANGLES, BOARD_ROTATION, euler_matrix
+from ...mavlink.parameters.mounting import BOARD_ANGLES, BOARD_ROTATION, euler_matrix, tilt_deg
 from ...mavlink.parameters.slots import PX4_LIMITS, Slot, all_slots
-from ...mavlink.prearm import SYS_STATUS
 from ...mavlink.px4_preparation import AUTOCAL, QUICK
+from ...mavlink.requests import SYS_STATUS
 from .firmware import ATTITUDE, HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .options import VehicleOptions
 

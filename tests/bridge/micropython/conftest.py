@@ -9,7 +9,7 @@ import pytest
 
 from mpucal.bridge.port import Chunk
 from mpucal.errors import BusError
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 
 ROOT = Path(__file__).parents[3]
 PACKAGE, VERSION = "@micropython/micropython-webassembly-pyscript", "1.27.0"

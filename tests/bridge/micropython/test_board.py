@@ -16,7 +16,7 @@ from mpucal.chip.config import Config
 from mpucal.cli.running import open_runner
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
 

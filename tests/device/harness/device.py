@@ -26,9 +26,8 @@ from umockdev import Testbed
 from mpucal.chip.access import Reply
 from mpucal.data import Vector
 from mpucal.simulated.chip import Chip, SimulatedBus, open_simulated
-from mpucal.simulated.chip.clock import CLOCKS, SimulatedClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.bus import CLOCKS, SimulatedClock
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.simulated.sensor import Counts, Setting
 
 NODE, SPI_NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "/dev/spidev0.0", "still", "DS3231"

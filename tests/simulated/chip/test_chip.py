@@ -6,8 +6,7 @@ import pytest
 from mpucal.chip import registers as reg
 from mpucal.errors import EndOfCapture
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 
 MS = 1_000_000
 TRIM = (-1500, 2001, 700)

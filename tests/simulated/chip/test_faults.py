@@ -15,12 +15,9 @@ from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, BusHeld, ChipError, NoAnswer
 from mpucal.files.mcap import read_capture
-from mpucal.simulated.chip.bus import SimulatedBus
+from mpucal.simulated.chip.bus import FastClock, FaultInjector, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import FactoryTrim
-from mpucal.simulated.chip.fault_injector import FaultInjector
-from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.sources.replay import ReplayBus
 

@@ -3,7 +3,7 @@
 import numpy as np
 import scipy
 
-from mpucal.simulated.vehicle.filter import LowPass
+from mpucal.simulated.vehicle.ardupilot import LowPass
 
 
 def test_each_row_is_filtered_by_its_own_cutoff():

@@ -12,8 +12,8 @@ from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.imu import MESSAGE_ID
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.encoding import name_bytes, to_wire
-from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
-from mpucal.mavlink.request import send_command
+from mpucal.mavlink.requests import send_command
+from mpucal.mavlink.texts import ReceivedPrompt, encode_prompt
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions

@@ -17,7 +17,7 @@ from mpucal.chip.driver import Driver
 from mpucal.doctor.finding import Finding, Mark
 from mpucal.errors import BusError, NoAnswer
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.bus import FastClock
 from mpucal.sources import usb_i2c
 from mpucal.sources.usb_i2c import Ftdi, Mcp2221, UsbBus, adapters
 

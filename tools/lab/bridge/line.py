@@ -8,7 +8,7 @@ from typing import Protocol
 
 from mpucal.bridge.port import BAUDS, Chunk
 from mpucal.bridge.port_errors import port_gone
-from mpucal.simulated.chip.clock import SimulatedClock
+from mpucal.simulated.chip.bus import SimulatedClock
 
 STEP_NS = 500_000
 BITS_A_BYTE = 10
