@@ -68,6 +68,8 @@ def _rotation(name: str, values: Values) -> Vector | None:
 
 # Greatest trim that ArduPilot accepts of its own level calibration (HAL_INS_TRIM_LIMIT_DEG).
 MOST_DEG = 10.0
+# A smaller one is not measured: PX4's simulator writes 1e-6 so that no level calibration is asked for.
+LEAST_DEG = 1e-3
 
 
 def trim_names(firmware: str) -> tuple[str, ...]:
@@ -140,12 +142,12 @@ class Leveller:
     mounting: Vector
 
     def keep(self) -> Level:
-        """Return the level by which what was level stays level; a trim of zero, which nobody levelled, stays zero.
+        """Return the level by which what was level stays level; a trim of zero, which nobody levelled, stays.
 
         Under `old`, the specific force along u was level, and `new` makes A t u + c of t u. Its length is g, which
         gives t.
         """
-        if not self.held_deg[:2].any():
+        if np.abs(self.held_deg[:2]).max() < LEAST_DEG:
             return self._level(self.held_deg[:2])
         u = self._turned.T @ [0.0, 0.0, -1.0]
         c = self._recorrect(np.zeros(3))
