@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import Abandoned, MpucalError, OutputError, SourceError, escape_controls
-from .session.threads import ONE_THREAD
+from .session.beside import ONE_THREAD
 from .terminal.hangup import logging_after_hangup
 
 BUG = 1

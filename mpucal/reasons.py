@@ -1,6 +1,6 @@
 """The reasons against a calibration, by the table in reasons.toml: codes, sentences and remedies.
 
-A check (calibration/checks/, session/live/verification.py) decides whether a reason holds, and fills its numbers into
+A check (calibration/checks/, session/live_verification.py) decides whether a reason holds, and fills its numbers into
 one of its sentences: `reason("gyro_clipped", "samples", refuse=False, count=12, share=0.01)`. A new reason is a table
 in reasons.toml and a check. `python -m tools.make pages` makes docs/reasons.md from reasons.toml.
 """

@@ -25,7 +25,7 @@ if str(Path(__file__).parents[1]) in sys.path:
     sys.path.remove(str(Path(__file__).parents[1]))
 sys.path.append(str(Path(__file__).parents[1]))
 
-from mpucal.session.threads import ONE_THREAD
+from mpucal.session.beside import ONE_THREAD
 
 # programs that tests start find mpucal compiled, whatever the shell asks for: each would compile it for half a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -11,8 +11,8 @@ from mpucal.__main__ import run
 from mpucal.cli import COMMANDS, commands
 from mpucal.session.aims import AIMS
 from mpucal.session.events import Knowledge, Prompt, PromptKind
-from mpucal.terminal.glyphs import UNICODE
 from mpucal.terminal.layout import lines
+from mpucal.terminal.letters import UNICODE
 from mpucal.terminal.view import View
 
 PROJECT = Path(__file__).parents[1]

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from mpucal.session.threads import ONE_THREAD
+from mpucal.session.beside import ONE_THREAD
 
 Jobs = Annotated[int, "processes"]
 PROCESSORS = os.cpu_count() or 1

@@ -25,8 +25,7 @@ from ..recheck.update import update_biases
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.session_files import BLOB, DOCUMENT
-from ..session.folder import SessionFolder
-from ..session.results import check_owner, save
+from ..session.results import SessionFolder, check_owner, save
 from ..sinks.choose import choose_sinks
 from ..sinks.table import SINKS
 from ..sinks.write_back import file_recorder

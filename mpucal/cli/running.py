@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..result.clock import now
-from ..session.live.scheduler import InlineWorker
-from ..session.live.worker_process import ProcessWorker
+from ..session.live_scheduler import InlineWorker, ProcessWorker
 from ..session.runner import Runner
 from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console

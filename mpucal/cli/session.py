@@ -17,7 +17,7 @@ from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import warn_unset
 from ..result.session_files import DOCUMENT, LOG
-from ..session.folder import SessionFolder, check_unfinished
+from ..session.results import SessionFolder, check_unfinished
 from ..sinks.choose import announce_sinks, choose_sinks, interrupted_writes
 from ..sinks.kind import SinkKind
 from ..sinks.write_back import session_recorder

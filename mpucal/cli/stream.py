@@ -29,8 +29,8 @@ from ..session.events import Caution
 from ..session.ports import Source, polled
 from ..sources.opening import open_source
 from ..sources.table import source_title
+from ..terminal.console import JsonLines
 from ..terminal.keys import Keys
-from ..terminal.lines import JsonLines
 from .arguments import CALIBRATION_PATH, json_option, output_option
 from .loading import at_gravity_of, load_calibration
 from .options import ABOVE_ZERO, check_gyroscope, check_source, source_options

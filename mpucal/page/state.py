@@ -8,10 +8,9 @@ from typing import Any
 
 from ..session.boards import KINDS
 from ..session.events import Knowledge
-from ..terminal.lines import plain
+from ..terminal.console import count, groups, plain
 from ..terminal.view import View
 from ..terminal.voice import Said, in_words
-from ..terminal.words import count, groups
 
 # Number of messages that are kept.
 NOTES = 30

@@ -1,4 +1,4 @@
-"""Process beside a session: a module of mpucal that reads its stdin and answers on its stdout."""
+"""Process beside a session: a module of mpucal that reads its stdin and answers on its stdout; it has one thread."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import subprocess
 import sys
 from contextlib import suppress
 from typing import Any
-
-from .threads import ONE_THREAD
 
 
 def start_beside(module: str, text: bool = False) -> subprocess.Popen[Any]:
@@ -44,3 +42,8 @@ def end_beside(process: subprocess.Popen[Any]) -> None:
 def describe_end(code: int) -> str:
     """Describe how a process ended, by its exit code: after `the process ...`."""
     return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+
+
+# NumPy's libraries read these as they are loaded. Matrices are small here: a second thread would wait for the first,
+# and take its core from the loop that reads the sensor.
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

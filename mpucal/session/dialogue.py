@@ -13,7 +13,7 @@ from ..chip.records import FORGET, KEY, LATE
 from ..data import Recording, Samples
 from ..errors import Abandoned
 from .events import Abort, Command, Decision, Enough, Event, Forget, Key, Measured, Prompt, Redo, Tick
-from .live.scheduler import FitScheduler
+from .live_scheduler import FitScheduler
 from .machine import Machine
 from .ports import Note, Operator
 from .table import MEASURING, State

@@ -13,7 +13,6 @@ import numpy as np
 from ..data import Samples
 from .aims import select_aim
 from .boards import speak_of, usual_board
-from .check_poses import CheckPoses
 from .coverage import Coverage
 from .events import (
     Abort,
@@ -46,7 +45,7 @@ from .plan import Plan
 from .rotate import Rotate
 from .step import End, Step
 from .table import MEASURING, State, next_state
-from .verify import Verify
+from .verify import CheckPoses, Verify
 
 # A source that is polled must answer within this time.
 SILENT_S = 5.0

@@ -1,8 +1,9 @@
-"""Meter of the board's motion, 4 times a second, and cautions about turning too fast, clipping and lost samples."""
+"""Meter of the board's motion, 4 times a second: the turn to the wanted orientation, and cautions."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,10 +11,9 @@ from ..data import Samples, Sensor
 from ..rests.limits import HAND
 from ..rests.stillness import Detector, Moved
 from ..rests.windows import Window, Windows
-from .attitude import Attitude, canonical
-from .events import Caution, Direction, Meter, Output, down_of
+from .attitude import Attitude, canonical, compose, from_vector, rotate, turned_up, yaw_between
+from .events import Caution, Direction, Meter, Output, Quaternion, down_of
 from .step import SAY_AGAIN_S
-from .turn_guide import TurnGuide
 
 WINDOW_S = 0.25
 NEAR_RANGE = 0.8
@@ -97,3 +97,93 @@ class MotionWatch:
             return False
         self._last_s[caution.code] = caution.t_s
         return True
+
+
+# The eight directions in which the board's top can be turned, anticlockwise from the right as seen from above.
+TURN_WORDS = (
+    "roll it to the right",
+    "tip it away and right",
+    "tip it away from you",
+    "tip it away and left",
+    "roll it to the left",
+    "tip it toward you and left",
+    "tip it toward you",
+    "tip it toward you and right",
+)
+ROUND_DEG = 5.0
+# A heading is kept as long as it leads this near to the wanted orientation.
+KEPT_RAD = math.radians(10.0)
+# The words are kept as long as the heading differs from theirs by no more than this; up to a right angle, the shortest
+# one: a turn of 25 deg by words that are 60 deg off would leave 25 deg.
+WORDS_KEPT_RAD = math.radians(30.0)
+# From one call to the next the wanted attitude turns about the vertical by no more than this.
+SLEW_RAD = math.radians(15.0)
+
+
+class Turn(NamedTuple):
+    """Turn to a wanted orientation: its angle, its words, and the attitude that it leads to."""
+
+    missing_deg: float
+    words: str
+    attitude: Quaternion
+
+
+class TurnGuide:
+    """Guide to one orientation after another.
+
+    The guide keeps to the heading that it has chosen. For a board that is nearly upside down every heading is about as
+    short, and each tremor makes another one the shortest.
+    """
+
+    def __init__(self) -> None:
+        self._to: Direction | None = None
+        self._heading = 0.0
+        self._word_index = 0
+        self._wanted: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    def turn_to(self, down: Direction, attitude: Quaternion) -> Turn:
+        """Return the turn of a board with this attitude that points the unit vector `down` of its axes down."""
+        new = down != self._to
+        x, y, z = rotate(attitude, down)
+        missing = math.atan2(math.hypot(x, y), -z)
+        self._update_heading(math.atan2(y, x), missing, new)
+        # The turn's axis is horizontal, and at right angles to the heading of the top.
+        along_x, along_y = math.cos(self._heading), math.sin(self._heading)
+        turn = math.atan2(x * along_x + y * along_y, -z)
+        turned = compose(from_vector(-turn * along_y, turn * along_x, 0.0), attitude)
+        wanted = turned_up(turned, (-down[0], -down[1], -down[2]))
+        if not new:
+            slew = min(max(yaw_between(wanted, self._wanted), -SLEW_RAD), SLEW_RAD)
+            wanted = compose(from_vector(0.0, 0.0, slew), self._wanted)
+        self._to, self._wanted = down, wanted
+        rounded = ROUND_DEG * round(math.degrees(missing) / ROUND_DEG)
+        words = f"{rounded:.0f} deg more, {TURN_WORDS[self._word_index]}" if rounded else ""
+        return Turn(math.degrees(missing), words, wanted)
+
+    def _update_heading(self, shortest: float, missing: float, new: bool) -> None:
+        """Change the heading no more than is needed to end within KEPT_RAD of the wanted orientation."""
+        if new:
+            # Upside down, any heading will do: one of the four simple ones is easy to follow.
+            simple = missing > math.pi - KEPT_RAD
+            self._heading = _angle(2 * round(shortest / (math.pi / 2.0)) if simple else _nearest(shortest))
+        aside = _wrapped(self._heading - shortest)
+        if abs(aside) > math.pi / 2.0 and missing < math.pi - KEPT_RAD:
+            aside = _wrapped(aside + math.pi)
+        reach = math.sin(KEPT_RAD) / max(math.sin(missing), 1e-9)
+        most = math.asin(reach) if reach < 1.0 else math.pi
+        self._heading = shortest + min(max(aside, -most), most)
+        told = self._heading if missing > math.pi / 2.0 else shortest
+        if new or abs(_wrapped(told - _angle(self._word_index))) > WORDS_KEPT_RAD:
+            self._word_index = _nearest(told)
+
+
+def _nearest(heading: float) -> int:
+    return round(heading / (math.pi / 4.0)) % len(TURN_WORDS)
+
+
+def _angle(index: int) -> float:
+    return index * math.pi / 4.0
+
+
+def _wrapped(angle: float) -> float:
+    return math.remainder(angle, 2.0 * math.pi)

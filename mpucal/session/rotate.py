@@ -32,9 +32,8 @@ from .events import (
     down_of,
     triple,
 )
-from .pauses import HOLD_S, PLACED_S, Pause, PoseStep, classify_use, countdown, held
 from .plan import Plan
-from .step import ENOUGH, End
+from .step import ENOUGH, HOLD_S, PLACED_S, End, Pause, PoseStep, classify_use, countdown, held
 
 PASS_WINDOW_S = 0.1
 # Least length of a pause. A fit uses shorter rests, too.

@@ -14,8 +14,8 @@ from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture,
 from ..result.calibration import Calibration
 from .dialogue import Dialogue
 from .events import Connected, Fitted, Key, Prompt, Resumed, SourceEnded, Written
-from .live.scheduler import FitScheduler, InlineWorker, Worker
-from .live.verification import add_verification
+from .live_scheduler import FitScheduler, InlineWorker, Worker
+from .live_verification import add_verification
 from .machine import Machine
 from .plan import Plan
 from .ports import Note, Operator, Source, polled

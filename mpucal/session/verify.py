@@ -1,4 +1,4 @@
-"""The third step of a session: check the first calibration in orientations that it has not seen."""
+"""The last step: orientations that check a calibration, the session's first one or (`mpucal check`) an older one."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
-from .aims import VERIFY_PLACED, Aim, directions, unseen_rad
-from .boards import describe, describe_tilt
-from .coverage import DISTINCT_RAD, Coverage
+from .aims import ALL_AROUND, VERIFY_PLACED, Aim, directions, unseen_rad
+from .boards import BOARD, describe, describe_tilt
+from .coverage import DISTINCT_RAD, Coverage, Directions
 from .events import (
     Caution,
     Checked,
@@ -29,9 +29,8 @@ from .events import (
     down_of,
     triple,
 )
-from .pauses import HOLD_S, PATIENCE_S, Pause, PoseStep, classify_use, countdown, held, is_wanted
 from .plan import Plan
-from .step import ENOUGH
+from .step import ENOUGH, HOLD_S, PATIENCE_S, Pause, PoseStep, classify_use, countdown, held, is_wanted
 
 # Bias and scale factor errors bend raw directions by up to a tenth: these must be farther apart by that.
 BENT = 1.1
@@ -183,3 +182,66 @@ class Verify(PoseStep):
         words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
         number = f"{self._number + 1} of {self._of}"
         return Prompt(PromptKind.VERIFY, f"Verification {number}: {words}, then hold it still.", triple(down))
+
+
+ORIENTATIONS = 3
+# A check has few samples: a longer hold averages the hand's tremor.
+CHECK_HOLD_S = 2.0
+# Weight that prefers, of both directions along an axis, the one that is farther from all others.
+OTHER_WAY = 0.1
+
+
+class CheckPoses(PoseStep):
+    """Step that asks for the orientations that would show most, and takes any new one."""
+
+    def __init__(self, flat: Rested, board: str = BOARD) -> None:
+        super().__init__(flat, CHECK_HOLD_S)
+        self._board = board
+        self._shown = Directions()
+        self._shown.add(np.array(flat.acc))
+        self.prompt = self._next()
+
+    def add(self, samples: Samples) -> list[Output | Finished]:
+        """Return the outputs for `samples`; Finished comes last and ends the step."""
+        t_s = float(samples.t[-1])
+        if self._begun_s is None:
+            self._begun_s = self._prompted_s = t_s
+        outputs: list[Output | Finished] = []
+        for pause in self._pauses.add(samples):
+            if self._number < ORIENTATIONS:
+                outputs += self._hold(pause)
+        if self._number == ORIENTATIONS:
+            return [*outputs, Finished(f"{ORIENTATIONS} orientations: done")]
+        if t_s - self._begun_s >= PATIENCE_S:
+            return [*outputs, Finished(f"no new orientation for {PATIENCE_S:.0f} s")]
+        return [*outputs, *self._remind(t_s, self._prompted_s, "no new orientation for a while")]
+
+    def _hold(self, pause: Pause) -> list[Output]:
+        new = not self._shown.near(pause.acc)
+        use = classify_use(pause.acc, self.prompt.down, new) if new else Use.SEEN
+        outputs: list[Output] = [*countdown(pause, use)]
+        if pause.seconds < CHECK_HOLD_S - 1e-6:
+            return outputs
+        self._pauses.leave(pause.run)
+        self._prompted_s = pause.t_s
+        outputs.append(held(pause, use))
+        if not new:
+            seen = Caution(pause.t_s, "seen_already", "this orientation was shown already", self.prompt.text)
+            return [*outputs, seen]
+        self._shown.add(pause.acc)
+        self._number += 1
+        self._begun_s = pause.t_s
+        outputs.append(Progress(pause.t_s, self._number, ORIENTATIONS, f"held {self._number} of {ORIENTATIONS}"))
+        if self._number < ORIENTATIONS:
+            self.prompt = self._next()
+            outputs.append(self.prompt)
+        return outputs
+
+    def _next(self) -> Prompt:
+        """Return a prompt for the axis that differs most from all orientations shown: a bias shows along either way."""
+        along = -ALL_AROUND @ self._shown.units.T
+        down = ALL_AROUND[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
+        number = f"{self._number + 1} of {ORIENTATIONS}"
+        words = describe(triple(down), self._board)
+        text = f"Orientation {number}: {words}, or any other new one, then hold it still for 2 s."
+        return Prompt(PromptKind.VERIFY, text, triple(down))

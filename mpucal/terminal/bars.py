@@ -7,9 +7,9 @@ import textwrap
 from rich.text import Text
 
 from ..session.events import PromptKind
-from .glyphs import Glyphs
+from .console import Group, groups, sentence
+from .letters import Glyphs
 from .view import View
-from .words import Group, groups, sentence
 
 KNOWLEDGE_ROWS = 3
 _LABEL, _NEEDLE = 19, 20

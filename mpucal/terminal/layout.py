@@ -7,11 +7,11 @@ import textwrap
 from rich.text import Text
 
 from ..session.events import PromptKind
-from . import board, letters, orientation_map
+from . import letters, pictures
 from .bars import NARROWEST, caution_rows, keys, knowledge_rows, meter
-from .glyphs import Glyphs
+from .console import count, sentence
+from .letters import Glyphs
 from .view import View
-from .words import count, sentence
 
 # Smaller screens show text only.
 LEAST_COLUMNS, LEAST_ROWS = 60, 20
@@ -113,7 +113,7 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     attitudes = (view.meter.attitude, view.meter.wanted) if view.meter is not None else ()
     for name, style, attitude in zip(("now", "turn it like this"), ("", "yellow"), attitudes, strict=False):
         if attitude is not None:
-            canvas = board.picture(view.board, attitude, board_columns, height)
+            canvas = pictures.draw_board(view.board, attitude, board_columns, height)
             parts.append((name, canvas.lines(style, glyphs.unicode), board_columns))
     if view.confirming and height > 2:
         text_columns = columns - board_columns - 3
@@ -122,7 +122,7 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     marks = _marks(view)
     if marks:
         for upper, name in ((False, "+Z up"), (True, "-Z up")):
-            canvas = orientation_map.draw_half(upper, marks, map_columns, height, glyphs.unicode)
+            canvas = pictures.draw_half(upper, marks, map_columns, height, glyphs.unicode)
             parts.append((name, canvas.lines("", glyphs.unicode), map_columns))
     names = Text(" ").join(Text(name[:width].center(width), style="dim") for name, _, width in parts)
     return [names, *(Text(" ").join(_filled(rows[k], width) for _, rows, width in parts) for k in range(height))]

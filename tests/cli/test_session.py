@@ -157,7 +157,7 @@ def test_a_folder_renamed_and_a_capture_truncated_during_a_session(mpucal, walk,
 
 def test_a_nearly_full_disk_is_refused_before_the_board_is_lifted(mpucal, tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr("mpucal.session.folder.shutil.disk_usage", lambda path: usage._replace(free=1_500_000))
+    monkeypatch.setattr("mpucal.session.results.shutil.disk_usage", lambda path: usage._replace(free=1_500_000))
     result = mpucal("session", "--bus", "sim", "-o", tmp_path / "board")
     assert result.code == OutputError.exit_code
     assert "only 1.5 MB are free" in result.err

@@ -9,7 +9,7 @@ from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
-from mpucal.session.pauses import HOLD_S, PauseDetector
+from mpucal.session.step import HOLD_S, PauseDetector
 from tools.lab.scenarios.recordings import attitude
 
 RATE_HZ, FLAT_S, MOVE_S, GRAVITY_MPS2 = 100.0, 6.0, 1.0, 9.81

@@ -12,7 +12,7 @@ from mpucal.errors import Abandoned, CaptureError, ChipError, EndOfCapture, NoAn
 from mpucal.result.calibration import Calibration
 from mpucal.session import runner as module
 from mpucal.session.events import Decision, Key, Prompt, PromptKind
-from mpucal.session.live.scheduler import InlineWorker
+from mpucal.session.live_scheduler import InlineWorker
 from mpucal.session.plan import Plan
 from mpucal.session.ports import ReplayedOperator
 from mpucal.session.runner import Runner

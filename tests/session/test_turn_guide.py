@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mpucal.session.aims import ALL_AROUND
-from mpucal.session.turn_guide import TURN_WORDS, TurnGuide
+from mpucal.session.meter import TURN_WORDS, TurnGuide
 
 STRAIGHT = (1.0, 0.0, 0.0, 0.0)
 

@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from mpucal.terminal.console import console
-from mpucal.terminal.lines import JsonLines, Lines
+from mpucal.terminal.console import JsonLines, Lines, console
 from mpucal.terminal.screen import Screen
 
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 import pytest
 
 from mpucal.session.events import Caution, Progress, Prompt, PromptKind, Seen
-from mpucal.terminal.glyphs import ASCII, UNICODE
 from mpucal.terminal.layout import lines
+from mpucal.terminal.letters import ASCII, UNICODE
 
 SIZES = [(80, 24), (160, 50), (60, 20), (100, 30), (40, 12), (20, 5), (1, 1)]
 BRAILLE = re.compile("[\u2801-\u28ff]")

@@ -6,8 +6,8 @@ import os
 import pytest
 
 from mpucal.session.events import Caution, Decision, Prompt, PromptKind
+from mpucal.terminal.console import JsonLines, Lines
 from mpucal.terminal.keys import Keys
-from mpucal.terminal.lines import JsonLines, Lines
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.session.attitude import straight
 from mpucal.session.boards import BOARDS
-from mpucal.terminal import board, orientation_map
+from mpucal.terminal import pictures
 
 DIRECTIONS = [
     (0, 0, -1),
@@ -26,7 +26,7 @@ def held(down):
 
 def test_the_board_is_never_seen_edge_on():
     for face in Rotation.random(200, random_state=0).apply([0.0, 0.0, 1.0]):
-        view = np.array(board.view_of(face.tolist()))
+        view = np.array(pictures.view_of(face.tolist()))
         np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-12)
         assert abs(view[2] @ face) >= 0.3
 
@@ -41,7 +41,7 @@ def where(canvas, letter):
 def test_the_letter_of_the_lowest_axis_is_below_the_others(axis, letter, size):
     for sign in (1.0, -1.0):
         down = tuple(sign if i == axis else 0.0 for i in range(3))
-        canvas = board.picture("gy-521", held(down), *size)
+        canvas = pictures.draw_board("gy-521", held(down), *size)
         rows = {other: where(canvas, other)[0] for other in "XYZ"}
         others = [row for other, row in rows.items() if other != letter]
         assert (rows[letter] > max(others)) if sign > 0 else (rows[letter] < min(others))
@@ -50,7 +50,7 @@ def test_the_letter_of_the_lowest_axis_is_below_the_others(axis, letter, size):
 @pytest.mark.parametrize("size", [(22, 9), (44, 20)], ids=["small", "large"])
 def test_each_kind_of_board_differs_in_any_way_to_hold_it(size):
     drawn = [
-        "\n".join(line.plain for line in board.picture(kind, held(down), *size).lines("", unicode=unicode))
+        "\n".join(line.plain for line in pictures.draw_board(kind, held(down), *size).lines("", unicode=unicode))
         for kind in (BOARDS if size[1] > 10 else ("gy-521", "vehicle"))
         for unicode in (True, False)
         for down in DIRECTIONS
@@ -61,7 +61,7 @@ def test_each_kind_of_board_differs_in_any_way_to_hold_it(size):
 def test_the_map_shows_a_direction_on_its_own_half():
     marks = [("held", (0.0, 0.0, 1.0)), ("wanted", (0.9, 0.0, -0.43))]
     upper, lower = (
-        [line.plain for line in orientation_map.draw_half(half, marks, 20, 10, unicode=False).lines("", unicode=False)]
+        [line.plain for line in pictures.draw_half(half, marks, 20, 10, unicode=False).lines("", unicode=False)]
         for half in (True, False)
     )
     assert any("o" in row for row in upper)

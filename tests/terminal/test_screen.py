@@ -10,10 +10,9 @@ import pytest
 from rich.text import Text
 
 from mpucal.session.events import Prompt, PromptKind
-from mpucal.terminal.glyphs import UNICODE
 from mpucal.terminal.keys import Keys
-from mpucal.terminal.painter import Painter
-from mpucal.terminal.screen import Screen
+from mpucal.terminal.letters import UNICODE
+from mpucal.terminal.screen import Painter, Screen
 
 SHOWN, GIVEN_BACK = "\x1b[?1049h", "\x1b[?1049l"
 COLOUR = re.compile(r"\x1b\[(\d+;)*(3[0-8]|9[0-7])[;m]")

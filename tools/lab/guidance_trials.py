@@ -29,8 +29,8 @@ from mpucal.data import Vector
 from mpucal.page.state import state
 from mpucal.result.calibration import GOOD
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind, Use
+from mpucal.session.meter import TURN_WORDS
 from mpucal.session.plan import Plan
-from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.simulated import rotation as quaternions
 from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import HANDS, Guided

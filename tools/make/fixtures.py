@@ -32,8 +32,8 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.faults import OF_CHIP, fault_kinds
 from mpucal.sources.opening import reopen_source
 from mpucal.sources.tap import Tap
+from mpucal.terminal.console import JsonLines
 from mpucal.terminal.keys import Keys
-from mpucal.terminal.lines import JsonLines
 
 from . import vectors
 

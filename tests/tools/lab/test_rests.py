@@ -9,7 +9,7 @@ from mpucal.calibration.masks import with_masks
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
-from mpucal.session.pauses import HOLD_S, PauseDetector
+from mpucal.session.step import HOLD_S, PauseDetector
 from tools.lab.scenarios.family import simulate
 from tools.lab.scenarios.table import FAMILIES
 

@@ -7,8 +7,7 @@ import pytest
 
 from mpucal.data import Samples, Sensor
 from mpucal.session.events import Checked, FitKind, Learnt, Tried
-from mpucal.session.live.fits import Fits, Task
-from mpucal.session.live.store import SampleStore
+from mpucal.session.live_fits import Fits, SampleStore, Task
 from mpucal.session.plan import Plan
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 

@@ -13,8 +13,7 @@ import pytest
 from mpucal.data import Samples, Sensor
 from mpucal.errors import Abandoned
 from mpucal.session.events import FitKind, RequestFit
-from mpucal.session.live.scheduler import FitScheduler, InlineWorker
-from mpucal.session.live.worker_process import ProcessWorker
+from mpucal.session.live_scheduler import FitScheduler, InlineWorker, ProcessWorker
 from mpucal.session.plan import Plan
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 
@@ -114,5 +113,5 @@ def test_an_exception_of_a_fit_is_raised_with_its_answer(poses, apart):
 
 
 def test_a_process_ends_with_the_program_that_began_it():
-    command = [sys.executable, "-m", "mpucal.session.live.worker_process"]
+    command = [sys.executable, "-m", "mpucal.session.live_scheduler"]
     assert subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode == 0

@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...calibration.evidence import Evidence
-from ...calibration.verification import NewOrientation
-from ...data import Recording, Vector
-from ...origin import Origin
-from ...reasons import Reason, reason
-from ...rests.intervals import RestFinder
-from ...result.calibration import REFUSED, USABLE, Calibration
-from ...result.keys import Quality
-from ..events import Checked, Verification, triple
+from ..calibration.evidence import Evidence
+from ..calibration.verification import NewOrientation
+from ..data import Recording, Vector
+from ..origin import Origin
+from ..reasons import Reason, reason
+from ..rests.intervals import RestFinder
+from ..result.calibration import REFUSED, USABLE, Calibration
+from ..result.keys import Quality
+from .events import Checked, Verification, triple
 
 AXES = "xyz"
 # A board is not held still deliberately for a shorter time.

@@ -8,7 +8,7 @@ from mpucal.data import Recording, Sensor
 from mpucal.reasons import Reason
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Checked
-from mpucal.session.live.verification import add_verification, judge_verification
+from mpucal.session.live_verification import add_verification, judge_verification
 
 
 def rest(magnitude=0.0, direction=0.0, turn=(1.2, 0.0, 0.0), miss=(0.0, 0.0, 0.0), clipped=False):

@@ -1,0 +1,178 @@
+"""Pictures of the board or the vehicle in the attitude of a Meter, and the map of its orientations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+from ..session.attitude import rotate
+from ..session.boards import BOARDS
+from ..session.events import Direction, Quaternion
+from .canvas import Canvas, Point
+
+View = tuple[Direction, Direction, Direction]
+
+_AXES: tuple[tuple[str, Direction, str], ...] = (
+    ("X", (1.0, 0.0, 0.0), "bold red"),
+    ("Y", (0.0, 1.0, 0.0), "bold green"),
+    ("Z", (0.0, 0.0, 1.0), "bold blue"),
+)
+# Distances from the middle to the ends of the axes, and to their letters.
+_TIPS, _LETTERS = (1.35, 1.1, 0.75), (1.62, 1.38, 1.05)
+# Turns and tilts of the view: first from the front, above and a little from the right, then others.
+_VIEWS_DEG = (-28.0, 28.0), (30.0, 52.0, 12.0, 70.0)
+# Least visible share of the plate's face; a view that shows less is too near to its edge.
+_LEAST_FACE = 0.35
+_REACH = 1.75
+# On fewer rows the lines of a plate's edge would merge.
+_LARGE = 14
+
+
+def draw_board(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
+    """Return the picture of a kind of board in an attitude."""
+    canvas, model = Canvas(columns, rows), MODELS[kind]
+    face = rotate(attitude, (0.0, 0.0, model.up))
+    across, up, eye = view_of(face)
+    scale = min(canvas.centre[0], canvas.centre[1] * 1.15) / _REACH
+
+    def seen(point: Direction) -> Point:
+        room = rotate(attitude, point)
+        return (canvas.centre[0] + scale * _dot(across, room), canvas.centre[1] - scale * _dot(up, room))
+
+    for stroke in model.strokes(_dot(eye, face) > 0.0, rows >= _LARGE):
+        for a, b in pairwise(stroke):
+            canvas.line(seen(a), seen(b))
+    for (letter, axis, style), tip, end in zip(_AXES, _TIPS, _LETTERS, strict=True):
+        canvas.line(seen((0.0, 0.0, 0.0)), seen(_scaled(axis, tip)))
+        canvas.letter(seen(_scaled(axis, end)), letter, style)
+    return canvas
+
+
+def view_of(face: Direction) -> View:
+    """Return unit vectors of the room across, up and toward the eye, from which a board is not seen edge-on.
+
+    face : unit vector at right angles to the board, in the room's axes.
+    """
+    views = [_view(turn, tilt) for tilt in _VIEWS_DEG[1] for turn in _VIEWS_DEG[0]]
+    for view in views:
+        if abs(_dot(view[2], face)) >= _LEAST_FACE:
+            return view
+    return max(views, key=lambda view: abs(_dot(view[2], face)))
+
+
+def _view(turn_deg: float, tilt_deg: float) -> View:
+    turn, tilt = math.radians(turn_deg), math.radians(tilt_deg)
+    across = (math.cos(turn), -math.sin(turn), 0.0)
+    away = (math.sin(turn), math.cos(turn), 0.0)
+    up = (away[0] * math.sin(tilt), away[1] * math.sin(tilt), math.cos(tilt))
+    eye = (-away[0] * math.cos(tilt), -away[1] * math.cos(tilt), math.sin(tilt))
+    return across, up, eye
+
+
+def _dot(a: Direction, b: Direction) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _scaled(v: Direction, factor: float) -> Direction:
+    return (factor * v[0], factor * v[1], factor * v[2])
+
+
+Stroke = tuple[Direction, ...]
+
+
+@dataclass(frozen=True)
+class Model:
+    """Model of a board, as strokes from point to point.
+
+    Attributes
+    ----------
+    up : sign of z on the upper side. always, above, below : strokes that are visible from everywhere, from above, and
+        from below. fine : strokes for large pictures.
+    """
+
+    up: float
+    always: tuple[Stroke, ...]
+    above: tuple[Stroke, ...]
+    below: tuple[Stroke, ...]
+    fine: tuple[Stroke, ...]
+
+    def strokes(self, front: bool, large: bool) -> Iterable[Stroke]:
+        """Yield the visible strokes; front : the upper side faces the eye."""
+        yield from self.always
+        yield from self.above if front else self.below
+        if large:
+            yield from self.fine
+
+
+def _around(corners: Iterable[tuple[float, float]], z: float) -> Stroke:
+    points = tuple((x, y, z) for x, y in corners)
+    return (*points, points[0])
+
+
+def _rectangle(x: float, y: float, z: float) -> Stroke:
+    return _around(((-x, -y), (x, -y), (x, y), (-x, y)), z)
+
+
+def _breakout(*fine: Stroke) -> Model:
+    """Return a plate with its chip on the component side."""
+    x, y, z = 1.0, 0.7, 0.09
+    faces = _rectangle(x, y, z), _rectangle(x, y, -z)
+    return Model(1.0, (), (faces[0], _rectangle(0.28, 0.28, z)), faces[1:], (*faces, *fine))
+
+
+def _pins() -> Iterable[Stroke]:
+    """Yield a row of eight pins along the edge at -y, which is nearest to the operator of a board laid flat."""
+    for k in range(8):
+        x = 0.8 * (2 * k / 7 - 1.0)
+        yield (x, -0.6, -0.09), (x, -0.6, -0.3)
+
+
+def _vehicle() -> Model:
+    """Return a multicopter: body with its nose toward +x, four rotors above, and two skids below (z points down)."""
+    body = _around(((1.0, 0.0), (0.5, 0.25), (-0.6, 0.25), (-0.6, -0.25), (0.5, -0.25)), 0.0)
+    nose = (0.5, 0.25, 0.0), (0.5, -0.25, 0.0)
+    octagon = [math.radians(45.0 * k) for k in range(8)]
+    rotors, arms, skids = [], [], []
+    for i, j in product((1, -1), (1, -1)):
+        rotors.append(_around([(0.7 * i + 0.3 * math.cos(a), 0.8 * j + 0.3 * math.sin(a)) for a in octagon], -0.1))
+        arms.append(((0.3 * i, 0.25 * j, 0.0), (0.52 * i, 0.56 * j, -0.1)))
+        skids.append(((0.3 * i, 0.25 * j, 0.0), (0.3 * i, 0.3 * j, 0.4)))
+    skids += [((-0.5, 0.3 * j, 0.4), (0.5, 0.3 * j, 0.4)) for j in (1, -1)]
+    return Model(-1.0, (body, *arms, *rotors), (), tuple(skids), (nose, *skids))
+
+
+MODELS = dict(zip(BOARDS, (_breakout(*_pins()), _breakout(), _vehicle()), strict=True))
+
+
+_CIRCLE = [(math.cos(math.pi * k / 20), math.sin(math.pi * k / 20)) for k in range(41)]
+MARKS_UNICODE = {"held": "●", "passed": "∙", "wanted": "◎", "now": "+"}
+MARKS_ASCII = {"held": "o", "passed": ".", "wanted": "X", "now": "+"}
+_STYLES = {"held": "bold green", "passed": "green", "wanted": "bold yellow reverse", "now": "bold"}
+
+
+def draw_half(upper: bool, marks: Iterable[tuple[str, Direction]], columns: int, rows: int, unicode: bool) -> Canvas:
+    """Return a map of one half of the sphere, with the board's x to the right and y upwards.
+
+    Parameters
+    ----------
+    upper : the half with z > 0 (the component side down). marks : kind ("held", "passed", "wanted", "now") and
+        direction of each mark; later ones cover earlier ones.
+    """
+    canvas = Canvas(columns, rows)
+    radius = min(canvas.centre) - 0.5
+    rim = [_at(canvas, radius, x, y) for x, y in _CIRCLE]
+    for before, after in pairwise(rim):
+        canvas.line(before, after)
+    glyphs = MARKS_UNICODE if unicode else MARKS_ASCII
+    for name, (x, y, z) in marks:
+        if (z > 0.0) == upper:
+            # Lambert's azimuthal equal-area projection, scaled so that the rim of the half is at 1.
+            shrink = 1.0 / math.sqrt(1.0 + abs(z))
+            canvas.letter(_at(canvas, 0.92 * radius, x * shrink, y * shrink), glyphs[name], _STYLES[name])
+    return canvas
+
+
+def _at(canvas: Canvas, radius: float, x: float, y: float) -> Point:
+    return (canvas.centre[0] + radius * x, canvas.centre[1] - radius * y)
