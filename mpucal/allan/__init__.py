@@ -18,10 +18,10 @@ from .trace import Spectrum, Trace, find_steps, find_turn
 __all__ = ["NoiseMeter", "noise_of"]
 
 AXES = tuple(f"{sensor} {axis}" for sensor in (ACCELEROMETER, GYROSCOPE) for axis in "xyz")
-UNITS = ("m/s²",) * 3 + ("rad/s",) * 3
-# samples that are added at once
-RUN = 16384
+UNITS = tuple(unit for unit in ("m/s²", "rad/s") for _ in "xyz")
 LEAST_SAMPLES = 256
+# samples that are added at once, as their sums take a dozen times their memory
+RUN = 16384
 # degrees Celsius of a change that is reported; correlation of an axis with it that is reported
 WARMED_C, CORRELATED = 2.0, 0.7
 # rms over the white noise of a sample: a weaker tone is hidden

@@ -13,8 +13,7 @@ import numpy as np
 
 from ..data import Vector
 
-# blocks per tau
-BLOCKS = 16
+# distances in samples; beyond the last, which many blocks make a tau
 _FIRST = (1, 2, 4, 8, 16)
 
 
@@ -77,7 +76,7 @@ class Octaves:
         blocks, at = np.asarray(values - self._middle), 0
         while len(blocks):
             if at == len(self._levels):
-                self._levels.append(_Level(self._axes, (BLOCKS,)))
+                self._levels.append(_Level(self._axes, _FIRST[-1:]))
             blocks = self._levels[at].add(blocks)
             at += 1
 

@@ -25,8 +25,8 @@ TURNED_RAD, TURNED_RAD_S = math.radians(2.0), math.radians(3.0)
 SEGMENT = 4096
 # a line's least height above its neighbours, beyond the limit of chance, and the probability of that limit
 LEAST_SHARE, SURPRISE = 0.3, 1e-4
-# bins: half widths of the neighbourhoods and of a line; lines per axis
-NEIGHBOURS, LINE, AT_MOST = (8, 32), 2, 1
+# bins: half widths of the neighbourhoods and of a line
+NEIGHBOURS, LINE = (8, 32), 2
 
 
 class Trace:
@@ -116,7 +116,7 @@ class Spectrum:
             self._segments += 1
 
     def tones(self, rate_hz: float) -> list[Tone]:
-        """Return the significant lines, the strongest of each axis first."""
+        """Return the strongest line of each axis that is significant."""
         from scipy.ndimage import median_filter  # noqa: PLC0415 - slow to import
         from scipy.stats import chi2  # noqa: PLC0415
 
@@ -133,11 +133,9 @@ class Spectrum:
             above = of / floor
             # the lowest bins are drift, and the highest lack neighbours
             above[: 2 * LINE] = above[-2 * LINE :] = 0.0
-            lines: list[Tone] = []
-            while len(lines) < AT_MOST and (at := int(above.argmax())) and above[at] > (1.0 + LEAST_SHARE) * most:
+            at = int(above.argmax())
+            if above[at] > (1.0 + LEAST_SHARE) * most:
                 around = slice(max(at - LINE, 0), at + LINE + 1)
                 power = float(np.sum(of[around] - floor[around])) * rate_hz / SEGMENT
-                lines.append(Tone(axis, at * rate_hz / SEGMENT, float(np.sqrt(max(power, 0.0)))))
-                above[around] = 0.0
-            found += lines
+                found.append(Tone(axis, at * rate_hz / SEGMENT, float(np.sqrt(max(power, 0.0)))))
         return found

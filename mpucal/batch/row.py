@@ -37,9 +37,6 @@ NUMBERS = (
 )
 COLUMNS = (*TEXTS, *WHOLE, *NUMBERS)
 
-# digits of the digest in the name of a row's report
-REPORT_DIGITS = 16
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -93,7 +90,7 @@ def make_row(path: str, settings: Settings, known: str | None = None) -> dict[st
             )
             row |= _numbers(calibration, recording)
             if settings.reports:
-                row["report"] = f"{row['digest'][:REPORT_DIGITS]}.html"
+                row["report"] = f"{row['digest'][:16]}.html"
                 write_bytes(f"{settings.reports}/{row['report']}", render(calibration, recording).encode())
     except MpucalError as error:
         row["error"] = str(error).replace(str(local), path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import islice
 from typing import Any
@@ -15,30 +15,37 @@ MAJOR = 1
 MAX_LENGTH = 256
 FORMULA = "a = inv(D) @ (y - b_a + applied_b_a)"
 
-# firmware_protocol.md, "Layout": fields of minor version 0, those appended by 1 and by 2, and the checksum
-FIELDS = struct.Struct("<4s B B H 40s B 3x f f 9f 3f f Q f 3f 9f 3f")
-# the numbers of FIELDS behind the formula, in their order
+# firmware_protocol.md, "Layout": the numbers behind the header, by the minor version that appended them: the field of a
+# Blob, its code for struct, and the count of its numbers
+HEADER = "<4s B B H 40s"
 LAYOUT = (
-    *(("who_am_i", 1), ("accel_range_g", 1), ("gyro_range_dps", 1), ("D", 9), ("b_a", 3), ("gravity", 1)),
-    *(("created", 1), ("temperature_c", 1), ("applied_b_a", 3), ("K", 9), ("b_omega", 3)),
+    (
+        *(
+            ("who_am_i", "B 3x", 1),
+            ("accel_range_g", "f", 1),
+            ("gyro_range_dps", "f", 1),
+            ("D", "f", 9),
+            ("b_a", "f", 3),
+        ),
+        *(("gravity", "f", 1), ("created", "Q", 1), ("temperature_c", "f", 1), ("applied_b_a", "f", 3), ("K", "f", 9)),
+        ("b_omega", "f", 3),
+    ),
+    (("b_a_slope", "f", 3), ("temperature_range_c", "f", 2)),
+    (("gyro_counts", "f", 1),),
 )
-SLOPE = struct.Struct("<3f 2f")
-COUNTS = struct.Struct("<f")
+# the fields of each minor version, and of those before it
+FIELDS = [[row for rows in LAYOUT[: minor + 1] for row in rows] for minor in range(len(LAYOUT))]
+FORMATS = [
+    struct.Struct(" ".join([HEADER, *(f"{count if count > 1 else ''}{code}" for _, code, count in rows)]))
+    for rows in FIELDS
+]
 CHECKSUM = struct.Struct("<I")
-LENGTH = FIELDS.size + CHECKSUM.size
-LENGTH_WITH_SLOPE = LENGTH + SLOPE.size
-LENGTH_WITH_COUNTS = LENGTH_WITH_SLOPE + COUNTS.size
-HEADER_LENGTH = 8
-
-APPENDED = (("b_a_slope", 3), ("temperature_range_c", 2))
+LENGTHS = [form.size + CHECKSUM.size for form in FORMATS]
 NO_SLOPE, NO_RANGE = (0.0, 0.0, 0.0), (math.nan, math.nan)
 
 # limits of D's largest element, and of its determinant over the cube of that element
 LEAST_GAIN, MOST_GAIN = 1e-3, 1e3
 LEAST_DETERMINANT = 1e-6
-
-MAJOR_AT = 4
-LENGTH_AT = 6
 
 
 class BlobError(ValueError):
@@ -88,22 +95,14 @@ class Blob:
         BlobError : D, b_a or applied_b_a is not finite, or a value does not fit its field.
         """
         _check_usable(self)
+        minor = 2 if self.gyro_counts is not None else 1 if any(self.b_a_slope) else 0
         values = {**vars(self), "created": _unix_seconds(self.created)}
-        numbers = [each for name, count in LAYOUT for each in (values[name] if count > 1 else (values[name],))]
+        numbers = [each for name, _, n in FIELDS[minor] for each in (values[name] if n > 1 else (values[name],))]
         try:
-            minor, appended = self._encode_appended()
-            body = FIELDS.pack(MAGIC, MAJOR, minor, LENGTH + len(appended), FORMULA.encode(), *numbers)
+            body = FORMATS[minor].pack(MAGIC, MAJOR, minor, LENGTHS[minor], FORMULA.encode(), *numbers)
         except (struct.error, OverflowError) as error:
             raise BlobError(f"a value does not fit its field ({error})") from error
-        body += appended
         return body + CHECKSUM.pack(zlib.crc32(body))
-
-    def _encode_appended(self) -> tuple[int, bytes]:
-        """Return the minor version and the fields appended to those of version 0."""
-        slope = SLOPE.pack(*self.b_a_slope, *self.temperature_range_c)
-        if self.gyro_counts is not None:
-            return 2, slope + COUNTS.pack(self.gyro_counts)
-        return (1, slope) if any(self.b_a_slope) else (0, b"")
 
     @classmethod
     def decode(cls, data: bytes) -> Blob:
@@ -114,28 +113,32 @@ class Blob:
         BlobError : too short, another magic, major version or length, damaged, or not usable.
         """
         _check_whole(data)
-        numbers = iter(FIELDS.unpack_from(data)[5:])
+        minor = max(minor for minor, length in enumerate(LENGTHS) if length <= len(data))
+        numbers = iter(FORMATS[minor].unpack_from(data)[5:])
         values: dict[str, Any] = {
-            name: tuple(islice(numbers, count)) if count > 1 else next(numbers) for name, count in LAYOUT
+            name: tuple(islice(numbers, n)) if n > 1 else next(numbers) for name, _, n in FIELDS[minor]
         }
         values["created"] = _iso_8601(values["created"])
-        slope, range_c = _slope(data, values["temperature_c"])
-        blob = cls(**values, b_a_slope=slope, temperature_range_c=range_c, gyro_counts=_gyro_counts(data))
+        blob = cls(**values)
+        low, high = blob.temperature_range_c
+        # a slope that cannot be used is none
+        if not (all(map(math.isfinite, blob.b_a_slope)) and -math.inf < low <= blob.temperature_c <= high < math.inf):
+            blob = replace(blob, b_a_slope=NO_SLOPE, temperature_range_c=NO_RANGE)
         _check_usable(blob)
         return blob
 
 
 def _check_whole(data: bytes) -> None:
     """Make the checks of firmware_protocol.md, "Reading", in its order."""
-    if len(data) < HEADER_LENGTH:
+    if len(data) < CHECKSUM.size + len(MAGIC):
         raise BlobError(f"{len(data)} bytes are too short for a blob")
-    if not data.startswith(MAGIC):
-        raise BlobError(f"it begins with {data[: len(MAGIC)]!r}, not {MAGIC!r}")
-    if data[MAJOR_AT] != MAJOR:
-        raise BlobError(f"its layout has major version {data[MAJOR_AT]}, but only {MAJOR} is known")
-    length = int.from_bytes(data[LENGTH_AT : LENGTH_AT + 2], "little")
-    if not LENGTH <= length <= MAX_LENGTH:
-        raise BlobError(f"its length field is {length}, but {LENGTH} to {MAX_LENGTH} are allowed")
+    magic, major, _minor, length = struct.unpack_from("<4s B B H", data)
+    if magic != MAGIC:
+        raise BlobError(f"it begins with {magic!r}, not {MAGIC!r}")
+    if major != MAJOR:
+        raise BlobError(f"its layout has major version {major}, but only {MAJOR} is known")
+    if not LENGTHS[0] <= length <= MAX_LENGTH:
+        raise BlobError(f"its length field is {length}, but {LENGTHS[0]} to {MAX_LENGTH} are allowed")
     if length != len(data):
         raise BlobError(f"its length field is {length}, but it has {len(data)} bytes")
     (checksum,) = CHECKSUM.unpack_from(data, length - CHECKSUM.size)
@@ -143,24 +146,8 @@ def _check_whole(data: bytes) -> None:
         raise BlobError("its checksum does not match: it is damaged")
 
 
-def _slope(data: bytes, temperature_c: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return b_a(T) and its range; NO_SLOPE and NO_RANGE if they are missing or unusable."""
-    if len(data) < LENGTH_WITH_SLOPE:
-        return NO_SLOPE, NO_RANGE
-    values = SLOPE.unpack_from(data, FIELDS.size)
-    usable = all(map(math.isfinite, (*values, temperature_c))) and values[3] <= temperature_c <= values[4]
-    return (values[:3], values[3:]) if usable else (NO_SLOPE, NO_RANGE)
-
-
-def _gyro_counts(data: bytes) -> float | None:
-    if len(data) < LENGTH_WITH_COUNTS:
-        return None
-    (counts,) = COUNTS.unpack_from(data, LENGTH_WITH_SLOPE - CHECKSUM.size)
-    return float(counts)
-
-
 def _check_usable(blob: Blob) -> None:
-    for name, count in (*LAYOUT, *APPENDED):
+    for name, _, count in FIELDS[1]:
         if count == 1:
             continue
         values = getattr(blob, name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import permutations
 from statistics import NormalDist
 
 import numpy as np
@@ -18,8 +19,6 @@ CONFIDENCE = 0.99
 # Factor by which the uncertainties of a calibration with reservations may be too small. Halves of a real recording with
 # this verdict, of an unchanged sensor, were 1.1 times as far apart as two good ones may be, and there are worse ones.
 RESERVED = 2.0
-# K is symmetric to rounding if the calibration is in the body frame
-SYMMETRIC = 1e-6
 WARMER_C = 3.0
 # a covariance covers chance alone: a smaller improvement does not count
 LEAST_STD_MPS2 = 0.001
@@ -101,11 +100,8 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     if _has_own_axes(a) or _has_own_axes(b):
         a, b = (replace(c, D=error_model.sensor_axes(c.D)) for c in (a, b))
     bias = b.b_a_at(a.sensor.temperature_c) - a.b_a_at(b.sensor.temperature_c if not b.follows_temperature else None)
-    numbers = [
-        *_row("bias", "mg", error_model.bias_mg(bias), error_model.bias_mg(np.hypot(a.b_a_std, b.b_a_std))),
-        *_scale_factor_errors(a, b),
-        *_misalignments(a, b),
-    ]
+    deviation = error_model.bias_mg(np.hypot(a.b_a_std, b.b_a_std))
+    numbers = [*_row("bias", "mg", error_model.bias_mg(bias), deviation), *_of_matrix(a, b)]
     std = np.hypot(a.b_omega_std, b.b_omega_std)
     gyroscope = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
     margin = RESERVED if _has_reservations(a) or _has_reservations(b) else 1.0
@@ -114,7 +110,7 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
 
 def in_body_frame(c: Calibration) -> Calibration:
     """Return the calibration in the frame where K is symmetric: K = U S V^T, Q = V U^T, K -> Q K, D -> D Q^T."""
-    if not np.isfinite(c.K).all() or np.abs(c.K - c.K.T).max() < SYMMETRIC:
+    if not np.isfinite(c.K).all():
         return c
     U, _, Vt = np.linalg.svd(c.K)
     Q = Vt.T @ U.T
@@ -126,22 +122,16 @@ def _row(name: str, unit: str, value: Vector, std: Vector) -> list[Difference]:
     return [Difference(f"{name} {axis}", unit, float(value[i]), float(std[i])) for i, axis in enumerate(AXES)]
 
 
-def _scale_factor_errors(a: Calibration, b: Calibration) -> list[Difference]:
+def _of_matrix(a: Calibration, b: Calibration) -> list[Difference]:
+    """Return the differences of the scale factor errors and of the misalignments."""
     value = error_model.scale_factor_error(b.D) - error_model.scale_factor_error(a.D)
     std = np.hypot(*(error_model.scale_factor_error_std(c.D_std) for c in (a, b)))
-    return _row("scale factor error", "%", value, std)
-
-
-def _misalignments(a: Calibration, b: Calibration) -> list[Difference]:
-    value = error_model.misalignment(b.D) - error_model.misalignment(a.D)
     # an angle beyond half a turn is one in the other direction
-    value = (value + 180.0) % 360.0 - 180.0
-    std = np.hypot(*(error_model.misalignment_std(c.D, c.D_std) for c in (a, b)))
-    return [
-        Difference(f"misalignment {AXES[i]}->{AXES[j]}", "deg", float(value[i, j]), float(std[i, j]))
-        for i in range(3)
-        for j in range(3)
-        if i != j
+    angle = (error_model.misalignment(b.D) - error_model.misalignment(a.D) + 180.0) % 360.0 - 180.0
+    angle_std = np.hypot(*(error_model.misalignment_std(c.D, c.D_std) for c in (a, b)))
+    return _row("scale factor error", "%", value, std) + [
+        Difference(f"misalignment {AXES[i]}->{AXES[j]}", "deg", float(angle[i, j]), float(angle_std[i, j]))
+        for i, j in permutations(range(3), 2)
     ]
 
 

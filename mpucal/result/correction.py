@@ -79,15 +79,11 @@ def _with_registers(calibration: Calibration, sensor: Sensor) -> Correction:
 
 def _check_origin(of: Sensor, sensor: Sensor) -> None:
     """Refuse a chip's calibration for samples that an autopilot rotated and corrected, and the other way round."""
-    if (of.origin, sensor.origin) == (Origin.CHIP, Origin.VEHICLE):
+    kinds = {Origin.CHIP: "a chip's own samples", Origin.VEHICLE: "an autopilot's stream"}
+    if of.origin is not sensor.origin and {of.origin, sensor.origin} == kinds.keys():
         raise UsageError(
-            f"the calibration is of a chip's own samples, but these came through {sensor.chip}",
-            "give the calibration of this vehicle",
-        )
-    if (of.origin, sensor.origin) == (Origin.VEHICLE, Origin.CHIP):
-        raise UsageError(
-            "the calibration is of an autopilot's stream, but these are a chip's own samples",
-            "give the calibration of this chip",
+            f"the calibration is of {kinds[of.origin]}, but these are {kinds[sensor.origin]}",
+            f"give the calibration of this {'chip' if sensor.origin is Origin.CHIP else 'vehicle'}",
         )
 
 

@@ -102,14 +102,17 @@ def _check(calibrations: Sequence[Calibration]) -> None:
             "one of the calibrations is of an autopilot's stream, and the autopilot's parameters may have changed",
             "use the autopilot's own temperature calibration, or a chip's session",
         )
-    for name in ("who_am_i", "accel_offsets"):
-        if len({value for c in calibrations if (value := getattr(c.sensor, name)) is not None}) > 1:
-            raise UsageError(f"the calibrations are of different sensors ({name} differs)", "give those of one sensor")
-    if len({c.fit.get("gravity") for c in calibrations}) > 1:
+    of = [
+        (c.sensor.who_am_i, c.sensor.accel_offsets, c.fit.get("gravity"), *c.applied_in_hardware) for c in calibrations
+    ]
+    chips, offsets, gravities, *applied = (set(values) for values in zip(*of, strict=True))
+    if len(chips - {None}) > 1 or len(offsets - {None}) > 1:
+        raise UsageError("the calibrations are of different sensors", "give those of one sensor")
+    if len(gravities) > 1:
         raise UsageError(
             "the calibrations were made with different gravities", "calibrate again with the same --gravity"
         )
-    if len({tuple(c.applied_in_hardware) for c in calibrations}) > 1:
+    if any(len(values) > 1 for values in applied):
         raise UsageError(
             "the offset registers subtract different values in the calibrations", "give those made before a write"
         )
@@ -138,17 +141,18 @@ def _is_sure(c: Calibration) -> bool:
 
 
 def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-    """Return b_a and slope at `away` = 0, (3,) each, each followed by its standard deviations."""
-    values = np.zeros((4, 3))
-    for i in range(3):
-        w = weight[:, i]
-        if np.ptp(away) == 0.0:
-            values[:, i] = (w * b_a[:, i]).sum() / w.sum(), w.sum() ** -0.5, 0.0, np.inf
-            continue
-        (slope, intercept), covariance = np.polyfit(away, b_a[:, i], 1, w=np.sqrt(w), cov="unscaled")
-        slope_std, intercept_std = np.sqrt(np.diag(covariance))
-        values[:, i] = intercept, intercept_std, slope, slope_std
-    return values[0], values[1], values[2], values[3]
+    """Return b_a and slope at `away` = 0, (3,) each, each followed by its standard deviations.
+
+    Weighted least squares of a straight line; without a span the slope is 0 and its deviation infinite.
+    """
+    x = away[:, None]
+    w, wx, wxx = (np.sum(weight * x**power, axis=0) for power in range(3))
+    wy, wxy = (np.sum(weight * b_a * x**power, axis=0) for power in range(2))
+    determinant = w * wxx - wx**2
+    if np.ptp(away) == 0.0:
+        return wy / w, w**-0.5, np.zeros(3), np.full(3, np.inf)
+    b_a_0, slope = (wxx * wy - wx * wxy) / determinant, (w * wxy - wx * wy) / determinant
+    return b_a_0, np.sqrt(wxx / determinant), slope, np.sqrt(w / determinant)
 
 
 def _worst(residual: Vector, weight: Vector) -> float:

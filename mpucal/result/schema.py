@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import reprlib
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
@@ -22,7 +23,6 @@ _IS: Mapping[str, Callable[[Any], bool]] = {
     "number": lambda value: isinstance(value, int | float) and not isinstance(value, bool),
     "integer": lambda value: isinstance(value, int) and not isinstance(value, bool),
 }
-MOST_SHOWN = 40
 
 
 def check_document(document: Any) -> None:
@@ -74,5 +74,4 @@ def _check_object(value: Mapping[str, Any], schema: Mapping[str, Any], where: st
 
 
 def _wrong(where: str, value: Any, what: str) -> ValueError:
-    shown = repr(value)
-    return ValueError(f"{where} is {shown if len(shown) <= MOST_SHOWN else shown[:MOST_SHOWN] + '...'}, {what}")
+    return ValueError(f"{where} is {reprlib.repr(value)}, {what}")

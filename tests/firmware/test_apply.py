@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.result.blob import LENGTH, MAX_LENGTH, Blob, BlobError
+from mpucal.result.blob import LENGTHS, MAX_LENGTH, Blob, BlobError
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "mpucal" / "firmware" / "src"
@@ -139,13 +139,17 @@ def random_blobs(rng, count):
         data[:, at : at + 4 * numbers] = values.astype(np.float32).view(np.uint8)
     wild = rng.random(count) < 0.1
     data[wild, 60:108] = rng.integers(0, 256, (wild.sum(), 48), np.uint8)
-    sizes = np.where(rng.random(count) < 0.7, LENGTH, rng.integers(LENGTH, MAX_LENGTH + 1, count)).astype(np.uint16)
+    sizes = np.where(rng.random(count) < 0.7, LENGTHS[0], rng.integers(LENGTHS[0], MAX_LENGTH + 1, count)).astype(
+        np.uint16
+    )
     data[:, 6:8] = sizes[:, None].view(np.uint8)
     for row, size in zip(data, sizes, strict=True):
         row[size - 4 : size] = np.frombuffer(struct.pack("<I", zlib.crc32(row[: size - 4])), np.uint8)
     spoilt = np.flatnonzero(rng.random(count) < 0.2)
     # the first bytes are few, and each of them decides
-    at = np.where(rng.random(len(spoilt)) < 0.5, rng.integers(0, 8, len(spoilt)), rng.integers(0, LENGTH, len(spoilt)))
+    at = np.where(
+        rng.random(len(spoilt)) < 0.5, rng.integers(0, 8, len(spoilt)), rng.integers(0, LENGTHS[0], len(spoilt))
+    )
     data[spoilt, at] ^= rng.integers(1, 256, len(spoilt)).astype(np.uint8)
     cut = rng.random(count) < 0.02
     sizes[cut] = rng.integers(0, sizes[cut])
@@ -204,7 +208,7 @@ def check_computed(usable, fields, counts, a):
 
 
 def test_a_blob_cut_anywhere_is_refused_and_nothing_read_behind_it(apply):
-    whole = bytearray(MEASURED.encode()[:-4]) + bytes(MAX_LENGTH - LENGTH)
+    whole = bytearray(MEASURED.encode()[:-4]) + bytes(MAX_LENGTH - LENGTHS[0])
     struct.pack_into("<H", whole, 6, MAX_LENGTH)
     whole += struct.pack("<I", zlib.crc32(whole))
     for size in range(MAX_LENGTH):

@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from mpucal.result.blob import (
-    COUNTS,
-    FIELDS,
+    FORMATS,
     FORMULA,
-    LENGTH,
-    LENGTH_WITH_COUNTS,
-    SLOPE,
+    LENGTHS,
     Blob,
     BlobError,
 )
@@ -142,13 +139,13 @@ def test_the_documents_table_is_the_codecs_format():
         code = f"{count}x" if name == "reserved" else code
         assert struct.calcsize("<" + code) == int(last or first) - int(first) + 1, name
         expected, at = f"{expected} {code}", int(last or first) + 1
-    assert expected.replace("< ", "<") == f"{FIELDS.format} {SLOPE.format[1:]} {COUNTS.format[1:]}"
-    assert at + 4 == LENGTH_WITH_COUNTS
+    assert expected.replace("< ", "<") == FORMATS[2].format
+    assert at + 4 == LENGTHS[2]
 
 
 def test_the_documents_example_is_the_blob_of_its_numbers(blob):
     lines = re.findall(r"^    ([0-9a-f]{4})  ((?:[0-9a-f]{2} ?)+)$", PROTOCOL, re.M)
-    assert [int(offset, 16) for offset, _ in lines] == list(range(0, LENGTH, 16))
+    assert [int(offset, 16) for offset, _ in lines] == list(range(0, LENGTHS[0], 16))
     assert bytes.fromhex(" ".join(row for _, row in lines)) == blob.encode()
     for number in (*blob.D, *blob.b_a, blob.gravity, blob.temperature_c):
         assert f"{number:.9g}" in PROTOCOL

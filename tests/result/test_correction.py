@@ -26,7 +26,7 @@ def through(parameters):
 @pytest.mark.parametrize(
     ("calibration", "sensor", "autopilot", "says"),
     [
-        (made(CHIP), STREAM, None, "a chip's own samples, but these came through ArduPilot-IMU1"),
+        (made(CHIP), STREAM, None, "a chip's own samples, but these are an autopilot's stream"),
         (made(STREAM), CHIP, None, "an autopilot's stream, but these are a chip's own samples"),
         (made(extra=VEHICLE), Sensor(), through(NEW), "INS_ACCOFFS_X was 0.3 while .* but 0 during the calibration"),
     ],

@@ -7,7 +7,7 @@ import pytest
 
 from mpucal.data import Sensor
 from mpucal.errors import RefusedError, UsageError
-from mpucal.result.blob import LENGTH_WITH_COUNTS
+from mpucal.result.blob import LENGTHS
 from mpucal.result.calibration import Calibration
 from mpucal.result.merge import merge
 
@@ -74,7 +74,7 @@ def test_what_the_data_do_not_support_is_said(changes, says):
     assert "do not support" in made.why
     assert says in made.why
     assert not made.calibration.follows_temperature
-    assert len(made.calibration.blob().encode()) == LENGTH_WITH_COUNTS
+    assert len(made.calibration.blob().encode()) == LENGTHS[2]
 
 
 def test_a_gain_that_changes_is_said():
