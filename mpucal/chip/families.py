@@ -8,35 +8,12 @@ Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
-from typing import NamedTuple
 
 from ..errors import ChipError
 from . import registers as reg
 
 # A full FIFO may show a frame less than its size.
 FIFO_SLACK_BYTES = 16
-
-
-class WordGroup(Enum):
-    """Group of words in a FIFO frame: its name and its number of words."""
-
-    ACCEL = "accelerometer", 3
-    TEMPERATURE = "temperature", 1
-    GYRO = "gyroscope", 3
-
-    @property
-    def words(self) -> int:
-        """Number of words."""
-        return self.value[1]
-
-
-class Columns(NamedTuple):
-    """Positions of the groups in a frame of seven words."""
-
-    accel: slice
-    temperature: int
-    gyro: slice
 
 
 @dataclass(frozen=True)
@@ -49,7 +26,6 @@ class Family:
     source : document of its differences from the others.
     fifo_bytes : size of the FIFO after a reset.
     widest_fifo_bytes : size with both FIFO_SIZE bits of ACCEL_CONFIG2 set; None: these bits have no effect.
-    frame : order of a FIFO frame.
     fifo_en_frame : value of FIFO_EN for a whole frame. fifo_en_with_temperature : True if its accelerometer bit adds
         the temperature.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
@@ -88,7 +64,6 @@ class Family:
     zero_rate_dps: float
     accel_offset_lsb_per_g: float = 2048.0
     widest_fifo_bytes: int | None = None
-    frame: tuple[WordGroup, ...] = (WordGroup.ACCEL, WordGroup.TEMPERATURE, WordGroup.GYRO)
     fifo_en_frame: int = reg.FIFO_EN_FRAME
     fifo_en_with_temperature: bool = False
     gyro_range_shift: int = reg.FULL_SCALE_SHIFT
@@ -102,15 +77,6 @@ class Family:
     nonlinearity_percent: float = 0.5
     spi_data_hz: int = 8_000_000
     zero_g_drift: str = ""
-
-    @property
-    def columns(self) -> Columns:
-        """Positions of the groups in a frame."""
-        first, at = 0, {}
-        for group in self.frame:
-            at[group] = slice(first, first + group.words)
-            first += group.words
-        return Columns(at[WordGroup.ACCEL], at[WordGroup.TEMPERATURE].start, at[WordGroup.GYRO])
 
     def accel_lag_s(self, dlpf_cfg: int) -> float:
         """Return the time by which the accelerometer lags behind the gyroscope; 0 if not documented."""

@@ -1,8 +1,8 @@
 """FIFO decoder: checks the frames' alignment, marks clipped samples, and gives each sample its time.
 
-A frame is 14 bytes, big-endian int16: accelerometer x, y, z, temperature, gyroscope x, y, z in the order of its
-family's row (RM-MPU-6000A r4.2, registers 59 to 72 and 116). A frame of the accelerometer alone has six bytes. It has
-no temperature from which misalignment would show; there a part of a frame shows it, since the FIFO slips by bytes.
+A frame is 14 bytes, big-endian int16: accelerometer x, y, z, temperature, gyroscope x, y, z (RM-MPU-6000A r4.2,
+registers 59 to 72 and 116). A frame of the accelerometer alone has six bytes. It has no temperature from which
+misalignment would show; there a part of a frame shows it, since the FIFO slips by bytes.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from .bit_flips import BitFlipFilter, Counts
 from .settings import Settings
 
 FULL_SCALE_COUNT = 32767
+# columns of a frame
+ACCEL, TEMPERATURE, GYRO = slice(0, 3), 3, slice(4, 7)
 
 # The die does not change by 1.2 C from one sample to the next; a misaligned frame shows another word here.
 MAX_TEMPERATURE_STEP = 400
@@ -67,7 +69,7 @@ class FifoDecoder:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self.settings, self._columns = settings, settings.columns
+        self.settings = settings
         clock = PolledClock if settings.polled else SampleClock
         self._clock: SampleClock | PolledClock = clock(settings.nominal_rate_hz)
         self._host = HostClock()
@@ -153,7 +155,7 @@ class FifoDecoder:
         ends = np.cumsum(lengths)
         odd = (frames[1:] == frames[:-1]).all(axis=1)
         if not self.settings.accel_only:
-            temperature = frames[:, self._columns.temperature].astype(np.int64)
+            temperature = frames[:, TEMPERATURE].astype(np.int64)
             before = temperature[0] if self._temperature is None else self._temperature
             odd = np.concatenate((odd, [False])) | (np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP)
         plain = int(np.searchsorted(ends, np.argmax(odd), side="right")) if odd.any() else len(lengths)
@@ -183,7 +185,7 @@ class FifoDecoder:
         self._runs.append(Run(self._clock.segment, first, frames, gap))
         self.accepted += len(frames)
         if not self.settings.accel_only:
-            self._temperature_sum += int(frames[:, self._columns.temperature].sum(dtype=np.int64))
+            self._temperature_sum += int(frames[:, TEMPERATURE].sum(dtype=np.int64))
 
     def _is_stuck(self, kept: Counts) -> bool:
         """Return True if a frame repeats itself for too long."""
@@ -266,7 +268,7 @@ class FifoDecoder:
     def _is_aligned(self, frames: Counts) -> bool:
         if not len(frames) or self.settings.accel_only:
             return True
-        temperature = frames[:, self._columns.temperature].astype(np.int64)
+        temperature = frames[:, TEMPERATURE].astype(np.int64)
         before = temperature[0] if self._temperature is None else self._temperature
         if (np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP).any():
             return False
@@ -289,12 +291,12 @@ class FifoDecoder:
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
         segment = np.concatenate([np.full(len(run.frames), run.segment) for run in runs])
         index = np.concatenate([np.arange(run.first, run.first + len(run.frames)) for run in runs])
-        accel, gyro = frames[:, self._columns.accel], frames[:, self._columns.gyro]
+        accel, gyro = frames[:, ACCEL], frames[:, GYRO]
         return Samples(
             t=make_increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz),
             acc=accel * settings.mps2_per_lsb,
             gyr=np.full((n, 3), np.nan) if alone else gyro * reg.rad_s_per_lsb(settings.fs_sel),
-            temperature_c=np.full(n, np.nan) if alone else self._celsius(frames[:, self._columns.temperature]),
+            temperature_c=np.full(n, np.nan) if alone else self._celsius(frames[:, TEMPERATURE]),
             gap=gap,
             acc_clipped=_clipped(accel),
             gyr_clipped=np.zeros(n, bool) if alone else _clipped(gyro),

@@ -12,7 +12,7 @@ from typing import Self
 from ..data import Sensor
 from ..errors import RecordingError
 from . import registers as reg
-from .families import Columns, Part
+from .families import Part
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,6 @@ class Settings:
     def frame_bytes(self) -> int:
         """Number of bytes in a frame."""
         return 2 * self.frame_words
-
-    @property
-    def columns(self) -> Columns:
-        """Positions of the words in a frame; for the accelerometer alone, only its own apply."""
-        columns = self.part.family.columns
-        return columns._replace(accel=slice(0, reg.ACCEL_WORDS)) if self.accel_only else columns
 
     @property
     def mps2_per_lsb(self) -> float:

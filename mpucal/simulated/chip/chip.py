@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...chip import registers as reg
-from ...chip.families import Family, WordGroup
+from ...chip.families import Family
 from ...data import Vector
 from ...errors import EndOfCapture
 from ..sensor import Counts, Feed, Setting
@@ -295,20 +295,16 @@ class Chip:
 
 
 # Bits of FIFO_EN for a sample's seven words, in register order
-WORD_BITS = {
-    WordGroup.ACCEL: [(word, reg.FIFO_EN_ACCEL) for word in (0, 1, 2)],
-    WordGroup.TEMPERATURE: [(3, reg.FIFO_EN_TEMP)],
-    WordGroup.GYRO: [(4, reg.FIFO_EN_XG), (5, reg.FIFO_EN_YG), (6, reg.FIFO_EN_ZG)],
-}
+WORD_BITS = (*[reg.FIFO_EN_ACCEL] * 3, reg.FIFO_EN_TEMP, reg.FIFO_EN_XG, reg.FIFO_EN_YG, reg.FIFO_EN_ZG)
 GYRO = slice(4, 7)
 
 
 def _columns(sources: int, family: Family) -> list[int]:
-    """Return the numbers of a sample's words that FIFO_EN selects, in the frame's order."""
+    """Return the numbers of a sample's words that FIFO_EN selects."""
     if family.fifo_en_with_temperature:
         sources |= reg.FIFO_EN_TEMP
         sources |= reg.FIFO_EN_XG | reg.FIFO_EN_YG if sources & reg.FIFO_EN_ZG else 0
-    return [word for group in family.frame for word, bit in WORD_BITS[group] if sources & bit]
+    return [word for word, bit in enumerate(WORD_BITS) if sources & bit]
 
 
 def _setting(registers: bytearray, rate_hz: float, model: Model, factory: FactoryTrim) -> Setting:
