@@ -116,7 +116,7 @@ def command(
                 click.echo(err=True)
             steps = files_written(files, command_again(calibration, into.path), calibration.verdict, of_vehicle)
             click.echo(f"{summary(calibration)}\n\n{steps}")
-        record = session_recorder(into.path, calibration, recording, source.truth)
+        record = session_recorder(into.path, calibration, recording, source.truth())
         device = {**options, "gravity": source.plan.gravity, "model": source.plan.model}
         latest = calibration
         # Whatever happens to the writing, there is a result to print.
@@ -167,7 +167,7 @@ def _run(
             calibration = runner.calibrate(recording, fit)
             if name:
                 calibration = replace(calibration, extra={**calibration.extra, NAME: name})
-            return recording, calibration, runner.write(folder.path, calibration, recording, source.truth)
+            return recording, calibration, runner.write(folder.path, calibration, recording, source.truth())
     except BaseException as error:
         if kept := folder.kept:
             person.say(f"  The capture is kept in {kept}{_how_to_continue(source, kept.parent, error)}.")
@@ -178,7 +178,7 @@ def _how_to_continue(source: OpenedSource, folder: Path, error: BaseException) -
     """Return how to resume; an error that says "start again" gets that advice in its remedy instead."""
     if (folder / DOCUMENT.name).exists():
         return f", and the results in {folder}"
-    if not source.resumable:
+    if not source.words:
         return ""
     if not isinstance(error, MpucalError) or AGAIN not in error.remedy:
         return f"; continue with --resume {folder}"

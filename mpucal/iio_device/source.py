@@ -28,7 +28,7 @@ from ..sources.host_bus import HostBus, converting
 from ..sources.kind import Request
 from ..sources.opened_source import Say
 from ..sources.read_timer import ReadTimer
-from .errors import attribute_error, buffer_error
+from .errors import file_error
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
@@ -168,7 +168,7 @@ class IioFiles(HostBus):
             return Reply("\n".join(self._names(device)).encode(), self.now_ns())
         if not name:
             return self._buffer(device, count)
-        with converting(lambda error: attribute_error(error, device, name, None)):
+        with converting(lambda error: file_error(error, device, name)):
             reply = self._timer.read(register, count, lambda: (self._sysfs / register).read_bytes()[:count])
         # The driver reads the count from the chip in between.
         return reply._replace(t_ns=(reply.t_ns + self.now_ns()) // 2)
@@ -177,7 +177,7 @@ class IioFiles(HostBus):
         """See Files."""
         device, _, name = register.partition("/")
         t_ns = self.now_ns()
-        with converting(lambda error: attribute_error(error, device, name, data.decode())):
+        with converting(lambda error: file_error(error, device, name, data.decode())):
             if not name.endswith(PERSISTENT_SUFFIX) and register not in self._before:
                 self._before[register] = (self._sysfs / register).read_bytes().strip()
             self._put(register, data)
@@ -211,12 +211,12 @@ class IioFiles(HostBus):
         except BlockingIOError:
             return Reply(b"", t_ns)
         except OSError as error:
-            raise buffer_error(error, device) from error
+            raise file_error(error, device) from error
 
     def _names(self, device: str) -> list[str]:
         """List all attributes, those of the groups with the group's name in front."""
         folder = self._sysfs / device
-        with converting(lambda error: attribute_error(error, device, "", None)):
+        with converting(lambda error: file_error(error, device, "the attributes")):
             names = [path.name for path in folder.iterdir() if path.is_file()]
             groups = [folder / group for group in ATTRIBUTE_GROUPS if (folder / group).is_dir()]
             return sorted(

@@ -42,10 +42,11 @@ class Chain(Generic[Part]):
     Parameters
     ----------
     parts : in order; only the last one may be another than a recorded one.
+    last_ns : time of the last record: the clock of the last part begins a second later, unless it shows more.
     """
 
-    def __init__(self, parts: Sequence[Part]) -> None:
-        self._parts = list(parts)
+    def __init__(self, parts: Sequence[Part], last_ns: int = 0) -> None:
+        self._parts, self._last_ns = list(parts), last_ns
         self._recorded = [isinstance(part, Recorded) for part in parts]
         self._at = 0
 
@@ -94,30 +95,36 @@ class Chain(Generic[Part]):
 class ChainedBus(Chain[Bus | Files]):
     """Parts of a session with a chip or a driver of the kernel."""
 
+    _shift_ns: int | None = None
+
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
-        return self._part.read(register, count)
+        reply = self._part.read(register, count)
+        return reply if self.replaying else reply._replace(t_ns=self._shifted(reply.t_ns))
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
-        return self._part.write(register, data)
+        t_ns = self._part.write(register, data)
+        return t_ns if self.replaying else self._shifted(t_ns)
 
     def sleep_until(self, t_ns: int) -> None:
-        """See Bus."""
-        self._part.sleep_until(t_ns)
+        """Sleep as Bus does; at once in a replay, and before the first access after it, when the shift is unknown."""
+        if self._shift_ns is not None:
+            self._part.sleep_until(t_ns - self._shift_ns)
+
+    def _shifted(self, t_ns: int) -> int:
+        if self._shift_ns is None:
+            self._shift_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
+        return t_ns + self._shift_ns
 
 
 class ChainedTransport(Chain[Transport]):
-    """Parts of a session with a vehicle.
+    """Parts of a session with a vehicle."""
 
-    Parameters
-    ----------
-    last_ns : time of the last record, which the clock of the live link continues.
-    """
+    _shift_ns = 0
 
     def __init__(self, parts: Sequence[Transport], last_ns: int) -> None:
-        super().__init__(parts)
-        self._last_ns, self._shift_ns = last_ns, 0
+        super().__init__(parts, last_ns)
         self._take_properties()
 
     def go_on(self) -> bool:
@@ -148,42 +155,6 @@ class ChainedTransport(Chain[Transport]):
 
     def _take_properties(self) -> None:
         self.name, self.datagrams, self.outward = self._part.name, self._part.datagrams, self._part.outward
-
-
-class ShiftedClockBus:
-    """Bus whose clock continues an earlier one.
-
-    Parameters
-    ----------
-    bus : its first access gets a time one second after `last_ns`, unless its own clock shows more.
-    """
-
-    def __init__(self, bus: Bus | Files, last_ns: int) -> None:
-        self._bus, self._last_ns = bus, last_ns
-        self._shift_ns: int | None = None
-
-    def read(self, register: Any, count: int) -> Reply:
-        """See Bus."""
-        reply = self._bus.read(register, count)
-        return reply._replace(t_ns=self._shifted(reply.t_ns))
-
-    def write(self, register: Any, data: bytes) -> int:
-        """See Bus."""
-        return self._shifted(self._bus.write(register, data))
-
-    def sleep_until(self, t_ns: int) -> None:
-        """Sleep as Bus does; at once before the first access, when the shift is unknown."""
-        if self._shift_ns is not None:
-            self._bus.sleep_until(t_ns - self._shift_ns)
-
-    def close(self) -> None:
-        """See Bus."""
-        self._bus.close()
-
-    def _shifted(self, t_ns: int) -> int:
-        if self._shift_ns is None:
-            self._shift_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
-        return t_ns + self._shift_ns
 
 
 def split_at_resumes(captures: Iterable[Sequence[Record]], more: bool = False) -> list[list[Record]]:

@@ -89,7 +89,7 @@ class OpenedSource(ABC):
     Attributes
     ----------
     line : open bus or transport; a Chain in a replay and in a resumed session. plan : of the session.
-    hands : receive the prompts besides the operator. read_truth : returns the true parameters of a simulated sensor.
+    hands : receive the prompts besides the operator. truth : returns the true parameters of a simulated sensor.
     recovered : description of a damaged capture's readable part. capture_name : name of its capture's file.
     words : options that open it again; see Request.words. A session can be resumed only with them.
     real_time : True if its time passes by itself, False if it waits for the program.
@@ -98,7 +98,7 @@ class OpenedSource(ABC):
     line: Any
     plan: Plan
     hands: Sequence[Listener] = ()
-    read_truth: Callable[[], Mapping[str, Any] | None] = lambda: None
+    truth: Callable[[], Mapping[str, Any] | None] = lambda: None
     recovered: str | None = None
     capture_name: str = CAPTURE.name
     words: Mapping[str, Any] = field(default_factory=dict)
@@ -110,16 +110,6 @@ class OpenedSource(ABC):
     def parts(self) -> Chain[Any] | None:
         """Recorded parts of the session, followed by the sensor itself if it is resumed; None without them."""
         return self.line if isinstance(self.line, Chain) else None
-
-    @property
-    def resumable(self) -> bool:
-        """True if a session on it can be resumed from its capture."""
-        return bool(self.words)
-
-    @property
-    def truth(self) -> Mapping[str, Any] | None:
-        """True parameters of a simulated sensor."""
-        return self.read_truth()
 
     @property
     def listeners(self) -> Sequence[Listener]:

@@ -15,7 +15,7 @@ from ..files.recorders import VEHICLE, recorder_of
 from ..files.tlog import TLOG, read_tlog
 from ..result.session_files import CAPTURE
 from ..session.plan import Plan
-from .chain import Chain, ChainedBus, ChainedTransport, ShiftedClockBus, split_at_resumes
+from .chain import Chain, ChainedBus, ChainedTransport, split_at_resumes
 from .kind import Request
 from .opened_source import SOURCE, OpenedSource
 from .opening import refuse_fixed_options, reopen_source
@@ -91,6 +91,7 @@ def _chained(captures: Sequence[Capture], live: Any = None) -> Chain[Any]:
     parts = split_at_resumes((capture.records for capture in captures), more=live is not None)
     name = captures[0].name
     last_ns = max((record.t_ns for part in parts for record in part), default=0)
+    last = [live] if live else []
     if not captures[0].meta or recorder_of(captures[0].meta, name) is VEHICLE:
-        return ChainedTransport([*(PacketReplay(part, name) for part in parts), *([live] if live else [])], last_ns)
-    return ChainedBus([*(ReplayBus(part, name) for part in parts), *([ShiftedClockBus(live, last_ns)] if live else [])])
+        return ChainedTransport([*(PacketReplay(part, name) for part in parts), *last], last_ns)
+    return ChainedBus([*(ReplayBus(part, name) for part in parts), *last], last_ns)

@@ -7,10 +7,11 @@ just before it. CH341 and CP2112 have a driver of the Linux kernel, and are /dev
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from abc import abstractmethod
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 from ..chip.access import Reply
 from ..chip.registers import WHO_AM_I
@@ -27,106 +28,29 @@ MAX_READ_BYTES = 1024
 MCP2221_VENDOR, MCP2221_PRODUCT = 0x04D8, 0x00DD
 
 
-class Adapter(Protocol):
-    """Adapter of bytes; `missing` is the exception of its library if nothing acknowledges."""
-
-    missing: type[Exception]
-
-    def exchange(self, address: int, out: bytes, count: int) -> bytes:
-        """Write `out`, then read `count` bytes after a repeated start."""
-        ...
-
-    def write(self, address: int, out: bytes) -> None:
-        """Write `out`."""
-        ...
-
-    def close(self) -> None:
-        """Close the adapter."""
-        ...
-
-
-class Ftdi:
-    """FT232H, FT2232H or FT4232H; `url` as in pyftdi, such as ftdi://ftdi:232h/1."""
-
-    def __init__(self, url: str) -> None:
-        from pyftdi.i2c import I2cController, I2cNackError  # noqa: PLC0415 - an extra
-
-        # By default it logs each address that is not acknowledged.
-        logging.getLogger("pyftdi.i2c").setLevel(logging.ERROR)
-        self.missing = I2cNackError
-        self._controller = I2cController()
-        self._controller.configure(url, frequency=I2C_HZ)
-
-    def exchange(self, address: int, out: bytes, count: int) -> bytes:
-        """Write `out`, then read `count` bytes."""
-        return bytes(self._controller.exchange(address, out, count))
-
-    def write(self, address: int, out: bytes) -> None:
-        """Write `out`."""
-        self._controller.write(address, out)
-
-    def close(self) -> None:
-        """Close the adapter."""
-        self._controller.close()
-
-
-class Mcp2221:
-    """MCP2221(A) by its name: mcp2221, or mcp2221:SERIAL if there are several."""
-
-    def __init__(self, name: str) -> None:
-        import EasyMCP2221  # noqa: PLC0415 - an extra
-        from EasyMCP2221.exceptions import NotAckError  # noqa: PLC0415 - the same
-
-        self.missing = NotAckError
-        self._device = EasyMCP2221.Device(usbserial=name.partition(":")[2] or None, scan_serial=True)
-        self._device.I2C_speed(I2C_HZ)
-
-    def exchange(self, address: int, out: bytes, count: int) -> bytes:
-        """Write `out`, then read `count` bytes."""
-        self._device.I2C_write(address, out, kind="nonstop")
-        return bytes(self._device.I2C_read(address, count, kind="restart"))
-
-    def write(self, address: int, out: bytes) -> None:
-        """Write `out`."""
-        self._device.I2C_write(address, out)
-
-    def close(self) -> None:
-        """Close the device, which EasyMCP2221 would keep open for its next user."""
-        self._device.__del__()
-
-
-def open_ftdi(request: Request) -> OpenedChip:
-    """Open the chip on the adapter that --bus ftdi://... names."""
-    return _open(request, "pyftdi", Ftdi)
-
-
-def open_mcp2221(request: Request) -> OpenedChip:
-    """Open the chip on the adapter that --bus mcp2221[:SERIAL] names."""
-    return _open(request, "EasyMCP2221", Mcp2221)
-
-
-def _open(request: Request, library: str, adapter: Callable[[str], Adapter]) -> OpenedChip:
-    if find_spec(library) is None:
-        raise BusError(f"the Python library {library} is not installed", "pip install mpucal[usb]")
-    return OpenedChip(UsbBus(request.value, adapter, request.values.get("address")), request.plan, words=request.words)
-
-
 class UsbBus(HostBus):
     """Chip at one address of a USB adapter.
 
     Parameters
     ----------
-    name : of the adapter, which `adapter` opens. address : of the chip; None tries 0x68, then 0x69.
+    name : of the adapter. address : of the chip; None tries 0x68, then 0x69.
 
     Raises
     ------
-    BusError : no such adapter, no permission, or in use by another program. NoAnswer : nothing acknowledges.
+    BusError : no library, no such adapter, no permission, or in use by another program. NoAnswer : nothing
+    acknowledges.
     """
 
-    def __init__(self, name: str, adapter: Callable[[str], Adapter], address: int | None = None) -> None:
+    library: ClassVar[str]
+    # exception of the library if nothing acknowledges
+    missing: type[Exception]
+
+    def __init__(self, name: str, address: int | None = None) -> None:
+        if find_spec(self.library) is None:
+            raise BusError(f"the Python library {self.library} is not installed", "pip install mpucal[usb]")
         self._name, self._timer = name, ReadTimer(self.now_ns)
         try:
-            self._adapter = adapter(name)
+            self.connect(name)
         except Exception as error:  # libusb, hidapi and both libraries have their own
             raise BusError(
                 f"the USB adapter {name} cannot be opened ({error})",
@@ -136,8 +60,24 @@ class UsbBus(HostBus):
             addresses = ADDRESSES if address is None else (address,)
             self.address = find_chip(name, addresses, lambda each: self._exchange(each, WHO_AM_I, 1)[0])
         except BaseException:
-            self._adapter.close()
+            self.close()
             raise
+
+    @abstractmethod
+    def connect(self, name: str) -> None:
+        """Open the adapter."""
+
+    @abstractmethod
+    def exchange(self, address: int, register: int, count: int) -> bytes:
+        """Write the register's address, then read `count` bytes after a repeated start."""
+
+    @abstractmethod
+    def put(self, address: int, out: bytes) -> None:
+        """Write `out`."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the adapter."""
 
     def read(self, register: int, count: int) -> Reply:
         """Read `count` bytes from `register` on; the time is just before the first transfer."""
@@ -154,28 +94,86 @@ class UsbBus(HostBus):
         """Write `data` from `register` on, and return the time just before the transfer."""
         t_ns = self.now_ns()
         with self._converting_errors(self.address):
-            self._adapter.write(self.address, bytes([register]) + data)
+            self.put(self.address, bytes([register]) + data)
         return t_ns
-
-    def close(self) -> None:
-        """Close the adapter."""
-        self._adapter.close()
 
     def _exchange(self, address: int, register: int, count: int) -> bytes:
         with self._converting_errors(address):
-            return self._adapter.exchange(address, bytes([register]), count)
+            return self.exchange(address, register, count)
 
     @contextmanager
     def _converting_errors(self, address: int) -> Iterator[None]:
         try:
             yield
-        except self._adapter.missing as error:
+        except self.missing as error:
             raise no_answer_error(self._name, (address,)) from error
         except Exception as error:  # libusb, hidapi and both libraries have their own
             raise BusError(
                 f"a transfer over the USB adapter {self._name} failed ({error})",
                 "check its cable and the chip's wires, and that SDA and SCL have pull-ups",
             ) from error
+
+
+class Ftdi(UsbBus):
+    """FT232H, FT2232H or FT4232H, by a URL of pyftdi, such as ftdi://ftdi:232h/1."""
+
+    library = "pyftdi"
+
+    def connect(self, name: str) -> None:
+        """See UsbBus."""
+        from pyftdi.i2c import I2cController, I2cNackError  # noqa: PLC0415 - an extra
+
+        # By default it logs each address that is not acknowledged.
+        logging.getLogger("pyftdi.i2c").setLevel(logging.ERROR)
+        self.missing = I2cNackError
+        self._controller = I2cController()
+        self._controller.configure(name, frequency=I2C_HZ)
+
+    def exchange(self, address: int, register: int, count: int) -> bytes:
+        """See UsbBus."""
+        return bytes(self._controller.exchange(address, bytes([register]), count))
+
+    def put(self, address: int, out: bytes) -> None:
+        """See UsbBus."""
+        self._controller.write(address, out)
+
+    def close(self) -> None:
+        """See UsbBus."""
+        self._controller.close()
+
+
+class Mcp2221(UsbBus):
+    """MCP2221(A) by its name: mcp2221, or mcp2221:SERIAL if there are several."""
+
+    library = "EasyMCP2221"
+
+    def connect(self, name: str) -> None:
+        """See UsbBus."""
+        import EasyMCP2221  # noqa: PLC0415 - an extra
+        from EasyMCP2221.exceptions import NotAckError  # noqa: PLC0415 - the same
+
+        self.missing = NotAckError
+        self._device = EasyMCP2221.Device(usbserial=name.partition(":")[2] or None, scan_serial=True)
+        self._device.I2C_speed(I2C_HZ)
+
+    def exchange(self, address: int, register: int, count: int) -> bytes:
+        """See UsbBus."""
+        self._device.I2C_write(address, bytes([register]), kind="nonstop")
+        return bytes(self._device.I2C_read(address, count, kind="restart"))
+
+    def put(self, address: int, out: bytes) -> None:
+        """See UsbBus."""
+        self._device.I2C_write(address, out)
+
+    def close(self) -> None:
+        """Close the device, which EasyMCP2221 would keep open for its next user."""
+        self._device.__del__()
+
+
+def open_source(request: Request) -> OpenedChip:
+    """Open the chip on the adapter that --bus ftdi://... or mcp2221[:SERIAL] names."""
+    adapter = Ftdi if request.kind.word == "ftdi" else Mcp2221
+    return OpenedChip(adapter(request.value, request.values.get("address")), request.plan, words=request.words)
 
 
 def adapters() -> list[tuple[str, str]]:

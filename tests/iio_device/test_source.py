@@ -21,7 +21,7 @@ from mpucal.iio.decode import IioDecoder
 from mpucal.iio.devices import Devices
 from mpucal.iio.driver import IioDriver
 from mpucal.iio_device import source
-from mpucal.iio_device.errors import attribute_error
+from mpucal.iio_device.errors import file_error
 from mpucal.iio_device.source import IioFiles
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
@@ -262,9 +262,7 @@ def test_an_attribute_that_a_driver_does_not_answer_is_left_out(monkeypatch):
 
     def refuse(self, register, count):
         if register.endswith("in_accel_x_calibbias"):
-            raise attribute_error(
-                OSError(errno.EINVAL, "Invalid argument"), "iio:device0", "in_accel_x_calibbias", None
-            )
+            raise file_error(OSError(errno.EINVAL, "Invalid argument"), "iio:device0", "in_accel_x_calibbias")
         return read(self, register, count)
 
     monkeypatch.setattr(SimulatedFiles, "read", refuse)

@@ -15,7 +15,7 @@ from mpucal.errors import BusError, EndOfCapture, NoAnswer
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.apart import CAN_FORK, SourceApart
-from mpucal.sources.chain import ChainedBus, ShiftedClockBus
+from mpucal.sources.chain import ChainedBus
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
 from tools.lab.recorded_chip import open_recorded
@@ -137,7 +137,7 @@ def test_a_resumed_session_is_replayed_here_before_the_process_goes_on():
     measure(Driver(before[0], Config()))
 
     def resumed():
-        return ChainedBus([ReplayBus(before[1]), ShiftedClockBus(rest(), before[1][-1].t_ns)])
+        return ChainedBus([ReplayBus(before[1]), rest()], before[1][-1].t_ns)
 
     chain = resumed()
     bus, alone = tapped(chain)

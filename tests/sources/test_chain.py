@@ -4,7 +4,8 @@ import pytest
 
 from mpucal.chip.access import Reply, Transaction
 from mpucal.chip.records import RESUMED, SessionEvent
-from mpucal.sources.chain import PAUSE_NS, ShiftedClockBus, split_at_resumes
+from mpucal.sources.chain import PAUSE_NS, ChainedBus, split_at_resumes
+from mpucal.sources.replay import ReplayBus
 
 S = 1_000_000_000
 
@@ -44,7 +45,8 @@ class Young:
 
 def test_a_clock_continues_the_earlier_one():
     young = Young()
-    bus = ShiftedClockBus(young, 7 * S)
+    bus = ChainedBus([ReplayBus([]), young], 7 * S)
+    assert bus.go_on()
     bus.sleep_until(3 * S)
     assert young.slept_ns == []
     first_ns = bus.read(0x75, 1).t_ns

@@ -25,7 +25,7 @@ from ...data import Samples
 from ...iio.attributes import ACCEL, AXES, GYRO, MPU_SCALES, PRINTED_SCALES, TEMP, TIMESTAMP
 from ...iio.scan_elements import FrameLayout, ScanElement
 from ...iio.setup import TRIGGERS
-from ...iio_device.errors import attribute_error, buffer_error
+from ...iio_device.errors import file_error
 from ..chip import SimulatedBus
 
 RATES_HZ = (10, 20, 50, 100, 200, 500)
@@ -65,7 +65,7 @@ class SimulatedFiles(Files):
             return Reply("\n".join(sorted(held.texts)).encode(), self._now_ns)
         if not name:
             if not held.running:
-                raise buffer_error(_error(errno.EINVAL), device)
+                raise file_error(_error(errno.EINVAL), device)
             take = count - count % held.layout.frame_bytes
             data, held.frames = bytes(held.frames[:take]), held.frames[take:]
             return Reply(data, self._now_ns)
@@ -80,7 +80,7 @@ class SimulatedFiles(Files):
         device, _, name = register.partition("/")
         held, text = self._device(device, name), data.decode()
         if held.running and name != "buffer/enable":
-            raise attribute_error(_error(errno.EBUSY), device, name, text)
+            raise file_error(_error(errno.EBUSY), device, name, text)
         if name.endswith("_calibbias"):
             x, y, z = (
                 int(text) if name == f"{ACCEL}_{a}_calibbias" else w for a, w in zip(AXES, self._words(), strict=True)
@@ -113,7 +113,7 @@ class SimulatedFiles(Files):
     def _device(self, device: str, name: str) -> _Device:
         held = self._devices.get(device)
         if held is None or (name and name not in held.texts):
-            raise attribute_error(_error(errno.ENOENT), device, name, None)
+            raise file_error(_error(errno.ENOENT), device, name)
         return held
 
     def _fill_buffers(self) -> None:
@@ -140,7 +140,7 @@ class SimulatedFiles(Files):
     def _read_channel(self, channel: str) -> int:
         """Read the present count of one channel."""
         if self._running:
-            raise attribute_error(_error(errno.EBUSY), "iio:device0", f"{channel}_raw", None)
+            raise file_error(_error(errno.EBUSY), "iio:device0", f"{channel}_raw")
         self._start_driver()
         reply = self._bus.read(REGISTERS[channel], 2)
         self._now_ns = max(self._now_ns, reply.t_ns)

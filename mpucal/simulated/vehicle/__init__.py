@@ -25,7 +25,7 @@ def open_source(request: Request) -> OpenedVehicle:
         request.plan,
         words=request.words,
         key=key,
-        read_truth=vehicle.truth_document,
+        truth=vehicle.truth_document,
         real_time=transport.real_time,
         **link_identity(request),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -19,7 +20,7 @@ from mpucal.errors import BusError, NoAnswer
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.sources import usb_i2c
-from mpucal.sources.usb_i2c import Ftdi, Mcp2221, UsbBus, adapters
+from mpucal.sources.usb_i2c import Ftdi, Mcp2221, adapters
 
 pytest.importorskip("pyftdi")
 pytest.importorskip("EasyMCP2221")
@@ -75,11 +76,11 @@ def _beside(name):
 
 @pytest.fixture(params=[("ftdi", Ftdi), ("mcp2221", Mcp2221)], ids=["ftdi", "mcp2221"])
 def adapter(request, plugged):
-    return SPELLED[request.param[0]], request.param[1]
+    return partial(request.param[1], SPELLED[request.param[0]])
 
 
 def test_registers_go_both_ways(adapter):
-    bus = UsbBus(*adapter)
+    bus = adapter()
     assert (bus.address, bus.read(reg.WHO_AM_I, 1).data) == (0x68, b"\x68")
     bus.write(reg.PWR_MGMT_1, b"\x01\x00")
     bus.write(reg.SMPLRT_DIV, b"\x07\x03\x08\x10")
@@ -91,14 +92,14 @@ def test_registers_go_both_ways(adapter):
 
 def test_an_address_where_nothing_is_is_told(adapter):
     with pytest.raises(NoAnswer, match=r"0x69"):
-        UsbBus(*adapter, 0x69)
-    bus = UsbBus(*adapter)
+        adapter(0x69)
+    bus = adapter()
     assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
     bus.close()
 
 
 def test_the_driver_samples_over_it(adapter):
-    bus = UsbBus(*adapter)
+    bus = adapter()
     driver = Driver(bus, Config(rate_hz=100))
     driver.start()
     end = time.monotonic() + 60.0
@@ -123,7 +124,7 @@ def test_of_several_each_is_named_by_its_serial(enumerated, chip, monkeypatch):
     # without a look at what is there, then after one
     for _ in range(2):
         for name, path in (("mcp2221:0002", b"2"), ("mcp2221:0001", b"1")):
-            bus = UsbBus(name, Mcp2221)
+            bus = Mcp2221(name)
             assert (hid.opened, bus.address) == (path, 0x68)
             bus.close()
         assert [spelled for spelled, _ in adapters() if "mcp" in spelled] == ["mcp2221:0001", "mcp2221:0002"]
@@ -149,7 +150,7 @@ def test_the_doctor_lists_adapters_and_examines_the_chip(name, plugged, capsys, 
 def test_an_adapter_that_is_not_there_is_told(name, plugged):
     kind = Ftdi if name.startswith("ftdi") else Mcp2221
     with pytest.raises(BusError, match=r"the USB adapter .* cannot be opened"):
-        UsbBus(name, kind)
+        kind(name)
 
 
 @pytest.mark.parametrize("name", SPELLED)
