@@ -4,22 +4,19 @@
 
 The commands and their option -o are those of the command line: one without a row here, or with another option that is a
 path and no input, is an error. Each command is first run undisturbed, for the files that it writes. Then each of these,
-and the folder of them, is a file, a folder, a device, a pipe or a link, or lies on a disk that is full or read-only (a
-tmpfs for root; for others a limit of the files' size, and a folder without permission to write). A command may then
-replace an old file as a whole, or follow a link to a folder. Otherwise it has to end with a sentence, leave what was
-there, and leave no temporary file. Exit code 1: one did not.
+and the folder of them, is a file, a folder, a device, a pipe or a link. A command may then replace an old file as a
+whole, or follow a link to a folder. Otherwise it has to end with a sentence, leave what was there, and leave no
+temporary file. Exit code 1: one did not. Full and read-only disks are those of syscalls.py.
 """
 
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import stat
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -122,42 +119,9 @@ def _content(path: Path) -> object:
     return sorted(each.name for each in path.iterdir()) if path.is_dir() else None
 
 
-@contextmanager
-def _disk(options: str, here: Path) -> Iterator[Path]:
-    """Yield a folder on a disk of its own if this is root's process."""
-    with TemporaryDirectory(dir=here.parent) as place:
-        if os.geteuid():
-            yield Path(place)
-            return
-        subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", place], check=True)
-        try:
-            yield Path(place)
-        finally:
-            subprocess.run(["umount", "-l", place], check=True)
-
-
-def on_bad_disk(words: tuple[str, ...], here: Path, full: bool) -> str:
-    """Run a command whose output lies on a disk without a free page, or where nothing may be written."""
-    with _disk("size=64k" if full else "ro", here) as place:
-        if not full and os.geteuid():
-            place.chmod(0o555)
-        elif full and not os.geteuid():
-            with suppress(OSError), (place / "filler").open("wb", buffering=0) as filler:
-                while filler.write(bytes(4096)):
-                    pass
-        done = _run(words, here, place, longest=1 if full and os.geteuid() else None)
-        odd = _odd(done, place) or ("" if done.code not in (0, 5) else f"exit code {done.code}")
-        return f"WRONG: {odd}" if odd else "refused"
-
-
-def _run(words: tuple[str, ...], here: Path, place: Path, longest: int | None = None) -> Ended:
-    """Run a command in `here` with its output in `place`, where files may have `longest` bytes."""
-
-    def call() -> int:
-        if longest is not None:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (longest, longest))
-        return run([word.format(place / "out") for word in words])
-
+def _run(words: tuple[str, ...], here: Path, place: Path) -> Ended:
+    """Run a command in `here` with its output in `place`."""
+    call = partial(run, [word.format(place / "out") for word in words])
     return Child(call, here, here.parent / "said").go().wait()
 
 
@@ -198,8 +162,6 @@ def tried(words: tuple[str, ...], here: Path) -> Iterator[tuple[str, str]]:
         yield from ((kind, obstructed(words, here, file, kind)) for file in files[:MOST_FILES])
         if in_folder:
             yield f"{kind}, of the folder", obstructed(words, here, Path("out"), kind)
-    for full, kind in ((True, "full disk"), (False, "read-only disk")):
-        yield kind, on_bad_disk(words, here, full)
 
 
 def scenarios(commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS)) -> list[str]:

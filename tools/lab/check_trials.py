@@ -1,8 +1,7 @@
-"""`mpucal check` on simulated pairs of a calibration and a check with known truth, and on halves of real recordings.
+"""`mpucal check` on simulated pairs of a calibration and a check with known truth.
 
 python -m tools.lab check_trials --seeds 504                     what is told against what happened, each as often
 python -m tools.lab check_trials --only nothing --seeds 2000     false alarms
-python -m tools.lab check_trials recordings/*.npz                halves of real recordings: nothing happened
 
 A pair is an MPU-6050 in a trembling hand: twelve poses make the calibration, a flat rest and the three orientations
 that are asked for, each missed by some degrees, the check; with `--any` any three. Every sensor also ages by five days,
@@ -15,8 +14,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -29,7 +27,6 @@ from mpucal.recheck.observed import BETA, NOISE, NONLINEAR, apply_errors
 from mpucal.result.calibration import REFUSED
 from mpucal.simulated.sensor import SensorTruth
 
-from .halves import halves
 from .judge import rms
 from .runner import Trial, names_of
 from .scenarios.course import direction
@@ -124,48 +121,22 @@ def at(recording: mpucal.Recording, temperature_c: float) -> mpucal.Recording:
     return replace(recording, sensor=sensor, temperature_c=np.full(len(recording), temperature_c), flat=None)
 
 
-def of_pair(event: str, seed: int, motion: str) -> Row | None:
+def of_pair(
+    item: tuple[str, int], *, any: Annotated[bool, "any three orientations, not those that are asked for"] = False
+) -> Row | None:
     """Calibrate, apply an event, and check; None if the calibration was refused."""
+    event, seed = item
     if (begun := calibrated_and_aged(seed)) is None:
         return None
     calibration, aged, of_event, of_errors = begun
     after, temperature_c = happened(aged, event, of_event)
-    recording = at(hand_scenario(2 * seed + 1, motion, tremble=True, sensor=after).recording, temperature_c)
-    row = Row(name=event, seed=seed, **told(calibration, imperfect(recording, of_errors), DAYS))
-    if row.theta is not None:
-        off = calibration.D @ row.theta[BETA] + calibration.b_a - after.b_a
+    made = hand_scenario(2 * seed + 1, "check" if any else "check as asked", tremble=True, sensor=after)
+    found = check(calibration, imperfect(at(made.recording, temperature_c), of_errors), days=DAYS)
+    row = Row(name=event, seed=seed, verdict=found.verdict, what=found.what, probability=found.probability)
+    if found.theta is not None:
+        off = calibration.D @ found.theta[BETA] + calibration.b_a - after.b_a
         row.error_mg = float(np.abs(off).max()) / drift.MG
-    del row.theta
     return row
-
-
-def told(calibration: mpucal.Calibration, recording: mpucal.Recording, days: float) -> dict[str, Any]:
-    """Return what a check says of a calibration, and the likeliest change."""
-    found = check(calibration, recording, days=days)
-    return {name: getattr(found, name) for name in ("verdict", "what", "probability", "seconds", "theta")}
-
-
-def of_halves(path: Path, gravity: float) -> list[Row]:
-    """Check each half of a recording against the calibration of the other, if that was not refused."""
-    rows = []
-    parts = halves(mpucal.load(path))
-    for one, other in (parts, parts[::-1]):
-        calibration = mpucal.calibrate(one, gravity=gravity)
-        if calibration.verdict != REFUSED:
-            rows.append(Row(name=path.stem, **{**told(calibration, other, 0.0), "theta": None}))
-    return rows
-
-
-def tried(
-    item: Path | tuple[str, int],
-    *,
-    any: Annotated[bool, "any three orientations, not those that are asked for"] = False,
-    gravity: Annotated[float, "m/s^2, of the recordings"] = 9.81,
-) -> list[Row] | Row | None:
-    """Check the halves of a recording, or a simulated pair of an event and a seed."""
-    if isinstance(item, Path):
-        return of_halves(item, gravity)
-    return of_pair(*item, motion="check" if any else "check as asked")
 
 
 def events(seeds: range, only: Sequence[str]) -> list[tuple[str, int]]:
@@ -174,13 +145,10 @@ def events(seeds: range, only: Sequence[str]) -> list[tuple[str, int]]:
 
 
 def scenarios(
-    recordings: Annotated[list[Path], "real recordings, halved"] = (),
-    *,
-    seeds: range,
-    only: Annotated[list[str], names_of(EVENTS), "events, with ; between"] = EVENTS,
-) -> Sequence[Path | tuple[str, int]]:
-    """Return the recordings, or pairs of an event and a seed."""
-    return recordings or events(seeds, only)
+    *, seeds: range, only: Annotated[list[str], names_of(EVENTS), "events, with ; between"] = EVENTS
+) -> list[tuple[str, int]]:
+    """Return pairs of an event and a seed."""
+    return events(seeds, only)
 
 
 def told_as(rows: Sequence[Row]) -> str:
@@ -203,4 +171,4 @@ COLUMNS: dict[str, Column] = {
     "error, mg": over("error_mg", rms),
 }
 
-main = Trial(__doc__, tried, scenarios, COLUMNS, seeds="0:504")
+main = Trial(__doc__, of_pair, scenarios, COLUMNS, seeds="0:504")

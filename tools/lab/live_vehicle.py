@@ -51,7 +51,6 @@ from mpucal.simulated.vehicle.imus import FROM_HAND, to_hand_axes
 from . import own_calibration
 from .judge import off, rms, z_of
 
-MPUCAL = Path(sys.executable).parent / "mpucal"
 # header of a message of the SITL for each step: magic number, steps a second, number of the step
 HEAD, MAGIC = struct.Struct("<HHI"), (18458, 29569)
 BLOCK = 20
@@ -138,45 +137,34 @@ class Body:
             yield t_s, {"imu": {"gyro": turn, "accel_body": felt}, **at}
 
 
-class Held:
-    """Parameters of a vehicle's IMUs, and those that would be true.
-
-    Parameters
-    ----------
-    parameters : by name.
-    """
-
-    def __init__(self, parameters: Mapping[str, float]) -> None:
-        self.parameters = parameters
-
-    def true(self, imu: int) -> Correction:
-        """Return the parameters that IMU `imu`, counted from 1, needs."""
-        bias, scale = (np.array([self.parameters[f"SIM_ACC{imu}_{kind}_{a}"] for a in AXES]) for kind in KINDS_OF_ERROR)
-        # the vehicle takes a scale of 0 as 1
-        return Correction(bias, np.where(scale == 0, 1.0, scale))
-
-    def off(self) -> list[str]:
-        """Return how far the parameters of each IMU are from the truth at worst: offset [m/s^2] and scale."""
-        imus = range(1, round(self.parameters["SIM_IMU_COUNT"]) + 1)
-        return ["{:.5f} {:.6f}".format(*off(ardupilot_slot(imu), self.parameters, self.true(imu))) for imu in imus]
-
-    def z(self, document: Mapping[str, Any], skew: Vector) -> tuple[float, ...]:
-        """Return (12,) of D and b_a of one IMU's document, where this is what was held while it was measured."""
-        imu = int(document["autopilot"]["imu"])
-        where = ardupilot_slot(imu)
-        R, held, true = mounting(ARDUPILOT, where, self.parameters), where.correction(self.parameters), self.true(imu)
-        if R is None or held is None:
-            return ()
-        D, b_a = R @ np.diag(held.scale / true.scale) @ skew @ R.T, R @ (held.scale * (true.offset - held.offset))
-        return z_of(document, {"D": D, "b_a": b_a})
-
-
-def held(url: str) -> Held:
-    """Ask the vehicle at another of its ports for what it holds now."""
+def held(url: str) -> dict[str, float]:
+    """Ask the vehicle at another of its ports for the parameters that it holds now, by name."""
     names = [f"SIM_ACC{imu}_{kind}_{a}" for imu in range(1, IMUS + 1) for kind in KINDS_OF_ERROR for a in AXES]
     with closing(_locked(url)) as link:
-        own = read_parameters(link, ["SIM_IMU_COUNT", *names], ARDUPILOT)
-        return Held(own | read_stream_parameters(link, ARDUPILOT))
+        return read_parameters(link, ["SIM_IMU_COUNT", *names], ARDUPILOT) | read_stream_parameters(link, ARDUPILOT)
+
+
+def needed(held: Mapping[str, float], imu: int) -> Correction:
+    """Return the parameters that IMU `imu`, counted from 1, needs."""
+    bias, scale = (np.array([held[f"SIM_ACC{imu}_{kind}_{a}"] for a in AXES]) for kind in KINDS_OF_ERROR)
+    # the vehicle takes a scale of 0 as 1
+    return Correction(bias, np.where(scale == 0, 1.0, scale))
+
+
+def far(held: Mapping[str, float]) -> list[str]:
+    """Return how far the parameters of each IMU are from the truth at worst: offset [m/s^2] and scale."""
+    imus = range(1, round(held["SIM_IMU_COUNT"]) + 1)
+    return ["{:.5f} {:.6f}".format(*off(ardupilot_slot(imu), held, needed(held, imu))) for imu in imus]
+
+
+def z(document: Mapping[str, Any], before: Mapping[str, float], skew: Vector) -> tuple[float, ...]:
+    """Return (12,) of D and b_a of one IMU's document, where `before` is what was held while it was measured."""
+    where, true = ardupilot_slot(imu := int(document["autopilot"]["imu"])), needed(before, imu)
+    R, own = mounting(ARDUPILOT, where, before), where.correction(before)
+    if R is None or own is None:
+        return ()
+    D, b_a = R @ np.diag(own.scale / true.scale) @ skew @ R.T, R @ (own.scale * (true.offset - own.offset))
+    return z_of(document, {"D": D, "b_a": b_a})
 
 
 def _locked(url: str) -> Link:
@@ -208,73 +196,46 @@ def main(
     hand: Annotated[str, HANDS] = "guided",
     arm: Annotated[str, ARMS] = "steady",
     seed: Annotated[int, "of the hand"] = 0,
-    killed_at: Annotated[int | None, "prompt at which it is killed, and then resumed"] = None,
     cross_axis: Annotated[float, "standard deviation, of the accelerometers"] = 0.0,
     own: Annotated[bool, "ArduPilot calibrates itself"] = False,
 ) -> int:
     """Run one session, and print its line; return its exit code."""
-    body = Body(port, hand, arm, seed, cross_axis)
+    body, document = Body(port, hand, arm, seed, cross_axis), None
     before = held(parameters)
-    R_b = mounting(ARDUPILOT, ardupilot_slot(1), before.parameters)
-    if R_b is not None:
+    if (R_b := mounting(ARDUPILOT, ardupilot_slot(1), before)) is not None:
         body.mounting = R_b
-    if own:
-        with closing(_locked(mavlink)) as link:
-            done, took_s, level = own_calibration.calibrate(link, body)
-            angle = own_calibration.attitude_error_deg(link, body, level)
-        print(line(int(not done), None, took_s, angle, before, held(parameters), body.skew))
-        return int(not done)
     with closing(_locked(mavlink)) as link:
-        level = own_calibration.set_level(link, body)
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary) / "session"
-        code = session(body, ["--mavlink", mavlink, "-o", str(folder), *words], killed_at)
-        if killed_at:
-            code = session(body, ["--resume", str(folder), *words])
-        file = folder / "calibration.json"
-        document = json.loads(file.read_text()) if file.exists() else None
+        if own:
+            done, took_s, level = own_calibration.calibrate(link, body)
+            code = int(not done)
+        else:
+            level = own_calibration.set_level(link, body)
+    if not own:
+        code, document = session(body, ["--mavlink", mavlink, *words])
+        took_s = document["fit"]["seconds"] if document else math.nan
     with closing(_locked(mavlink)) as link:
         angle = own_calibration.attitude_error_deg(link, body, level)
-    took_s = document["fit"]["seconds"] if document else math.nan
-    print(line(code, document, took_s, angle, before, held(parameters), body.skew))
+    imus = [document, *document.get("others", [])] if document else []
+    errors = rms([each for one in imus if "accelerometer" in one for each in z(one, before, body.skew)])
+    verdict = document["quality"]["verdict"] if document else "none"
+    was, now = max(far(before)), ", ".join(far(held(parameters)))
+    end = f"took {took_s:.0f} s, attitude off {angle:.2f} deg"
+    print(f"exit {code} {verdict}: was {was}, is {now}, z {errors:.2f}, {end}")
     return code
 
 
-def session(body: Body, words: list[str], killed_at: int | None = None) -> int:
-    """Run `mpucal session`, pass its prompts to the hand, and print its output; return its exit code.
-
-    killed_at : number of the prompt at which the session is killed.
-    """
-    heard = 0
-    command = [str(MPUCAL), "session", "--json-events", *words]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
-        for text in process.stderr or ():
-            event: dict[str, Any] = json.loads(text) if text.startswith("{") else {"event": "error", "text": text}
-            if event["event"] == "prompt":
-                heard += 1
-                if heard == killed_at:
-                    process.kill()
-                    continue
-                body.hear(event["kind"], event["down"])
-            said = [str(event[key]).strip() for key in ("text", "why", "what", "do") if event.get(key)]
-            if said and event["event"] in SAID:
-                print(f"{event['event']}: {' '.join(said)}", file=sys.stderr)
-    return process.returncode
-
-
-def line(
-    code: int,
-    document: Mapping[str, Any] | None,
-    took_s: float,
-    angle_deg: float,
-    before: Held,
-    after: Held,
-    skew: Vector,
-) -> str:
-    """Return the result in a line; document : calibration.json of a session. angle_deg : of the attitude afterwards."""
-    imus = [document, *document.get("others", [])] if document else []
-    z = rms([each for one in imus if "accelerometer" in one for each in before.z(one, skew)])
-    verdict = document["quality"]["verdict"] if document else "none"
-    was, now = max(before.off()), ", ".join(after.off())
-    end = f"took {took_s:.0f} s, attitude off {angle_deg:.2f} deg"
-    return f"exit {code} {verdict}: was {was}, is {now}, z {z:.2f}, {end}"
+def session(body: Body, words: list[str]) -> tuple[int, dict[str, Any] | None]:
+    """Run `mpucal session`, pass its prompts to the hand, and print its output; return its exit code and its result."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "session"
+        command = [sys.executable, "-m", "mpucal", "session", "--json-events", *words, "-o", str(folder)]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
+            for text in process.stderr or ():
+                event: dict[str, Any] = json.loads(text) if text.startswith("{") else {"event": "error", "text": text}
+                if event["event"] == "prompt":
+                    body.hear(event["kind"], event["down"])
+                said = [str(event[key]).strip() for key in ("text", "why", "what", "do") if event.get(key)]
+                if said and event["event"] in SAID:
+                    print(f"{event['event']}: {' '.join(said)}", file=sys.stderr)
+        file = folder / "calibration.json"
+        return process.returncode, json.loads(file.read_text()) if file.exists() else None

@@ -1,14 +1,10 @@
-"""Sessions on the simulated chip, one a seed: their ends, their errors, and their times.
+"""Sessions on the simulated chip, one a seed, in hands that follow the guidance, or turn as they like.
 
-    python -m tools.lab session_trials hands --seeds 50 --of guided placing random wandering
-    python -m tools.lab session_trials parts
-
-hands: a hand that follows the guidance, beside hands that turn as they like. parts: each part of
-mpucal/chip/families.py, simulated by what its row says. Sessions with faults are those of `python -m tools.lab
-campaign`.
+    python -m tools.lab session_trials --seeds 50 --of guided placing random wandering
 
 An error is that of a calibrated reading, rms over all directions; claims are errors in units of what is claimed. Times
-are simulated seconds since the start. Exit code 1 where one ended as it should not.
+are simulated seconds since the start. Exit code 1 where one ended as it should not. Sessions with faults are those of
+`python -m tools.lab campaign`.
 """
 
 from __future__ import annotations
@@ -20,36 +16,23 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mpucal.chip.families import PARTS
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
 from mpucal.session.events import Decision, PromptKind, Verification
 from mpucal.session.plan import Plan
-from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.disturbance import ARMS
 from mpucal.simulated.hands import HANDS
 
 from .judge import rms
-from .runner import Trial
-from .sessions import ABANDONED, NOTHING, SilentOperator, by_command, judge_session, session
+from .runner import Trial, each_seed
+from .sessions import ABANDONED, NOTHING, SilentOperator, judge_session, session
 from .table import Column, Row, count, frequencies, known, over
 
-# limits for a part: the temperature [C], and each element of D
-TEMPERATURE_C, NEAR_C, NEAR = 27.0, 0.3, 2e-3
 HELD = (*HANDS, *(f"guided,arm={arm}" for arm in ARMS))
 
 
-def parts() -> dict[str, tuple[str, str]]:
-    """Return each part as --bus sim: names it: its name, and where its row is from; revision C is one more."""
-    by_family = {model.family: name for name, model in reversed(MODELS.items())}
-    found = {
-        f"{by_family[part.family]},who_am_i={who_am_i:#04x}": (part.chip, part.family.source)
-        for who_am_i, part in PARTS.items()
-    }
-    return {**found, "mpu6050c": ("MPU-6050C", PARTS[0x68].family.source)}
-
-
-def of_hand(name: str, seed: int) -> Row:
-    """Run a session in that hand, and note the times of its steps."""
+def of_hand(item: tuple[str, int]) -> Row:
+    """Run a session in a hand, and note the times of its steps."""
+    name, seed = item
     ear = SilentOperator()
     done = session(f"sim:hand={name}", Plan(), seed, ear)
     rotated_s, finished_s = ear.when(PromptKind.VERIFY), ear.when(PromptKind.REST)
@@ -66,49 +49,9 @@ def of_hand(name: str, seed: int) -> Row:
     )
 
 
-def of_part(name: str, seed: int) -> Row:
-    """Run a session on a part; it must end good, with the right name and temperature."""
-    words = ("--bus", f"sim:chip={name},temperature_c={TEMPERATURE_C}", "--seed", str(seed))
-    done, document = by_command(*words, "--rate", "50", "--model", "hand")
-    if done.calibration is None:
-        return judge_session(name, seed, done, "no calibration")
-    (chip, source), sensor = parts()[name], document["sensor"]
-    error = float(np.abs(done.calibration.D - done.truth["D"]).max())
-    near = abs(sensor["temperature_c"] - TEMPERATURE_C) < NEAR_C and error < NEAR
-    right = near and done.calibration.verdict == GOOD and sensor["chip"] == chip
-    said = f"{sensor['chip']}, {sensor['temperature_c']:.1f} C, D within {error:.1e} ({source})"
-    return judge_session(name, seed, replace(done, said=said), "" if right else "not as its row says")
-
-
-# by name: the items, those of them that are tried by default, and the function that tries one
-TRIALS: dict[str, tuple[Sequence[str], Sequence[str], Callable[[str, int], Row]]] = {
-    "hands": (HELD, ["guided"], of_hand),
-    "parts": ([*parts()], [*parts()], of_part),
-}
-
-
-def tried(item: tuple[str, str, int]) -> Row:
-    """Run one session of a trial."""
-    trial, name, seed = item
-    return TRIALS[trial][2](name, seed)
-
-
-def scenarios(
-    trial: Annotated[str, TRIALS],
-    *,
-    seeds: range,
-    of: Annotated[list[str] | None, "some of it; default: all, or the guided hand"] = None,
-) -> list[tuple[str, str, int]]:
-    """Return the sessions that are asked for.
-
-    Raises
-    ------
-    SystemExit : the trial has nothing of such a name.
-    """
-    names, usual, _ = TRIALS[trial]
-    if unknown := set(of or ()) - set(names):
-        raise SystemExit(f"{trial} are {', '.join(names)}, and not {', '.join(unknown)}")
-    return [(trial, name, seed) for name in of or usual for seed in seeds]
+def scenarios(*, seeds: range, of: Annotated[list[str], HELD] = ("guided",)) -> list[tuple[str, int]]:
+    """Return each hand with each seed."""
+    return each_seed(of, seeds)
 
 
 def typical(name: str, middle: Callable[[Sequence[float]], Any] = np.median) -> Column:
@@ -141,4 +84,4 @@ def line(ended: Row) -> str:
     return f"{mark}{ended.name}, seed {ended.seed}: {ended.verdict}, {ended.error:.4f} m/s² {ended.said}"
 
 
-main = Trial(__doc__, tried, scenarios, COLUMNS, seeds="4:5", line=line)
+main = Trial(__doc__, of_hand, scenarios, COLUMNS, seeds="4:5", line=line)

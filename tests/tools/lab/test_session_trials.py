@@ -21,10 +21,10 @@ from mpucal.session.events import Prompt, PromptKind
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.sources.tap import Tap
-from tools.lab import session_trials as trials
-from tools.lab.sessions import NOTHING, Session, SilentOperator, judge_session
+from tools.lab.sessions import NOTHING, Session, SilentOperator, by_command, judge_session
 
 FAULTS = tuple(fault_kinds(*OF_CHIP))
 HALF = -(-len(FAULTS) // 2)
@@ -63,24 +63,31 @@ def test_no_pair_of_faults_makes_a_wrong_calibration_good(number, seed):
     assert ended.verdict != NOTHING or ended.said
 
 
-def test_every_part_has_its_name_its_temperature_and_a_source():
-    parts = trials.parts()
-    assert {name for name, _ in parts.values()} == {part.chip for part in PARTS.values()} | {"MPU-6050C"}
-    for words, (name, source) in parts.items():
-        bus = open_simulated(f"sim:chip={words},seed=4,temperature_c=27")
-        bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
-        driver = Driver(bus, Config())
-        found = driver.start()
-        end_ns = driver.now_ns() + 5e8
-        while driver.now_ns() < end_ns:
-            driver.poll()
-        assert (found.chip, bool(source)) == (name, True)
-        assert driver.recording().temperature_c.mean() == pytest.approx(27, abs=0.3)
-        driver.stop()
+def parts():
+    """Each part as --bus sim: names it, with its name and the source of its row; revision C is one more."""
+    by_family = {model.family: name for name, model in reversed(MODELS.items())}
+    for who_am_i, part in PARTS.items():
+        yield f"{by_family[part.family]},who_am_i={who_am_i:#04x}", part.chip, part.family.source
+    yield "mpu6050c", "MPU-6050C", PARTS[0x68].family.source
+
+
+@pytest.mark.parametrize(("words", "name", "source"), [*parts()])
+def test_a_part_has_its_name_its_temperature_and_a_source(words, name, source):
+    bus = open_simulated(f"sim:chip={words},seed=4,temperature_c=27")
+    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    driver = Driver(bus, Config())
+    found = driver.start()
+    end_ns = driver.now_ns() + 5e8
+    while driver.now_ns() < end_ns:
+        driver.poll()
+    assert (found.chip, bool(source)) == (name, True)
+    assert driver.recording().temperature_c.mean() == pytest.approx(27, abs=0.3)
+    driver.stop()
 
 
 @pytest.mark.slow
-def test_a_session_on_a_part_that_only_its_identity_names_ends_good():
-    ended = trials.of_part("clone98,who_am_i=0xae", 4)
-    assert (ended.verdict, ended.wrong) == ("good", "")
-    assert ended.said.startswith("ICM-20608D, 27.")
+@pytest.mark.parametrize(("words", "name", "source"), [*parts()])
+def test_a_session_on_a_part_ends_good(words, name, source):
+    done, document = by_command("--bus", f"sim:chip={words}", "--seed", "4", "--rate", "50", "--model", "hand")
+    assert (done.calibration.verdict, document["sensor"]["chip"]) == (GOOD, name), source
+    np.testing.assert_allclose(done.calibration.D, done.truth["D"], atol=2e-3)
