@@ -26,6 +26,7 @@ def state(view: View, said: Said | None = None) -> dict[str, Any]:
         "confirming": view.confirming,
         "flat": KINDS[view.board].picture,
         "meter": view.meter,
+        "eye": view.eye._asdict(),
         "countdown": view.waiting,
         "progress": view.progress,
         "count": None if view.progress is None else count(view.progress),

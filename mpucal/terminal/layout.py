@@ -113,7 +113,7 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     attitudes = (view.meter.attitude, view.meter.wanted) if view.meter is not None else ()
     for name, style, attitude in zip(("now", "turn it like this"), ("", "yellow"), attitudes, strict=False):
         if attitude is not None:
-            canvas = pictures.draw_board(view.board, attitude, board_columns, height)
+            canvas = pictures.draw_board(view.board, attitude, view.eye, board_columns, height)
             parts.append((name, canvas.lines(style, glyphs.unicode), board_columns))
     if view.confirming and height > 2:
         text_columns = columns - board_columns - 3

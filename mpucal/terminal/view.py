@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
+from ..session.attitude import rotate
 from ..session.boards import BOARD, flat_description
 from ..session.events import (
     Caution,
@@ -20,6 +22,7 @@ from ..session.events import (
     Progress,
     Prompt,
     PromptKind,
+    Quaternion,
     Seen,
     Use,
     Verification,
@@ -50,6 +53,48 @@ CONNECTING = "WAIT"
 TURNING = (PromptKind.ROTATE, PromptKind.VERIFY)
 
 
+# Eyes [deg] from which a board is seen, in the order of preference, and the least visible share of its face: of another
+# eye, and of the present one, which a tremor does not change.
+_TURNS_DEG, _TILTS_DEG = (-14.0, 14.0, -28.0, 28.0, -48.0, 48.0), (32.0, 52.0, 16.0, 68.0)
+LEAST_FACE, KEPT_FACE = 0.5, 0.38
+_LAID = (1.0, 0.0, 0.0, 0.0)
+
+
+class Eye(NamedTuple):
+    """Direction from which the board is seen, in the terminal and on the page: turned from the front, and above."""
+
+    turn_deg: float = _TURNS_DEG[0]
+    tilt_deg: float = _TILTS_DEG[0]
+
+    @property
+    def axes(self) -> tuple[Direction, Direction, Direction]:
+        """Unit vectors of the room across, up and toward the eye."""
+        turn, tilt = math.radians(self.turn_deg), math.radians(self.tilt_deg)
+        x, y = math.sin(turn), math.cos(turn)
+        up = (x * math.sin(tilt), y * math.sin(tilt), math.cos(tilt))
+        return (y, -x, 0.0), up, (-x * math.cos(tilt), -y * math.cos(tilt), math.sin(tilt))
+
+    def moved(self, attitudes: Sequence[Quaternion]) -> Eye:
+        """Return the eye for a board in these attitudes: this one, unless it sees one of them nearly edge-on."""
+        faces = [rotate(attitude, (0.0, 0.0, 1.0)) for attitude in attitudes]
+
+        def share(eye: Eye) -> float:
+            return min(abs(dot(eye.axes[2], face)) for face in faces)
+
+        if share(self) >= KEPT_FACE:
+            return self
+        eyes = [Eye(turn, tilt) for tilt in _TILTS_DEG for turn in _TURNS_DEG]
+        return next((eye for eye in eyes if share(eye) >= LEAST_FACE), max(eyes, key=share))
+
+
+FRONT = Eye()
+
+
+def dot(a: Direction, b: Direction) -> float:
+    """Return the scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 class Moment(StrEnum):
     """Subject of the headline."""
 
@@ -67,12 +112,13 @@ class View:
 
     Attributes
     ----------
-    board : kind of picture. seen : orientations that count, in their order. verified : those since the last prompt to
-        turn. notes : decisions and other messages, in their order.
+    board : kind of picture. eye : from where it is seen. seen : orientations that count, in their order.
+    verified : those since the last prompt to turn. notes : decisions and other messages, in their order.
     """
 
     title: str = "mpucal"
     board: str = BOARD
+    eye: Eye = FRONT
     prompt: Prompt | None = None
     meter: Meter | None = None
     countdown: Countdown | None = None
@@ -93,7 +139,11 @@ class View:
                 return self._prompted(output)
             case Decision(why, _):
                 return self.noted(why)
-            case Meter() | Countdown() | Progress() | Knowledge() | Caution():
+            case Meter():
+                laying = self.prompt is not None and self.prompt.kind is PromptKind.LAY_FLAT
+                wanted = _LAID if laying else output.wanted or output.attitude
+                view = replace(self, meter=output, eye=self.eye.moved((output.attitude, wanted)))
+            case Countdown() | Progress() | Knowledge() | Caution():
                 latest: dict[str, Any] = {type(output).__name__.lower(): output}
                 view = replace(self, **latest)
             case Held():

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mpucal.session.attitude import straight
+from mpucal.session.attitude import rotate, straight
 from mpucal.session.boards import BOARDS
 from mpucal.terminal import pictures
+from mpucal.terminal.view import Eye
 
 DIRECTIONS = [
     (0, 0, -1),
@@ -24,11 +25,19 @@ def held(down):
     return straight((-np.array(down, float) / np.linalg.norm(down)).tolist())
 
 
-def test_the_board_is_never_seen_edge_on():
-    for face in Rotation.random(200, random_state=0).apply([0.0, 0.0, 1.0]):
-        view = np.array(pictures.view_of(face.tolist()))
-        np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-12)
-        assert abs(view[2] @ face) >= 0.3
+def test_the_board_is_never_seen_edge_on_and_the_eye_moves_no_more_than_it_must():
+    eye = Eye()
+    for attitude in Rotation.random(200, random_state=0).as_quat(scalar_first=True).tolist():
+        eye, before = eye.moved([attitude]), eye
+        axes = np.array(eye.axes)
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+        face = rotate(attitude, (0.0, 0.0, 1.0))
+        assert abs(axes[2] @ face) >= 0.38
+        assert eye == before or abs(np.array(before.axes[2]) @ face) < 0.38
+
+
+def picture(kind, down, *size):
+    return pictures.draw_board(kind, held(down), Eye().moved([held(down)]), *size)
 
 
 def where(canvas, letter):
@@ -41,7 +50,7 @@ def where(canvas, letter):
 def test_the_letter_of_the_lowest_axis_is_below_the_others(axis, letter, size):
     for sign in (1.0, -1.0):
         down = tuple(sign if i == axis else 0.0 for i in range(3))
-        canvas = pictures.draw_board("gy-521", held(down), *size)
+        canvas = picture("gy-521", down, *size)
         rows = {other: where(canvas, other)[0] for other in "XYZ"}
         others = [row for other, row in rows.items() if other != letter]
         assert (rows[letter] > max(others)) if sign > 0 else (rows[letter] < min(others))
@@ -50,7 +59,7 @@ def test_the_letter_of_the_lowest_axis_is_below_the_others(axis, letter, size):
 @pytest.mark.parametrize("size", [(22, 9), (44, 20)], ids=["small", "large"])
 def test_each_kind_of_board_differs_in_any_way_to_hold_it(size):
     drawn = [
-        "\n".join(line.plain for line in pictures.draw_board(kind, held(down), *size).lines("", unicode=unicode))
+        "\n".join(line.plain for line in picture(kind, down, *size).lines("", unicode=unicode))
         for kind in (BOARDS if size[1] > 10 else ("gy-521", "vehicle"))
         for unicode in (True, False)
         for down in DIRECTIONS

@@ -42,27 +42,14 @@ export function pointing(down, from) {
   return times([sine < 1e-6 && angle > 1 ? 0 : Math.cos(angle / 2), x, y, z], from);
 }
 
-// The viewer's eye: in front, above and a little to one side, so that left, right and away are those of the person; it
-// moves so that no board is seen edge-on.
-const TURNS = [-14, 14, -28, 28, -48, 48], TILTS = [32, 52, 16, 68], LEAST_FACE = 0.5, KEEPS_FACE = 0.38;
-
-export function eye({ turn, tilt }) {
-  const t = radians(turn), e = radians(tilt), away = [Math.sin(t), Math.cos(t), 0];
+// The axes across, up and toward the eye of mpucal/terminal/view.py, which chooses from where the board is seen.
+export function eye({ turn_deg, tilt_deg }) {
+  const t = radians(turn_deg), e = radians(tilt_deg), away = [Math.sin(t), Math.cos(t), 0];
   return {
     across: [Math.cos(t), -Math.sin(t), 0],
     up: [away[0] * Math.sin(e), away[1] * Math.sin(e), Math.cos(e)],
     toward: [-away[0] * Math.cos(e), -away[1] * Math.cos(e), Math.sin(e)],
   };
-}
-
-// Least visible share of the face of a board.
-const face = (view, attitudes) => Math.min(...attitudes.map((q) => Math.abs(dot(eye(view).toward, rotate(q, [0, 0, 1])))));
-
-export function viewOf(attitudes, kept) {
-  if (kept && face(kept, attitudes) >= KEEPS_FACE) return kept;
-  const views = TILTS.flatMap((tilt) => TURNS.map((turn) => ({ turn, tilt })));
-  return views.find((view) => face(view, attitudes) >= LEAST_FACE)
-    ?? views.reduce((best, view) => (face(view, attitudes) > face(best, attitudes) ? view : best));
 }
 
 // A model: a plate, boxes above and below it (lowest and highest corner, colour), and the print on both faces.
@@ -359,7 +346,7 @@ function arc(picture, way, over = false) {
 
 // The sphere of directions that can point down, fixed to the board and seen from a little below: the direction that
 // points down now is at its foot.
-const BALL_VIEW = { turn: -20, tilt: -28 };
+const BALL_VIEW = { turn_deg: -20, tilt_deg: -28 };
 
 export function drawBall(picture, attitude, taken, wanted) {
   picture.begin(1.28);

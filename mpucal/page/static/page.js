@@ -1,6 +1,6 @@
 // The page: changes from the server are shown at once; the board moves to its new attitude by an animation.
 
-import { FLAT, TURNED_OVER, Picture, between, drawBall, drawBoard, pointing, turn, viewOf } from "./board.js";
+import { FLAT, TURNED_OVER, Picture, between, drawBall, drawBoard, pointing, turn } from "./board.js";
 import * as sound from "./sound.js";
 
 const $ = (id) => document.getElementById(id);
@@ -231,9 +231,9 @@ function live() {
 
 const now = new Picture($("now")), goal = new Picture($("goal")), ball = new Picture($("ball"));
 const still = matchMedia("(prefers-reduced-motion: reduce)");
-let from = FLAT, to = FLAT, movedAt = 0, view = viewOf([FLAT]), seenFrom = { ...view }, drawing = false;
+let from = FLAT, to = FLAT, movedAt = 0, seenFrom = {}, drawing = false;
 
-const LINE_VIEW = { turn: -28, tilt: 40 };
+const LINE_VIEW = { turn_deg: -28, tilt_deg: 40 };
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const flatDown = () => (state.board === "vehicle" ? [0, 0, 1] : [0, 0, -1]);
 const flat = () => (state.board === "vehicle" ? TURNED_OVER : FLAT);
@@ -259,7 +259,7 @@ function pictures(changed) {
     to = changed.meter.attitude;
     movedAt = performance.now();
   }
-  view = viewOf([to, ...(goes ? [goes] : [])], view);
+  seenFrom = { ...state.eye, ...seenFrom };
   draw();
 }
 
@@ -275,14 +275,13 @@ function frame(t) {
   drawing = false;
   const attitude = shownAttitude(performance.now()), goes = wanted();
   const k = still.matches ? 1 : 0.14;
-  seenFrom.turn += k * (view.turn - seenFrom.turn);
-  seenFrom.tilt += k * (view.tilt - seenFrom.tilt);
+  for (const name in seenFrom) seenFrom[name] += k * (state.eye[name] - seenFrom[name]);
   if (!$("pictures").hidden) {
     drawBoard(now, state.board, attitude, seenFrom, goes && state.meter?.wanted ? way(attitude) : null);
     if (goes) drawBoard(goal, state.board, goes, seenFrom);
   }
   if (!$("ball-figure").hidden) drawBall(ball, attitude, state.seen ?? [], state.verdict ? null : target());
-  const moving = performance.now() - movedAt < MOVE_MS || Math.abs(view.turn - seenFrom.turn) + Math.abs(view.tilt - seenFrom.tilt) > 0.2;
+  const moving = performance.now() - movedAt < MOVE_MS || Object.keys(seenFrom).some((name) => Math.abs(state.eye[name] - seenFrom[name]) > 0.1);
   if (moving && !document.hidden) draw();
 }
 
