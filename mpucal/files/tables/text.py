@@ -110,7 +110,7 @@ class TextTable(Table):
         found, unit = self._exact(column, kept), column.unit
         parts = [c for c in self.columns if c.quantity == NANOSECONDS and unit == "s"]
         try:
-            Decimal(_with_point(self.rows[0][column.place].strip()))
+            Decimal(_with_point(self._cell(int(kept.argmax()), column).strip()))
         except InvalidOperation:
             unit = "ns"
             below = [c for c in self.columns if c.quantity == TIME and c.unit in BELOW_A_SECOND and c != column]
