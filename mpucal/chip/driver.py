@@ -64,15 +64,6 @@ class Need(Enum):
     SET_UP = auto()
 
 
-_CURES = {
-    None: Need.NOTHING,
-    FifoFault.OVERFLOW: Need.RESTART,
-    FifoFault.MISALIGNED: Need.RESTART,
-    FifoFault.LATE: Need.RESTART,
-    FifoFault.LOST: Need.RESTART,
-}
-
-
 class Driver:
     """Driver of one chip on one bus.
 
@@ -247,9 +238,10 @@ class Driver:
     def _after_poll(self) -> Need:
         """Count the last poll's fault, and return what the chip needs."""
         fault = self._decoder.fault
-        if fault is not None:
-            self.faults[fault] += 1
-        return _CURES.get(fault, Need.SET_UP)
+        if fault is None:
+            return Need.NOTHING
+        self.faults[fault] += 1
+        return Need.SET_UP if fault is FifoFault.STUCK else Need.RESTART
 
     def _check_pace(self, settings: Settings) -> None:
         """Raise BusError if the chip makes frames faster than the quickest read moved them, after several overflows."""

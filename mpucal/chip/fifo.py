@@ -133,11 +133,13 @@ class FifoDecoder:
             return FifoFault.MISALIGNED
         self._read += len(frames)
         kept = np.concatenate((self._waiting, kept))
-        if self._is_stuck(kept):
+        # the first frame of each run of equal ones
+        begins = np.flatnonzero(np.concatenate(([True], (kept[1:] != kept[:-1]).any(axis=1)))[: len(kept)])
+        if (np.diff(begins, append=len(kept)) >= self._stuck_frames).any():
             return FifoFault.STUCK
         if look is not None:
             self._clock.add(*np.array([look]).T)
-        self._accept(kept)
+        self._accept(kept, len(kept) - int(begins[-1]) if len(begins) else 0)
         return None
 
     def accept_plain_polls(self, looks_ns: Whole, frames: Counts, lengths: Whole) -> int:
@@ -165,35 +167,23 @@ class FifoDecoder:
         kept = frames[: ends[plain - 1]]
         self._clock.add(looks_ns[:plain], self._read + ends[:plain])
         self._read += len(kept)
-        self._accept(kept)
+        self._accept(kept, 1)
         if not self.settings.accel_only:
             self._temperature = int(temperature[len(kept) - 1])
         return plain
 
-    def _accept(self, kept: Counts) -> None:
-        """Keep all frames except those at the end that the next poll decides on."""
-        differ = np.flatnonzero((kept[1:] != kept[:-1]).any(axis=1))
-        equal = len(kept) - (int(differ[-1]) + 1 if len(differ) else 0)
+    def _accept(self, kept: Counts, equal: int) -> None:
+        """Keep all frames except those at the end, of which `equal` are, that the next poll decides on."""
         accepted = len(kept) - (equal if equal > 1 else min(int(self._flips.is_open), len(kept)))
         self._waiting = kept[accepted:].copy()
-        if accepted:
-            first = self._read - len(kept)
-            self._append(kept[:accepted], first, gap=first == DROPPED_FRAMES and self._begun)
-            self._begun = True
-
-    def _append(self, frames: Counts, first: int, gap: bool) -> None:
-        self._runs.append(Run(self._clock.segment, first, frames, gap))
-        self.accepted += len(frames)
+        if not accepted:
+            return
+        first = self._read - len(kept)
+        self._runs.append(Run(self._clock.segment, first, kept[:accepted], first == DROPPED_FRAMES and self._begun))
+        self._begun = True
+        self.accepted += accepted
         if not self.settings.accel_only:
-            self._temperature_sum += int(frames[:, TEMPERATURE].sum(dtype=np.int64))
-
-    def _is_stuck(self, kept: Counts) -> bool:
-        """Return True if a frame repeats itself for too long."""
-        n = self._stuck_frames
-        if len(kept) < n:
-            return False
-        same = (kept[1:] == kept[:-1]).all(axis=1)
-        return bool((np.convolve(same, np.ones(n - 1, int), "valid") == n - 1).any())
+            self._temperature_sum += int(kept[:accepted, TEMPERATURE].sum(dtype=np.int64))
 
     def reset(self) -> None:
         """Discard what was in the FIFO, which was emptied: a frame begins at the next byte."""

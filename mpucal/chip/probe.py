@@ -5,6 +5,9 @@ identity.py decides from the replies, live and from a capture.
 
 from __future__ import annotations
 
+from contextlib import suppress
+from datetime import datetime
+
 from ..errors import ChipError
 from . import registers as reg
 from .families import PARTS, families_with_fifo, known_parts
@@ -113,12 +116,9 @@ def _fill_fifo(port: Port) -> int | None:
 
 def _is_clock_time(head: bytes) -> bool:
     """Return True if the first seven registers are a time: second, minute, hour, weekday, day, month, year in BCD."""
-    low = (0, 0, 0, 1, 1, 1, 0)
-    high = (59, 59, 23, 7, 31, 12, 99)
     # The upper bits hold flags: clock halt, 12 h mode, century.
-    masks = (0x7F, 0x7F, 0x3F, 0x07, 0x3F, 0x1F, 0xFF)
-    for byte, mask, least, most in zip(head, masks, low, high, strict=True):
-        tens, ones = divmod(byte & mask, 16)
-        if ones > 9 or not least <= 10 * tens + ones <= most:
-            return False
-    return True
+    digits = (f"{byte & mask:02x}" for byte, mask in zip(head, (0x7F, 0x7F, 0x3F, 0x07, 0x3F, 0x1F, 0xFF), strict=True))
+    with suppress(ValueError):
+        datetime.strptime(" ".join(digits), "%S %M %H 0%u %d %m %y")
+        return True
+    return False

@@ -5,9 +5,8 @@ The chip is not reset, which would reload its trim, and the FIFO is not touched.
 
 from __future__ import annotations
 
-from contextlib import suppress
-from types import TracebackType
-from typing import Self
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 import numpy as np
 
@@ -34,35 +33,35 @@ PATIENCE = 40
 HALF_SENSITIVITY_G = 0.75
 
 
-class TemporaryMeasurement:
-    """Context manager that sets the chip to measure, and restores its settings at the end if the bus still works.
+@contextmanager
+def temporary_measurement(port: Port, patience: int = PATIENCE) -> Iterator[TemporaryMeasurement]:
+    """Set the chip to measure during a `with` block, and restore its settings at the end if the bus still works.
 
     Parameters
     ----------
-    port : of the chip. patience : number of tries until the board must lie still.
+    patience : number of tries until the board must lie still.
     """
+    old = {register: port.read(register, 1)[0] for register in SETTING}
+    try:
+        port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
+        port.sleep(SETTLE_NS)
+        for register, value in SETTING.items():
+            port.write(register, value)
+        port.sleep(SETTLE_NS)
+        yield TemporaryMeasurement(port, patience)
+    finally:
+        # In reverse order: the chip falls asleep last.
+        for register, value in reversed(old.items()):
+            with suppress(BusError):
+                port.write(register, value)
 
-    def __init__(self, port: Port, patience: int = PATIENCE) -> None:
-        self._port = port
-        self._patience = patience
-        self._old: dict[int, int] = {}
+
+class TemporaryMeasurement:
+    """Chip that `temporary_measurement` has set to measure."""
+
+    def __init__(self, port: Port, patience: int) -> None:
+        self._port, self._patience = port, patience
         self._sensitivity: float | None = None
-
-    def __enter__(self) -> Self:
-        self._old = {register: self._port.read(register, 1)[0] for register in SETTING}
-        try:
-            self._port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
-            self._port.sleep(SETTLE_NS)
-            for register, value in SETTING.items():
-                self._port.write(register, value)
-            self._port.sleep(SETTLE_NS)
-        except BaseException:
-            self._restore()
-            raise
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._restore()
 
     def rest(self) -> Vector:
         """Measure the accelerometer at rest (3,) [g], from a hundred reads; wait for a moving board to be put down.
@@ -83,12 +82,6 @@ class TemporaryMeasurement:
                 return np.asarray(acc_g.mean(0))
         moves_mg = 1000 * acc_g.std(0).max()
         raise BoardMoved(f"the board moves (by {moves_mg:.0f} mg)", "put it on a firm surface and let go of it")
-
-    def _restore(self) -> None:
-        # In reverse order: the chip falls asleep last.
-        for register, value in reversed(self._old.items()):
-            with suppress(BusError):
-                self._port.write(register, value)
 
 
 def read_counts(port: Port, words: int) -> Vector:

@@ -23,7 +23,7 @@ from ..chip.offset_response import OffsetResponse, measure_offset_response
 from ..chip.offsets import PLACES, OffsetRegisters, restore
 from ..chip.port import Port
 from ..chip.probe import read_identity
-from ..chip.quick_measure import PATIENCE, TemporaryMeasurement
+from ..chip.quick_measure import PATIENCE, temporary_measurement
 from ..chip.self_test import run_self_test
 from ..chip.transfer_stats import REMEDY, TransferStats
 from ..data import Sensor
@@ -69,7 +69,7 @@ def examine(
         read_identity(port)
         olds = [OffsetRegisters.read(port, place) for place in PLACES]
         yield from examine_bus(bus)
-        with suppress(ChipError), TemporaryMeasurement(port) as measurement:
+        with suppress(ChipError), temporary_measurement(port) as measurement:
             # Wait until the board is put down. If it is not, a later step reports it.
             measurement.rest()
             patience = PATIENCE
@@ -174,7 +174,7 @@ def _offsets_and_bits(port: Port, part: Part, patience: int) -> Iterator[tuple[F
     """Examine the offset registers, and the bits that do not move when they shift the reading."""
     family, odd = part.family, None
     try:
-        with TemporaryMeasurement(port, patience) as measurement:
+        with temporary_measurement(port, patience) as measurement:
             try:
                 response = measure_offset_response(port, measurement, family.accel_offset_h)
                 yield _offsets(response, family)

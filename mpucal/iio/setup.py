@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 from ..chip.access import Files, Transaction
 from ..chip.config import Config
@@ -76,16 +76,12 @@ class DeviceAttributes:
         foreign = tuple(f"{kind}_" for kind in (ACCEL, GYRO) if kind not in kinds)
         for name in sorted(self.names):
             if name.endswith(READ_SUFFIXES) and not name.startswith(foreign):
-                self._try_to_read(name)
-
-    def _try_to_read(self, name: str) -> None:
-        """Read an attribute that the driver may list and still not support."""
-        try:
-            self.read(name)
-        except NoAnswer:
-            raise
-        except BusError:
-            return
+                try:
+                    self.read(name)
+                except BusError as error:
+                    # A driver may list an attribute and still not support it.
+                    if isinstance(error, NoAnswer):
+                        raise
 
     def read(self, name: str, count: int = TEXT_BYTES) -> str:
         """Read the text of an attribute; "": the list of all names."""
@@ -145,14 +141,12 @@ def set_up(
             f"stop it (`sudo fuser -v /dev/{attributes.device}` names it), or if there is none:"
             f" echo 0 | sudo tee /sys/bus/iio/devices/{attributes.device}/{ENABLE}",
         )
+    # Polling works without permission to write, with the present settings.
+    with nullcontext() if buffered else suppress(BusError):
+        _set_scales(attributes, kinds, config, decoder)
+        _set_rate(attributes, kinds, config)
     if not buffered:
-        # Polling works without permission to write, with the present settings.
-        with suppress(BusError):
-            _set_scales(attributes, kinds, config, decoder)
-            _set_rate(attributes, kinds, config)
         return False
-    _set_scales(attributes, kinds, config, decoder)
-    _set_rate(attributes, kinds, config)
     if TRIGGER in names:
         _choose_trigger(attributes, trigger)
     if CLOCK in names:

@@ -38,14 +38,13 @@ class StreamAligner:
     def take(self) -> tuple[Times, Vector]:
         """Return the new complete rows: times (n,) of the first stream, and all streams' columns at these times."""
         t_ns, values = self._t[0], self._values[0]
-        others = list(zip(self._t[1:], self._values[1:], strict=True))
-        if not all(len(t) for t, _ in others):
+        if not all(map(len, self._t)):
             return t_ns[:0], np.zeros((0, sum(value.shape[1] for value in self._values)))
-        due = len(t_ns) if not others else int(np.searchsorted(t_ns, min(t[-1] for t, _ in others), "right"))
-        first = 0 if not others else int(np.searchsorted(t_ns, max(t[0] for t, _ in others)))
+        due = int(np.searchsorted(t_ns, min(t[-1] for t in self._t), "right"))
+        first = int(np.searchsorted(t_ns, max(t[0] for t in self._t)))
         asked = t_ns[first:due]
         parts = [values[first:due]]
-        for i, (t, held) in enumerate(others, 1):
+        for i, (t, held) in enumerate(zip(self._t[1:], self._values[1:], strict=True), 1):
             parts.append(_interpolate(asked, t, held))
             if due:
                 # The last sample at or before the returned times is needed for the next ones.

@@ -127,23 +127,17 @@ def found_devices() -> list[tuple[str, str]]:
 
 
 class IioFiles(HostBus):
-    """Files of IIO devices; see Files.
+    """Files of IIO devices; see Files."""
 
-    Parameters
-    ----------
-    sysfs : folder of the devices' folders. dev : folder of their device files.
-    """
-
-    def __init__(self, sysfs: Path | None = None, dev: Path | None = None) -> None:
-        self._sysfs, self._dev = sysfs or SYSFS, dev or DEVICES
+    def __init__(self) -> None:
         self._open: dict[str, int] = {}
         self._before: dict[str, bytes] = {}
         self._timer = ReadTimer(self.now_ns)
 
     def check(self, device: str) -> None:
         """Raise BusError if there is no such device."""
-        if not (self._sysfs / device).is_dir():
-            there = [f"{path.name} ({_name(path)})" for path in sorted(self._sysfs.glob("iio:device*"))]
+        if not (SYSFS / device).is_dir():
+            there = [f"{path.name} ({_name(path)})" for path in sorted(SYSFS.glob("iio:device*"))]
             remedy = (
                 f"use one of {', '.join(there)}" if there else "load the driver of the sensor, which needs its overlay"
             )
@@ -151,7 +145,7 @@ class IioFiles(HostBus):
 
     def check_writable(self, device: str) -> None:
         """Raise BusError if this user may not write calibbias or udev's rules, to which a session writes at its end."""
-        for path in (*sorted((self._sysfs / device).glob(f"*{PERSISTENT_SUFFIX}")), RULES):
+        for path in (*sorted((SYSFS / device).glob(f"*{PERSISTENT_SUFFIX}")), RULES):
             if not os.access(path, os.W_OK):
                 raise BusError(
                     f"{path} cannot be written, and this session is to write to it",
@@ -162,14 +156,14 @@ class IioFiles(HostBus):
         """Read a file as Files has it; TRIGGERS gives the names of all triggers."""
         device, _, name = register.partition("/")
         if register == TRIGGERS:
-            names = [_name(path) for path in sorted(self._sysfs.glob("trigger*"))]
+            names = [_name(path) for path in sorted(SYSFS.glob("trigger*"))]
             return Reply("\n".join(names).encode(), self.now_ns())
         if register.endswith("/"):
             return Reply("\n".join(self._names(device)).encode(), self.now_ns())
         if not name:
             return self._buffer(device, count)
         with converting(lambda error: file_error(error, device, name)):
-            reply = self._timer.read(register, count, lambda: (self._sysfs / register).read_bytes()[:count])
+            reply = self._timer.read(register, count, lambda: (SYSFS / register).read_bytes()[:count])
         # The driver reads the count from the chip in between.
         return reply._replace(t_ns=(reply.t_ns + self.now_ns()) // 2)
 
@@ -179,7 +173,7 @@ class IioFiles(HostBus):
         t_ns = self.now_ns()
         with converting(lambda error: file_error(error, device, name, data.decode())):
             if not name.endswith(PERSISTENT_SUFFIX) and register not in self._before:
-                self._before[register] = (self._sysfs / register).read_bytes().strip()
+                self._before[register] = (SYSFS / register).read_bytes().strip()
             self._put(register, data)
         return t_ns
 
@@ -191,12 +185,12 @@ class IioFiles(HostBus):
         while self._before:
             register, text = self._before.popitem()
             with suppress(OSError):
-                if (self._sysfs / register).read_bytes().strip() != text:
+                if (SYSFS / register).read_bytes().strip() != text:
                     self._put(register, text)
 
     def _put(self, register: str, data: bytes) -> None:
         # One unbuffered write gets the driver's refusal at once.
-        fd = os.open(self._sysfs / register, os.O_WRONLY | os.O_TRUNC)
+        fd = os.open(SYSFS / register, os.O_WRONLY | os.O_TRUNC)
         try:
             os.write(fd, data)
         finally:
@@ -206,7 +200,7 @@ class IioFiles(HostBus):
         t_ns = self.now_ns()
         try:
             if device not in self._open:
-                self._open[device] = os.open(self._dev / device, os.O_RDONLY | os.O_NONBLOCK)
+                self._open[device] = os.open(DEVICES / device, os.O_RDONLY | os.O_NONBLOCK)
             return Reply(os.read(self._open[device], count), t_ns)
         except BlockingIOError:
             return Reply(b"", t_ns)
@@ -215,7 +209,7 @@ class IioFiles(HostBus):
 
     def _names(self, device: str) -> list[str]:
         """List all attributes, those of the groups with the group's name in front."""
-        folder = self._sysfs / device
+        folder = SYSFS / device
         with converting(lambda error: file_error(error, device, "the attributes")):
             names = [path.name for path in folder.iterdir() if path.is_file()]
             groups = [folder / group for group in ATTRIBUTE_GROUPS if (folder / group).is_dir()]

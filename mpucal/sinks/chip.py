@@ -20,7 +20,7 @@ from ..chip.offset_response import OffsetResponse, measure_offset_response
 from ..chip.offsets import PLACES, OffsetRegisters, Place, Words, restore, shift_words, word_difference
 from ..chip.port import Port
 from ..chip.probe import read_identity
-from ..chip.quick_measure import TemporaryMeasurement
+from ..chip.quick_measure import TemporaryMeasurement, temporary_measurement
 from ..chip.setup import reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
@@ -128,10 +128,10 @@ class ChipSink:
             likely = self._find_place(calibration)
             olds = self._blocks()
         with self._restoring(olds):
-            with TemporaryMeasurement(self._port) as measurement:
+            with temporary_measurement(self._port) as measurement:
                 response = measure_offset_response(self._port, measurement, likely)
             reference = self._reference(calibration, response)
-            with TemporaryMeasurement(self._port) as measurement:
+            with temporary_measurement(self._port) as measurement:
                 applied = self._apply(calibration, response, reference, measurement)
         bias = ", ".join(f"{1000 * value:+.0f}" for value in applied / STANDARD_GRAVITY_MPS2)
         return Applied(

@@ -108,11 +108,6 @@ class I2cBus(HostBus):
 
     def read(self, register: int, count: int) -> Reply:
         """Read `count` bytes from `register` on, in one message if possible; the time is just before the transfer."""
-        if count > MAX_MESSAGE_BYTES:
-            raise BusError(
-                f"{self._path} transfers at most {MAX_MESSAGE_BYTES} bytes at once, not {count}",
-                "read less at once",
-            )
         return self._timer.read(register, count, lambda: self._read(register, count))
 
     def _read(self, register: int, count: int) -> bytes:

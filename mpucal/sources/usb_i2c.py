@@ -194,22 +194,11 @@ def _mcp2221_adapters() -> list[tuple[str, str]]:
     except Exception:  # hidapi is missing, or there is no permission
         return []
     several = len(devices) > 1
+    # as the factory sets them, they do not enumerate with their serials
     return [
-        (f"mcp2221:{each['serial_number'] or _serial(i)}" if several else "mcp2221", str(each["product_string"]))
-        for i, each in enumerate(devices)
+        (f"mcp2221:{each['serial_number'] or 'SERIAL'}" if several else "mcp2221", str(each["product_string"]))
+        for each in devices
     ]
-
-
-def _serial(place: int) -> str:
-    """Read the serial from the flash of an MCP2221 that does not enumerate with it, as the factory sets them."""
-    import EasyMCP2221  # noqa: PLC0415 - an extra
-
-    try:
-        device = EasyMCP2221.Device(devnum=place)
-    except Exception:  # another program has it
-        return "SERIAL"
-    device.__del__()
-    return str(device.usbserial)
 
 
 def _ftdi_adapters() -> list[tuple[str, str]]:

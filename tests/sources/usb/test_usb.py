@@ -116,18 +116,19 @@ def test_what_is_plugged_in_is_listed(plugged):
 
 @pytest.mark.parametrize("enumerated", [True, False])
 def test_of_several_each_is_named_by_its_serial(enumerated, chip, monkeypatch):
-    """Out of the factory none enumerates with it: it is read from the flash."""
+    """Out of the factory none enumerates with it, and it is found by the one in its flash."""
     hid = _beside("mcp2221_device").Hid(chip, ("0001", "0002"), enumerated)
     monkeypatch.setattr("EasyMCP2221.MCP2221.hid", hid)
     monkeypatch.setattr("EasyMCP2221.Device._catalog", {})
     monkeypatch.setitem(sys.modules, "hid", hid)
+    names = ["mcp2221:0001", "mcp2221:0002"] if enumerated else ["mcp2221:SERIAL"] * 2
     # without a look at what is there, then after one
     for _ in range(2):
         for name, path in (("mcp2221:0002", b"2"), ("mcp2221:0001", b"1")):
             bus = Mcp2221(name)
             assert (hid.opened, bus.address) == (path, 0x68)
             bus.close()
-        assert [spelled for spelled, _ in adapters() if "mcp" in spelled] == ["mcp2221:0001", "mcp2221:0002"]
+        assert [spelled for spelled, _ in adapters() if "mcp" in spelled] == names
 
 
 def test_none_is_listed_where_hidapi_is_missing(plugged, monkeypatch):
