@@ -13,9 +13,8 @@ from ..errors import WrongValue
 from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
-from .checks import find_gyroscope_fault, find_reasons, is_unusable
-from .checks.sensor import gyro_contradicts, is_trustworthy
-from .checks.unusable import no_gyroscope
+from .checks import CONTRADICTED, NO_GYROSCOPE, find_gyroscope_fault, find_reasons, is_unusable
+from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hypotheses import SURE, Explanation, explain, gyroscope_change, remove_change
 from .masks import find_reset, with_masks
@@ -49,7 +48,7 @@ def estimate(
     decoded = decode(recording)
     masked = with_masks(decoded.recording)
     before = Evidence(masked, gravity, None, None, model, gravity_anyway=gravity_anyway, decoded=decoded)
-    whole = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
+    whole = _with_gyroscope(before) if NO_GYROSCOPE.reason(before) is None else (before, NOTHING | {"model": model})
     if model != "auto":
         return whole
     at_fault = find_gyroscope_fault(whole[0])
@@ -58,8 +57,8 @@ def estimate(
     of_rests = _of_rests(before, at_fault)
     if refusing := tuple(reason for reason in find_reasons(of_rests) if reason.refuse):
         # other faults of the gyroscope can be mended, and then the rests need not be enough
-        return (replace(whole[0], against_rests=refusing) if no_gyroscope(before) else whole[0]), whole[1]
-    if at_fault == gyro_contradicts(whole[0]) and _is_known_better(whole[0], of_rests):
+        return (replace(whole[0], against_rests=refusing) if NO_GYROSCOPE.reason(before) else whole[0]), whole[1]
+    if at_fault == CONTRADICTED.reason(whole[0]) and _is_known_better(whole[0], of_rests):
         return whole
     return of_rests, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
 

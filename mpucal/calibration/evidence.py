@@ -54,6 +54,18 @@ class Evidence:
     decoded: Decoded | None = None
     against_rests: tuple[Reason, ...] = ()
 
+    @property
+    def rest(self) -> Flat:
+        """Flat segment, where there is one."""
+        assert self.flat is not None
+        return self.flat
+
+    @property
+    def estimate(self) -> Fit:
+        """Fit, where there is one."""
+        assert self.fit is not None
+        return self.fit
+
     @cached_property
     def uncertainty(self) -> Uncertainty | None:
         """Uncertainty of a calibrated measurement by the fit's covariance; None where D is unusable."""

@@ -25,8 +25,8 @@ EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibratio
 def command(a: Path, b: Path, as_json: bool) -> None:
     """Compare calibration B (.json or .bin) with A: bias in mg, scale factor error in %, misalignment in deg.
 
-    Two good calibrations of one unchanged sensor are called different in 1 of 100 cases. If one of them is usable with
-    reservations, its uncertainties may be too small, and a small difference is reported as undecided.
+    Two good calibrations of one unchanged sensor are called different in 1 of 100 cases at most. If one of them is
+    usable with reservations, its uncertainties may be too small, and a small difference is reported as undecided.
     """
     comparison = compare(load_calibration(a), load_calibration(b))
     click.echo(json.dumps(_document(comparison), indent=2) if as_json else _page(comparison))

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -118,11 +119,14 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
         for a, b in runs.tolist()
     ]
     rests = _Rests(mended, runs, readings, calibration, float(np.nanmean(T)) if known else None)
-    parts = [_Residuals.magnitude(rests, k, gravity) for k in range(len(runs))]
-    turns = (_Residuals.direction(rests, k, flat, calibration) for k in range(1, len(runs) if has_rates else 1))
-    parts += [turn for turn in turns if turn is not None]
-    parts.append(_Residuals.rate(recording, runs[0].tolist(), flat, calibration, len(runs)))
-    parts.append(_Residuals.noise(recording, flat, calibration, len(runs)))
+    turns = (_direction(rests, k, flat, calibration) for k in range(1, len(runs) if has_rates else 1))
+    parts = [_magnitudes(rests, gravity), *(turn for turn in turns if turn is not None)]
+    first = recording.gyr[slice(*runs[0])]
+    # A calibration without b_omega (from an old calibration.bin) has no residual of the rate.
+    rate = first.mean(0) - calibration.b_omega
+    parts.append(_of_theta(DELTA, rate, flat.Sigma_omega / len(first) + BIAS_RAD_S**2, rests))
+    noise = _noise_ratios(recording, flat, calibration)
+    parts.append(_of_theta(NOISE, noise, np.full(2, 1.0 / (6.0 * INDEPENDENT * flat.n)), rests))
     J_rests = np.vstack([part.J_rests for part in parts])
     J = np.vstack([part.J_theta for part in parts])
     J[:, : BETA.stop] += J_rests @ np.vstack([accelerometer_jacobian(a) for a in rests.a])
@@ -160,8 +164,7 @@ class _Rests:
             self.covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = variance * A @ A.T
 
 
-@dataclass(frozen=True)
-class _Residuals:
+class _Residuals(NamedTuple):
     """Residuals r (q,), their derivatives by the k means and by theta, and variance (q,) in addition to the means'."""
 
     r: Vector
@@ -169,68 +172,60 @@ class _Residuals:
     J_theta: Vector
     variance: Vector
 
-    @classmethod
-    def magnitude(cls, rests: _Rests, k: int, gravity: float) -> _Residuals:
-        """Return |a| - g of rest k."""
-        J_rests = np.zeros((1, rests.a.size))
-        J_rests[0, 3 * k : 3 * k + 3] = rests.unit[k]
-        r = np.array([rests.norm[k] - gravity])
-        return cls(r, J_rests, np.zeros((1, PARAMETERS)), np.array([FLOOR_MPS2**2]))
 
-    @classmethod
-    def direction(cls, rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _Residuals | None:
-        """Return the direction error of the turn to rest k; None if it clipped, or samples are missing."""
-        recording = rests.recording
-        (a, b), (c, d) = rests.runs[k - 1 : k + 1].tolist()
-        first, last = (a + b) // 2, (c + d) // 2
-        between = slice(first, last + 1)
-        if recording.gyr_clipped[between].any() or recording.gap[first + 1 : last + 1].any():
-            return None
-        dt = np.diff(recording.t[between])
-        rates = 0.5 * (recording.gyr[first:last] + recording.gyr[first + 1 : last + 1]) - flat.b_omega
-        steps = dt[:, None] * (rates @ calibration.K.T)
-        T = turned(-steps)
-        here, there = rests.unit[k], T @ rests.unit[k - 1]
-        across = np.linalg.svd(here[None])[2][1:]  # (2, 3) unit vectors at right angles to gravity
-        J_rests = np.zeros((2, rests.a.size))
-        for at, matrix in ((k - 1, -cross(here) @ T), (k, cross(there))):
-            unit = rests.unit[at]
-            of_unit = (np.eye(3) - np.outer(unit, unit)) / rests.norm[at]
-            J_rests[:, 3 * at : 3 * at + 3] = across @ matrix @ of_unit
-        J_theta = np.zeros((2, PARAMETERS))
-        J_theta[:, G] = -across @ _gyroscope_jacobian(steps, rests.unit[k - 1], here)
-        noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
-        noise += FLOOR_RAD**2 + (NONLINEAR * float(np.linalg.norm(steps, axis=1).sum())) ** 2
-        return cls(across @ np.cross(there, here), J_rests, J_theta, np.full(2, noise))
+def _magnitudes(rests: _Rests, gravity: float) -> _Residuals:
+    """Return |a| - g of each rest."""
+    k = len(rests.a)
+    J_rests = np.zeros((k, k, 3))
+    J_rests[range(k), range(k)] = rests.unit
+    nothing = np.zeros((k, PARAMETERS))
+    return _Residuals(rests.norm - gravity, J_rests.reshape(k, 3 * k), nothing, np.full(k, FLOOR_MPS2**2))
 
-    @classmethod
-    def rate(cls, recording: Recording, run: list[int], flat: Flat, calibration: Calibration, rests: int) -> _Residuals:
-        """Return the mean rate of the first rest, calibrated."""
-        gyr = recording.gyr[run[0] : run[1]]
-        J_theta = np.zeros((3, PARAMETERS))
-        J_theta[:, DELTA] = np.eye(3)
-        variance = flat.Sigma_omega / len(gyr) + BIAS_RAD_S**2
-        # A calibration without b_omega (from an old calibration.bin) has no residual of the rate.
-        r = gyr.mean(0) - calibration.b_omega
-        known = np.isfinite(r)
-        return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), J_theta[known], variance[known])
 
-    @classmethod
-    def noise(cls, recording: Recording, flat: Flat, calibration: Calibration, rests: int) -> _Residuals:
-        """Return the logarithms of both sensors' noise, relative to the calibration's, as far as they are known."""
-        J_theta = np.zeros((2, PARAMETERS))
-        J_theta[:, NOISE] = np.eye(2)
-        r = np.full(2, np.nan)
-        pairs = (recording.acc, calibration.noise_std), (recording.gyr, calibration.gyro_noise_std)
-        # At another rate, bandwidth and noise differ.
-        same_rate = calibration.sensor.rate_hz == recording.sensor.rate_hz is not None
-        for k, (values, then) in enumerate(pairs):
-            now = values[flat.first : flat.last]
-            if same_rate and not _is_shaken(now, recording.rate_hz):
-                r[k] = float(np.log(now.std(0) / then).mean())
-        known = np.isfinite(r)
-        variance = np.full(2, 1.0 / (6.0 * INDEPENDENT * flat.n))
-        return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), J_theta[known], variance[known])
+def _direction(rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _Residuals | None:
+    """Return the direction error of the turn to rest k; None if it clipped, or samples are missing."""
+    recording = rests.recording
+    first, last = (rests.runs[k - 1 : k + 1].sum(1) // 2).tolist()
+    between = slice(first, last + 1)
+    if recording.gyr_clipped[between].any() or recording.gap[first + 1 : last + 1].any():
+        return None
+    dt = np.diff(recording.t[between])
+    rates = 0.5 * (recording.gyr[first:last] + recording.gyr[first + 1 : last + 1]) - flat.b_omega
+    steps = dt[:, None] * (rates @ calibration.K.T)
+    T = turned(-steps)
+    here, there = rests.unit[k], T @ rests.unit[k - 1]
+    across = np.linalg.svd(here[None])[2][1:]  # (2, 3) unit vectors at right angles to gravity
+    J_rests = np.zeros((2, rests.a.size))
+    for at, matrix in ((k - 1, -cross(here) @ T), (k, cross(there))):
+        unit = rests.unit[at]
+        of_unit = (np.eye(3) - np.outer(unit, unit)) / rests.norm[at]
+        J_rests[:, 3 * at : 3 * at + 3] = across @ matrix @ of_unit
+    J_theta = np.zeros((2, PARAMETERS))
+    J_theta[:, G] = -across @ _gyroscope_jacobian(steps, rests.unit[k - 1], here)
+    noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
+    noise += FLOOR_RAD**2 + (NONLINEAR * float(np.linalg.norm(steps, axis=1).sum())) ** 2
+    return _Residuals(across @ np.cross(there, here), J_rests, J_theta, np.full(2, noise))
+
+
+def _of_theta(place: slice, r: Vector, variance: Vector, rests: _Rests) -> _Residuals:
+    """Return residuals that measure a part of theta; those that are not known are NaN, and left out."""
+    known = np.isfinite(r)
+    return _Residuals(
+        r[known], np.zeros((known.sum(), rests.a.size)), np.eye(PARAMETERS)[place][known], variance[known]
+    )
+
+
+def _noise_ratios(recording: Recording, flat: Flat, calibration: Calibration) -> Vector:
+    """Return the logarithms (2,) of both sensors' noise, relative to the calibration's, as far as they are known."""
+    # At another rate, bandwidth and noise differ.
+    same_rate = calibration.sensor.rate_hz == recording.sensor.rate_hz is not None
+    ratios = np.full(2, np.nan)
+    pairs = (recording.acc, calibration.noise_std), (recording.gyr, calibration.gyro_noise_std)
+    for k, (values, then) in enumerate(pairs):
+        now = values[flat.first : flat.last]
+        if same_rate and not _is_shaken(now, recording.rate_hz):
+            ratios[k] = float(np.log(now.std(0) / then).mean())
+    return ratios
 
 
 def _is_shaken(values: Vector, rate_hz: float) -> bool:

@@ -1,4 +1,4 @@
-"""Checks of an estimate: each function returns a Reason of mpucal/reasons.py against it, or None.
+"""Table of what may be wrong with a recording or its estimate; each row finds a Reason of mpucal/reasons.py, or None.
 
 unusable     no estimate is possible: wrong units, no rest, no turn, a dead axis
 recording    moved while flat, clipped, lost, warming or vibrating; a gravity not found on Earth
@@ -9,93 +9,95 @@ estimate     directions not observable, no convergence, contradictions, a change
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from typing import Literal, NamedTuple
 
 from ...reasons import Reason
 from ..evidence import Evidence
 from . import bits, estimate, recording, sensor, unusable
+from .sensor import is_trustworthy
 
-Check = Callable[[Evidence], Reason | None]
 
-UNUSABLE: tuple[Check, ...] = (
-    unusable.time_unit,
-    unusable.accelerometer_unit,
-    unusable.same_magnitude,
-    unusable.gyroscope_unit,
-    unusable.never_still,
-    unusable.hardly_turned,
-    unusable.dead_accelerometer,
-    unusable.dead_gyroscope,
+class Row(NamedTuple):
+    """Row of the table.
+
+    Attributes
+    ----------
+    find : returns why the recording, or its estimate, is wrong. needs : without this it finds nothing.
+    unusable : nothing can be estimated then. of_gyroscope : an estimate from the rests alone does not suffer from it.
+    """
+
+    find: Callable[[Evidence], Reason | None]
+    needs: Literal["", "flat", "fit", "trustworthy fit"] = ""
+    unusable: bool = False
+    of_gyroscope: bool = False
+
+    def reason(self, e: Evidence) -> Reason | None:
+        """Return the reason that this row finds."""
+        if (self.needs == "flat" and e.flat is None) or (self.needs.endswith("fit") and e.fit is None):
+            return None
+        return None if self.needs == "trustworthy fit" and not is_trustworthy(e) else self.find(e)
+
+
+TABLE = (
+    Row(unusable.time_unit, unusable=True),
+    Row(unusable.accelerometer_unit, unusable=True),
+    Row(unusable.same_magnitude, unusable=True),
+    Row(unusable.gyroscope_unit, unusable=True, of_gyroscope=True),
+    Row(unusable.never_still, unusable=True),
+    Row(unusable.hardly_turned, "flat", unusable=True),
+    Row(unusable.dead_accelerometer, "flat", unusable=True),
+    Row(unusable.dead_gyroscope, "flat", unusable=True, of_gyroscope=True),
+    Row(recording.moved_while_still, "flat"),
+    Row(estimate.tilted_only, "fit"),
+    Row(estimate.few_orientations, "fit"),
+    Row(recording.gyro_clipped, of_gyroscope=True),
+    Row(recording.accel_clipped),
+    Row(recording.data_lost, of_gyroscope=True),  # gaps do not spoil rests
+    Row(sensor.wrong_range, "trustworthy fit"),
+    Row(sensor.accelerometer_factor, "trustworthy fit"),
+    Row(sensor.axes, "trustworthy fit", of_gyroscope=True),
+    Row(sensor.gyro_off, "trustworthy fit", of_gyroscope=True),
+    Row(recording.temperature_moved),
+    Row(recording.vibrating, "fit"),
+    Row(recording.gravity_unlikely),
+    Row(bits.low_byte_signed),
+    Row(bits.bits_stuck),
+    Row(sensor.clock_off, of_gyroscope=True),
+    Row(sensor.sensors_lag, "fit", of_gyroscope=True),
+    Row(estimate.not_converged, "fit"),
+    Row(estimate.inconsistent, "fit"),
+    Row(estimate.contradiction, "fit"),
 )
 
-CHECKS: tuple[Check, ...] = (
-    recording.moved_while_still,
-    estimate.tilted_only,
-    estimate.few_orientations,
-    recording.gyro_clipped,
-    recording.accel_clipped,
-    recording.data_lost,
-    sensor.wrong_range,
-    sensor.accelerometer_factor,
-    sensor.axes,
-    sensor.gyro_off,
-    recording.temperature_moved,
-    recording.vibrating,
-    recording.gravity_unlikely,
-    bits.low_byte_signed,
-    bits.bits_stuck,
-    sensor.clock_off,
-    sensor.sensors_lag,
-    estimate.not_converged,
-    estimate.inconsistent,
-    estimate.contradiction,
-)
-
-# An estimate from the rests alone does not use the gyroscope, and gaps do not spoil it.
-NOT_OF_RESTS: tuple[Check, ...] = (
-    unusable.gyroscope_unit,
-    unusable.dead_gyroscope,
-    recording.gyro_clipped,
-    recording.data_lost,
-    sensor.axes,
-    sensor.gyro_off,
-    sensor.clock_off,
-    sensor.sensors_lag,
-)
+# Faults of the gyroscope, for which the rests alone may give an estimate. Without rates, or with rates of another
+# range, the other rows mean nothing.
+NO_GYROSCOPE, OTHER_RANGE = Row(unusable.no_gyroscope), Row(sensor.gyro_range, "fit")
+CONTRADICTED = Row(sensor.gyro_contradicts, "fit")
+AT_FAULT = (NO_GYROSCOPE, Row(unusable.dead_gyroscope, "flat"), OTHER_RANGE, CONTRADICTED)
 
 
-def find_gyroscope_fault(evidence: Evidence) -> Reason | None:
+def find_gyroscope_fault(e: Evidence) -> Reason | None:
     """Return why the gyroscope cannot be used: not recorded, dead, of another range, or contradicted by the rests."""
-    checks: tuple[Check, ...] = (
-        unusable.no_gyroscope,
-        unusable.dead_gyroscope,
-        sensor.gyro_range,
-        sensor.gyro_contradicts,
-    )
-    return next((fault for check in checks if (fault := check(evidence)) is not None), None)
+    return next(_found(e, AT_FAULT), None)
 
 
-def find_reasons(evidence: Evidence) -> list[Reason]:
+def find_reasons(e: Evidence) -> list[Reason]:
     """Return all reasons against an estimate, those that refuse it first."""
-    reasons = []
-    if evidence.model == "static":
-        checks = _suited(evidence, UNUSABLE + CHECKS)
-        reasons = [] if evidence.gyroscope is None else [evidence.gyroscope]
-    else:
-        # Without a gyroscope, or with rates of another range, the other checks mean nothing.
-        only = unusable.no_gyroscope(evidence) or sensor.gyro_range(evidence)
-        if only is not None:
-            return [only, *evidence.against_rests]
-        # A fit exists only where the recording is usable.
-        checks = [*CHECKS] if evidence.fit is not None else [*UNUSABLE, *CHECKS]
-    reasons += [reason for check in checks if (reason := check(evidence)) is not None]
+    of_rests = e.model == "static"
+    if not of_rests and (only := [*_found(e, (NO_GYROSCOPE, OTHER_RANGE))]):
+        return [only[0], *e.against_rests]
+    # A fit with the gyroscope exists only where the recording is usable.
+    rows = [row for row in TABLE if not (row.of_gyroscope if of_rests else row.unusable and e.fit is not None)]
+    reasons = [*([] if e.gyroscope is None else [e.gyroscope]), *_found(e, rows)]
     return sorted(reasons, key=lambda reason: not reason.refuse)
 
 
-def is_unusable(evidence: Evidence) -> bool:
+def is_unusable(e: Evidence) -> bool:
     """Return True if nothing can be estimated from the recording."""
-    return any(check(evidence) is not None for check in _suited(evidence, UNUSABLE))
+    rows = [row for row in TABLE if row.unusable and not (row.of_gyroscope and e.model == "static")]
+    return any(True for _ in _found(e, rows))
 
 
-def _suited(evidence: Evidence, checks: tuple[Check, ...]) -> list[Check]:
-    return [check for check in checks if evidence.model != "static" or check not in NOT_OF_RESTS]
+def _found(e: Evidence, rows: Iterable[Row]) -> Iterator[Reason]:
+    return (reason for row in rows if (reason := row.reason(e)) is not None)

@@ -44,7 +44,7 @@ class Low(NamedTuple):
 
 def bits_stuck(e: Evidence) -> Reason | None:
     """Find an axis of either sensor whose low or high bits never change."""
-    if dead_accelerometer(e) is not None or dead_gyroscope(e) is not None:
+    if e.flat is not None and (dead_accelerometer(e) or dead_gyroscope(e)) is not None:
         return None
     acc, gyr = (None, None) if e.decoded is None else e.decoded.words
     most = MOST_MPS2 if e.uncertainty is None else min(MOST_MPS2, HONEST_STD * e.uncertainty.rms_mps2)

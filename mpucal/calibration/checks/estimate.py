@@ -20,7 +20,7 @@ LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 def few_orientations(e: Evidence) -> Reason | None:
     """Find directions that the data leave open, where the model holds."""
     rms = _model_rms(e)
-    if e.fit is None or (rms is not None and rms <= GOOD_RMS_MPS2):
+    if rms is not None and rms <= GOOD_RMS_MPS2:
         return None
     if e.uncertainty is None or rms is None:
         return reason("few_orientations", "nothing_known")
@@ -42,32 +42,32 @@ def _model_rms(e: Evidence) -> float | None:
 
 def tilted_only(e: Evidence) -> Reason | None:
     """Find a board that was only tilted, and name the parameters that keep their assumed values."""
-    if e.model != "tilt" or e.fit is None:
+    if e.model != "tilt":
         return None
-    left = [name for name in e.fit.at_prior if name.startswith(("D_", "b_a_"))]
+    left = [name for name in e.estimate.at_prior if name.startswith(("D_", "b_a_"))]
     named = f"; {', '.join(left)} keep their assumed values, as they are not observable" if left else ""
     return reason("few_orientations", "tilted", degrees=np.rad2deg(CONE_RAD), left=named)
 
 
 def not_converged(e: Evidence) -> Reason | None:
     """Find a minimiser that did not settle."""
-    if e.fit is None or e.fit.converged:
-        return None
-    return reason("not_converged", "iterations", iterations=e.fit.iterations)
+    fit = e.estimate
+    return None if fit.converged else reason("not_converged", "iterations", iterations=fit.iterations)
 
 
 def inconsistent(e: Evidence) -> Reason | None:
     """Find data that the model does not explain: innovations beyond white noise."""
-    if e.fit is None or e.uncertainty is None:
+    fit = e.estimate
+    if e.uncertainty is None:
         return None
-    if e.fit.spread_mps2 > CHANGED_MPS2:
-        return reason("inconsistent", "rests", spread=e.fit.spread_mps2)
+    if fit.spread_mps2 > CHANGED_MPS2:
+        return reason("inconsistent", "rests", spread=fit.spread_mps2)
     # A robust model leaves outliers in its innovations: its parts judge it, or its uncertainty has grown by them.
-    if e.model in ("hand", "tilt") or not e.fit.nis > MOST_NIS:
+    if e.model in ("hand", "tilt") or not fit.nis > MOST_NIS:
         return None
     # The noise is larger than the model's by as much as the innovations are, and so is what is known.
-    refuse = e.uncertainty.rms_mps2 * (e.fit.nis / 3.0) ** 0.5 > USABLE_RMS_MPS2
-    return reason("inconsistent", "innovations", refuse, nis=e.fit.nis)
+    refuse = e.uncertainty.rms_mps2 * (fit.nis / 3.0) ** 0.5 > USABLE_RMS_MPS2
+    return reason("inconsistent", "innovations", refuse, nis=fit.nis)
 
 
 def contradiction(e: Evidence) -> Reason | None:
@@ -99,10 +99,10 @@ def _is_useless(e: Evidence) -> bool:
 def _is_disturbed(e: Evidence) -> bool:
     """Return True if samples are lost or clipped, or nothing settled: parts disagree then, too."""
     r = e.recording
-    return bool(e.fit is None or not e.fit.converged or r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any())
+    return bool(not e.estimate.converged or r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any())
 
 
 def _since_the_start(e: Evidence, span: tuple[float, float]) -> tuple[float, float]:
     """Return times after the flat segment as times since the recording's start [s]."""
-    begin = 0.0 if e.flat is None else float(e.recording.t[e.flat.last - 1] - e.recording.t[0])
+    begin = float(e.recording.t[e.rest.last - 1] - e.recording.t[0])
     return begin + span[0], begin + span[1]

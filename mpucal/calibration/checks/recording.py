@@ -26,10 +26,10 @@ SEPARABLE_HZ = 48.0
 
 def moved_while_still(e: Evidence) -> Reason | None:
     """Find a board that moved in the flat segment that the caller named."""
-    if e.flat is None or e.flat.n < 4:
+    half = e.rest.n // 2
+    if half < 2:
         return None
-    half = e.flat.n // 2
-    acc = e.recording.acc[e.flat.first : e.flat.first + 2 * half].reshape(2, half, 3)
+    acc = e.recording.acc[e.rest.first : e.rest.first + 2 * half].reshape(2, half, 3)
     moved = np.abs(acc[1].mean(0) - acc[0].mean(0))
     if (moved <= 0.1 + 6.0 * np.sqrt(2.0 * acc.var(1).min(0) / half)).all():
         return None
@@ -72,16 +72,14 @@ def data_lost(e: Evidence) -> Reason | None:
 
 def vibrating(e: Evidence) -> Reason | None:
     """Find vibration, as of a motor that runs from the start or from later on."""
-    if e.flat is None or e.fit is None:
-        return None
     std = np.sqrt(noise_variance(e.recording) @ np.full(3, 1.0 / 3.0))
     least = SHAKING_MPS2 if e.recording.rate_hz < SEPARABLE_HZ else VIBRATING_MPS2
-    share = float(np.mean(std > np.maximum(least, LOUDER_THAN_FLAT * np.sqrt(e.flat.Sigma_a.mean()))))
-    at_rest = float(np.median(std[e.flat.first : e.flat.last]))
+    share = float(np.mean(std > np.maximum(least, LOUDER_THAN_FLAT * np.sqrt(e.rest.Sigma_a.mean()))))
+    at_rest = float(np.median(std[e.rest.first : e.rest.last]))
     if share < VIBRATING_SHARE and at_rest < SHAKING_MPS2:
         return None
     return reason(
-        "vibrating", "noise", std=float(np.median(std[e.flat.last :])), share=max(share, float(at_rest > SHAKING_MPS2))
+        "vibrating", "noise", std=float(np.median(std[e.rest.last :])), share=max(share, float(at_rest > SHAKING_MPS2))
     )
 
 

@@ -39,9 +39,7 @@ def is_trustworthy(e: Evidence) -> bool:
 
 def wrong_range(e: Evidence) -> Reason | None:
     """Find three scale factors near the same power of two."""
-    if e.fit is None or not is_trustworthy(e):
-        return None
-    scale = _scale_factors(e.fit.D)
+    scale = _scale_factors(e.estimate.D)
     power = np.round(np.log2(scale)).astype(int)
     if power[0] == 0 or not (power == power[0]).all() or not (np.abs(scale / 2.0 ** power[0] - 1.0) < ALIKE).all():
         return None
@@ -50,11 +48,9 @@ def wrong_range(e: Evidence) -> Reason | None:
 
 def accelerometer_factor(e: Evidence) -> Reason | None:
     """Find three scale factors that are wrong by one factor, which is no range's and larger than a sensor's error."""
-    if e.fit is None or not is_trustworthy(e) or wrong_range(e) is not None:
-        return None
-    scale = _scale_factors(e.fit.D)
+    scale = _scale_factors(e.estimate.D)
     factor = float(scale.mean())
-    if abs(factor - 1.0) < SCALE_OFF or not (np.abs(scale / factor - 1.0) < ALIKE).all():
+    if wrong_range(e) is not None or abs(factor - 1.0) < SCALE_OFF or not (np.abs(scale / factor - 1.0) < ALIKE).all():
         return None
     far = not 1.0 / MOST_SCALE < factor < MOST_SCALE
     return reason("units_suspect", "scale_factors" if far else "alike", factor=factor)
@@ -67,9 +63,7 @@ def _scale_factors(D: Vector) -> Vector:
 
 def axes(e: Evidence) -> Reason | None:
     """Find axes that are mirrored or swapped relative to the gyroscope's."""
-    if e.fit is None or not is_trustworthy(e):
-        return None
-    U, _, Vt = np.linalg.svd(e.fit.D)
+    U, _, Vt = np.linalg.svd(e.estimate.D)
     Q = U @ Vt
     if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
         return None
@@ -88,7 +82,7 @@ def _reads_up(e: Evidence, M: Vector) -> bool:
 
     Where it lay on another side, return True for the M that changes fewer signs.
     """
-    flat = np.zeros(3) if e.flat is None else M.T @ e.flat.y
+    flat = M.T @ e.rest.y
     return bool(flat[2] > 0.0) if np.abs(flat).argmax() == 2 else bool(np.trace(M) > 0.0)
 
 
@@ -106,7 +100,7 @@ _SIGNED_PERMUTATIONS = [
 
 def gyro_range(e: Evidence) -> Reason | None:
     """Find rates that are all a power of two too small or too large for how gravity turned from rest to rest."""
-    if e.fit is None or (is_trustworthy(e) and _is_within_tolerance(e.fit.K)) or e.gyro_factor == 1.0:
+    if (is_trustworthy(e) and _is_within_tolerance(e.estimate.K)) or e.gyro_factor == 1.0:
         return None
     assumed = e.recording.sensor.gyro_range_dps
     ranges = "" if assumed is None else f": ±{e.gyro_factor * assumed:g} deg/s, read as ±{assumed:g}"
@@ -115,7 +109,7 @@ def gyro_range(e: Evidence) -> Reason | None:
 
 def gyro_contradicts(e: Evidence) -> Reason | None:
     """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest."""
-    if e.fit is None or (is_trustworthy(e) and e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2):
+    if is_trustworthy(e) and e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2:
         return None
     within, of_all = e.gyro_miss
     if within > MOST_MISS_RAD:
@@ -125,9 +119,9 @@ def gyro_contradicts(e: Evidence) -> Reason | None:
 
 def gyro_off(e: Evidence) -> Reason | None:
     """Find a gyroscope outside the tolerances of its data sheet; rates beyond its range pull at K, too."""
-    if e.fit is None or e.recording.gyr_clipped.any() or not is_trustworthy(e) or _is_within_tolerance(e.fit.K):
+    if e.recording.gyr_clipped.any() or _is_within_tolerance(e.estimate.K):
         return None
-    scale, cross = _gyro_errors(e.fit.K)
+    scale, cross = _gyro_errors(e.estimate.K)
     axis = int(np.argmax(scale))
     return reason("gyro_off", "scale", axis="xyz"[axis], scale=scale[axis], cross=cross)
 
@@ -157,13 +151,13 @@ def clock_off(e: Evidence) -> Reason | None:
 
 def sensors_lag(e: Evidence) -> Reason | None:
     """Find an accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters explain."""
-    if e.fit is None or e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
+    if e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
         return None
     (of_prior,) = BY_NAME["tau"].sd
-    std = float(replace(e.fit, covariance=e.claim.covariance).std("tau")[0])
+    std = float(replace(e.estimate, covariance=e.claim.covariance).std("tau")[0])
     # The prior draws the estimate towards the filters' delay: remove it, to have what the data alone say.
     data, filters_s = 1.0 - (std / of_prior) ** 2, e.recording.sensor.accel_lag_s
-    lag_s = filters_s + (e.fit.delay_s - filters_s) / data if data > 0.0 else 0.0
+    lag_s = filters_s + (e.estimate.delay_s - filters_s) / data if data > 0.0 else 0.0
     if not data > 0.0 or abs(lag_s) < max(LAG_S, LEAST_STDS * std / data**0.5):
         return None
     return reason("clock_off", "apart", lag=1e3 * abs(lag_s), how="lags behind" if lag_s > 0 else "runs ahead of")

@@ -107,9 +107,9 @@ def never_still(e: Evidence) -> Reason | None:
 
 def hardly_turned(e: Evidence) -> Reason | None:
     """Find a board that was not turned after it lay flat."""
-    if e.flat is None or _rested_late(e):
+    after = len(e.recording) - e.rest.last
+    if _rested_late(e):
         return None
-    after = len(e.recording) - e.flat.last
     if e.gravity_moved >= LEAST_TURN_RAD and after >= FEWEST_SAMPLES:
         return None
     return reason("few_orientations", "hardly_turned", degrees=np.rad2deg(e.gravity_moved), samples=after)
@@ -128,33 +128,24 @@ def _rested_late(e: Evidence) -> bool:
 
 def dead_accelerometer(e: Evidence) -> Reason | None:
     """Find an axis of the accelerometer that is constant, throughout or for seconds while the others show a turn."""
-    if e.flat is None:
-        return None
-    axes = _constant_axes(e, e.recording.acc, e.flat.Sigma_a, QUIETEST_ACC_MPS2)
+    axes = _constant_axes(e, e.recording.acc, e.rest.Sigma_a, QUIETEST_ACC_MPS2)
     if axes:
         return reason("bits_stuck", "constant", axes=axes, when="in every sample")
-    if np.sqrt(e.flat.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.origin is Origin.VEHICLE:
+    if np.sqrt(e.rest.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.origin is Origin.VEHICLE:
         return None  # data that are computed, or rounded on their way, repeat
     least, t = max(round(STUCK_S * e.recording.rate_hz), FEWEST_SAMPLES), e.recording.t - e.recording.t[0]
     for axis, column in zip("xyz", e.recording.acc.T, strict=True):
-        for first, last in _repeats(column, least):
-            if np.ptp(e.recording.acc[first:last], axis=0).max() > LEAST_TURN_RAD * e.gravity:
-                when = f"from {t[first]:.0f} to {t[last - 1]:.0f} s"
+        for first, last in true_runs(np.diff(column) == 0.0).tolist():
+            turn = np.ptp(e.recording.acc[first : last + 1], axis=0).max()
+            if last + 1 - first >= least and turn > LEAST_TURN_RAD * e.gravity:
+                when = f"from {t[first]:.0f} to {t[last]:.0f} s"
                 return reason("bits_stuck", "constant", axes=axis, when=when)
     return None
 
 
-def _repeats(column: Vector, least: int) -> list[tuple[int, int]]:
-    """Return first and last + 1 of the runs of at least `least` samples in which a column (n,) repeats its value."""
-    runs = true_runs(np.diff(column) == 0.0).tolist()
-    return [(first, last + 1) for first, last in runs if last + 1 - first >= least]
-
-
 def dead_gyroscope(e: Evidence) -> Reason | None:
     """Find an axis of the gyroscope that is constant throughout."""
-    if e.flat is None:
-        return None
-    axes = _constant_axes(e, e.recording.gyr, e.flat.Sigma_omega, QUIETEST_GYRO_RAD_S)
+    axes = _constant_axes(e, e.recording.gyr, e.rest.Sigma_omega, QUIETEST_GYRO_RAD_S)
     return reason("gyro_off", "constant", axes=axes) if axes else None
 
 
