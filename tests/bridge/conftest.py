@@ -97,6 +97,12 @@ def started(rig):
 
 
 @pytest.fixture(scope="session")
+def numbered():
+    """Kind of feed whose samples are numbered."""
+    return NumberedFeed
+
+
+@pytest.fixture(scope="session")
 def numbers():
     """Returns the numbers of the feed's samples in a recording."""
     return lambda recording: np.rint(recording.acc[:, 0] / recording.acc[0, 2] * 8192).astype(int)

@@ -13,19 +13,17 @@ from mpucal.errors import BusError, NoAnswer
 MS = 1_000_000
 
 
-@pytest.mark.parametrize(
-    ("model", "rate_hz", "latency_ms"), [("mpu6050", 50, 16), ("mpu6500", 1000, 1), ("clone98", 1000, 16)]
-)
+@pytest.mark.parametrize(("model", "rate_hz", "latency_ms"), [("mpu6050", 50, 16), ("mpu6500", 1000, 1)])
 def test_the_driver_loses_nothing(started, numbers, stream, model, rate_hz, latency_ms):
     """An FTDI adapter holds bytes back for 16 ms by default."""
     made, driver = started(model, latency_ms * MS, rate_hz=rate_hz)
-    stream(driver, 4)
+    stream(driver, 3)
     driver.stop()
     made.opened.close()
     recording = driver.recording()
     assert not recording.gap.any()
     assert set(np.diff(numbers(recording))) == {1}
-    assert len(recording) > 3.8 * rate_hz
+    assert len(recording) > 2.8 * rate_hz
     assert recording.sensor.rate_hz == pytest.approx(rate_hz * 1.0025, rel=300e-6)
 
 
@@ -108,8 +106,8 @@ def test_during_a_stream_only_int_enable_is_requested(started, stream):
 
 @pytest.mark.parametrize(
     ("how", "lost"),
-    [({"burst_ns": 450 * MS}, 0.0), ({"latency_ns": 300 * MS}, 0.02), ({"latency_ns": 5 * MS}, 0.02)],
-    ids=["bursts of 0.45 s", "300 ms, and 2 % of the packets sent again", "the same on a quick line"],
+    [({"burst_ns": 450 * MS}, 0.0), ({"latency_ns": 300 * MS}, 0.02)],
+    ids=["bursts of 0.45 s", "300 ms, and 2 % of the packets sent again"],
 )
 def test_a_line_that_delays_replies_makes_no_gap(rig, numbers, stream, how, lost):
     made, remarks = rig(line=how), []
@@ -127,11 +125,11 @@ def test_a_line_that_delays_replies_makes_no_gap(rig, numbers, stream, how, lost
     made.line._step = sent_again
     driver = Driver(made.bus(), Config(rate_hz=200), say=remarks.append)
     driver.start()
-    stream(driver, 10)
+    stream(driver, 6)
     recording = driver.recording()
     assert recording.gap.sum() == 0
     assert set(np.diff(numbers(recording))) == {1}
-    assert len(recording) > 1600
+    assert len(recording) > 900
     driver.stop()
     assert not any("failed" in sentence for sentence in remarks)
 

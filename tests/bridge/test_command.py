@@ -8,15 +8,19 @@ from types import SimpleNamespace
 import pytest
 
 from mpucal.__main__ import run
+from mpucal.bridge.bus import BridgeBus
 from mpucal.bridge.conformance import talks
-from mpucal.bridge.frame import Frame
-from mpucal.bridge.messages import REPLY_BIT, Hello
+from mpucal.bridge.doctor import examine_bridge_and_chip
+from mpucal.chip.config import Config
+from mpucal.doctor.finding import Mark
 from mpucal.errors import BusError, OutputError
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Prompt, PromptKind
+from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import FastClock
-from tools.lab.bridge import EmulatedBridge, Memory
+from mpucal.sources.chip import OpenedChip
+from tools.lab.bridge import EmulatedBridge, EmulatedLine, Memory
 
 BLOB = Path(__file__).parents[2] / "fixtures" / "vectors" / "blob_measured.bin"
 
@@ -60,14 +64,6 @@ def test_a_capture_without_its_suffix_is_refused_at_once(board, mpucal, tmp_path
     assert not (tmp_path / "plain").exists()
 
 
-def test_what_only_hosts_are_sent_a_bridge_ignores(board):
-    bridge = EmulatedBridge(board.chip, board.clock.now)
-    bridge.receive(Frame(Hello.TYPE | REPLY_BIT, 1, Hello().payload()).encode())
-    assert bridge.work() == b""
-    bridge.receive(Frame(Hello.TYPE, 1, Hello().payload()).encode())
-    assert bridge.work() != b""
-
-
 def test_into_the_memory_and_back(board, mpucal, tmp_path):
     nothing = mpucal("show", "--serial", board.name)
     assert nothing.code == BusError.exit_code
@@ -100,14 +96,17 @@ def test_a_blob_of_before_says_that_its_unit_is_known(board, mpucal):
     assert "does not state the unit of K: 131 counts to 1 deg/s" in shown.err
 
 
-def test_the_doctor_tells_bridge_and_chip(board, mpucal):
-    board.chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
-    told = mpucal("doctor", "--serial", board.name, "--seconds", "2", "--json")
-    assert told.code == 0, told.out
-    found = {finding["topic"]: finding for finding in json.loads(told.out)["findings"]}
-    assert found["bridge"]["data"]["name"] == "emulated bridge"
-    assert found["bridge"]["data"]["pushes"]
-    assert found["offset registers"]["data"]["place"] == 0x06
+def test_the_doctor_tells_bridge_and_chip():
+    clock = FastClock()
+    chip = open_simulated("sim:seed=5", clock=clock)
+    bus = BridgeBus(EmulatedLine(EmulatedBridge(chip, clock.now), clock, step_ns=2_000_000))
+    chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    source = OpenedChip(bus, Plan(Config()), (chip.hear,))
+    found = {finding.topic: finding for finding in examine_bridge_and_chip(source, 2.0)}
+    assert not [finding for finding in found.values() if finding.mark is Mark.BAD]
+    assert found["bridge"].data["name"] == "emulated bridge"
+    assert found["bridge"].data["pushes"]
+    assert found["offset registers"].data["place"] == 0x06
     # what passes through a serial line does not show the speed of the bus behind it
     assert "serial line" in found
     assert "bus speed" not in found

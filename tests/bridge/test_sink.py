@@ -62,20 +62,6 @@ def calibration():
     return replace(good, sensor=replace(good.sensor, who_am_i=0x68))
 
 
-def test_it_is_stored_read_back_and_found_valid(calibration):
-    store = FakeStore()
-    applied = BridgeSink(store).write(calibration)
-    assert store.blob == calibration.blob().encode()
-    assert applied.calibration is calibration
-    assert "blob number 8 (212 bytes, CRC-32 1234abcd), read back and validated" in applied.what
-
-
-def test_the_old_one_is_kept_in_a_file_of_its_number(tmp_path):
-    (path,) = BridgeSink(FakeStore()).keep(tmp_path)
-    assert (path.name, path.read_bytes()) == ("bridge-blob-7.bin", OLD)
-    assert BridgeSink(FakeStore(None)).keep(tmp_path) == ()
-
-
 @pytest.mark.parametrize(
     ("changes", "store", "words"),
     [
@@ -114,15 +100,6 @@ def test_what_fails_leaves_the_old_one_and_says_so(calibration, store, words, le
     with pytest.raises(WriteBackError, match=words):
         BridgeSink(held).write(calibration)
     assert held.blob == left
-
-
-def test_other_data_are_an_objection_and_overwritten_only_by_a_write(calibration):
-    held = FakeStore(None)
-    held.occupied = True
-    assert "holds other data, perhaps another sketch's" in BridgeSink(held).reason_to_keep(calibration)
-    assert held.occupied
-    BridgeSink(held).write(calibration)
-    assert (held.occupied, held.blob) == (False, calibration.blob().encode())
 
 
 def test_a_reply_that_was_lost_behind_the_commit_is_no_failure(calibration):

@@ -21,26 +21,17 @@ def asked_for(mocked, data_hz):
     assert {hz for *_, hz, first, _ in seen if first == 0x80 | reg.FIFO_R_W} == {data_hz}
 
 
-def test_the_doctor_and_what_the_kernel_is_asked_for(device):
-    mocked = device("sim:seed=3,chip=mpu6500")
-    mocked.tell(prompt={"kind": "lay_flat", "down": None})
-    result = mocked.mpucal("doctor", "--spi", NODE, "--seconds", "2", "--json")
-    findings = {finding["topic"]: finding for finding in json.loads(result.out)["findings"]}
-    assert (result.code, findings["chip"]["data"]["chip"]) == (0, "MPU-6500")
-    asked_for(mocked, 20_000_000)
-
-
 @pytest.mark.parametrize(
     ("chip", "name", "data_hz"), [("mpu6500", "MPU-6500", 20_000_000), ("icm20602", "ICM-20602", 8_000_000)]
 )
 def test_both_sensors_at_1_khz_are_recorded_over_spi(device, chip, name, data_hz):
     mocked = device(f"sim:seed=3,chip={chip}")
-    result = mocked.mpucal("record", "--spi", NODE, "--rate", "1000", "--seconds", "2", "-o", "walk.mcap")
+    result = mocked.mpucal("record", "--spi", NODE, "--rate", "1000", "--seconds", "1", "-o", "walk.mcap")
     assert result.code == 0, result.err
     recording = mpucal.load(mocked.folder / "walk.mcap")
     assert recording.sensor.chip == name
     assert not recording.gap.any()
-    assert len(recording) == pytest.approx(2000, rel=0.02)
+    assert len(recording) == pytest.approx(1000, rel=0.04)
     asked_for(mocked, data_hz)
 
 

@@ -68,8 +68,8 @@ def make(once):
 
 @pytest.fixture(scope="session")
 def avr_build(make):
-    """Builds the firmware for the ATmega328P: (folder, output)."""
-    return make("all")
+    """Builds the firmware for the ATmega328P at 500000 baud: (folder, output)."""
+    return make("all", "BAUD=500000")
 
 
 @pytest.fixture(scope="session")
@@ -78,12 +78,6 @@ def sketches(make):
     if not ARDUINO.exists():
         pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
     return make("sketches")[0]
-
-
-@pytest.fixture(scope="session")
-def fast_build(make):
-    """Folder with the firmware for the ATmega328P at 500000 baud."""
-    return make("all", "BAUD=500000")[0]
 
 
 @pytest.fixture(scope="session")

@@ -21,76 +21,64 @@ ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "mpucal" / "firmware" / "src"
 VECTORS = ROOT / "fixtures" / "vectors"
 MEASURED = Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
+WANTED = {path: json.loads(path.with_suffix(".json").read_text()) for path in sorted(VECTORS.glob("blob_*.bin"))}
 
-OK, NO_BLOB, OTHER_MAJOR, BAD_LENGTH, BAD_CRC, NOT_FINITE, NOT_INVERTIBLE, OTHER_CHIP, OTHER_RANGE = range(9)
+OK, NO_BLOB, OTHER_MAJOR, BAD_LENGTH, BAD_CRC, NOT_FINITE, NOT_INVERTIBLE, OTHER_CHIP, OTHER_RANGE, NO_ROOM = range(10)
 EPS = np.finfo(np.float32).eps
 STANDARD_GRAVITY_MPS2 = 9.80665
-BLOBS = 50_000
+MPS2_PER_COUNT = 4 * STANDARD_GRAVITY_MPS2 / 32768
+BLOBS = 10_000
 # the calendar ends in the year 9999
 LAST_SECOND = 253_402_300_799
 
 
 @pytest.fixture(scope="module")
-def apply(core):
-    def call(blob: bytes, counts, who_am_i=0, accel_range_g=0.0):
-        counts = np.ascontiguousarray(counts, np.int16).reshape(-1, 3)
-        a = np.full(counts.shape, np.nan, np.float32)
+def call(core):
+    """Calls a function of host.c for a blob and counts: (status, what it computed)."""
+
+    def run(name, blob, *how, counts=(0, 0, 0), made=np.float32):
+        counts = np.ascontiguousarray(counts, np.int16)
+        out = np.full(counts.shape, -1, made)
         # of exactly this size, so that a sanitizer sees a byte too many
         memory = (ctypes.c_uint8 * len(blob)).from_buffer_copy(blob)
-        status = core.host_apply(
-            memory,
-            ctypes.c_uint32(len(blob)),
-            ctypes.c_uint8(who_am_i),
-            ctypes.c_float(accel_range_g),
-            counts.ctypes.data_as(ctypes.c_void_p),
-            ctypes.c_uint32(len(counts)),
-            a.ctypes.data_as(ctypes.c_void_p),
-        )
-        return status, a
+        pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (counts, out)]
+        function = getattr(core, f"host_{name}")
+        function.restype = ctypes.c_uint8
+        return function(memory, ctypes.c_uint32(len(blob)), *how, *pointers), out
 
-    return call
+    return run
 
 
-def reference(blob: Blob, counts, accel_range_g=None):
-    """inv(D) (y - b_a + applied_b_a) in float64, and how far float32 may be off it: (n, 3) each."""
-    D, b = np.array(blob.D).reshape(3, 3), np.array(blob.b_a) - np.array(blob.applied_b_a)
-    y = np.asarray(counts, float) * STANDARD_GRAVITY_MPS2 * (accel_range_g or blob.accel_range_g) / 32768
-    inverse = np.linalg.inv(D)
-    # some ten roundings, of numbers as large as the cofactors' and the sums' terms
-    size = (np.abs(y) + np.abs(blob.b_a) + np.abs(blob.applied_b_a)) @ np.abs(inverse).T
-    return (y - b) @ inverse.T, 16 * EPS * np.linalg.cond(D) ** 2 * size + np.finfo(np.float32).tiny
+@pytest.fixture(scope="module")
+def load(call):
+    """Loads a blob for a chip and a range; returns the status."""
+    return lambda blob, who=0, range_g=0.0: call("apply", blob, ctypes.c_uint8(who), ctypes.c_float(range_g))[0]
 
 
-@pytest.mark.parametrize("path", sorted(VECTORS.glob("blob_*.bin")), ids=lambda path: path.stem)
-def test_agrees_with_every_golden_vector(path, apply):
-    wanted = json.loads(path.with_suffix(".json").read_text())
-    status, _ = apply(path.read_bytes(), [0, 0, 0], accel_range_g=4.0)
+@pytest.mark.parametrize("path", WANTED, ids=lambda path: path.stem)
+def test_agrees_with_every_golden_vector(path, call, load):
+    """Acceleration at each temperature, and angular rate."""
+    wanted, data = WANTED[path], path.read_bytes()
     if "rejected" in wanted:
-        assert status in (*range(NO_BLOB, NOT_INVERTIBLE + 1), OTHER_RANGE)
+        assert load(data, range_g=4.0) in (*range(NO_BLOB, NOT_INVERTIBLE + 1), OTHER_RANGE)
         return
-    assert status == OK
-    blob = Blob.decode(path.read_bytes())
-    counts = np.rint(np.array(wanted["y"]) * 32768 / (STANDARD_GRAVITY_MPS2 * 4))
-    _, a = apply(path.read_bytes(), counts, accel_range_g=4.0)
-    a64, bound = reference(blob, counts, 4.0)
-    assert (np.abs(a - a64) <= bound).all()
-    # half a count is what rounding y to counts may do
-    assert a[0] == pytest.approx(wanted["a"], abs=2 * STANDARD_GRAVITY_MPS2 * 4 / 32768)
+    blob = Blob.decode(data)
+    counts = np.rint(np.array(wanted["y"]) / MPS2_PER_COUNT)
+    rounded = np.linalg.solve(np.array(blob.D).reshape(3, 3), counts * MPS2_PER_COUNT - wanted["y"])
+    for temperature_c, a in zip(wanted.get("at_c", [85.0]), wanted.get("a_at", [wanted["a"]]), strict=True):
+        status, found = call("apply_at", data, ctypes.c_float(temperature_c), counts=counts)
+        assert (status, found) == (OK, pytest.approx(np.array(a) + rounded, abs=1e-5))
+    status, w = call("apply_gyro", data, ctypes.c_float(500.0), counts=wanted["counts"])
+    assert (status, w) == (OK, pytest.approx(np.array(wanted["w"]), abs=1e-5))
 
 
-def test_what_hardware_subtracts_is_not_subtracted_twice(apply):
-    counts = [100, -200, 8192]
-    b_a = (0.25, -0.5, 0.75)
-    y_offset = np.array(b_a) * 32768 / (STANDARD_GRAVITY_MPS2 * 4)
-    plain = replace(MEASURED, b_a=b_a, applied_b_a=(0.0, 0.0, 0.0)).encode()
-    applied = replace(MEASURED, b_a=b_a, applied_b_a=b_a).encode()
-    # the chip that subtracts b_a delivers less of it, and both give the same acceleration
-    _, of_plain = apply(plain, np.rint(counts + y_offset))
-    _, of_applied = apply(applied, counts)
-    assert of_applied == pytest.approx(of_plain, abs=1e-3)
-    exact, bound = reference(Blob.decode(applied), [counts])
-    assert np.array_equal(Blob.decode(applied).b_a, Blob.decode(applied).applied_b_a)
-    assert (np.abs(of_applied - exact) <= bound).all()
+def test_at_a_temperature_that_is_not_known_b_a_is_the_blobs(call):
+    data, counts = (VECTORS / "blob_sloped.bin").read_bytes(), (100, -200, 8000)
+    either = [
+        call("apply_at", data, ctypes.c_float(celsius), counts=counts)[1].tolist()
+        for celsius in (np.nan, Blob.decode(data).temperature_c)
+    ]
+    assert either[0] == either[1]
 
 
 @pytest.mark.parametrize(
@@ -104,9 +92,12 @@ def test_what_hardware_subtracts_is_not_subtracted_twice(apply):
         ((0x68, 0.0), (0x68, 0.0), OTHER_RANGE),
     ],
 )
-def test_says_where_a_blob_does_not_belong(measured, used, status, apply):
-    blob = replace(MEASURED, who_am_i=measured[0], accel_range_g=measured[1]).encode()
-    assert apply(blob, [0, 0, 0], *used)[0] == status
+def test_says_where_a_blob_does_not_belong(measured, used, status, load):
+    assert load(replace(MEASURED, who_am_i=measured[0], accel_range_g=measured[1]).encode(), *used) == status
+
+
+def test_a_gyroscope_at_another_range_is_refused(call):
+    assert call("apply_gyro", MEASURED.encode(), ctypes.c_float(250.0))[0] == OTHER_RANGE
 
 
 @pytest.mark.parametrize(
@@ -114,15 +105,13 @@ def test_says_where_a_blob_does_not_belong(measured, used, status, apply):
     [np.zeros(9), np.ones(9), np.eye(3).ravel() * 1e-20, np.eye(3).ravel() * 1e20, [1, 2, 3, 2, 4, 6, 0, 0, 1]],
     ids=["zero", "ones", "tiny", "huge", "two rows alike"],
 )
-def test_a_matrix_that_cannot_be_inverted_is_refused(D, apply):
+def test_a_matrix_that_cannot_be_inverted_is_refused(D, load):
     body = bytearray(MEASURED.encode()[:-4])
     body[60:96] = np.float32(D).tobytes()
     blob = bytes(body) + struct.pack("<I", zlib.crc32(body))
     with pytest.raises(BlobError, match="no inverse"):
         Blob.decode(blob)
-    status, a = apply(blob, [1, 2, 3])
-    assert status == NOT_INVERTIBLE
-    assert np.isnan(a).all()
+    assert load(blob) == NOT_INVERTIBLE
 
 
 def random_blobs(rng, count):
@@ -207,12 +196,32 @@ def check_computed(usable, fields, counts, a):
     return well.sum()
 
 
-def test_a_blob_cut_anywhere_is_refused_and_nothing_read_behind_it(apply):
+def test_a_blob_cut_anywhere_is_refused_and_nothing_read_behind_it(load):
     whole = bytearray(MEASURED.encode()[:-4]) + bytes(MAX_LENGTH - LENGTHS[0])
     struct.pack_into("<H", whole, 6, MAX_LENGTH)
     whole += struct.pack("<I", zlib.crc32(whole))
     for size in range(MAX_LENGTH):
-        assert apply(bytes(whole[:size]), [0, 0, 0])[0] in (NO_BLOB, BAD_LENGTH), size
+        assert load(bytes(whole[:size])) in (NO_BLOB, BAD_LENGTH), size
+
+
+ENDS = np.array(np.meshgrid(*[[-32768, -32767, -1, 0, 1, 32767]] * 3)).reshape(3, -1).T
+
+
+def test_fixed_point_is_within_a_count_over_the_whole_range(call):
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        D = np.eye(3) * rng.uniform(0.7, 1.4, 3) + rng.uniform(-0.15, 0.15, (3, 3))
+        b_a = rng.uniform(-5, 5, 3)
+        counts = np.vstack([ENDS, rng.integers(-32768, 32768, (5000, 3))])
+        blob = replace(MEASURED, D=tuple(D.ravel()), b_a=tuple(b_a)).encode()
+        status, corrected = call("apply_fixed", blob, ctypes.c_uint32(len(counts)), counts=counts, made=np.int32)
+        assert status == OK, seed
+        assert np.abs(corrected - np.linalg.solve(D, (counts - b_a / MPS2_PER_COUNT).T).T).max() < 0.55, seed
+
+
+@pytest.mark.parametrize("changes", [{"D": (0.5, 0, 0, 0, 1, 0, 0, 0, 1)}, {"b_a": (5000.0, 0, 0)}], ids=["D", "b_a"])
+def test_what_has_no_room_in_fixed_point_is_refused(changes, call):
+    assert call("apply_fixed", replace(MEASURED, **changes).encode(), ctypes.c_uint32(1), made=np.int32)[0] == NO_ROOM
 
 
 STANDARDS = [("gcc", "c99"), ("g++", "c++11"), ("g++", "c++17")]

@@ -1,59 +1,81 @@
-"""Core's replies to every request, and the tables of its headers, against firmware_protocol.md."""
+"""Rules of firmware_protocol.md, held by both bridges: the core of the firmware, and the program for MicroPython."""
 
 from __future__ import annotations
 
+import ctypes
+import errno
+import json
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mpucal.bridge import board
 from mpucal.bridge import messages as wire
+from mpucal.bridge.conformance import find_difference, talks
+from mpucal.bridge.doctor import examine_conformance
 from mpucal.bridge.frame import Deframer, Frame
 from mpucal.bridge.messages import Status
+from mpucal.bridge.store import BlobStore
+from mpucal.doctor.finding import Mark
 
-ROOT = Path(__file__).parents[2]
-VECTORS = ROOT / "fixtures" / "vectors"
-DOCUMENT = (ROOT / "firmware_protocol.md").read_text()
-HEADERS = "".join(
-    (ROOT / "mpucal" / "firmware" / "src" / f"mpucal_{name}.h").read_text() for name in ("protocol", "frame")
-)
+VECTORS = Path(__file__).parents[2] / "fixtures" / "vectors"
 BLOB = (VECTORS / "blob_measured.bin").read_bytes()
 OTHER = (VECTORS / "blob_appended.bin").read_bytes()
 CRC = int.from_bytes(BLOB[-4:], "little")
 
 
-@dataclass
 class Chip:
-    """Registers at one address; reads return increasing bytes."""
+    """Registers at one address, for the buses of both bridges; reads return increasing bytes, FIFO_COUNT 504.
 
-    address: int = 0x68
-    failure: int = 0
-    written: list[tuple[int, bytes]] = field(default_factory=list)
+    Attributes
+    ----------
+    failure : status of every transfer. number : of the error that MicroPython raises for it.
+    """
+
+    def __init__(self, address=0x68):
+        self.address, self.failure, self.number, self.written = address, Status.OK, errno.EIO, []
 
     def read(self, address, first, count):
+        if address == 0:  # the general call
+            return Status.BUS_FAILED, b""
         if address != self.address:
             return Status.NO_ANSWER, b""
-        return self.failure, bytes((first + i) & 0xFF for i in range(count))
+        increasing = bytes((first + i) & 0xFF for i in range(count))
+        return self.failure, b"\x01\xf8" if (first, count) == (0x72, 2) else increasing
 
     def write(self, address, first, data):
-        if address != self.address:
-            return Status.NO_ANSWER
         self.written.append((first, data))
-        return self.failure
+        return self.read(address, first, 1)[0]
+
+    # machine.I2C
+
+    def readfrom(self, address, count):
+        return self._or_error(*self.read(address, 0, count), probing=True)
+
+    def readfrom_mem(self, address, register, count):
+        return self._or_error(*self.read(address, register, count))
+
+    def writeto_mem(self, address, register, data):
+        self._or_error(self.write(address, register, data), b"")
+
+    def _or_error(self, status, data, probing=False):
+        # a transfer that broke off looks like a missing acknowledge, but the chip is still there
+        if status and not (probing and (status, self.number) == (Status.BUS_FAILED, errno.EIO)):
+            raise OSError(self.number)
+        return data
 
 
 class Asking:
-    """Bridge with the requests of a host."""
+    """Host's requests to a bridge; `said` takes bytes and returns those of the bridge."""
 
-    def __init__(self, host, core, chip, eeprom):
-        self.chip, self.eeprom = chip, eeprom
-        self.bridge = host.HostBridge(core, eeprom, chip.read, chip.write)
+    def __init__(self, said, chip):
+        self.said, self.chip = said, chip
 
     def frames(self, data):
-        return list(Deframer().feed(self.bridge.receive(data)))
+        return list(Deframer().feed(self.said(data)))
 
     def raw(self, kind, payload=b"", seq=5):
         return [
@@ -76,16 +98,41 @@ class Asking:
         state = self.ask(wire.BlobState())
         if state.status == Status.NO_BLOB:
             return None
-        pieces = range(0, state.length, wire.MAX_READ)
-        counts = [min(wire.MAX_READ, state.length - offset) for offset in pieces]
-        return b"".join(
-            self.ask(wire.BlobRead(offset, count)).data for offset, count in zip(pieces, counts, strict=True)
-        )
+        pieces = [(at, min(wire.MAX_READ, state.length - at)) for at in range(0, state.length, wire.MAX_READ)]
+        return b"".join(self.ask(wire.BlobRead(*piece)).data for piece in pieces)
 
 
-@pytest.fixture
-def fresh(host, core):
-    return Asking(host, core, Chip(), host.Eeprom())
+@pytest.fixture(scope="session")
+def on_core(host, core):
+    """Makes a bridge of the firmware's core, with an EEPROM."""
+
+    def make(chip=None, eeprom=None):
+        chip, eeprom = chip or Chip(), eeprom or host.Eeprom()
+        asking = Asking(host.HostBridge(core, eeprom, chip.read, chip.write).receive, chip)
+        asking.eeprom = eeprom
+        return asking
+
+    return make
+
+
+def on_micropython(folder, chip):
+    """Make a bridge of the program for MicroPython, with files in a folder."""
+    bridge = board.Bridge([chip], lambda: 0, f"{folder}/")
+
+    def said(data):
+        bridge.receive(data)
+        return bridge.work()
+
+    asking = Asking(said, chip)
+    asking.files = bridge.files
+    return asking
+
+
+@pytest.fixture(params=["core", "MicroPython"])
+def fresh(request, tmp_path):
+    if request.param == "core":
+        return request.getfixturevalue("on_core")()
+    return on_micropython(tmp_path, Chip())
 
 
 @pytest.fixture
@@ -94,77 +141,54 @@ def bridge(fresh):
     return fresh
 
 
-@pytest.mark.parametrize("kind", [0x02, 0x05, 0x10, 0x14, 0x33], ids=hex)
-def test_before_hello_every_request_is_told_so(kind, fresh):
-    (frame,) = fresh.frames(Frame(kind, 5).encode())
-    assert (frame.type, frame.seq, frame.payload[0]) == (kind | wire.REPLY_BIT, 5, Status.NO_HELLO)
+def test_answers_as_the_golden_talks_say(fresh):
+    for name, talk in talks().items():
+        fresh.ask(wire.Hello())
+        for each in talk["talk"]:
+            assert find_difference(each, fresh.frames(bytes.fromhex(each["host"]))) == "", name
+        fresh.ask(wire.Hello())
+        fresh.ask(wire.BlobErase())
 
 
-def test_hello_says_who_it_is(fresh):
-    fresh.bridge.now_us = 0x89ABCDEF
-    answer = fresh.ask(wire.Hello())
-    assert answer == wire.HelloReply(
-        status=0,
-        t_us=0x89ABCDEF,
-        magic=b"MPUB",
-        major=1,
-        minor=0,
-        address=0x68,
-        features=wire.Feature.STREAM | wire.Feature.BLOB,
-        window=3,
-        blob_bytes=256,
-        name=b"core on a host".ljust(16, b"\0"),
-    )
+def test_before_hello_every_request_is_told_so(fresh):
+    for kind in (0x02, 0x05, 0x10, 0x14, 0x33):
+        (frame,) = fresh.frames(Frame(kind, 5).encode())
+        assert (frame.type, frame.seq, frame.payload[0]) == (kind | wire.REPLY_BIT, 5, Status.NO_HELLO)
 
 
 @pytest.mark.parametrize(
     ("at", "asked", "found"), [(0x68, 0, 0x68), (0x69, 0, 0x69), (0x69, 0x69, 0x69), (0x69, 0x68, 0), (0x20, 0, 0)]
 )
-def test_hello_looks_for_the_chip(at, asked, found, fresh):
+def test_hello_says_who_it_is_and_looks_for_the_chip(at, asked, found, fresh):
     fresh.chip.address = at
-    assert fresh.ask(wire.Hello(address=asked)).address == found
+    answer = fresh.ask(wire.Hello(address=asked))
+    assert (answer.status, answer.magic, answer.major, answer.address) == (Status.OK, b"MPUB", 1, found)
+    assert (answer.features & ~wire.Feature.LEAVE, answer.blob_bytes) == (wire.Feature.STREAM | wire.Feature.BLOB, 256)
+
+
+def test_registers_are_read_and_written(bridge):
+    del bridge.chip.written[:]
+    for count in (1, 14, 56):
+        assert bridge.ask(wire.Read(0x3B, count)).data == bytes(range(0x3B, 0x3B + count))
+    for data in (b"\x80", bytes(32)):
+        assert bridge.ask(wire.Write(0x6B, data)).status == Status.OK
+        assert bridge.chip.written.pop() == (0x6B, data)
+    for count in (1, 56, 57, 500, 4096):
+        answers = bridge.raw(wire.Burst.TYPE, wire.Burst(0x74, count).payload())
+        assert [answer.offset for answer in answers] == list(range(0, count, 56))
+        assert [len(answer.data) for answer in answers] == [min(56, count - at) for at in range(0, count, 56)]
+    # bytes behind the fields that it knows are ignored
+    assert [answer.data for answer in bridge.raw(wire.Read.TYPE, wire.Read(0x75, 1).payload() + b"later")] == [b"\x75"]
 
 
 @pytest.mark.parametrize(
-    "payload",
-    [b"", b"MPUB\1", b"MPUX\1\0\0", b"MPUB\1\0", b"MPUB\1\0\x80"],
-    ids=["none", "cut", "magic", "no address", "address"],
+    ("code", "number"),
+    [(Status.NO_ANSWER, errno.EIO), (Status.BUS_FAILED, errno.EIO), (Status.BUS_FAILED, errno.ETIMEDOUT)],
 )
-def test_a_hello_that_is_none_changes_nothing(payload, fresh):
-    assert [answer.status for answer in fresh.raw(wire.Hello.TYPE, payload)] == [Status.BAD_PAYLOAD]
-    assert fresh.ask(wire.Read(0x75, 1)).status == Status.NO_HELLO
-
-
-@pytest.mark.parametrize("count", [1, 14, 56])
-def test_reads_registers(count, bridge):
-    bridge.bridge.now_us = 1234
-    assert bridge.ask(wire.Read(0x3B, count)) == wire.ReadReply(0, 1234, bytes(range(0x3B, 0x3B + count)))
-
-
-@pytest.mark.parametrize("count", [1, 56, 57, 112, 500, 4096])
-def test_a_burst_comes_in_pieces(count, bridge):
-    answers = bridge.raw(wire.Burst.TYPE, wire.Burst(0x74, count).payload())
-    assert [answer.offset for answer in answers] == list(range(0, count, 56))
-    assert [len(answer.data) for answer in answers] == [min(56, count - at) for at in range(0, count, 56)]
-
-
-def test_a_burst_ends_where_a_transfer_fails(bridge):
-    bridge.chip.failure = Status.BUS_FAILED
-    answers = bridge.raw(wire.Burst.TYPE, wire.Burst(0x74, 500).payload())
-    assert [answer.status for answer in answers] == [Status.BUS_FAILED]
-
-
-@pytest.mark.parametrize("data", [b"\x80", bytes(32)], ids=len)
-def test_writes_registers(data, bridge):
-    del bridge.chip.written[:]
-    assert bridge.ask(wire.Write(0x6B, data)).status == Status.OK
-    assert bridge.chip.written == [(0x6B, data)]
-
-
-@pytest.mark.parametrize("code", [Status.NO_ANSWER, Status.BUS_FAILED])
-def test_a_transfer_that_failed_says_how(code, bridge):
-    bridge.chip.failure = code
+def test_a_transfer_that_failed_says_how(code, number, bridge):
+    bridge.chip.failure, bridge.chip.number = code, number
     assert [bridge.ask(wire.Read(0, 1)).status, bridge.ask(wire.Write(0, b"\0")).status] == [code, code]
+    assert [answer.status for answer in bridge.raw(wire.Burst.TYPE, wire.Burst(0x74, 500).payload())] == [code]
 
 
 BAD_PAYLOADS = {
@@ -191,16 +215,17 @@ BAD_PAYLOADS = {
 }
 
 
-@pytest.mark.parametrize(("kind", "payload"), BAD_PAYLOADS.values(), ids=BAD_PAYLOADS)
-def test_a_payload_out_of_its_limits_is_refused(kind, payload, bridge):
+def test_a_payload_out_of_its_limits_is_refused(bridge):
     del bridge.chip.written[:]
-    assert [answer.status for answer in bridge.raw(kind, payload)] == [Status.BAD_PAYLOAD]
-    assert (bridge.chip.written, bridge.eeprom.writes) == ([], 0)
+    for name, (kind, payload) in BAD_PAYLOADS.items():
+        assert [answer.status for answer in bridge.raw(kind, payload)] == [Status.BAD_PAYLOAD], name
+    assert bridge.chip.written == []
 
 
-def test_bytes_behind_the_fields_it_knows_are_ignored(bridge):
-    answers = bridge.raw(wire.Read.TYPE, wire.Read(0x75, 1).payload() + b"later")
-    assert answers == [wire.ReadReply(0, 0, b"\x75")]
+def test_a_hello_that_is_none_changes_nothing(fresh):
+    for payload in (b"", b"MPUB\1", b"MPUX\1\0\0", b"MPUB\1\0", b"MPUB\1\0\x80"):
+        assert [answer.status for answer in fresh.raw(wire.Hello.TYPE, payload)] == [Status.BAD_PAYLOAD], payload
+        assert fresh.ask(wire.Read(0x75, 1)).status == Status.NO_HELLO
 
 
 def test_unknown_requests_are_told_so_and_replies_ignored(bridge):
@@ -211,18 +236,17 @@ def test_unknown_requests_are_told_so_and_replies_ignored(bridge):
     assert [frame.type for frame in frames] == [kind | wire.REPLY_BIT for kind in unknown]
 
 
-def test_a_blob_is_stored_read_and_replaced(bridge):
+def test_blobs_are_stored_read_replaced_and_erased(bridge):
     assert bridge.stored() is None
     assert bridge.ask(wire.BlobRead(0, 1)).status == Status.NO_BLOB
     for generation, blob in enumerate((BLOB, OTHER, BLOB), 1):
-        assert bridge.store(blob) == wire.BlobCommitReply(0, 0, generation)
+        assert bridge.store(blob).generation == generation
         state = bridge.ask(wire.BlobState())
-        assert (state.generation, state.length, state.crc) == (
-            generation,
-            len(blob),
-            int.from_bytes(blob[-4:], "little"),
-        )
+        assert (state.generation, state.length) == (generation, len(blob))
+        assert state.crc == int.from_bytes(blob[-4:], "little")
         assert bridge.stored() == blob
+    assert bridge.ask(wire.BlobErase()).status == Status.OK
+    assert bridge.stored() is None
 
 
 def test_until_commit_the_old_blob_counts_and_hello_gives_the_new_one_up(bridge):
@@ -245,12 +269,11 @@ def test_repeats_of_blob_messages_do_no_harm(bridge):
     assert [bridge.ask(commit).generation for _ in range(3)] == [1, 1, 1]
 
 
-@pytest.mark.parametrize("name", [*sorted(path.stem for path in VECTORS.glob("blob_bad_*.bin")), "blob_not_finite"])
-def test_what_is_no_blob_leaves_the_old_one(name, bridge):
+def test_what_is_no_blob_leaves_the_old_one(bridge):
     bridge.store(OTHER)
-    bad = (VECTORS / f"{name}.bin").read_bytes()
-    assert bridge.store(bad).status == Status.BAD_BLOB
-    assert bridge.stored() == OTHER
+    for path in (*VECTORS.glob("blob_bad_*.bin"), VECTORS / "blob_not_finite.bin"):
+        assert bridge.store(path.read_bytes()).status == Status.BAD_BLOB, path
+        assert bridge.stored() == OTHER
     assert bridge.store(BLOB).status == Status.OK
 
 
@@ -266,84 +289,158 @@ OUT_OF_ORDER = {
 }
 
 
-@pytest.mark.parametrize(("requests", "status"), OUT_OF_ORDER.values(), ids=OUT_OF_ORDER)
-def test_blob_messages_out_of_order_are_refused(requests, status, bridge):
+def test_blob_messages_out_of_order_are_refused(bridge):
     bridge.store(BLOB)
-    assert [bridge.ask(request).status for request in requests][-1] == status
-    assert bridge.stored() == BLOB
+    for name, (requests, status) in OUT_OF_ORDER.items():
+        bridge.ask(wire.Hello())
+        assert [bridge.ask(request).status for request in requests][-1] == status, name
+        assert bridge.stored() == BLOB
 
 
-def test_erase_leaves_none(bridge):
-    bridge.store(OTHER)
-    bridge.store(BLOB)
-    assert bridge.ask(wire.BlobErase()).status == Status.OK
-    assert bridge.stored() is None
-
-
-def test_a_memory_that_does_not_keep_its_bytes_is_told(bridge):
+def test_a_memory_that_does_not_keep_its_bytes_is_told(on_core):
+    bridge = on_core()
+    bridge.ask(wire.Hello())
     bridge.eeprom.stuck.update(range(1024))
     assert bridge.ask(wire.BlobBegin(188)).status == Status.OK
     assert bridge.ask(wire.BlobData(0, BLOB[:32])).status == Status.STORAGE_FAILED
 
 
-requests = st.one_of(
-    st.binary(max_size=90),
-    st.builds(Frame, st.sampled_from([*wire.REQUESTS]), st.integers(0, 255), st.binary(max_size=66)).map(Frame.encode),
-    st.builds(wire.BlobBegin, st.integers(0, 300)).map(lambda it: Frame(it.TYPE, 1, it.payload()).encode()),
-    st.builds(wire.BlobData, st.integers(0, 300), st.binary(min_size=1, max_size=32)).map(
-        lambda it: Frame(it.TYPE, 1, it.payload()).encode()
-    ),
-    st.builds(wire.Stream, st.integers(0, 56), st.integers(1, 32)).map(
-        lambda it: Frame(it.TYPE, 1, it.payload()).encode()
+def test_a_write_that_power_cuts_leaves_the_old_blob_in_the_files(tmp_path):
+    bridge = on_micropython(tmp_path, Chip())
+    bridge.ask(wire.Hello())
+    assert [bridge.store(blob).generation for blob in (OTHER, BLOB)] == [1, 2]
+    used, _, _ = bridge.files.stored()
+    path = Path(bridge.files.paths[used])
+    whole = path.read_bytes()
+    for cut in range(len(whole)):
+        path.write_bytes(whole[:cut])
+        assert bridge.files.stored() == (1 - used, 1, OTHER)
+
+
+def test_other_data_are_given_up_only_by_an_erase(host, on_core):
+    others = bytes(range(256)) * 4
+    bridge = on_core(eeprom=host.Eeprom(others))
+
+    def occupied():
+        return bool(bridge.ask(wire.Hello()).features & wire.Feature.OCCUPIED)
+
+    assert occupied()
+    assert bridge.ask(wire.BlobBegin(212)).status == Status.OCCUPIED
+    assert bridge.ask(wire.BlobState()).status == Status.NO_BLOB
+    assert bridge.ask(wire.BlobData(0, b"x")).status == Status.NOT_BEGUN
+    assert bridge.eeprom.content == others
+    assert bridge.ask(wire.BlobErase()).status == Status.OK
+    assert not occupied()
+    assert bridge.ask(wire.BlobBegin(212)).status == Status.OK
+    assert bridge.eeprom.content[2 * 264 :] == others[2 * 264 :]
+
+
+def blob_data(at, size=32):
+    return Frame(0x13, 1, wire.BlobData(at, BLOB[at : at + size]).payload())
+
+
+frames = st.one_of(
+    st.builds(Frame, st.sampled_from([*wire.REQUESTS, 0x33]), st.integers(0, 255), st.binary(max_size=66)),
+    st.builds(blob_data, st.integers(0, 187)),
+    st.builds(lambda size: Frame(0x12, 2, wire.BlobBegin(size).payload()), st.integers(0, 300)),
+    st.builds(lambda *how: Frame(0x05, 5, wire.Stream(*how).payload()), st.integers(0, 56), st.integers(1, 32)),
+    st.sampled_from(
+        [
+            Frame(0x12, 2, wire.BlobBegin(188).payload()),
+            Frame(0x14, 3, wire.BlobCommit(188, CRC).payload()),
+            Frame(0x10, 4),
+            *(blob_data(at) for at in range(0, 188, 32)),
+        ]
     ),
 )
 
 
-@settings(max_examples=300)
-@given(told=st.lists(requests, max_size=30))
-def test_whatever_comes_it_sends_nothing_but_answers_and_keeps_its_blob(told, host, core):
-    asking = Asking(host, core, Chip(), host.Eeprom())
+@settings(max_examples=60)
+@given(told=st.lists(frames, max_size=25))
+def test_both_bridges_answer_alike(told, on_core, tmp_path_factory):
+    """Comparison but for what HELLO says, LEAVE of a pasted program alone, and the time of a look at the FIFO."""
+    both = on_core(), on_micropython(tmp_path_factory.mktemp("flash"), Chip())
+    for frame in [Frame(1, 0, wire.Hello().payload()), *told]:
+        if frame.type == wire.Leave.TYPE:
+            continue
+        ours, theirs = ([each for each in one.frames(frame.encode()) if each.type != wire.Frames.TYPE] for one in both)
+        assert [(each.type, each.seq) for each in ours] == [(each.type, each.seq) for each in theirs]
+        for our, their in zip(ours, theirs, strict=True):
+            assert our.payload[0] == their.payload[0]
+            # a failed request's reply may be longer
+            if our.payload[0] == Status.OK and frame.type != wire.Hello.TYPE:
+                assert our.payload == their.payload
+
+
+@settings(max_examples=60)
+@given(told=st.lists(st.one_of(st.binary(max_size=90), frames.map(Frame.encode)), max_size=30))
+def test_whatever_comes_the_core_sends_nothing_but_answers_and_keeps_its_blob(told, host, core):
+    chip = Chip()
+    bridge = host.HostBridge(core, host.Eeprom(), chip.read, chip.write)
+    asking = Asking(bridge.receive, chip)
     asking.ask(wire.Hello())
     asking.store(BLOB)
     for data in told:
-        sent = asking.bridge.receive(data + b"\0")
-        asking.bridge.now_us += 700
+        sent = bridge.receive(data + b"\0")
+        bridge.now_us += 700
         deframer = Deframer()
-        for frame in deframer.feed(sent + asking.bridge.look()):
-            wire.answer_of(frame.type, frame.payload)
+        for frame in deframer.feed(sent + bridge.look()):
+            assert frame.type == 0x33 | wire.REPLY_BIT or wire.answer_of(frame.type, frame.payload)
         assert deframer.rejected == 0
     # an ERASE and a whole BEGIN, DATA, COMMIT are within what may come, another blob is not
     assert asking.stored() in (BLOB, None)
 
 
-# The document's tables and the headers'.
+def test_the_package_holds_the_golden_talks():
+    assert talks() == {path.stem[5:]: json.loads(path.read_text()) for path in VECTORS.glob("talk_*.json")}
 
 
-def rows(heading):
-    section = DOCUMENT.split(f"### {heading}\n")[1].split("\n### ")[0].split("\n#### ")[0]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line[:1] == "|"][
-        2:
-    ]
+EXCHANGE = json.loads((VECTORS / "talk_fifo_count.json").read_text())["talk"][0]
 
 
-def constant(name):
-    (value,) = re.findall(rf"\bMPUCAL_{name} ?=? (0x[0-9A-F]+|\d+)\b", HEADERS)
-    return int(value, 0)
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ([], "0 replies to"),
+        ([Frame(0x82, 3, bytes(5) + b"\1\xf8")], "seq 3"),
+        ([Frame(0x82, 2, bytes([5, 0, 0, 0, 0]))], "status 5 .NO_ANSWER."),
+        ([Frame(0x82, 2, bytes(5) + b"\xf8\1")], "f801 in the reply"),
+    ],
+)
+def test_another_answer_is_described(said, words):
+    assert re.search(words, find_difference(EXCHANGE, said))
 
 
-def test_types_are_the_documents():
-    requests = {name: int(kind, 0) for kind, name, *_ in rows("Messages") if kind.startswith("0x") and " " not in kind}
-    assert requests == {name: constant(name) for name in requests}
-    assert len(requests) == len(wire.REQUESTS) + 1
+def test_the_build_for_an_uno_has_all_talks(switch_on, greeted):
+    """The examination of `mpucal doctor --conformance` works with any chip, and erases what it stores."""
+    link = greeted(switch_on()[1])
+    found = list(examine_conformance(link))
+    assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
+    assert {finding.topic for finding in found} == talks().keys()
+    BlobStore(link).write(BLOB)
+    # what is stored there stays
+    left_out = {finding.topic for finding in examine_conformance(link) if finding.mark is Mark.UNKNOWN}
+    assert left_out == {name for name, talk in talks().items() if "blob" in talk["needs"]}
+    assert BlobStore(link).read() == BLOB
 
 
-def test_status_codes_are_the_documents():
-    codes = {name: int(code) for code, name, _ in rows("Status codes")}
-    assert codes == {name: constant(f"CODE_{name}") for name in codes}
-    assert len(codes) == len(Status)
+def test_a_narrow_clock_is_extended(tmp_path):
+    """MicroPython has such a clock; the other bridges do not."""
+    vector = json.loads((VECTORS / "clock_30_bits.json").read_text())
+    assert vector["bits"] == board.TICKS.bit_length()
+    shown = iter(vector["shows"])
+    bridge = board.Bridge([Chip()], lambda: next(shown), f"{tmp_path}/")
+    begun, *later = vector["t_us"]
+    # it may count from any value
+    assert [(begun + bridge.clock()) % 2**32 for _ in later] == later
 
 
-def test_limits_are_the_documents():
-    limits = {name: int(value) for name, value, _ in rows("Limits")}
-    assert limits == {name: constant(name) for name in limits}
-    assert constant("BEAT_MS") == next(int(value) for name, value, _ in rows("Timing") if name == "BEAT_MS")
+@pytest.mark.parametrize("path", sorted(VECTORS.glob("slots_*.bin")), ids=lambda path: path.stem)
+def test_the_later_of_two_blobs_counts(path, host, core):
+    wanted = json.loads(path.with_suffix(".json").read_text())
+    eeprom = host.Eeprom(path.read_bytes().ljust(1024, b"\xff"))
+    memory = ctypes.byref(eeprom.memory)
+    stored = core.mpucal_slots_stored(memory)
+    assert (stored.generation, stored.at) == (wanted["generation"], 8 + 264 * wanted["stored"])
+    at = core.mpucal_slots_open(memory)
+    assert core.mpucal_slots_seal(memory, at) == wanted["generation_of_the_next"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -14,12 +13,18 @@ import pytest
 
 from mpucal.bridge.bus import BridgeBus
 from mpucal.bridge.store import BlobStore
+from mpucal.calibration import calibrate
 from mpucal.chip import registers as reg
+from mpucal.chip.config import Config
+from mpucal.cli.running import open_runner
 from mpucal.errors import BusError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
-from mpucal.simulated.chip import Chip, SimulatedBus
+from mpucal.session.plan import Plan
+from mpucal.simulated.chip import Chip, SimulatedBus, open_simulated
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
+from mpucal.sources.chip import OpenedChip
+from mpucal.terminal.console import console
 
 ROOT = Path(__file__).parents[2]
 OLD = (ROOT / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
@@ -30,22 +35,26 @@ FIXED_LIMIT = 1000
 RATE_HZ = 1000
 
 
-class Numbers:
-    """Feed of numbered samples: accelerometer x and y hold the number, at a constant temperature."""
+STILL = (1000, -2000, 8000, -700, 300, -200, 30000)
 
-    def __init__(self):
-        self._next = 0
+
+class Feed:
+    """Accelerometer, temperature and gyroscope stand still; `numbered`: accelerometer x and y hold the number."""
+
+    def __init__(self, numbered):
+        self._next, self._numbered = 0, numbered
 
     def samples(self, edges_s, _setting):
         numbers = np.arange(self._next, self._next + len(edges_s) - 1)
         self._next += len(numbers)
-        words = np.zeros((len(numbers), 7), np.int16)
-        words[:, 0], words[:, 1] = np.divmod(numbers, 1000)
+        words = np.tile(np.int16(STILL), (len(numbers), 1))
+        if self._numbered:
+            words[:, 0], words[:, 1] = np.divmod(numbers, 1000)
         return words
 
 
-def _numbering(clock):
-    return SimulatedBus(Chip(MODELS["mpu6050"], Numbers(), 0.0, FactoryTrim()), clock)
+def _numbering(clock, numbered=True):
+    return SimulatedBus(Chip(MODELS["mpu6050"], Feed(numbered), 0.0, FactoryTrim()), clock)
 
 
 @pytest.fixture(scope="module")
@@ -58,16 +67,7 @@ def test_flash_and_ram_leave_room(avr_build):
     assert (flash < FLASH_LIMIT, ram < RAM_LIMIT) == (True, True)
 
 
-def test_the_bridges_ram_is_as_stated(avr_build):
-    header = (ROOT / "mpucal" / "firmware" / "src" / "mpucal_bridge.h").read_text()
-    (stated,) = re.findall(r"struct mpucal_bridge \((\d+) bytes", header)
-    symbols = subprocess.run(
-        ["avr-nm", "-S", avr_build[0] / "mpucal_bridge.elf"], capture_output=True, text=True, check=True
-    ).stdout
-    (size,) = re.findall(r"^\w+ (\w+) [bB] bridge\b", symbols, re.MULTILINE)
-    assert int(size, 16) == int(stated)
-
-
+@pytest.mark.slow
 def test_the_readme_gives_the_cycles_that_are_counted(make):
     if shutil.which("simavr") is None:
         pytest.skip("needs simavr, of the packages in tools/ci_packages.txt")
@@ -104,52 +104,29 @@ def test_the_sketch_writes_as_many_bytes_as_the_protocol_allows(switch_on, sketc
         assert bus.read(reg.PWR_MGMT_1, 2).data == bytes([0, count])
 
 
-class Still:
-    """Feed of one constant sample: accelerometer, temperature, gyroscope."""
-
-    WORDS = (1000, -2000, 8000, -700, 300, -200, 30000)
-
-    def samples(self, edges_s, _setting):
-        return np.tile(np.int16(self.WORDS), (len(edges_s) - 1, 1))
-
-
-def _still(clock):
-    return SimulatedBus(Chip(MODELS["mpu6050"], Still(), 0.0, FactoryTrim()), clock)
-
-
 def test_the_corrected_sketch_prints_what_is_stored(switch_on, sketches, open_store):
     sloped = (ROOT / "fixtures" / "vectors" / "blob_sloped.bin").read_bytes()
     _, port = switch_on()
     open_store(port).write(sloped)
-    board, _ = switch_on(_still, sketches / "mpucal_corrected_sketch.elf")
+    board, _ = switch_on(lambda clock: _numbering(clock, numbered=False), sketches / "mpucal_corrected_sketch.elf")
     board.run(0.5)
     *_, line, _ = board.receive().decode().splitlines()
-    words = np.array(Still.WORDS, float)
+    words = np.array(STILL, float)
     y, T, w = words[:3] * (4 * 9.80665 / 32768), words[3] / 340 + 36.53, words[4:] * np.radians(1 / 65.5)
     wanted = np.concatenate(Calibration.from_blob(Blob.decode(sloped)).apply(y, w, T))
     np.testing.assert_allclose([float(number) for number in line.split()], wanted, atol=2e-4)
 
 
-def test_reads_and_writes_registers_in_the_bridges_time(switch_on):
-    board, port = switch_on()
-    bus = BridgeBus(port)
-    first, second = bus.read(reg.WHO_AM_I, 1), bus.read(reg.WHO_AM_I, 1)
-    assert (first.data, bus.link.bridge.address) == (b"\x68", 0x68)
-    assert 0 < second.t_ns - first.t_ns < 10_000_000
-    bus.write(reg.PWR_MGMT_1, b"\x01\x00")
-    assert bus.read(reg.PWR_MGMT_1, 2).data == b"\x01\x00"
-    assert board.overruns == 0
-
-
-def test_half_a_kilohertz_fits_115200_baud(switch_on, started):
-    board, port = switch_on(_numbering)
+@pytest.mark.slow
+def test_half_a_kilohertz_fits_115200_baud(switch_on, make, started):
+    board, port = switch_on(_numbering, make("all")[0] / "mpucal_bridge.elf")
     recording = started(board, port, 500).until(3)
     assert (recording.gap.sum(), board.overruns, len(recording) > 1000) == (0, 0, True)
 
 
 @pytest.mark.parametrize("seconds", [2, pytest.param(60, marks=pytest.mark.slow)])
-def test_1_khz_at_500_kbaud_loses_nothing(switch_on, fast_build, seconds, started):
-    board, port = switch_on(_numbering, fast_build / "mpucal_bridge.elf")
+def test_1_khz_at_500_kbaud_loses_nothing(switch_on, seconds, started):
+    board, port = switch_on(_numbering)
     recording = started(board, port, RATE_HZ).until(seconds + 1)
     words = np.rint(recording.acc * 8192 / 9.80665).astype(int)
     numbers = words[:, 0] * 1000 + words[:, 1]
@@ -160,13 +137,23 @@ def test_1_khz_at_500_kbaud_loses_nothing(switch_on, fast_build, seconds, starte
     assert np.diff(recording.t) == pytest.approx(1 / RATE_HZ, rel=1e-3)
 
 
-def test_a_blob_outlives_the_power(switch_on, open_store):
-    board, port = switch_on()
-    open_store(port).write(OLD)
+@pytest.mark.slow
+def test_a_whole_session_ends_in_the_eeprom_and_outlives_the_power(switch_on, open_store, tmp_path):
+    hand = []
+
+    def held(clock):
+        hand.append(open_simulated("sim:seed=3", clock=clock))
+        return hand[0]
+
+    board, port = switch_on(held)
+    opened = OpenedChip(BridgeBus(port), Plan(Config(rate_hz=50), target="quick"), (hand[0].hear,), real_time=False)
+    with open_runner(opened, tmp_path / "capture.mcap", console(quiet=True)) as runner:
+        found = runner.calibrate(runner.measure(), calibrate)
+    assert found.verdict == "good", found.quality["reasons"]
+    open_store(port).write(found.blob().encode())
     board.cut_power()
-    _, port = switch_on()
-    store = open_store(port)
-    assert (store.read(), store.state().generation) == (OLD, 1)
+    store = open_store(switch_on()[1])
+    assert (store.read(), store.state().generation) == (found.blob().encode(), 1)
 
 
 class Gone(Exception):  # noqa: N818 - stands for a plug that was pulled

@@ -84,13 +84,13 @@ def test_waits_for_a_batch_then_pushes_it_with_the_looks_time(stream):
 
 def test_looks_at_least_once_a_millisecond_and_not_all_the_time(stream):
     del stream.reads[:]
-    for _ in range(10_000):
+    for _ in range(2000):
         stream.look(10)
     counts = [read for read in stream.reads if read == (0x72, 2)]
-    assert 100 <= len(counts) <= 250
+    assert 20 <= len(counts) <= 50
 
 
-@pytest.mark.parametrize("frames", [5, 8, 9, 33, 73])
+@pytest.mark.parametrize("frames", [5, 8, 73])
 def test_all_that_was_counted_comes_in_as_few_messages_as_hold_it(frames, stream):
     stream.make(frames)
     messages = stream.pushed()
@@ -117,12 +117,6 @@ def test_after_100_ms_pushes_what_there_is_even_nothing(stream):
     assert [(message.index, message.frames) for message in stream.look(1000)] == [(1, b"")]
 
 
-def test_more_frames_than_a_chip_holds_are_an_overflow(stream):
-    stream.make(74)
-    (message,) = stream.look()
-    assert (message.status, message.drops, message.left, message.frames) == (Status.OVERFLOW, 1, 0, b"")
-
-
 def test_an_overflow_while_it_was_read_takes_the_last_message_away(stream):
     stream.make(8)
     stream.status = FIFO_OFLOW
@@ -131,18 +125,20 @@ def test_an_overflow_while_it_was_read_takes_the_last_message_away(stream):
     assert (last.status, last.drops, last.index, last.left, last.frames) == (Status.OVERFLOW, 1, 4, 0, b"")
 
 
-@pytest.mark.parametrize("register", [0x72, 0x74, 0x3A], ids=["count", "frames", "status"])
 @pytest.mark.parametrize("code", [Status.NO_ANSWER, Status.BUS_FAILED])
-def test_a_transfer_that_fails_halts_the_stream(register, code, stream):
-    stream.make(4)
-    stream.failures[register] = code
-    (message,) = stream.look()
-    assert (message.status, message.drops, message.frames) == (code, 1, b"")
+def test_a_transfer_that_fails_halts_the_stream(code, host, core):
+    for register in (0x72, 0x74, 0x3A):
+        stream = Streaming(host, core)
+        stream.make(4)
+        stream.failures[register] = code
+        (message,) = stream.look()
+        assert (message.status, message.drops, message.frames) == (code, 1, b""), register
 
 
-def test_once_halted_it_says_so_every_100_ms_and_leaves_the_fifo_alone(stream):
+def test_more_frames_than_a_chip_holds_are_an_overflow_told_every_100_ms(stream):
     stream.make(74)
-    stream.look()
+    (message,) = stream.look()
+    assert (message.status, message.drops, message.left, message.frames) == (Status.OVERFLOW, 1, 0, b"")
     del stream.reads[:]
     assert stream.look(99_000) == []
     (message,) = stream.look(1000)
@@ -150,25 +146,18 @@ def test_once_halted_it_says_so_every_100_ms_and_leaves_the_fifo_alone(stream):
     assert stream.reads == []
 
 
-def test_stream_starts_anew_and_drops_count_on(stream):
-    stream.make(74)
-    stream.look()
-    stream.fifo.clear()
-    assert [reply.status for reply in stream.ask(wire.Stream(BYTES, 4))] == [Status.OK]
-    stream.make(4)
-    (message,) = stream.look()
-    assert (message.status, message.index, message.drops) == (Status.OK, 0, 1)
-
-
-def test_hello_stops_it_and_forgets_the_drops(stream):
-    stream.make(74)
-    stream.look()
-    stream.ask(wire.Hello())
-    assert stream.look(200_000) == []
-    stream.fifo.clear()
-    stream.ask(wire.Stream(BYTES, 1))
-    stream.make(1)
-    assert [message.drops for message in stream.look()] == [0]
+def test_stream_starts_anew_and_drops_count_on_until_a_hello(stream):
+    for hello, drops in ((False, 1), (True, 0)):
+        stream.make(74)
+        stream.look()
+        if hello:
+            stream.ask(wire.Hello())
+            assert stream.look(200_000) == []
+        stream.fifo.clear()
+        assert [reply.status for reply in stream.ask(wire.Stream(BYTES, 4))] == [Status.OK]
+        stream.make(4)
+        (message,) = stream.look()
+        assert (message.status, message.index, message.drops) == (Status.OK, 0, drops)
 
 
 @pytest.mark.parametrize("request_", [wire.Stream(0, 0), wire.BlobBegin(188)], ids=["stop", "blob"])
@@ -187,7 +176,7 @@ def test_requests_are_answered_between_messages_of_a_look(stream):
     assert numbers(*stream.look(10)) == [4, 5, 6, 7]
 
 
-@pytest.mark.parametrize("frame_bytes", [1, 12, 14, 20, 29, 56])
+@pytest.mark.parametrize("frame_bytes", [1, 20, 56])
 def test_frames_of_any_length_are_pushed_whole(frame_bytes, host, core):
     stream = Streaming(host, core, batch=1, frame_bytes=frame_bytes)
     stream.make(7)
@@ -199,12 +188,12 @@ def test_frames_of_any_length_are_pushed_whole(frame_bytes, host, core):
 
 
 def test_index_and_clock_wrap(host, core):
-    stream = Streaming(host, core, batch=4)
+    stream = Streaming(host, core, batch=32, frame_bytes=1)
     stream.bridge.now_us = 2**32 - 1500
-    stream.ask(wire.Stream(BYTES, 4))
+    stream.ask(wire.Stream(1, 32))
     indices = []
-    for _ in range(2**16 // 4 + 2):
-        stream.make(4)
+    for _ in range(2**16 // 56 + 2):
+        stream.make(56)
         stream.bridge.now_us %= 2**32
         indices += [message.index for message in stream.look()]
-    assert indices == [(4 * i) % 2**16 for i in range(2**16 // 4 + 2)]
+    assert indices == [(56 * i) % 2**16 for i in range(2**16 // 56 + 2)]

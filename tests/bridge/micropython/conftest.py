@@ -17,6 +17,8 @@ PACKAGE, VERSION = "@micropython/micropython-webassembly-pyscript", "1.27.0"
 STEP_NS, MOST = 10_000_000, 255
 TICKS = 2**30
 ENODEV = 19
+# from MicroPython's documentation of the raw REPL: the request for raw paste, and the answers to it
+RAW_PASTE, BANNER, WINDOW = b"\x05A\x01", b"raw REPL; CTRL-B to exit\r\n>", 128
 
 
 @pytest.fixture(scope="session")
@@ -48,12 +50,16 @@ class NodeBoard:
     Attributes
     ----------
     chip : a bus on the board's I2C(0); None: nothing is connected.
+    raw_paste : "taken", "refused", or "unknown" as before MicroPython 1.14. MicroPython in node has no raw paste:
+        where it is taken, this class frees the window and passes on what was pasted.
+    busy : True until Ctrl-C comes: a main.py runs.
     """
 
     name, bauds = "the board", (115_200,)
 
-    def __init__(self, package, chip, clock):
-        self.chip, self._clock = chip, clock
+    def __init__(self, package, chip, clock, raw_paste="taken", busy=False):
+        self.chip, self._clock, self._raw_paste, self._busy = chip, clock, raw_paste, busy
+        self._pasted, self._room = None, 0
         words = ["node", str(Path(__file__).with_name("board.mjs")), str(package)]
         self._node = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         self._input, self._output, self._waits = bytearray(), bytearray(), False
@@ -78,7 +84,27 @@ class NodeBoard:
                 self._serve()
 
     def write(self, data):
+        if self._busy:
+            self._busy, data = b"\x03" not in data, data.partition(b"\x03")[2]
+        if self._pasted is not None:
+            self._paste(data)
+        elif data != RAW_PASTE or self._raw_paste == "refused":
+            self._input += data
+        elif self._raw_paste == "unknown":
+            self._output += BANNER
+        else:
+            self._output += b"R\x01" + WINDOW.to_bytes(2, "little") + b"\x01"
+            self._pasted, self._room = b"", 2 * WINDOW
+
+    def _paste(self, data):
         self._input += data
+        if data == b"\x04":
+            return
+        assert len(data) <= self._room, "more than there is room for"
+        freed = (len(self._pasted) + len(data)) // WINDOW - len(self._pasted) // WINDOW
+        self._pasted += data
+        self._room += freed * WINDOW - len(data)
+        self._output += b"\x01" * freed
 
     def set_baud(self, baud):
         pass
@@ -99,6 +125,9 @@ class NodeBoard:
         data = self._node.stdout.read(low | high << 8)
         match chr(kind):
             case "w":
+                if self._pasted is not None and data.startswith(b"OK"):
+                    # the raw mode confirms a program by OK, raw paste by Ctrl-D
+                    self._pasted, data = None, b"\x04" + data[2:]
                 self._output += data
             case "g":
                 self._waits = True
@@ -133,8 +162,8 @@ def board(micropython):
     """Switches a board on: MicroPython with a chip."""
     boards = []
 
-    def switch_on(chip=None, clock=None):
-        boards.append(NodeBoard(micropython, chip, clock or FastClock()))
+    def switch_on(chip=None, clock=None, **how):
+        boards.append(NodeBoard(micropython, chip, clock or FastClock(), **how))
         return boards[-1]
 
     yield switch_on

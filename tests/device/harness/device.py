@@ -2,8 +2,6 @@
 
     python device.py sim:chip=mpu6500 CLOCK_FILE
 
-`still` in place of `sim` is the chip of the contract that all buses keep: the same counts again and again.
-
 On stdout, a line of JSON with the environment in which programs find it. On stdin, lines of JSON: {"prompt": ...}
 lets the hand hear it, {"pass_s": S} lets time pass, {"adapter": {...}} changes the adapter, {"registers": {...}} writes
 to the chip, {"seen": FILE} writes the messages on SPI to a file; each is answered by an empty line. CLOCK_FILE holds
@@ -18,19 +16,15 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 from adapter import Adapter
 from spi import SpiDevice
 from umockdev import Testbed
 
 from mpucal.chip.access import Reply
-from mpucal.data import Vector
-from mpucal.simulated.chip import Chip, SimulatedBus, open_simulated
+from mpucal.simulated.chip import SimulatedBus, open_simulated
 from mpucal.simulated.chip.bus import CLOCKS, SimulatedClock
-from mpucal.simulated.chip.models import MODELS, FactoryTrim
-from mpucal.simulated.sensor import Counts, Setting
 
-NODE, SPI_NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "/dev/spidev0.0", "still", "DS3231"
+NODE, SPI_NODE, CLOCK_CHIP = "/dev/i2c-1", "/dev/spidev0.0", "DS3231"
 DEVICES = """\
 P: /devices/platform/i2c-1
 E: SUBSYSTEM=i2c
@@ -90,21 +84,10 @@ class ClockChip:
         return 0
 
 
-class StillFeed:
-    """A feed of one sample, again and again, at 25 C."""
-
-    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
-        """Return (n, 7) int16 between (n + 1,) times."""
-        temperature = round((25.0 - setting.zero_c) * setting.lsb_per_c)
-        return np.tile(np.array([12, -34, 4096, temperature, 56, -78, 90], np.int16), (len(edges_s) - 1, 1))
-
-
 def open_bus(text: str, clock: Path) -> SimulatedBus | ClockChip:
     """The bus that `text` names, in the time of `clock`."""
     if text == CLOCK_CHIP:
         return ClockChip()
-    if text == STILL:
-        return SimulatedBus(Chip(MODELS["mpu6050"], StillFeed(), 2500.0, FactoryTrim()), SharedClock(clock))
 
     def shared() -> SimulatedClock:
         return SharedClock(clock)

@@ -58,7 +58,7 @@ struct board {
     uint64_t transfer_began;
     uint8_t chip_register, chip_selected, register_is_next, fault, clocks, direction, addressed;
     struct line to_avr, from_avr;
-    uint32_t overruns, eeprom_writes;
+    uint32_t overruns;
     uint16_t written_at;
 };
 
@@ -180,7 +180,6 @@ static void on_eeprom_control(avr_t *avr, avr_io_addr_t address, uint8_t value, 
         avr->data[address] |= 1 << EEPE;
     } else if (value & 1 << EEPE) {
         avr->data[address] |= 1 << EEPE;
-        board->eeprom_writes++;
         board->written_at = (uint16_t)(avr->data[board->eeprom->r_eearl] | avr->data[board->eeprom->r_eearh] << 8);
         avr_cycle_timer_register_usec(avr, EEPROM_US, eeprom_done, board);
     }
@@ -296,13 +295,6 @@ uint32_t board_receive(struct board *board, uint8_t *bytes, uint32_t size) {
     return count;
 }
 
-/* The reset button, which is also what DTR does. */
-void board_reset(struct board *board) {
-    board->to_avr.count = 0;
-    avr_cycle_timer_cancel(board->avr, deliver, board);
-    avr_reset(board->avr);
-}
-
 /* From now on: 0 sound, 1 does not acknowledge its address, 2 nor data, 3 holds the bus until SCL has clocked it free. */
 void board_fault(struct board *board, uint8_t fault) {
     board->fault = fault;
@@ -323,10 +315,6 @@ void board_poke(struct board *board, uint16_t address, uint8_t value) {
 /* What was lost on the line because nobody took it in time. */
 uint32_t board_overruns(const struct board *board) {
     return board->overruns;
-}
-
-uint32_t board_eeprom_writes(const struct board *board) {
-    return board->eeprom_writes;
 }
 
 /* The power fails: a byte that is being written to the EEPROM is left as `torn`. */

@@ -6,8 +6,6 @@ import ctypes
 import subprocess
 from enum import IntEnum
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from mpucal.chip.access import Bus
 
@@ -43,11 +41,9 @@ def load_library(folder: Path) -> ctypes.CDLL:
         "board_cycle": (u64, [board]),
         "board_send": (u32, [board, ctypes.c_char_p, u32]),
         "board_receive": (u32, [board, ctypes.c_char_p, u32]),
-        "board_reset": (None, [board]),
         "board_fault": (None, [board, u8]),
         "board_poke": (None, [board, ctypes.c_uint16, u8]),
         "board_overruns": (u32, [board]),
-        "board_eeprom_writes": (u32, [board]),
         "board_close": (None, [board, u8]),
     }
     for name, (result, arguments) in prototypes.items():
@@ -92,12 +88,6 @@ class Board:
             raise OSError(f"cannot use {elf} or {eeprom}")
         self._buffer = ctypes.create_string_buffer(BUFFER_BYTES)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None):
-        self.cut_power()
-
     @property
     def cycle(self) -> int:
         """Cycles of the processor since it was switched on."""
@@ -112,11 +102,6 @@ class Board:
     def overruns(self) -> int:
         """Bytes lost on the line because they were not read in time."""
         return self._library.board_overruns(self._board)
-
-    @property
-    def eeprom_writes(self) -> int:
-        """Bytes written to the EEPROM."""
-        return self._library.board_eeprom_writes(self._board)
 
     def run(self, seconds: float) -> None:
         """Run the board for some seconds."""
@@ -136,10 +121,6 @@ class Board:
         """Return the bytes that the board has sent since the last call."""
         count = self._library.board_receive(self._board, self._buffer, BUFFER_BYTES)
         return self._buffer.raw[:count]
-
-    def press_reset(self) -> None:
-        """Reset the board, as DTR does when the port is opened; there is no bootloader."""
-        self._library.board_reset(self._board)
 
     def fault(self, fault: Fault) -> None:
         """Give the chip a fault from now on."""

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from mpucal.bridge.port import Chunk
 
 STEP_S = 0.000_25
 
 
-class Runs(Protocol):
-    """Interface to a board."""
-
-    now_s: float
-
-    def run(self, seconds: float) -> None: ...
-    def send(self, data: bytes) -> int: ...
-    def receive(self) -> bytes: ...
-    def press_reset(self) -> None: ...
-
-
 class BoardPort:
-    """Port with the board's clock, so that the speed of this machine has no effect."""
+    """Port with the clock of the board, an emulator.board.Board, so that the speed of this machine has no effect."""
 
     name = "the emulated board"
     bauds = (500_000,)
 
-    def __init__(self, board: Runs) -> None:
+    def __init__(self, board) -> None:
         self._board = board
 
     def now_ns(self) -> int:
@@ -45,12 +32,8 @@ class BoardPort:
         """Send `data`."""
         self._board.send(data)
 
-    def set_baud(self, baud: int) -> None:
-        """Do nothing: there is one rate."""
-
-    def reopen(self) -> None:
-        """Reset the board."""
-        self._board.press_reset()
+    def revive(self, until_ns: int) -> None:
+        """Do nothing: firmware starts by itself."""
 
     def close(self) -> None:
         """Do nothing: the board keeps running."""

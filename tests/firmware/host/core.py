@@ -54,7 +54,7 @@ class Stored(ctypes.Structure):
 
 def compile_core(folder: Path) -> None:
     """Compile the core into `folder`, with the sanitizers if the environment asks for them."""
-    flags = SANITIZERS if SANITIZE in os.environ else ["-O2"]
+    flags = SANITIZERS if SANITIZE in os.environ else ["-O1"]
     sources = [*sorted(SOURCES.glob("*.c")), Path(__file__).with_name("host.c")]
     command = ["gcc", "-std=c99", *WARNINGS, *flags, f"-I{SOURCES}", "-fPIC", "-shared", "-o", str(folder / CORE)]
     subprocess.run([*command, *map(str, sources)], check=True)
@@ -66,7 +66,7 @@ def load_core(folder: Path) -> ctypes.CDLL:
     core.mpucal_slots_stored.restype = Stored
     core.mpucal_slots_open.restype = U16
     core.mpucal_slots_seal.restype = U32
-    for name in ("mpucal_frame_open", "mpucal_frame_close", "mpucal_frame_receive", "host_apply"):
+    for name in ("mpucal_frame_open", "mpucal_frame_close", "mpucal_frame_receive"):
         getattr(core, name).restype = U8
     core.host_accepted.argtypes, core.host_accepted.restype = [ctypes.c_uint64, U32], U32
     return core

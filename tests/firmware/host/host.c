@@ -75,13 +75,53 @@ void host_read_blobs(const uint8_t *blobs, uint32_t stride, const uint16_t *size
     }
 }
 
-/* mpucal_load of one blob, and mpucal_apply to `count` samples of it. */
+/* mpucal_load of one blob, and mpucal_apply to three counts. */
 uint8_t host_apply(const uint8_t *blob, uint32_t size, uint8_t who_am_i, float accel_range_g, const int16_t *counts,
-                   uint32_t count, float *a_mps2) {
+                   float *a_mps2) {
     struct mpucal sensor;
     enum mpucal_status status = mpucal_load(&sensor, blob, size, who_am_i, accel_range_g);
-    for (uint32_t i = 0; status == MPUCAL_OK && i < count; i++) {
-        mpucal_apply(&sensor, counts + 3 * i, a_mps2 + 3 * i);
+    if (status == MPUCAL_OK) {
+        mpucal_apply(&sensor, counts, a_mps2);
+    }
+    return (uint8_t)status;
+}
+
+/* mpucal_apply_at of three counts at +-4 g. */
+uint8_t host_apply_at(const uint8_t *blob, uint32_t size, float temperature_c, const int16_t *counts, float *a_mps2) {
+    struct mpucal sensor;
+    struct mpucal_drift drift;
+    struct mpucal_source source = {mpucal_read_memory, blob, (uint16_t)size};
+    enum mpucal_status status = mpucal_load_from(&sensor, &source, 0, 4.0f);
+    if (status == MPUCAL_OK) {
+        status = mpucal_load_drift(&drift, &source);
+    }
+    if (status == MPUCAL_OK) {
+        mpucal_apply_at(&sensor, &drift, counts, temperature_c, a_mps2);
+    }
+    return (uint8_t)status;
+}
+
+/* mpucal_apply_gyro of three counts. */
+uint8_t host_apply_gyro(const uint8_t *blob, uint32_t size, float range_dps, const int16_t *counts, float *w) {
+    struct mpucal_gyro gyro;
+    struct mpucal_source source = {mpucal_read_memory, blob, (uint16_t)size};
+    enum mpucal_status status = mpucal_load_gyro(&gyro, &source, range_dps);
+    if (status == MPUCAL_OK) {
+        mpucal_apply_gyro(&gyro, counts, w);
+    }
+    return (uint8_t)status;
+}
+
+/* mpucal_apply_fixed of `count` samples at +-4 g. */
+uint8_t host_apply_fixed(const uint8_t *blob, uint32_t size, uint32_t count, const int16_t *counts, int32_t *corrected) {
+    struct mpucal sensor;
+    struct mpucal_fixed fixed;
+    enum mpucal_status status = mpucal_load(&sensor, blob, size, 0, 4.0f);
+    if (status == MPUCAL_OK) {
+        status = mpucal_fix_accel(&fixed, &sensor, 4.0f);
+    }
+    for (; status == MPUCAL_OK && count--; counts += 3, corrected += 3) {
+        mpucal_apply_fixed(&fixed, counts, corrected);
     }
     return (uint8_t)status;
 }
