@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpucal.chip.bit_flips import BitFlipFilter, until_jumps
+from mpucal.chip.bit_flips import BitFlipFilter
 
 NONE = np.zeros((0, 7), np.int16)
 
@@ -46,9 +46,3 @@ def test_motion_a_step_and_a_blow_are_left_alone():
     passed, repaired = filtered(true, 8)
     assert repaired == 0
     assert np.array_equal(passed, true)
-
-
-@pytest.mark.parametrize(("ends", "medians"), [([9], 7), ([1], 7), ([6, 4], 7), ([8], 6)])
-def test_polls_beyond_the_frames_are_refused(ends, medians):
-    with pytest.raises(ValueError, match=r"ends of the polls|a median for each"):
-        until_jumps(np.zeros((8, 7), np.int16), np.array(ends), np.ones(medians))

@@ -53,15 +53,6 @@ def test_captures_that_cannot_be_decoded_are_refused(disturbed):
             decode(accesses, "late")
 
 
-def test_accesses_without_bytes_say_nothing(disturbed, same):
-    _, transactions = disturbed()
-    registers = (reg.PWR_MGMT_1, reg.USER_CTRL, reg.FIFO_EN, reg.FIFO_COUNT_H, reg.INT_STATUS, reg.WHO_AM_I)
-    empty = [Transaction(op, register, 1, b"", 0) for op in ("read", "write") for register in registers]
-    reset = next(i for i, t in enumerate(transactions) if t.op == "write" and t.register == reg.PWR_MGMT_1) + 1
-    damaged = [*empty, *transactions[:reset], *empty, *transactions[reset:-3], *empty, *transactions[-3:]]
-    assert same(decode(damaged), decode(transactions))
-
-
 def without_its_probe(transactions):
     """Remove the test of the FIFO, which the first version of the driver did not make."""
     counts = [i for i, t in enumerate(transactions) if t.register == reg.FIFO_COUNT_H]

@@ -117,25 +117,6 @@ def test_a_poll_that_is_not_accepted_leaves_a_gap(data, overflow, fault):
     assert decoder.recording("x").gap.tolist() == [False, False, True, False, False]
 
 
-def test_provisional_times_increase_and_final_times_are_regular():
-    decoder, rng, t = fresh(frames_before=0), np.random.default_rng(1), []
-    taken = 0
-    for n in range(1, 400):
-        look_ns = n * 20_000_000 + int(rng.integers(0, 4_000_000))
-        size = look_ns // 4_966_000 - taken
-        decoder.set_count(look_ns, size * 14)
-        decoder.add_bytes(packed(*calm(size)))
-        assert decoder.finish_poll(False) is None
-        taken += size
-        t.extend(decoder.take().t)
-    assert (np.diff(t) > 0).all()
-    recording = decoder.recording("x")
-    assert np.ptp(np.diff(recording.t)) < 1e-9
-    assert np.abs(recording.t - t).max() < 0.005
-    assert recording.sensor.rate_hz == pytest.approx(1e9 / 4_966_000, rel=100e-6)
-    assert recording.sensor.temperature_c == pytest.approx(-2000 / 340 + 36.53)
-
-
 @pytest.mark.parametrize("cut", range(1, 12))
 def test_a_frame_that_repeats_itself_is_not_delivered(cut):
     """Frames before the run are delivered however polls cut it, and after a reset there is a gap."""

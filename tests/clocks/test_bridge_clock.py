@@ -50,13 +50,6 @@ def test_a_reset_takes_no_time_away(shows_s, away_s):
     assert clock.bus_time(shown(round(shows_s * S) + S), host_ns + S) == pytest.approx(host_ns + S, abs=60 * MS)
 
 
-def test_a_clock_that_went_on_is_followed():
-    clock = BridgeClock()
-    clock.bus_time(shown(10 * S), S)
-    clock.on_greeting(shown(13 * S), 4 * S + 16 * MS)
-    assert clock.bus_time(shown(14 * S), 5 * S) == 14 * S
-
-
 def test_a_bridge_that_runs_at_half_speed_is_followed():
     """An emulated board on a busy machine does so; a wait for its time must end."""
     clock = BridgeClock()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mpucal.clocks.piecewise_rate import find_breaks
 from mpucal.clocks.sample_clock import SampleClock, poll_phase
 
 POLL_S = 0.020
@@ -57,7 +58,27 @@ def test_segments_share_one_rate_and_keep_their_own_offset():
     assert np.allclose(zeros, firsts, atol=0.1 / 200)
 
 
-def test_the_prior_loses_its_weight():
-    """A clone is 5 % off, which no data sheet allows."""
-    t_ns, taken, _ = looks(np.random.default_rng(8), 210.0, 30)
-    assert clock_of(200, t_ns, taken).rate_hz == pytest.approx(210, rel=20e-6)
+def counted(rates_hz, each_s=20.0, seed=0, late_s=0.001):
+    """Times and counts of looks every 40 ms at a chip whose rate changes every `each_s`."""
+    rng = np.random.default_rng(seed)
+    t_s = np.sort(np.arange(0.0, each_s * len(rates_hz), 0.04) + rng.uniform(0, 0.004))
+    edges = each_s * np.arange(len(rates_hz) + 1)
+    taken = np.interp(t_s + rng.uniform(0, late_s, len(t_s)), edges, np.cumsum([0.0, *(each_s * np.array(rates_hz))]))
+    return t_s, np.floor(taken)
+
+
+def test_a_steady_clock_has_no_break():
+    for seed in range(20):
+        assert find_breaks(*counted([198.6], each_s=120.0, seed=seed, late_s=0.02)) == [], seed
+
+
+def test_final_times_follow_a_clock_that_changes():
+    t_s, taken = counted((200.0, 202.0), late_s=0.0)
+    clock = clock_of(200, np.rint(t_s * 1e9).astype(int), taken.astype(int))
+    index = np.arange(int(taken[-1]))
+    segment = np.zeros_like(index)
+    true = np.interp(index + 1.0, [0, 4000, 8040], [0, 20, 40])
+    off_s = clock.final()(segment, index) - true
+    assert np.abs(off_s).max() < 0.004
+    assert np.abs(off_s[np.abs(index - 4000) > 100]).max() < 0.0005
+    assert np.abs(clock.times_s(segment, index) - true).max() > 0.02

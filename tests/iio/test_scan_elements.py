@@ -72,11 +72,3 @@ def test_alignment_is_numpys_interpolation_however_the_samples_come(one, other, 
     inside = (t >= s[0]) & (t <= s[-1])
     expected = np.column_stack((t[inside], values[inside], *(np.interp(t[inside], s, column) for column in held.T)))
     np.testing.assert_allclose(np.array(rows).reshape(-1, 4), expected, rtol=1e-12, atol=1e-12)
-
-
-def test_a_sample_that_is_not_later_is_left_out():
-    aligned = StreamAligner([1])
-    aligned.add(0, np.array([5, 5, 4, 6]), np.arange(4.0)[:, None])
-    aligned.take()
-    aligned.add(0, np.array([6, 7]), np.arange(2.0)[:, None])
-    assert aligned.take()[0].tolist() == [7]

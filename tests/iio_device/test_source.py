@@ -6,7 +6,6 @@ import struct
 import time
 from contextlib import suppress
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from hypothesis import strategies as st
 
 from mpucal.chip.access import Transaction
 from mpucal.chip.config import Config
-from mpucal.errors import BusError, CaptureError, ChipError, MpucalError, NoAnswer, UsageError
+from mpucal.errors import BusError, ChipError, MpucalError, NoAnswer, UsageError
 from mpucal.iio import decode
 from mpucal.iio.decode import IioDecoder
 from mpucal.iio.devices import Devices
@@ -302,18 +301,6 @@ def test_a_session_that_is_to_write_is_refused_where_it_may_not(tree, tmp_path, 
     monkeypatch.setattr(os, "access", lambda path, mode: (path, mode) != (bias, os.W_OK))
     with pytest.raises(BusError, match=rf"{bias} cannot be written"):
         open_source({"iio": "0", "writes": True})
-
-
-@pytest.mark.parametrize("text", ["iio:device0", "device0", "0"])
-def test_devices_by_their_names(text):
-    assert Devices.parse(text) == BOTH
-    assert Devices.parse(f"gyro=1,accel={text}") == ("iio:device0", "iio:device1")
-
-
-@pytest.mark.parametrize("head", [{}, {"iio": None}, {"iio": ["iio:device0"]}])
-def test_a_capture_whose_head_names_no_devices_is_not_replayed(head):
-    with pytest.raises(CaptureError, match=r"the head of a\.mcap does not name the IIO devices"):
-        source.replayed(SimpleNamespace(meta=head, name="a.mcap"), None, None, {})
 
 
 def test_a_chip_that_the_kernel_holds_is_pointed_to_by_its_other_name(tmp_path, monkeypatch):

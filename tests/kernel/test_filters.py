@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.likelihood import evaluate, trace, value
+from mpucal.calibration.likelihood import evaluate, trace
 from mpucal.calibration.parameters import ACCEL, HAND, IMU, NAMES
-from mpucal.calibration.problem import SERIES, SERIES_OF_A_HAND, Problem, Series
+from mpucal.calibration.problem import SERIES, Problem, Series
 from mpucal.kernel import _kernel
 from tools.lab.reference import evaluate_hand_reference, evaluate_reference, gains, innovations
 
@@ -102,12 +102,6 @@ def test_the_hand_gradient_and_fisher_equal_central_differences_with_fixed_gains
     fisher = np.einsum("pna,nab,qnb->pq", de, weighted, de, optimize=True)
     np.testing.assert_allclose(ours.gradient * scale, gradient * scale, atol=1e-8)
     np.testing.assert_allclose(ours.fisher * np.outer(scale, scale), fisher * np.outer(scale, scale), atol=1e-11)
-
-
-def test_the_hand_filter_without_a_hand_is_the_exact_one(hand_problem, theta):
-    series = replace(hand_problem.series, **dict.fromkeys(SERIES_OF_A_HAND))
-    at = replace(hand_problem, series=series, huber=np.inf)
-    assert value(at, theta) == pytest.approx(evaluate(at, theta, 0).V, rel=1e-12)
 
 
 def test_without_samples_only_the_flat_mean_counts(hand_problem, theta, instruction_set):

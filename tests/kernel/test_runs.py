@@ -69,9 +69,3 @@ def test_mean_rates_follow_a_coning_body():
     assert miss < 0.1 * of_midpoint
     with pytest.raises(ValueError, match="no rates before"):
         _kernel.mean_rates(rate[:5], bias, np.ones(5))
-
-
-def test_numbers_that_are_not_aligned_are_refused(x):
-    shifted = np.frombuffer(b"\0" + x.tobytes(), offset=1).reshape(x.shape)
-    with pytest.raises(ValueError, match="not aligned"):
-        _kernel.moving_mean(shifted, 3)

@@ -105,12 +105,6 @@ def test_a_clock_that_wires_bear_is_not_passed(opened):
         SpiBus("/dev/spidev0.0:quick")
 
 
-def test_a_long_read_of_the_fifo_is_cut_and_goes_on_at_the_same_register(opened):
-    bus, device = opened()
-    assert len(bus.read(reg.FIFO_R_W, 5000).data) == 5000
-    assert [(message[0], len(message)) for message, _ in device.messages] == [(0xF4, 4096), (0xF4, 906)]
-
-
 @pytest.mark.parametrize("chip", ["mpu6500", "icm20602"])
 def test_the_driver_measures_and_i2c_stays_off(opened, chip):
     """Every write to USER_CTRL turns I2C off; the driver reads back what it wrote."""

@@ -5,11 +5,10 @@ from pkgutil import resolve_name
 
 import pytest
 
-from mpucal.errors import CaptureError, UsageError
+from mpucal.errors import UsageError
 from mpucal.origin import Origin
-from mpucal.session.plan import Plan
 from mpucal.sources.kind import Option
-from mpucal.sources.opening import check_source, reopen_source
+from mpucal.sources.opening import check_source
 from mpucal.sources.table import SOURCES, kinds_for, matching_kinds
 
 IDS = [kind.flag for kind in SOURCES]
@@ -43,11 +42,6 @@ def test_each_option_is_refused_with_sources_that_do_not_have_it():
             with pytest.raises(UsageError, match=f"{kind.flag} does not take {option.flag}"):
                 check_source({kind.option.name: kind.word or "x"}, {option.name: option.flag}, "session")
     assert refused
-
-
-def test_a_capture_of_an_unknown_source_says_so():
-    with pytest.raises(CaptureError, match=r"does not know \(usb\)"):
-        reopen_source({"usb": "/dev/usb0"}, Plan())
 
 
 def test_options_refuse_meaningless_text():
