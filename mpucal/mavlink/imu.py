@@ -19,7 +19,6 @@ Xyz = tuple[float, float, float]
 ACC_LSB_MPS2 = STANDARD_GRAVITY_MPS2 / 1000.0
 GYRO_LSB_RAD_S = 1e-3
 HIGHRES_UPDATED = 0b111111  # HIGHRES_IMU_UPDATED_FLAGS of accelerometer and gyroscope
-CENTIDEGREES = 100.0
 
 HIGHRES, RAW = "HIGHRES_IMU", "RAW_IMU"
 # In ArduPilot's dataflash logs this message has floats of every IMU.
@@ -83,8 +82,8 @@ def _highres(m: Message) -> Reading | None:
 
 
 def _truncated(m: Message, name: str) -> Reading:
-    # The temperature is an extension field, which is 0 if it was not sent.
-    temperature_c = m.temperature / CENTIDEGREES if m.temperature else math.nan
+    # The temperature [0.01 degrees] is an extension field, which is 0 if it was not sent.
+    temperature_c = m.temperature / 100 if m.temperature else math.nan
     acc = (_centred(m.xacc, ACC_LSB_MPS2), _centred(m.yacc, ACC_LSB_MPS2), _centred(m.zacc, ACC_LSB_MPS2))
     gyr = (_centred(m.xgyro, GYRO_LSB_RAD_S), _centred(m.ygyro, GYRO_LSB_RAD_S), _centred(m.zgyro, GYRO_LSB_RAD_S))
     time = m.time_boot_ms if name in SCALED else m.time_usec

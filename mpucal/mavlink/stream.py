@@ -11,14 +11,12 @@ from .firmwares import PX4, preferred_messages
 from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, decode_reading
 from .link import Link, S
 from .requests import encode_command, send_command
-from .stream_buffers import US_PER_S
 
 # ArduPilot's rates at a loop of 400 Hz: the next lower one is requested after one that it denies.
 LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
 # Over a slow radio the first messages come late.
 ARRIVE_NS, ENOUGH, RATE_NS = 3 * S, 3, S
 ACK_S, ACK_TRIES = 0.7, 4
-TEMPERATURE_US = 500_000
 OTHER_IMUS = ("SCALED_IMU2", "SCALED_IMU3")
 
 # HIGHRES_IMU is in no stream group, and PX4 has no groups: a station that lowers it requests it by name.
@@ -112,7 +110,7 @@ class Streams:
     def _request_temperature(self) -> None:
         """Request RAW_IMU for IMU 1's own temperature, which ArduPilot's HIGHRES_IMU lacks; nothing depends on it."""
         if self._takes_temperature:
-            command = dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[RAW], TEMPERATURE_US
+            command = dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[RAW], 500_000
             self._link.send(encode_command(self._link, *command))
 
     def _restart_window(self) -> None:
@@ -151,7 +149,7 @@ class Streams:
         self._link.send(encode_command(self._link, *self._interval_command(name)))
 
     def _interval_command(self, name: str) -> tuple[int, int, int]:
-        interval_us = round(US_PER_S / self._requested_hz[name])
+        interval_us = round(1e6 / self._requested_hz[name])
         return dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[name], interval_us
 
     def _arrives(self, name: str) -> bool:
@@ -216,4 +214,4 @@ class Streams:
 def _rate_hz(stream: Stream, times: Collection[int], seconds: float) -> float:
     """Return a stream's rate by its own clock, which a burst or a busy vehicle does not change."""
     span_us = (max(times) - min(times)) * stream.unit_us
-    return (len(times) - 1) * US_PER_S / span_us if len(times) > ENOUGH else len(times) / seconds
+    return (len(times) - 1) * 1e6 / span_us if len(times) > ENOUGH else len(times) / seconds

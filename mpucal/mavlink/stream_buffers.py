@@ -15,7 +15,6 @@ from ..data import Autopilot, Recording, Samples, Sensor, Vector
 from .firmwares import accel_lag_s
 from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream
 
-US_PER_S = 1e6
 MS_US = 1000
 
 # Single lost packets only lower the rate; a longer time without one is a gap.
@@ -97,11 +96,11 @@ def _samples(numbers: Vector, t_us: Vector, before_us: float | None = None) -> S
     n = len(t_us)
     if not n:
         return Samples.empty()
-    steps = np.diff(t_us, prepend=t_us[0] if before_us is None else before_us) / US_PER_S
+    steps = np.diff(t_us, prepend=t_us[0] if before_us is None else before_us) / 1e6
     limit = GAP_S if n < 3 else max(GAP_S, GAP_INTERVALS * float(np.median(steps[1:])))
     no = np.zeros(n, bool)
     return Samples(
-        t=t_us / US_PER_S,
+        t=t_us / 1e6,
         acc=numbers[:, :3],
         gyr=numbers[:, 3:6],
         temperature_c=numbers[:, 6],

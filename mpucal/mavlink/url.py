@@ -56,23 +56,20 @@ def parse_url(text: str) -> Url:
         host, _, port = rest.rpartition(":")
         if rest and not host and not rest.isdecimal():
             raise _not_understood(text, "it names no port")
-        if not host and head == Kind.UDP:
-            host = EVERYWHERE
+        host = host or (EVERYWHERE if head == Kind.UDP else "")
+        if not host:
+            raise _not_understood(text, "it names no host")
         if not (port.isascii() and port.isdecimal() and int(port) in PORTS):
-            raise _not_understood(text, f"{port!r} is not a port" if host else "it names no host")
-        return _url(Kind(head), host, int(port), text)
+            raise _not_understood(text, f"{port!r} is not a port")
+        return Url(Kind(head), host, int(port))
     if text.startswith(("/", "serial:")):
         device, _, baud = text.removeprefix("serial:").partition(":")
         if baud and not (baud.isdecimal() and int(baud)):
             raise _not_understood(text, f"{baud!r} is not a baud rate")
-        return _url(Kind.SERIAL, device, int(baud) if baud else USB_BAUD, text)
+        if not device:
+            raise _not_understood(text, "it names no device")
+        return Url(Kind.SERIAL, device, int(baud) if baud else USB_BAUD)
     raise _not_understood(text, "no known form")
-
-
-def _url(kind: Kind, host: str, port: int, text: str) -> Url:
-    if not host:
-        raise _not_understood(text, "it names no host")
-    return Url(kind, host, port)
 
 
 def _not_understood(text: str, why: str) -> UsageError:

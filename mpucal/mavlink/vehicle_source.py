@@ -27,8 +27,6 @@ BACK_NS = 30 * S
 LOOK_NS = S
 # The operator is told of a loss of this share, once so many packets were sent.
 LOSS_SHARE, LOSS_AFTER = 0.05, 2000
-# More vehicles are not listed in a message.
-MOST_LISTED = 8
 
 
 class VehicleSource:
@@ -271,8 +269,7 @@ def choose_vehicle(vehicles: tuple[Vehicle, ...], system: int | None) -> Vehicle
     UsageError : several, with their list, or none of that system.
     """
     asked = [vehicle for vehicle in vehicles if system in (None, vehicle.system)]
-    shown = sorted(vehicles, key=lambda v: (v.system, v.address))[:MOST_LISTED]
-    listed = ", ".join(map(str, shown)) + (f" and {more} more" if (more := len(vehicles) - len(shown)) else "")
+    listed = ", ".join(map(str, sorted(vehicles, key=lambda v: (v.system, v.address))))
     if len(asked) == 1:
         return asked[0]
     if not asked:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from ..calibration.rotation import shortest_turn
 from ..data import Vector
+from ..mavlink.texts import Prompt
 from . import rotation
 from .disturbance import Mishap
 from .legs import STEP_HZ, Hold, Leg, Move, steps
@@ -25,20 +25,6 @@ TURN_RAD = (math.radians(50.0), math.radians(130.0))
 ON_THE_TABLE, IN_THE_HAND = 0.0, 1.0
 # Halfway through the rotation.
 MISHAP_AFTER_S = 18.0
-
-
-class HandPrompt(Protocol):
-    """Part of a prompt that a hand obeys."""
-
-    @property
-    def kind(self) -> str:
-        """lay_flat, hold_still, rotate, verify or rest; a hand ignores any other."""
-        ...
-
-    @property
-    def down(self) -> tuple[float, float, float] | None:
-        """Unit vector in the board's axes that is to point down, if one is wanted."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -68,7 +54,7 @@ class Hand:
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng, self._reaction_rng = rng.spawn(2)
-        self._prompts: deque[tuple[int, HandPrompt]] = deque()
+        self._prompts: deque[tuple[int, Prompt]] = deque()
         self._last: tuple[str, tuple[float, float, float] | None] | None = None
         self._leg: Leg = Hold(0, 0, IN_THE_HAND)
         self._task = "hold_still"
@@ -81,7 +67,7 @@ class Hand:
         tilt = self._rng.uniform(-0.5, 0.5, 3)
         return Stance(0, rotation.exp(tilt), IN_THE_HAND)
 
-    def hear(self, prompt: HandPrompt, t_s: float) -> None:
+    def hear(self, prompt: Prompt, t_s: float) -> None:
         """Receive a prompt at `t_s`, to be obeyed a reaction time later; a repeated prompt is ignored."""
         received = (str(prompt.kind), prompt.down)
         if received == self._last:

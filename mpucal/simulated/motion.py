@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 
 from ..data import Vector
+from ..mavlink.texts import Prompt
 from . import rotation
 from .disturbance import (
     ARMS,
@@ -21,15 +22,13 @@ from .disturbance import (
     Mishap,
     point_acceleration,
 )
-from .hand import REACTION_S, Hand, HandPrompt, Stance
+from .hand import REACTION_S, Hand, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 
 # Shorter than any reaction: a prompt never changes motion that has been computed.
 AHEAD_S = REACTION_S[0] / 2
 
 SINES = 12
-# The number of times that one sample needs, with its force at other times
-FEW = 4
 
 
 class BandNoise:
@@ -136,7 +135,7 @@ class Motion:
         self._sums = np.zeros((1, 6))
         self._attitudes = self._shaken(self._stance.attitude[None], 0, np.ones(1))
 
-    def hear(self, prompt: HandPrompt, t_s: float) -> None:
+    def hear(self, prompt: Prompt, t_s: float) -> None:
         """Pass a prompt to the hand at `t_s`."""
         self._hand.hear(prompt, t_s)
 
@@ -166,21 +165,10 @@ class Motion:
 
     def _sums_at(self, t_s: Vector) -> tuple[Vector, int]:
         """Return the integrals of force and rate (n, 6) until times (n,) [s], and the step before the last of these."""
-        if len(t_s) <= FEW:
-            # For one sample, plain numbers take half as long and give the same bits.
-            each = [self._sum_at(each_s) for each_s in t_s.tolist()]
-            return np.array([sums for sums, _ in each]), each[-1][1]
         place = np.maximum(t_s * STEP_HZ - self._first, 0.0)
         node = np.minimum(place.astype(int), len(self._sums) - 2)
         part = (place - node)[:, None]
         return np.asarray((1 - part) * self._sums[node] + part * self._sums[node + 1]), int(node[-1])
-
-    def _sum_at(self, t_s: float) -> tuple[Vector, int]:
-        """Return the integral of force and rate (6,) from the start to `t_s`, and the step before that."""
-        place = max(t_s * STEP_HZ - self._first, 0.0)
-        node = min(int(place), len(self._sums) - 2)
-        part = place - node
-        return (1 - part) * self._sums[node] + part * self._sums[node + 1], node
 
     def warmer_c(self, edges_s: Vector) -> Vector:
         """Return (n,) degrees Celsius by which the chip is warmer than at first, between (n + 1,) times [s]."""

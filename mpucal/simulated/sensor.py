@@ -187,9 +187,6 @@ def density(std: Vector, rate_hz: float) -> Vector:
     return np.asarray(std / np.sqrt(rate_hz / 2.0))
 
 
-TEMPERATURE = 3
-
-
 class Feed(Protocol):
     """Source of the next samples, at the chip's sample clock."""
 
@@ -212,5 +209,5 @@ class SensorFeed:
         counts = self._set[1].counts(*self._motion.means(edges_s, setting.accel_lag_s), self._rng)
         if self._motion.mishaps:
             warmer = np.rint(self._motion.warmer_c(edges_s) * setting.lsb_per_c).astype(np.int16)
-            counts[:, TEMPERATURE] += warmer
+            counts[:, 3] += warmer
         return counts

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 from ..chip.records import BEGUN, END, OPENED
 from ..data import Recording, Samples, Sensor
@@ -213,37 +213,24 @@ def open_source(request: Request) -> OpenedVehicle:
     ------
     UsageError : not a URL, or not a key. LinkError : the link cannot be opened.
     """
-    key = signing_key(request)
-    transport = open_transport(parse_url(request.value))
-    return OpenedVehicle(transport, request.plan, words=request.words, key=key, **link_identity(request))
+    options = link_options(request)
+    return OpenedVehicle(open_transport(parse_url(request.value)), request.plan, **options)
 
 
-class LinkIdentity(TypedDict):
-    """MAVLink ids of the vehicle and of mpucal, and its intention to write the result and to prepare the vehicle."""
-
-    system: int | None
-    own_system: int
-    writes: bool
-    prepare: bool
-
-
-def link_identity(request: Request) -> LinkIdentity:
-    """Return the LinkIdentity that the options select."""
-    own = request.values.get("source_system")
-    return {
-        "system": request.values.get("system"),
-        "own_system": OWN_SYSTEM if own is None else int(own),
-        "writes": bool(request.values.get("writes")),
-        "prepare": request.values.get("prepare") == "yes",
-    }
-
-
-def signing_key(request: Request) -> bytes | None:
-    """Read the signing key if one is named.
+def link_options(request: Request) -> dict[str, Any]:
+    """Return the arguments of an OpenedVehicle that the options of --mavlink give.
 
     Raises
     ------
-    UsageError : the key cannot be read.
+    UsageError : the signing key cannot be read.
     """
-    path = request.values.get("signing_key")
-    return None if path is None else read_key(Path(path))
+    values = request.values
+    path, own = values.get("signing_key"), values.get("source_system")
+    return {
+        "words": request.words,
+        "key": None if path is None else read_key(Path(path)),
+        "system": values.get("system"),
+        "own_system": OWN_SYSTEM if own is None else int(own),
+        "writes": bool(values.get("writes")),
+        "prepare": values.get("prepare") == "yes",
+    }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
 
 from ...errors import LinkError
@@ -11,7 +10,7 @@ from ..dialect import Message
 from ..firmwares import EKF2_IMU_CTRL, FILTERS, PX4
 from ..link import Link, S
 from ..requests import ask
-from .encoding import REAL32, Number, Parameter, as_float32, decode_parameter, error_name, name_bytes, to_wire
+from .encoding import REAL32, as_float32, decode_parameter, error_name, name_bytes, to_wire
 from .mounting import BOARD_ANGLES, BOARD_ROTATION, CUSTOM_ANGLES, ORIENTATION
 from .slots import all_slots
 
@@ -21,32 +20,30 @@ TIMEOUT_S, TRIES = 0.5, 10
 LATE_NS = S // 2
 
 
-@dataclass(frozen=True)
-class Refusal:
-    """The vehicle's refusal, with its reason in words."""
-
-    why: str
-
-
 class ParameterClient:
     """Client of the parameters of the vehicle that `link` is locked to."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
         self._bytewise = link.vehicle.family == PX4
-        self._received: dict[str, set[Number]] = {}
+        self._received: dict[str, set[float]] = {}
         link.subscribe(self._on_message)
 
-    def read(self, names: Sequence[str]) -> dict[str, Number]:
+    def read(self, names: Sequence[str]) -> dict[str, float]:
         """Return the values of all of `names`.
 
         Raises
         ------
         LinkError : one does not come. EndOfCapture : a replay holds no more.
         """
-        return {name: self._read(name).value for name in names}
+        held = read_parameters(self._link, names, self._link.vehicle.family)
+        if missing := [name for name in names if name not in held]:
+            raise LinkError(
+                f"{self._link.vehicle} does not report {missing[0]}", "check the link and the firmware's version"
+            )
+        return held
 
-    def read_agreed(self, names: Sequence[str]) -> dict[str, Number]:
+    def read_agreed(self, names: Sequence[str]) -> dict[str, float]:
         """Return the values of all of `names` if all answers agree: two senders with one vehicle's id do not.
 
         Raises
@@ -78,20 +75,21 @@ class ParameterClient:
         wanted = as_float32(value) if kind == REAL32 else value
         message = self._link.encode("param_set", name_bytes(name), to_wire(wanted, kind, self._bytewise), kind)
 
-        def reply(received: Message) -> Parameter | Refusal | None:
-            answer = self._answer(received, name)
-            # ArduPilot echoes earlier values of a vector's other axes.
-            return None if isinstance(answer, Parameter) and answer.value != wanted else answer
+        def refusal(received: Message) -> str | None:
+            """Return the reason of a refusal, "" of a confirmation; ArduPilot echoes earlier values before it."""
+            if received.get_type() == "PARAM_ERROR" and received.param_id == name:
+                return error_name(received.error)
+            parameter = decode_parameter(received, self._bytewise)
+            return "" if parameter is not None and (parameter.name, parameter.value) == (name, wanted) else None
 
-        answer = ask(self._link, message, reply, TIMEOUT_S, TRIES)
-        if isinstance(answer, Parameter):
-            return
-        why = answer.why if isinstance(answer, Refusal) else "it did not confirm it"
-        raise LinkError(
-            f"{self._link.vehicle} did not take {name} = {value:.6g}: {why}", "check whether it is read-only there"
-        )
+        why = ask(self._link, message, refusal, TIMEOUT_S, TRIES)
+        if why != "":
+            raise LinkError(
+                f"{self._link.vehicle} did not take {name} = {value:.6g}: {why or 'it did not confirm it'}",
+                "check whether it is read-only there",
+            )
 
-    def find_mismatches(self, values: Mapping[str, float]) -> dict[str, Number]:
+    def find_mismatches(self, values: Mapping[str, float]) -> dict[str, float]:
         """Read `values` back; return those that the vehicle holds otherwise, as it holds them."""
         held = self.read(tuple(values))
         return {name: held[name] for name, value in values.items() if held[name] != as_float32(value)}
@@ -100,22 +98,6 @@ class ParameterClient:
         parameter = decode_parameter(message, self._bytewise) if self._received else None
         if parameter is not None and parameter.name in self._received:
             self._received[parameter.name].add(parameter.value)
-
-    def _read(self, name: str) -> Parameter:
-        request = self._link.encode("param_request_read", name_bytes(name), -1)
-        answer = ask(self._link, request, lambda received: self._answer(received, name), TIMEOUT_S, TRIES)
-        if isinstance(answer, Parameter):
-            return answer
-        why = answer.why if isinstance(answer, Refusal) else "no answer"
-        raise LinkError(
-            f"{self._link.vehicle} does not report {name} ({why})", "check the link and the firmware's version"
-        )
-
-    def _answer(self, received: Message, name: str) -> Parameter | Refusal | None:
-        if received.get_type() == "PARAM_ERROR" and received.param_id == name:
-            return Refusal(error_name(received.error))
-        parameter = decode_parameter(received, self._bytewise)
-        return parameter if parameter is not None and parameter.name == name else None
 
 
 # A list of all parameters would slow every stream, so they are read by name; ArduPilot does not answer for one that

@@ -17,7 +17,6 @@ from ..dialect import HEADER, Message
 Number = int | float
 
 FLOAT32 = struct.Struct("<f")
-NAME_BYTES = 16
 
 # MAV_PARAM_TYPE -> PX4's layout of the value's bytes in the float's bytes
 BYTEWISE = {
@@ -107,15 +106,12 @@ def decode_parameter(message: Message, bytewise: bool) -> Parameter | None:
 
 def name_bytes(name: str) -> bytes:
     """Return a param_id: up to 16 bytes, without a NUL if the name fills them."""
-    return name.encode("ascii")[:NAME_BYTES]
+    return name.encode("ascii")[:16]
 
 
 def error_name(number: int) -> str:
     """Return the meaning of a MAV_PARAM_ERROR in words."""
     return ERRORS.get(number, f"error {number}")
-
-
-PARAMS_COLUMNS = 5
 
 
 def param_text(values: Mapping[str, float], remarks: Iterable[str] = ()) -> str:
@@ -150,8 +146,8 @@ def read_parameters_file(path: Path) -> dict[str, float]:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
         rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip() and not line.startswith("#")]
-        # QGroundControl's rows begin with vehicle and component.
-        pairs = [row[2:4] if len(row) == PARAMS_COLUMNS else row for row in rows]
+        # QGroundControl's rows have vehicle and component before, and the type after.
+        pairs = [row[2:4] or row for row in rows]
         return {name: as_float32(float(value)) for name, value in pairs}
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error

@@ -11,9 +11,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...chip.access import Reply
+from ...mavlink.texts import Prompt
 from ...sources.i2c_errors import transfer_error
 from ..faults import Fault, FaultKind, Schedule
-from ..hand import HandPrompt
 from ..motion import Motion
 from ..sensor import SensorTruth
 from .chip import Chip
@@ -212,7 +212,7 @@ class SimulatedBus:
     def close(self) -> None:
         """Do nothing: no device is open."""
 
-    def hear(self, prompt: HandPrompt) -> None:
+    def hear(self, prompt: Prompt) -> None:
         """Pass a prompt to the hand; the bus of a recording ignores it."""
         if self._motion is not None:
             self._motion.hear(prompt, self._clock.now() * 1e-9)

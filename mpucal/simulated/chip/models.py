@@ -17,8 +17,8 @@ from ...chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU
 from ...data import Vector
 
 Whole = NDArray[np.int64]
-Three = tuple[float, float, float]
-Codes = tuple[int, int, int]
+Three = tuple[float, ...]
+Codes = tuple[int, ...]
 
 # A self-test response is within this share of the code's; data sheets allow 14 %.
 SELF_TEST_SPREAD = 0.05
@@ -51,11 +51,11 @@ class FactoryTrim:
         spread = 1 + of_test.uniform(-SELF_TEST_SPREAD, SELF_TEST_SPREAD, (2, 3))
         accel_g, gyro_dps = _responses(family, accel_codes, gyro_codes) * spread
         return cls(
-            accel_trim=_whole(trim),
-            accel_codes=_whole(accel_codes),
-            gyro_codes=_whole(gyro_codes),
-            accel_self_test_g=_real(accel_g),
-            gyro_self_test_dps=_real(gyro_dps),
+            accel_trim=tuple(trim.tolist()),
+            accel_codes=tuple(accel_codes.tolist()),
+            gyro_codes=tuple(gyro_codes.tolist()),
+            accel_self_test_g=tuple(accel_g.tolist()),
+            gyro_self_test_dps=tuple(gyro_dps.tolist()),
         )
 
     def registers(self, family: Family) -> dict[int, int]:
@@ -85,19 +85,6 @@ def _responses(family: Family, accel_codes: Whole, gyro_codes: Whole) -> Vector:
         return np.array([accel_g, 25 * 1.046 ** (gyro_codes - 1) * np.array([1, -1, 1])])
     counts = 2620 * 1.01 ** (np.array([accel_codes, gyro_codes]) - 1)
     return np.asarray(counts / np.array([[reg.ACCEL_LSB_PER_G[0]], [reg.GYRO_LSB_PER_DPS[0]]]))
-
-
-def _whole(values: Whole) -> Codes:
-    x, y, z = (int(value) for value in values)
-    return x, y, z
-
-
-def _real(values: Vector) -> Three:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
-
-
-AWAKE = 0x01
 
 
 @dataclass(frozen=True)
@@ -146,7 +133,7 @@ class Model:
     def reset_values(self, factory: FactoryTrim) -> bytearray:
         """Return all 128 registers after a reset, with the factory settings of this piece."""
         values = bytearray(128)
-        values[reg.PWR_MGMT_1] = reg.PWR_MGMT_1_SLEEP if self.family.asleep else AWAKE
+        values[reg.PWR_MGMT_1] = reg.PWR_MGMT_1_SLEEP if self.family.asleep else 0x01
         values[reg.WHO_AM_I] = self.identity
         for address, value in factory.registers(self.family).items():
             values[address] = value

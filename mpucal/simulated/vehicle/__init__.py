@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...sources.kind import Request
-from ...vehicle.source import OpenedVehicle, link_identity, signing_key
+from ...vehicle.source import OpenedVehicle, link_options
 from .options import VehicleOptions
 from .transport import SimulatedTransport
 from .vehicle import Sent, SimulatedVehicle
@@ -16,16 +16,14 @@ def open_source(request: Request) -> OpenedVehicle:
 
     A command that opens it again passes the same dict `kept`: the vehicle then has the parameters that it had before.
     """
-    key = signing_key(request)
-    vehicle = SimulatedVehicle(VehicleOptions.parse(request.value), request.plan.gravity, key)
+    options = link_options(request)
+    vehicle = SimulatedVehicle(VehicleOptions.parse(request.value), request.plan.gravity, options["key"])
     vehicle.switch_on(request.values.get("kept", {}).setdefault(request.value, vehicle.firmware.store))
     transport = SimulatedTransport(vehicle)
     return OpenedVehicle(
         transport,
         request.plan,
-        words=request.words,
-        key=key,
         truth=vehicle.truth_document,
         real_time=transport.real_time,
-        **link_identity(request),
+        **options,
     )

@@ -14,7 +14,9 @@ from ...mavlink.parameters.encoding import INT32, REAL32, Parameter
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES, ORIENTATION, tilt_deg
 from ...mavlink.parameters.slots import AXES, all_slots
 from ...mavlink.requests import SYS_STATUS
-from .firmware import ATTITUDE, HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
+from ...mavlink.rest import ATTITUDE
+from ...vehicle.sink import SAVE_IDS
+from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .imus import BLOCK
 from .options import VehicleOptions
 from .store import INT8, INT16
@@ -75,19 +77,12 @@ def butterworth(cutoff_hz: float, rate_hz: float) -> tuple[Three, Three]:
 
 
 LOOP_HZ = 400
-# A message comes at 0.8 of the loop's rate at most, in intervals of whole ms.
-SHORTEST_MS = 3
 DEVICE_IDS = (2753028, 2753036, 2753044)
 SLOTS = all_slots(ARDUPILOT)
 # Defaults of a SITL, which are not the identity.
 OFFSET, SCALE = 0.001, 1.001
 # Greatest difference of the accelerometers from the first, where z counts half, and the time that they must agree.
 INCONSISTENT_MPS2, AGREED_S = np.array([0.75, 0.75, 2.25]), 10
-BAROMETER_C = 41.0
-# Bit of MAV_OPTIONS
-ONLY_ITS_OWN = 1
-# param5 of MAV_CMD_PREFLIGHT_CALIBRATION
-FORCE_SAVE = 76
 
 
 class ArduPilot(Firmware):
@@ -154,7 +149,7 @@ class ArduPilot(Firmware):
             return dialect().MAVLink_raw_imu_message(t_us, *self.milli(0), 0, 0, 0, 0, centi)
         if message_id == HIGHRES_IMU and self.options.highres:
             message = self.highres_imu(t_us, np.zeros(3), np.zeros(3))
-            message.temperature = BAROMETER_C
+            message.temperature = 41.0  # the barometer's
             return message
         if message_id in SCALED_IMUS:
             imu = SCALED_IMUS.index(message_id)
@@ -170,7 +165,8 @@ class ArduPilot(Firmware):
         """Accept an interval in whole ms; deny a shorter one than it can send, which changes nothing."""
         m = dialect()
         known = self.message(message_id, 0) is not None or message_id in SCALED_IMUS
-        if not known or 0 < interval_us < SHORTEST_MS * 1000:
+        # 0.8 of the loop's rate at most, in whole ms
+        if not known or 0 < interval_us < 3000:
             return m.MAV_RESULT_DENIED, -1
         return m.MAV_RESULT_ACCEPTED, max(interval_us, 0) // 1000 * 1000
 
@@ -196,14 +192,14 @@ class ArduPilot(Firmware):
         if how == LEVEL:
             self.store_level(tilt_deg(self.mean_force))
             return True
-        if how != FORCE_SAVE:
+        if how != SAVE_IDS:
             return False
         self._saved_ids = list(DEVICE_IDS[: self.options.imus])
         return True
 
     def accepts(self, system: int) -> bool:
         """Accept every station, or with MAV_OPTIONS' bit 0 the vehicle's own ground station alone."""
-        return not int(self.store["MAV_OPTIONS"]) & ONLY_ITS_OWN or system == self.store["MAV_GCS_SYSID"]
+        return not int(self.store["MAV_OPTIONS"]) & 1 or system == self.store["MAV_GCS_SYSID"]
 
     def complaints(self) -> list[str]:
         """Return AP_Arming's complaints: every IMU must be calibrated, and all must agree for ten seconds."""

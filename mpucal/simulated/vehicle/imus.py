@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...data import Vector
-from ...mavlink.texts import Direction, ReceivedPrompt
+from ...mavlink.texts import Direction, Prompt, ReceivedPrompt
 from ..disturbance import ARMS
 from ..faults import begin_mishaps
-from ..hand import HandPrompt
 from ..hands import HANDS
 from ..motion import Motion
 from ..sensor import SensorResponse, SensorTruth, Setting
@@ -50,7 +49,7 @@ class Imus:
         """Temperature of the dies."""
         return self.truths[0].temperature_c + self._warmer_c
 
-    def hear(self, prompt: HandPrompt, t_s: float) -> None:
+    def hear(self, prompt: Prompt, t_s: float) -> None:
         """Pass a prompt to the hand, with `down` in the vehicle's axes."""
         down = prompt.down
         self._motion.hear(ReceivedPrompt(str(prompt.kind), None if down is None else to_hand_axes(down)), t_s)

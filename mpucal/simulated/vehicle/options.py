@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES
+from ...mavlink.parameters.slots import ARDUPILOT_IMUS
 from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_VEHICLE, Fault, Where
 from ..hands import HANDS
@@ -15,8 +16,6 @@ from ..option_text import FAULT, Parser, at_least, faults, one_of, parse_options
 FIRMWARES = ("ardupilot", "px4")
 TYPES = ("copter", "plane", "rover")
 PACES = ("fast", "real")
-MOST_IMUS = 3
-LAST_ORIENTATION = 40
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class VehicleOptions:
 
 def _orientation(text: str) -> int:
     value = int(text)
-    if not (0 <= value <= LAST_ORIENTATION or value in CUSTOM_ANGLES):
+    if not (value in range(41) or value in CUSTOM_ANGLES):
         raise ValueError(text)
     return value
 
@@ -77,7 +76,7 @@ def _orientation(text: str) -> int:
 PARSERS: dict[str, Parser] = {
     "firmware": one_of(FIRMWARES),
     "type": one_of(TYPES),
-    "imus": whole(1, MOST_IMUS),
+    "imus": whole(1, ARDUPILOT_IMUS),
     "system": whole(1, 250),
     "rotation": (_orientation, "a MAV_SENSOR_ORIENTATION: 0 to 40, 100 to 102"),
     "highres": (lambda text: {"yes": True, "no": False}[text], "yes or no"),

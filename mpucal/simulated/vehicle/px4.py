@@ -14,7 +14,8 @@ from ...mavlink.parameters.mounting import BOARD_ANGLES, BOARD_ROTATION, euler_m
 from ...mavlink.parameters.slots import PX4_LIMITS, Slot, all_slots
 from ...mavlink.px4_preparation import AUTOCAL, QUICK
 from ...mavlink.requests import SYS_STATUS
-from .firmware import ATTITUDE, HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
+from ...mavlink.rest import ATTITUDE
+from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .options import VehicleOptions
 
 LOOP_HZ = 250
@@ -26,7 +27,6 @@ DOES_NOT_EXIST, PERMISSION_DENIED, TYPE_MISMATCH = 1, 3, 7
 LEARN_GYROSCOPE, LEARN_ACCELEROMETER = 1, 2
 # A lower rate is taken for a bias.
 STILL_RAD_S = 0.05
-ALL_OF_THEM = 7
 
 
 class Px4(Firmware):
@@ -46,7 +46,7 @@ class Px4(Firmware):
         store.add("MAV_SYS_ID", options.system, INT32)
         store.add(BOARD_ROTATION, options.rotation, INT32)
         store.add_all(BOARD_ANGLES, 0.0)
-        store.add(EKF2_IMU_CTRL, ALL_OF_THEM, INT32)
+        store.add(EKF2_IMU_CTRL, 0b111, INT32)
         store.add(AUTOCAL, 1, INT32)
         for number, slot in enumerate(SLOTS):
             exists = number < options.imus

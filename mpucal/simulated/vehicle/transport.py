@@ -11,8 +11,6 @@ from ...mavlink.transport import US, ReceivedBytes
 from ..faults import FAULTS, Fault, Where
 from .vehicle import SimulatedVehicle
 
-LATE_BY = 3
-
 
 class PacketLine:
     """Carrier of packets.
@@ -34,7 +32,7 @@ class PacketLine:
             if self._happens("loss"):
                 continue
             if self._happens("reorder"):
-                self._late.append((LATE_BY, data))
+                self._late.append((3, data))
                 continue
             out.append(data)
             if self._happens("duplicate"):

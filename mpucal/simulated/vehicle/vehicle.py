@@ -12,7 +12,7 @@ from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
 from ...mavlink.ftp import Payload
-from ...mavlink.link import OWN_COMPONENT
+from ...mavlink.link import OWN_COMPONENT, SEQUENCE
 from ...mavlink.parameters.encoding import from_wire, name_bytes, to_wire
 from ...mavlink.requests import ARMED
 from ...mavlink.texts import ReceivedPrompt, decode_prompt
@@ -60,12 +60,9 @@ S_US = 1_000_000
 US = 1_000
 HEARTBEAT = 0
 SLOWER_WHILE_BUSY = 4
-SEQUENCE = 256
 # MAV_TYPE
 TYPES = {"plane": 1, "copter": 2, "rover": 10}
 REBOOT_US = 2 * S_US
-# param1 of MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
-REBOOT = 1
 SECOND_STATION, SECOND_STATION_HZ = 255, 4
 
 
@@ -287,7 +284,7 @@ class SimulatedVehicle:
         return int(dialect().MAV_RESULT_ACCEPTED)
 
     def _preflight_reboot(self, message: Message) -> int:
-        if self.firmware.armed or message.param1 != REBOOT:
+        if self.firmware.armed or message.param1 != 1:
             return int(dialect().MAV_RESULT_DENIED)
         return int(dialect().MAV_RESULT_ACCEPTED)
 
