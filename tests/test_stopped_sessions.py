@@ -33,7 +33,7 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
     stops_s = {10.0: 70.0, 100.0: 90.0}
     world = worlds.World(worlds.VEHICLE)
     for at_s, stopped_s in stops_s.items():
-        world.moments.add(at_s, lambda stopped_s=stopped_s: pass_by(world, stopped_s))
+        world.at(at_s, lambda stopped_s=stopped_s: pass_by(world, stopped_s))
     days = iter(range(1, 1_000_000))
     words = ["--mavlink", "sim:seed=3,imus=1", "--rate", "50", "--target", "quick", "--no-write"]
     with world.opened(), quick(), patch("time.time_ns", lambda: time_ns() + (-1) ** next(days) * DAY_NS):
@@ -53,7 +53,7 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
 @pytest.mark.parametrize(("kind", "stopped_s"), [("CHIP", 5.0), ("BRIDGE", 300.0)])
 def test_a_chip_is_turned_on_after_a_stop(tmp_path, capsys, kind, stopped_s):
     world = worlds.World(getattr(worlds, kind))
-    world.moments.add(30.0, lambda: world.bus._clock.spend(round(stopped_s * 1e9)))
+    world.at(30.0, lambda: world.bus._clock.spend(round(stopped_s * 1e9)))
     with world.opened(), quick():
         words = ["--bus", "sim:seed=3", "--rate", "25", "--target", "quick", "--yes"]
         code = run(["session", *words, "-o", str(tmp_path / "board")])

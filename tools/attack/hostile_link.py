@@ -23,8 +23,6 @@ from tools.processes import quick
 
 OTHER_KEY = bytes(32)
 ODD = (float("nan"), float("inf"), -float("inf"), 3.4e38, -3.4e38, 1e-45, 0.0, 1.0, -9.8)
-# number of packets of a kind that are kept to be sent again, and the share of new ones
-KEPT, FRESH = 2000, 0.1
 
 
 class Attacker:
@@ -37,21 +35,13 @@ class Attacker:
 
     def __init__(self, seed: int, firmware: str, heard: Sequence[bytes] = ()) -> None:
         self._rng = random.Random(seed)
-        self._made: dict[str, list[bytes]] = {}
         self._names = [name.encode() for name in stream_parameter_names("PX4" if firmware == "px4" else "ArduPilot")]
         self.heard = list(heard)
         self.now_us = 0
 
     def packet(self, kind: str) -> bytes:
-        """Return a packet of `kind`: a new one, or an earlier one, since making them is slow."""
-        made, rng = self._made.setdefault(kind, []), self._rng
-        if len(made) < KEPT:
-            made.append(KINDS[kind](self))
-            return made[-1]
-        at = int(rng.random() * KEPT)
-        if rng.random() < FRESH:
-            made[at] = KINDS[kind](self)
-        return made[at]
+        """Return a packet of `kind`."""
+        return KINDS[kind](self)
 
     def _packed(self, message: Any, system: int = 1, component: int = 1) -> bytes:
         mav = dialect().MAVLink(None, system, component)

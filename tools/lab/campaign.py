@@ -95,7 +95,7 @@ def suffer(case: Case, world: World) -> int:
     os.environ["XDG_STATE_HOME"] = str(Path("state").resolve())
     if case.k % REPORTS:
         results.report = lambda _: None
-    world.moments.add(case.blows[0].at_s, begin)
+    world.at(case.blows[0].at_s, begin)
     with world.opened(), quick():
         return run(words(case.number))
 

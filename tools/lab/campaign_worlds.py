@@ -1,7 +1,7 @@
 """Simulated worlds in which faults strike at any instant: the chip, its bus, the line, the vehicle, or the process.
 
 A world is `--bus sim`, the same chip behind the emulated bridge, or `--mavlink sim`. Whenever its time goes on,
-`Timeline.reach` hears of it.
+`World.reach` hears of it.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     BRIDGE: (*fault_kinds(*OF_CHIP, Where.HAND), STEP, *SERIAL, *CLOCK, *PROCESS),
     VEHICLE: (*fault_kinds(*OF_VEHICLE), *PROCESS),
 }
+SIMULATED = fault_kinds(*OF_CHIP, *OF_VEHICLE, Where.HAND, Where.DEFECT)
 SPOILT_BYTES, WITHIN_BYTES = 40, 4000
 STEP_MG = 3.0, 300.0
 ROOM_BYTES, SAID_BYTES = 400_000, 20_000
@@ -60,36 +61,30 @@ class TimedFault:
     def __str__(self) -> str:
         return f"{self.name}@{self.at_s:g}"
 
-    def fault(self) -> Fault | None:
-        """Return the row of the simulation's table of faults."""
-        table = fault_kinds(*OF_CHIP, *OF_VEHICLE, Where.HAND, Where.DEFECT)
-        return Fault(self.name, self.at_s if table[self.name].timed else 0.0) if self.name in table else None
 
+class World:
+    """Simulated world: the sources that the hooks below have opened; one for each process.
 
-class Timeline:
-    """Calls of functions at times of the world's clock; `due` holds the times [s] and functions."""
+    Attributes
+    ----------
+    due : times [s] of the world's clock, the earliest first, and the functions that are called then.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
         self.due: list[tuple[float, Callable[[], None]]] = []
+        self.bus: HookedBus | None = None
+        self.line: EmulatedLine | None = None
+        self.transport: HookedTransport | None = None
 
     def reach(self, now_s: float) -> None:
         """Call the functions that are due at `now_s`."""
         while self.due and self.due[0][0] <= now_s:
             self.due.pop(0)[1]()
 
-    def add(self, at_s: float, call: Callable[[], None]) -> None:
+    def at(self, at_s: float, call: Callable[[], None]) -> None:
         """Have a function called at a time [s]."""
         self.due = sorted([*self.due, (at_s, call)], key=lambda item: item[0])
-
-
-class World:
-    """Simulated world: the sources that the hooks below have opened; one for each process."""
-
-    def __init__(self, kind: str) -> None:
-        self.kind, self.moments = kind, Timeline()
-        self.bus: HookedBus | None = None
-        self.line: EmulatedLine | None = None
-        self.transport: HookedTransport | None = None
 
     @contextmanager
     def opened(self) -> Iterator[None]:
@@ -107,15 +102,14 @@ class World:
 
     def begin_faults(self, blows: Sequence[TimedFault]) -> None:
         """Begin these faults, each at its time."""
-        faults = _faults(blows)
         if self.bus is not None:
-            self.bus.begin_faults(faults, blows[0].number)
+            self.bus.begin_faults(_faults(blows), blows[0].number)
             self.bus._motion.mishaps = (*self.bus._motion.mishaps, *_befallen(blows))
         else:
-            self.transport.begin_faults(faults)
+            self.transport.begin_faults(_faults(blows))
         for blow in blows:
             if blow.name in (*PROCESS, *CLOCK, *SERIAL):
-                self.moments.add(blow.at_s, lambda blow=blow: self._strike(blow))
+                self.at(blow.at_s, lambda blow=blow: self._strike(blow))
 
     def truths(self, blows: Sequence[TimedFault], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the values of (D, b_a) that count as true: before and after each fault, and amid slow ones."""
@@ -137,16 +131,18 @@ class World:
         if blow.name in SIGNALS:
             os.kill(os.getpid(), SIGNALS[blow.name])
         elif blow.name == "disk_full":
-            fill_disk(blow.number % ROOM_BYTES)
+            # no file may grow beyond this, as on a full disk; messages on stderr go to a file, too, and get their room
+            room = max(blow.number % ROOM_BYTES, os.fstat(2).st_size + SAID_BYTES)
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
         elif blow.name == "deaf":
             os.dup2(os.open("/dev/full", os.O_WRONLY), 2)
         elif blow.name in CLOCK and self.bus is not None:
             self.bus._clock.spend(round(PAUSES_S[blow.name] * 1e9))
         elif blow.name in SERIAL and self.line is not None:
             rng = np.random.default_rng(blow.number)
-            spoilt = [
-                (int(at), blow.name, int(rng.integers(1, 256))) for at in rng.integers(0, WITHIN_BYTES, SPOILT_BYTES)
-            ]
+            places = rng.integers(0, WITHIN_BYTES, SPOILT_BYTES)
+            spoilt = [(int(at), blow.name, int(rng.integers(1, 256))) for at in places]
             if rng.random() < 0.5:
                 self.line.to_host = LineFaults(spoilt)
             else:
@@ -163,12 +159,12 @@ class HookedBus(SimulatedBus):
 
     def read(self, register: int, count: int) -> Any:
         """See SimulatedBus."""
-        self._world.moments.reach(self._clock.now() * 1e-9)
+        self._world.reach(self._clock.now() * 1e-9)
         return super().read(register, count)
 
     def write(self, register: int, data: bytes) -> int:
         """See SimulatedBus."""
-        self._world.moments.reach(self._clock.now() * 1e-9)
+        self._world.reach(self._clock.now() * 1e-9)
         return super().write(register, data)
 
     def begin_faults(self, faults: Sequence[Fault], seed: int) -> None:
@@ -182,18 +178,9 @@ class Bridged(BridgeBus):
     real_time = False
 
     def __init__(self, chip: SimulatedBus, world: World) -> None:
-        clock = chip._clock
-        world.line = EmulatedLine(EmulatedBridge(chip, clock.now), clock)
-        self._chip_bus = chip
+        world.line = EmulatedLine(EmulatedBridge(chip, chip._clock.now), chip._clock)
+        self.hear, self.truth_document = chip.hear, chip.truth_document
         super().__init__(world.line)
-
-    def hear(self, prompt: Any) -> None:
-        """See SimulatedBus."""
-        self._chip_bus.hear(prompt)
-
-    def truth_document(self) -> dict[str, Any] | None:
-        """See SimulatedBus."""
-        return self._chip_bus.truth_document()
 
 
 class HookedTransport(SimulatedTransport):
@@ -206,7 +193,7 @@ class HookedTransport(SimulatedTransport):
 
     def receive(self, until_ns: int) -> Any:
         """See Transport."""
-        self._world.moments.reach(self._vehicle.now_us * 1e-6)
+        self._world.reach(self._vehicle.now_us * 1e-6)
         return super().receive(until_ns)
 
     def begin_faults(self, faults: Sequence[Fault]) -> None:
@@ -217,18 +204,10 @@ class HookedTransport(SimulatedTransport):
         self._line = PacketLine(faults, vehicle.options.seed)
 
 
-def fill_disk(room: int) -> None:
-    """Limit the files of this process to `room` bytes, so that writes fail as on a full disk.
-
-    Messages on stderr go to a file, too, and get the room that they need.
-    """
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    room = max(room, os.fstat(2).st_size + SAID_BYTES)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
-
-
 def _faults(blows: Sequence[TimedFault]) -> list[Fault]:
-    return [fault for fault in (blow.fault() for blow in blows) if fault is not None]
+    """Return those that the simulation's table of faults has."""
+    known = [blow for blow in blows if blow.name in SIMULATED]
+    return [Fault(blow.name, blow.at_s if SIMULATED[blow.name].timed else 0.0) for blow in known]
 
 
 def _befallen(blows: Sequence[TimedFault]) -> list[Mishap]:

@@ -6,10 +6,9 @@ python -m tools.lab guidance_trials --seeds 20 --hand wandering
 Counted over whole sessions on the simulated chip, as the page shows them: pictures that jump by more than 20 deg beyond
 what gravity and the gyroscope turned meanwhile (the board's, and where the wanted one is drawn), a HOLD farther from
 the wanted orientation than 15 deg that is not said to be useful, an orientation asked for in place of another without a
-word on what was held, and counts above their total. In the transcript of what is said, played and shown large: "hold"
+word on what was held, and counts above their total. In the transcript of what is said and played: "hold"
 and "turn" that contradict each other within a second, a tone for wrong before a hold that is taken, words said twice
-within five seconds, words while the board is held, and a headline that is taken back within a second although the hand,
-which may do as it likes, has not turned the board meanwhile. Then the time to the verdict of the hand that is given the
+within five seconds, and words while the board is held. Then the time to the verdict of the hand that is given the
 wanted orientation is compared with that of one that turns the board as the page says in words, by so many degrees, and
 looks again.
 """
@@ -43,8 +42,6 @@ from .sessions import session
 from .table import Column, Row, count, grouped, known
 
 BEYOND_DEG = 20.0
-# More than a hand's tremor and its error of aim.
-TURNED_DEG = 10.0
 COUNT = re.compile(r"(\d+) of (\d+)")
 BY_WORDS = "by words"
 LOOKS_S = 0.25
@@ -101,24 +98,16 @@ class Transcript:
 
     Attributes
     ----------
-    said : announcements, with the moment of each. shown : senses of the headline and the views from which they are
-        shown; empty where it neither asks for a turn nor for a hold.
+    said : announcements, with the moment of each.
     """
 
     said: list[tuple[Said, Moment]] = field(default_factory=list)
-    shown: list[tuple[str, View]] = field(default_factory=lambda: [("", View())])
     wrong: Counter[str] = field(default_factory=Counter)
     voice: Voice = field(default_factory=Voice)
 
     def hear(self, view: View) -> None:
         """Follow a change of the view."""
         self.voice.hear(view)
-        sense = SENSES.get(view.moment, "")
-        if sense != self.shown[-1][0]:
-            self.shown.append((sense, view))
-            (one, first), (other, then) = self.shown[-3:-1] if len(self.shown) > 2 else [self.shown[0]] * 2
-            if sense == one and {one, other} == {STAY, GO} and first.prompt is view.prompt:
-                self.wrong["shown for less than a second"] += is_taken_back(then, view)
         now = self.voice.said
         if now is None or (self.said and now is self.said[-1][0]):
             return
@@ -136,12 +125,6 @@ class Transcript:
         turning = view.prompt is not None and view.prompt.kind is not PromptKind.LAY_FLAT
         holding = turning and moment is view.moment is Moment.COUNTING
         self.wrong["said while holding"] += holding and view.held is None
-
-
-def is_taken_back(then: View, now: View) -> bool:
-    """Return True if less than a second lies between two views, and the board was not turned in it."""
-    assert then.meter and now.meter and then.now_s is not None and now.now_s is not None
-    return now.now_s - then.now_s < SETTLED_S and angle(then.meter.attitude, now.meter.attitude) < TURNED_DEG
 
 
 @dataclass

@@ -63,5 +63,4 @@ def test_contradictions_in_a_transcript_are_counted():
         "contradicted within a second": 2,
         "wrong before taken": 1,
         "said twice": 1,
-        "shown for less than a second": 1,
     }
