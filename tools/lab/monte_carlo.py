@@ -3,6 +3,7 @@
 python -m tools.lab monte_carlo --seeds 60
 python -m tools.lab monte_carlo --scenes '12 poses;continuous' --model hand --seeds 60 --json poses.json
 python -m tools.lab monte_carlo --scenes paper --seeds 1000             beside the paper's figures
+python -m tools.lab monte_carlo --methods '*' --seeds 5                 beside other methods: the paper's takes long
 python -m tools.lab monte_carlo --crlb --model accel --seeds 1000       one sensor, many noises
 """
 
@@ -12,6 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -27,7 +29,8 @@ from mpucal.rests.flat import flat_statistics
 from mpucal.result.calibration import REFUSED
 
 from .judge import followed, judged, judgement, sph_rms, tilts_deg
-from .runner import Trial, each_seed, names_of
+from .rivals import Estimate, Rests, Unfit, aligned_ellipsoid, ellipsoid, six_positions
+from .runner import Trial, names_of
 from .scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
 from .scenarios.sensors import hand_sensor, paper_sensor
 from .table import Column, Row, cell, frequencies, grouped, known, over, plain_table, show, table
@@ -35,6 +38,7 @@ from .table import Column, Row, cell, frequencies, grouped, known, over, plain_t
 # NIS is 3 for data that conform to the model, and tens if the fit ended in a wrong optimum
 NIS_WRONG = 10.0
 FITS = {"accel": fit_accel, "paper": fit_paper}
+PRINTED = "the paper's algorithm"
 TILTS = ("uncalibrated", "true D, b_a", "calibrated")
 # required mean errors, and means (standard deviations) of the paper before and after calibration [deg]
 PAPER = {"roll": ("0.345", "8.3 (7.1)", "0.32 (0.40)"), "pitch": ("0.265", "8.3 (6.9)", "0.33 (0.43)")}
@@ -70,31 +74,48 @@ SCENES = {
 }
 
 
-def of_seed(item: tuple[str, int], model: str) -> Row:
-    """Simulate and calibrate a scene and a seed, and judge the result.
+METHODS: dict[str, Callable[[Rests, float], Estimate] | None] = {
+    "mpucal": None,
+    PRINTED: None,
+    "six positions": six_positions,
+    "ellipsoid": ellipsoid,
+    "ellipsoid, turned to the gyro": aligned_ellipsoid,
+}
+
+
+def of_seed(item: tuple[str, int, str], model: str) -> Row:
+    """Simulate a scene and a seed, calibrate by a method, and judge the result.
 
     In the row, `before` is the error without a calibration [m/s^2], `failure` why it does not count, `known_K` the
     number of K's six elements with a standard uncertainty, and the tilts are errors with each of TILTS.
     """
-    scene, seed = item
+    scene, seed, method = item
     simulated = SCENES[scene].simulate(seed)
-    truth, began = simulated.truth, time.perf_counter()
+    recording, truth, of_rests = simulated.recording, simulated.truth, METHODS[method]
+    same = {"scene": scene, "seed": seed, "method": method, "before": sph_rms(truth, np.eye(3), np.zeros(3))}
+    began = time.perf_counter()
     try:
-        result = mpucal.calibrate(simulated.recording, model=model, gravity=GRAVITY_MPS2)
-    except MpucalError as error:
-        return judgement(REFUSED, scene=scene, seed=seed, model=model, failure=str(error))
-    ms, of_paper = 1e3 * (time.perf_counter() - began), scene.startswith("paper")
-    known_K, before = np.isfinite(result.K_std[np.triu_indices(3)]).sum(), sph_rms(truth, np.eye(3), np.zeros(3))
-    more = {"model": result.fit["model"], "failure": None, "before": before, "ms": ms, "known_K": int(known_K)}
-    row = judged(result, (truth.D, truth.b_a), gravity=truth.gravity, scene=scene, seed=seed, **more)
-    if not result.fit["converged"]:
-        row.failure = "not converged"
-    elif of_paper and not (result.fit["nis"] or np.inf) < NIS_WRONG:
-        row.failure = "wrong optimum (NIS)"
-    elif not row.error < before:
+        if of_rests:
+            found = of_rests(Rests.of(recording), GRAVITY_MPS2)
+            row = judgement(error=sph_rms(truth, found.D, found.b_a), **same, model=method, failure=None)
+        else:
+            model = "paper" if method == PRINTED else model
+            result = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
+            same |= {"model": result.fit["model"], "failure": None}
+            row = judged(result, (truth.D, truth.b_a), gravity=truth.gravity, **same)
+    except (MpucalError, Unfit) as error:
+        return judgement(REFUSED, **same, model=model, failure=str(error))
+    row.ms, of_paper = 1e3 * (time.perf_counter() - began), scene.startswith("paper")
+    if not row.error < row.before:
         row.failure = "worse than no calibration"
-    if of_paper:
-        row.roll_deg, row.pitch_deg = tilts(simulated, result)
+    if not of_rests:
+        row.known_K = int(np.isfinite(result.K_std[np.triu_indices(3)]).sum())
+        if not result.fit["converged"]:
+            row.failure = "not converged"
+        elif of_paper and not (result.fit["nis"] or np.inf) < NIS_WRONG:
+            row.failure = "wrong optimum (NIS)"
+        if of_paper:
+            row.roll_deg, row.pitch_deg = tilts(simulated, result)
     return row
 
 
@@ -111,10 +132,14 @@ def successful(runs: Sequence[Row]) -> list[Row]:
     return [run for run in runs if run.failure is None]
 
 
+def wanted_error(runs: Sequence[Row]) -> float | None:
+    """Return the mean error that mpucal is to have in a scene [m/s^2]; None if none is set."""
+    return SCENES[runs[0].scene].wanted if runs[0].method == "mpucal" else None
+
+
 def met(runs: Sequence[Row]) -> bool | None:
     """Return True if all runs of a scene succeeded with the required mean error; None if none is set."""
-    wanted = SCENES[runs[0].scene].wanted
-    if wanted is None:
+    if (wanted := wanted_error(runs)) is None:
         return None
     return len(successful(runs)) == len(runs) and float(np.mean(known(runs, "error"))) <= wanted
 
@@ -133,7 +158,7 @@ COLUMNS: dict[str, Column] = {
     "uncalibrated": over("before"),
     "error, m/s²": of_successful("error"),
     "worst error": of_successful("error", max),
-    "wanted": lambda runs: SCENES[runs[0].scene].wanted,
+    "wanted": wanted_error,
     "met": lambda runs: {None: "", True: "yes", False: "[red]no[/red]"}[met(runs)],
     **Z_COLUMNS,
     "K known": of_successful("known_K"),
@@ -173,7 +198,7 @@ def efficiency(fits: Sequence[Row]) -> list[dict[str, Any]]:
     return [dict(zip(("", "RMSE", "√CRLB", "RMSE / √CRLB"), row, strict=True)) for row in rows]
 
 
-def tried(item: int | tuple[str, int], *, model: Annotated[str, MODELS] = "auto") -> Row | None:
+def tried(item: int | tuple[str, int, str], *, model: Annotated[str, MODELS] = "auto") -> Row | None:
     """Fit one sensor with a seed's noise, or calibrate a scene and a seed."""
     return fit_fixed(item, model) if isinstance(item, int) else of_seed(item, model)
 
@@ -182,10 +207,11 @@ def scenarios(
     *,
     seeds: range,
     scenes: Annotated[list[str], names_of(SCENES), "patterns, with ; between"] = tuple(SCENES),
+    methods: Annotated[list[str], names_of(METHODS), "patterns, with ; between"] = ("mpucal",),
     crlb: Annotated[bool, f"section 4.4: one sensor, many noises; --model {' or '.join(FITS)}"] = False,
-) -> Sequence[int | tuple[str, int]]:
+) -> Sequence[int | tuple[str, int, str]]:
     """Return the seeds of one sensor's noises, or the seeds of each scene."""
-    return seeds if crlb else each_seed(scenes, seeds)
+    return seeds if crlb else list(product(scenes, seeds, methods))
 
 
 def report(found: list[Any], seeds: range, model: str, crlb: bool) -> None:
@@ -195,9 +221,9 @@ def report(found: list[Any], seeds: range, model: str, crlb: bool) -> None:
         failed = len(seeds) - len(found)
         show(plain_table(efficiency(found), f"section 4.4, {about}, of one sensor; {failed} failed"))
         return
-    show(table(grouped(found, "scene"), COLUMNS, about))
-    show(table(grouped(successful(found), "model"), Z_COLUMNS, "claims by model"))
-    if of_paper := [run for run in found if run.scene == "paper"]:
+    show(table(grouped(found, "scene", "method"), COLUMNS, about))
+    show(table(grouped([run for run in successful(found) if run.z], "model"), Z_COLUMNS, "claims by model"))
+    if of_paper := [run for run in found if run.scene == "paper" and run.method == "mpucal"]:
         show(tilt_table(of_paper))
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.lab import compare, noise_trials, strangers
+from tools.lab import monte_carlo, noise_trials, strangers
 
 SESSION = str(Path(__file__).parents[3] / "fixtures" / "sessions" / "mpu6050.mcap")
 
@@ -15,9 +15,9 @@ SESSION = str(Path(__file__).parents[3] / "fixtures" / "sessions" / "mpu6050.mca
     [
         (noise_trials, ["--hours", "0.01", "--seeds", "1"], "gyroscope, restless"),
         (strangers, [SESSION], "good (hand)"),
-        (compare, ["--scenes", "12 poses", "--seeds", "1:2", "--without", "mpucal*;*algorithm"], "turned to the gyro"),
+        (monte_carlo, ["--scenes", "12 poses", "--seeds", "1:2", "--methods", "six*;ell*"], "no rest with"),
     ],
-    ids=["noise", "strangers", "compare"],
+    ids=["noise", "strangers", "monte_carlo"],
 )
 def test_a_trial_prints_its_table_and_writes_its_rows(trial, words, said, tmp_path, capsys):
     assert trial.main([*words, "--jobs", "1", "--json", str(tmp_path / "rows.json")]) == 0
