@@ -79,13 +79,8 @@ def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
         rows = [np.full(3, np.nan) if family is None else np.broadcast_to(of(family), 3) for family in families]
         return np.array(rows, float).reshape(-1, 3)
 
-    known = np.isfinite(D).all(axis=(1, 2))
-    scale, angle = np.full((len(D), 3), np.nan), np.full(len(D), np.nan)
-    for i in np.flatnonzero(known):
-        scale[i] = scale_factor_error(D[i])
-        angle[i] = np.nanmax(np.abs(misalignment(D[i])))
     rows = (
-        ("scale factor error {}", "%", scale, tolerance(lambda family: family.scale_percent)),
+        ("scale factor error {}", "%", scale_factor_error(D), tolerance(lambda family: family.scale_percent)),
         ("bias {}", "mg", bias_mg(b_a), tolerance(lambda family: family.zero_g_mg)),
         ("gyroscope's bias {}", "deg/s", np.degrees(b_omega), tolerance(lambda family: family.zero_rate_dps)),
     )
@@ -94,8 +89,9 @@ def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
         for name, unit, values, limit in rows
         for k, axis in enumerate(AXES)
     ]
+    angles = misalignment(D)[:, ~np.eye(3, dtype=bool)]
     cross = np.degrees(np.arctan(tolerance(lambda family: family.cross_axis_percent)[:, 0] / 100.0))
-    made.insert(2 * len(AXES), Parameter("largest misalignment", "deg", angle, cross))
+    made.insert(2 * len(AXES), Parameter("largest misalignment", "deg", np.max(np.abs(angles), axis=1), cross))
     return made
 
 

@@ -10,7 +10,7 @@ from ..chip.families import Family, family_of
 from ..data import Vector
 from ..result.calibration import REFUSED, Calibration
 from .elements import paragraph, table
-from .units import AXES, ParameterRow, accelerometer
+from .units import AXES, ParameterRow, accelerometer, unbroken
 
 USUAL, UNUSUAL, OUTSIDE = "usual", "unusual", "outside"
 # share of the tolerance: two of the three standard deviations that it covers
@@ -27,8 +27,7 @@ def accelerometer_table(c: Calibration, id_: str) -> str:
     sheet = family_of(c.sensor.chip)
     rows = []
     for row in accelerometer(c):
-        # a narrow column breaks before ±, not after it
-        cells = [f"{row.name}, {row.unit}", *(cell.replace("± ", "±\u00a0") for cell in row.cells)]
+        cells = [f"{row.name}, {row.unit}", *map(unbroken, row.cells)]
         if sheet is not None:
             compared = describe_comparison(row, sheet)
             corrected = "; corrected" if OUTSIDE in compared and c.verdict != REFUSED else ""

@@ -42,7 +42,7 @@ VERDICTS = {
 
 def render(calibration: Calibration, recording: Recording | None = None) -> str:
     """Return the report of a calibration; with its recording, it includes pictures. Collapsed parts are not printed."""
-    no_pictures = recording is not None and not sections.is_regular(calibration)
+    no_pictures = recording is not None and not calibration.is_regular
     track = None if recording is None or no_pictures else Track(recording, calibration)
     drawn: Mapping[str, str] = defaultdict(str) if track is None else gallery(track)
     body = (

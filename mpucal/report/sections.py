@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..result.keys import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
 from .data_sheet import CAPTION, about, accelerometer_table, unusual_parameters
 from .elements import as_float, code, escape, heading, number, pair, paragraph, quantity, section, table
-from .units import AXES, ParameterRow, gyroscope, with_std
+from .units import AXES, gyroscope, unbroken, with_std
 
 # docs/method.md, "Precision and repeatability"
 REPEATABILITY = (
@@ -68,15 +68,9 @@ def _list(items: list[str]) -> str:
     return "<ul>\n" + "".join(f"<li>{item}</li>\n" for item in items) + "</ul>\n"
 
 
-def is_regular(c: Calibration) -> bool:
-    """Return True if D and b_a are known and D can be inverted."""
-    known = np.isfinite(c.D).all() and np.isfinite(c.b_a).all()
-    return bool(known and np.linalg.matrix_rank(c.D) == 3)
-
-
 def accelerometer_section(c: Calibration) -> str:
     """Return the section on the errors of the accelerometer, with their uncertainties, and their repeatability."""
-    lasting = paragraph(REPEATABILITY, "repeatability", note=True) if is_regular(c) else ""
+    lasting = paragraph(REPEATABILITY, "repeatability", note=True) if c.is_regular else ""
     return section(
         "The accelerometer", unusual_parameters(c), accelerometer_table(c, "accelerometer"), about(c), lasting
     )
@@ -84,7 +78,7 @@ def accelerometer_section(c: Calibration) -> str:
 
 def formula(c: Calibration) -> str:
     """Return the correction formula."""
-    if not is_regular(c):
+    if not c.is_regular:
         return paragraph(NO_FORMULA, "formula", note=True)
     intro = paragraph(f"{ACCELEROMETER_FORMULA}, in m/s², with y the output of the sensor at its nominal scale factor:")
     applied = ""
@@ -120,7 +114,8 @@ def gyroscope_table(c: Calibration) -> str:
         else "Scale factor errors and misalignments were set to zero: the recording agrees with that, or they are not"
         " observable from it."
     )
-    return _rows("gyroscope", rows) + paragraph(remark, note=True)
+    cells = [[f"{row.name}, {row.unit}", *map(unbroken, row.cells)] for row in rows]
+    return table("gyroscope", CAPTION, ["", *AXES], cells) + paragraph(remark, note=True)
 
 
 def verification_section(c: Calibration) -> str:
@@ -160,19 +155,8 @@ def matrices(c: Calibration) -> str:
     )
 
 
-def _rows(id_: str, rows: Sequence[ParameterRow]) -> str:
-    """Return a table with a column for each axis."""
-    cells = [[f"{row.name}, {row.unit}", *map(_unbroken, row.cells)] for row in rows]
-    return table(id_, CAPTION, ["", *AXES], cells)
-
-
 def _pair(value: float, std: float) -> str:
-    return _unbroken(with_std(value, std, most_digits=9).removeprefix("+"))
-
-
-def _unbroken(text: str) -> str:
-    """Return the text without a line break after ±, so that a narrow column breaks before it."""
-    return text.replace("± ", "±\u00a0")
+    return unbroken(with_std(value, std, most_digits=9).removeprefix("+"))
 
 
 def vehicle_section(c: Calibration) -> str:

@@ -77,6 +77,11 @@ def with_std(value: float, std: float, most_digits: int = 5) -> str:
     return f"{value:+.{digits}f} ± {std:.{digits}f}"
 
 
+def unbroken(text: str) -> str:
+    """Return the text without a line break after ±, so that a narrow column breaks before it."""
+    return text.replace("± ", "±\u00a0")
+
+
 def estimated_error(c: Calibration) -> str:
     """Return a sentence on the estimated error of a calibrated acceleration; empty if unknown or refused."""
     error = c.quality.get("error_std") or {}

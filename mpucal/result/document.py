@@ -55,53 +55,34 @@ def to_document(fields: Mapping[str, Any], follows_temperature: bool) -> dict[st
     return {key: plain(value) for key, value in values.items()}
 
 
-def _check_format(document: Mapping[str, Any]) -> None:
-    if document.get("format") != FORMAT:
-        raise ValueError(f'"format" is {reprlib.repr(document.get("format"))}, not {FORMAT!r}')
-    version = document.get("version", VERSION)
-    if isinstance(version, int) and version > VERSION:
-        raise ValueError(f"version {version} is newer than {VERSION}")
-
-
 def from_document(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments of a Calibration; unknown keys are ignored, missing ones get its defaults.
 
     Raises
     ------
-    ValueError, KeyError, TypeError, AttributeError : it is not such a document.
+    ValueError : the document, or one in `others`, does not satisfy its schema, or holds numbers that cannot be used.
     """
-    _check_format(document)
-    for key in ("D", "b_a"):
-        if key not in document["accelerometer"]:
-            raise KeyError(key)
+    if not isinstance(document, Mapping):
+        raise ValueError(f"it is a {type(document).__name__}, not an object")
+    if document.get("format") != FORMAT:
+        raise ValueError(f'"format" is {reprlib.repr(document.get("format"))}, not {FORMAT!r}')
+    version = document.get("version", VERSION)
+    if isinstance(version, int) and version > VERSION:
+        raise ValueError(f"version {version} is newer than {VERSION}")
+    check_document({"version": VERSION, **document})
+    for one in (document, *document.get("others", ())):
+        _check_numbers(one)
     return {
         "D": np.full((3, 3), np.nan),
         "b_a": np.full(3, np.nan),
         **_arrays(document),
         **({KEY: from_lower(_array(document[KEY], LOWER[0].shape))} if KEY in document else {}),
-        "fit": dict(document.get("fit", {})),
-        "quality": dict(document.get("quality", {})),
+        "fit": document.get("fit", {}),
+        "quality": document.get("quality", {}),
         "sensor": Sensor.of(document.get("sensor", {})),
-        "created": _date(document.get("created") or ""),
+        "created": _date(document.get("created", "")),
         "extra": {key: document[key] for key in EXTRA if key in document},
     }
-
-
-def check(document: Any) -> dict[str, Any]:
-    """Return a document from a file if it satisfies its schema and D and K can be inverted, also those in `others`.
-
-    Raises
-    ------
-    ValueError : the first error.
-    """
-    if not isinstance(document, dict):
-        raise ValueError(f"it is a {type(document).__name__}, not an object")
-    _check_format(document)
-    document.setdefault("version", VERSION)
-    check_document(document)
-    for one in (document, *document.get("others", ())):
-        _check_numbers(one)
-    return document
 
 
 def digest(document: Mapping[str, Any]) -> str:
@@ -131,7 +112,7 @@ def _doubles(value: Any) -> Any:
 
 
 def drop_unserialisable(fields: Mapping[str, Any]) -> dict[str, Vector]:
-    """Return a Calibration's arrays by name, with NaN for numbers and matrices that `check` refuses."""
+    """Return a Calibration's arrays by name, with NaN for numbers and matrices that a reader refuses."""
     arrays = {
         name: np.where(np.abs(fields[name]) <= LARGEST, fields[name], np.nan)
         for part, _, name, _ in ARRAYS
@@ -186,13 +167,12 @@ def _arrays(document: Mapping[str, Any]) -> dict[str, Vector]:
     }
 
 
-def _date(text: Any) -> str:
+def _date(text: str) -> str:
     """Return a time of ISO 8601, or "" if it is unknown."""
-    if text == "":
-        return ""
-    if not isinstance(text, str) or not DATE.fullmatch(text):
-        raise ValueError(f"created is {reprlib.repr(text)}, which is not an ISO 8601 time")
-    datetime.fromisoformat(text)
+    if text:
+        if not DATE.fullmatch(text):
+            raise ValueError(f"created is {reprlib.repr(text)}, which is not an ISO 8601 time")
+        datetime.fromisoformat(text)
     return text
 
 

@@ -21,32 +21,35 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 
 AXES = "xyz"
 MG_PER_MPS2 = 1000.0 / STANDARD_GRAVITY_MPS2
+# 0, and NaN on the diagonal: no axis is misaligned to itself
+OFF_DIAGONAL = np.where(np.eye(3, dtype=bool), np.nan, 0.0)
 
 
 def scale_factor_error(M: Vector) -> Vector:
-    """Return (3,) % of x, y, z from the matrix M (3, 3)."""
-    return np.asarray(100.0 * (np.diag(M) - 1.0))
+    """Return (..., 3) % of x, y, z from matrices M (..., 3, 3)."""
+    return 100.0 * (_diagonal(M) - 1.0)
 
 
 def scale_factor_error_std(M_std: Vector) -> Vector:
-    """Return (3,) % from the standard deviations (3, 3) of M."""
-    return np.asarray(100.0 * np.diag(M_std))
+    """Return (..., 3) % from the standard deviations (..., 3, 3) of M."""
+    return 100.0 * _diagonal(M_std)
 
 
 def misalignment(M: Vector) -> Vector:
-    """Return (3, 3) deg, where [i, j] is misalignment i->j; NaN on the diagonal."""
-    angle = np.degrees(np.arctan2(M, np.diag(M)[:, None]))
-    np.fill_diagonal(angle, np.nan)
-    return np.asarray(angle)
+    """Return (..., 3, 3) deg, where [i, j] is misalignment i->j; NaN on the diagonal."""
+    return np.asarray(np.degrees(np.arctan2(M, _diagonal(M)[..., None])) + OFF_DIAGONAL)
 
 
 def misalignment_std(M: Vector, M_std: Vector) -> Vector:
-    """Return the standard deviations (3, 3) of `misalignment` [deg]; NaN on the diagonal."""
-    along, along_std = np.diag(M)[:, None], np.diag(M_std)[:, None]
+    """Return the standard deviations (..., 3, 3) of `misalignment` [deg]; NaN on the diagonal."""
+    along, along_std = _diagonal(M)[..., None], _diagonal(M_std)[..., None]
     with np.errstate(divide="ignore", invalid="ignore"):
         std = np.degrees(np.hypot(along * M_std, M * along_std) / (M**2 + along**2))
-    np.fill_diagonal(std, np.nan)
-    return np.asarray(std)
+    return np.asarray(std + OFF_DIAGONAL)
+
+
+def _diagonal(M: Vector) -> Vector:
+    return np.diagonal(M, axis1=-2, axis2=-1)
 
 
 def bias_mg(b: Vector) -> Vector:
