@@ -276,9 +276,9 @@ def test_an_accelerometer_that_dies_is_refused_and_its_calibration_can_be_read(a
     assert Calibration.load(tmp_path / "calibration.json") == calibration
 
 
-@pytest.mark.parametrize(("first", "last"), [(1900, 2050), (0, 900)], ids=["a second", "at rest"])
-def test_an_axis_that_repeats_for_a_second_or_at_rest_is_not_stuck(in_hand, first, last):
-    assert "bits_stuck" not in judged(changed(put(slice(first, last), 2, None))(in_hand.recording))[1]
+def test_an_axis_that_repeats_for_a_second_or_at_rest_is_not_stuck(in_hand):
+    for rows in (slice(1900, 2050), slice(0, 900)):
+        assert "bits_stuck" not in judged(changed(put(rows, 2, None))(in_hand.recording))[1]
 
 
 def test_one_turn_leaves_the_axis_of_the_turn_unknown(bases):

@@ -27,7 +27,7 @@ def tilts(angle_rad, around=8):
 
 
 def tilted(seed):
-    """Return ten seconds flat, then a move of 1.6 s to each tilt and a rest of 2 s; and gravity's path (n, 3)."""
+    """Return ten seconds flat, then a move of 1.6 s to each tilt and a rest of 2 s."""
     rng = np.random.default_rng(seed)
     ups = tilts(TILT_RAD)
     s, rate = [np.tile(ups[0], (1000, 1))], [np.zeros((1000, 3))]
@@ -40,38 +40,24 @@ def tilted(seed):
     n = len(path)
     acc = path @ D.T + B_A + rng.normal(scale=0.03, size=(n, 3))
     gyr = rates + B_OMEGA + rng.normal(scale=0.002, size=(n, 3))
-    return Recording.from_arrays(np.arange(n) / RATE_HZ, acc, gyr), path
+    return Recording.from_arrays(np.arange(n) / RATE_HZ, acc, gyr)
 
 
 def fitted(recording):
     return fit_tilt(recording, flat_statistics(recording, find_flat(recording)), GRAVITY_MPS2)
 
 
-@pytest.fixture(scope="module")
-def found():
-    recording, path = tilted(1)
-    return fitted(recording), recording, path
-
-
-def test_gravity_is_right_where_the_board_was_tilted(found):
-    fit, recording, path = found
-    assert fit.converged
-    calibrated = (recording.acc - fit.b_a) @ np.linalg.inv(fit.D).T
-    raw = np.linalg.norm((recording.acc - path)[1000:].mean(0))
-    assert np.abs((calibrated - path)[1000:].mean(0)).max() < 0.05 * raw
-    assert np.sqrt(np.mean((calibrated - path)[1000:] ** 2)) < 0.06
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_errors_are_within_their_standard_deviations(seed):
-    fit = fitted(tilted(seed)[0])
+    fit = fitted(tilted(seed))
+    assert fit.converged
     z = np.append((fit.D - D).ravel(), fit.b_a - B_A) / fit.std(*D_NAMES, *B_A_NAMES)
     assert np.abs(z).max() < 3.5
     assert np.sqrt(np.mean(z**2)) < 1.5
 
 
-def test_parameters_that_tilts_do_not_show_are_named_and_keep_their_prior(found):
-    fit = found[0]
+def test_parameters_that_tilts_do_not_show_are_named_and_keep_their_prior():
+    fit = fitted(tilted(1))
     # Near level, a gain of the vertical has the effect of its bias, and the others' gains are cosines.
     left = {name for name in fit.at_prior if name in D_NAMES + B_A_NAMES}
     assert left == {"D_xx", "D_yy", "D_zz", "b_a_z"}
