@@ -12,9 +12,6 @@ from ..terminal.console import count, groups, plain
 from ..terminal.view import View
 from ..terminal.voice import Said, in_words
 
-# Number of messages that are kept.
-NOTES = 30
-
 
 def state(view: View, said: Said | None = None) -> dict[str, Any]:
     """Return the view's values and what was `said` last by name, not yet as JSON; see `changes`."""
@@ -37,7 +34,7 @@ def state(view: View, said: Said | None = None) -> dict[str, Any]:
         "held": view.held,
         "seen": view.seen,
         "verified": view.verified,
-        "notes": view.notes[-NOTES:],
+        "notes": view.notes,
         "begun_s": view.begun_s,
     }
 

@@ -32,6 +32,7 @@ class Aim:
     Attributes
     ----------
     target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
+    least_of_vehicle : the same of a vehicle, whose samples are filtered, rounded, or late.
     longest_s : time limit of the turning [s]. verify : number of new orientations for the verification.
     sides : orientations that are enough for a vehicle that is put down in each, in place of `least`; 0: they are not.
     flat_s : time for which the board lies flat first.
@@ -39,6 +40,7 @@ class Aim:
 
     target: Target
     least: int
+    least_of_vehicle: int
     longest_s: float
     verify: int
     sides: int = 0
@@ -47,14 +49,12 @@ class Aim:
 
 AIMS: Mapping[str, Aim] = MappingProxyType(
     {
-        "quick": Aim(Target(0.3, 0.15, 3.0), least=8, longest_s=60.0, verify=2),
-        "normal": Aim(Target(0.1, 0.05, 1.0), least=10, longest_s=120.0, verify=3),
-        "best": Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
+        "quick": Aim(Target(0.3, 0.15, 3.0), least=8, least_of_vehicle=8, longest_s=60.0, verify=2),
+        "normal": Aim(Target(0.1, 0.05, 1.0), least=10, least_of_vehicle=14, longest_s=120.0, verify=3),
+        "best": Aim(Target(0.04, 0.02, 0.4), least=14, least_of_vehicle=14, longest_s=240.0, verify=3),
     }
 )
 NORMAL = "normal"
-# A vehicle's samples are filtered, rounded, or taken at other times than they say: they need more orientations.
-LEAST_OF_VEHICLE = 14
 # An autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows what is left of it.
 FLAT_OF_VEHICLE_S = 5.0
 # Directions that point down on the six sides of a vehicle, as a pilot takes them: level, left, right, nose down, nose
@@ -68,8 +68,7 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     aim = AIMS[target]
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
-    least = LEAST_OF_VEHICLE if target == NORMAL else aim.least
-    return replace(aim, least=least, sides=len(SIDES), flat_s=FLAT_OF_VEHICLE_S)
+    return replace(aim, least=aim.least_of_vehicle, sides=len(SIDES), flat_s=FLAT_OF_VEHICLE_S)
 
 
 def unseen_rad(tilt_only: bool) -> float:

@@ -23,8 +23,6 @@ STILL_S, MOVING_S = 0.2, 2.0
 CORRECT_RAD_S = math.radians(60.0)
 # Until the end of the flat rest, a board at rest is turned about the vertical towards straight, at most so fast.
 STRAIGHTEN_RAD_S = math.radians(30.0)
-# An accelerometer that reads less is in free fall, or dead.
-FALLING_MPS2 = 1e-3
 # A board that lies on its component side was turned over about its x axis.
 _LAID, _TURNED_OVER = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
 
@@ -77,11 +75,11 @@ class Attitude:
         if not self._begun:
             self._begun = True
             x, y, z = acc
-            self._q = straight((x / force, y / force, z / force) if force >= FALLING_MPS2 else (0.0, 0.0, 1.0))
+            self._q = straight((x / force, y / force, z / force) if force else (0.0, 0.0, 1.0))
             return
         q = compose(self._q, from_vector(rate[0] * seconds, rate[1] * seconds, rate[2] * seconds))
-        # In free fall no direction is up, and the gyroscope alone carries the attitude.
-        if force >= FALLING_MPS2:
+        # A dead accelerometer shows no direction, and the gyroscope alone carries the attitude.
+        if force:
             x, y, z = rotate(q, acc)
             aside = math.hypot(x, y)
             missing = math.atan2(aside, z)

@@ -22,7 +22,6 @@ SAME_RAD = math.radians(2.0)
 # Least spread of the directions, where 1.0 is evenly over the sphere. Varied orientations exceed it several times; the
 # six faces, or tilts about one axis, stay below it by orders of magnitude.
 SPREAD = 0.05
-_UNIFORM = 2.0 / 15.0
 
 
 class Directions:
@@ -61,7 +60,7 @@ class Directions:
         if not len(self):
             return 0.0
         p = _monomials(self.units)
-        return float(np.linalg.eigvalsh(p.T @ p / len(p))[0]) / _UNIFORM
+        return float(np.linalg.eigvalsh(p.T @ p / len(p))[0]) / (2.0 / 15.0)
 
 
 class Coverage:

@@ -11,16 +11,13 @@ from ..rests.windows import Windows
 from .aims import FLAT_S
 from .boards import BOARD, KINDS
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
-from .step import SAY_AGAIN_S, Step
+from .step import PATIENCE_S, SAY_AGAIN_S, Step
 
 WINDOW_S = 0.5
-# Least rest after which Enter goes on.
+# Least rest after which Enter goes on, and whose end is worth a caution.
 SHORTEST_S = 2.0
 # Least rest in a recording without a session, whose person knew of no countdown.
 RECORDED_S = 5.0
-PATIENCE_S = 60.0
-# Shorter stillness is interrupted without a caution.
-WORTH_SAYING_S = 1.0
 # Remedy for missing samples, for every source.
 LOST = "check the wires or the link, end other programs, or take a lower --rate"
 
@@ -98,7 +95,7 @@ class LayFlat(Step):
         """Return the countdown, after a caution if the board was moved since it was still last."""
         outputs: list[Output] = []
         before, self._still = self._still, still
-        if before is not None and still.run != before.run and before.seconds >= WORTH_SAYING_S:
+        if before is not None and still.run != before.run and before.seconds >= SHORTEST_S:
             self._cautioned_s = t_s
             what, remedy = f"the board was moved: {self._motion}", "let go of it; the countdown starts again"
             outputs.append(Caution(t_s, "moved", what, remedy))
@@ -107,7 +104,7 @@ class LayFlat(Step):
     def _moved(self, moved: Moved, t_s: float) -> list[Output]:
         self._motion = moved.what
         outputs = self._countdown(t_s, "waiting for the board to be still", paused=True)
-        if moved.after_s >= WORTH_SAYING_S or t_s - self._cautioned_s >= SAY_AGAIN_S:
+        if moved.after_s >= SHORTEST_S or t_s - self._cautioned_s >= SAY_AGAIN_S:
             self._cautioned_s = t_s
             remedy = LOST if moved.lost else "put it on a firm surface and let go of it"
             outputs.append(Caution(t_s, "trembling", f"not still: {moved.what}", remedy))

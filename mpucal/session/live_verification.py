@@ -17,10 +17,9 @@ from ..rests.intervals import RestFinder
 from ..result.calibration import REFUSED, USABLE, Calibration
 from ..result.keys import Quality
 from .events import Checked, Verification, triple
+from .rotate import REST_S
 
 AXES = "xyz"
-# A board is not held still deliberately for a shorter time.
-SHORTEST_REST_S = 0.5
 # A shorter turn shows too little of a scale factor error to blame one.
 LEAST_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
@@ -43,7 +42,7 @@ def _fitted_directions(evidence: Evidence) -> Vector:
     r, fit, flat = evidence.recording, evidence.fit, evidence.flat
     if fit is None or flat is None:
         return np.zeros((0, 3))
-    shortest = SHORTEST_REST_S * r.rate_hz
+    shortest = REST_S * r.rate_hz
     means = [r.acc[a:b].mean(0) for a, b in RestFinder(r, flat).typical() if b - a >= shortest]
     up = np.linalg.solve(fit.D, (np.reshape(means, (-1, 3)) - fit.b_a).T).T
     return np.asarray(-up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9))

@@ -95,9 +95,7 @@ class Machine:
         ------
         IllegalEvent : the event is not legal in this state, which does not change.
         """
-        before, self.state = self.state, next_state(self.state, event)
-        # The person may begin a step anew, too.
-        begins = self.state is not before or (isinstance(event, Redo) and self.state is State.ROTATE)
+        self.state, begins = next_state(self.state, event)
         outputs = [*self._react(event, begins), *(self._begin() if begins else [])]
         return [speak_of(output, self._plan.board) for output in outputs]
 

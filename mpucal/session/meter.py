@@ -13,9 +13,8 @@ from ..rests.stillness import Detector, Moved
 from ..rests.windows import Window, Windows
 from .attitude import Attitude, canonical, compose, from_vector, rotate, turned_up, yaw_between
 from .events import Caution, Direction, Meter, Output, Quaternion, down_of
-from .step import SAY_AGAIN_S
+from .step import SAY_AGAIN_S, WINDOW_S
 
-WINDOW_S = 0.25
 NEAR_RANGE = 0.8
 
 

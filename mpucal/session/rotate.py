@@ -33,13 +33,12 @@ from .events import (
     triple,
 )
 from .plan import Plan
-from .step import ENOUGH, HOLD_S, PLACED_S, End, Pause, PoseStep, classify_use, countdown, held
+from .step import ENOUGH, HOLD_S, PATIENCE_S, PLACED_S, WAIT_S, End, Pause, PoseStep, classify_use, countdown, held
 
 PASS_WINDOW_S = 0.1
 # Least length of a pause. A fit uses shorter rests, too.
 PAUSE_S = 1.0
 REST_S = 0.5
-PATIENCE_S = 60.0
 # Nine tilts may be asked for; a sloppy hand makes this many different ones of them.
 TILTS = 6
 # Beyond these the hand's own acceleration hides the direction of gravity [m/s^2].
@@ -49,8 +48,6 @@ LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 KNOW_EVERY_S = REPORT_EVERY_S = 1.0
 # Interval of the fits while no new orientation is seen, which tell little that is new.
 SHOW_EVERY_S = 5.0
-# Session time after which the answer of a fit is taken.
-WAIT_S = 0.5
 # Least number of orientations that show a pace, and number of those left from which on the information must be known:
 # at least this share of what the target needs.
 LEAST_FOR_PACE, NEAR_THE_END, LEAST_KNOWN = 3, 3, 0.25

@@ -83,8 +83,10 @@ HOLD_S = 1.25
 PLACED_S, NEWEST = 3.0, 2
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0
-# A check and a verification end after this time without a new orientation.
-PATIENCE_S = 40.0
+# Rests, turnings and questions end after this time without progress; a check and a verification after the second one.
+PATIENCE_S, VERIFY_PATIENCE_S = 60.0, 40.0
+# Session time after which the answer of a fit is taken.
+WAIT_S = 0.5
 # A board this near to the wanted orientation is in it.
 WANTED_RAD = math.radians(15.0)
 USE_TEXTS = {

@@ -41,53 +41,46 @@ class State(StrEnum):
     ABORTED = "aborted"
 
 
-def _stay(state: State, *events: type[Event]) -> dict[type[Event], State]:
-    """Return the rows of events that leave the session in `state`."""
-    return dict.fromkeys(events, state)
-
-
 # States that need samples.
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
-# An event that a row does not name is illegal in that state.
+# Events that a state takes and that leave it as it is.
+_KEYS = (Enough, Redo)
+_SAMPLES = (Measured, Tick, Resumed, Enough)
+TAKEN: Mapping[State, tuple[type[Event], ...]] = MappingProxyType(
+    {
+        State.CONNECT: _KEYS,
+        State.LAY_FLAT: (*_SAMPLES, Redo),
+        State.ROTATE: (*_SAMPLES, Learnt),
+        State.VERIFY: (*_SAMPLES, Learnt, Tried, Checked),
+        State.CALIBRATE: _KEYS,
+        State.WRITE: _KEYS,
+    }
+)
+# Events that begin a state, which may be the present one. An event that neither table names is illegal in that state.
 TRANSITIONS: Mapping[State, Mapping[type[Event], State]] = MappingProxyType(
     {
-        State.CONNECT: {
-            **_stay(State.CONNECT, Enough, Redo),
-            Connected: State.LAY_FLAT,
-            SourceEnded: State.ABORTED,
-            Abort: State.ABORTED,
-        },
+        State.CONNECT: {Connected: State.LAY_FLAT, SourceEnded: State.ABORTED, Abort: State.ABORTED},
         State.LAY_FLAT: {
-            **_stay(State.LAY_FLAT, Measured, Tick, Resumed, Enough, Redo),
             Rested: State.ROTATE,
             Stopped: State.ABORTED,
             SourceEnded: State.ABORTED,
             Abort: State.ABORTED,
         },
         State.ROTATE: {
-            **_stay(State.ROTATE, Measured, Tick, Learnt, Resumed, Enough, Redo),
+            Redo: State.ROTATE,
             Turned: State.VERIFY,
             Finished: State.CALIBRATE,
             SourceEnded: State.CALIBRATE,
             Abort: State.ABORTED,
         },
         State.VERIFY: {
-            **_stay(State.VERIFY, Measured, Tick, Learnt, Tried, Checked, Resumed, Enough),
             Redo: State.ROTATE,
             Finished: State.CALIBRATE,
             SourceEnded: State.CALIBRATE,
             Abort: State.ABORTED,
         },
-        State.CALIBRATE: {
-            **_stay(State.CALIBRATE, Enough, Redo),
-            Fitted: State.WRITE,
-            Abort: State.ABORTED,
-        },
-        State.WRITE: {
-            **_stay(State.WRITE, Enough, Redo),
-            Written: State.DONE,
-            Abort: State.ABORTED,
-        },
+        State.CALIBRATE: {Fitted: State.WRITE, Abort: State.ABORTED},
+        State.WRITE: {Written: State.DONE, Abort: State.ABORTED},
         State.DONE: {},
         # Resumed after a board that was never still, for example: there is no flat rest yet.
         State.ABORTED: {Resumed: State.LAY_FLAT},
@@ -99,14 +92,15 @@ class IllegalEvent(Exception):  # noqa: N818 - named by what went wrong
     """Event that is not legal in the machine's state: a programming error of its owner."""
 
 
-def next_state(state: State, event: Event) -> State:
-    """Return the state to which `event` leads from `state`.
+def next_state(state: State, event: Event) -> tuple[State, bool]:
+    """Return the state after an event, and True if the event begins it.
 
     Raises
     ------
-    IllegalEvent : the table holds no such transition.
+    IllegalEvent : the tables do not name the event in this state.
     """
-    try:
-        return TRANSITIONS[state][type(event)]
-    except KeyError:
-        raise IllegalEvent(f"{type(event).__name__} in state {state}") from None
+    if (begun := TRANSITIONS[state].get(type(event))) is not None:
+        return begun, True
+    if type(event) in TAKEN.get(state, ()):
+        return state, False
+    raise IllegalEvent(f"{type(event).__name__} in state {state}")

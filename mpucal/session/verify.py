@@ -30,7 +30,19 @@ from .events import (
     triple,
 )
 from .plan import Plan
-from .step import ENOUGH, HOLD_S, PATIENCE_S, Pause, PoseStep, classify_use, countdown, held, is_wanted
+from .step import (
+    ENOUGH,
+    HOLD_S,
+    PATIENCE_S,
+    VERIFY_PATIENCE_S,
+    WAIT_S,
+    Pause,
+    PoseStep,
+    classify_use,
+    countdown,
+    held,
+    is_wanted,
+)
 
 # Bias and scale factor errors bend raw directions by up to a tenth: these must be farther apart by that.
 BENT = 1.1
@@ -38,10 +50,6 @@ BENT = 1.1
 ASKED_FOR_RAD = math.radians(25.0)
 # Session time after which the first calibration is taken; the person turns the board meanwhile.
 TRY_WAIT_S = 3.0
-# Session time after which its comparison with the new orientations is taken.
-CHECK_WAIT_S = 0.5
-# Time for which a person may decide to turn the board again.
-OFFERED_S = 60.0
 # Number of orientations that may be requested in place of ones that the calibration has seen after all.
 MOST_MORE = 2
 
@@ -75,7 +83,7 @@ class Verify(PoseStep):
         if self._begun_s is None:
             self._begun_s = self._prompted_s = t_s
         if self._refusal is not None:
-            return [self._refusal] if t_s - self._begun_s >= OFFERED_S else []
+            return [self._refusal] if t_s - self._begun_s >= PATIENCE_S else []
         outputs: list[Output | Finished] = []
         for pause in self._pauses.add(samples):
             use = self._classify_use(pause)
@@ -84,11 +92,11 @@ class Verify(PoseStep):
         if self._requested:
             return outputs
         outputs += self._remind(t_s, self._prompted_s, "this orientation has not been held yet")
-        if t_s - self._begun_s < PATIENCE_S:
+        if t_s - self._begun_s < VERIFY_PATIENCE_S:
             return outputs
         if self._number:
             self._requested = True
-            return [*outputs, RequestFit(FitKind.CHECK, CHECK_WAIT_S, self._of)]
+            return [*outputs, RequestFit(FitKind.CHECK, WAIT_S, self._of)]
         not_shown = reason("verification_failed", "not_shown")
         self.checked = Checked((), None, not_shown)
         return [*outputs, Finished(not_shown.what)]
@@ -154,7 +162,7 @@ class Verify(PoseStep):
         progress = Progress(pause.t_s, self._number, self._of, text, left_s or None)
         if self._number == self._of:
             self._requested = True
-            return [held(pause, use), progress, RequestFit(FitKind.CHECK, CHECK_WAIT_S, self._of)]
+            return [held(pause, use), progress, RequestFit(FitKind.CHECK, WAIT_S, self._of)]
         self.prompt = self._next(self.prompt)
         return [held(pause, use), progress, self.prompt]
 
@@ -212,8 +220,8 @@ class CheckPoses(PoseStep):
                 outputs += self._hold(pause)
         if self._number == ORIENTATIONS:
             return [*outputs, Finished(f"{ORIENTATIONS} orientations: done")]
-        if t_s - self._begun_s >= PATIENCE_S:
-            return [*outputs, Finished(f"no new orientation for {PATIENCE_S:.0f} s")]
+        if t_s - self._begun_s >= VERIFY_PATIENCE_S:
+            return [*outputs, Finished(f"no new orientation for {VERIFY_PATIENCE_S:.0f} s")]
         return [*outputs, *self._remind(t_s, self._prompted_s, "no new orientation for a while")]
 
     def _hold(self, pause: Pause) -> list[Output]:

@@ -7,19 +7,17 @@ import textwrap
 from rich.text import Text
 
 from ..session.events import PromptKind
+from ..session.step import SAY_AGAIN_S
 from .console import Group, groups, sentence
 from .letters import Glyphs
 from .view import View
 
 KNOWLEDGE_ROWS = 3
 _LABEL, _NEEDLE = 19, 20
-_WIDE = 110
 # Text is wrapped to at least this width; on narrower screens it is cut.
 NARROWEST = 12
-# Time for which a caution is highlighted.
-LOUD_S = 6.0
-# Below this width values are shown without bars.
-NARROW = 60
+# Below the first width no bars are shown; from the second on letters are large, and the values are those of all axes.
+NARROW, LARGE_COLUMNS = 60, 120
 KEYS_NARROW, KEYS_REDO_NARROW = "Enter: skip  q: stop", "Enter: skip  r: again  q: stop"
 KEYS = "Enter: skip ahead    q or Ctrl-C: stop"
 KEYS_REDO = "Enter: skip ahead    r: restart the turning    q or Ctrl-C: stop"
@@ -73,7 +71,7 @@ def caution_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
         rows, style = (f"! {sentence(doubt)}" if doubt else "", ""), "bold yellow"
     else:
         age_s = view.now_s - c.t_s
-        loud = age_s <= LOUD_S
+        loud = age_s <= SAY_AGAIN_S
         rows = (f"! {sentence(c.what)}{'' if loud else f' ({age_s:.0f} s ago)'}", f"{glyphs.arrow} {sentence(c.do)}")
         style = "bold yellow reverse" if loud else "dim"
     width = max(columns - 2, NARROWEST)
@@ -97,7 +95,7 @@ def _progress(view: View, glyphs: Glyphs) -> list[Text]:
 
 def _group(group: Group, columns: int, glyphs: Glyphs) -> Text:
     """Return the row of a group: its least certain axis, or all three where there is space."""
-    shown = range(3) if columns >= _WIDE else (group.worst,)
+    shown = range(3) if columns >= LARGE_COLUMNS else (group.worst,)
     values = "  ".join(f"{'xyz'[i]} {group.text(i)}" for i in shown)
     if columns < NARROW:
         return Text(f" {group.name:<{_LABEL}}{values}")

@@ -65,10 +65,8 @@ def console(
     return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False, title=title, board=board)
 
 
+# Least time between two lines of progress.
 PROGRESS_EVERY_S = 1.0
-KNOWLEDGE_EVERY_S = 5.0
-# Least time between two cautions of one kind.
-CAUTION_EVERY_S = 5.0
 KEYS = "(Enter: skip ahead; r and Enter: restart the turning; q and Enter, or Ctrl-C: stop.)"
 BELL = "\a"
 
@@ -87,19 +85,19 @@ class Lines:
         self._open = True
         self._prompt: Prompt | None = None
         self._last = ""
-        self._due_s: dict[str, float] = {}
+        self._due_s = -math.inf
 
     def hear(self, output: Output) -> None:
-        """Print an output, unless it is repeated too soon."""
+        """Print an output; progress once a second."""
         match output:
             case Prompt():
                 self._say_prompt(output)
-            case Progress(t_s, _, _, text) if text != self._last and self._is_due("progress", t_s, PROGRESS_EVERY_S):
-                self._last = text
+            case Progress(t_s, _, _, text) if text != self._last and t_s >= self._due_s - 1e-6:
+                self._last, self._due_s = text, t_s + PROGRESS_EVERY_S
                 self.say(f"  {text}")
-            case Knowledge() if self._is_due("knowledge", output.t_s, KNOWLEDGE_EVERY_S):
+            case Knowledge():
                 self.say(f"  {known(output)}")
-            case Caution(t_s, code, what, do) if self._is_due(code, t_s, CAUTION_EVERY_S):
+            case Caution(_, _, what, do):
                 self.say(f"  ! {sentence(what)} {sentence(do)}")
             case Verification():
                 self.say(f"  {output.text}")
@@ -141,12 +139,6 @@ class Lines:
         keys = "" if self._explained else f"\n  {KEYS}"
         self._explained = True
         self.say(f"{bell}\n{HEADLINES[prompt.kind]}\n  {prompt.text}{keys}\n")
-
-    def _is_due(self, name: str, t_s: float, every_s: float) -> bool:
-        if t_s < self._due_s.get(name, -math.inf) - 1e-6:
-            return False
-        self._due_s[name] = t_s + every_s
-        return True
 
 
 class JsonLines(Lines):

@@ -21,7 +21,6 @@ _WORDS = {
     "quit": Key.ABORT,
 }
 _ENDING = (signal.SIGINT, signal.SIGTERM)
-_AT_ONCE = 64
 # A Ctrl-C that the reading loop has not taken after this time interrupts it: it may hang on a device.
 PATIENCE_S = 0.25
 
@@ -89,7 +88,7 @@ class Keys:
         if not self._single:
             line = keyboard.readline()
             return [line.strip().lower()] if line else None
-        data = os.read(keyboard.fileno(), _AT_ONCE)
+        data = os.read(keyboard.fileno(), 64)
         return _words(data.decode("latin-1")) if data else None
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:

@@ -8,21 +8,20 @@ from rich.text import Text
 
 from ..session.events import PromptKind
 from . import letters, pictures
-from .bars import NARROWEST, caution_rows, keys, knowledge_rows, meter
+from .bars import LARGE_COLUMNS, NARROW, NARROWEST, caution_rows, keys, knowledge_rows, meter
 from .console import count, sentence
 from .letters import Glyphs
 from .view import View
 
 # Smaller screens show text only.
-LEAST_COLUMNS, LEAST_ROWS = 60, 20
-LARGE_COLUMNS, LARGE_ROWS, AIRY_ROWS = 120, 40, 30
+LEAST_ROWS, LARGE_ROWS, AIRY_ROWS = 20, 40, 30
 _PROMPT_ROWS, _LEAST_PICTURE_ROWS = 2, 5
 _BLANK = Text("")
 
 
 def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     """Return exactly `rows` lines of at most `columns` characters."""
-    roomy = columns >= LEAST_COLUMNS and rows >= LEAST_ROWS
+    roomy = columns >= NARROW and rows >= LEAST_ROWS
     air = [_BLANK] if rows >= AIRY_ROWS else []
     headline = _headline(view, columns, rows, glyphs)
     # A headline of two lines leaves one row less.
@@ -57,7 +56,7 @@ def _status(view: View, columns: int, glyphs: Glyphs) -> Text:
         if view.meter.temperature_c is not None:
             facts.insert(1, f"{view.meter.temperature_c:.1f} °C")
     # A narrow screen keeps the clock alone.
-    right = "   ".join(facts) if columns >= LEAST_COLUMNS else facts[-1]
+    right = "   ".join(facts) if columns >= NARROW else facts[-1]
     # Replacements may be longer, and the clock comes last.
     right, title = (text.translate(glyphs.replacements) for text in (right, view.title))
     space = max(columns - len(right) - 3, 1)

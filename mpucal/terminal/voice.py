@@ -13,10 +13,8 @@ CONNECTING = "Connecting"
 HOLD = "Hold still"
 # Time for which a change of the moment lasts before it contradicts what was said.
 SETTLED_S = 1.0
-# Interval at which the instruction to turn is repeated.
+# Interval at which the instruction to turn is repeated; older cautions are not said.
 REPEAT_S = 5.0
-# Cautions that are older are not said.
-LATE_S = 3.0
 
 
 class Tone(StrEnum):
@@ -85,7 +83,7 @@ class Voice:
                 return
         if view.caution is not self._caution and self._may_caution(view):
             self._caution = view.caution
-            if view.caution is not None and self._t_s - view.caution.t_s < LATE_S:
+            if view.caution is not None and self._t_s - view.caution.t_s < REPEAT_S:
                 self._say(f"{view.caution.what}. {view.caution.do}", Tone.WRONG)
                 return
         self._instruct(view)

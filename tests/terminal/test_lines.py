@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from mpucal.session.events import Caution, Decision, Prompt, PromptKind
+from mpucal.session.events import Decision, Prompt, PromptKind
 from mpucal.terminal.console import JsonLines, Lines
 from mpucal.terminal.keys import Keys
 
@@ -23,17 +23,6 @@ def test_the_bell_rings_at_new_prompts_only(out):
     silent = io.StringIO()
     Lines(silent, Keys()).hear(Prompt(PromptKind.ROTATE, "Now turn it."))
     assert "\a" not in silent.getvalue()
-
-
-def test_the_same_warning_is_not_repeated_at_once(out):
-    lines = Lines(out, Keys())
-    for t_s, code in ((1.0, "too_fast"), (2.0, "too_fast"), (2.5, "clipped"), (6.5, "too_fast")):
-        lines.hear(Caution(t_s, code, f"{code} at {t_s}", "turn more slowly"))
-    assert out.getvalue().splitlines() == [
-        "  ! Too_fast at 1.0. Turn more slowly.",
-        "  ! Clipped at 2.5. Turn more slowly.",
-        "  ! Too_fast at 6.5. Turn more slowly.",
-    ]
 
 
 def test_a_whole_session_is_told(out, session):
