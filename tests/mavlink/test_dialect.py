@@ -59,12 +59,6 @@ def test_a_damaged_packet_is_left_out(packets, data):
     assert bytes(packet) not in data_of(found) or found[0].message.get_type().startswith("UNKNOWN")
 
 
-def test_a_cut_datagram_leaves_nothing_to_the_next(packets):
-    parse = parser()
-    assert parse.datagram(bytes(packets[1][:-3])) == []
-    assert data_of(parse.datagram(bytes(packets[1]))) == [bytes(packets[1])]
-
-
 @given(mg=st.floats(-16000, 16000), mrad_s=st.floats(-32000, 32000))
 def test_a_truncated_value_is_centred(station, decoded, mg, mrad_s):
     content = decode_reading(decoded(station().raw(1, (int(mg), 0, -1000), (0, int(mrad_s), 0))))

@@ -83,14 +83,6 @@ def test_a_partner_that_was_named_is_spoken_to_at_once_and_no_vehicle_there_is_o
     assert [(t, address) for t, address, _ in transport.sent[:2]] == [(0.0, None), (1.0, None)]
 
 
-def test_a_second_vehicle_is_heard_where_the_first_comes_late(script, station):
-    late = [(t_s + 3, *rest) for t_s, *rest in heartbeats(station(), HOME)]
-    later = [(t_s + 3.7, *rest) for t_s, *rest in heartbeats(station(7), STRANGER)]
-    link = unlocked(script(in_order(late, later)))
-    assert [vehicle.system for vehicle in link.listen()] == [1, 7]
-    assert link.now_ns() == 5.5 * S
-
-
 def test_a_vehicle_that_comes_back_at_another_port_is_found_there_once_it_is_sought(script, station, decoded):
     moved, neighbour = "10.0.0.2:40001", "10.0.0.2:999"
     after = [(20.5 + k, moved, station().heartbeat()) for k in range(10)]

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from mpucal.errors import RecordingError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.parameters.encoding import (
-    error_name,
     from_wire,
     name_bytes,
     param_text,
@@ -46,11 +45,6 @@ def test_integers_travel_by_their_bytes_to_px4(kind, data):
         return
     parameter = sent("CAL_ACC0_ID", value, kind, True)
     assert (parameter.value, parameter.index, parameter.count) == (value, 7, 100)
-
-
-def test_errors_beyond_pymavlinks_enumeration_have_words():
-    assert error_name(7) == "it has another type"
-    assert error_name(99) == "error 99"
 
 
 @settings(max_examples=30)

@@ -22,7 +22,7 @@ from mpucal.files.messages import PACKETS
 from mpucal.files.tlog import read_tlog
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM
-from mpucal.mavlink.log import Log, read_log
+from mpucal.mavlink.log import read_log
 from mpucal.mavlink.texts import CHUNK, PREFIX, Note, NoteReader
 from mpucal.mavlink.tlog import RawPacket, TlogFile, encode_tlog
 from mpucal.session.plan import Plan
@@ -119,18 +119,6 @@ def test_a_parameter_that_changes_splits_a_log(station, made):
     recording = mpucal.load(made(packets))
     assert len(recording) == 300
     assert recording.autopilot.parameters["INS_ACCOFFS_X"] == 0.25
-
-
-def test_names_and_numbers_of_parameters_that_no_firmware_has_are_not_kept():
-    log = Log("ArduPilot")
-    for number in range(10_000):
-        log.add_parameter(f"P{number}", 1.0)
-    log.add_parameter("P1", 2.0)
-    for name in ("a\x1b[2J", "", "Ä"):
-        log.add_parameter(name, 1.0)
-    assert not {"a\x1b[2J", "", "Ä"} & set(log.segments[-1].parameters)
-    assert len(log.segments[-1].parameters) < 10_000
-    assert log.segments[-1].parameters["P1"] == 2.0
 
 
 def test_several_vehicles_are_listed_and_one_can_be_chosen(station, made):

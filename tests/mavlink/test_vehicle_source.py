@@ -9,7 +9,7 @@ import scipy
 from mpucal.errors import EndOfCapture, LinkError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.client import ParameterClient, read_stream_parameters, stream_parameter_names
+from mpucal.mavlink.parameters.client import ParameterClient
 from mpucal.mavlink.parameters.mounting import mounting
 from mpucal.mavlink.parameters.slots import ardupilot_slot
 from mpucal.mavlink.requests import check_prearm
@@ -69,11 +69,6 @@ def test_all_imus_are_recorded_by_their_truest_streams(opened, words, messages):
     assert set(t) <= set(recording.t)
     # That of IMU 1 is its own, and not the barometer's of HIGHRES_IMU.
     assert [r.temperature_c[-1] for r in recordings] == pytest.approx([26.2] * len(messages), abs=0.5)
-
-
-def test_no_parameter_is_given_up_where_one_packet_in_five_is_lost(simulated):
-    held = read_stream_parameters(simulated("imus=1,fault=loss").link, ARDUPILOT)
-    assert set(held) == set(stream_parameter_names(ARDUPILOT))
 
 
 def test_the_angles_of_a_board_that_is_turned_by_its_own_are_asked_for(opened):
@@ -264,9 +259,3 @@ def test_px4_says_whether_it_would_arm_though_it_does_not_list_the_check(simulat
     px4 = simulated(f"firmware=px4{words}")
     assert not px4.vehicle.firmware.sys_status().onboard_control_sensors_present & 0x10000000
     assert check_prearm(px4.link).ready is not bool(words)
-
-
-def test_px4_may_give_its_reasons_as_events_alone(simulated, monkeypatch):
-    px4 = simulated("firmware=px4")
-    monkeypatch.setattr(px4.vehicle.firmware, "complaints", lambda: ["in an event"])
-    assert str(check_prearm(px4.link)) == "would not arm: its events say why, as QGroundControl shows them"

@@ -110,16 +110,6 @@ def test_a_passing_fault_is_a_gap_at_most(name, gaps, lost_s):
     assert np.diff(recording.t).min() > 0
 
 
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [("stuck", "a wire holds SDA or SCL low"), ("unplugged", "nothing answers at 0x68")],
-)
-def test_a_lasting_fault_ends_with_its_cause(name, says):
-    recording, error = measured(suffering(Fault(name, 2.5)))
-    assert says in str(error)
-    assert len(recording) > 200
-
-
 # No driver can notice these.
 UNSEEN = {"low_byte", "high_bit"}
 places = st.builds(

@@ -146,25 +146,6 @@ def test_px4s_highres_imu_lacks_the_biases_that_the_estimator_learns():
     assert turn[7] > 0.5 * bias > turn[4]
 
 
-def test_ardupilot_echoes_a_vectors_other_axes_and_is_silent_on_unknown_names():
-    station = Station()
-    echoes = [m.param_id for m in station.set("INS_ACCOFFS_Y", 0.25) if m.get_type() == "PARAM_VALUE"]
-    assert echoes == ["INS_ACCOFFS_X", "INS_ACCOFFS_Y", "INS_ACCOFFS_Z"]
-    assert station.vehicle.firmware.store["INS_ACCOFFS_Y"] == 0.25
-    assert station.set("INS_NO_SUCH", 1.0) == []
-    assert station.set("INS_ACCOFFS_X", float("nan")) == []
-
-
-@pytest.mark.parametrize(("value", "used"), [(0.009, 0.0), (0.011, 0.011)], ids=["too little", "enough"])
-def test_px4_stores_and_ignores_a_small_change(value, used):
-    station = Station("firmware=px4,imus=1")
-    (echo,) = [m for m in station.set("CAL_ACC0_XOFF", value) if m.get_type() == "PARAM_VALUE"]
-    assert echo.param_value == pytest.approx(value)
-    for _ in range(2):
-        assert station.vehicle.firmware.correction(0)[0][0] == pytest.approx(used)
-        station.vehicle.firmware.start()
-
-
 def test_the_tool_puts_it_on_a_real_port(program):
     command = program("lab", "sim_vehicle", "tcp:127.0.0.1:0", "firmware=px4", "--speed", "4")
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
