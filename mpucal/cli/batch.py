@@ -19,7 +19,7 @@ from ..disk.output_folder import OutputFolder
 from ..errors import UsageError
 from .arguments import PATH, output_option
 from .options import fit_options
-from .person import say
+from .person import duration, say
 from .recording_options import hint_options, make_hints, read_hints_file
 
 EXAMPLE = "Example: `mpucal batch 'line3/*.mcap' -o fleet --workers 1`"
@@ -98,16 +98,10 @@ def _progress_text(progress: Progress) -> str:
     if made := progress.done - progress.kept:
         text += f", {made / progress.seconds:.3g} a second"
     if progress.left_s:
-        text += f", {_duration(progress.left_s)} left"
+        text += f", {duration(progress.left_s)} left"
     if progress.kept:
         text += f", {progress.kept} done before"
     return text + (f", {progress.failed} unreadable" if progress.failed else "")
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 def _write_results(folder: Path, paths: list[str], journal: RowJournal) -> None:

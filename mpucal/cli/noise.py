@@ -28,7 +28,7 @@ from ..session.results import save
 from ..sources.opening import open_source
 from .arguments import PATH, json_option, output_option
 from .options import ABOVE_ZERO, check_gyroscope, check_input, check_source, given_options, source_options
-from .person import say
+from .person import duration, say
 from .recording_options import given_hints, hint_options, say_interpretation
 
 EXAMPLE = "Example: `mpucal noise walk.npz -o noise`, or `mpucal noise --bus sim --hours 0.02`"
@@ -68,7 +68,7 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
             save(into.path, {PAGE: render(noise).encode(), DOCUMENT: noise.json().encode()})
         click.echo(f"\nWritten to {folder}:\n  {DOCUMENT}, {PAGE}", err=as_json)
     if failure is not None:
-        failure.what += f"; the noise is that of the {_duration(noise.seconds)} until then"
+        failure.what += f"; the noise is that of the {duration(noise.seconds)} until then"
         raise failure
 
 
@@ -134,10 +134,10 @@ def _progress() -> Iterator[Any]:
         if monotonic() - shown_s < PROGRESS_S[on_a_terminal]:
             return
         shown_s = monotonic()
-        of = "" if seconds is None else f" of {_duration(seconds)}"
+        of = "" if seconds is None else f" of {duration(seconds)}"
         needed_s = meter.needed_s(WANTED)
-        more = "" if needed_s is None else f"; bias instability to {100 * WANTED:.0f} %: {_duration(needed_s)} more"
-        text = f"{_duration(meter.seconds)}{of}{more}"
+        more = "" if needed_s is None else f"; bias instability to {100 * WANTED:.0f} %: {duration(needed_s)} more"
+        text = f"{duration(meter.seconds)}{of}{more}"
         click.echo(f"\r{text}   " if on_a_terminal else text, err=True, nl=not on_a_terminal)
 
     try:
@@ -145,8 +145,3 @@ def _progress() -> Iterator[Any]:
     finally:
         if on_a_terminal:
             click.echo(err=True)
-
-
-def _duration(seconds: float) -> str:
-    minutes, hours = seconds / 60.0, seconds / 3600.0
-    return f"{hours:.1f} h" if hours >= 1.0 else f"{minutes:.1f} min" if minutes >= 1.0 else f"{seconds:.0f} s"

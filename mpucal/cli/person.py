@@ -14,6 +14,13 @@ def say(text: str) -> None:
     click.echo(f"mpucal: {text.strip()}", err=True)
 
 
+def duration(seconds: float) -> str:
+    """Return a time in s, min or h."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.1f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
 def ask_in_doubt(question: str, yes: bool) -> None:
     """Ask about an objection; raise WriteBackError unless a person agrees, also with `yes` or without a person."""
     objection = question.partition(". ")[0]

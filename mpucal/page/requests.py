@@ -10,8 +10,8 @@ from __future__ import annotations
 import hmac
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from http import HTTPStatus
+from typing import NamedTuple
 
 PAGE_FILES = {
     "": ("page.html", "text/html; charset=utf-8"),
@@ -23,20 +23,10 @@ PAGE_FILES = {
 KEYS = ("enough", "redo", "abort")
 
 
-class RequestKind(Enum):
-    """Kinds of resources."""
+class Allowed(NamedTuple):
+    """Request that is allowed: the kind of its resource (page, events, results, keys), and the resource's name."""
 
-    PAGE = "a file of the page"
-    EVENTS = "the session as it goes on"
-    RESULT = "a result"
-    KEY = "a key"
-
-
-@dataclass(frozen=True)
-class AllowedRequest:
-    """Request that is allowed: the kind of its resource, and the resource's name."""
-
-    kind: RequestKind
+    kind: str
     name: str = ""
 
 
@@ -55,7 +45,7 @@ class RequestFilter:
 
     def check(
         self, method: str, target: str, hosts: Sequence[str], origins: Sequence[str], results: Collection[str]
-    ) -> AllowedRequest | HTTPStatus:
+    ) -> Allowed | HTTPStatus:
         """Return the request if it is allowed, else the status that refuses it.
 
         Parameters
@@ -68,23 +58,14 @@ class RequestFilter:
         token, slash, name = path.partition("/")
         if not hmac.compare_digest(token.encode(), self.token.encode()) or not slash or not target.startswith("/"):
             return HTTPStatus.NOT_FOUND
-        if method == "POST":
-            return self._key(name, origins)
+        kind, _, rest = name.partition("/")
+        if method == "POST" and self.keys and kind == "keys" and rest in KEYS:
+            own = all(origin == f"http://{self.host}" for origin in origins)
+            return Allowed(kind, rest) if own else HTTPStatus.FORBIDDEN
         if method != "GET":
             return HTTPStatus.METHOD_NOT_ALLOWED
         if name in PAGE_FILES:
-            return AllowedRequest(RequestKind.PAGE, name)
-        if name == "events":
-            return AllowedRequest(RequestKind.EVENTS)
-        folder, _, result = name.partition("/")
-        if folder == "results" and result in results:
-            return AllowedRequest(RequestKind.RESULT, result)
+            return Allowed("page", name)
+        if name == "events" or (kind == "results" and rest in results):
+            return Allowed(kind, rest)
         return HTTPStatus.NOT_FOUND
-
-    def _key(self, name: str, origins: Sequence[str]) -> AllowedRequest | HTTPStatus:
-        folder, _, key = name.partition("/")
-        if not self.keys or folder != "keys" or key not in KEYS:
-            return HTTPStatus.METHOD_NOT_ALLOWED
-        if any(origin != f"http://{self.host}" for origin in origins):
-            return HTTPStatus.FORBIDDEN
-        return AllowedRequest(RequestKind.KEY, key)

@@ -24,7 +24,7 @@ from shutil import copyfileobj
 from socketserver import TCPServer
 from typing import Any
 
-from .requests import PAGE_FILES, AllowedRequest, RequestFilter, RequestKind
+from .requests import PAGE_FILES, Allowed, RequestFilter
 
 CLIENTS = 4
 CONNECTIONS = 24
@@ -161,17 +161,18 @@ class Handler(BaseHTTPRequestHandler):
             self.headers.get_all("Origin", []),
             self.server.results,
         )
-        if not isinstance(request, AllowedRequest):
-            self.send_error(request)
-        elif request.kind is RequestKind.PAGE:
-            self._page(*PAGE_FILES[request.name])
-        elif request.kind is RequestKind.EVENTS:
-            self._events()
-        elif request.kind is RequestKind.RESULT:
-            self._result(request.name)
-        else:
-            self.server.pressed(request.name)
-            self._begin(HTTPStatus.NO_CONTENT)
+        match request:
+            case Allowed("page", name):
+                self._page(*PAGE_FILES[name])
+            case Allowed("events"):
+                self._events()
+            case Allowed("results", name):
+                self._result(name)
+            case Allowed("keys", name):
+                self.server.pressed(name)
+                self._begin(HTTPStatus.NO_CONTENT)
+            case HTTPStatus():
+                self.send_error(request)
 
     do_POST = do_HEAD = do_PUT = do_DELETE = do_OPTIONS = do_PATCH = do_GET
 

@@ -1,4 +1,4 @@
-"""The files that a session leaves in its folder, one row each: name, content and maker.
+"""The files that a session leaves in its folder, one row each: name and content.
 
 The table in docs/session.md has the same rows. A sink's files are in the sink's own row (`mpucal/sinks/table.py`).
 """
@@ -17,13 +17,10 @@ class SessionFile:
     Attributes
     ----------
     name : of the first file; further ones are numbered. what : its content, in Markdown, for docs/session.md.
-    made_by : "module:function" that makes its content from a result (see `mpucal.session.results.Maker`); None if it is
-        not made from a result.
     """
 
     name: str
     what: str
-    made_by: str | None = None
 
     def numbered(self, number: int) -> str:
         """Return the name of file number 1, 2, ...: capture.mcap, capture-2.mcap, ..."""
@@ -53,19 +50,16 @@ CAPTURE_OF_VEHICLE = SessionFile("capture.tlog", "")
 DOCUMENT = SessionFile(
     "calibration.json",
     "D, b_a and the gyroscope's K, b_omega with standard deviations, the fit, the verdict and its reasons",
-    "mpucal.session.results:document",
 )
 BLOB = SessionFile(
     "calibration.bin",
     "the same for firmware, specified in [firmware_protocol.md](firmware_protocol.md); not for a refused calibration",
-    "mpucal.session.results:blob",
 )
 REPORT = SessionFile(
     "report.html",
     "the same for a person: verdict, next steps, and values beside the data sheet; two pages in print",
-    "mpucal.session.results:report",
 )
-TRUTH = SessionFile("truth.json", "true parameters of a simulated chip", "mpucal.session.results:simulated_truth")
+TRUTH = SessionFile("truth.json", "true parameters of a simulated chip")
 
 LOG = SessionFile("session.log", "messages of a session after its terminal went away")
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import json
 import shlex
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -22,55 +20,23 @@ from ..files.folder import all_captures_in
 from ..report import render
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import stamp
-from ..result.session_files import DOCUMENT, REPORT, SESSION_FILES
-
-
-@dataclass(frozen=True)
-class Result:
-    """Source of the files; truth : the true parameters of a simulated sensor."""
-
-    calibration: Calibration
-    recording: Recording
-    truth: Mapping[str, Any] | None
-
-
-# Makes a file's content; None: this result has no such file.
-Maker = Callable[[Result], bytes | None]
+from ..result.session_files import BLOB, DOCUMENT, REPORT, TRUTH
 
 
 def result_files(
     calibration: Calibration, recording: Recording, truth: Mapping[str, Any] | None = None
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and content of each file of a result, one at a time; truth : see Result."""
-    result = Result(calibration, recording, truth)
-    for file in SESSION_FILES:
-        if file.made_by is not None:
-            make: Maker = resolve_name(file.made_by)
-            content = make(result)
-            if content is not None:
-                yield file.name, content
+    """Yield the name and content of each file of a result, one at a time.
 
-
-def document(result: Result) -> bytes:
-    """Return calibration.json."""
-    return result.calibration.json().encode()
-
-
-def blob(result: Result) -> bytes | None:
-    """Return calibration.bin; None if the calibration was refused, or its D or b_a is not known."""
-    calibration = result.calibration
-    known = np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()
-    return calibration.blob().encode() if calibration.verdict != REFUSED and known else None
-
-
-def report(result: Result) -> bytes:
-    """Return report.html."""
-    return render(result.calibration, result.recording).encode()
-
-
-def simulated_truth(result: Result) -> bytes | None:
-    """Return truth.json; None for a real sensor."""
-    return None if result.truth is None else (json.dumps(result.truth, indent=2) + "\n").encode()
+    A refused calibration, or one without D or b_a, has no blob, and a real sensor no `truth`: the true parameters of a
+    simulated one.
+    """
+    yield DOCUMENT.name, calibration.json().encode()
+    if calibration.verdict != REFUSED and np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all():
+        yield BLOB.name, calibration.blob().encode()
+    yield REPORT.name, render(calibration, recording).encode()
+    if truth is not None:
+        yield TRUTH.name, (json.dumps(truth, indent=2) + "\n").encode()
 
 
 def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.page.requests import KEYS, PAGE_FILES, AllowedRequest, RequestFilter
+from mpucal.page.requests import KEYS, PAGE_FILES, Allowed, RequestFilter
 
 HOST, TOKEN = "127.0.0.1:8000", "c2VjcmV0LXRva2VuLTEyOA"
 RESULTS = {"report.html", "calibration.json"}
@@ -31,4 +31,4 @@ def test_only_requests_with_host_and_token_are_allowed(method, target, hosts, or
     looks = method == "GET" and target in {f"/{TOKEN}/{name}" for name in LOOKS}
     presses = keys and method == "POST" and target in {f"/{TOKEN}/keys/{key}" for key in KEYS}
     own = all(origin == f"http://{HOST}" for origin in origins)
-    assert isinstance(request, AllowedRequest) == (hosts == [HOST] and (looks or (presses and own)))
+    assert isinstance(request, Allowed) == (hosts == [HOST] and (looks or (presses and own)))
