@@ -10,8 +10,7 @@ What it should not have raised is printed with the seed that makes it again (--f
 
 Guided, libFuzzer keeps what reaches new branches of mpucal in build/fuzz/TARGET, goes on from there the next time, and
 says how many branches were reached. Half of the mutants are those of above. What was wrong is kept in
-build/fuzz/TARGET.wrong until it is mended. --again FILE TARGET runs a file again, or all of a folder: with
-build/fuzz/TARGET, coverage.py tells which lines are reached.
+build/fuzz/TARGET.wrong until it is mended.
 """
 
 from __future__ import annotations
@@ -148,14 +147,6 @@ def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: 
     atheris.Fuzz()
 
 
-def run_again(check: Check, path: Path) -> tuple[str, int]:
-    """Run saved files again; return the same as `blind`."""
-    paths = sorted(path.iterdir()) if path.is_dir() else [path]
-    traces = [trace for each in paths if (trace := check(each.read_bytes())) is not None]
-    print(*traces, sep="\n", end="", flush=True)
-    return f"{len(paths):>9} files", len(traces)
-
-
 def too_long(_signal: int, _frame: FrameType | None) -> None:
     """Raise TooLongError, as the handler of the timer's signal."""
     raise TooLongError(f"longer than {LONGEST_S} s of processor time")
@@ -168,7 +159,6 @@ def main(
     budget: Annotated[float | None, "of all of them, in place of --seconds"] = None,
     first: int = TODAY * 10**7,
     guided: Annotated[bool, "by coverage"] = False,
-    again: Annotated[Path | None, "run a target on this file, or all of a folder"] = None,
 ) -> int:
     """Run the targets; return 1 after an unexpected exception."""
     if guided:
@@ -189,11 +179,8 @@ def main(
         bad = 0
         for name in targets or of:
             run, corpus = of[name]
-            if again is not None:
-                did, wrong = run_again(checked(run), again)
-            else:
-                each_s = seconds if budget is None else budget / len(targets or of)
-                did, wrong = (by_coverage if guided else blind)(name, checked(run), corpus, first, each_s)
+            each_s = seconds if budget is None else budget / len(targets or of)
+            did, wrong = (by_coverage if guided else blind)(name, checked(run), corpus, first, each_s)
             bad += wrong
             print(f"{name:<44}{did}: {wrong} wrong", flush=True)
     return int(bad > 0)

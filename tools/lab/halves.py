@@ -1,29 +1,17 @@
-"""Are the claimed standard deviations true? D and b_a of the two halves of a recording, cut in the middle of a rest.
-
-python -m tools.lab halves recordings/*.npz
-
-Simulations are compared with their truth by monte_carlo.
-"""
+"""The two halves of a recording, cut in the middle of a rest."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 
-import mpucal
-from mpucal.calibration import MODELS
 from mpucal.calibration.masks import with_masks
-from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
-from mpucal.errors import MpucalError, RecordingError
+from mpucal.data import Recording
+from mpucal.errors import RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
-
-from .judge import rms
-from .runner import Trial
-from .table import Column, Row, grouped, over, show, table
+from mpucal.result.calibration import Calibration
 
 LEAST_REST_S = 1.0
 
@@ -75,51 +63,7 @@ def reversed_in_time(recording: Recording) -> Recording:
     )
 
 
-def agreement(name: str, one: mpucal.Calibration, other: mpucal.Calibration) -> Row:
-    """Compare two calibrations of one sensor: z are differences of D row-major and b_a in units of what both claim."""
-    difference = np.append(one.D - other.D, one.b_a - other.b_a)
+def agreement(one: Calibration, other: Calibration) -> tuple[float, ...]:
+    """Return (12,) the differences of two calibrations, D row-major and b_a, in units of what both claim."""
     std = np.hypot(np.append(one.D_std, one.b_a_std), np.append(other.D_std, other.b_a_std))
-    models = "/".join(dict.fromkeys(str(half.fit["model"]) for half in (one, other)))
-    if not np.isfinite(difference).all():
-        return Row(name=name, model=models, why="nothing could be estimated")
-    z = tuple((difference / std).tolist())
-    return Row(name=name, model=models, z=z, rms_z=rms(z), why=None)
-
-
-def of_file(
-    path: Path,
-    *,
-    model: Annotated[str, MODELS] = "auto",
-    gravity: Annotated[float, "m/s^2"] = STANDARD_GRAVITY_MPS2,
-) -> Row:
-    """Cut a recorded file, calibrate both halves and compare them."""
-    try:
-        one, other = (mpucal.calibrate(half, model=model, gravity=gravity) for half in halves(mpucal.load(path)))
-    except MpucalError as error:
-        return Row(name=path.stem, model=model, why=str(error))
-    return agreement(path.stem, one, other)
-
-
-COLUMNS: dict[str, Column] = {
-    "runs": len,
-    "rms z, median": over("rms_z", np.median),
-    "rms z, worst": over("rms_z", max),
-    "largest |z|": over("z", lambda z: np.abs(z).max()),
-    "why there is none": lambda of: next((a.why for a in of if a.why), None),
-}
-
-
-def scenarios(recordings: Annotated[list[Path], "files that mpucal reads"]) -> list[Path]:
-    """Return the recordings."""
-    return recordings
-
-
-def report(found: list[Row]) -> None:
-    """Print a line for each recording, and one for all recordings by each model."""
-    of_all = {("all", model): rows for model, rows in grouped(found, "model").items()}
-    show(table(grouped(found, "name", "model") | of_all, COLUMNS, WANTED))
-
-
-# rms z of 12 parameters: 1 for a true claim, and the limits of the median and the worst
-WANTED = "halves of recordings; wanted: median 0.7 to 1.3, worst 2 or less"
-main = Trial(__doc__, of_file, scenarios, report=report)
+    return tuple((np.append(one.D - other.D, one.b_a - other.b_a) / std).tolist())

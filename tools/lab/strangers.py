@@ -1,9 +1,10 @@
-"""Recordings of other people: the try at which each is read, its verdict, and |a| of its rests before and after.
+"""Recordings of other people: the try at which each is read, its verdict, |a| of its rests, and if its halves agree.
 
 python -m tools.lab strangers recordings/*.csv folder/
 
 A try adds the options that the error message before it suggests. |a| of the rests is compared with an ellipsoid that is
-fitted to all rests but one, and judged by that one.
+fitted to all rests but one, and judged by that one. Halves are cut in the middle of a rest, and both calibrated: z are
+the differences of D and b_a in units of what both claim, which are 1 if the standard deviations are true.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
 from mpucal.errors import MpucalError, RecordingError
 
+from .halves import agreement, halves
 from .judge import rms
 from .rivals import Rests, Unfit, ellipsoid
 from .runner import Trial
@@ -65,8 +67,17 @@ def of_path(path: Path, *, gravity: Annotated[float, "m/s^2"] = STANDARD_GRAVITY
     found.rests, found.before = len(rests.y), _off(rests.y, gravity)
     if np.isfinite(calibration.D).all() and len(rests.y):
         found.after = _off(calibration.apply(rests.y), gravity)
-    found.left_out = left_out(rests, gravity)
+    found.left_out, found.z = left_out(rests, gravity), halves_z(recording, gravity)
     return found
+
+
+def halves_z(recording: Recording, gravity: float) -> tuple[float, ...]:
+    """Return (12,) how the calibrations of the halves differ; empty where there are none."""
+    try:
+        one, other = (mpucal.calibrate(half, gravity=gravity) for half in halves(recording))
+    except MpucalError:
+        return ()
+    return agreement(one, other)
 
 
 def left_out(rests: Rests, gravity: float) -> float:
@@ -91,6 +102,8 @@ COLUMNS: dict[str, Column] = {
     "before": over("before"),
     "after": over("after"),
     "ellipsoid": over("left_out"),
+    "halves, rms z": over("z", rms),
+    "largest |z|": over("z", lambda z: np.abs(z).max()),
     "verdict": first("verdict"),
 }
 

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.errors import RecordingError
 from tools.lab import halves
 from tools.lab.scenarios.recordings import hand_scenario
 
@@ -42,12 +41,6 @@ def test_without_a_rest_in_the_middle_the_second_half_is_read_backwards():
     assert other.flat[0] < 25
     assert one.gyr[: one.flat[1]].std(0).max() < 0.05
     np.testing.assert_allclose(other.acc[: 8 * 50], whole.acc[::-1][: 8 * 50])
-
-
-def test_a_rest_alone_has_no_halves():
-    recording = hand_scenario(0, "pose12", rate_hz=50.0).recording
-    with pytest.raises(RecordingError, match="no second rest"):
-        halves.halves(replace(recording.part(0, recording.flat[1]), flat=None))
 
 
 def test_a_gap_stands_on_its_other_side_backwards(poses):
