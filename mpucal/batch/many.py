@@ -16,7 +16,7 @@ from typing import Any
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import OutputFolder
 from ..errors import SourceError, UsageError
-from ..files.budget import VARIABLE, allowed_bytes
+from ..files.reading import VARIABLE, allowed_bytes
 from .journal import RowJournal
 from .row import Settings, make_rows
 

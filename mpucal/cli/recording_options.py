@@ -12,8 +12,8 @@ import click
 
 from ..arguments import read_limited
 from ..errors import UsageError
-from ..files.budget import MOST_MB, VARIABLE, allowed_bytes
 from ..files.hints import Hints, parse_columns, parse_span, parse_units
+from ..files.reading import MOST_MB, VARIABLE, allowed_bytes
 from .options import ABOVE_ZERO, Parsed, decorated, given_options
 from .person import say
 

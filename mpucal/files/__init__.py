@@ -10,9 +10,9 @@ import numpy as np
 
 from ..data import Recording
 from ..errors import RecordingError
-from .budget import limit_memory
 from .formats import find_format, written_format
 from .hints import NO_HINTS, Hints
+from .reading import limit_memory
 from .rows import Rows, Write, arrival_clock, cut_span, describe, drop_incomplete, shown_units, to_si, with_times
 
 
@@ -25,7 +25,7 @@ def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
     Raises
     ------
     RecordingError : there is no such file, it holds no recording, its units or columns are doubtful, or it needs more
-        memory than allowed (see budget).
+        memory than allowed (see reading).
     UsageError : hints for a file that needs none.
     CaptureError : a capture that cannot be read.
     ChipError : a capture of an unknown chip.

@@ -13,19 +13,18 @@ from numpy.typing import NDArray
 
 from ..data import Recording
 from ..errors import RecordingError
-from .budget import HELD, check_size
 from .hints import NO_HINTS, Hints
 from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
-from .reading import first_bytes, import_extra, reading
+from .reading import HELD, check_size, first_bytes, import_extra, reading
 from .tables.array_table import ArrayTable, columns_of_arrays, stated_rate, tables_of_arrays
 from .tables.phone import is_pair, recording_of_tables
 from .tables.table import recording_from_table, stated_rate_hz
 
 _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is what with --columns t=NAME,ax=NAME,..."
 Arrays = Iterator[tuple[str, NDArray[Any]]]
-# bytes from the beginning of a document of JSON, and numbers in them beyond which it holds samples, not settings
-SNIFFED, FEWEST_NUMBERS = 1 << 16, 200
+# numbers at the beginning of a document of JSON beyond which it holds samples, not settings
+FEWEST_NUMBERS = 200
 _IS_OWN = b'"D":', b'"b_a":'
 
 
@@ -41,7 +40,7 @@ def is_of_others(path: Path) -> bool:
 
 def is_json_of_samples(path: Path) -> bool:
     """Return True if a file of JSON begins with many numbers, and is no calibration."""
-    begun = first_bytes(path, SNIFFED)
+    begun = first_bytes(path)
     return sum(byte in b",:" for byte in begun) > FEWEST_NUMBERS and not all(key in begun for key in _IS_OWN)
 
 

@@ -20,8 +20,7 @@ from ..data import Samples, Vector
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ._text import lines, numbers
-from .budget import LONGEST_LINE
-from .reading import reading
+from .reading import LONGEST_LINE, reading
 from .rows import Rows, Write, check_runs
 from .tables.names import COLDEST_C, WARMEST_C, ignored_sensors, parse_header
 from .tables.times import plausible_utc_ns

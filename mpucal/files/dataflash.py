@@ -10,8 +10,6 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..arguments import LARGEST
 from ..data import Recording
 from ..errors import RecordingError
@@ -27,9 +25,6 @@ PARAMETER = "PARM"
 # before ArduPilot 4.0 each IMU had its own message; since then `I` numbers them from 0
 IMUS = {"IMU": 1, "IMU2": 2, "IMU3": 3}
 US = 1_000
-# of an unknown file: bytes to look at, the longest packet, how much more often than others its bytes repeat, and how
-# nearly as often as its multiples'
-SNIFFED, LONGEST_PACKET, REPEATS, NEARLY = 1 << 16, 512, 1.2, 0.95
 
 
 def is_dataflash(path: Path) -> bool:
@@ -46,7 +41,7 @@ def load_dataflash(path: Path) -> Recording:
     """
     if not is_dataflash(path):
         raise RecordingError(
-            f"{path} is not a dataflash log of ArduPilot, and mpucal knows no other .bin{_packets(path)}",
+            f"{path} is not a dataflash log of ArduPilot, and mpucal knows no other .bin",
             f"have the program that wrote it write a table with the columns {','.join(ROLES)}, and give that",
         )
     log = Log(ARDUPILOT)
@@ -59,17 +54,6 @@ def load_dataflash(path: Path) -> Recording:
             "have LOG_BITMASK log the IMU (IMU or IMU_FAST) also while disarmed, and turn it again",
         )
     return log.recording(path.name)
-
-
-def _packets(path: Path) -> str:
-    """Return what the bytes of an unknown file repeat, in words; empty if they repeat nothing."""
-    data = np.frombuffer(first_bytes(path, SNIFFED), np.uint8)
-    alike = [np.mean(data[length:] == data[:-length]) for length in range(1, min(LONGEST_PACKET, len(data) // 4))]
-    most = max(alike, default=0.0)
-    # the shortest of its multiples, which repeat nearly as often
-    length = next((i for i, share in enumerate(alike, 1) if share > NEARLY * most), 1)
-    repeats = length > 1 and most > REPEATS * np.median(alike)
-    return f" (it seems to be packets of {length} bytes)" if repeats else ""
 
 
 def _fill(log: Log, path: Path) -> None:

@@ -1,14 +1,29 @@
-"""The folder of a session, and its captures in their order: the first, and one for each time it was resumed."""
+"""Folders: a session's with its captures in order, and one of recordings of one sensor, which are joined into one.
+
+A session has a capture, and one for each time that it was resumed. The recordings are of a side of the board each, or
+of one turning of it; the motion between two files is unknown: a gap, long enough to count as an interruption.
+"""
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from pathlib import Path
 
-from ..data import Recording
+import numpy as np
+
+from ..data import Recording, Samples, Vector
 from ..errors import RecordingError
-from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
+from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT, SessionFile
 from . import formats
+from .hints import NO_HINTS, Hints
+from .reading import reading
 from .rows import Rows
+from .tables.phone import tables_of_sides
+from .tables.times import GAP_S
+
+# of files that may be such recordings
+SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet", ".json", ".jsonl")
+MOST = 500
 
 
 def captures_in(folder: Path, capture: SessionFile = CAPTURE) -> list[Path]:
@@ -43,3 +58,66 @@ def _find_session(folder: Path) -> tuple[formats.Format, list[Path]]:
             return row, captures
     none = " and ".join(f"no {capture.name}" for capture in captured)
     raise RecordingError(f"the folder {folder} holds {none}", "give the folder of a session, or a recording in it")
+
+
+def is_folder_of_recordings(path: Path) -> bool:
+    """Return True if a folder holds several recordings, and no session."""
+    return len(_recordings(path)) >= 2
+
+
+def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """Return the recordings in a folder as one, in the order of their times of day, or else of their names.
+
+    Raises
+    ------
+    RecordingError : fewer than two of them can be read.
+    """
+    with reading(path):
+        files = _recordings(path)
+    read: dict[str, Recording] = {}
+    failed: dict[str, RecordingError] = {}
+    for file in files:
+        try:
+            read[file.name] = formats.find_format(file, hints).read(file, hints=hints)
+        except RecordingError as error:
+            failed[file.name] = error
+    if len(read) < 2:
+        first_error = next(iter(failed.values()))
+        what = f"{path.name}: {first_error.what}"
+        raise RecordingError(what, first_error.remedy, first_error.options) from first_error
+    parts = list(read.values())
+    begins_ns = [(part.utc_ns or 0) + part.t[0] * 1e9 for part in parts]
+    known = all(part.utc_ns is not None for part in parts)
+    if known:
+        parts = [parts[at] for at in np.argsort(begins_ns, kind="stable")]
+    t: list[Vector] = []
+    end = 0.0
+    for part in parts:
+        begins = part.t + ((part.utc_ns or 0) - (parts[0].utc_ns or 0)) * 1e-9
+        # times of day that overlap cannot be of one sensor's clock
+        follows = known and begins[0] > end
+        t.append(begins if follows else part.t - part.t[0] + end + GAP_S * bool(t))
+        end = float(t[-1][-1])
+    whole = Samples.joined([replace(part, t=at) for part, at in zip(parts, t, strict=True)])
+    starts = np.cumsum([len(part) for part in parts])[:-1]
+    arrays = {f.name: getattr(whole, f.name) for f in fields(Samples)}
+    arrays["gap"][starts] = True
+    first = parts[0]
+    taken = (
+        f"{path.name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
+        f" {', '.join(read)}. {first.taken or ''}"
+    )
+    if failed:
+        taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
+    return Recording(**arrays, sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=taken.strip())
+
+
+def _recordings(path: Path) -> list[Path]:
+    files = sorted(child for child in path.iterdir() if child.is_file())
+    if {file.name for file in files} & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(files) > MOST:
+        return []
+    sides = tables_of_sides(file.name for file in files)
+    found = [file for file in files if file.name in sides or (not sides and file.suffix.lower() in SUFFIXES)]
+    return [
+        file for file in found if (of := formats.recognise(file)) is not None and (of.hinted or file.suffix == ".npz")
+    ]

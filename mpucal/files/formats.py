@@ -16,8 +16,8 @@ from ..arguments import check_regular
 from ..data import Recording
 from ..errors import OutputError, RecordingError, UsageError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
-from .budget import READ, check_size
 from .hints import NO_HINTS, Hints
+from .reading import READ, check_size
 from .rows import Rows, Write
 
 FOLDER = "/"
@@ -98,7 +98,7 @@ _TABLE = ("another program's table", "tables.table:load_table", "tables.table:is
 _TWO = ("a phone's tables", "tables.phone:load_two_tables", "tables.phone:is_one_of_two_tables")
 _ARCHIVE = ("a phone's tables", "tables.phone:load_archive_of_tables", "tables.phone:is_archive_of_tables")
 _PHONE = ("the folder of a phone's tables", "tables.phone:load_folder_of_tables", "tables.phone:is_folder_of_tables")
-_FOLDER = "recording_folder:load_folder_of_recordings", "recording_folder:is_folder_of_recordings"
+_FOLDER = "folder:load_folder_of_recordings", "folder:is_folder_of_recordings"
 _BAG, _BAG_ROWS = "ros:load_bag", "ros:bag_rows"
 _ARRAYS = "arrays:load_arrays"
 FORMATS = (

@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.records import Channel, Header, Metadata, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
+from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
 from ..data import Samples, Vector
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
-from .chunks import ChunkWriter
 from .mcap import CALIBRATED
 from .rows import Rows, Write
 from .tables.units import NS
@@ -107,15 +106,19 @@ def imu_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
 
     Stamps are times of day if these are known, as on every robot, and else the recording's own times.
     """
-    utc_ns = rows.utc_ns or 0
+    utc_ns, size = rows.utc_ns or 0, MESSAGE.itemsize
     with atomic_file(path) as file:
-        writer = ChunkWriter(
-            file,
-            MESSAGE,
-            Header(profile="ros2", library=f"{CALIBRATED} {version('mpucal')}"),
-            Schema(id=1, data=SCHEMA.encode(), encoding=SchemaEncoding.ROS2, name="sensor_msgs/msg/Imu"),
-            Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
-            Metadata(CALIBRATED, {"done": done}),
-        )
-        yield lambda samples: writer.add(*encode_messages(samples, rows.noise, utc_ns))
+        writer = Writer(file, compression=CompressionType.ZSTD)
+        writer.start("ros2", f"{CALIBRATED} {version('mpucal')}")
+        writer.add_metadata(CALIBRATED, {"done": done})
+        schema = writer.register_schema("sensor_msgs/msg/Imu", SchemaEncoding.ROS2, SCHEMA.encode())
+        channel = writer.register_channel(TOPIC, MessageEncoding.CDR, schema)
+
+        def write(samples: Samples) -> None:
+            times, messages = encode_messages(samples, rows.noise, utc_ns)
+            data = messages.tobytes()
+            for at, t_ns in enumerate(times.tolist()):
+                writer.add_message(channel, t_ns, data[at * size : (at + 1) * size], t_ns)
+
+        yield write
         writer.finish()

@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .budget import allowed_bytes, check_size
-from .reading import import_extra
+from .reading import allowed_bytes, check_size, import_extra
 
 HEAD = 128
 MATLAB, HDF5 = b"MATLAB", b"MATLAB 7.3"

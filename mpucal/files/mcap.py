@@ -33,7 +33,6 @@ from ..disk.growing_file import GrowingFile
 from ..errors import CaptureError, OutputError
 from ..mavlink.tlog import RawPacket
 from ..strict_json import parse_own_json
-from .budget import LONGEST_CHUNK
 from .messages import (
     BUS,
     PACKETS,
@@ -44,6 +43,7 @@ from .messages import (
     encode_event,
     event_schema,
 )
+from .reading import LONGEST_CHUNK
 
 Record = Transaction | RawPacket | SessionEvent
 
@@ -52,9 +52,6 @@ FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
 CALIBRATED = "mpucal.imu"
 
 _REMEDY = "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu"
-
-# of a channel, in MCAP's specification
-NO_SCHEMA = 0
 
 # half of the second that a killed program may lose; the other half may pass between two records
 CHUNK_NS = 500_000_000
@@ -172,7 +169,7 @@ class _Stream:
         texts = {key: json.dumps(value) for key, value in {**meta, VERSION_KEY: VERSION}.items()}
         self._writer.add_metadata(FORMAT, texts)
         if topic == PACKETS:
-            self._channels[PACKETS] = self._writer.register_channel(PACKETS, "mavlink", NO_SCHEMA)
+            self._channels[PACKETS] = self._writer.register_channel(PACKETS, "mavlink", schema_id=0)
         else:
             self._register(BUS, MessageEncoding.Protobuf, "mpucal.Accesses", SchemaEncoding.Protobuf, accesses_schema())
         event = ("mpucal.SessionEvent", SchemaEncoding.JSONSchema, event_schema())

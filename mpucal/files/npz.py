@@ -31,18 +31,16 @@ from ..data import Samples, Sensor
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ..strict_json import parse_json
-from .budget import check_size
-from .reading import reading
+from .reading import check_size, reading
 from .rows import ROWS, Rows, Write, check_runs, make_recording
 from .tables.times import plausible_utc_ns
 
 NEEDED = ("t", "acc", "gyr")
 TEMPERATURES = ("temperature_c", "temperature")
 MASKS = ("gap", "acc_clipped", "gyr_clipped")
+LARGE = (*NEEDED, *TEMPERATURES, *MASKS)
 DONE = "done"
 UTC = "utc_ns"
-SMALL = ("flat", "flat_samples", "sensor", DONE, UTC)
-COPIED = 1 << 20
 # errors of zipfile, its decompressors and numpy: damaged, encrypted, of an unknown method, longer than memory
 DAMAGED = (
     *(ValueError, TypeError, AttributeError, ArithmeticError, LookupError, EOFError, RuntimeError, MemoryError),
@@ -58,36 +56,31 @@ def npz_rows(path: Path) -> Rows:
     ------
     RecordingError : it cannot be read, or holds no recording.
     """
-    # no pickles: a recording must not run code
-    with _open_archive(path) as file, np.load(file, allow_pickle=False) as archive:
+    with _open_archive(path) as archive:
         missing = [key for key in NEEDED if key not in archive.files]
         if missing:
             has = ", ".join(archive.files) or "nothing"
             raise RecordingError(f"{path} has no {', '.join(missing)}; it has {has}", _REMEDY)
-        small, large = _arrays(archive, path, SMALL), (*NEEDED, *TEMPERATURES, *MASKS)
-        arrays = {} if _by_rows(archive.zip) else _arrays(archive, path, large)
-        size = _size(archive, large)
+        small = _arrays(archive, path, ("flat", "flat_samples", "sensor", DONE, UTC))
+        arrays = {} if _by_rows(archive) else _arrays(archive, path, LARGE)
+        size = _size(archive, LARGE)
     sensor, flat = _sensor(small, path), _flat(small, path)
     runs = _runs(path)
     if arrays:
-        warm = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
-        known = {key: arrays.get(key) for key in (*NEEDED, *MASKS)}
-        runs = Rows.of(make_recording(**known, temperature_c=warm, name=path.name)).runs
+        warm = next((arrays.pop(key) for key in TEMPERATURES if key in arrays), None)
+        arrays.pop("temperature", None)
+        runs = Rows.of(make_recording(**arrays, temperature_c=warm, name=path.name)).runs
+    utc_ns = np.asarray(small.get(UTC, np.nan))
     return Rows(
         check_runs(runs, path.name),
         sensor,
         flat,
         name=path.name,
         done=str(small.get(DONE, "")),
-        utc_ns=_utc_ns(small),
+        utc_ns=plausible_utc_ns(int(utc_ns)) if utc_ns.shape == () and utc_ns.dtype.kind in "iu" else None,
         plain=True,
         size=size,
     )
-
-
-def _utc_ns(arrays: Mapping[str, Any]) -> int | None:
-    value = np.asarray(arrays.get(UTC, np.nan))
-    return plausible_utc_ns(int(value)) if value.shape == () and value.dtype.kind in "iu" else None
 
 
 def _arrays(archive: Any, path: Path, keys: Sequence[str]) -> dict[str, Any]:
@@ -101,14 +94,16 @@ def _size(archive: Any, keys: Sequence[str]) -> int:
 
 
 @contextmanager
-def _open_archive(path: Path) -> Iterator[IO[bytes]]:
+def _open_archive(path: Path) -> Iterator[Any]:
     """Open an archive; an error of the block becomes a RecordingError."""
     try:
         with reading(path), path.open("rb") as file:
             if not zipfile.is_zipfile(file):
                 raise RecordingError(f"{path} is not a whole NumPy archive", _REMEDY)
             file.seek(0)
-            yield file
+            # no pickles: a recording must not run code
+            with np.load(file, allow_pickle=False) as archive:
+                yield archive
     except DAMAGED as error:
         raise RecordingError(f"{path} is not a whole NumPy archive ({error})", _REMEDY) from error
 
@@ -156,43 +151,33 @@ class _Column:
             return np.frombuffer(data, self.dtype).reshape(count, *self.shape[1:]).astype(dtype)
 
 
-def _by_rows(archive: zipfile.ZipFile) -> bool:
+def _columns(archive: Any, stack: ExitStack) -> dict[str, _Column]:
+    there = [key for key in LARGE if key in archive.files]
+    return {key: _Column(stack.enter_context(archive.zip.open(f"{key}.npy"))) for key in there}
+
+
+def _by_rows(archive: Any) -> bool:
     """Return True if all arrays are stored by rows in the right shapes, as nearly always."""
-    shapes = {}
-    for key in (*NEEDED, *TEMPERATURES, *MASKS):
-        if f"{key}.npy" not in archive.namelist():
-            continue
-        with archive.open(f"{key}.npy") as file:
-            column = _Column(file)
-        if column.fortran or column.dtype.kind not in ("fiub" if key in MASKS else "fiu"):
-            return False
-        shapes[key] = column.shape
-    if not set(NEEDED) <= shapes.keys() or len(shapes["t"]) != 1:
-        return False
-    n = shapes["t"][0]
-    return n >= 2 and all(shape == ((n, 3) if key in ("acc", "gyr") else (n,)) for key, shape in shapes.items())
+    with ExitStack() as stack:
+        columns = _columns(archive, stack)
+    n = (*columns["t"].shape, 0)[0]
+    return n >= 2 and all(
+        column.shape == ((n, 3) if key in ("acc", "gyr") else (n,))
+        and column.dtype.kind in ("fiub" if key in MASKS else "fiu")
+        and not column.fortran
+        for key, column in columns.items()
+    )
 
 
 def _runs(path: Path) -> Iterator[Samples]:
-    with _open_archive(path) as file, ExitStack() as stack:
-        archive = stack.enter_context(zipfile.ZipFile(file))
-        names = set(archive.namelist())
-
-        def column(*keys: str) -> _Column | None:
-            key = next((key for key in keys if f"{key}.npy" in names), None)
-            return None if key is None else _Column(stack.enter_context(archive.open(f"{key}.npy")))
-
-        t, acc, gyr = (_Column(stack.enter_context(archive.open(f"{key}.npy"))) for key in NEEDED)
-        warm, masks = column(*TEMPERATURES), [column(key) for key in MASKS]
-        for first in range(0, t.shape[0], ROWS):
-            n = min(ROWS, t.shape[0] - first)
-            yield Samples(
-                t.take(n, float),
-                acc.take(n, float),
-                gyr.take(n, float),
-                np.full(n, np.nan) if warm is None else warm.take(n, float),
-                *(np.zeros(n, bool) if mask is None else mask.take(n, bool) for mask in masks),
-            )
+    with _open_archive(path) as archive, ExitStack() as stack:
+        columns = _columns(archive, stack)
+        warm = next((columns[key] for key in TEMPERATURES if key in columns), None)
+        for first in range(0, columns["t"].shape[0], ROWS):
+            n = min(ROWS, columns["t"].shape[0] - first)
+            run = {key: columns[key].take(n, float) for key in NEEDED}
+            run |= {key: columns[key].take(n, bool) if key in columns else np.zeros(n, bool) for key in MASKS}
+            yield Samples(**run, temperature_c=np.full(n, np.nan) if warm is None else warm.take(n, float))
 
 
 @contextmanager
@@ -226,4 +211,4 @@ def _join(archive: zipfile.ZipFile, name: str, column: IO[bytes], count: int) ->
     column.seek(0)
     with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
         npy.write_array_header_1_0(member, described)
-        copyfileobj(column, member, COPIED)
+        copyfileobj(column, member)

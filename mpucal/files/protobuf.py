@@ -20,8 +20,6 @@ Columns = NDArray[np.uint64]
 
 VARINT, BYTES = 0, 2
 LONGEST = 10
-# from this number on NumPy packs faster than a loop
-FEW = 100
 __all__ = ["field", "fields", "frames", "pack_varints", "schema", "unpacked", "unzigzag", "zigzag"]
 
 # descriptor.proto: types and labels of fields
@@ -32,8 +30,8 @@ OPTIONAL, REPEATED = 1, 3
 def field(number: int, value: int | bytes) -> bytes:
     """Encode a field of a whole number >= 0, or of bytes."""
     if isinstance(value, int):
-        return _varint(number << 3 | VARINT) + _varint(value)
-    return _varint(number << 3 | BYTES) + _varint(len(value)) + value
+        return pack_varints([number << 3 | VARINT, value])
+    return pack_varints([number << 3 | BYTES, len(value)]) + value
 
 
 def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
@@ -59,9 +57,7 @@ def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
 def pack_varints(values: ArrayLike) -> bytes:
     """Encode (n,) whole numbers >= 0 as consecutive varints."""
     value = np.asarray(values, np.uint64)[:, None]
-    if len(value) < FEW:
-        return _varints(value[:, 0].tolist())
-    widest = max(-(-int(value.max()).bit_length() // 7), 1)
+    widest = max(-(-int(value.max(initial=0)).bit_length() // 7), 1)
     left = value >> (np.uint64(7) * np.arange(widest + 1, dtype=np.uint64))
     # a byte is written while digits of the number are left, with bit 8 set if another byte follows
     more = left[:, 1:] > 0
@@ -96,21 +92,6 @@ def schema(package: str, messages: Mapping[str, Sequence[tuple[str, str, bool]]]
             message += field(2, what if kind in TYPES else what + field(6, f".{package}.{kind}".encode()))
         file += field(4, message)
     return field(1, file + field(12, b"proto3"))
-
-
-def _varint(value: int) -> bytes:
-    return _varints([value])
-
-
-def _varints(values: list[int]) -> bytes:
-    digits = bytearray()
-    for value in values:
-        left = value
-        while left > 127:
-            digits.append(left & 127 | 128)
-            left >>= 7
-        digits.append(left)
-    return bytes(digits)
 
 
 def _read(message: bytes, at: int) -> tuple[int, int]:

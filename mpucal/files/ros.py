@@ -20,6 +20,7 @@ from mcap.records import Metadata
 from ..data import Recording
 from ..errors import CaptureError, MpucalError, RecordingError
 from .hints import NO_HINTS, Hints
+from .imu import NOT_MEASURED
 from .mcap import CALIBRATED, FORMAT
 from .reading import first_bytes, import_extra
 from .rows import Rows
@@ -28,16 +29,13 @@ from .tables.times import Stream
 from .tables.units import COUNTS, NS, acceleration_unit
 
 IMU, IMU_OF_ROS1, ROS1 = "sensor_msgs/msg/Imu", "sensor_msgs/Imu", b"ros1"
-SNIFFED = 1 << 16
 _HEADER = struct.Struct("<8xBQI")
-# sensor_msgs/Imu: a first covariance of -1 means no such measurement
-NOT_MEASURED = -1.0
 REMEDY = "give a bag with sensor_msgs/Imu"
 
 
 def is_mcap_of_ros(path: Path) -> bool:
     """Return True if an MCAP file begins as one of ROS, and not as a capture."""
-    begun = first_bytes(path, SNIFFED)
+    begun = first_bytes(path)
     if len(begun) < _HEADER.size or FORMAT.encode() in begun[: _HEADER.size + 100]:
         return False
     return _profile(begun) in (b"ros2", ROS1) or IMU.encode() in begun
@@ -79,7 +77,7 @@ def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     highlevel, typesys = (import_extra(f"rosbags.{name}", "ros", path) for name in ("highlevel", "typesys"))
     try:
-        if path.suffix.lower() == ".mcap" and _profile(first_bytes(path, SNIFFED)) == ROS1:
+        if path.suffix.lower() == ".mcap" and _profile(first_bytes(path)) == ROS1:
             topics, found = _read_ros1(path, typesys.get_typestore(typesys.Stores.ROS1_NOETIC), hints)
             return _recording(path, topics, found, hints)
         with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:

@@ -13,7 +13,7 @@ from ..arguments import is_plausible
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from ..origin import Origin
-from .budget import check_size
+from .reading import check_size
 from .tables.clock import FEWEST, Clock, are_gaps, fit_clock
 from .tables.units import QUANTITIES, acceleration_unit, gyro_unit, rate_factor
 

@@ -12,9 +12,9 @@ from ..mavlink.dialect import Parser, dialect
 from ..mavlink.log import read_log
 from ..mavlink.texts import NoteReader, is_own
 from ..mavlink.tlog import RawPacket, TlogFile, encode_tlog
-from .budget import check_size
 from .folder import captures_in
 from .mcap import Capture, CaptureReader, Record
+from .reading import check_size
 
 TLOG = ".tlog"
 

@@ -29,8 +29,6 @@ from .tables.times import Stream
 from .tables.units import SLOWEST_HZ
 
 COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
-# RELATIVE_TIMESTAMP_INVALID
-INVALID = 0x7FFFFFFF
 # size and type of a message; bytes that are checked for zeros
 NO_MESSAGE, PAGE = bytes(3), 4096
 _DAMAGE = (*DAMAGED, struct.error)
@@ -122,4 +120,5 @@ def _stream(data: Any, names: Iterable[str], unit: str) -> Stream:
 def _later_us(combined: Any) -> NDArray[np.int64]:
     """Return (n,) us by which sensor_combined's accelerations are later than its rates."""
     later = np.asarray(combined.get("accelerometer_timestamp_relative", 0), np.int64)
-    return np.where(later == INVALID, 0, later)
+    # RELATIVE_TIMESTAMP_INVALID
+    return np.where(later == np.iinfo(np.int32).max, 0, later)

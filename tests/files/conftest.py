@@ -17,8 +17,8 @@ BOTH = (("/imu/data_raw", True, True),)
 
 @pytest.fixture(scope="session")
 def walk():
-    """A recording in which a hand turns the board, from t = 0 on, at an even 100 Hz, 14 s of it."""
-    whole = mpucal.load(FIXTURE).part(1000, 2400)
+    """A recording in which a hand turns the board, from t = 0 on, at an even 100 Hz, 10 s of it."""
+    whole = mpucal.load(FIXTURE).part(1000, 2000)
     return mpucal.Recording.from_arrays(np.arange(len(whole)) / 100, whole.acc, whole.gyr, name="walk")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import mpucal
 from mpucal.errors import RecordingError
-from mpucal.files import budget, mcap, open_rows
+from mpucal.files import mcap, open_rows, reading
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
@@ -22,7 +22,7 @@ def archive(path, n, **more):
 def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
     archive(tmp_path / "zeros.npz", 40_000)
     archive(tmp_path / "more.npz", 100, more=np.zeros(200_000))
-    monkeypatch.setenv(budget.VARIABLE, "1")
+    monkeypatch.setenv(reading.VARIABLE, "1")
     with pytest.raises(RecordingError, match=r"takes 2 MB, but only 1 MB are allowed.*--most-mb"):
         mpucal.load(tmp_path / "zeros.npz")
     # an array that is not asked for is not unpacked, and rows take no memory
@@ -35,16 +35,16 @@ def test_what_takes_more_than_it_says_is_stopped_but_not_other_threads_of_a_call
     import resource
 
     def limited():
-        with budget.limit_memory(tmp_path / "a.csv"):
+        with reading.limit_memory(tmp_path / "a.csv"):
             return resource.getrlimit(resource.RLIMIT_DATA) != before
 
     before = resource.getrlimit(resource.RLIMIT_DATA)
-    monkeypatch.delenv(budget.VARIABLE, raising=False)
+    monkeypatch.delenv(reading.VARIABLE, raising=False)
     with ThreadPoolExecutor(1) as other:
         assert not other.submit(limited).result()
-        monkeypatch.setenv(budget.VARIABLE, "64")
+        monkeypatch.setenv(reading.VARIABLE, "64")
         assert other.submit(limited).result()
-    with pytest.raises(RecordingError, match=r"a\.csv takes more than 64 MB"), budget.limit_memory(tmp_path / "a.csv"):
+    with pytest.raises(RecordingError, match=r"a\.csv takes more than 64 MB"), reading.limit_memory(tmp_path / "a.csv"):
         bytearray(128 << 20)
     assert resource.getrlimit(resource.RLIMIT_DATA) == before
 

@@ -34,7 +34,7 @@ def table(walk):
 def files(walk, write_bag, tmp_path_factory):
     """suffix -> the bytes of a whole file."""
     folder = tmp_path_factory.mktemp("whole")
-    some = walk.part(1000, 1000 + N)
+    some = walk.part(700, 700 + N)
     table(some).to_csv(folder / "a.csv", index=False)
     table(some).to_csv(folder / "a.tsv", index=False, sep="\t")
     table(some).to_parquet(folder / "a.parquet")

@@ -152,11 +152,11 @@ def test_one_table_of_two_is_read_with_the_other_if_that_is_there(walk, walk_ns,
 
 def test_pairs_of_tables_are_told_apart_by_their_names(walk, walk_ns, assert_same, tmp_path):
     phyphox(tmp_path, walk, walk_ns, prefix="run1_")
-    phyphox(tmp_path, walk.part(0, 900), walk_ns, prefix="run2_")
+    phyphox(tmp_path, walk.part(0, 600), walk_ns, prefix="run2_")
     first = mpucal.load(tmp_path)
     assert_same(first, walk, 1e-9, 1e-9, 1e-9)
     assert "of 2 pairs of tables, it is the first" in first.taken
-    assert len(mpucal.load(tmp_path / "run2_Gyroscope.csv")) == 900
+    assert len(mpucal.load(tmp_path / "run2_Gyroscope.csv")) == 600
 
 
 @pytest.mark.parametrize("said", ["ax,ay,az,t", "t=4,ax=1,ay=2,az=3,gx=1,gy=2,gz=3"])
@@ -168,24 +168,24 @@ def test_two_tables_without_names_whose_columns_are_said(said, walk, walk_ns, as
 
 
 def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_path):
-    for name, part in (("b", walk.part(700, 1400)), ("a", walk.part(0, 700))):
+    for name, part in (("b", walk.part(500, 1000)), ("a", walk.part(0, 500))):
         np.save(tmp_path / f"{name}.npy", np.column_stack([part.t, part.acc, part.gyr]))
     (tmp_path / "notes.txt").write_text("turned by hand\n")
     (tmp_path / "settings.json").write_text(json.dumps({"rate": 100}))
     savemat(tmp_path / "results.mat", {"accel_bias": np.zeros((3, 1)), "M_a": 0.005 * np.eye(3)})
     read = mpucal.load(tmp_path)
     np.testing.assert_allclose(read.acc, walk.acc, atol=1e-9)
-    assert np.flatnonzero(read.gap).tolist() == [700]
+    assert np.flatnonzero(read.gap).tolist() == [500]
     assert "how the board turned between them is unknown: a.npy, b.npy." in read.taken
     assert "Left out were results.mat (" in read.taken
 
 
 def test_pairs_of_tables_of_sides_are_one_recording_at_the_rate_that_they_state(walk, tmp_path):
     for k, side in enumerate(("x_up", "y_down")):
-        part = walk.part(700 * k, 700 * (k + 1))
+        part = walk.part(500 * k, 500 * (k + 1))
         savemat(tmp_path / f"{side}_accel.mat", {"accel": part.acc, "Fs": 50})
         savemat(tmp_path / f"{side}_gyro.mat", {"gyro": part.gyr, "Fs": 50})
     read = mpucal.load(tmp_path, units="gyr=rad/s", rate=100)
     np.testing.assert_allclose(read.acc, walk.acc)
-    assert np.flatnonzero(read.gap).tolist() == [700]
+    assert np.flatnonzero(read.gap).tolist() == [500]
     assert mpucal.load(tmp_path / "x_up_accel.mat", units="gyr=rad/s").rate_hz == pytest.approx(50.0)

@@ -81,15 +81,15 @@ def path(tmp_path):
 def test_a_growing_capture_takes_no_more_memory(path):
     with CaptureWriter(path) as writer:
         writer.start(META)
-        for record in polls(5_000, period_ns=200_000_000):
+        for record in polls(1_000, period_ns=200_000_000):
             writer.transaction(record)
         chunks = [each for each in gc.get_objects() if isinstance(each, ChunkIndex)]
     assert chunks == []
     with path.open("rb") as file:
-        assert len(make_reader(file).get_summary().chunk_indexes) > 100
+        assert len(make_reader(file).get_summary().chunk_indexes) > 30
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(
     st.lists(reads | writes | events, max_size=20),
     st.dictionaries(words.filter(lambda word: word != mcap.VERSION_KEY), plain),
@@ -193,7 +193,7 @@ def sixty_polls(tmp_path_factory):
     return path.read_bytes()
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(share=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
 def test_a_changed_bit_is_noticed_and_what_precedes_it_is_kept(sixty_polls, path, share, bit):
     records, whole = polls(60), bytearray(sixty_polls)

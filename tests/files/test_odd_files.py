@@ -54,8 +54,8 @@ def test_times_that_are_none(times, says, tmp_path):
 
 
 def test_times_in_small_integers_do_not_wrap(tmp_path, walk):
-    n = 3 * len(walk)  # 42 s
-    made = pd.DataFrame(np.tile(np.column_stack([walk.acc, walk.gyr]), (3, 1)), columns=NAMES[1:])
+    n = 4 * len(walk)  # 40 s
+    made = pd.DataFrame(np.tile(np.column_stack([walk.acc, walk.gyr]), (4, 1)), columns=NAMES[1:])
     made.insert(0, "t [ms]", (np.arange(n) * 10 - 20_000).astype(np.int16))
     made.to_parquet(tmp_path / "a.parquet")
     np.testing.assert_allclose(mpucal.load(tmp_path / "a.parquet").t, np.arange(n) / 100, atol=1e-12)

@@ -261,7 +261,7 @@ FORMS = {
         f"12:34:56.789 -> time,{AXES}", "t a w", "12:34:56.789 -> {},{},{},{},{},{},{}\n"
     ),
     "seconds and nanoseconds": Form(f"header.stamp.sec,header.stamp.nanosec,{AXES}", "sec nanosec a w"),
-    "a time under an unknown name": Form(f"Line,Ticks,{AXES}", "i t a w", says=f"{BY_GRAVITY}-,t,ax,ay,az,gx,gy,gz"),
+    "a time under an unknown name": Form(f"Line,Ticks,{AXES}", "i t a w", says="Ticks is taken for the time"),
     "a rate above the names": Form(
         f"# Config: data_rate = 100.0 Hz, filter = 488 Hz, acc_range = 4 g\nLogging Type,1\nWaiting time,3\n{AXES}",
         *("counts", ",", "walk.csv", "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|)", None, IN_COUNTS),
@@ -349,7 +349,7 @@ def test_named_columns_beside_columns_of_words(said, read, walk, assert_same):
 
 
 def test_what_physics_does_not_confirm_is_not_guessed(read, walk):
-    turned_otherwise = replace(walk, gyr=np.roll(walk.gyr, 700, axis=0))
+    turned_otherwise = replace(walk, gyr=np.roll(walk.gyr, 500, axis=0))
     with pytest.raises(RecordingError, match="name its columns in their order"):
         read("", "t a w", " ", turned_otherwise)
     with pytest.raises(RecordingError, match="there is no column h for t: name one of a, b, c, d, e, f, g"):
@@ -413,7 +413,7 @@ def test_the_range_of_counts_is_not_misled_by_large_biases(read, walk):
 
 def test_a_rate_is_found_by_how_gravity_turns_and_must_fit(read, walk):
     found = read(AXES, "a dps")
-    assert found.rate_hz == pytest.approx(100.0, rel=0.15)
+    assert found.rate_hz == pytest.approx(100.0, rel=0.2)
     assert "this sample rate is that at which its rates turn gravity" in found.taken
     for units in ("", "acc=m/s^2"):
         with pytest.raises(RecordingError, match=r"gravity turns 0\.\d+ times as fast .* for the times --rate \d"):
@@ -604,7 +604,7 @@ def test_times_that_begin_anew_are_an_interruption(walk, walk_ns, tmp_path):
     """Tell a sketch that is started again from a clock that is set back a little."""
     half = len(walk) // 2
     t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
-    t[half + 300] -= 0.02
+    t[half + 200] -= 0.02
     (tmp_path / "walk.csv").write_text(f"time,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
     found = mpucal.load(tmp_path / "walk.csv", units="acc=m/s^2,gyr=rad/s")
     assert "times in s, which begin anew 1 times," in found.taken

@@ -29,6 +29,7 @@ from .units import (
     time_unit,
     to_signed,
     turning,
+    typical_size,
 )
 
 FEWEST, WIDEST = 200, 16
@@ -42,31 +43,24 @@ NEAR = 2.0
 EVEN = 0.99
 # a correlation that is less by as much is no worse
 ALIKE = 0.1
-# more samples add nothing
-MOST_SAMPLES = 200_000
 
 
-def guess_columns(table: Vector, hints: Hints, sensors: Sequence[int] = ()) -> dict[str, int]:
-    """Return role -> place among the columns of (n, k) numbers; empty if nothing fits.
-
-    Parameters
-    ----------
-    sensors : the places of ax ... gz, if they are known; then only the time is looked for.
-    """
-    table = table[np.isfinite(table).all(axis=1)][:MOST_SAMPLES]
-    if len(table) >= FEWEST and not sensors:
+def guess_columns(table: Vector, hints: Hints) -> dict[str, int]:
+    """Return role -> place among the columns of (n, k) numbers; empty if nothing fits."""
+    table = table[np.isfinite(table).all(axis=1)]
+    if len(table) >= FEWEST:
         varies = np.flatnonzero(np.ptp(table, axis=0) > 0.0)
         if len(varies) < table.shape[1]:
             return {role: int(varies[at]) for role, at in guess_columns(table[:, varies], hints).items()}
     n, width = table.shape
     if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND**2).all():
         return {}
-    clocks = [place for place in range(width) if place not in sensors and is_clock(table[:, place])]
+    clocks = [place for place in range(width) if is_clock(table[:, place])]
     # an index increases, too
     clocks.sort(key=lambda place: bool((np.diff(table[:, place]) == 1.0).all()))
     for at in (*clocks, None):
         t = _seconds(None if at is None else table[:, at], n, hints)
-        pairs = [tuple(sensors)] if sensors else _pairs(table, [place for place in range(width) if place != at])
+        pairs = _pairs(table, [place for place in range(width) if place != at])
         turned = {pair: _turned(table, pair, t, any_rate=at is None) for pair in pairs}
         # rates turn a magnetic field, too
         for sized in (True, False):
@@ -75,7 +69,7 @@ def guess_columns(table: Vector, hints: Hints, sensors: Sequence[int] = ()) -> d
             found = next((pair for pair in alike if turned[pair] >= best - ALIKE), None)
             if found is not None:
                 return dict(zip(ROLES[1:], found, strict=True)) | ({} if at is None else {"t": at})
-    return {} if sensors else _accelerometer_alone(table, clocks)
+    return _accelerometer_alone(table, clocks)
 
 
 def _accelerometer_alone(table: Vector, clocks: list[int]) -> dict[str, int]:
@@ -90,11 +84,11 @@ def _accelerometer_alone(table: Vector, clocks: list[int]) -> dict[str, int]:
 
 def _is_one_g(acc: Vector) -> bool:
     """Return True if (n, 3) numbers are nearly 1 g long in m/s^2, g or counts, and vary."""
-    low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
+    size, scatter = typical_size(acc)
     units = [QUANTITIES["acc"]["m/s^2"] / STANDARD_GRAVITY_MPS2, 1.0]
     if size > 0.0 and are_counts(acc):
         units = [2.0 ** -min(max(round(math.log2(size)), FEWEST_PER_G), MOST_PER_G)]
-    return 0.0 < high - low < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
+    return 0.0 < scatter < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
 
 
 def _has_size(table: Vector, pair: Sequence[int]) -> bool:
@@ -128,13 +122,9 @@ def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
 def _pairs(table: Vector, places: list[int]) -> list[tuple[int, ...]]:
     """Return the places of two sensors' three adjacent columns each, of which the first keep a magnitude."""
     starts = range(len(places) - 2)
-    gravity = [a for a in starts if _is_gravity(to_signed(table[:, places[a : a + 3]]))]
+    sizes = {a: typical_size(to_signed(table[:, places[a : a + 3]])) for a in starts}
+    gravity = [a for a, (size, scatter) in sizes.items() if 0.0 < scatter <= MOST_SCATTER * size]
     return [(*places[a : a + 3], *places[w : w + 3]) for a in gravity for w in starts if abs(a - w) >= 3]
-
-
-def _is_gravity(acc: Vector) -> bool:
-    low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
-    return bool(0.0 < high - low <= MOST_SCATTER * size)
 
 
 def _turned(table: Vector, pair: Sequence[int], t: Vector, *, any_rate: bool) -> float:

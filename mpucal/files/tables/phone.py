@@ -3,17 +3,23 @@
 The names of two tables of one recording differ by the sensor's word alone.
 
 Sensor Logger's Accelerometer.csv excludes gravity; TotalAcceleration.csv and AccelerometerUncalibrated.csv include it.
-Of several accelerometers, the one with gravity that is nearest to the sensor's own output is read.
+Of several accelerometers, the one with gravity that is nearest to the sensor's own output is read. Its Metadata.csv has
+the platform: on iOS accelerations have the opposite sign, unless `standardisation` is true
+(tszheichoi/awesome-sensor-logger, COORDINATES.md). phyphox's meta/time.csv has the time of day of each start
+(phyphox-ios, ExperimentExport.swift); phyphox corrects the sign itself.
 """
 
 from __future__ import annotations
 
+import csv
 import lzma
 import re
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -21,18 +27,16 @@ import numpy as np
 from ...data import Recording
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
-from ..budget import HELD, check_size
 from ..hints import NO_HINTS, Hints
 from ..matlab import MATLAB, read_matlab_arrays
-from ..reading import first_bytes, reading
-from .app_metadata import is_app_metadata, read_app_metadata
+from ..reading import HELD, check_size, first_bytes, reading
 from .array_table import ArrayTable, columns_of_arrays, stated_rate
 from .names import ACC, GYR, TIME, Table, first_triple, parse_header, with_sensor
 from .streams import join_streams
-from .table import SNIFFED, columns_by_hint, sensor_stream, stated_rate_hz
+from .table import FLIPPED, columns_by_hint, sensor_stream, stated_rate_hz
 from .text import TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
-from .units import acceleration_unit, are_counts, to_signed
+from .units import NS, acceleration_unit, are_counts, to_signed
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
@@ -40,6 +44,7 @@ _OF_GYR = "gyroscopeuncalibrated gyroscope gyro gyr gyrm rotationrate angularvel
 NAMES = {ACC: _OF_ACC.split(), GYR: _OF_GYR.split()}
 # imu_tk names tables of text .mat, too
 SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat")
+METADATA, TIMES_OF_DAY = "metadata.csv", "meta/time.csv"
 # of a table within a file
 OF_FILE = ".table"
 SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|face|side)(?![a-z])")
@@ -84,7 +89,7 @@ def is_one_of_two_tables(path: Path) -> bool:
         alike = [_parse(name) for name in names]
         if {of[0] for of in alike if of and of[2] == found[2]} != {ACC, GYR}:
             return False
-        begun = first_bytes(path, SNIFFED)
+        begun = first_bytes(path)
         table = None if begun.startswith(MATLAB) else find_table(decode_text(begun, path.name), path.name)
     except (OSError, RecordingError):
         return False
@@ -180,8 +185,8 @@ def _recording(
     """Return the recording in the pair of tables that holds `wanted`, or in the first."""
     pairs = _pairs(names)
     pair = next((pair for pair in pairs if wanted in pair), pairs[0])
-    beside = {member: read(member) for member in names if is_app_metadata(member)}
-    metadata = read_app_metadata({member: data for member, data in beside.items() if isinstance(data, bytes)})
+    beside = [(member, read(member)) for member in names if member.lower().endswith((METADATA, TIMES_OF_DAY))]
+    flipped, zero_ns, remark = _read_app_metadata([(name, data) for name, data in beside if isinstance(data, bytes)])
     found: dict[str, tuple[str, Stream]] = {}
     for member, (quantity, _) in sorted(pair.items(), key=lambda item: (item[1][1], item[0])):
         if quantity in found and (quantity == GYR or _holds_gravity(found[ACC][1])):
@@ -196,11 +201,33 @@ def _recording(
         if quantity not in found or _holds_gravity(stream):
             found[quantity] = member, stream
     (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
-    acc = replace(acc, values=-acc.values if metadata.sign_flipped else acc.values, zero_ns=metadata.zero_ns)
+    acc = replace(acc, values=-acc.values if flipped else acc.values, zero_ns=zero_ns)
     of = f"from {_called(of_acc)} and {_called(of_gyr)}"
     more = f"of {len(pairs)} pairs of tables, it is the first; give one file of another pair to read that"
-    remarks = [of, more if len(pairs) > 1 and not wanted else "", *metadata.remarks]
+    remarks = [of, more if len(pairs) > 1 and not wanted else "", remark]
     return join_streams(acc, gyr, hints, name, remarks=remarks)
+
+
+def _read_app_metadata(files: Iterable[tuple[str, bytes]]) -> tuple[bool, int | None, str]:
+    """Return what an app wrote beside its tables: if the sign is iOS's, time of day at time 0 [ns], and a remark."""
+    flipped, zero_ns, remark = False, None, ""
+    for name, data in files:
+        with suppress(RecordingError, csv.Error):
+            text = decode_text(data, name)
+            separator = next((cell for cell in ",;\t" if cell in text.partition("\n")[0]), ",")
+            read = csv.DictReader(text.splitlines(), delimiter=separator, restkey="")
+            rows = [{(key or "").lower(): cell or "" for key, cell in row.items()} for row in read]
+            starts = [row for row in rows if row.get("event", "").upper() == "START"]
+            if len(starts) > 1:
+                remark = f"it was paused {len(starts) - 1} times, and its times do not count the pauses"
+            elif starts:
+                with suppress(KeyError, ArithmeticError, ValueError):
+                    of_day, at = (Decimal(starts[0][of].replace(",", ".")) for of in ("system time", "experiment time"))
+                    zero_ns = int((of_day - at) * NS)
+            elif [row.get("platform", "").lower() for row in rows[:1]] == ["ios"]:
+                flipped = rows[0].get("standardisation", "").lower() != "true"
+                remark = FLIPPED if flipped else remark
+    return flipped, zero_ns, remark
 
 
 def _holds_gravity(stream: Stream) -> bool:

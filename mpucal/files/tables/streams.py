@@ -26,7 +26,7 @@ from ..rows import make_recording
 from . import times, units
 from .clock import are_new
 from .times import Stream
-from .units import COUNTS, FULL_SCALE, QUANTITIES, resolve_unit
+from .units import COUNTS, QUANTITIES, resolve_unit
 
 # octaves: half way to the next range, which leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
@@ -173,7 +173,7 @@ def _left_out(t: Vector, why: str) -> tuple[Vector, str, Mask]:
 def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str, Mask]:
     """Return (n, 3) m/s^2, how they were read, and (n,) True where one is clipped."""
     values, said = stream.values, hints.units.get("acc", stream.unit)
-    size = float(np.median(np.linalg.norm(values, axis=1)))
+    size = units.typical_size(values)[0]
     seen = units.acceleration_unit(values)
     if said == COUNTS or (not said and units.are_counts(values) and (not seen or hints.accel_range_g)):
         return _scale_counts(values, hints, name, size)
@@ -210,9 +210,8 @@ def _averaged(values: Vector) -> Vector:
 
 def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
     """Return the same of (n, 3) counts, whose median magnitude is `size`."""
-    low, high = np.percentile(np.linalg.norm(values, axis=1), [25, 75]).tolist()
-    if high - low > SHAKING * size:
-        size = float(np.median(np.linalg.norm(_averaged(values), axis=1)))
+    if units.typical_size(values)[1] > SHAKING * size:
+        size = units.typical_size(_averaged(values))[0]
     per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
     scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
@@ -296,4 +295,4 @@ def is_wrong_full_scale(ratio: float) -> bool:
 
 def _is_clipped(values: Vector) -> Mask:
     """Return (n,) True where one of (n, 3) counts is at the end of the range."""
-    return np.asarray(((values >= FULL_SCALE - 1) | (values <= -FULL_SCALE)).any(axis=1))
+    return np.asarray(((values >= ACCEL_COUNTS - 1) | (values <= -ACCEL_COUNTS)).any(axis=1))

@@ -12,11 +12,9 @@ import numpy as np
 
 from ...data import Recording, Vector
 from ...errors import RecordingError
-from ..budget import HELD, check_size
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, ROLES, Hints
-from ..reading import first_bytes, reading
-from .app_metadata import FLIPPED
+from ..reading import HELD, check_size, first_bytes, reading
 from .clock import FEWEST
 from .guess import guess_columns, is_clock, is_even_clock
 from .labelled import labelled_table, marked_table
@@ -43,7 +41,6 @@ from .text import HEAD, PREAMBLE, TextTable, decode_text, find_numeric_table, fi
 from .times import Stream
 from .units import BEYOND, QUANTITIES, acceleration_unit, are_counts
 
-SNIFFED = 1 << 16
 # with a larger share of empty lines, these lines are another sensor's and not lost
 ANOTHERS = 0.1
 # words of a program's preamble -> units that its names of columns do not say
@@ -58,6 +55,7 @@ RATE = re.compile(
 # m/s^2: whole numbers that are larger are counts
 LARGEST_OF_SI = 300.0
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
+FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
 # accelerations from which a program has taken gravity
 WITHOUT_GRAVITY = re.compile(r"\s*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
 # stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
@@ -78,7 +76,7 @@ def is_own_table(path: Path) -> bool:
 
 def _begun(path: Path) -> TextTable | None:
     try:
-        return _find(decode_text(first_bytes(path, SNIFFED), path.name), path.name)
+        return _find(decode_text(first_bytes(path), path.name), path.name)
     except RecordingError:
         return None
 
@@ -182,30 +180,29 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
 
 def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Column], str]:
     """Return the columns with those that only physics shows, and a remark on them; see guess_columns."""
-    acc, gyr = first_triple(columns, ACC), first_triple(columns, GYR)
-    known = (*acc, *gyr) if acc and gyr else ()
+    known = bool(first_triple(columns, ACC) and first_triple(columns, GYR))
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if known and (table.clocks(columns) or hints.rate_hz):
         return columns, ""
     of = _numbers(table, columns)
-    places, sensors = list(of), [list(of).index(c.place) for c in known if c.place in of]
-    numbers = np.column_stack(list(of.values())) if of else np.zeros((0, 0))
-    found = {role: places[i] for role, i in guess_columns(numbers, hints, sensors).items()}
-    even = [] if "t" in found else [place for place in of if is_even_clock(of[place])]
-    if known and even:
-        clock = Column(table.header[even[0]], even[0], TIME)
-        return [*columns, clock], f"{clock.name.strip()} is taken for the time"
-    if not found or (known and "t" not in found):
+    even = [place for place in of if is_even_clock(of[place])]
+    if known:
+        clocks = [Column(table.header[place], place, TIME) for place in even[:1]]
+        return [*columns, *clocks], "".join(f"{clock.name.strip()} is taken for the time" for clock in clocks)
+    places = list(of)
+    found = (
+        {role: places[at] for role, at in guess_columns(np.column_stack([*of.values()]), hints).items()} if of else {}
+    )
+    if not found:
         return columns, ""
-    found |= dict(zip("t", even, strict=False))
-    words = ["-"] * (max(found.values()) + 1)
-    for role, place in found.items():
-        words[place] = role
-    named = (TEMPERATURE, TIME, NANOSECONDS) if table.clocks(columns) and not known else (TEMPERATURE,)
+    found = dict(zip("t", even, strict=False)) | found
+    order = {place: role for role, place in found.items()}
+    words = ",".join(order.get(place, "-") for place in range(max(order) + 1))
+    named = (TEMPERATURE, TIME, NANOSECONDS) if table.clocks(columns) else (TEMPERATURE,)
     kept = [c for c in columns if c.quantity in named]
     found = {role: place for role, place in found.items() if role != "t" or TIME not in named}
     by = "how gravity turns" if "gx" in found else "the length of gravity"
-    remark = f"its columns were guessed from {by}: --columns {','.join(words)}"
+    remark = f"its columns were guessed from {by}: --columns {words}"
     return [*columns_by_hint(table.header, replace(hints, columns=found)), *kept], remark
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
-from ..budget import check_size
+from ..reading import check_size
 from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
 from .units import NS, QUANTITIES, find_unit
 
@@ -29,8 +29,8 @@ PREAMBLE = 200
 HEAD = 4096
 # rows by which a column of times is known
 LOOKED_AT = 50
-# a file with a larger share of NUL bytes is binary
-MOST_NUL = 0.1
+# a file with a larger share of NUL bytes is binary, and a column with a larger share of words no clock
+MOST_ODD = 0.1
 # a header may begin with such a mark; any other line that does is a comment
 COMMENT = ("#", "%", "//")
 # the share of lines that may be damaged
@@ -38,8 +38,6 @@ MOST_BAD = 0.01
 # Bytes that a line takes at least while it is read, in CPython on 64 bits: a list (56), its reference and line number
 # (16 and 32), a Decimal of its time (104 and 8). A cell takes a reference and a float64.
 LINE, CELL = 216, 16
-# numbers of both sensors
-SIX = 6
 # exponents of numbers beyond this would take all memory as integers
 MOST_DIGITS = 40
 # units of a column beside whole seconds
@@ -89,7 +87,8 @@ class TextTable(Table):
         # the last of them may be torn
         some = self.rows[:: max(len(self.rows) // LOOKED_AT, 1)][: LOOKED_AT + 1] or self.rows
         cells = [(c, [row[c.place] for row in some if c.place < len(row)]) for c in columns if c.quantity == TIME]
-        return [c for c, of in cells if of and all(map(_is_number, filter(str.strip, of)))]
+        # a few cells may be damaged
+        return [c for c, of in cells if of and np.mean([*map(_is_number, filter(str.strip, of))] or 1) > 1 - MOST_ODD]
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """See Table; a cell that a line lacks, or of a few damaged lines, is empty. The error names the line."""
@@ -188,7 +187,7 @@ def decode_text(data: bytes, name: str) -> str:
     if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
         # a spreadsheet's "Unicode text"; the bytes that were read may end within a letter
         text = data.decode("utf-16", "replace")
-    elif data.count(b"\0") > MOST_NUL * len(data):
+    elif data.count(b"\0") > MOST_ODD * len(data):
         raise RecordingError(f"{name} is not text", "give a table as text")
     else:
         # a logger that is switched off leaves zeros, and so does one that has not written yet
@@ -255,7 +254,7 @@ def _header_cells(above: str, line: str, separator: str | None) -> list[str]:
 def find_numeric_table(text: str, name: str, least: int) -> TextTable | None:
     """Return the table whose lines hold `least` numbers or more, with any header or none; None if there is none.
 
-    Among fewer than six numbers, other cells are a mark that each line repeats.
+    Among fewer numbers than those of both sensors, other cells are a mark that each line repeats.
     """
     begun = text.split("\n", PREAMBLE)[:PREAMBLE]
     for first, (line, following) in enumerate(pairwise(begun)):
@@ -263,7 +262,7 @@ def find_numeric_table(text: str, name: str, least: int) -> TextTable | None:
             cells, more = _cells(line, separator), _cells(following, separator)
             alike = [_is_number(one) and _is_number(other) for one, other in zip(cells, more, strict=False)]
             marked = all(one == other for one, other, number in zip(cells, more, alike, strict=False) if not number)
-            if sum(alike) >= least and len(more) == len(cells) and (marked or sum(alike) >= SIX):
+            if sum(alike) >= least and len(more) == len(cells) and (marked or sum(alike) >= 2 * len("xyz")):
                 above = _cells(begun[first - 1], separator) if first else []
                 return _read(text, name, above if len(above) == len(cells) else [], first, separator)
     return None

@@ -11,12 +11,11 @@ import math
 
 import numpy as np
 
-from ...data import GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
+from ...data import ACCEL_COUNTS, GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
 from ...errors import RecordingError
 
 NS = 1_000_000_000
 COUNTS = "counts"
-FULL_SCALE = 32768
 # counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
 FEWEST_PER_G, MOST_PER_G = 8, 14
 # quantity -> unit -> SI
@@ -91,18 +90,24 @@ def acceleration_unit(acc: Vector) -> str:
     """
     if not (np.abs(acc) < BEYOND).all():
         return ""
-    low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
-    if high - low > SCATTER * size:
+    size, scatter = typical_size(acc)
+    if scatter > SCATTER * size:
         return ""
     units = QUANTITIES["acc"].items()
     return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
 
 
+def typical_size(values: Vector) -> tuple[float, float]:
+    """Return the median of the lengths of (n, 3) numbers, and the distance of their quartiles."""
+    low, size, high = np.percentile(np.linalg.norm(values, axis=1), [25, 50, 75]).tolist()
+    return size, high - low
+
+
 def to_signed(values: Vector) -> Vector:
     """Return (n, 3) 16-bit counts with their sign, if they were read as unsigned or count from the lowest value."""
-    if values.min() < 0 or not FULL_SCALE <= values.max() < 2 * FULL_SCALE or not (values == np.rint(values)).all():
+    if values.min() < 0 or not ACCEL_COUNTS <= values.max() < 2 * ACCEL_COUNTS or not (values == np.rint(values)).all():
         return values
-    wrapped, shifted = np.where(values >= FULL_SCALE, values - 2 * FULL_SCALE, values), values - FULL_SCALE
+    wrapped, shifted = np.where(values >= ACCEL_COUNTS, values - 2 * ACCEL_COUNTS, values), values - ACCEL_COUNTS
     # the wrong reading jumps from one end of the range to the other
     steps = [float(np.abs(np.diff(each, axis=0)).sum()) for each in (wrapped, shifted)]
     return np.asarray(wrapped if steps[0] < steps[1] else shifted)
@@ -110,7 +115,7 @@ def to_signed(values: Vector) -> Vector:
 
 def are_counts(values: Vector) -> bool:
     """Return True if all values are whole 16-bit numbers."""
-    return bool((values == np.rint(values)).all() and np.abs(values).max() <= FULL_SCALE)
+    return bool((values == np.rint(values)).all() and np.abs(values).max() <= ACCEL_COUNTS)
 
 
 def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
