@@ -21,7 +21,6 @@ import numpy as np
 
 from ..data import Vector
 
-NAMES = ("white_noise", "bias_instability", "random_walk", "quantisation")
 CONFIDENCE = 0.95
 # an octave with fewer non-overlapping differences has almost no information
 LEAST_CLUSTERS = 5.0
@@ -37,12 +36,11 @@ NEAR, FAR, PLACES = 1e-3, 1e2, 40
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Coefficients of one axis (4,), as in NAMES, with 95 % intervals; `first` is the least tau used [samples]."""
+    """Coefficients N, B, K and Q of one axis, (4,), with their intervals."""
 
     value: Vector
     low: Vector
     high: Vector
-    first: float
 
 
 def fit_coefficients(
@@ -73,7 +71,7 @@ def fit_coefficients(
     for i in range(len(best.squares)):
         found[:, i] = best.unbiased(i), *best.interval(i, confidence)
     value, low, high = np.sqrt(found * units)
-    return Coefficients(value, low, high, float(best.sizes[0]))
+    return Coefficients(value, low, high)
 
 
 def design_matrix(sizes: Vector) -> Vector:
@@ -90,7 +88,7 @@ class _Fit:
         from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
         from scipy.stats import chi2  # noqa: PLC0415
 
-        self.sizes, self._A = sizes, design_matrix(sizes)[:, :terms]
+        self._A = design_matrix(sizes)[:, :terms]
         # covariance of independent octaves: the start, and a floor for noise of other kinds
         self._independent = np.diag(2.0 * variances**2 * sizes / samples)
         self._products = _products(sizes, samples)[:terms, :terms]

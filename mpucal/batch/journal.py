@@ -34,9 +34,6 @@ class RowJournal:
         with suppress(OSError):
             self._file.close()
 
-    def __len__(self) -> int:
-        return len(self._known)
-
     def digest(self, path: str) -> str | None:
         """Return the digest of the file of a row; None if there is no row, or the file could not be read."""
         return self._known.get(path, (0, None))[1]

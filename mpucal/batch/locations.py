@@ -1,4 +1,4 @@
-"""Files, folders, globs and URLs of fsspec: found, fetched, identified and written."""
+"""Files, folders, globs and URLs of fsspec: found, fetched and identified."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..disk.atomic import write_atomically
-from ..errors import OutputError, RecordingError, UsageError
+from ..errors import RecordingError, UsageError
 
 
 def expand(words: Iterable[str]) -> list[str]:
@@ -83,25 +82,6 @@ def compute_digest(path: Path) -> str:
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror or error})", "check the path") from error
     return digest.hexdigest()
-
-
-def write_bytes(place: str, data: bytes) -> None:
-    """Write a file or URL.
-
-    Raises
-    ------
-    OutputError : it cannot be written.
-    """
-    try:
-        if "://" not in place:
-            write_atomically(Path(place), data)
-            return
-        import fsspec  # noqa: PLC0415
-
-        with fsspec.open(place, "wb") as file:
-            file.write(data)
-    except OSError as error:
-        raise OutputError(f"cannot write {place} ({error})", "choose another place with -o") from error
 
 
 def _expand_url(word: str) -> list[str]:

@@ -19,7 +19,6 @@ from .fleet import FAR, Parameter, parameters, repeatability, repeated_sensors
 PAGE = "fleet.html"
 # rows of a table on the page; results.csv has all
 MOST = 200
-BINS = 40
 VERDICTS = ("good", "usable", "refused")
 Columns = Mapping[str, Sequence[Any]]
 
@@ -105,7 +104,7 @@ def _histograms(found: Iterable[Parameter], prefix: str) -> str:
         return ""
     limits = np.unique(np.concatenate([each.limit[np.isfinite(each.limit)] for each in some]))
     values = np.concatenate([*(each.known for each in some), limits, -limits])
-    edges = np.linspace(values.min() - 1e-6, values.max() + 1e-6, BINS + 1)
+    edges = np.histogram_bin_edges(values, 40)
     counts = [np.histogram(each.known, edges)[0] for each in some]
     most = 1.05 * float(np.max(counts))
     axes = Axes((float(edges[0]), float(edges[-1])), (0.0, most), f"[{some[0].unit}]", "boards")

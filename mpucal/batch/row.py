@@ -9,20 +9,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from fnmatch import fnmatch
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..data import Recording
+from ..disk.atomic import write_atomically
 from ..errors import MpucalError
 from ..files import load
 from ..files.hints import NO_HINTS, Hints
 from ..mavlink.parameters.document import calibrate_vehicle
 from ..report import render
 from ..result.calibration import Calibration
-from .locations import compute_digest, fetch, write_bytes
+from .locations import compute_digest, fetch
 
 AXES = "xyz"
 TEXTS = ("path", "batch", "digest", "sensor", "recorded", "chip", "model", "verdict", "reasons", "report", "error")
@@ -91,7 +92,7 @@ def make_row(path: str, settings: Settings, known: str | None = None) -> dict[st
             row |= _numbers(calibration, recording)
             if settings.reports:
                 row["report"] = f"{row['digest'][:16]}.html"
-                write_bytes(f"{settings.reports}/{row['report']}", render(calibration, recording).encode())
+                write_atomically(Path(settings.reports, row["report"]), render(calibration, recording).encode())
     except MpucalError as error:
         row["error"] = str(error).replace(str(local), path)
     except Exception as error:

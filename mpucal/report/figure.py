@@ -80,9 +80,9 @@ class Axes:
         """Return a line through values."""
         return line(*self.place(x, y), colour, width)
 
-    def level(self, y: float, colour: str = INK) -> str:
+    def level(self, y: float) -> str:
         """Return a dashed horizontal line at a value."""
-        return line(*self.place(np.array(self._x), np.array([y, y])), colour, dashed=True)
+        return line(*self.place(np.array(self._x), np.array([y, y])), INK, dashed=True)
 
     def band(self, first: float, last: float) -> str:
         """Return a shaded range of x."""

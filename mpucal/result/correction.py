@@ -11,8 +11,6 @@ from ..errors import UsageError
 from ..origin import Origin
 from .calibration import Calibration
 
-# an offset register's bit 0 does nothing
-RESERVED = 1
 # relative and absolute: a parameter is a float32 and passes through text
 TOLERANCE = 1e-5
 
@@ -65,7 +63,8 @@ def _with_registers(calibration: Calibration, sensor: Sensor) -> Correction:
     if calibrated is None or now is None:
         remark = "It is assumed that the chip's offset registers still subtract the b_a that was written there."
         return Correction(calibration, (remark,) if np.any(applied) else ())
-    same = all((a ^ b) & ~RESERVED == 0 for a, b in zip(calibrated, now, strict=True))
+    # bit 0 of an offset register does nothing
+    same = all(a | 1 == b | 1 for a, b in zip(calibrated, now, strict=True))
     if same and np.any(applied):
         remark = "The offset registers held the factory trim again: all of b_a is subtracted here."
         return Correction(replace(calibration, applied_in_hardware=np.zeros(3)), (remark,))

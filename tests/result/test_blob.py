@@ -80,18 +80,9 @@ def test_values_that_do_not_fit_are_refused(blob, change):
         replace(blob, **change).encode()
 
 
-@pytest.mark.parametrize(
-    ("created", "read"),
-    [
-        ("", ""),
-        ("2024-05-17T09:30:00", "2024-05-17T09:30:00+00:00"),
-        ("2024-05-17T09:30:00Z", "2024-05-17T09:30:00+00:00"),
-        ("2024-05-17T11:30:00.987+02:00", "2024-05-17T09:30:00+00:00"),
-    ],
-    ids=["unknown", "no offset", "UTC", "another offset, fraction"],
-)
-def test_created_is_kept_in_whole_seconds_of_utc(blob, created, read):
-    assert Blob.decode(replace(blob, created=created).encode()).created == read
+def test_created_is_kept_in_whole_seconds_of_utc(blob):
+    for created in ("2024-05-17T09:30:00", "2024-05-17T11:30:00.987+02:00"):
+        assert Blob.decode(replace(blob, created=created).encode()).created == "2024-05-17T09:30:00+00:00"
 
 
 def from_json(value):

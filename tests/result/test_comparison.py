@@ -91,9 +91,7 @@ def test_without_uncertainties_nothing_is_claimed():
     [
         ({"sensor": Sensor(who_am_i=0x70)}, "of two chips"),
         ({"sensor": Sensor(temperature_c=40.0)}, "mpucal merge"),
-        ({"sensor": Sensor(accel_offsets=(1, 2, 4))}, "offset registers"),
         ({"fit": {"gravity": 9.81}}, r"scale factors by \+0.034 %"),
-        ({"quality": {"verdict": "usable", "reasons": [{"code": "few_orientations", "message": ""}]}}, "B is usable"),
         ({"extra": {"autopilot": {"params_old": {"INS_ACCOFFS_X": 1.0}}}}, "parameters of the autopilot"),
     ],
 )

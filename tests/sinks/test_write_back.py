@@ -4,6 +4,7 @@ import json
 import sys
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -116,58 +117,30 @@ def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, 
     assert new == (not fails & {1, 2, 3} and full_after != 0)
 
 
-def test_a_place_that_cannot_be_restored_says_what_it_keeps(tmp_path):
-    class Kept(Registers):
-        put_back = None
-
-        def keep(self, folder):
-            return ()
-
-    with pytest.raises(OutputError, match="it is written, but cannot write"):
-        write_to(KIND, Kept(set()), measured(), tmp_path, unsaved, print)
-
-
-def test_a_place_that_takes_calibrations_alone_is_given_nothing_else(tmp_path):
+def test_a_place_that_cannot_be_restored_says_what_it_keeps_and_takes_calibrations_alone(tmp_path):
     sink = Registers(set())
     sink.put_back = None
     with pytest.raises(WriteBackError, match="old is not a calibration"):
         put_back(KIND, sink, tmp_path / "old", tmp_path, print)
     assert sink.steps == 0
+    sink.keep = lambda folder: ()
+    with pytest.raises(OutputError, match="it is written, but cannot write"):
+        write_to(KIND, sink, measured(), tmp_path, unsaved, print)
 
 
-def test_a_refused_calibration_is_not_written(tmp_path, monkeypatch):
-    sink = Registers(set())
+def test_what_cannot_be_written_is_told_or_a_failure(tmp_path, monkeypatch):
+    sink, said = Registers(set()), []
     assert write_all(monkeypatch, sink, measured(verdict="refused"), tmp_path, as_it_is) == []
     assert not sink.held.any()
-
-
-def test_a_device_that_is_gone_is_a_write_back_that_failed(tmp_path, monkeypatch):
     gone = BusError("there is no serial port /dev/x", "plug it in")
     with pytest.raises(WriteBackError, match="nothing was written to the made-up sink: there is no serial port"):
         write_all(monkeypatch, gone, measured(), tmp_path, as_it_is)
-
-
-@pytest.mark.parametrize("asked", [(), ("made",)], ids=["by default", "asked for"])
-def test_a_device_that_keeps_nothing_is_a_failure_where_it_was_asked_for(tmp_path, monkeypatch, asked):
+    # a device that keeps nothing is a failure only where it was asked for
     keeps_nothing = KeepsNothing("the firmware of the bridge on x keeps no calibration", "flash another")
-    calibration, said = measured(), []
-    if asked:
-        with pytest.raises(WriteBackError):
-            write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, asked)
-    else:
-        assert write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, said=said.append) == []
-        assert "only in files" in said[0]
-
-
-class ComparableRegisters(Registers):
-    """A place that finds what it holds as good, or not."""
-
-    def __init__(self, reason):
-        super().__init__(set())
-        self.reason = reason
-
-    def reason_to_keep(self, calibration):
-        return self.reason
+    assert write_all(monkeypatch, keeps_nothing, measured(), tmp_path, as_it_is, said=said.append) == []
+    assert "only in files" in said[0]
+    with pytest.raises(WriteBackError):
+        write_all(monkeypatch, keeps_nothing, measured(), tmp_path, as_it_is, ("made",))
 
 
 @pytest.mark.parametrize(
@@ -183,12 +156,11 @@ class ComparableRegisters(Registers):
 def test_without_a_person_only_what_is_verified_and_better_is_written(
     monkeypatch, tmp_path, verification, reason, objection
 ):
-    sink, calibration = ComparableRegisters(reason), measured(**verification)
-
-    def write():
-        doubts = {"in_doubt": lambda question: ask_in_doubt(question, yes=True)}
-        return write_all(monkeypatch, sink, calibration, tmp_path, as_it_is, **doubts)
-
+    sink, calibration = Registers(set()), measured(**verification)
+    sink.reason_to_keep = lambda calibration: reason
+    write = partial(
+        write_all, monkeypatch, sink, calibration, tmp_path, as_it_is, in_doubt=partial(ask_in_doubt, yes=True)
+    )
     if objection is None:
         write()
     else:
