@@ -47,7 +47,7 @@ def failing(number):
 # what the kernel says where somebody opens a bus, or asks for a chip on it, and what a person is told
 BUSES = {
     "no permission": (False, errno.EACCES, "no permission to use /dev/i2c-1: add yourself to its group"),
-    "no adapter": (False, errno.ENXIO, "no adapter is behind /dev/i2c-1: plug it in"),
+    "no adapter": (False, errno.ENXIO, "the I2C bus /dev/i2c-1 is gone: plug it in"),
     "a wire held low": (
         True,
         errno.ETIMEDOUT,

@@ -20,8 +20,25 @@ class Reply(NamedTuple):
     host_ns: int | None = None
 
 
-class _Clocked(Protocol):
-    """Device that has a clock and can be closed."""
+class Bus(Protocol):
+    """Transport of register reads and writes, and of the time (ns, in the bus's own clock).
+
+    Linux I2C, the replay and the simulated chip are buses; so is a tap that records one of them, and so are the files
+    of a kernel driver, whose names stand in place of registers: `iio:device0/in_accel_scale` is an attribute,
+    `iio:device0` its buffer, `iio:device0/` the list of its attributes.
+    Every method raises BusError if the transfer fails; a replay raises EndOfCapture at its end.
+    """
+
+    def read(self, register: Any, count: int) -> Reply:
+        """Read `count` bytes from `register` on, or up to `count` of a file, without blocking.
+
+        FIFO_R_W does not auto-increment. The time is the read's beginning.
+        """
+        ...
+
+    def write(self, register: Any, data: bytes) -> int:
+        """Write `data` from `register` on, or to a file, and return the time."""
+        ...
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bus's clock shows `t_ns` (a replay and a fast simulation return at once)."""
@@ -29,37 +46,6 @@ class _Clocked(Protocol):
 
     def close(self) -> None:
         """Release the device."""
-        ...
-
-
-class Bus(_Clocked, Protocol):
-    """Transport of register reads and writes, and of the time (ns, in the bus's own clock).
-
-    Linux I2C, the replay and the simulated chip are buses; so is a tap that records one of them.
-    Every method raises BusError if the transfer fails; a replay raises EndOfCapture at its end.
-    """
-
-    def read(self, register: int, count: int) -> Reply:
-        """Read `count` bytes from `register` on. FIFO_R_W does not auto-increment. The time is the read's beginning."""
-        ...
-
-    def write(self, register: int, data: bytes) -> int:
-        """Write `data` from `register` on, and return the time."""
-        ...
-
-
-class Files(_Clocked, Protocol):
-    """Transport of the files of a kernel driver: as Bus, with the name of a file in place of a register.
-
-    `iio:device0/in_accel_scale` is an attribute, `iio:device0` its buffer, `iio:device0/` the list of its attributes.
-    """
-
-    def read(self, register: str, count: int) -> Reply:
-        """Read up to `count` bytes of a file without blocking."""
-        ...
-
-    def write(self, register: str, data: bytes) -> int:
-        """Write an attribute, and return the time."""
         ...
 
 
@@ -80,7 +66,7 @@ class Transaction:
 
     Attributes
     ----------
-    op : read or write. register : address, or the name of a file of Files. data : bytes moved.
+    op : read or write. register : address, or the name of a file. data : bytes moved.
     t_ns : time of the bus's clock. host_ns : see Reply.
     error : None, or the error of a failed transfer (then `data` holds the bytes of the attempted write).
     count : bytes requested (reads) or given (writes).

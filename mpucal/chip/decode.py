@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from . import registers as reg
 from .access import Transaction
 from .accesses import Accesses
 from .families import Part
-from .fifo import FifoDecoder, FifoFault, Run
+from .fifo import FifoDecoder, FifoFault
 from .identity import Behaviour
 from .settings import Settings
 
@@ -31,14 +31,15 @@ class Decoder:
 
     Attributes
     ----------
-    fault : reason why the last poll was not accepted; None if it was.
+    fifo : decoder of the frames, from the first start of the FIFO on. fault : reason why the last poll was not
+        accepted; None if it was.
     """
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._held: dict[int, int] = {}
         self._evidence = Behaviour()
-        self._fifo: FifoDecoder | None = None
+        self.fifo: FifoDecoder | None = None
         self._before_reset: dict[int, int] = {}
         self._accel_offsets: Words | None = None
         self.fault: FifoFault | None = None
@@ -92,25 +93,25 @@ class Decoder:
 
     def feed_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
         """Take `data` read from `register` on at `t_ns`; `host_ns` as in Reply."""
-        if self._fifo is None:
+        if self.fifo is None:
             self._hold(register, data)
             self._evidence.observe(register, data, self._held)
         elif register == reg.FIFO_COUNT_H:
-            self._fifo.set_count(t_ns, int.from_bytes(data, "big"))
+            self.fifo.set_count(t_ns, int.from_bytes(data, "big"))
         elif register == reg.FIFO_R_W:
-            self._fifo.add_bytes(data)
+            self.fifo.add_bytes(data)
         elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
             lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
             if host_ns is not None:
-                self._fifo.add_clock_pairs(np.array([t_ns]), np.array([host_ns]))
-            polled = self._fifo.settings.polled
+                self.fifo.add_clock_pairs(np.array([t_ns]), np.array([host_ns]))
+            polled = self.fifo.settings.polled
             if polled:
-                self._fifo.set_count(t_ns, reg.FRAME_BYTES)
-                self._fifo.add_bytes(data[reg.ACCEL_XOUT_H - register :])
+                self.fifo.set_count(t_ns, reg.FRAME_BYTES)
+                self.fifo.add_bytes(data[reg.ACCEL_XOUT_H - register :])
             overflow = bool(data[reg.INT_STATUS - register] & reg.INT_FIFO_OFLOW)
-            self.fault = self._fifo.finish_poll(overflow and not polled, lost)
+            self.fault = self.fifo.finish_poll(overflow and not polled, lost)
         elif register == reg.TEMP_OUT_H:
-            self._fifo.set_temperature(int.from_bytes(data, "big", signed=True))
+            self.fifo.set_temperature(int.from_bytes(data, "big", signed=True))
         else:
             self._hold(register, data)
 
@@ -130,47 +131,16 @@ class Decoder:
         if register == reg.USER_CTRL and data[0] & reg.USER_CTRL_FIFO_RESET:
             self._fifo_was_reset()
 
-    def provisional_ns(self, t_ns: int) -> int:
-        """Convert a time of the bus's clock to the provisional times of `take`."""
-        return t_ns if self._fifo is None else self._fifo.provisional_ns(t_ns)
-
-    @property
-    def repaired(self) -> int:
-        """Number of words in which a bit flipped on the bus was repaired."""
-        return 0 if self._fifo is None else self._fifo.repaired
-
-    @property
-    def accepted(self) -> int:
-        """Number of accepted frames."""
-        return 0 if self._fifo is None else self._fifo.accepted
-
-    def take(self) -> Samples:
-        """Return the samples since the last `take`, with provisional times."""
-        return self._fifo.take() if self._fifo is not None else Samples.empty()
-
-    def release(self) -> list[Run]:
-        """Hand over the frames since the last call; see FifoDecoder.release."""
-        return self._fifo.release() if self._fifo is not None else []
-
-    def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
-        """Yield the samples of released runs, in the same order, with final times."""
-        return self._fifo.final(runs) if self._fifo is not None else iter(())
-
     @property
     def sensor(self) -> Sensor:
         """Sensor as far as it is known."""
-        return replace(Sensor() if self._fifo is None else self._fifo.sensor, accel_offsets=self._accel_offsets)
-
-    def forget(self) -> None:
-        """Forget all samples taken: `recording` holds those from now on."""
-        if self._fifo is not None:
-            self._fifo.forget()
+        return replace(Sensor() if self.fifo is None else self.fifo.sensor, accel_offsets=self._accel_offsets)
 
     def recording(self) -> Recording:
         """Return all samples with final times."""
-        if self._fifo is None:
+        if self.fifo is None:
             return Recording(**vars(Samples.empty()), name=self._name)
-        return replace(self._fifo.recording(self._name), sensor=self.sensor)
+        return replace(self.fifo.recording(self._name), sensor=self.sensor)
 
     def _feed_each(self, accesses: Accesses, first: int, last: int) -> None:
         for transaction in accesses.part(first, last):
@@ -178,15 +148,15 @@ class Decoder:
 
     def _feed_polls(self, accesses: Accesses, first: int, last: int) -> int:
         """Decode the leading ordinary polls of the accesses first..last-1; return the number of their accesses."""
-        if self._fifo is None or accesses.frames.shape[1] != self._fifo.settings.frame_words:
+        if self.fifo is None or accesses.frames.shape[1] != self.fifo.settings.frame_words:
             return 0
         looks, reads, checks = (np.arange(first + i, last, ACCESSES_A_POLL) for i in range(ACCESSES_A_POLL))
         frames = accesses.frames[accesses.begin[reads[0]] : accesses.end[reads[-1]]]
         lengths = accesses.end[reads] - accesses.begin[reads]
-        polls = self._fifo.accept_plain_polls(accesses.t_ns[looks], frames, lengths)
+        polls = self.fifo.accept_plain_polls(accesses.t_ns[looks], frames, lengths)
         timed = checks[:polls][accesses.has_host_ns[checks[:polls]]]
         if len(timed):
-            self._fifo.add_clock_pairs(accesses.t_ns[timed], accesses.host_ns[timed])
+            self.fifo.add_clock_pairs(accesses.t_ns[timed], accesses.host_ns[timed])
         if polls:
             self.fault = None
         return ACCESSES_A_POLL * polls
@@ -196,12 +166,12 @@ class Decoder:
 
     def _fifo_was_reset(self) -> None:
         settings = Settings.from_registers(self._held, self.part, self._name)
-        if self._fifo is None:
-            self._fifo = FifoDecoder(settings)
+        if self.fifo is None:
+            self.fifo = FifoDecoder(settings)
             self._accel_offsets = self._words(self._held)
-        elif settings != self._fifo.settings:
+        elif settings != self.fifo.settings:
             raise RecordingError(f"{self._name} holds samples of two ranges or rates", "record each of them on its own")
-        self._fifo.reset()
+        self.fifo.reset()
 
     def _words(self, held: Mapping[int, int]) -> Words | None:
         """Return the accelerometer's offset words; None if not all are in `held`."""

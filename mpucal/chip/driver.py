@@ -21,7 +21,7 @@ from .access import Bus
 from .config import Config
 from .decode import Decoder
 from .families import Part
-from .fifo import FifoFault
+from .fifo import FifoDecoder, FifoFault
 from .identity import describe_mismatch
 from .offsets import PLACES
 from .port import Port
@@ -75,8 +75,10 @@ class Driver:
 
     Attributes
     ----------
-    faults : number of polls that were not accepted, by reason.
+    settings : of the started chip. faults : number of polls that were not accepted, by reason.
     """
+
+    settings: Settings
 
     def __init__(
         self,
@@ -90,7 +92,6 @@ class Driver:
         self._decoder = Decoder(name)
         self._port = Port(bus, self._decoder, stats)
         self._config = config or Config()
-        self._settings: Settings | None = None
         self._polls = 0
         self._next_poll_ns = 0
         self._need = Need.NOTHING
@@ -100,17 +101,18 @@ class Driver:
 
     def now_ns(self) -> int:
         """Return the last time of the bus's clock, at the host's rate as far as that is known."""
-        return self._decoder.provisional_ns(self._port.now_ns)
+        fifo, now_ns = self._decoder.fifo, self._port.now_ns
+        return now_ns if fifo is None else fifo.provisional_ns(now_ns)
 
     @property
     def part(self) -> Part:
         """Part that the started chip was identified as."""
-        return self._running.part
+        return self.settings.part
 
     @property
     def repaired(self) -> int:
         """Number of samples in which a bit flipped on the bus was repaired."""
-        return self._decoder.repaired
+        return self._fifo.repaired
 
     def start(self) -> Sensor:
         """Identify, reset, wake and configure the chip, and start its FIFO.
@@ -125,14 +127,13 @@ class Driver:
         self._read_offsets()
         wake(self._port)
         probe(self._port)
-        self._settings = self._config.settings(self._decoder.part)
-        configure(self._port, self._settings)
+        settings = self.settings = self._config.settings(self._decoder.part)
+        configure(self._port, settings)
         self._restart()
-        no_fifo = NO_FIFO if self._settings.polled else None
-        for sentence in filter(None, (describe_mismatch(self._settings.sensor), self._correction_remark(), no_fifo)):
+        no_fifo = NO_FIFO if settings.polled else None
+        for sentence in filter(None, (describe_mismatch(settings.sensor), self._correction_remark(), no_fifo)):
             self._say(sentence)
-        sensor = self._settings.sensor
-        return replace(sensor, rate_hz=self._config.rate_hz) if self._settings.polled else sensor
+        return replace(settings.sensor, rate_hz=self._config.rate_hz) if settings.polled else settings.sensor
 
     def poll(self) -> Samples:
         """Wait for the next poll, and return the samples since the last one with provisional times.
@@ -146,22 +147,21 @@ class Driver:
         BusError : the bus is too slow for the rate.
         """
         begun_ns = self._port.now_ns
-        running = self._running
         self._port.sleep_until(self._next_poll_ns)
         trouble: BusError | ChipError | None = None
         try:
             if self._need is Need.NOTHING:
-                self._need = self._read_samples() if running.polled else self._drain_fifo(running)
+                self._need = self._read_samples() if self.settings.polled else self._drain_fifo()
             if self._need is not Need.NOTHING:
-                self._recover(running)
+                self._recover()
         except (BusError, ChipError) as error:
             trouble = error
             self._plan_next_poll()
-        self._check_pace(running)
-        samples = self._decoder.take()
+        self._check_pace()
+        samples = self._fifo.take()
         self._fruitless_ns = 0 if len(samples) else self._fruitless_ns + self._spent_ns(begun_ns, trouble)
         if self._fruitless_ns > DEAD_NS:
-            raise trouble or self._diagnose_silence(running)
+            raise trouble or self._diagnose_silence()
         return samples
 
     def recording(self) -> Recording:
@@ -170,14 +170,15 @@ class Driver:
 
     def forget(self) -> None:
         """Forget all samples: `recording` holds those from now on."""
-        self._decoder.forget()
+        self._fifo.forget()
 
     def stop(self) -> None:
         """Stop the FIFO if the bus still works; the chip stays awake."""
         with suppress(BusError, EndOfCapture):
             stop_fifo(self._port)
-        if self.repaired > MAX_REPAIRED_SHARE * self._decoder.accepted:
-            self._say(f"a bit had flipped on the bus in {self.repaired} samples, which were repaired: {REMEDY}")
+        fifo = self._decoder.fifo
+        if fifo is not None and fifo.repaired > MAX_REPAIRED_SHARE * fifo.accepted:
+            self._say(f"a bit had flipped on the bus in {fifo.repaired} samples, which were repaired: {REMEDY}")
         if self._port.stats.errors:
             self._say(f"{self._port.stats}: {self._port.stats.remedy}")
 
@@ -202,10 +203,11 @@ class Driver:
             " removed it, and this calibration is for the chip without it"
         )
 
-    def _drain_fifo(self, settings: Settings) -> Need:
+    def _drain_fifo(self) -> Need:
         """Read all whole frames; return what the chip needs next."""
-        count, begun_ns = self._fifo_count(settings.frame_bytes), self._port.now_ns
+        count, begun_ns = self._fifo_count(), self._port.now_ns
         self._plan_next_poll()
+        settings = self.settings
         if count >= settings.part.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
             self.faults[FifoFault.OVERFLOW] += 1
             return Need.RESTART
@@ -243,9 +245,9 @@ class Driver:
         self.faults[fault] += 1
         return Need.SET_UP if fault is FifoFault.STUCK else Need.RESTART
 
-    def _check_pace(self, settings: Settings) -> None:
+    def _check_pace(self) -> None:
         """Raise BusError if the chip makes frames faster than the quickest read moved them, after several overflows."""
-        rate_hz = settings.nominal_rate_hz
+        rate_hz = self.settings.nominal_rate_hz
         if self.faults[FifoFault.OVERFLOW] < REPEATED_OVERFLOWS or not 1e9 <= self._frame_ns * rate_hz < math.inf:
             return
         raise BusError(
@@ -253,18 +255,18 @@ class Driver:
             "run the bus at 400 kHz (`dtparam=i2c_arm_baudrate=400000` on a Raspberry Pi), or use a lower --rate",
         )
 
-    def _recover(self, settings: Settings) -> None:
+    def _recover(self) -> None:
         """Restart the FIFO; before that, set up a chip that lost its settings or repeats itself."""
-        if self._need is not Need.SET_UP and not is_configured(self._port, settings):
+        if self._need is not Need.SET_UP and not is_configured(self._port, self.settings):
             self.faults[FifoFault.LOST] += 1
             self._need = Need.SET_UP
         if self._need is Need.SET_UP:
-            self._set_up_again(settings)
+            self._set_up_again()
         self._restart()
 
-    def _set_up_again(self, settings: Settings) -> None:
+    def _set_up_again(self) -> None:
         answer = self._port.read(reg.WHO_AM_I, 1)[0]
-        part = settings.part
+        part = self.settings.part
         if answer != part.who_am_i:
             raise ChipError(
                 f"the {part.chip} answers 0x{answer:02x} to WHO_AM_I now, and answered 0x{part.who_am_i:02x} before",
@@ -272,16 +274,16 @@ class Driver:
             )
         reset(self._port)
         wake(self._port)
-        configure(self._port, settings)
+        configure(self._port, self.settings)
 
     def _restart(self) -> None:
-        restart_fifo(self._port, self._running)
+        restart_fifo(self._port, self.settings)
         self._need = Need.NOTHING
         self._plan_next_poll()
 
-    def _fifo_count(self, frame_bytes: int) -> int:
+    def _fifo_count(self) -> int:
         count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")
-        if count % frame_bytes:
+        if count % self.settings.frame_bytes:
             # The chip is writing a frame, or the FIFO has slipped.
             self._port.sleep(FRAME_WRITTEN_NS)
             count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")
@@ -298,10 +300,10 @@ class Driver:
         held_ns = BUS_HELD_NS if isinstance(trouble, BusHeld) else 0
         return min(self._port.now_ns - begun_ns, LONGEST_POLL_NS) + held_ns
 
-    def _diagnose_silence(self, settings: Settings) -> ChipError:
+    def _diagnose_silence(self) -> ChipError:
         """Return the error that explains two seconds without a valid sample."""
-        chip = settings.part.chip
-        if not is_configured(self._port, settings):
+        chip = self.settings.part.chip
+        if not is_configured(self._port, self.settings):
             return ChipError(
                 f"the {chip} lost its settings several times",
                 "its supply breaks down: check the wires and connectors, then start again",
@@ -318,7 +320,7 @@ class Driver:
         )
 
     @property
-    def _running(self) -> Settings:
-        if self._settings is None:
+    def _fifo(self) -> FifoDecoder:
+        if self._decoder.fifo is None:
             raise RuntimeError("the driver was not started")
-        return self._settings
+        return self._decoder.fifo

@@ -67,10 +67,11 @@ def capture_rows(*paths: Path) -> Rows:
     decoder, spool = Decoder(session.name), Spool()
     for access in session.accesses():
         decoder.feed(access)
-        spool.add(decoder.release())
-    if spool.frames < 2:
+        if decoder.fifo is not None:
+            spool.add(decoder.fifo.release())
+    if decoder.fifo is None or spool.frames < 2:
         raise RecordingError(f"{session.name} holds {spool.frames} samples", "record for longer")
-    runs = decoder.final(spool.runs())
+    runs = decoder.fifo.final(spool.runs())
     runs = _without(runs, session.forgotten) if session.forgotten else runs
     return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name, utc_ns=session.utc_ns)
 

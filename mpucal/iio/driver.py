@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 
-from ..chip.access import Files
+from ..chip.access import Bus
 from ..chip.config import Config
 from ..data import Recording, Samples, Sensor
 from ..errors import BusError, ChipError, EndOfCapture, NoAnswer
@@ -42,7 +42,7 @@ class IioDriver:
 
     def __init__(
         self,
-        files: Files,
+        files: Bus,
         devices: Devices,
         config: Config,
         name: str = "recording",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 
-from ..chip.access import Files, Transaction
+from ..chip.access import Bus, Transaction
 from ..chip.config import Config
 from ..errors import BusError, ChipError, NoAnswer
 from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, full_scale, parse_available
@@ -52,7 +52,7 @@ class DeviceAttributes:
     names : of all its attributes. now_ns : last time of the clock.
     """
 
-    def __init__(self, files: Files, decoder: IioDecoder, device: str) -> None:
+    def __init__(self, files: Bus, decoder: IioDecoder, device: str) -> None:
         self._files, self._decoder, self.device = files, decoder, device
         self._old: list[tuple[str, str]] = []
         self.names: frozenset[str] = frozenset()

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from ..chip.access import Files
 from ..chip.config import Config
 from ..chip.offsets import Words, word_difference
 from ..data import STANDARD_GRAVITY_MPS2, Vector
@@ -67,9 +66,8 @@ class KernelSink:
 
     def __init__(self, source: OpenedIio, journal: Journal | None = None) -> None:
         self._source, self._journal = source, journal or Journal()
-        self._files: Files = source.bus  # type: ignore[assignment]
         self._decoder = IioDecoder("the kernel's driver")
-        self._attributes = DeviceAttributes(self._files, self._decoder, source.devices.accel)
+        self._attributes = DeviceAttributes(self._source.bus, self._decoder, source.devices.accel)
         self._attributes.read_all([ACCEL])
         name = f"61-mpucal-{source.devices.accel.replace(':', '-')}.rules"
         self._rule = None if source.rules is None else source.rules / name
@@ -158,7 +156,7 @@ class KernelSink:
         ------
         ChipError : it never lay still. BusError : a channel cannot be read.
         """
-        driver = IioDriver(self._files, self._source.devices, Config(), trigger=POLLED)
+        driver = IioDriver(self._source.bus, self._source.devices, Config(), trigger=POLLED)
         driver.start()
         try:
             for _ in range(TRIES):

@@ -66,9 +66,8 @@ class OpenedIio(OpenedChip):
 
     def contents(self) -> dict[str, Any]:
         """Read the attributes; nothing is set up or written."""
-        files: Any = self.bus
         facts: dict[str, Any] = {"where": self.where}
-        with closing(files):
+        with closing(self.bus) as files:
             for device in self.devices.each:
                 names = files.read(f"{device}/", LIST_BYTES).data.decode().split("\n")
                 before = "" if len(self.devices.each) == 1 else f"{device}/"
@@ -111,9 +110,8 @@ def open_source(request: Request) -> OpenedIio:
         files.check(device)
     if request.values.get("writes"):
         files.check_writable(devices.accel)
-    bus: Any = files
     return OpenedIio(
-        bus, request.plan, words=request.words, devices=devices, trigger=request.values.get("trigger"), rules=RULES
+        files, request.plan, words=request.words, devices=devices, trigger=request.values.get("trigger"), rules=RULES
     )
 
 
@@ -127,7 +125,7 @@ def found_devices() -> list[tuple[str, str]]:
 
 
 class IioFiles(HostBus):
-    """Files of IIO devices; see Files."""
+    """Files of IIO devices; see Bus."""
 
     def __init__(self) -> None:
         self._open: dict[str, int] = {}
@@ -153,7 +151,7 @@ class IioFiles(HostBus):
                 )
 
     def read(self, register: str, count: int) -> Reply:
-        """Read a file as Files has it; TRIGGERS gives the names of all triggers."""
+        """Read a file as Bus has it; TRIGGERS gives the names of all triggers."""
         device, _, name = register.partition("/")
         if register == TRIGGERS:
             names = [_name(path) for path in sorted(SYSFS.glob("trigger*"))]
@@ -168,7 +166,7 @@ class IioFiles(HostBus):
         return reply._replace(t_ns=(reply.t_ns + self.now_ns()) // 2)
 
     def write(self, register: str, data: bytes) -> int:
-        """See Files."""
+        """See Bus."""
         device, _, name = register.partition("/")
         t_ns = self.now_ns()
         with converting(lambda error: file_error(error, device, name, data.decode())):

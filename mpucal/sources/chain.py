@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, runtime_checkable
 
-from ..chip.access import Bus, Files, Reply
+from ..chip.access import Bus, Reply
 from ..chip.records import ABORT, KEY, RESUMED, SessionEvent
 from ..mavlink.transport import ReceivedBytes, Transport
 
@@ -92,7 +92,7 @@ class Chain(Generic[Part]):
         return self._parts[self._at]
 
 
-class ChainedBus(Chain[Bus | Files]):
+class ChainedBus(Chain[Bus]):
     """Parts of a session with a chip or a driver of the kernel."""
 
     _shift_ns: int | None = None

@@ -35,20 +35,23 @@ _TRANSFER = {
 }
 
 
+def device_error(error: OSError, path: str, kind: str, group: str, there: str) -> BusError:
+    """Convert the error of the device at `path`, an I2C bus or an SPI device; `there` : remedy for a wrong path."""
+    if error.errno == errno.ENOENT:
+        return BusError(f"there is no {kind} {path}", there)
+    if error.errno in (errno.EACCES, errno.EPERM):
+        remedy = f"add yourself to its group: `sudo usermod -aG {group} $USER`, then log in again"
+        return BusError(f"no permission to use {path}", remedy)
+    if error.errno in (errno.ENOTTY, errno.EISDIR, errno.EINVAL):
+        return BusError(f"{path} is not an {kind}", there)
+    if error.errno in (errno.ENXIO, errno.ENODEV, errno.ESHUTDOWN):
+        return BusError(f"the {kind} {path} is gone", "plug it in or load its driver, and start again")
+    return BusError(f"{path} does not work ({error.strerror})", "check the wires and the driver, and start again")
+
+
 def opening_error(error: OSError, path: str) -> BusError:
     """Convert the error of an adapter at `path` that could not be opened."""
-    if error.errno == errno.ENOENT:
-        return BusError(f"there is no I2C bus {path}", _other_buses())
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return BusError(
-            f"no permission to use {path}",
-            "add yourself to its group: `sudo usermod -aG i2c $USER`, then log in again",
-        )
-    if error.errno in (errno.ENOTTY, errno.EISDIR, errno.EINVAL):
-        return BusError(f"{path} is not an I2C bus", _other_buses())
-    if error.errno in (errno.ENXIO, errno.ENODEV):
-        return BusError(f"no adapter is behind {path}", "plug it in or load its driver, and start again")
-    return BusError(f"cannot open {path} ({error.strerror})", "check the adapter and its driver")
+    return device_error(error, path, "I2C bus", "i2c", _other_buses())
 
 
 def transfer_error(error: OSError, path: str, address: int) -> BusError:

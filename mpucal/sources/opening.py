@@ -70,13 +70,10 @@ def check_resume_options(given: Mapping[str, str]) -> None:
     ------
     UsageError : one was given.
     """
-    for name in (*(kind.option.name for kind in SOURCES), *_fixed_by_capture(), OUTPUT_FOLDER):
-        if name in given:
-            raise UsageError(
-                f"--resume does not take {given[name]}: a session keeps its settings and folder",
-                "remove it",
-                without=given[name],
-            )
+    names = (*(kind.option.name for kind in SOURCES), *_fixed_by_capture(), OUTPUT_FOLDER)
+    for written in (given[name] for name in names if name in given):
+        what = f"--resume does not take {written}: a session keeps its settings and folder"
+        raise UsageError(what, "remove it", without=written)
 
 
 def refuse_fixed_options(request: Request) -> None:
@@ -86,13 +83,10 @@ def refuse_fixed_options(request: Request) -> None:
     ------
     UsageError : one was given.
     """
-    for name in _fixed_by_capture():
-        if name in request.given:
-            raise UsageError(
-                f"{request.kind.flag} does not take {request.given[name]}, which the capture fixes",
-                "remove it, or use `mpucal calibrate` to fit the capture with other options",
-                without=request.given[name],
-            )
+    for written in (request.given[name] for name in _fixed_by_capture() if name in request.given):
+        what = f"{request.kind.flag} does not take {written}, which the capture fixes"
+        remedy = "remove it, or use `mpucal calibrate` to fit the capture with other options"
+        raise UsageError(what, remedy, without=written)
 
 
 def open_source(

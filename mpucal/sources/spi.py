@@ -8,7 +8,6 @@ its captures are those of I2C. An ICM-20602 and its like have this bit in their 
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Callable
 
 from ..chip.access import Reply
@@ -25,6 +24,7 @@ from ..chip.registers import (
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
 from .host_bus import HostBus, converting, lock_device, register_after
+from .i2c_errors import device_error
 from .kind import Request
 from .read_timer import ReadTimer
 
@@ -116,20 +116,8 @@ class SpiBus(HostBus):
             return bytes(self._device.xfer2(list(message), hz))
 
     def _error(self, error: OSError) -> BusError:
-        path = self._path
-        if error.errno == errno.ENOENT:
-            return BusError(
-                f"there is no SPI device {path}",
-                "enable SPI (`dtparam=spi=on` on a Raspberry Pi), and give /dev/spidevB.C",
-            )
-        if error.errno in (errno.EACCES, errno.EPERM):
-            remedy = "add yourself to its group: `sudo usermod -aG spi $USER`, then log in again"
-            return BusError(f"no permission to use {path}", remedy)
-        if error.errno in (errno.ENOTTY, errno.EISDIR, errno.EINVAL):
-            return BusError(f"{path} is not an SPI device, or does not support mode 3", "give /dev/spidevB.C")
-        if error.errno in (errno.ENODEV, errno.ENXIO, errno.ESHUTDOWN):
-            return BusError(f"the SPI device {path} is gone", "check its driver, and start again")
-        return BusError(f"a transfer with {path} failed ({error.strerror})", "check the wires, and start again")
+        there = "enable SPI (`dtparam=spi=on` on a Raspberry Pi), and give a /dev/spidevB.C that supports mode 3"
+        return device_error(error, self._path, "SPI device", "spi", there)
 
 
 def _change_user_ctrl(register: int, data: bytes, change: Callable[[int], int]) -> bytes:

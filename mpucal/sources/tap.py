@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Literal, TypeVar
 
-from ..chip.access import Bus, Failure, Files, Reply, Transaction
+from ..chip.access import Bus, Failure, Reply, Transaction
 from ..chip.records import Recorder
 from ..errors import BusError
 
@@ -18,7 +18,7 @@ class Tap:
     A failed access has no time: it is recorded with the last known time. Both may be replaced between two accesses.
     """
 
-    def __init__(self, bus: Bus | Files, recorder: Recorder) -> None:
+    def __init__(self, bus: Bus, recorder: Recorder) -> None:
         self.bus = bus
         self.recorder = recorder
         self._latest_ns = 0

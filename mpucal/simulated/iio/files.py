@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...chip import registers as reg
-from ...chip.access import Files, Reply
+from ...chip.access import Bus, Reply
 from ...chip.config import Config
 from ...chip.decode import Decoder
 from ...chip.driver import Driver
@@ -36,7 +36,7 @@ REGISTERS = {channel: reg.ACCEL_XOUT_H + 2 * i for i, channel in enumerate([*CHA
 IDENTITY = "1, 0, 0; 0, 1, 0; 0, 0, 1"
 
 
-class SimulatedFiles(Files):
+class SimulatedFiles(Bus):
     """Files of one device with both sensors, or of two with one each.
 
     Parameters
@@ -56,7 +56,7 @@ class SimulatedFiles(Files):
         self._now_ns = 0
 
     def read(self, register: str, count: int) -> Reply:
-        """See Files."""
+        """See Bus."""
         if register == TRIGGERS:
             return Reply(b"hrtimer-0", self._now_ns)
         device, _, name = register.partition("/")
@@ -76,7 +76,7 @@ class SimulatedFiles(Files):
         return Reply(f"{held.texts[name]}\n".encode(), self._now_ns)
 
     def write(self, register: str, data: bytes) -> int:
-        """See Files."""
+        """See Bus."""
         device, _, name = register.partition("/")
         held, text = self._device(device, name), data.decode()
         if held.running and name != "buffer/enable":
@@ -103,7 +103,7 @@ class SimulatedFiles(Files):
         self._now_ns = max(self._now_ns, t_ns)
 
     def close(self) -> None:
-        """See Files."""
+        """See Bus."""
         self._bus.close()
 
     @property
