@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+import tomllib
 import zlib
 from dataclasses import asdict, replace
 from fractions import Fraction
@@ -247,109 +248,21 @@ def lines() -> dict[str, tuple[bytes, dict[str, Any]]]:
     }
 
 
-# Requests of a host to a bridge that was greeted, that stores nothing, and whose chip has 504 bytes in its FIFO: the
-# request's type, its seq, its payload (in hexadecimal), and the reply's status and bytes behind t_us, if there is one.
-# Several that are sent at once stand in one line, with & between them.
-
-READ = "02 2 7202 > OK 01f8"
-BEGIN = f"12 8 {wire.BlobBegin(188).payload().hex()} > OK"
-DATA = [
-    f"13 {at // 32} {wire.BlobData(at, MEASURED.encode()[at : at + 32]).payload().hex()} > OK"
-    for at in range(0, 188, 32)
+CHUNKS = [
+    f"13 {at // 32} {wire.BlobData(at, MEASURED.encode()[at : at + 32]).payload().hex()}" for at in range(0, 188, 32)
 ]
+DATA = [f"{chunk} > OK" for chunk in CHUNKS]
 COMMIT = f"14 9 {wire.BlobCommit(188, 0x5D9B9255).payload().hex()}"
-COMMITTED = f"{COMMIT} > OK {struct.pack('<I', 1).hex()}"
-
-
-def commit(seq: int, length: int, crc: int = 0x5D9B9255) -> str:
-    """Return a BLOB_COMMIT of another length."""
-    return f"14 {seq} {wire.BlobCommit(length, crc).payload().hex()}"
-
-
-def greeting(seq: int, asked: int, found: int) -> str:
-    """Return HELLO and its reply with their version and address."""
-    return f"01 {seq} {wire.Hello(address=asked).payload().hex()} > OK {(wire.MAGIC + bytes([1, 0, found])).hex()}"
-
-
-# talks by name: the rule that each one tests, what it needs of a bridge, and its lines
-TALKS: dict[str, tuple[str, tuple[str, ...], list[str]]] = {
-    "fifo_count": ("FIFO_COUNT passes through as it is in the chip, big-endian", ("chip",), [READ]),
-    "types_from_0x80": (
-        "types from 0x80 on are ignored",
-        ("chip",),
-        ["80 1", f"81 1 {wire.Hello().payload().hex()}", "ff 1", READ],
-    ),
-    "other_magic": (
-        "a HELLO with another magic is answered with BAD_PAYLOAD, and nothing is done",
-        ("chip",),
-        [f"01 3 {b'MPUX'.hex()}010000 > BAD_PAYLOAD", READ],
-    ),
-    "stream_stop_of_one_byte": (
-        "STREAM needs both bytes to stop, too",
-        ("stream",),
-        ["05 4 00 > BAD_PAYLOAD", "05 5 0000 > OK"],
-    ),
-    "window": (
-        "a host may send MIN_WINDOW requests at once; each is answered, in their order",
-        ("chip", "stream"),
-        [f"{READ} & 02 3 7202 > OK 01f8", f"05 4 00 > BAD_PAYLOAD & {READ}"],
-    ),
-    "commit_too_early": (
-        "a commit that fails leaves what was begun as it was; one that is repeated succeeds, and changes nothing",
-        ("blob",),
-        [BEGIN, DATA[0], f"{COMMIT} > BAD_OFFSET", *DATA[1:], COMMITTED, COMMITTED],
-    ),
-    "begin_of_0": (
-        "a BLOB_BEGIN of 0 is taken, and its commit fails",
-        ("blob",),
-        ["12 6 0000 > OK", f"{commit(7, 0, 0)} > BAD_BLOB", "10 8 > NO_BLOB"],
-    ),
-    "generation_after_erase": (
-        "the generation begins at 1 again",
-        ("blob",),
-        [BEGIN, *DATA, COMMITTED, "15 10 > OK", "10 11 > NO_BLOB", BEGIN, *DATA, COMMITTED],
-    ),
-    "begin_refused": (
-        "a BLOB_BEGIN that is refused does nothing: what was begun before goes on",
-        ("blob",),
-        [BEGIN, DATA[0], "12 1 ffff > NO_ROOM", "12 2 01 > BAD_PAYLOAD", *DATA[1:], COMMITTED],
-    ),
-    "payload_before_state": (
-        "a payload is looked at before what is stored or begun: BAD_PAYLOAD where NO_BLOB or NOT_BEGUN applies too",
-        ("blob",),
-        [
-            *("11 1 000000 > BAD_PAYLOAD", "11 2 000001 > NO_BLOB", "13 3 0000 > BAD_PAYLOAD"),
-            *("13 4 000001 > NOT_BEGUN", "14 5 0000000000 > BAD_PAYLOAD", "14 6 000000000000 > NOT_BEGUN"),
-        ],
-    ),
-    "commit_of_another_length": (
-        "a commit of another length than was begun is answered with BAD_OFFSET",
-        ("blob",),
-        [BEGIN, *DATA, f"{commit(1, 187)} > BAD_OFFSET", f"{commit(2, 189)} > BAD_OFFSET", COMMITTED],
-    ),
-    "erase_ends_what_was_begun": (
-        "BLOB_ERASE gives up what was begun",
-        ("blob",),
-        [BEGIN, DATA[0], "15 1 > OK", DATA[1].replace("> OK", "> NOT_BEGUN"), f"{COMMIT} > NOT_BEGUN"],
-    ),
-    "address_without_a_chip": (
-        "a HELLO whose address does not answer succeeds with address 0; transfers then fail, at no address at all",
-        ("chip", "stream"),
-        [
-            *(greeting(1, 0x23, 0), "02 2 7501 > NO_ANSWER", "03 3 744600 > NO_ANSWER", "04 4 2300 > NO_ANSWER"),
-            *("05 5 0e04 > OK", "05 6 0000 > OK", greeting(7, 0, 0x68), READ),
-        ],
-    ),
-    "address_beyond_7_bits": (
-        "a HELLO whose address has more than 7 bits is answered with BAD_PAYLOAD, and nothing is done",
-        ("chip",),
-        [f"01 1 {b'MPUB'.hex()}010080 > BAD_PAYLOAD", f"01 2 {b'MPUB'.hex()}0100 > BAD_PAYLOAD", READ],
-    ),
-    "another_major": (
-        "a HELLO of another major version needs its first six bytes; the bridge stays as it was",
-        ("chip",),
-        [f"01 1 {b'MPUB'.hex()}6300 > BAD_VERSION", READ],
-    ),
+MACROS = {
+    "READ": "02 2 7202 > OK 01f8",
+    "HELLO": wire.Hello().payload().hex(),
+    "BEGIN": f"12 8 {wire.BlobBegin(188).payload().hex()} > OK",
+    "DATA": "\n".join(DATA),
+    "DATA0": DATA[0],
+    "REST": "\n".join(DATA[1:]),
+    "CHUNK1": CHUNKS[1],
+    "COMMIT": COMMIT,
+    "COMMITTED": f"{COMMIT} > OK {struct.pack('<I', 1).hex()}",
 }
 
 
@@ -365,7 +278,7 @@ def exchanged(text: str) -> tuple[Frame, Frame | None]:
     return request, Frame(request.type | wire.REPLY_BIT, request.seq, reply)
 
 
-def talk(settled: str, needs: tuple[str, ...], lines: list[str]) -> dict[str, Any]:
+def talk(settled: str, needs: list[str], lines: list[str]) -> dict[str, Any]:
     """Return a talk's JSON: requests as bytes on the line, and replies as frames; a list where several are due."""
     said: list[dict[str, Any]] = []
     for line in lines:
@@ -373,12 +286,16 @@ def talk(settled: str, needs: tuple[str, ...], lines: list[str]) -> dict[str, An
         answers = [plain_frame(reply) for _, reply in pairs if reply is not None]
         host = b"".join(request.encode() for request, _ in pairs)
         said.append({"host": host.hex(), "bridge": answers if len(pairs) > 1 else next(iter(answers), None)})
-    return {"settled": settled, "needs": list(needs), "talk": said}
+    return {"settled": settled, "needs": needs, "talk": said}
 
 
 def talks() -> dict[str, dict[str, Any]]:
     """Return the talks' JSON by name."""
-    return {name: talk(*row) for name, row in TALKS.items()}
+    rows = tomllib.loads(Path(__file__).with_name("talks.toml").read_text(encoding="utf-8"))
+    return {
+        name: talk(row["settled"], row["needs"], "\n".join(row["lines"]).format_map(MACROS).splitlines())
+        for name, row in rows.items()
+    }
 
 
 def clock(bits: int) -> dict[str, Any]:
