@@ -15,14 +15,13 @@ import os
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import click
-import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.cli import COMMANDS, commands
@@ -30,35 +29,24 @@ from tools.lab.runner import Trial
 from tools.lab.table import Column, Row, frequencies
 from tools.processes import Child, Ended, ready
 
-QUICK = ("--rate", "25", "--target", "quick", "--yes")
-CALIBRATION, TABLE, RECORDED = "a/calibration.json", "walk.npz", "a/capture.mcap"
-# Arguments of each command with an output; {} stands for the output.
-WORDS: dict[str, tuple[str, ...]] = {
-    "session": ("session", "--bus", "sim:seed=1", *QUICK, "--no-write", "-o", "{}"),
-    "record": ("record", "--bus", "sim:seed=1", "--seconds", "2", "-o", "{}.mcap"),
-    "calibrate": ("calibrate", RECORDED, "-o", "{}"),
-    "batch": ("batch", RECORDED, "--workers", "1", "--reports", "-o", "{}"),
-    "write": ("write", CALIBRATION, "chip", "--bus", "sim:seed=1", "--yes", "-o", "{}"),
-    "check": ("check", CALIBRATION, RECORDED, "-o", "{}"),
-    "noise": ("noise", RECORDED, "-o", "{}"),
-    "apply": ("apply", CALIBRATION, TABLE, "-o", "{}.csv"),
-    "apply .npz": ("apply", CALIBRATION, TABLE, "-o", "{}.npz"),
-    "apply .mcap": ("apply", CALIBRATION, TABLE, "-o", "{}.mcap"),
-    "stream": ("stream", "--bus", "sim:seed=1", "--apply", CALIBRATION, "--seconds", "1", "-o", "{}.mcap"),
-    "export": ("export", CALIBRATION, "--to", "json", "-o", "{}"),
-    "merge": ("merge", CALIBRATION, "b/calibration.json", "-o", "{}"),
-    "firmware": ("firmware", "-o", "{}"),
+from .syscalls_commands import WORDS, prepared
+
+# what is given to -o stands for the output
+COMMANDS_WITH_OUTPUT = {
+    **WORDS,
+    "batch": ["batch", "in.mcap", "--workers", "1", "--reports", "-o", "board"],
+    "apply .npz": ["apply", "a.json", "in.npz", "-o", "out.npz"],
+    "apply .mcap": ["apply", "a.json", "in.npz", "-o", "out.mcap"],
 }
 # Options whose paths are read; `session --resume` continues in the folder of a session.
 READ = {"--noise", "--hints", "--apply", "--resume", "calibration", "calibrations", "recording", "file", "a", "b"}
 OLD, CODES = b"old", (0, 2, 3, 5, 6)
 # a library has many files, and these stand for all
 MOST_FILES = 8
-SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
 
 
 def check_rows() -> str:
-    """Return a sentence on rows that WORDS lacks for the command line; empty if it is complete."""
+    """Return a sentence on rows that are missing for the command line; empty if it is complete."""
     found: set[str] = set()
     for name in COMMANDS:
         command = commands.get_command(click.Context(commands), name)
@@ -67,7 +55,7 @@ def check_rows() -> str:
                 found.add(name)
             elif isinstance(option.type, click.Path) and option.opts[0] not in READ:
                 return f"{name} {option.opts[0]} is a path: read, or written?"
-    odd = found ^ {name.split()[0] for name in WORDS}
+    odd = found ^ {words[0] for words in COMMANDS_WITH_OUTPUT.values()}
     return f"no row, or no option -o: {', '.join(sorted(odd))}" if odd else ""
 
 
@@ -91,7 +79,7 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 }
 
 
-def obstructed(words: tuple[str, ...], here: Path, file: Path, kind: str) -> str:
+def obstructed(words: Sequence[str], here: Path, file: Path, kind: str) -> str:
     """Run a command with an obstacle at `file` (relative); return the outcome in words."""
     with TemporaryDirectory(dir=here.parent) as place:
         path = Path(place) / file
@@ -119,10 +107,12 @@ def _content(path: Path) -> object:
     return sorted(each.name for each in path.iterdir()) if path.is_dir() else None
 
 
-def _run(words: tuple[str, ...], here: Path, place: Path) -> Ended:
+def _run(words: Sequence[str], here: Path, place: Path) -> Ended:
     """Run a command in `here` with its output in `place`."""
-    call = partial(run, [word.format(place / "out") for word in words])
-    return Child(call, here, here.parent / "said").go().wait()
+    words = list(words)
+    at = words.index("-o") + 1
+    words[at] = str((place / "out").with_suffix(Path(words[at]).suffix))
+    return Child(partial(run, words), here, here.parent / "said").go().wait()
 
 
 def _odd(done: Ended, place: Path) -> str:
@@ -132,24 +122,18 @@ def _odd(done: Ended, place: Path) -> str:
     return "; ".join([*odd, *(f"{path.name} is left" for path in place.rglob(".*"))])
 
 
-def of_command(name: str) -> list[Row]:
+def of_command(item: tuple[str, Path]) -> list[Row]:
     """Run a command with each obstacle: a row for each output."""
     ready()
+    name, start = item
     with TemporaryDirectory() as base:
-        (here := Path(base) / "here").mkdir()
-        (here / "a").mkdir()
-        shutil.copy(SESSION, here / RECORDED)
-        _run(("calibrate", RECORDED, "-o", "a"), here, here)
-        if name == "merge":
-            _run((*WORDS["session"], "--bus", "sim:seed=1,temperature_c=45", "-o", "b"), here, here)
-        np.savez(here / TABLE, t=np.arange(9) / 9, acc=np.full((9, 3), 9.0), gyr=np.zeros((9, 3)))
-        return [
-            Row(name=name, kind=kind, outcome=outcome, wrong=outcome.startswith("WRONG"))
-            for kind, outcome in tried(WORDS[name], here)
-        ]
+        here = Path(base) / "here"
+        shutil.copytree(start, here)
+        outcomes = tried(COMMANDS_WITH_OUTPUT[name], here)
+        return [Row(name=name, kind=kind, outcome=told, wrong=told.startswith("WRONG")) for kind, told in outcomes]
 
 
-def tried(words: tuple[str, ...], here: Path) -> Iterator[tuple[str, str]]:
+def tried(words: Sequence[str], here: Path) -> Iterator[tuple[str, str]]:
     """Yield each obstacle with the outcome for each file that a command writes, and for their folder."""
     with TemporaryDirectory(dir=here.parent) as place:
         done = _run(words, here, Path(place))
@@ -164,11 +148,14 @@ def tried(words: tuple[str, ...], here: Path) -> Iterator[tuple[str, str]]:
             yield f"{kind}, of the folder", obstructed(words, here, Path("out"), kind)
 
 
-def scenarios(commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS)) -> list[str]:
-    """Return the commands, if there is a row for each of the command line's."""
+def scenarios(
+    commands: Annotated[list[str], COMMANDS_WITH_OUTPUT, "default: all"] = tuple(COMMANDS_WITH_OUTPUT),
+) -> list[tuple[str, Path]]:
+    """Return the commands, if there is a row for each of the command line's, with a folder of their inputs."""
     if lacks := check_rows():
         sys.exit(lacks)
-    return commands
+    start = prepared()
+    return [(name, start) for name in commands]
 
 
 COLUMNS: dict[str, Column] = {"outcomes": lambda rows: frequencies(row.outcome for row in rows)}

@@ -172,16 +172,22 @@ def prepared() -> Path:
     start.mkdir()
     warm = [word.replace(f"{SIM}20", f"{SIM}45,hand=placing") for word in SESSION]
     for name, words in (("a", SESSION), ("b", warm), ("v", FLIGHT)):
-        folder = place / name
-        made = run_failing([*words, str(folder)], start)
-        assert made.code == 0, made.said
-        shutil.copy(folder / "calibration.json", start / f"{name}.json")
-    written = run_failing([*WORDS["write"][:-3], "-o", str(place / "a"), "--yes"], start)
-    assert written.code == 0, written.said
+        _made([*words, str(place / name)], start)
+        shutil.copy(place / name / "calibration.json", start / f"{name}.json")
+    _made([*WORDS["write"][:-3], "-o", str(place / "a"), "--yes"], start)
     shutil.copy(place / "a" / "chip-offsets.json", start)
     shutil.copy(place / "a" / "capture.mcap", start / "in.mcap")
     recording = load(start / "in.mcap")
     np.savez(start / "in.npz", t=recording.t, acc=recording.acc, gyr=recording.gyr)
     shutil.copytree(place / "b", start / "board", ignore=shutil.ignore_patterns("capture*"))
-    shutil.rmtree(start / STATE, ignore_errors=True)
     return start
+
+
+def _made(words: Sequence[str], folder: Path) -> None:
+    def call() -> int:
+        os.environ["XDG_STATE_HOME"] = str(folder.with_name("state"))
+        with quick():
+            return run(words)
+
+    done = Child(call, folder, folder.with_name("said")).go().wait()
+    assert done.code == 0, done.said
