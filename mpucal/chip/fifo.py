@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..clocks.host_clock import HostClock
-from ..clocks.polled_clock import PolledClock
-from ..clocks.sample_clock import NS, SampleClock, Times, Whole, make_increasing
+from ..clocks.sample_clock import NS, PolledClock, SampleClock, Times, Whole, make_increasing
 from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
 from .bit_flips import BitFlipFilter, Counts

@@ -29,8 +29,7 @@ from .attributes import (
     read_number,
     read_scale,
 )
-from .scan_elements import FrameLayout, ScanElement
-from .stream_aligner import StreamAligner, Times
+from .scan_elements import FrameLayout, ScanElement, StreamAligner, Times
 
 NS = 1e-9
 # Samples are missing if the next one is so many intervals later.

@@ -6,17 +6,53 @@ IIO_VERSION changes with every change of them.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from contextlib import suppress
+from typing import NamedTuple
 
 from ..chip.access import Bus
 from ..chip.config import Config
 from ..data import Recording, Samples, Sensor
-from ..errors import BusError, ChipError, EndOfCapture, NoAnswer
+from ..errors import BusError, ChipError, EndOfCapture, NoAnswer, UsageError
 from .attributes import ACCEL, AXES, GYRO, TEMP
 from .decode import IioDecoder
-from .devices import Devices
 from .setup import DeviceAttributes, set_up
+
+DEVICE = re.compile(r"(?:iio:)?(?:device)?(\d+)")
+
+
+class Devices(NamedTuple):
+    """Devices of the two sensors, such as iio:device0."""
+
+    accel: str
+    gyro: str
+
+    @property
+    def each(self) -> tuple[str, ...]:
+        """Devices without duplicates."""
+        return tuple(dict.fromkeys(self))
+
+    @classmethod
+    def parse(cls, text: str) -> Devices:
+        """Parse iio:device0, or accel=iio:device0,gyro=iio:device1; `iio:` and `device` may be left out.
+
+        Raises
+        ------
+        UsageError : another text.
+        """
+        parts = dict(part.partition("=")[::2] for part in text.split(","))
+        if set(parts) == {"accel", "gyro"}:
+            return cls(_device(parts["accel"]), _device(parts["gyro"]))
+        return cls(_device(text), _device(text))
+
+
+def _device(text: str) -> str:
+    found = DEVICE.fullmatch(text.strip())
+    if found is None:
+        raise UsageError(f"--iio: {text!r} is not a device", "give iio:deviceN, or accel=iio:deviceN,gyro=iio:deviceM")
+    return f"iio:device{found.group(1)}"
+
 
 # The driver gives up after so long without a sample.
 DEAD_NS = 2_000_000_000

@@ -17,17 +17,15 @@ from ..errors import BusError, CaptureError
 from ..files.mcap import Capture
 from ..files.recorders import DRIVER
 from ..iio import IIO_VERSION
-from ..iio.devices import Devices
-from ..iio.driver import IioDriver
+from ..iio.driver import Devices, IioDriver
 from ..iio.setup import LIST_BYTES, TEXT_BYTES, TRIGGERS
 from ..origin import Origin
 from ..session.plan import Plan
 from ..sources.chain import Chain
 from ..sources.chip import OpenedChip
-from ..sources.host_bus import HostBus, converting
+from ..sources.host_bus import HostBus, ReadTimer, converting
 from ..sources.kind import Request
 from ..sources.opened_source import Say
-from ..sources.read_timer import ReadTimer
 from .errors import file_error
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")

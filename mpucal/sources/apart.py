@@ -26,8 +26,7 @@ from ..session.beside import describe_end
 from ..session.events import Prompt
 from ..session.ports import Source
 from .chain import Chain
-from .replay import ReplayBus, as_asked, successful
-from .tap import Tap
+from .replay import ReplayBus, Tap, as_asked, successful
 
 CAN_FORK = sys.platform == "linux"
 # Wish of the session, and what the process sends between its last poll and the accesses that stop the sensor.

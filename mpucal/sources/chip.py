@@ -17,7 +17,7 @@ from ..session.ports import Source
 from .apart import CAN_FORK, SourceApart
 from .chain import Chain
 from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
-from .tap import Tap
+from .replay import Tap
 
 if TYPE_CHECKING:
     from ..files.mcap import Capture

@@ -1,4 +1,4 @@
-"""Common parts of the buses of this computer: the monotonic clock, the search for the chip, its lock, and errors."""
+"""Common parts of the buses of this computer: clock, times of reads, the search for the chip, its lock, and errors."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from ..chip.access import Reply
 from ..chip.families import PARTS
-from ..chip.registers import FIFO_R_W
-from ..errors import BusError, NoAnswer
+from ..chip.registers import ACCEL_XOUT_H, FIFO_COUNT_H, FIFO_R_W
+from ..chip.transfer_stats import LATE_REMEDY
+from ..errors import BusError, LateRead, NoAnswer
 from .i2c_errors import no_answer_error
 
 # AD0 low, AD0 high
@@ -83,3 +85,49 @@ def lock_device(handle: int | None, chip: str, remedy: str = "end it", address: 
         raise BusError(f"another mpucal uses {chip}", remedy) from error
     except (ImportError, OSError, TypeError):
         return
+
+
+TRIES = 3
+# Excess over the shortest read: two samples at 1 kHz, and more than a transfer varies by.
+LATE_NS = 2_000_000
+# Attributes of a kernel driver that are samples end so.
+RAW = "_raw"
+
+
+class ReadTimer:
+    """Makes reads with the time just before each, and repeats a delayed one whose time matters.
+
+    The time of a sample or of a count of samples is early by at most LATE_NS more than that of the shortest read of as
+    many bytes.
+    """
+
+    def __init__(self, now_ns: Callable[[], int]) -> None:
+        self._now_ns = now_ns
+        self._shortest_ns: dict[tuple[int | str, int], int] = {}
+
+    def read(self, register: int | str, count: int, transfer: Callable[[], bytes]) -> Reply:
+        """Make the read `transfer` of `count` bytes from `register` on, or of the file of this name.
+
+        Raises
+        ------
+        LateRead : the time matters, and all tries were delayed.
+        """
+        for _ in range(TRIES):
+            t_ns = self._now_ns()
+            data = transfer()
+            took_ns = self._now_ns() - t_ns
+            shortest_ns = min(took_ns, self._shortest_ns.get((register, count), took_ns))
+            self._shortest_ns[register, count] = shortest_ns
+            if took_ns - shortest_ns <= LATE_NS or not _is_timed(register, count):
+                return Reply(data, t_ns)
+        raise LateRead(
+            f"a read took {(took_ns - shortest_ns) / 1e6:.0f} ms longer than usual, so that its time is not known",
+            LATE_REMEDY,
+        )
+
+
+def _is_timed(register: int | str, count: int) -> bool:
+    """Return True if the time of the read is that of samples; then it may be repeated, too."""
+    if isinstance(register, str):
+        return register.endswith(RAW)
+    return register == FIFO_COUNT_H or register <= ACCEL_XOUT_H < register + count

@@ -19,10 +19,9 @@ from ..chip.families import PARTS
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, HostBus, converting, find_chip, lock_device, register_after
+from .host_bus import ADDRESSES, HostBus, ReadTimer, converting, find_chip, lock_device, register_after
 from .i2c_errors import DEVICES, no_answer_error, opening_error, transfer_error
 from .kind import Request
-from .read_timer import ReadTimer
 
 TRIES = 3
 

@@ -23,10 +23,9 @@ from ..chip.registers import (
 )
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
-from .host_bus import HostBus, converting, lock_device, register_after
+from .host_bus import HostBus, ReadTimer, converting, lock_device, register_after
 from .i2c_errors import device_error
 from .kind import Request
-from .read_timer import ReadTimer
 
 READ, MODE = 0x80, 3
 REGISTER_HZ, LEAST_DATA_HZ = 1_000_000, 8_000_000

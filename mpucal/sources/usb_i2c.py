@@ -17,10 +17,9 @@ from ..chip.access import Reply
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, HostBus, find_chip, register_after
+from .host_bus import ADDRESSES, HostBus, ReadTimer, find_chip, register_after
 from .i2c_errors import no_answer_error
 from .kind import Request
-from .read_timer import ReadTimer
 
 I2C_HZ = 400_000
 # Command buffer of an MPSSE engine; shorter transfers are not faster, by the adapter's latency.

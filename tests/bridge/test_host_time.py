@@ -16,8 +16,7 @@ from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.sources.opened_source import NewRecords
-from mpucal.sources.replay import EndOfCapture, ReplayBus
-from mpucal.sources.tap import Tap
+from mpucal.sources.replay import EndOfCapture, ReplayBus, Tap
 from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
 MS = 1_000_000

@@ -14,7 +14,7 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import FastClock, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
-from mpucal.sources.tap import Tap
+from mpucal.sources.replay import Tap
 
 
 class NumberedFeed:

@@ -13,7 +13,7 @@ from mpucal.chip.port import TRIES
 from mpucal.data import Samples
 from mpucal.errors import BusError, BusHeld, ChipError, EndOfCapture, NoAnswer
 from mpucal.simulated.chip import open_simulated
-from mpucal.sources.read_timer import LATE_NS, ReadTimer
+from mpucal.sources.host_bus import LATE_NS, ReadTimer
 from mpucal.sources.replay import ReplayBus
 
 CHIPS = ["mpu6050", "mpu6500", "mpu6500_512", "clone98", "icm20690", "icm20602", "mpu6886"]

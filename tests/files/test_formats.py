@@ -17,7 +17,7 @@ from mpucal.files.formats import FORMATS, Format, readable_formats, writable_for
 from mpucal.files.mcap import CaptureWriter
 from mpucal.files.rows import Rows
 from mpucal.simulated.chip import open_simulated
-from mpucal.sources.tap import Tap
+from mpucal.sources.replay import Tap
 
 ROOT = Path(__file__).parents[2]
 

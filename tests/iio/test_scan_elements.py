@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.errors import ChipError
-from mpucal.iio.scan_elements import FrameLayout, ScanElement
-from mpucal.iio.stream_aligner import StreamAligner
+from mpucal.iio.scan_elements import FrameLayout, ScanElement, StreamAligner
 
 
 def element(name, index, text):

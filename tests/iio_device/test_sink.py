@@ -10,7 +10,7 @@ from mpucal.chip.config import RateOnlyConfig
 from mpucal.chip.offsets import RESERVED_BIT
 from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
 from mpucal.errors import RecordingError, WriteBackError
-from mpucal.iio.devices import Devices
+from mpucal.iio.driver import Devices
 from mpucal.iio_device.sink import KernelSink
 from mpucal.iio_device.source import OpenedIio
 from mpucal.result.calibration import REFUSED, Calibration

@@ -17,8 +17,7 @@ from mpucal.chip.config import Config
 from mpucal.errors import BusError, ChipError, MpucalError, NoAnswer, UsageError
 from mpucal.iio import decode
 from mpucal.iio.decode import IioDecoder
-from mpucal.iio.devices import Devices
-from mpucal.iio.driver import IioDriver
+from mpucal.iio.driver import Devices, IioDriver
 from mpucal.iio_device import source
 from mpucal.iio_device.errors import file_error
 from mpucal.iio_device.source import IioFiles

@@ -8,8 +8,7 @@ from mpucal.bridge import BridgeBus
 from mpucal.chip import registers as reg
 from mpucal.errors import EndOfCapture
 from mpucal.sources.i2c import I2cBus
-from mpucal.sources.replay import ReplayBus
-from mpucal.sources.tap import Tap
+from mpucal.sources.replay import ReplayBus, Tap
 from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
 

@@ -7,7 +7,7 @@ import pytest
 from mpucal.chip import registers as reg
 from mpucal.chip.driver import SAMPLE_BYTES, STATUS_BYTES
 from mpucal.errors import LateRead
-from mpucal.sources.read_timer import TRIES, ReadTimer
+from mpucal.sources.host_bus import TRIES, ReadTimer
 
 USUAL_NS = 400_000
 

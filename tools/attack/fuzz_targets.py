@@ -29,7 +29,7 @@ from mpucal.export.forms import FORMS
 from mpucal.files import load
 from mpucal.files.hints import Hints, parse_columns, parse_units
 from mpucal.files.mcap import FORMAT, read_capture
-from mpucal.iio.devices import Devices
+from mpucal.iio.driver import Devices
 from mpucal.mavlink.parameters.encoding import read_parameters_file
 from mpucal.mavlink.url import parse_url, read_key
 from mpucal.page.address import parse_address

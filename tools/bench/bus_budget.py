@@ -27,8 +27,8 @@ from mpucal.simulated.chip.bus import FastClock, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.simulated.sensor import Counts, Setting
+from mpucal.sources.replay import Tap
 from mpucal.sources.spi import DATA, REGISTER_HZ
-from mpucal.sources.tap import Tap
 
 from .timing import used
 

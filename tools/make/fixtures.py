@@ -31,7 +31,7 @@ from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.faults import OF_CHIP, fault_kinds
 from mpucal.sources.opening import reopen_source
-from mpucal.sources.tap import Tap
+from mpucal.sources.replay import Tap
 from mpucal.terminal.console import JsonLines
 from mpucal.terminal.keys import Keys
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...iio.devices import Devices
+from ...iio.driver import Devices
 from ...iio_device.source import OpenedIio
 from ...sources.kind import Request
 from ..chip import open_simulated, polled_seldom

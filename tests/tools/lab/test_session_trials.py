@@ -23,7 +23,7 @@ from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
-from mpucal.sources.tap import Tap
+from mpucal.sources.replay import Tap
 from tools.lab.sessions import NOTHING, Session, SilentOperator, by_command, judge_session
 
 FAULTS = tuple(fault_kinds(*OF_CHIP))
