@@ -25,7 +25,6 @@ PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"
 RECORDINGS = SHARED / "recordings"
 RECORDING = RECORDINGS / "mpu6050_session.npz"
-BROAD_HZ = 250.0
 # a session looks five times as often, for the person's sake
 SELDOM_S = 0.2
 YARDSTICK = SHARED / "check" / "gravity_transport.py"
@@ -152,28 +151,3 @@ def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name,
     found = session_of(tmp_path, recording)
     assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")
     assert transported_deg(found.file, "--trim", 0.5, "--gravity", 9.81, recording=recording) <= most_deg
-
-
-@pytest.mark.slow
-def test_one_that_never_rests_between_is_calibrated_and_known_less_well(tmp_path):
-    """Continuous rotation, 285.7 Hz, drawn through to a rate that the chip has."""
-    broad = np.load(RECORDINGS / "broad_01.npz")
-    t = np.arange(broad["t"][0], broad["t"][-1], 1.0 / BROAD_HZ)
-    drawn = {
-        name: np.stack([np.interp(t, broad["t"], axis) for axis in broad[name].T], axis=1) for name in ("acc", "gyr")
-    }
-    np.savez(tmp_path / "broad.npz", t=t, **drawn)
-    found = session_of(tmp_path, tmp_path / "broad.npz", poll_s=None)
-    assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")
-    assert 0.005 < max(found.document["accelerometer"]["b_a_std"]) < 0.05
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "words"), [("mpu6050_turn90", "known to"), ("mpu6050_static", "hardly turned")])
-def test_one_that_was_hardly_turned_is_refused_for_that(tmp_path, name, words):
-    found = session_of(tmp_path, RECORDINGS / f"{name}.npz")
-    assert (found.code, found.document["quality"]["verdict"]) == (5, "refused")
-    reason = found.document["quality"]["reasons"][0]
-    assert reason["code"] == "few_orientations"
-    assert words in reason["message"]
-    assert not (found.file.parent / "calibration.bin").exists()

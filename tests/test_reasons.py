@@ -7,7 +7,7 @@ from string import Formatter
 import pytest
 
 import mpucal
-from mpucal.reasons import KINDS, Reason, reason
+from mpucal.reasons import KINDS, reason
 
 PACKAGE = Path(mpucal.__file__).parent
 ALL = {(code, name): row for code, kind in KINDS.items() for name, row in kind.sentences.items()}
@@ -53,13 +53,6 @@ def test_a_row_is_whole():
             assert row.remedy, code
             assert not row.what.endswith((".", ";"))
             assert not row.remedy.endswith(".")
-
-
-def test_a_code_that_is_not_in_the_table_cannot_be_made():
-    with pytest.raises(ValueError, match="no_such_code"):
-        Reason("no_such_code", "something is wrong", "do something", True)
-    with pytest.raises(KeyError):
-        reason("no_such_code", "samples")
 
 
 def test_who_decides_whether_it_refuses():

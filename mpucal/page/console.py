@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from ..errors import MpucalError
 from ..session.events import Command, Decision, Key, Output, Prompt
@@ -22,10 +22,8 @@ from .result import Result
 ASK_EVERY_S = 0.1
 
 
-class ResultCallback(Protocol):
-    """Function that shows a result, and its files, on the page."""
-
-    def __call__(self, result: Result, paths: Sequence[Path]) -> None: ...  # noqa: D102
+# Function that shows a result, and its files, on the page.
+ResultCallback = Callable[[Result, Sequence[Path]], None]
 
 
 class TeeConsole:

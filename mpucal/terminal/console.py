@@ -14,6 +14,7 @@ from typing import Any, Protocol, TextIO
 from ..report.units import UNKNOWN
 from ..session.boards import BOARD
 from ..session.events import Caution, Decision, Direction, Key, Knowledge, Output, Progress, Prompt, Verification
+from ..session.ports import Operator
 from .keys import Keys
 from .view import HEADLINES
 
@@ -21,17 +22,11 @@ from .view import HEADLINES
 KERNEL = "JPY_PARENT_PID"
 
 
-class Console(Protocol):
+class Console(Operator, Protocol):
     """Interface that shows a session, and returns keys."""
-
-    def hear(self, output: Output) -> None:
-        """Show an output."""
 
     def say(self, text: str) -> None:
         """Show a message."""
-
-    def pressed(self) -> Sequence[Key]:
-        """Return the keys that were pressed since the last call; never waits."""
 
     def listening(self) -> AbstractContextManager[None]:
         """Show the session, and accept keys, Ctrl-C among them, within the context."""

@@ -72,25 +72,6 @@ def test_a_table_goes_to_stdout(mpucal, save, session, calibration, tmp_path):
     np.testing.assert_allclose(load("out.csv").acc, formula(recording)[0], atol=1e-12)
 
 
-def test_units_are_those_that_calibrate_sees(mpucal, save, session, calibration):
-    """The board lies still for longer than the first run of samples lasts, which shows no unit of rates."""
-    recording = load(session.folder)
-    still = replace(recording.part(0, 100), flat=None)
-    dt = recording.t[1] - recording.t[0]
-    parts = {
-        name: np.concatenate([np.tile(getattr(still, name), (300, 1)), getattr(recording, name)])
-        for name in ("acc", "gyr")
-    }
-    long = type(recording).from_arrays(np.arange(len(parts["acc"])) * dt, **parts)
-    save(replace(long, acc=long.acc / STANDARD_GRAVITY_MPS2, gyr=np.degrees(long.gyr)), "in.npz")
-    done = mpucal("apply", "c.json", "in.npz", "-o", "out.npz")
-    assert done.code == 0, done.err
-    assert "acc was read in g, which its values suggest; gyr was read in deg/s" in done.err
-    np.testing.assert_allclose(load("out.npz").acc, formula(long)[0], atol=1e-9)
-    np.testing.assert_allclose(load("out.npz").gyr, formula(long)[1], atol=1e-9)
-    np.testing.assert_allclose(load("in.npz").gyr, long.gyr, atol=1e-9)
-
-
 def as_text(rows, path):
     names = "time,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z"
     np.savetxt(path, rows, delimiter=",", header=names, comments="")

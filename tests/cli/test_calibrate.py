@@ -145,10 +145,3 @@ def test_a_finished_session_is_not_gone_on_with(mpucal, session):
     assert "is finished" in result.err
     assert f"-o {session.folder}-2" in result.err
     assert contents(session.folder) == before
-
-
-def test_more_memory_is_allowed_by_an_option(mpucal, tmp_path, monkeypatch):
-    monkeypatch.setenv("MPUCAL_MOST_MB", "1")
-    np.savez_compressed(tmp_path / "long.npz", t=np.arange(40_000) / 100, acc=np.ones((40_000, 3)), gyr=[0])
-    assert "are allowed" in mpucal("calibrate", "long.npz").err
-    assert "are allowed" not in mpucal("calibrate", "long.npz", "--most-mb", "100").err

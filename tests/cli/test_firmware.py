@@ -74,10 +74,3 @@ def test_other_boards_are_left_to_arduino_cli(installed, programs, capsys, board
     program(programs, 0, "arduino-cli")
     assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 0
     assert f"arduino-cli {(programs / 'said').read_text().strip()}" == command
-
-
-def test_without_avrdude_the_command_is_given(installed, programs, capsys):
-    assert run(["firmware", "--flash", "/dev/ttyX"]) == 3
-    assert (
-        f"avrdude -p atmega328p -c arduino -b 115200 -P /dev/ttyX -D -U flash:w:{installed}" in capsys.readouterr().err
-    )

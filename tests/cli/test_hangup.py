@@ -1,6 +1,5 @@
 """A terminal that goes away in the middle of a session or measurement, as a dropped ssh connection makes it."""
 
-import json
 import os
 import pty
 import select
@@ -101,22 +100,3 @@ def test_a_session_that_keeps_going_gets_its_result(on_a_terminal, tmp_path):
     assert "the terminal went away" in log
     assert log.count("flat and still for 10 s: done") == 1
     assert "The calibration is good." in log
-
-
-@pytest.mark.slow
-def test_a_session_whose_terminal_is_closed_while_it_waits_for_its_page_goes_on(on_a_terminal, tmp_path):
-    session = on_a_terminal("--page", "--bus", "sim:seed=3,pace=fast")
-    session.read_until(lambda seen: b"Open the page" in seen)
-    os.close(session.terminal)
-    assert session.exit_code() == 0
-    assert "The calibration is good." in (tmp_path / "board" / "session.log").read_text()
-
-
-@pytest.mark.slow
-def test_a_measurement_of_noise_keeps_its_result(on_a_terminal, tmp_path):
-    measurement = on_a_terminal("--bus", "sim:hand=still", held=("noise", 5), command=("noise", "-o", "noise"))
-    measurement.read_until_held()
-    os.close(measurement.terminal)
-    measurement.let_go()
-    assert measurement.exit_code() == 0
-    assert json.loads((tmp_path / "noise" / "noise.json").read_text())["seconds"] > 3.0

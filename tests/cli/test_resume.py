@@ -139,23 +139,6 @@ def test_a_capture_without_a_source_cannot_be_resumed(mpucal, write_capture, tmp
     assert "does not name its source" in result.err
 
 
-@pytest.mark.slow
-def test_a_board_that_was_never_still_is_laid_flat_again(mpucal, write_capture, tmp_path):
-    first = mpucal("session", "--bus", "sim:hand=restless", "--rate", "50", "-o", "restless")
-    assert first.code == 4
-    assert "start again" not in first.err
-    assert first.err.count("--resume restless") == 1
-
-    # The session is resumed with the board in another, calm hand.
-    recorded = read_capture(tmp_path / "restless" / "capture.mcap")
-    (tmp_path / "calm").mkdir()
-    meta = {**recorded.meta, "source": {**recorded.meta["source"], "bus": "sim:hand=guided"}}
-    write_capture(tmp_path / "calm" / "capture.mcap", meta, recorded.records)
-    resumed = mpucal("session", "--resume", "calm")
-    assert resumed.code == 0, resumed.err
-    assert resumed.err.count("LAY FLAT") == 1
-
-
 @pytest.mark.parametrize(
     ("words", "code", "what"),
     [

@@ -1,7 +1,6 @@
 """`mpucal show` of calibrations, recordings and devices, and the summary of a calibration."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -134,21 +133,3 @@ def test_a_vehicles_parameters_are_shown(mpucal):
     assert shown["firmware"] == "ArduPilot"
     assert "INS_ACCOFFS_X" in shown["parameters"]
     assert "INS_ACCOFFS_X" in mpucal("show", "--mavlink", "sim").out
-
-
-def test_hardware_offsets_are_shown_and_not_subtracted_again(mpucal, tmp_path):
-    b_a = np.array([0.25, -0.5, 0.75])
-    entry = {"to": "chip", "where": "the chip", "what": "the registers subtract it", "at": "2024-05-17T09:30:00+00:00"}
-    made = Calibration(np.eye(3), b_a, applied_in_hardware=b_a, extra={"written": [entry]})
-    sloped = replace(
-        made,
-        b_a_slope=np.array([0.01, 0.0, -0.02]),
-        temperature_range_c=np.array([10.0, 40.0]),
-        sensor=replace(made.sensor, temperature_c=25.0),
-    )
-    sloped.save(tmp_path / "c.json")
-    out = mpucal("show", "c.json").out
-    assert "subtract (+25.5, -51.0, +76.5) mg of b_a" in out
-    assert "Written at 2024-05-17T09:30:00+00:00: the registers subtract it." in out
-    assert "b_a changes by (+1.020, +0.000, -2.039) mg/°C" in out
-    assert "y_x -0.00000" in out or "y_x +0.00000" in out

@@ -4,16 +4,13 @@ import json
 import signal
 import subprocess
 import sys
-import threading
 from dataclasses import replace
 
 import pytest
 
 from mpucal.page.state import changes, state
 from mpucal.reasons import Reason
-from mpucal.session.events import Prompt, PromptKind
 from mpucal.terminal.view import View
-from mpucal.terminal.voice import Voice
 
 # Records the page's texts at each change.
 WATCH = """() => {
@@ -61,21 +58,6 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
     assert tab.get_attribute("body", "data-look") == "no"
 
 
-def test_the_axes_in_brackets_are_shown_and_not_spoken(tab, server):
-    server.latest.update({"title": "a chip", "headline": "Connecting"})
-    tab.goto(server.url)
-    tab.wait_for_selector("text=Connecting")
-    prompt = Prompt(
-        PromptKind.ROTATE, "Turn the board: on its left edge (−X +Z), then hold it still.", (-0.7, 0.0, 0.7)
-    )
-    view, voice = View().after(prompt), Voice()
-    voice.hear(view)
-    server.latest.update(changes(state(view, voice.said), {}))
-    tab.wait_for_function("() => document.querySelector('#spoken').textContent !== ''")
-    assert tab.inner_text("#spoken") == "Turn the board: on its left edge, then hold it still."
-    assert tab.inner_text("#prompt") == prompt.text
-
-
 def test_a_lost_connection_is_shown_and_reopened(tab, serve):
     server = serve()
     server.latest.update({"title": "a chip", "headline": "Before"})
@@ -89,18 +71,6 @@ def test_a_lost_connection_is_shown_and_reopened(tab, serve):
     again.latest.update({"title": "a chip", "headline": "After"})
     tab.wait_for_selector("text=After")
     assert tab.is_hidden("#lost")
-
-
-def test_keys_are_shown_only_if_allowed(tab, serve):
-    pressed = threading.Event()
-    server = serve(keys=True, pressed=lambda key: pressed.set() if key == "redo" else None)
-    server.latest.update({"title": "a chip", "keys": False, "headline": "One"})
-    tab.goto(server.url)
-    tab.wait_for_selector("text=One")
-    assert tab.is_hidden("#keys")
-    server.latest.update({"keys": True})
-    tab.click("text=Again")
-    assert pressed.wait(10.0)
 
 
 @pytest.fixture

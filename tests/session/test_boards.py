@@ -45,10 +45,3 @@ def test_no_two_orientations_have_the_same_words(board):
         asked = ALL_AROUND if flat is None else directions(flat, tilt_only=True)
         words = [describing(tuple(down), board).partition(" (")[0] for down in asked.tolist()]
         assert len(set(words)) == len(words)
-
-
-def test_a_tilt_is_described_by_what_is_lower():
-    assert describe_tilt((0.0, 0.0, -1.0), BOARD) == "level"
-    assert describe_tilt((-0.35, 0.35, -0.87), BOARD) == "lower at its left edge and far edge (−X +Y)"
-    assert describe_tilt((0.5, 0.0, 0.87), VEHICLE) == "lower at its nose (+X)"
-    assert describe_tilt((0.0, 0.87, 0.5), PLAIN) == "lower at its chip face (+Z)"

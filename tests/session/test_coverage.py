@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.session.aims import ALL_AROUND, TILT_RAD, directions
+from mpucal.session.aims import ALL_AROUND
 from mpucal.session.coverage import DISTINCT_RAD, SPREAD, Coverage, Directions
 
 FACES = np.vstack([np.eye(3), -np.eye(3)])
@@ -34,16 +34,6 @@ def test_the_farthest_directions_mend_them(units):
         coverage.paused.add(-coverage.paused.farthest_down(ALL_AROUND))
     assert coverage.varied
     assert coverage.paused.spread() > SPREAD
-
-
-@pytest.mark.parametrize(
-    "flat", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8)], ids=["level", "upright", "tilted"]
-)
-def test_tilts_alone_stay_near_level_and_differ(flat):
-    asked = directions(flat, tilt_only=True)
-    assert (asked @ np.array(flat) >= np.cos(TILT_RAD) - 1e-9).all()
-    between = np.arccos(np.clip(asked @ asked.T, -1.0, 1.0))[np.triu_indices(len(asked), 1)]
-    assert (between > DISTINCT_RAD).all()
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 40))

@@ -37,24 +37,6 @@ def fits():
     return Fits(Plan(gravity=GRAVITY_MPS2), SENSOR)
 
 
-def test_more_orientations_are_better_known(fits, poses):
-    found = []
-    for first, last in ((0, 18), (18, 26), (26, 44)):
-        found.append(fits.do(Task(part(poses, first, last), FitKind.KNOW)).knowledge)
-    assert [k.overall for k in found] == sorted(k.overall for k in found)
-    assert max(found[0].bias_mg) > 3 * max(found[2].bias_mg)
-    assert found[2].overall > 0.9
-    assert all(0.0 <= p <= 1.0 for k in found for p in (*k.gain, *k.misalignment, *k.bias))
-    assert not any(k.doubt for k in found)
-
-
-def test_the_same_tasks_give_the_same_bits_however_the_samples_come(poses):
-    whole, pieces = (Fits(Plan(gravity=GRAVITY_MPS2), SENSOR) for _ in range(2))
-    for second in range(22):
-        pieces.do(Task(part(poses, second, second + 1)))
-    assert pieces.do(Task(NONE, FitKind.ADVISE)) == whole.do(Task(part(poses, 0, 22), FitKind.ADVISE))
-
-
 def test_the_advised_orientation_is_a_turn_away(fits, poses):
     learnt = fits.do(Task(part(poses, 0, 22), FitKind.ADVISE))
     assert isinstance(learnt, Learnt)

@@ -71,13 +71,6 @@ def test_an_answer_is_brought_after_the_asked_number_of_samples_and_no_sooner(sc
     assert not scheduler.due
 
 
-def test_forgotten_requests_have_no_answer(scheduler, slow):
-    scheduler.request(RequestFit(FitKind.KNOW, 0.0))
-    scheduler.forget(7)
-    assert not scheduler.due
-    assert slow.tasks[-1].forget == 7
-
-
 @pytest.fixture
 def apart():
     worker = ProcessWorker(PLAN, SENSOR)

@@ -102,8 +102,3 @@ def test_an_unverified_calibration_is_usable_at_most(verdict, then):
     assert found.verdict == then
     assert found.quality["reasons"][0]["message"] == "it moved; fasten it"
     assert found.quality["verification"] == {"agrees": None, "orientations": []}
-
-
-def test_an_agreement_changes_no_verdict_and_none_adds_nothing():
-    assert add_verification(calibration(), Checked((), True)).verdict == "usable"
-    assert "verification" not in add_verification(calibration(), None).quality

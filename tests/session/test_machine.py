@@ -27,7 +27,6 @@ from mpucal.session.events import (
     RequestFit,
     Resumed,
     Seen,
-    SourceEnded,
     Target,
     Tick,
     Tried,
@@ -139,14 +138,6 @@ def test_a_moved_board_restarts_the_countdown_with_a_caution(board, disturb, wha
     assert [caution.code for caution in session.of(Caution)][-1] == "moved"
     assert max(countdown.remaining_s for countdown in session.of(Countdown)[-16:]) == pytest.approx(9.5, abs=0.6)
     assert session.feed(board.still(3.0)).state is State.ROTATE
-
-
-def test_a_bump_only_pauses_the_count(board):
-    session = Session().feed(board.still(8.0)).feed(board.shaken(1.0, 2.0))
-    assert session.of(Countdown)[-1].paused
-    assert session.of(Countdown)[-1].remaining_s == pytest.approx(2.0, abs=0.6)
-    assert "m/s² along x" in session.words()
-    assert session.feed(board.still(3.6)).state is State.ROTATE
 
 
 def test_never_still_for_a_minute_is_abandoned_with_a_reason(board):
@@ -346,50 +337,11 @@ def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, v
     assert verifying.machine.checked.agrees is None
 
 
-def test_a_requested_orientation_that_was_seen_is_replaced(board, verifying):
-    asked = verifying.of(Prompt)[-1]
-    verifying.machine._step._coverage.rested.add(-np.array(asked.down))
-    show(verifying, board, [[-v for v in asked.down]])
-    assert verifying.of(Caution)[-1].code == "seen_already"
-    another = verifying.of(Prompt)[-1]
-    assert np.dot(another.down, asked.down) < np.cos(np.radians(20.0))
-    assert verifying.of(Caution)[-1].do == another.text
-    assert "1 of 3" in another.text
-
-
-def test_an_orientation_that_the_fit_has_seen_is_replaced(board, verifying, varied):
-    verifying.checked = Checked((), None, MOVED)
-    show(verifying, board, varied[9:12])
-    assert verifying.state is State.VERIFY
-    assert "3 of 3" in verifying.of(Prompt)[-1].text
-    verifying.checked = Checked((), agrees=True)
-    show(verifying, board, varied[12:13])
-    assert verifying.state is State.CALIBRATE
-    assert verifying.machine.checked.agrees
-
-
-def test_a_refused_first_calibration_is_not_verified(board, rotating, varied):
-    rotating.overall, rotating.tried = 1.0, Tried("refused", FLIPPED)
-    show(rotating, board, varied[:9])
-    assert rotating.state is State.CALIBRATE
-    assert "not verified: an axis is flipped" in rotating.words()
-    assert rotating.machine.checked.reason == FLIPPED
-
-
 def test_the_verification_times_out(board, verifying):
     verifying.feed(board.still(41.0))
     assert verifying.state is State.CALIBRATE
     assert "held still in none of the requested orientations" in verifying.words()
     assert verifying.machine.checked.agrees is None
-
-
-def test_a_partial_verification_is_checked_at_the_time_out(board, verifying, varied):
-    show(verifying, board, varied[9:10])
-    assert FitKind.CHECK not in [ask.kind for ask in verifying.of(RequestFit)]
-    verifying.feed(board.still(41.0))
-    assert [ask.kind for ask in verifying.of(RequestFit)][-1] is FitKind.CHECK
-    assert verifying.state is State.CALIBRATE
-    assert verifying.machine.checked.agrees
 
 
 @pytest.fixture
@@ -456,14 +408,6 @@ def test_until_end_accepts_a_shorter_rest(board, seconds, state):
     assert session.feed(board.turn((1, 0, 0), 1.0, 1.0)).state is state
 
 
-def test_until_end_turns_until_the_source_ends(board, varied):
-    session = Session(until_end=True).feed(board.still(10.6))
-    for up in varied:
-        session.feed(board.turn_to(up)).feed(board.still(2.0))
-    assert session.feed(board.still(62.0), poll=50).state is State.ROTATE
-    assert session.give(SourceEnded()).state is State.CALIBRATE
-
-
 def test_enter_cuts_the_stillness_short_once_there_is_some(board):
     session = Session().feed(board.still(1.2)).give(Enough())
     assert session.state is State.LAY_FLAT
@@ -487,18 +431,6 @@ def test_decides_the_same_however_the_samples_arrive(make_board, varied):
         return [output for output in session.said if isinstance(output, Prompt | Decision)], len(session.of(Seen))
 
     assert decided(3) == decided(50)
-
-
-def test_samples_that_are_lost_again_and_again_are_not_blamed_on_the_table(board):
-    session = Session()
-    while session.state is State.LAY_FLAT:
-        samples = board.still(0.3)
-        samples.gap[0] = True
-        session.feed(samples)
-    last = [output for output in session.said if isinstance(output, Decision)][-1]
-    assert "samples were lost" in last.why
-    assert "wires" in last.remedy
-    assert not any("surface" in said.do for said in session.said if isinstance(said, Caution))
 
 
 def test_an_illegal_event_changes_no_state():

@@ -37,15 +37,6 @@ def test_keys_are_single_on_a_screen(keyboard):
     assert keys.pressed() == []
 
 
-@pytest.mark.parametrize("single", [False, True])
-def test_a_keyboard_that_went_away_says_nothing(keyboard, single):
-    typed, lines = keyboard
-    keys = Keys(lines, single)
-    typed.close()
-    assert keys.pressed() == []
-    assert keys.pressed() == []
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.usefixtures("uncollected")
 def test_the_first_signal_is_a_key_and_the_second_interrupts(number):

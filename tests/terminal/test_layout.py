@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Caution, Progress, Prompt, PromptKind, Seen
+from mpucal.session.events import Progress, Prompt, PromptKind, Seen
 from mpucal.terminal.layout import lines
 from mpucal.terminal.letters import ASCII, UNICODE
 
@@ -57,15 +57,6 @@ def test_on_a_low_screen_the_words_are_left(views):
     assert "Turn the board: on its corner" in drawn[2]
 
 
-@pytest.mark.parametrize("kind", [PromptKind.REST, PromptKind.AGAIN])
-def test_nothing_shows_where_to_turn_once_no_orientation_is_asked_for(views, kind):
-    ended = views["turned"].after(Prompt(kind, "You can put the board down."))
-    drawn = "\n".join(text_of(ended))
-    assert "turn it like this" not in drawn
-    assert "now" in drawn
-    assert (ended.meter.wanted, ended.meter.missing_deg, ended.meter.turn) == (None, None, "")
-
-
 @pytest.mark.parametrize(
     ("progress", "shown"),
     [
@@ -88,13 +79,3 @@ def test_the_finish_line_has_a_mark_for_each_orientation(views, progress, shown)
     assert not any(
         "xxxx" in line for line in text_of(views["turned"].after(Prompt(PromptKind.REST, "Done.")), glyphs=ASCII)
     )
-
-
-def test_a_warning_grows_quiet(views):
-    view = views["turned"]
-    loud = [line for line in lines(view, 80, 24, UNICODE) if "480 deg/s" in line.plain]
-    assert "reverse" in str(loud[0].spans)
-    later = view.after(Caution(0.0, "too_fast", "it turned at 480 deg/s", "turn it more slowly"))
-    quiet = [line for line in lines(later.after(view.meter), 80, 24, UNICODE) if "480 deg/s" in line.plain]
-    assert "(25 s ago)" in quiet[0].plain
-    assert "reverse" not in str(quiet[0].spans)

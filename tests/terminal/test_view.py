@@ -49,22 +49,6 @@ def test_a_countdown_ends_when_the_board_moves_or_the_orientation_is_decided(vie
     assert counting.after(Held(26.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken")).headline == "TAKEN"
 
 
-@pytest.mark.parametrize(
-    ("board", "down", "words"),
-    [
-        ("gy-521", (0.0, 0.1, -0.99), "Chip up, pins toward you?"),
-        ("gy-521", (0.0, 0.0, 1.0), "Chip down, pins away from you?"),
-        ("plain", (0.0, 0.0, -1.0), "+Y away from you?"),
-        ("vehicle", (0.0, 0.0, 1.0), "On its feet"),
-        ("gy-521", (0.0, 0.7, -0.7), "It is tilted"),
-    ],
-)
-def test_the_flat_orientation_is_described(views, board, down, words):
-    view = replace(views["laid"], board=board)
-    assert words in replace(view, meter=replace(view.meter, down=down)).confirming
-    assert views["turned"].confirming == ""
-
-
 def test_an_orientation_is_ticked_as_it_is_taken(views):
     """Follow a hold as a session does: the progress counts it at its beginning, and it is seen before its end."""
     view = replace(views["turned"], seen=(), countdown=None)
@@ -90,11 +74,3 @@ def test_the_use_of_an_orientation_is_the_headline_for_a_moment(views, use, head
     assert view.headline == headline
     assert (replace(view, now_s=26.6).headline == headline) == (use is not Use.TAKEN)
     assert replace(view, now_s=28.0).headline == "ROLL LEFT 60"
-
-
-def test_near_the_wanted_orientation_nothing_is_turned(views):
-    view = views["turned"]
-    near = replace(view.meter, missing_deg=10.0)
-    assert replace(view, meter=near).headline == "HOLD STILL"
-    assert replace(view, meter=replace(near, turning_dps=100.0)).headline == "ROLL LEFT 60"
-    assert replace(view, meter=replace(near, turning_dps=100.0, turn="")).headline == "HOLD STILL"

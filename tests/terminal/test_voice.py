@@ -81,12 +81,3 @@ def test_a_caution_is_said_once_and_not_late():
     assert told in spoken(SIDE, left(1.0), caution, left(2.25), left(2.5))
     late = spoken(SIDE, left(1.0), Countdown(1.9, 0.5, 1.25, False), caution, held(5.0), left(9.0))
     assert not any("too fast" in words for _, _, words in late)
-
-
-def test_a_restart_of_the_flat_rest_is_said_while_it_counts():
-    flat = Prompt(PromptKind.LAY_FLAT, "Lay it flat.")
-    moved = Caution(4.0, "moved", "the board was moved", "let go of it; the countdown starts again")
-    resting = meter(0.5, None, still=True)
-    words = spoken(flat, resting, Countdown(0.5, 9.0, 10.0, False), moved, Countdown(4.0, 9.5, 10.0, False))
-    assert [tone for _, tone, _ in words] == [Tone.NONE, Tone.HOLD, Tone.WRONG]
-    assert words[1][2].startswith("Chip up, pins toward you?")
