@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
-from ..rests.intervals import statistics
+from ..rests.intervals import Intervals, statistics
 from .parameters import NAMES, PLACES
 from .preprocessing import POSE_MPS2, Preprocessed
 from .problem import Series
@@ -27,20 +26,6 @@ DEGREES_OF_FREEDOM = 4.0
 WORTHLESS = 0.02
 # Least number of degrees of freedom that an estimate leaves in all transitions together.
 LEAST_LEFT = 1.0
-
-
-class StaticPoses(NamedTuple):
-    """Poses of the k rests between the transitions.
-
-    first, last : (k,) samples of the recording. coming, leaving : (k, 3) m/s^2, the mean specific force of each in the
-    body's axes at its first and at its last sample. variance : (k,) rad^2 an axis, of its direction.
-    """
-
-    first: NDArray[np.intp]
-    last: NDArray[np.intp]
-    coming: Vector
-    leaving: Vector
-    variance: Vector
 
 
 class Transition(NamedTuple):
@@ -64,16 +49,17 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     """Return the transitions under theta; none where they are too few to be compared."""
     series, flat = prepared.problem.series, prepared.flat
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
-    rests = _rests(prepared, turns, theta)
-    if len(rests.first) <= FEWEST_TRANSITIONS:
+    runs = prepared.runs[prepared.runs[:, 1] > flat.last + 1]
+    if len(runs) <= FEWEST_TRANSITIONS:
         return []
-    spans = [slice(*span) for span in zip(rests.last[:-1] - flat.last, rests.first[1:] + 1 - flat.last, strict=True)]
-    F, leaving, coming = np.array([turned(turns[span]) for span in spans]), rests.leaving[:-1], rests.coming[1:]
+    coming, leaving, direction = _rests(prepared, runs, turns, theta)
+    spans = [slice(*span) for span in zip(runs[:-1, 1] - flat.last, runs[1:, 0] + 1 - flat.last, strict=True)]
+    F, leaving, coming = np.array([turned(turns[span]) for span in spans]), leaving[:-1], coming[1:]
     # The miss is the sine of the angle between two directions, along their axis.
     carried = np.einsum("kij,kj->ki", F, leaving)
     miss = np.cross(carried, coming) / (lengths(carried) * lengths(coming))[:, None]
     of_gyro = flat.Sigma_omega.mean() * np.array([series.dt[span] @ series.dt[span] for span in spans])
-    variance = of_gyro + rests.variance[:-1] + rests.variance[1:]
+    variance = of_gyro + direction[:-1] + direction[1:]
     if series.q_extra is not None:
         variance += [series.q_extra[span].sum() for span in spans]
     columns = spans, F, leaving, coming, miss, variance.tolist(), of_gyro.tolist()
@@ -145,11 +131,14 @@ def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
     return ds
 
 
-def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> StaticPoses:
-    """Return the flat segment and the rests after it; `turns` (n, 3) [rad] are the steps of the series."""
+def _rests(prepared: Preprocessed, runs: Intervals, turns: Vector, theta: Theta) -> tuple[Vector, Vector, Vector]:
+    """Return the poses of k rests between transitions; `turns` (n, 3) [rad] are the steps of the series.
+
+    These are the mean specific force (k, 3) [m/s^2] of each in the body's axes at its first sample, and at its last
+    one, and the variance (k,) [rad^2 an axis] of its direction.
+    """
     recording, flat = prepared.recording, prepared.flat
     inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D, and must not stop there
-    runs = prepared.runs[prepared.runs[:, 1] > flat.last + 1]
     mean, spread = statistics(recording.acc, runs)
     s, n = (mean - theta.b_a) @ inverse.T, runs[:, 1] - runs[:, 0]
     # A board in a hand turns a little as it rests: each sample is rotated into the axes of either end.
@@ -159,5 +148,4 @@ def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> StaticPoses:
     coming, leaving = (s + np.cross(path[at], s) - across for at in (runs[:, 0] + 1, runs[:, 1]))
     tremor = np.maximum(np.mean(spread - flat.Sigma_a, axis=1), 0.0)
     of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S * recording.rate_hz / n) ** 2
-    variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / prepared.problem.gravity**2
-    return StaticPoses(runs[:, 0], runs[:, 1], coming, leaving, variance)
+    return coming, leaving, (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / prepared.problem.gravity**2

@@ -80,63 +80,58 @@ def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float,
     recording = remove_drift(recording, flat, rests.bias_runs(runs))
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))
-    return [
-        _Transition(recording, flat, fit, long[k - 1], long[k]).verify(gravity) for k in range(max(first, 1), len(long))
-    ]
+    return [_verify(recording, flat, fit, gravity, long[k - 1], long[k]) for k in range(max(first, 1), len(long))]
 
 
-class _Transition:
-    """Transition from one rest to the next: their means, and the gyroscope's steps between them."""
+def _verify(
+    r: Recording, flat: Flat, fit: Fit, gravity: float, start: tuple[int, int], end: tuple[int, int]
+) -> NewOrientation:
+    """Compare the rest `end` with the fit, and with the rest before it as the gyroscope's steps carry it."""
+    (a, b), (c, d) = start, end
+    between = slice(b - 1, c + 1)
+    # An arm sways as it rests: its readings are carried to the sample where the turn begins, or ends.
+    z, z_var = _mean(carried(r, flat, fit, slice(a, b), -1), r.rate_hz)
+    y, y_var = _mean(carried(r, flat, fit, slice(c, d), 0), r.rate_hz)
+    dt = np.diff(r.t[between])
+    rates = 0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega
+    steps = dt[:, None] * rates
+    noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
+    gyro_var = 2.0 * noise + (LEAP_RAD**2 if _leaps(r.gyr[between], dt) else 0.0)
 
-    def __init__(
-        self, recording: Recording, flat: Flat, fit: Fit, start: tuple[int, int], end: tuple[int, int]
-    ) -> None:
-        (a, b), (c, d) = start, end
-        r, between, self._fit = recording, slice(b - 1, c + 1), fit
-        # An arm sways as it rests: its readings are carried to the sample where the turn begins, or ends.
-        self.z, self.z_var = _mean(carried(r, flat, fit, slice(a, b), -1), r.rate_hz)
-        self.y, self.y_var = _mean(carried(r, flat, fit, slice(c, d), 0), r.rate_hz)
-        dt = np.diff(r.t[between])
-        rates = 0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega
-        late = np.where(dt > LONG / r.rate_hz, dt - 1.0 / r.rate_hz, 0.0)
-        self.unsure_rad = float(late @ np.linalg.norm(rates, axis=1)) if r.sensor.origin is Origin.VEHICLE else 0.0
-        self.steps = dt[:, None] * rates
-        self.clipped = bool(r.gyr_clipped[between].any() or r.gap[b : c + 1].any())
-        noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
-        self.gyro_var = 2.0 * noise + (LEAP_RAD**2 if _leaps(r.gyr[between], dt) else 0.0)
+    def length_of(theta: Vector) -> Vector:
+        return np.array([np.linalg.norm(_calibrated(theta, y))])
 
-    def verify(self, gravity: float) -> NewOrientation:
-        """Compare the rest at its end with the fit."""
-        fit = self._fit
-        theta, covariance = _theta(fit)
-        s, miss = self._end(theta), self._miss(theta)
-        of_length = _slope(lambda x: np.array([np.linalg.norm(self._end(x))]), theta)
-        of_miss = _slope(self._miss, theta)
-        along = _unit(s) @ np.linalg.inv(fit.D)
-        length_var = float((of_length @ covariance @ of_length.T).item() + along**2 @ self.y_var)
-        miss_var = float(np.trace(of_miss @ covariance @ of_miss.T)) + self.gyro_var
-        miss_var += float(self.y_var.sum() + self.z_var.sum()) / gravity**2
-        direction = math.asin(min(float(np.linalg.norm(miss)), 1.0))
-        direction_std = math.hypot(math.sqrt(miss_var), FLOOR_RAD)
-        return NewOrientation(
-            down=-_unit(s),
-            magnitude=float(np.linalg.norm(s) - gravity),
-            magnitude_std=math.hypot(math.sqrt(length_var), FLOOR_MPS2),
-            direction=direction,
-            direction_std=direction_std,
-            turn=self.steps.sum(0) @ fit.K.T,
-            miss=miss,
-            clipped=self.clipped or 0.0 < direction - MOST_STD * direction_std <= self.unsure_rad,
-        )
+    def miss_of(theta: Vector) -> Vector:
+        # the sine (3,) of the angle from gravity as carried to gravity here, along its axis
+        F = turned(-(steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
+        return np.cross(_unit(F @ _calibrated(theta, z)), _unit(_calibrated(theta, y)))
 
-    def _end(self, theta: Vector) -> Vector:
-        """Return the calibrated mean (3,) [m/s^2] at its end."""
-        return _calibrated(theta, self.y)
-
-    def _miss(self, theta: Vector) -> Vector:
-        """Return the sine (3,) of the angle from gravity as carried to its end to gravity there, along its axis."""
-        F = turned(-(self.steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
-        return np.cross(_unit(F @ _calibrated(theta, self.z)), _unit(self._end(theta)))
+    theta, covariance = _theta(fit)
+    s, miss, of_length, of_miss = (
+        _calibrated(theta, y),
+        miss_of(theta),
+        _slope(length_of, theta),
+        _slope(miss_of, theta),
+    )
+    along = _unit(s) @ np.linalg.inv(fit.D)
+    length_var = float((of_length @ covariance @ of_length.T).item() + along**2 @ y_var)
+    miss_var = float(np.trace(of_miss @ covariance @ of_miss.T)) + gyro_var
+    miss_var += float(y_var.sum() + z_var.sum()) / gravity**2
+    direction = math.asin(min(float(np.linalg.norm(miss)), 1.0))
+    direction_std = math.hypot(math.sqrt(miss_var), FLOOR_RAD)
+    late = np.where(dt > LONG / r.rate_hz, dt - 1.0 / r.rate_hz, 0.0)
+    unsure_rad = float(late @ np.linalg.norm(rates, axis=1)) if r.sensor.origin is Origin.VEHICLE else 0.0
+    clipped = bool(r.gyr_clipped[between].any() or r.gap[b : c + 1].any())
+    return NewOrientation(
+        down=-_unit(s),
+        magnitude=float(np.linalg.norm(s) - gravity),
+        magnitude_std=math.hypot(math.sqrt(length_var), FLOOR_MPS2),
+        direction=direction,
+        direction_std=direction_std,
+        turn=steps.sum(0) @ fit.K.T,
+        miss=miss,
+        clipped=clipped or 0.0 < direction - MOST_STD * direction_std <= unsure_rad,
+    )
 
 
 def carried(recording: Recording, flat: Flat, known: Fit | Calibration, rest: slice, to: int) -> Vector:
