@@ -76,6 +76,7 @@ def test_a_session_without_a_fifo_is_replayed_to_the_bit(tmp_path, capsys):
     assert mpucal.load(made / "capture.mcap").gap.sum() == 1
 
 
+@pytest.mark.slow
 def test_the_filters_of_a_6500_are_found_and_told():
     """The gyroscope is a millisecond later than its accelerometer, and the estimate is drawn towards that."""
 

@@ -280,20 +280,6 @@ def test_forgetting_does_not_change_the_samples(started):
         np.testing.assert_array_equal(getattr(kept, name), getattr(forgotten, name))
 
 
-def test_the_gyroscope_is_off_at_4_khz(started, stream):
-    rig, driver = started("mpu6500", ALONE)
-    samples = stream(driver, 0.3)
-    assert np.isnan(samples.gyr).all()
-    assert not samples.gyr_clipped.any()
-    held = {register: data[-1] for register, data in rig.writes()}
-    assert held[reg.PWR_MGMT_2] == reg.STANDBY_GYRO
-    assert held[reg.ACCEL_CONFIG2] & ~reg.FIFO_SIZE == reg.ACCEL_FCHOICE_B
-    assert held[reg.FIFO_EN] == reg.FIFO_EN_ACCEL
-    # the register's temperature as the FIFO started
-    assert driver.recording().sensor.temperature_c == pytest.approx(-2000 / 333.87 + 21)
-    assert driver.recording().rate_hz == pytest.approx(4012, rel=1e-3)
-
-
 def test_a_rate_that_the_chip_does_not_have_is_refused(started):
     with pytest.raises(ChipError, match=r"the accelerometer of the MPU-6050 measures 1000 times a second at most"):
         started("mpu6050", ALONE)

@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mpucal.chip.families import part_of
@@ -45,6 +45,7 @@ def poll(decoder, data, n, overflow=False):
     return decoder.finish_poll(overflow)
 
 
+@settings(max_examples=40)
 @given(st.lists(st.tuples(int16, int16, int16, st.integers(-2100, -1900), int16, int16, int16), min_size=1))
 def test_values_are_counts_times_nominal_scale(frames):
     decoder = fresh()

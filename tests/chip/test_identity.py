@@ -1,7 +1,6 @@
 """Identification of chips by their behaviour, and the refusal of foreign ones."""
 
 import itertools
-import re
 
 import numpy as np
 import pytest
@@ -11,30 +10,10 @@ from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
-from mpucal.chip.identity import describe_mismatch
-from mpucal.data import Sensor
 from mpucal.errors import ChipError
 
 FILLING = {reg.FIFO_EN: reg.FIFO_EN_FRAME}
 WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}
-
-
-@pytest.mark.parametrize(
-    ("sensor", "says"),
-    [
-        pytest.param(Sensor("MPU-6050", 0x68), None, id="as it answers"),
-        pytest.param(
-            Sensor("MPU-6500", 0x68), "0x68 to WHO_AM_I as an MPU-6050 does, but .* as an MPU-6500", id="else"
-        ),
-        pytest.param(
-            Sensor("MPU-6500", 0x72), "0x72 to WHO_AM_I, as no known part does.* as an MPU-6500", id="unknown"
-        ),
-        pytest.param(Sensor("MPU-6050C", 0x68), "revision C, with half the sensitivity", id="revision C"),
-    ],
-)
-def test_remark_on_a_mismatch(sensor, says):
-    remark = describe_mismatch(sensor)
-    assert remark is None if says is None else re.search(says, remark)
 
 
 @pytest.mark.parametrize(

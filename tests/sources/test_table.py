@@ -1,15 +1,13 @@
 """Table of sources, and its uses."""
 
-from dataclasses import replace
 from pkgutil import resolve_name
 
 import pytest
 
 from mpucal.errors import UsageError
 from mpucal.origin import Origin
-from mpucal.sources.kind import Option
 from mpucal.sources.opening import check_source
-from mpucal.sources.table import SOURCES, kinds_for, matching_kinds
+from mpucal.sources.table import SOURCES, kinds_for
 
 IDS = [kind.flag for kind in SOURCES]
 
@@ -51,28 +49,3 @@ def test_options_refuse_meaningless_text():
     for name, text in {"bus": "", "address": "0x80", "seed": "-1", "system": "0", "dlpf": "7", "rate": "fast"}.items():
         with pytest.raises(ValueError, match=r"\.$"):
             options[name].parse(text)
-
-
-@pytest.fixture
-def added():
-    """Adds rows to the table during a test."""
-    before = list(SOURCES)
-    yield SOURCES.append
-    SOURCES[:] = before
-
-
-def test_kinds_of_source_share_an_option(added):
-    """A word of the value selects one, another option selects the other; the order of rows has no effect."""
-    beside = Option("pins")
-    by_word = replace(SOURCES[0], what="an adapter", word="ch347", forms="ch347:... for an adapter")
-    serial = next(kind for kind in SOURCES if kind.option.name == "serial")
-    by_option = replace(serial, what="a board without firmware", options=(beside,), beside="pins")
-    added(by_word)
-    added(by_option)
-    assert matching_kinds({"bus": "ch347:1", "pins": None}) == [by_word]
-    assert matching_kinds({"bus": "/dev/i2c-1", "pins": None}) == [SOURCES[0]]
-    assert matching_kinds({"serial": "x", "pins": "4,5"}) == [by_option]
-    assert matching_kinds({"serial": "x", "pins": None}) == [serial]
-    assert by_option.flag == "--serial --pins"
-    with pytest.raises(UsageError, match="--bus ftdi does not take --pins"):
-        check_source({"bus": "ftdi://1", "pins": "4,5"}, {"pins": "--pins"}, "session")
