@@ -31,11 +31,14 @@ WHOLE = ("who_am_i", "samples")
 MATRICES = ("D", "D_std", "K", "K_std")
 VECTORS = ("b_a", "b_a_std", "b_omega", "b_omega_std")
 SCALARS = ("accel_range_g", "gyro_range_dps", "rate_hz", "temperature_c", "seconds", "gravity", "nis")
-NUMBERS = (
-    *SCALARS,
-    *(f"{name}_{i}{j}" for name in MATRICES for i in AXES for j in AXES),
-    *(f"{name}_{i}" for name in VECTORS for i in AXES),
-)
+# column -> array of a calibration, and place in it
+ELEMENTS = {
+    f"{name}_{''.join(AXES[i] for i in at)}": (name, at)
+    for names, shape in ((MATRICES, (3, 3)), (VECTORS, (3,)))
+    for name in names
+    for at in np.ndindex(shape)
+}
+NUMBERS = (*SCALARS, *ELEMENTS)
 COLUMNS = (*TEXTS, *WHOLE, *NUMBERS)
 
 
@@ -118,13 +121,8 @@ def _numbers(calibration: Calibration, recording: Recording) -> dict[str, Any]:
         "gravity": fit.get("gravity"),
         "nis": fit.get("nis"),
     }
-    for name in ("accel_range_g", "gyro_range_dps", "rate_hz", "temperature_c"):
-        row[name] = getattr(sensor, name)
-    for name in MATRICES:
-        matrix = np.asarray(getattr(calibration, name), float)
-        row |= {f"{name}_{a}{b}": float(matrix[i, j]) for i, a in enumerate(AXES) for j, b in enumerate(AXES)}
-    for name in VECTORS:
-        row |= {f"{name}_{a}": float(getattr(calibration, name)[i]) for i, a in enumerate(AXES)}
+    row |= {name: getattr(sensor, name) for name in ("accel_range_g", "gyro_range_dps", "rate_hz", "temperature_c")}
+    row |= {column: float(getattr(calibration, name)[at]) for column, (name, at) in ELEMENTS.items()}
     numbers = (*WHOLE, *NUMBERS)
     return {
         key: value

@@ -29,6 +29,10 @@ from .keys import ARRAYS, Fit, FrozenDict, Quality, Verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# field of a config blob -> attribute
+OF_BLOB = {"applied_b_a": "applied_in_hardware"} | {
+    name: name for name in ("D", "b_a", "K", "b_omega", "b_a_slope", "temperature_range_c")
+}
 SHAPES = {row.attribute: row.shape for row in ARRAYS} | {"correlation": UNCORRELATED.shape}
 F = TypeVar("F", bound=frames.Frame)
 GOOD: Verdict = "good"
@@ -238,20 +242,17 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     def blob(self) -> Blob:
         """Return the config blob of this calibration; see firmware_protocol.md."""
         sensor = self.sensor
+        arrays = {name: tuple(getattr(self, attribute).ravel().tolist()) for name, attribute in OF_BLOB.items()}
+        if not self.follows_temperature:
+            arrays["temperature_range_c"] = NO_RANGE
         return Blob(
+            **arrays,
             who_am_i=sensor.who_am_i or 0,
             accel_range_g=sensor.accel_range_g or 0.0,
             gyro_range_dps=sensor.gyro_range_dps or 0.0,
-            D=tuple(self.D.ravel().tolist()),
-            b_a=tuple(self.b_a.tolist()),
             gravity=float(self.fit.get("gravity") or math.nan),
             temperature_c=math.nan if sensor.temperature_c is None else sensor.temperature_c,
             created=self.created,
-            applied_b_a=tuple(self.applied_in_hardware.tolist()),
-            K=tuple(self.K.ravel().tolist()),
-            b_omega=tuple(self.b_omega.tolist()),
-            b_a_slope=tuple(self.b_a_slope.tolist()),
-            temperature_range_c=tuple(self.temperature_range_c.tolist()) if self.follows_temperature else NO_RANGE,
             gyro_counts=GYRO_COUNTS,
         )
 
@@ -320,11 +321,10 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
             raise WrongType(f"a blob is given as {type(blob).__name__}", "give what Calibration.blob() returned")
         # K and b_omega of the blob refer to its own counts of full scale
         unit = GYRO_COUNTS / (blob.gyro_counts or GYRO_COUNTS)
+        arrays: dict[str, Any] = {key: np.reshape(getattr(blob, name), SHAPES[key]) for name, key in OF_BLOB.items()}
+        arrays |= {"K": arrays["K"] * unit, "b_omega": arrays["b_omega"] / unit}
         return cls(
-            D=np.array(blob.D).reshape(3, 3),
-            b_a=np.array(blob.b_a),
-            K=np.array(blob.K).reshape(3, 3) * unit,
-            b_omega=np.array(blob.b_omega) / unit,
+            **arrays,
             fit=cast(Fit, {"gravity": blob.gravity}),
             sensor=Sensor(
                 who_am_i=blob.who_am_i or None,
@@ -333,7 +333,4 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
                 temperature_c=None if math.isnan(blob.temperature_c) else blob.temperature_c,
             ),
             created=blob.created,
-            applied_in_hardware=np.array(blob.applied_b_a),
-            b_a_slope=np.array(blob.b_a_slope),
-            temperature_range_c=np.array(blob.temperature_range_c),
         )

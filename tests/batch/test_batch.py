@@ -32,8 +32,8 @@ LONG_S = 60
 
 @pytest.fixture(scope="module")
 def client():
-    """Two workers, each a process, and a client of their scheduler."""
-    with local_client(2) as client:
+    """A worker, a process of its own, and a client of its scheduler."""
+    with local_client(1) as client:
         yield client
 
 
