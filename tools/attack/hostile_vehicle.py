@@ -180,9 +180,4 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def line(row: Row) -> str:
-    """Return what was wrong; empty if nothing was."""
-    return f"WRONG {row.kind}, {row.attacker}: {'; '.join(row.wrong)}" if row.wrong else ""
-
-
-main = Trial(__doc__, of_attack, scenarios, COLUMNS, ("kind", "attacker"), seeds="0:3", line=line)
+main = Trial(__doc__, of_attack, scenarios, COLUMNS, ("kind", "attacker"), seeds="0:3")

@@ -130,7 +130,7 @@ def of_command(item: tuple[str, Path]) -> list[Row]:
         here = Path(base) / "here"
         shutil.copytree(start, here)
         outcomes = tried(COMMANDS_WITH_OUTPUT[name], here)
-        return [Row(name=name, kind=kind, outcome=told, wrong=told.startswith("WRONG")) for kind, told in outcomes]
+        return [Row(name=name, kind=kind, outcome=told, wrong=told.partition("WRONG: ")[2]) for kind, told in outcomes]
 
 
 def tried(words: Sequence[str], here: Path) -> Iterator[tuple[str, str]]:

@@ -263,9 +263,4 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def line(row: Row) -> str:
-    """Return what was wrong; empty if nothing was."""
-    return "\n".join(f"{row.command}: {wrong}" for wrong in row.wrong)
-
-
-main = Trial(__doc__, of_command, scenarios, COLUMNS, ("command", "kind"), line=line)
+main = Trial(__doc__, of_command, scenarios, COLUMNS, ("command", "kind"))

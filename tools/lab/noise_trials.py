@@ -11,8 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from mpucal.allan.model import NAMES, fit_coefficients
+from mpucal.allan.model import fit_coefficients
 from mpucal.allan.octaves import Octaves
+from mpucal.result.noise import INSTABILITY, WALK, WHITE
 
 from .runner import Trial, each_seed
 from .scenarios.noise import noise
@@ -45,7 +46,7 @@ def of_seed(item: tuple[str, int], *, hours: float = 1.0) -> list[Row]:
     ends = [end[:3] for one in found if one is not None for end in (one.low, one.high)]
     value = np.full(3, np.nan) if found[0] is None else found[0].value[:3]
     by_truth = (np.array([value, *ends]) / np.array(AXES[axis])).T.tolist()
-    of_names = zip(NAMES, AXES[axis], by_truth, strict=False)
+    of_names = zip((WHITE, INSTABILITY, WALK), AXES[axis], by_truth, strict=True)
     return [Row(axis=axis, name=name, truth=truth, by_truth=found) for name, truth, found in of_names]
 
 

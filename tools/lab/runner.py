@@ -8,6 +8,7 @@ import inspect
 import json
 import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -33,7 +34,7 @@ class Trial:
     judge : tries one scenario and returns a row, several, or None. scenarios : by the seeds and other options.
     columns : of the table, with a line for each value of the attributes `by`; title : of the table, by the options.
     report : prints more of the rows, and returns the exit code; otherwise that is 1 if a row has something `wrong`.
-    seeds : without --seeds. line : text of a row that is printed as it comes, if it is not empty.
+    seeds : without --seeds. line : text of a row that is printed as it comes; without it, what is `wrong`, if anything.
     """
 
     doc: str | None
@@ -66,7 +67,7 @@ class Trial:
         for told in in_parallel(judge, self.scenarios(**_taken(self.scenarios, given)), given["jobs"]):
             several = told if isinstance(told, list) else [] if told is None else [told]
             rows += several
-            for text in filter(None, map(self.line, several)) if self.line else ():
+            for text in filter(None, map(self.line or self._wrong, several)):
                 print(text, flush=True)
         if self.columns:
             show(table(grouped(rows, *self.by), self.columns, self.title.format(**given) or None))
@@ -78,6 +79,11 @@ class Trial:
             text = json.dumps([vars(row) for row in rows], indent=1)
             given["json"].write_text(text.replace("NaN", "null") + "\n", encoding="utf-8")
         return code
+
+    def _wrong(self, row: Row) -> str:
+        wrong = getattr(row, "wrong", None)
+        told = "; ".join(wrong) if isinstance(wrong, list) else wrong
+        return f"WRONG {', '.join(str(getattr(row, name)) for name in self.by)}: {told}" if wrong else ""
 
 
 def _taken(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -114,6 +120,7 @@ def in_parallel(run: Callable[[Any], Any], items: Iterable[Any], jobs: int) -> I
     if jobs == 1:
         yield from map(run, waiting)
         return
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        results = pool.imap(run, waiting)
+    # processes that may start others, as a batch does
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        results = pool.map(run, waiting)
         yield from track(results, "trials", len(waiting), console=Console(stderr=True), transient=True)
