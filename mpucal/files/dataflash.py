@@ -24,7 +24,6 @@ MAGIC = b"\xa3\x95"
 PARAMETER = "PARM"
 # before ArduPilot 4.0 each IMU had its own message; since then `I` numbers them from 0
 IMUS = {"IMU": 1, "IMU2": 2, "IMU3": 3}
-US = 1_000
 
 
 def is_dataflash(path: Path) -> bool:
@@ -66,7 +65,7 @@ def _fill(log: Log, path: Path) -> None:
                 continue
             content = _reading(message)
             if content is not None:
-                log.add_reading(content, content.time * US)
+                log.add_reading(content, content.time * 1000)
 
 
 @contextmanager

@@ -349,7 +349,7 @@ def test_named_columns_beside_columns_of_words(said, read, walk, assert_same):
 
 
 def test_what_physics_does_not_confirm_is_not_guessed(read, walk):
-    turned_otherwise = replace(walk, gyr=np.roll(walk.gyr, 500, axis=0))
+    turned_otherwise = replace(walk, gyr=np.roll(walk.gyr, 300, axis=0))
     with pytest.raises(RecordingError, match="name its columns in their order"):
         read("", "t a w", " ", turned_otherwise)
     with pytest.raises(RecordingError, match="there is no column h for t: name one of a, b, c, d, e, f, g"):

@@ -37,14 +37,10 @@ OUTLIERS, SELDOM = 0.1, 0.02
 STRETCH_S, STRETCH = 0.25, 48
 # stretches within which delayed samples have arrived
 CATCHES_UP = 8
-# rounds after which the envelope's slope has settled
-ROUNDS = 4
 # the share of stamps, the earliest ones, to which the clock is fitted
 IN_TIME = 0.75
 # periods, and multiples of the envelope's usual move or of the stamps' resolution: a jump by more than all is a gap
 LOST, BY_CHANCE, ROUNDED = 0.6, 6.0, 1.5
-# without stamps, samples are repeated ones if at most this share differs from the one before
-FEWEST_NEW = 0.5
 
 Numbers = NDArray[np.int64]
 
@@ -90,7 +86,7 @@ def are_new(at_once: Mask | None, values: Vector) -> Mask:
     alike = (values[1:] == values[:-1]).all(axis=1)
     if at_once is None:
         new = len(values) - np.count_nonzero(alike)
-        again = alike & (1 < new <= FEWEST_NEW * len(values))
+        again = alike & (1 < new <= len(values) / 2)
     else:
         again = at_once & alike & (np.count_nonzero(at_once & ~alike) <= np.count_nonzero(at_once & alike))
     return np.append(True, ~again)[: len(values)]
@@ -149,7 +145,8 @@ def _gaps(stamps: Vector, number: Numbers, period: float) -> tuple[Mask, Vector]
     width = max(round(STRETCH_S / period), STRETCH)
     edges = np.arange(0, n - width // 2, width)
     late = stamps - period * number
-    for _ in range(ROUNDS):
+    # after four rounds the envelope's slope has settled
+    for _ in range(4):
         late -= float(np.median(np.diff(np.minimum.reduceat(late, edges)))) / width * number
     least = np.minimum.reduceat(late, edges)
     chance = float(np.median(np.abs(np.diff(least))))

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from .names import ACC, GYR, TIME, first_triple, parse_column_name, parse_header
 from .text import PREAMBLE, TextTable
 
-# in a log that names three axes at once, the first such line may come late
-MOST_SEARCHED = 20_000
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
 _DATE = r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d:\d\d(?:\.\d{1,9})?"
 _NAME, _NUMBER = (
@@ -74,8 +72,8 @@ def labelled_table(text: str, name: str) -> TextTable | None:
     text = _join_records(text) if _BETWEEN_RECORDS in text else text
     text, threes = _THREE.subn(_name_axes, _AT.sub("time=", text))
     text = _TWO_LINES.sub(r"\1, ", text)
-    searched = MOST_SEARCHED if threes > PREAMBLE else PREAMBLE
-    for line in text.split("\n", searched)[:searched]:
+    # in a log that names three axes at once, the first such line may come late
+    for line in text.split("\n")[: None if threes > PREAMBLE else PREAMBLE]:
         header = list(_numbers(line))
         columns = parse_header(header)
         if first_triple(columns, ACC) and first_triple(columns, GYR):

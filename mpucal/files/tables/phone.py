@@ -22,8 +22,6 @@ from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
-import numpy as np
-
 from ...data import Recording
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
@@ -36,7 +34,7 @@ from .streams import join_streams
 from .table import FLIPPED, columns_by_hint, sensor_stream, stated_rate_hz
 from .text import TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
-from .units import NS, acceleration_unit, are_counts, to_signed
+from .units import NS, acceleration_unit, seem_counts
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
@@ -52,8 +50,6 @@ SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|
 HYPHEN = "0x2d"
 # the columns of a table without names, as data sets have them; the time may be missing
 UNNAMED = ["time", "x", "y", "z"]
-# whole numbers that are all smaller are not counts
-FEWEST_COUNTS = 200
 # RuntimeError includes NotImplementedError, of an unknown compression
 _DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
 
@@ -231,12 +227,8 @@ def _read_app_metadata(files: Iterable[tuple[str, bytes]]) -> tuple[bool, int | 
 
 
 def _holds_gravity(stream: Stream) -> bool:
-    return _are_counts(stream) or bool(acceleration_unit(stream.values[stream.complete]))
-
-
-def _are_counts(stream: Stream) -> bool:
     values = stream.values[stream.complete]
-    return len(values) > 0 and are_counts(to_signed(values)) and bool(np.abs(values).max() > FEWEST_COUNTS)
+    return seem_counts(values) or (len(values) > 0 and bool(acceleration_unit(values)))
 
 
 def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) -> Stream:
@@ -260,7 +252,7 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
     stream = sensor_stream(table, columns, of)
     # of a phone, by the convention of Android and iOS, where a line above names the columns
     named = isinstance(table, TextTable) and table.lines[0] > 1
-    is_phones = quantity == GYR and named and not _are_counts(stream)
+    is_phones = quantity == GYR and named and not seem_counts(stream.values[stream.complete])
     return replace(stream, unit="rad/s") if is_phones and not stream.unit else stream
 
 

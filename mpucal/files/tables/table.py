@@ -37,12 +37,10 @@ from .names import (
     with_sensor,
 )
 from .streams import index_with_gravity, join_streams, mean_acceleration_unit
-from .text import HEAD, PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
+from .text import HEAD, MOST_ODD, PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
 from .times import Stream
-from .units import BEYOND, QUANTITIES, acceleration_unit, are_counts
+from .units import BEYOND, QUANTITIES, acceleration_unit, are_counts, seem_counts
 
-# with a larger share of empty lines, these lines are another sensor's and not lost
-ANOTHERS = 0.1
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
 # above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
@@ -52,8 +50,6 @@ RATE = re.compile(
     r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
     re.IGNORECASE | re.MULTILINE,
 )
-# m/s^2: whole numbers that are larger are counts
-LARGEST_OF_SI = 300.0
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
 FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
 # accelerations from which a program has taken gravity
@@ -110,8 +106,7 @@ def _may_be_si(table: TextTable) -> bool:
     values = values[np.isfinite(values).all(axis=1)]
     if len(values) < FEWEST:
         return True
-    counts = are_counts(values) and float(np.median(np.abs(values).max(axis=1))) > LARGEST_OF_SI
-    return not counts and acceleration_unit(values) in ("", "m/s^2")
+    return not seem_counts(values) and acceleration_unit(values) in ("", "m/s^2")
 
 
 def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -297,7 +292,7 @@ def sensor_stream(
     empty = np.isnan(values).all(axis=1)
     clocks = [c for c in table.clocks(columns) if c.clock_of in ("", axes[0].quantity)]
     clock = min(clocks, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit), default=None)
-    others = np.count_nonzero(empty) > ANOTHERS * len(values)
+    others = np.count_nonzero(empty) > MOST_ODD * len(values)
     timed = np.ones(len(values), bool) if clock is None else table.has(clock)
     kept = np.asarray(~empty if others else ~empty | timed)
     unit = axes[0].unit if len({column.unit for column in axes}) == 1 else ""

@@ -29,7 +29,8 @@ PREAMBLE = 200
 HEAD = 4096
 # rows by which a column of times is known
 LOOKED_AT = 50
-# a file with a larger share of NUL bytes is binary, and a column with a larger share of words no clock
+# the share of NUL bytes beyond which a file is binary, of words beyond which a column is no clock, and of empty lines
+# beyond which these are another sensor's
 MOST_ODD = 0.1
 # a header may begin with such a mark; any other line that does is a comment
 COMMENT = ("#", "%", "//")

@@ -45,6 +45,8 @@ _PLAIN = str.maketrans(
 SLOWEST_HZ, FASTEST_HZ = 5.0, 8000.0
 # s: the longest step in a named unit; such a recording is too slow to calibrate, but readable
 SLOW_S = 2.0
+# m/s^2: whole numbers that are larger are counts
+LARGEST_OF_SI = 300.0
 # |a| / g: a sensor may have gains of 0.5 to 1.5
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
 # true over measured rate: the same gains
@@ -116,6 +118,11 @@ def to_signed(values: Vector) -> Vector:
 def are_counts(values: Vector) -> bool:
     """Return True if all values are whole 16-bit numbers."""
     return bool((values == np.rint(values)).all() and np.abs(values).max() <= ACCEL_COUNTS)
+
+
+def seem_counts(values: Vector) -> bool:
+    """Return True if (n, 3) numbers are whole, and larger than in any other unit."""
+    return len(values) > 0 and are_counts(to_signed(values)) and bool(np.abs(values).max() > LARGEST_OF_SI)
 
 
 def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
