@@ -20,7 +20,7 @@ from mpucal.result.calibration import Calibration
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.faults import Where, fault_kinds
 from tools.lab.bridge import EmulatedLine, Memory
-from tools.lab.bridge.line_faults import LineFaults
+from tools.lab.bridge.line import LineFaults
 
 MS = 1_000_000
 

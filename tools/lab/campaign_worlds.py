@@ -29,7 +29,7 @@ from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where,
 from mpucal.simulated.vehicle.transport import PacketLine, SimulatedTransport
 
 from .bridge import EmulatedBridge, EmulatedLine
-from .bridge.line_faults import LineFaults
+from .bridge.line import LineFaults
 
 CHIP, BRIDGE, VEHICLE = "chip", "bridge", "vehicle"
 SERIAL = tuple(fault_kinds(Where.SERIAL))

@@ -41,11 +41,3 @@ def test_without_a_rest_in_the_middle_the_second_half_is_read_backwards():
     assert other.flat[0] < 25
     assert one.gyr[: one.flat[1]].std(0).max() < 0.05
     np.testing.assert_allclose(other.acc[: 8 * 50], whole.acc[::-1][: 8 * 50])
-
-
-def test_a_gap_stands_on_its_other_side_backwards(poses):
-    gap = np.zeros(len(poses.recording), bool)
-    gap[100] = True  # between 99 and 100
-    backwards = halves.reversed_in_time(replace(poses.recording, gap=gap))
-    n = len(gap)
-    assert np.flatnonzero(backwards.gap).tolist() == [n - 1 - 99]

@@ -23,15 +23,6 @@ def test_a_failure_is_named_and_not_among_the_successful():
     assert column("models, failures", *runs) == "hand 2, not converged 1"
 
 
-@pytest.mark.parametrize(
-    ("error", "failure", "met"),
-    [(0.0039, None, True), (0.0041, None, False), (0.0039, "not converged", False)],
-    ids=["below", "above", "one run failed"],
-)
-def test_what_is_wanted_is_met_by_the_mean_of_runs_that_all_succeed(error, failure, met):
-    assert monte_carlo.met([run(error), run(error, failure)]) is met
-
-
 def test_a_simulated_sensor_is_found_as_well_as_is_claimed():
     found = monte_carlo.of_seed(("paper", 0, "mpucal"), "auto")
     assert found.failure is None and found.model == "accel" and found.known_K == 0

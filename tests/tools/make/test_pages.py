@@ -2,12 +2,8 @@
 
 import ast
 import re
-from graphlib import CycleError
 from pathlib import Path
 
-import pytest
-
-from mpucal.sources.table import SOURCES
 from tools.make import drawings, pages
 
 ROOT = Path(__file__).parents[3]
@@ -19,11 +15,6 @@ def test_an_arrow_that_a_longer_way_implies_is_left_out():
     imports = {"top": {"middle", "bottom"}, "middle": {"bottom"}, "bottom": set()}
     assert drawings.floors(imports) == ["bottom", "middle", "top"]
     assert drawings.reduced(imports) == {"top": {"middle"}, "middle": {"bottom"}, "bottom": set()}
-
-
-def test_a_circle_cannot_be_drawn():
-    with pytest.raises(CycleError):
-        drawings.floors({"one": {"other"}, "other": {"one"}})
 
 
 def defined(tree, name):
@@ -47,10 +38,3 @@ def test_what_it_points_at_is_there():
 
 def test_what_is_made_is_made_anew():
     assert not list(pages.outdated()), "run `python -m tools.make pages`"
-
-
-@pytest.mark.parametrize("kind", SOURCES, ids=lambda kind: kind.flag)
-def test_a_row_says_what_the_table_says(kind):
-    (row,) = (line for line in pages.sources().splitlines() if line.startswith(f"| `{kind.flag}` |"))
-    assert all(f"`{option.flag}`" in row for option in (*kind.options, *kind.settings))
-    assert ("`doctor`" in row) == bool(kind.doctor)

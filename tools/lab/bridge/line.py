@@ -1,19 +1,22 @@
-"""Serial line to an emulated bridge, as a port, in a time that passes only while the host waits."""
+"""Serial line to an emulated bridge, as a port, in a time that passes only while the host waits; and its faults."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from mpucal.bridge.port import BAUDS, Chunk
 from mpucal.bridge.port_errors import port_gone
 from mpucal.simulated.chip.bus import SimulatedClock
+from mpucal.simulated.faults import FAULTS
 
 STEP_NS = 500_000
 BITS_A_BYTE = 10
 # The clocks of host and bridge have different origins.
 HOST_AHEAD_NS = 7_000_000_000
+
+LATE = "late"
 
 Damage = Callable[[bytes], bytes]
 
@@ -116,3 +119,37 @@ class EmulatedLine:
 
 def _unchanged(data: bytes) -> bytes:
     return data
+
+
+class LineFaults:
+    """Function that damages the bytes of an EmulatedLine.
+
+    Parameters
+    ----------
+    at : number of the byte on the line, name of the fault, and a number from 1 to 255 that varies the damage.
+
+    Attributes
+    ----------
+    number : of the next byte.
+    """
+
+    def __init__(self, at: Iterable[tuple[int, str, int]]) -> None:
+        self._at = {number: (name, value) for number, name, value in at}
+        self.number = 0
+        self._held = b""
+
+    def __call__(self, data: bytes) -> bytes:
+        """Return the bytes that arrive now; late ones arrive with the next."""
+        out, late = bytearray(self._held), False
+        self._held = b""
+        for byte in data:
+            name, value = self._at.get(self.number, ("", 0))
+            self.number += 1
+            late = late or name == LATE
+            spoils = FAULTS[name].spoils if name else None
+            made = bytes([byte]) if spoils is None else spoils(byte, value)
+            if late:
+                self._held += made
+            else:
+                out += made
+        return bytes(out)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from mpucal.calibration.rotation import cross, shortest_turn
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
-from mpucal.errors import UsageError
 from mpucal.simulated import rotation
 from mpucal.simulated.disturbance import HandDisturbance
 from mpucal.simulated.sensor import SensorTruth, SiSetting
@@ -151,7 +150,7 @@ class _Scene:
     moving_s: float = MOVING_S
 
 
-_SCENES = {
+SCENES = {
     "pose6": _Scene(six_faces),
     "pose7": _Scene(partial(poses, n=7)),
     "pose9": _Scene(partial(poses, n=9)),
@@ -164,7 +163,6 @@ _SCENES = {
     "turns": _Scene(three_turns),
     "calm jerks": _Scene(continuous, _CALM, perfect_gyro=True),
 }
-MOTIONS = tuple(name for name in _SCENES if not name.startswith("check"))
 
 
 def paper_scenario(
@@ -198,17 +196,11 @@ def hand_scenario(
     Parameters
     ----------
     seed : draws the sensor, the motion, the hand and the noise; each is the same whatever the other arguments.
-    motion : one of MOTIONS, or of these two. tremble : the hand trembles in the poses.
+    motion : one of SCENES. tremble : the hand trembles in the poses.
     delay_s : how much later the accelerometer reports than the gyroscope.
     sensor : drawn from the seed unless given. truth_hz : how finely the hand is simulated, at least.
-
-    Raises
-    ------
-    UsageError : no such motion.
     """
-    if motion not in _SCENES:
-        raise UsageError(f"no simulated motion is called {motion!r}", f"choose one of {', '.join(MOTIONS)}")
-    scene = _SCENES[motion]
+    scene = SCENES[motion]
     habits = scene.habits
     if tremble:
         habits = replace(habits, tremor_mps2=TREMOR_MPS2, tremor_rad_s=TREMOR_RAD_S)

@@ -10,7 +10,7 @@ from mpucal.calibration.rotation import rotation
 from tools.lab.judge import sph_rms
 from tools.lab.scenarios.body import lever_acceleration
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, attitude, hand_scenario, paper_scenario
-from tools.lab.scenarios.sensors import hand_sensor, paper_sensor, quantise
+from tools.lab.scenarios.sensors import hand_sensor, paper_sensor
 
 SHARED = Path(__file__).parents[4].parent / "shared" / "simulated"
 # each is simulated once, and changed by no test
@@ -77,12 +77,6 @@ def test_a_levers_acceleration_is_the_second_derivative_of_its_path():
     from_path = (path[2:] - 2 * path[1:-1] + path[:-2]) / step_s**2
     in_body = (R[1:-1] @ from_path[..., None])[..., 0]
     np.testing.assert_allclose(lever_acceleration(omega, r, step_s)[2:-2], in_body[1:-1], atol=1e-5)
-
-
-def test_quantisation_rounds_and_clips_and_says_where():
-    y, clipped = quantise(np.array([[0.26, 0.0, -0.24], [1e9, 0.0, 0.0], [0.0, -1e9, 0.0]]), 0.5)
-    np.testing.assert_array_equal(y, [[0.5, 0.0, 0.0], [0.5 * 32767, 0.0, 0.0], [0.0, -0.5 * 32768, 0.0]])
-    np.testing.assert_array_equal(clipped, [False, True, True])
 
 
 @pytest.mark.parametrize(("draw", "error_mps2"), [(hand_sensor, 0.852), (paper_sensor, 4.32)], ids=["hand", "paper"])
