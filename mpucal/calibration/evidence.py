@@ -22,7 +22,6 @@ from .uncertainty import DIRECTIONS, Uncertainty, UncertaintyClaim, is_usable, p
 from .words import Decoded
 
 LEAST_STEP_RAD = np.deg2rad(2.0)  # turn of gravity in half a second that is above noise
-ENOUGH_STEPS = 100  # half seconds that tell a unit as well as all do
 LEAST_TURN_RAD = np.deg2rad(20.0)  # turn of gravity beyond the effect of biases and skew
 OTHER_RANGES = (0.25, 0.5, 2.0, 4.0)
 CLEARLY = 3.0  # ratio of misses above which another unit or range is the right one
@@ -88,18 +87,15 @@ class Evidence:
     @cached_property
     def gravity_moved(self) -> float:
         """Largest angle [rad] between the flat mean and a half-second mean after it."""
-        return 0.0 if self.flat is None else self._angle_from_flat(self.recording.acc[self.flat.last :])
+        return 0.0 if self.flat is None else self._angle_from(self.flat, self.recording.acc[self.flat.last :])
 
     @cached_property
     def gravity_moved_before(self) -> float:
         """Largest angle [rad] between the flat mean and a half-second mean before it."""
-        return 0.0 if self.flat is None else self._angle_from_flat(self.recording.acc[: self.flat.first])
+        return 0.0 if self.flat is None else self._angle_from(self.flat, self.recording.acc[: self.flat.first])
 
-    def _angle_from_flat(self, acc: Vector) -> float:
-        means = _means(acc, self._half_second)
-        if self.flat is None or len(means) == 0:
-            return 0.0
-        return float(_angles(_units(means), _units(self.flat.y[None])).max())
+    def _angle_from(self, flat: Flat, acc: Vector) -> float:
+        return float(_angles(_units(_means(acc, self._half_second)), _units(flat.y[None])).max(initial=0.0))
 
     @property
     def _half_second(self) -> int:
@@ -131,7 +127,6 @@ class Evidence:
         n = self._half_second
         u = _units(_means(self.recording.acc[flat.last :], n))
         at = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_STEP_RAD)
-        at = at[:: max(len(at) // ENOUGH_STEPS, 1)]
         return np.stack([u[at], u[at + 1]], axis=1), flat.last + n // 2 + at * n
 
     def _turns_of_half_seconds(self, flat: Flat) -> list[_Turn]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import NamedTuple
 
@@ -64,20 +64,15 @@ class ModelChoice(NamedTuple):
     why: str
 
 
-def fit_accel(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """Estimate D, b_a, b_omega and the first tilts with a trusted gyroscope: the paper's model, made efficient."""
-    return InPlaceFits(recording, flat, gravity).fit(ACCEL)
-
-
-def fit_imu(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """Estimate the parameters of `accel` and the gyroscope's matrix K."""
-    return InPlaceFits(recording, flat, gravity).fit(IMU)
+def fit_in_place(parameters: int, recording: Recording, flat: Flat, gravity: float) -> Fit:
+    """Estimate D, b_a, b_omega and the first tilts (ACCEL: the paper's model, made efficient), and K as well (IMU)."""
+    return InPlaceFits(recording, flat, gravity).fit(parameters)
 
 
 METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
     "hand": fit_hand,
-    "imu": fit_imu,
-    "accel": fit_accel,
+    "imu": partial(fit_in_place, IMU),
+    "accel": partial(fit_in_place, ACCEL),
     "paper": fit_paper,
     "tilt": fit_tilt,
     "static": fit_static,

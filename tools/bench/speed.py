@@ -14,7 +14,7 @@ import numpy as np
 import mpucal
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.likelihood import evaluate, value
-from mpucal.calibration.model_selection import METHODS, choose_model, fit_accel
+from mpucal.calibration.model_selection import METHODS, choose_model
 from mpucal.calibration.parameters import ACCEL, HAND, IMU
 from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.theta import Theta
@@ -123,7 +123,7 @@ def growth(runs: int) -> list[dict[str, Any]]:
     for n in GROWTH:
         recording = turned(60.0, n / 60.0)
         flat = flat_statistics(recording, recording.flat)
-        s = median_s(lambda r=recording, f=flat: fit_accel(r, f, GRAVITY_MPS2), runs)
+        s = median_s(lambda r=recording, f=flat: METHODS["accel"](r, f, GRAVITY_MPS2), runs)
         whole = peak_bytes(lambda r=recording: mpucal.calibrate(r, model="accel", gravity=GRAVITY_MPS2))
         rows.append(
             {

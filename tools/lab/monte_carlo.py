@@ -21,7 +21,7 @@ from rich.table import Table
 
 import mpucal
 from mpucal.calibration import MODELS
-from mpucal.calibration.model_selection import fit_accel
+from mpucal.calibration.model_selection import METHODS
 from mpucal.calibration.paper import fit_paper
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.errors import MpucalError
@@ -37,7 +37,7 @@ from .table import Column, Row, cell, frequencies, grouped, known, over, plain_t
 
 # NIS is 3 for data that conform to the model, and tens if the fit ended in a wrong optimum
 NIS_WRONG = 10.0
-FITS = {"accel": fit_accel, "paper": fit_paper}
+FITS = {"accel": METHODS["accel"], "paper": fit_paper}
 PRINTED = "the paper's algorithm"
 TILTS = ("uncalibrated", "true D, b_a", "calibrated")
 # required mean errors, and means (standard deviations) of the paper before and after calibration [deg]

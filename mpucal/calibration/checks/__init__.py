@@ -10,6 +10,7 @@ estimate     directions not observable, no convergence, contradictions, a change
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import Literal, NamedTuple
 
 from ...reasons import Reason
@@ -51,8 +52,8 @@ TABLE = (
     Row(recording.moved_while_still, "flat"),
     Row(estimate.tilted_only, "fit"),
     Row(estimate.few_orientations, "fit"),
-    Row(recording.gyro_clipped, of_gyroscope=True),
-    Row(recording.accel_clipped),
+    Row(partial(recording.clipped, "gyro_clipped", "gyr_clipped"), of_gyroscope=True),
+    Row(partial(recording.clipped, "accel_clipped", "acc_clipped")),
     Row(recording.data_lost, of_gyroscope=True),  # gaps do not spoil rests
     Row(sensor.wrong_range, "trustworthy fit"),
     Row(sensor.accelerometer_factor, "trustworthy fit"),

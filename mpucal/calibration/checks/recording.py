@@ -37,19 +37,11 @@ def moved_while_still(e: Evidence) -> Reason | None:
     return reason("moved_while_still", "mean", axis="xyz"[axis], moved=moved[axis])
 
 
-def gyro_clipped(e: Evidence) -> Reason | None:
-    """Find samples at the end of the gyroscope's range."""
-    return _clipped("gyro_clipped", e.recording.gyr_clipped)
-
-
-def accel_clipped(e: Evidence) -> Reason | None:
-    """Find samples at the end of the accelerometer's range."""
-    return _clipped("accel_clipped", e.recording.acc_clipped)
-
-
-def _clipped(code: str, mask: Mask) -> Reason | None:
-    share = float(mask.mean())
-    return reason(code, "samples", share > MOST_CLIPPED, count=int(mask.sum()), share=share) if share else None
+def clipped(code: str, mask: str, e: Evidence) -> Reason | None:
+    """Find samples at the end of a sensor's range, which a mask of the recording marks."""
+    marked: Mask = getattr(e.recording, mask)
+    share = float(marked.mean())
+    return reason(code, "samples", share > MOST_CLIPPED, count=int(marked.sum()), share=share) if share else None
 
 
 def data_lost(e: Evidence) -> Reason | None:

@@ -117,7 +117,7 @@ def hardly_turned(e: Evidence) -> Reason | None:
 
 def _seconds_before(e: Evidence) -> float:
     """Return the time [s] before the flat segment."""
-    return 0.0 if e.flat is None else float(e.recording.t[e.flat.first] - e.recording.t[0])
+    return float(e.recording.t[e.rest.first] - e.recording.t[0])
 
 
 def _rested_late(e: Evidence) -> bool:
