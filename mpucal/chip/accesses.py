@@ -11,10 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clocks.sample_clock import Whole
 from .access import Failure, Transaction
 from .registers import ACCEL_WORDS, FIFO_R_W, FRAME_WORDS
-
-Whole = NDArray[np.int64]
 
 # Register addresses are one byte: larger numbers stand for files.
 FIRST_FILE_NUMBER = 256

@@ -34,17 +34,17 @@ class Port:
 
     def read(self, register: int, count: int) -> bytes:
         """Read `count` bytes from `register` on, in up to three tries."""
-        return self._retried(lambda: self._read(register, count))
+        return self._tried(lambda: self._read(register, count))
 
     def read_destructive(self, register: int, count: int) -> bytes:
         """Read registers whose content the read removes or clears, so that a second read gives something else.
 
         It is repeated only if nothing was acknowledged: a chip is addressed before it gives its first byte.
         """
-        return self._retried(lambda: self._read(register, count), NoAnswer)
+        return self._tried(lambda: self._read(register, count), NoAnswer)
 
     def _read(self, register: int, count: int) -> bytes:
-        reply = self._counted(lambda: self._bus.read(register, count))
+        reply = self._bus.read(register, count)
         self.now_ns = max(self.now_ns, reply.t_ns)
         self._decoder.feed_read(register, reply.data, reply.t_ns, reply.host_ns)
         return reply.data
@@ -55,7 +55,7 @@ class Port:
 
     def write_block(self, register: int, data: bytes) -> None:
         """Write `data` from `register` on in one transfer, in up to three tries."""
-        t_ns = self._retried(lambda: self._counted(lambda: self._bus.write(register, data)))
+        t_ns = self._tried(lambda: self._bus.write(register, data))
         self.now_ns = max(self.now_ns, t_ns)
         self._decoder.feed_write(register, data)
 
@@ -68,19 +68,17 @@ class Port:
         """Wait `ns` nanoseconds of bus time."""
         self.sleep_until(self.now_ns + ns)
 
-    def _counted(self, access: Callable[[], T]) -> T:
-        self.stats.transfers += 1
-        try:
-            return access()
-        except BusError as error:
-            self.stats.count_error(error)
-            raise
-
-    def _retried(self, access: Callable[[], T], after: type[BusError] = BusError) -> T:
-        for _ in range(TRIES - 1):
+    def _tried(self, access: Callable[[], T], after: type[BusError] = BusError) -> T:
+        """Make an access and count it, again after errors of the kind `after`."""
+        left = TRIES
+        while True:
+            self.stats.transfers += 1
             try:
                 return access()
-            except after:
-                self.sleep(RETRY_NS)
-                self.stats.retries += 1
-        return access()
+            except BusError as error:
+                self.stats.count_error(error)
+                left -= 1
+                if not left or not isinstance(error, after):
+                    raise
+            self.sleep(RETRY_NS)
+            self.stats.retries += 1

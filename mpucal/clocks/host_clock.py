@@ -25,9 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Vector
-
-NS = 1e-9
-Whole = NDArray[np.int64]
+from .sample_clock import NS, Whole
 
 # A ceramic resonator is within 0.5 %, and RC oscillators within 1 %; warming moves either by some 50 ppm a minute.
 RATE_STD, DRIFT_STD_PER_S = 0.01, 100e-6 / 60

@@ -11,6 +11,7 @@ import numpy as np
 from ..chip.access import Transaction
 from ..chip.bit_flips import BitFlipFilter
 from ..chip.families import MPU6050
+from ..clocks.sample_clock import NS
 from ..data import Recording, Samples, Sensor, Vector
 from ..errors import ChipError, RecordingError
 from .attributes import (
@@ -31,7 +32,6 @@ from .attributes import (
 )
 from .scan_elements import FrameLayout, ScanElement, StreamAligner, Times
 
-NS = 1e-9
 # Samples are missing if the next one is so many intervals later.
 GAP_INTERVALS = 1.5
 # A buffer with another clock than the host's monotonic one is off by more.

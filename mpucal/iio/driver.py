@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from ..chip.access import Bus
 from ..chip.config import Config
+from ..chip.driver import DEAD_NS
 from ..data import Recording, Samples, Sensor
 from ..errors import BusError, ChipError, EndOfCapture, NoAnswer, UsageError
 from .attributes import ACCEL, AXES, GYRO, TEMP
@@ -54,8 +55,6 @@ def _device(text: str) -> str:
     return f"iio:device{found.group(1)}"
 
 
-# The driver gives up after so long without a sample.
-DEAD_NS = 2_000_000_000
 # The die's temperature changes slowly.
 TEMPERATURE_NS = 1_000_000_000
 
@@ -115,16 +114,16 @@ class IioDriver:
         self._each = [DeviceAttributes(self._files, self._decoder, device) for device in self._devices.each]
         for each in self._each:
             each.read_all(self._kinds(each.device))
-        running = []
         try:
-            for each in self._each:
-                running.append(set_up(each, self._kinds(each.device), self._config, self._decoder, self._trigger))
+            running = [
+                set_up(each, self._kinds(each.device), self._config, self._decoder, self._trigger)
+                for each in self._each
+            ]
+            if any(running) and not all(running):
+                raise ChipError("one of the two devices has no buffer", "use --trigger none, which polls both")
         except (BusError, ChipError):
             self._restore()
             raise
-        if any(running) and not all(running):
-            self._restore()
-            raise ChipError("one of the two devices has no buffer", "use --trigger none, which polls both")
         self._buffered = all(running)
         if not self._buffered:
             self._say(
@@ -146,7 +145,8 @@ class IioDriver:
         begun_ns = self.now_ns()
         period_ns = round((self._config.period_s if self._buffered else 1 / self._config.rate_hz) * 1e9)
         self._next_ns = max(self._next_ns + period_ns, begun_ns)
-        self._sleep_until(self._next_ns)
+        self._files.sleep_until(self._next_ns)
+        self._now_ns = max(self._now_ns, self._next_ns)
         trouble: BusError | None = None
         try:
             if self._buffered:
@@ -200,7 +200,3 @@ class IioDriver:
         if f"{TEMP}_raw" in first.names and self.now_ns() - self._warm_ns > TEMPERATURE_NS:
             self._warm_ns = self.now_ns()
             first.read(f"{TEMP}_raw")
-
-    def _sleep_until(self, t_ns: int) -> None:
-        self._files.sleep_until(t_ns)
-        self._now_ns = max(self._now_ns, t_ns)

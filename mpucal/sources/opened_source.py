@@ -160,10 +160,14 @@ class OpenedSource(ABC):
         """Begin the next part; return False if there is none."""
         return self.parts is not None and self.parts.go_on()
 
+    @property
+    def replaying(self) -> bool:
+        """True if its present part is a recorded one."""
+        return self.parts is not None and self.parts.replaying
+
     def is_late(self, late: bool) -> bool:
         """Return True if an answer is late now; in a replay, if it was."""
-        parts = self.parts
-        return bool(parts.pending_events(LATE)) if parts is not None and parts.replaying else late
+        return bool(self.line.pending_events(LATE)) if self.replaying else late
 
     def _only_new(self, listener: Listener) -> Listener:
-        return lambda prompt: None if self.parts is not None and self.parts.replaying else listener(prompt)
+        return lambda prompt: None if self.replaying else listener(prompt)
