@@ -10,7 +10,7 @@ A good accelerometer is taken as perfect, and spoilt: gains by 10 %, skew by 5 d
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -43,29 +43,21 @@ BESIDE = (
 )
 
 
-@dataclass(frozen=True)
-class Captured:
-    """A recording and the specific force (n, 3) [m/s^2] that motion capture gives, NaN where it saw nothing."""
+def captured(path: Path, gravity: float) -> tuple[Recording, Vector]:
+    """Load a .npz with t, acc, gyr and quat; the specific force (n, 3) [m/s^2] is NaN where motion capture saw nothing.
 
-    recording: Recording
-    specific_force: Vector
-
-    @classmethod
-    def load(cls, path: Path, gravity: float) -> Captured:
-        """Load a .npz with t, acc, gyr and quat.
-
-        Raises
-        ------
-        RecordingError : no quat in it.
-        """
-        with np.load(path) as file:
-            if "quat" not in file:
-                raise RecordingError(f"{path}: it holds no quat", "give a recording with optical motion capture")
-            recording = Recording.from_arrays(file["t"], file["acc"], file["gyr"], name=path.stem)
-            w, x, y, z = np.asarray(file["quat"], float).T
-        # the last row of the rotation from sensor to earth: the earth's z in the sensor's axes
-        up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z], axis=1)
-        return cls(with_masks(recording), gravity * up)
+    Raises
+    ------
+    RecordingError : no quat in it.
+    """
+    with np.load(path) as file:
+        if "quat" not in file:
+            raise RecordingError(f"{path}: it holds no quat", "give a recording with optical motion capture")
+        recording = Recording.from_arrays(file["t"], file["acc"], file["gyr"], name=path.stem)
+        w, x, y, z = np.asarray(file["quat"], float).T
+    # the last row of the rotation from sensor to earth: the earth's z in the sensor's axes
+    up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z], axis=1)
+    return with_masks(recording), gravity * up
 
 
 def distortion(seed: int) -> tuple[Vector, Vector]:
@@ -93,9 +85,9 @@ def of_seed(
     RecordingError : nothing could be estimated.
     """
     path, seed = item
-    captured = Captured.load(path, gravity)
+    good, s_true = captured(path, gravity)
     D_true, b_true = distortion(seed)
-    recording = replace(captured.recording, acc=captured.recording.acc @ D_true.T + b_true)
+    recording = replace(good, acc=good.acc @ D_true.T + b_true)
     result = mpucal.calibrate(recording, model=model, gravity=gravity)
     if not np.isfinite(result.D).all():
         raise RecordingError(f"{path}: nothing could be estimated", "see what `mpucal calibrate` says of it")
@@ -103,7 +95,7 @@ def of_seed(
     D = np.array([np.eye(3), result.D, result.D, D_true])
     b_a = np.array([np.zeros(3), result.b_a, result.b_a, b_true])
     s, turned_until = orientations(recording, D, b_a, result.K, gravity)
-    s_true = captured.specific_force[-len(s) :]
+    s_true = s_true[-len(s) :]
     errors = [sph_rms(truth, *sets) for sets in zip(D, b_a, strict=True)]
     tilts = (*tilts_deg(s_true, s), *tilts_deg(s_true[:turned_until], s[:turned_until]))
     same = {"name": path.stem, "seed": seed, "told": f"{result.fit['model']}, {result.verdict}"}

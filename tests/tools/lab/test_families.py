@@ -31,7 +31,7 @@ def test_the_worlds_acceleration_is_felt_in_the_boards_axes():
 
 def test_noise_has_the_density_that_was_asked_for():
     rng = np.random.default_rng(0)
-    y = np.zeros((200_000, 3))
+    y = np.zeros((100_000, 3))
     for one in (sensors.Sampling(), sensors.Sampling(lowpass_hz=40.0)):
         frequency, psd = scipy.signal.welch(one.gyroscope(y, 0.02, rng), 200.0, nperseg=1024, axis=0)
         passed = (frequency > 1.0) & (frequency < 15.0)
