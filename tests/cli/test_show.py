@@ -1,6 +1,7 @@
 """`mpucal show` of calibrations, recordings and devices, and the summary of a calibration."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -133,3 +134,20 @@ def test_a_vehicles_parameters_are_shown(mpucal):
     assert shown["firmware"] == "ArduPilot"
     assert "INS_ACCOFFS_X" in shown["parameters"]
     assert "INS_ACCOFFS_X" in mpucal("show", "--mavlink", "sim").out
+
+
+def test_calibrations_at_three_temperatures_differ_and_are_merged(mpucal, session):
+    made = Calibration.load(session.folder / "calibration.json")
+    for number, name in enumerate(("cold", "warm", "hot")):
+        sensor = replace(made.sensor, temperature_c=10.0 + 10.0 * number)
+        fit = {**made.fit, "recording_digest": f"{number:064x}"}
+        replace(made, sensor=sensor, b_a=made.b_a + 0.01 * number, fit=fit).save(f"{name}.json")
+    different = mpucal("diff", "cold.json", "hot.json")
+    assert (different.code, different.out[:10]) == (0, "Different:")
+    assert json.loads(mpucal("diff", "cold.json", "hot.json", "--json").out)["same"] is False
+    merged = mpucal("merge", "cold.json", "warm.json", "hot.json", "-o", "merged")
+    assert merged.code == 0, merged.err
+    assert "b_a changes by (+0.102, +0.102, +0.102) mg/°C" in merged.out
+    assert Calibration.load("merged/calibration.json").b_a_slope == pytest.approx([1e-3] * 3, abs=1e-6)
+    shown = mpucal("show", "merged/calibration.json").out
+    assert "b_a changes by" in shown

@@ -3,6 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mpucal.page.address import Address, lan_host, parse_address, qr_code
 from mpucal.page.requests import KEYS, PAGE_FILES, Allowed, RequestFilter
 
 HOST, TOKEN = "127.0.0.1:8000", "c2VjcmV0LXRva2VuLTEyOA"
@@ -32,3 +33,10 @@ def test_only_requests_with_host_and_token_are_allowed(method, target, hosts, or
     presses = keys and method == "POST" and target in {f"/{TOKEN}/keys/{key}" for key in KEYS}
     own = all(origin == f"http://{HOST}" for origin in origins)
     assert isinstance(request, Allowed) == (hosts == [HOST] and (looks or (presses and own)))
+
+
+def test_an_address_is_local_unless_the_network_is_given():
+    assert parse_address("127.0.0.1") == Address("127.0.0.1", 0, "127.0.0.1")
+    assert parse_address("lan").host == lan_host()
+    assert parse_address("[::1]:8000") == Address("::1", 8000, "[::1]")
+    assert "█" in qr_code("http://127.0.0.1:8000/token/")
