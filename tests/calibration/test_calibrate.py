@@ -139,7 +139,7 @@ def recordings(draw):
     return t[kept], acc[kept], gyr[kept], flat
 
 
-@settings(max_examples=50)
+@settings(max_examples=35)
 @given(recordings(), st.sampled_from([model for model in MODELS if model != "paper"]))
 def test_every_recording_gets_a_verdict(arrays, model):
     try:
@@ -206,7 +206,7 @@ def measured(draw):
     return recording, turned(simulated.truth, Q)
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(measured(), st.sampled_from(UNITS))
 def test_no_good_calibration_is_three_times_worse_than_it_claims(made, units):
     recording, truth = made
@@ -226,7 +226,7 @@ def test_no_good_calibration_is_three_times_worse_than_it_claims(made, units):
         assert sph_rms(truth, calibration.D, calibration.b_a) <= 3.0 * claimed
 
 
-@pytest.mark.parametrize(("rate_hz", "turn_s"), [(20.0, 10.0), (1000.0, 3.0), (4000.0, 3.0)])
+@pytest.mark.parametrize(("rate_hz", "turn_s"), [(20.0, 10.0), (4000.0, 3.0)])
 def test_at_the_slowest_and_the_fastest_rate(rate_hz, turn_s):
     simulated = paper_scenario(3, rate_hz=rate_hz, turn_s=turn_s)
     calibration = calibrate(simulated.recording, "auto", G)
