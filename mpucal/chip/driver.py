@@ -25,9 +25,8 @@ from .fifo import FifoDecoder, FifoFault
 from .identity import describe_mismatch
 from .offsets import PLACES
 from .port import Port
-from .probe import probe, read_identity
 from .settings import Settings
-from .setup import configure, is_configured, reset, restart_fifo, stop_fifo, wake
+from .setup import configure, is_configured, probe, read_identity, reset, restart_fifo, stop_fifo, wake
 from .transfer_stats import REMEDY, TransferStats
 
 DRIVER_VERSION = 6

@@ -1,10 +1,9 @@
-"""Accelerometer offset registers: their possible addresses, their content, and writing all of them in one transfer.
-
-offset_response.py measures the effect of a count.
+"""Accelerometer offset registers: their possible addresses, their content, and the measured effect of a count.
 
 Source: RM-MPU-6000A (0x06, two bytes an axis, one after the other); RM-MPU-9250A r1.4, registers 119 to 126 (0x77,
 with a reserved byte after each axis). 15 bits in [15:1]; bit 0 is reserved and kept. They hold the factory trim after
-power-on, and lose what was written with the supply.
+power-on, and lose what was written with the supply. Clones move them, and even InvenSense's own drivers disagree on the
+scale: so a known step is written, half a second is averaged, and the step is removed again.
 """
 
 from __future__ import annotations
@@ -14,9 +13,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Self
 
-from ..errors import BusError, ChipError
+import numpy as np
+
+from ..data import Vector
+from ..errors import BoardMoved, BusError, ChipError, OddOffsets
 from .families import FAMILIES
 from .port import Port
+from .quick_measure import TemporaryMeasurement
 
 Place = tuple[int, int, int]
 Words = tuple[int, int, int]
@@ -128,4 +131,75 @@ def restore(port: Port, old: OffsetRegisters) -> None:
     raise ChipError(
         f"the accelerometer's offset registers could not be restored to {old.data.hex(' ')} at 0x{old.place[0]:02x}",
         "switch the chip's supply off and on, which brings back its factory trim",
+    )
+
+
+# A different step on each axis shows axes that are swapped.
+STEPS = (256, 320, 384)
+# Words beyond this take the step in the other direction, so that it fits.
+LARGEST_TO_STEP_UP = 30_000
+
+SCALES_LSB_PER_G = (2048.0, 4096.0)
+# The accelerometer's own scale is within 3 %.
+TOLERANCE = 0.15
+# Half of the smallest step [g], and the largest difference between two readings of a board at rest [g].
+LEAST_SHIFT_G, MOTION_G = 0.03, 0.006
+
+
+@dataclass(frozen=True)
+class OffsetResponse:
+    """Effect of the offset registers.
+
+    Attributes
+    ----------
+    place : their addresses. lsb_per_g : counts that make 1 g. g_per_lsb : (3,) as measured, axis by axis.
+    """
+
+    place: Place
+    lsb_per_g: float
+    g_per_lsb: Vector
+
+
+def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likely: Place = PLACES[0]) -> OffsetResponse:
+    """Try the `likely` place, then the others; the registers hold their old content afterwards.
+
+    Raises
+    ------
+    BusError : a transfer failed. OddOffsets : no place responds, or one responds with an unknown scale.
+    ChipError : the board moves, or the old words could not be restored.
+    """
+    for place in sorted(PLACES, key=lambda place: place != likely):
+        old = OffsetRegisters.read(port, place)
+        steps = [step if word < LARGEST_TO_STEP_UP else -step for step, word in zip(STEPS, old.words, strict=True)]
+        probe = old.with_words(shift_words(old.words, steps))
+        before = measurement.rest()
+        with restoring(port, old):
+            kept = probe.write(port)
+            during = measurement.rest() if kept else before
+        if not kept:
+            continue
+        after = measurement.rest()
+        if (np.abs(after - before) > MOTION_G).any():
+            raise BoardMoved(
+                "the board moved while its offset registers were tried", "put it on a firm surface and let go of it"
+            )
+        shift = during - (before + after) / 2
+        if (np.abs(shift) > LEAST_SHIFT_G).any():
+            return _identify_scale(place, shift / np.array(word_difference(probe.words, old.words)))
+    raise OddOffsets(
+        "the accelerometer does not respond to its offset registers, neither at "
+        + " nor at ".join(f"0x{place[0]:02x}" for place in PLACES),
+        "use the calibration's files: this chip cannot hold a correction",
+    )
+
+
+def _identify_scale(place: Place, g_per_lsb: Vector) -> OffsetResponse:
+    for scale in SCALES_LSB_PER_G:
+        if (np.abs(g_per_lsb * scale - 1) < TOLERANCE).all():
+            return OffsetResponse(place, scale, g_per_lsb)
+    per_256 = ", ".join(f"{256_000 * value:+.0f}" for value in g_per_lsb)
+    raise OddOffsets(
+        f"256 counts in the offset registers at 0x{place[0]:02x} have an effect of {per_256} mg; known chips have 125"
+        " or 62.5",
+        "use the calibration's files: a correction in these registers would be wrong",
     )

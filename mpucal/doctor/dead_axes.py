@@ -13,8 +13,7 @@ import numpy as np
 
 from ..chip import registers as reg
 from ..chip.families import Part
-from ..chip.offset_response import MOTION_G, OffsetResponse
-from ..chip.offsets import OffsetRegisters, restoring, shift_words
+from ..chip.offsets import MOTION_G, OffsetRegisters, OffsetResponse, restoring, shift_words
 from ..chip.port import Port
 from ..chip.quick_measure import AFS_SEL, TemporaryMeasurement
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector

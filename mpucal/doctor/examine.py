@@ -19,12 +19,11 @@ from ..chip.driver import NO_FIFO, Driver
 from ..chip.families import PARTS, Family, Part
 from ..chip.fifo import FifoFault
 from ..chip.identity import describe_mismatch
-from ..chip.offset_response import OffsetResponse, measure_offset_response
-from ..chip.offsets import PLACES, OffsetRegisters, restore
+from ..chip.offsets import PLACES, OffsetRegisters, OffsetResponse, measure_offset_response, restore
 from ..chip.port import Port
-from ..chip.probe import read_identity
 from ..chip.quick_measure import PATIENCE, temporary_measurement
 from ..chip.self_test import run_self_test
+from ..chip.setup import read_identity
 from ..chip.transfer_stats import REMEDY, TransferStats
 from ..data import Sensor
 from ..errors import BoardMoved, ChipError, ChipReset, OddOffsets, SourceError

@@ -16,12 +16,20 @@ import numpy as np
 from ..chip.access import Bus
 from ..chip.decode import Decoder
 from ..chip.families import PARTS
-from ..chip.offset_response import OffsetResponse, measure_offset_response
-from ..chip.offsets import PLACES, OffsetRegisters, Place, Words, restore, shift_words, word_difference
+from ..chip.offsets import (
+    PLACES,
+    OffsetRegisters,
+    OffsetResponse,
+    Place,
+    Words,
+    measure_offset_response,
+    restore,
+    shift_words,
+    word_difference,
+)
 from ..chip.port import Port
-from ..chip.probe import read_identity
 from ..chip.quick_measure import TemporaryMeasurement, temporary_measurement
-from ..chip.setup import reset
+from ..chip.setup import read_identity, reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
 from ..result.calibration import Calibration

@@ -19,8 +19,8 @@ from ...chip.driver import Driver
 from ...chip.families import PARTS, Part
 from ...chip.offsets import OffsetRegisters, Words
 from ...chip.port import Port
-from ...chip.probe import read_identity
 from ...chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
+from ...chip.setup import read_identity
 from ...data import Samples
 from ...iio.attributes import ACCEL, AXES, GYRO, MPU_SCALES, PRINTED_SCALES, TEMP, TIMESTAMP
 from ...iio.scan_elements import FrameLayout, ScanElement
