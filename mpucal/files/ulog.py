@@ -73,23 +73,23 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
     if hints.topic not in (None, COMBINED, ACCEL):
         raise RecordingError(f"{path.name} is read from {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
     raw = (ACCEL, 0) in topics and (GYRO, 0) in topics
-    damage = ["it is damaged, and its whole part was read"] if log.file_corruption else []
+    damage = "it is damaged, and its whole part was read" if log.file_corruption else ""
     try:
         fast = raw and all(_is_fast(topics[name, 0]) for name in (ACCEL, GYRO))
         if raw and (hints.topic == ACCEL or (hints.topic is None and (fast or (COMBINED, 0) not in topics))):
             acc, gyr = (_stream(topics[n, 0], "xyz", unit) for n, unit in ((ACCEL, "m/s^2"), (GYRO, "rad/s")))
             others = sum(name == ACCEL for name, _ in topics) - 1
-            more = [f"{others} more accelerometers are in it"] if others else []
-            remarks = [f"from {ACCEL} and {GYRO}, the first of each", *more, *damage]
-            return join_streams(acc, gyr, hints, path.name, remarks=remarks)
+            more = f"{others} more accelerometers are in it" if others else ""
+            remark = f"from {ACCEL} and {GYRO}, the first of each"
+            return join_streams(acc, gyr, hints, path.name, remarks=[remark, more, damage])
         if (COMBINED, 0) in topics and hints.topic != ACCEL:
             combined = topics[COMBINED, 0]
             acc = _stream(combined, [f"accelerometer_m_s2[{axis}]" for axis in range(3)], "m/s^2")
             gyr = _stream(combined, [f"gyro_rad[{axis}]" for axis in range(3)], "rad/s")
             acc = replace(acc, times=np.asarray(acc.times) + _later_us(combined))
-            slow = [f"{ACCEL} is logged too slowly"] if raw and not fast else []
+            slow = f"{ACCEL} is logged too slowly" if raw and not fast else ""
             remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
-            return join_streams(acc, gyr, hints, path.name, remarks=[remark, *slow, *damage])
+            return join_streams(acc, gyr, hints, path.name, remarks=[remark, slow, damage])
     except _DAMAGE as error:
         raise _damage_error(path, error) from error
     has = ", ".join(sorted({name for name, _ in topics})) or "none of them"
