@@ -110,6 +110,7 @@ def test_its_mappings_are_those_of_the_document_and_do_not_change(calibration):
     assert {**calibration.fit, "model": "imu"}["model"] == "imu"
 
 
+@pytest.mark.slow  # what is sent is pickled, which the gate proves
 def test_a_pool_of_processes_calibrates_as_this_process_does(recording, calibration):
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         there = pool.submit(mpucal.calibrate, recording, "hand").result()
