@@ -42,7 +42,7 @@ def load_capture(*paths: Path) -> Recording:
     session = _SessionRecords(paths)
     recorder, guided = _recorder(paths)
     if recorder is VEHICLE:
-        recording = read_log(_Packets(session), session.name, over_reboots=guided)
+        recording = read_log(session, session.name, over_reboots=guided)
     elif recorder is CHIP:
         recording = decode(session.accesses(), session.name)
     else:
@@ -98,8 +98,8 @@ class _SessionRecords:
             if not isinstance(record, RawPacket):
                 yield record
 
-    def packets(self) -> Generator[RawPacket]:
-        """Yield the packets that count."""
+    def __iter__(self) -> Iterator[RawPacket]:
+        """Yield the packets that count, of which a vehicle's log is made in two passes."""
         for record in self._records():
             if isinstance(record, RawPacket) and self._counts:
                 yield record
@@ -127,16 +127,6 @@ class _SessionRecords:
                 f"{self.name} holds an event {event.name} without a whole number {key}",
                 "give a capture that mpucal recorded",
             ) from error
-
-
-@dataclass
-class _Packets:
-    """The packets of a session, which can be read more than once."""
-
-    session: _SessionRecords
-
-    def __iter__(self) -> Iterator[RawPacket]:
-        return self.session.packets()
 
 
 def _recorder(paths: Sequence[Path]) -> tuple[Recorder, bool]:
