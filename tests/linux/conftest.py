@@ -27,10 +27,31 @@ LONGEST_S, LONGEST_CPU_S = 900, 3600
 
 # In the order of their dependencies
 MODULES = (
-    "virtio_ring virtio virtio_pci_legacy_dev virtio_pci_modern_dev virtio_pci netfs fscache 9pnet 9pnet_virtio 9p overlay"
-    " i2c-dev i2c-mux industrialio kfifo_buf industrialio-triggered-buffer inv_sensors_timestamp inv-mpu6050"
-    " inv-mpu6050-i2c usb-common usbcore usbip-core vhci-hcd i2c-tiny-usb"
-).split()
+    "virtio_ring",
+    "virtio",
+    "virtio_pci_legacy_dev",
+    "virtio_pci_modern_dev",
+    "virtio_pci",
+    "netfs",
+    "fscache",
+    "9pnet",
+    "9pnet_virtio",
+    "9p",
+    "overlay",
+    "i2c-dev",
+    "i2c-mux",
+    "industrialio",
+    "kfifo_buf",
+    "industrialio-triggered-buffer",
+    "inv_sensors_timestamp",
+    "inv-mpu6050",
+    "inv-mpu6050-i2c",
+    "usb-common",
+    "usbcore",
+    "usbip-core",
+    "vhci-hcd",
+    "i2c-tiny-usb",
+)
 OWN = "interrupt"
 PROGRAMS = ("qemu-system-x86_64", "busybox", "dpkg-deb", "make", "gcc")
 QEMU = {
