@@ -3,7 +3,6 @@
 import contextlib
 import os
 import select
-import socket
 import threading
 import tty
 from types import SimpleNamespace
@@ -121,16 +120,15 @@ def stream():
 
 
 class Server:
-    """Thread that serves an emulated bridge on a pty or a socket, in a time that runs as fast as possible.
+    """Thread that serves an emulated bridge on a pseudo terminal, in a time that runs as fast as possible.
 
     Attributes
     ----------
     name : port for the host. device : the bridge; replacing it is a reset. clock : of the bridge.
     """
 
-    def __init__(self, device, clock, handle, name, step_ns):
-        self.device, self.clock, self.name = device, clock, name
-        self._handle, self._step_ns = handle, step_ns
+    def __init__(self, device, clock, handle):
+        self.device, self.clock, self.name, self._handle = device, clock, handle.name, handle
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
@@ -146,11 +144,13 @@ class Server:
             while not self._stop.is_set():
                 if select.select([self._handle], [], [], 0.0005)[0]:
                     self.device.receive(self._handle.read())
-                self.clock.sleep_until(self.clock.now() + self._step_ns)
+                self.clock.sleep_until(self.clock.now() + MS)
                 self._handle.write(self.device.work())
 
 
-class OnPty:
+class Pty:
+    """Board's end of a pseudo terminal."""
+
     def __init__(self):
         self._host, there = os.openpty()
         tty.setraw(there)
@@ -172,52 +172,16 @@ class OnPty:
         os.close(self._there)
 
 
-class OnSocket:
-    """Socket for one host after the other."""
-
-    def __init__(self):
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.name = f"socket://127.0.0.1:{self._listening.getsockname()[1]}"
-        self._host = None
-
-    def fileno(self):
-        return (self._host or self._listening).fileno()
-
-    def read(self):
-        if self._host is None:
-            self._host = self._listening.accept()[0]
-            return b""
-        try:
-            data = self._host.recv(4096)
-        except ConnectionError:
-            data = b""
-        if not data:
-            self._host.close()
-            self._host = None
-        return data
-
-    def write(self, data):
-        if self._host is not None and data:
-            with contextlib.suppress(ConnectionError):
-                self._host.sendall(data)
-
-    def close(self):
-        if self._host is not None:
-            self._host.close()
-        self._listening.close()
-
-
 @pytest.fixture
 def serve(monkeypatch):
-    """Serves a device on a "pty" or "socket", with time-outs that a busy machine does not reach."""
+    """Serves a device on a pseudo terminal, with time-outs that a busy machine does not reach."""
     monkeypatch.setattr(link, "REPLY_NS", 20_000 * MS)
     monkeypatch.setattr(link, "HELLO_NS", 20_000 * MS)
     monkeypatch.setattr(bus, "GONE_NS", 20_000 * MS)
     servers = []
 
-    def begin(device, clock, kind, step_ns=MS):
-        handle = {"pty": OnPty, "socket": OnSocket}[kind]()
-        servers.append(Server(device, clock, handle, handle.name, step_ns))
+    def begin(device, clock):
+        servers.append(Server(device, clock, Pty()))
         return servers[-1]
 
     yield begin

@@ -191,6 +191,20 @@ def test_another_device(text, sentence):
     assert 5e9 <= clock.now() - began < 6e9
 
 
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (b"raw REPL; CTRL-B to exit\r\n>", "MicroPython answers on the emulated line, not a bridge: add --micropython"),
+        (b"Adafruit CircuitPython 10.0.3 on 2025-10-17\r\n>>> ", "CircuitPython answers on the emulated line"),
+    ],
+    ids=["MicroPython", "CircuitPython"],
+)
+def test_a_repl_is_recognised(text, sentence):
+    clock = FastClock()
+    with pytest.raises(BusError, match=sentence):
+        BridgeBus(EmulatedLine(Chatty(clock, text), clock))
+
+
 class Flooding:
     """Line that sends endless zeros after `sound_reads` reads."""
 

@@ -34,11 +34,10 @@ def test_a_port_and_its_rate(text, name, bauds):
     assert split_port(text) == (name, bauds)
 
 
-@pytest.mark.parametrize(("kind", "rate_hz"), [("pty", 1000), ("socket", 200)])
-def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream, kind, rate_hz):
+def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream):
     made = rig()
-    bus = open_bridge(serve(made.line.device, made.clock, kind).name)
-    driver = Driver(bus, Config(rate_hz=rate_hz))
+    bus = open_bridge(serve(made.line.device, made.clock).name)
+    driver = Driver(bus, Config(rate_hz=1000))
     driver.start()
     stream(driver, 1)
     driver.stop()
@@ -47,18 +46,18 @@ def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream, 
     assert not recording.gap.any()
     assert set(np.diff(numbers(recording))) == {1}
     # The bridge's time goes on while this process waits for a processor.
-    assert len(recording) > 0.1 * rate_hz
+    assert len(recording) > 100
 
 
 def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_path):
     """A cable is plugged in again: the name stays, and the device behind it is new."""
     made = rig()
-    first, name = serve(made.line.device, made.clock, "pty"), tmp_path / "ttyUSB0"
+    first, name = serve(made.line.device, made.clock), tmp_path / "ttyUSB0"
     name.symlink_to(first.name)
     driver = Driver(open_bridge(str(name)), Config(rate_hz=200))
     driver.start()
     stream(driver, 1)
-    second = serve(made.new_bridge(), made.clock, "pty")
+    second = serve(made.new_bridge(), made.clock)
     name.unlink()
     name.symlink_to(second.name)
     first.stop()
@@ -70,7 +69,7 @@ def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_p
 
 def test_two_at_once(rig, serve):
     made = rig()
-    name = serve(made.line.device, made.clock, "pty").name
+    name = serve(made.line.device, made.clock).name
     port = SerialPort(name)
     with pytest.raises(BusError, match=f"another program uses {name}: close it"):
         SerialPort(name)

@@ -8,7 +8,6 @@ import json
 import os
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
@@ -20,8 +19,6 @@ from pathlib import Path
 import pytest
 
 HARNESS = Path(__file__).parent / "harness"
-# the words that harness/clock.c shares: the time; what was heard; what a worker was told and has done, and its process
-WORDS, HEARD_AT, NOBODY_LISTENS = struct.Struct("<5q"), 8, -1
 UPTIME_NS = 900 * 10**9
 PRELOAD = "LD_PRELOAD"
 INSTALLED = Path(sys.executable).parent / "mpucal"
@@ -61,8 +58,7 @@ class Device:
     def __init__(self, text: str, folder: Path, clock: Path, devices, programs) -> None:
         self.folder, time, self.programs = folder, folder / "clock", programs
         # an uptime of a quarter of an hour: a monotonic clock does not begin at zero
-        time.write_bytes(WORDS.pack(UPTIME_NS, NOBODY_LISTENS, 0, 0, 0))
-        self._time = time
+        time.write_bytes(UPTIME_NS.to_bytes(8, "little"))
         (there, to), (out, back) = os.pipe(), os.pipe()
         self._to, self._from, files = os.fdopen(to, "wb"), os.fdopen(out, "rb"), [there, back, sys.__stderr__.fileno()]
         self._device = devices.start(
@@ -134,29 +130,6 @@ class Device:
             finally:
                 os.kill(program.pid, signal.SIGKILL)
                 program.wait()
-
-    def session(self, *words) -> Result:
-        """Run a session, and guide the simulated hand through it; the session may fail before."""
-        self._share(0, told=0, worked=0, worker=0)
-        command = ("session", "--bus", "/dev/i2c-1", "--json-events", *words)
-        said = b""
-        with self.program(COMMAND, INSTALLED, *command) as (program, out, err):
-            for line in err:
-                event = json.loads(line) if line.startswith(b"{") else {}
-                if event.get("event") == "prompt":
-                    self.tell(prompt={"kind": event["kind"], "down": event.get("down")})
-                said += line
-                self._share(len(said))
-            heard = out.read()
-            self._share(NOBODY_LISTENS, told=0, worked=0, worker=0)
-            return Result(program.wait(), heard.decode(), said.decode())
-
-    def _share(self, heard: int, **worker: int) -> None:
-        """Share the number of the program's bytes that were read; see harness/clock.c."""
-        words = struct.pack(f"<{1 + len(worker)}q", heard, *worker.values())
-        with self._time.open("r+b") as file:
-            file.seek(HEARD_AT)
-            file.write(words)
 
     def forbid(self) -> None:
         """Make the kernel refuse to open the device file, even for root: it becomes a read-only setting of /proc."""

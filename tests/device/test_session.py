@@ -22,18 +22,6 @@ def calibration(b_a):
     return Calibration(np.eye(3), np.array(b_a), quality={"verdict": "good", "reasons": []})
 
 
-@pytest.mark.slow
-def test_a_session_ends_with_a_good_calibration_and_its_files(device):
-    mocked = device("sim:chip=mpu6500,who_am_i=0x68,seed=7")
-    result = mocked.session("--rate", "25", "--target", "quick", "--yes", "-o", "board")
-    assert result.code == 0, result.err
-    left = {path.name for path in (mocked.folder / "board").iterdir()}
-    assert {"capture.mcap", "calibration.json", "calibration.bin", "report.html"} <= left
-    document = json.loads((mocked.folder / "board" / "calibration.json").read_text())
-    assert document["quality"]["verdict"] == "good"
-    assert document["sensor"]["chip"] == "MPU-6500"
-
-
 def test_a_chip_that_is_recorded_is_nobody_elses(sound):
     calibration([0.1] * 3).save(sound.folder / "c.json")
     before = sorted(sound.folder.rglob("*"))

@@ -43,12 +43,6 @@ def told(monkeypatch, tmp_path):
     return tell
 
 
-def test_every_address_is_asked(told):
-    adapter = Adapter()
-    assert told(adapter).data["addresses"] == [0x68]
-    assert sorted(set(adapter.asked)) == list(range(0x08, 0x78))
-
-
 def test_a_held_bus_is_given_up_after_three_addresses(told):
     adapter = Adapter(lambda _address: errno.ETIMEDOUT)
     finding = told(adapter)
@@ -61,6 +55,7 @@ def test_a_held_bus_is_given_up_after_three_addresses(told):
 def test_one_slow_device_does_not_hide_the_others(told):
     adapter = Adapter(lambda address: errno.ETIMEDOUT if address in (0x20, 0x21, 0x40) else 0)
     assert told(adapter).data["addresses"] == [0x68]
+    assert sorted(set(adapter.asked)) == list(range(0x08, 0x78))
 
 
 def test_a_chip_on_another_bus_is_found(monkeypatch, tmp_path):
