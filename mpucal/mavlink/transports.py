@@ -11,21 +11,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..errors import BusError, LinkError, NoAnswer
 from .transport import OnePartner, ReceivedBytes, SteadyClock, Transport
 from .url import Kind, Url
 
 RETRY_NS = 500_000_000
-
-
-class UsbBoard(NamedTuple):
-    """The identity of a USB device, which stays when the system calls its port by another name."""
-
-    vid: int
-    pid: int
-    serial_number: str
 
 
 class ReconnectingTransport(OnePartner):
@@ -102,11 +94,11 @@ def _device(url: Url) -> str:
     return str(path.resolve()) if path.exists() else url.host
 
 
-def _usb_boards() -> dict[str, UsbBoard]:
-    """Return the boards on USB that have a serial number, by port."""
+def _usb_boards() -> dict[str, tuple[int, int, str]]:
+    """Return vendor, product and serial number of the boards on USB, by port, which may get another name."""
     from serial.tools.list_ports import comports  # noqa: PLC0415
 
-    return {p.device: UsbBoard(p.vid, p.pid, p.serial_number) for p in comports() if p.vid and p.serial_number}
+    return {p.device: (p.vid, p.pid, p.serial_number) for p in comports() if p.vid and p.serial_number}
 
 
 CHUNK = 65536

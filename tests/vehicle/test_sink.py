@@ -85,7 +85,7 @@ def vehicle_of(firmware, words=""):
     return copy.deepcopy(settled(firmware, words))
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def brief(monkeypatch):
     """Looks at streams at rest for a fifth of the time, where how long they are looked at decides nothing."""
     monkeypatch.setattr(rest_monitor, "WINDOW_NS", rest_monitor.WINDOW_NS // 5)
@@ -139,7 +139,6 @@ def test_a_vehicle_that_is_slow_for_a_moment_is_waited_for(monkeypatch):
 
 
 @pytest.mark.parametrize(("firmware", "words"), [("ardupilot", ",highres=no"), ("px4", ",imus=3,rotation=1")])
-@pytest.mark.usefixtures("brief")
 def test_every_imu_reads_gravity_better_and_a_second_write_changes_nothing(firmware, words):
     vehicle, transport, link = vehicle_of(firmware, words)
     calibration = calibration_of(vehicle)
@@ -174,7 +173,6 @@ def attitude_deg(vehicle, link):
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
-@pytest.mark.usefixtures("brief")
 def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmware):
     vehicle, _, link = vehicle_of(firmware, ",imus=1")
     assert send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 2) == 0
@@ -198,7 +196,6 @@ def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmwa
     assert re.search(said, applied.what)
 
 
-@pytest.mark.usefixtures("brief")
 def test_it_is_level_as_it_stands_where_the_person_says_so():
     vehicle, _, link = vehicle_of("px4", ",imus=1" + LEVELLED["px4"])
     applied = AutopilotSink(link, confirm=lambda question, with_yes: True).write(calibration_of(vehicle))
@@ -209,7 +206,6 @@ def test_it_is_level_as_it_stands_where_the_person_says_so():
     np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
 
 
-@pytest.mark.usefixtures("brief")
 def test_a_vehicle_whose_horizon_cannot_be_checked_after_its_reboot_need_not_reboot_again(monkeypatch):
     def silent(*_):
         raise LinkError("it is silent", "look")
@@ -220,7 +216,6 @@ def test_a_vehicle_whose_horizon_cannot_be_checked_after_its_reboot_need_not_reb
     assert "it is silent: look, and look whether its horizon is level before it flies" in applied.what
 
 
-@pytest.mark.usefixtures("brief")
 def test_a_level_that_nobody_set_is_not_made_of_old_offsets_and_a_vehicle_reboots_only_on_request():
     vehicle, _, link = vehicle_of("ardupilot", ",imus=1")
     applied = AutopilotSink(link).write(calibration_of(vehicle))
@@ -230,7 +225,6 @@ def test_a_level_that_nobody_set_is_not_made_of_old_offsets_and_a_vehicle_reboot
     assert "would arm" not in applied.what
 
 
-@pytest.mark.usefixtures("brief")
 def test_what_was_kept_is_put_back(tmp_path):
     vehicle, _, link = vehicle_of("ardupilot", ",imus=1" + LEVELLED["ardupilot"])
     sink = AutopilotSink(link)
@@ -286,7 +280,6 @@ def of_px4(calibration):
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )
-@pytest.mark.usefixtures("brief")
 def test_nothing_is_written_that_does_not_belong_there(firmware, words, change, why):
     vehicle, transport, link = vehicle_of(firmware, words)
     with pytest.raises(WriteBackError, match=rf"nothing was written.*{why}"):
@@ -294,7 +287,6 @@ def test_nothing_is_written_that_does_not_belong_there(firmware, words, change, 
     assert transport.sets == 0
 
 
-@pytest.mark.usefixtures("brief")
 def test_sensors_without_ids_of_their_own_are_given_theirs_and_a_refused_fit_changes_nothing():
     vehicle, _, link = vehicle_of("ardupilot", ",INS_ACC_ID=0,INS_ACC2_ID=4711")
     assert vehicle.firmware.complaints() == ["PreArm: 3D Accel calibration needed"]
@@ -307,7 +299,6 @@ def test_sensors_without_ids_of_their_own_are_given_theirs_and_a_refused_fit_cha
     assert "IMU 2 keeps" in applied.what
 
 
-@pytest.mark.usefixtures("brief")
 def test_px4_uses_what_it_stores_though_the_change_is_small():
     # 0.004 m/s^2 from what is in use: PX4 would store it and go on as before
     vehicle, _, link = vehicle_of("px4", ",imus=1")
@@ -378,7 +369,6 @@ def reboot(transport, number):
     strike(transport, number, lambda message: transport.vehicle.reboot())
 
 
-@pytest.mark.usefixtures("brief")
 @settings(max_examples=10)
 @given(
     firmware=st.sampled_from(FIRMWARES),
@@ -403,7 +393,6 @@ def test_whatever_happens_at_whichever_step_it_holds_the_old_or_the_new(firmware
         assert {name: held[name] for name in new} == new
 
 
-@pytest.mark.usefixtures("brief")
 def test_the_whole_d_is_kept_in_the_vehicles_storage():
     vehicle, _, link = vehicle_of("ardupilot", ",fault=loss")
     applied = AutopilotSink(link, store=True).write(calibration_of(vehicle))
@@ -414,7 +403,6 @@ def test_the_whole_d_is_kept_in_the_vehicles_storage():
         np.testing.assert_allclose(np.array(blob.D).reshape(3, 3), expected["D"], atol=1e-5)
 
 
-@pytest.mark.usefixtures("brief")
 def test_px4s_slots_in_another_order_are_found_by_their_effect():
     ids = ",CAL_ACC0_ID=1310996,CAL_ACC1_ID=1310988"
     vehicle, _, link = vehicle_of("px4", ids + ",CAL_ACC0_XOFF=0.3,CAL_ACC1_ZSCALE=1.05")
@@ -429,7 +417,6 @@ def test_px4s_slots_in_another_order_are_found_by_their_effect():
     assert "CAL_ACC1_XOFF" in applied.calibration.extra["autopilot"]["params_new"]
 
 
-@pytest.mark.usefixtures("brief")
 def test_an_imu_that_would_not_become_better_keeps_its_parameters():
     vehicle, _, link = vehicle_of("px4")
     sink = AutopilotSink(link)
@@ -466,7 +453,7 @@ def kill(message):
 
 
 @pytest.mark.parametrize(("firmware", "name"), [("px4", "SIGTERM"), ("ardupilot", "SIGINT")])
-@pytest.mark.usefixtures("brief", "uncollected")
+@pytest.mark.usefixtures("uncollected")
 def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, numbers = stored(vehicle), []
@@ -493,7 +480,6 @@ def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
 
 @pytest.mark.parametrize("number", [1, 3, 5, 6])
 @pytest.mark.parametrize("firmware", FIRMWARES)
-@pytest.mark.usefixtures("brief")
 def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_path):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, journal = stored(vehicle), Journal(tmp_path / "note.json")
@@ -511,7 +497,6 @@ def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_
     assert AutopilotSink(link, journal=journal).recover() is None
 
 
-@pytest.mark.usefixtures("brief")
 def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_off(tmp_path):
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     journal = Journal(tmp_path / "note.json")
@@ -534,7 +519,6 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
         ("ftp", "the address forged"),
     ],
 )
-@pytest.mark.usefixtures("brief")
 def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
     key = hostile.KEY if attacker == hostile.SIGNED else None
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1"), key=key)
@@ -559,7 +543,6 @@ def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
         assert value in (before, pytest.approx(new[name]))
 
 
-@pytest.mark.usefixtures("brief")
 def test_who_answers_in_the_vehicles_place_is_told_by_its_answers():
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     impostor = dialect().MAVLink(None, 1, 1)

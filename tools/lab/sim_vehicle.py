@@ -91,7 +91,7 @@ def run(vehicle: SimulatedVehicle, port: Any, datagrams: bool, speed: float) -> 
         last = now
         while data := port.recv(CHUNK):
             vehicle.receive(data, datagrams)
-        for data in line.carry([packet.data for packet in vehicle.run_until(round(passed_s * 1e6))]):
+        for data in line.carry(vehicle.run_until(round(passed_s * 1e6))):
             port.write(data)
 
 

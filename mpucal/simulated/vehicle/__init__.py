@@ -6,9 +6,9 @@ from ...sources.kind import Request
 from ...vehicle.source import OpenedVehicle, link_options
 from .options import VehicleOptions
 from .transport import SimulatedTransport
-from .vehicle import Sent, SimulatedVehicle
+from .vehicle import SimulatedVehicle
 
-__all__ = ["Sent", "SimulatedVehicle", "VehicleOptions"]
+__all__ = ["SimulatedVehicle", "VehicleOptions"]
 
 
 def open_source(request: Request) -> OpenedVehicle:

@@ -76,9 +76,7 @@ class SimulatedTransport:
         while not self._queue and self.now_ns() < until_ns:
             sent = self._vehicle.run_to_next(-(-(until_ns - self._begun_ns) // US))
             self._keep_pace()
-            self._queue.extend(
-                ReceivedBytes(data, ADDRESS, self.now_ns()) for data in self._line.carry([s.data for s in sent])
-            )
+            self._queue.extend(ReceivedBytes(data, ADDRESS, self.now_ns()) for data in self._line.carry(sent))
         return self._queue.popleft() if self._queue else None
 
     def send(self, data: bytes, address: str | None) -> None:

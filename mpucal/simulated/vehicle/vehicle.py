@@ -6,7 +6,7 @@ import itertools
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
@@ -66,13 +66,6 @@ REBOOT_US = 2 * S_US
 SECOND_STATION, SECOND_STATION_HZ = 255, 4
 
 
-class Sent(NamedTuple):
-    """A packet, and when it was sent [us of the vehicle's world]."""
-
-    t_us: int
-    data: bytes
-
-
 class SimulatedVehicle:
     """Vehicle in a hand, switched on at 0 us.
 
@@ -96,10 +89,11 @@ class SimulatedVehicle:
             self._mav.signing.secret_key, self._mav.signing.sign_outgoing = key, True
         self._parser = Parser(self._mav)
         self._now_us = 0
+        # Until then it neither sends nor receives, as during a boot.
         self._silent_until_us: float = 0
         self.card = Card(None if options.has_fault("no_storage") else self.firmware.folder)
         self._schedule = Schedule(options.fault)
-        self._out: deque[Sent] = deque()
+        self._out: deque[bytes] = deque()
         self._boot()
         if options.rotate_at is not None:
             self.imus.hear(ReceivedPrompt("rotate", None), options.rotate_at)
@@ -109,14 +103,9 @@ class SimulatedVehicle:
         """Time of its world."""
         return self._now_us
 
-    @property
-    def silent(self) -> bool:
-        """True while it neither sends nor receives, as during a boot."""
-        return self._now_us < self._silent_until_us
-
     def receive(self, data: bytes, datagram: bool = True) -> None:
         """Receive a datagram of whole packets, or a piece of a stream."""
-        if self.silent:
+        if self._now_us < self._silent_until_us:
             return
         for packet in self._parser.datagram(data) if datagram else self._parser.stream(data):
             # A prompt goes to the hand, not to the firmware.
@@ -126,13 +115,13 @@ class SimulatedVehicle:
             if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
                 answer(self, packet.message)
 
-    def run_until(self, until_us: int) -> list[Sent]:
+    def run_until(self, until_us: int) -> list[bytes]:
         """Move on to `until_us`; return the packets that were sent since the last call."""
         while self._now_us + self.firmware.tick_us <= until_us:
             self._run_ticks(until_us)
         return self._take_sent()
 
-    def run_to_next(self, until_us: int) -> list[Sent]:
+    def run_to_next(self, until_us: int) -> list[bytes]:
         """Move on until a packet may have been sent, at most to the first tick from `until_us` on; see `run_until`."""
         tick_us = self.firmware.tick_us
         self._run_ticks(max(-(-until_us // tick_us), self._now_us // tick_us + 1) * tick_us)
@@ -161,7 +150,7 @@ class SimulatedVehicle:
         for message_id, interval_us in intervals:
             self._streams.set(message_id, interval_us, self._now_us)
 
-    def _take_sent(self) -> list[Sent]:
+    def _take_sent(self) -> list[bytes]:
         sent = list(self._out)
         self._out.clear()
         return sent
@@ -179,7 +168,7 @@ class SimulatedVehicle:
             if fault.kind.strike is not None:
                 fault.kind.strike(self)
         self.firmware.sense(self.imus, 1)
-        if self.silent:
+        if self._now_us < self._silent_until_us:
             return
         for message_id in self._streams.due(self._now_us, SLOWER_WHILE_BUSY if self._list else 1):
             message = self._heartbeat() if message_id == HEARTBEAT else self._message(message_id)
@@ -201,7 +190,7 @@ class SimulatedVehicle:
     def _send(self, message: Message) -> None:
         data = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) % SEQUENCE
-        self._out.append(Sent(self._now_us, data))
+        self._out.append(data)
 
     def _send_value(self, name: str) -> None:
         held = self.firmware.store.parameter(name)
@@ -318,7 +307,7 @@ class SimulatedVehicle:
         """Set the rates that another ground station requests by default, and pass its HEARTBEAT on."""
         m = dialect()
         station = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3)
-        self._out.append(Sent(self._now_us, bytes(station.pack(m.MAVLink(None, SECOND_STATION, OWN_COMPONENT)))))
+        self._out.append(bytes(station.pack(m.MAVLink(None, SECOND_STATION, OWN_COMPONENT))))
         self._set_intervals(self.firmware.group(SECOND_STATION_HZ))
 
     def _file_transfer_protocol(self, message: Message) -> None:

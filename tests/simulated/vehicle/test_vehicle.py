@@ -50,7 +50,7 @@ class Station:
 
     def hear(self, seconds):
         sent = self.vehicle.run_until(self.vehicle.now_us + round(seconds * S_US))
-        return [packet.message for one in sent for packet in self._parser.datagram(one.data)]
+        return [packet.message for one in sent for packet in self._parser.datagram(one)]
 
     def rates(self, seconds=2.0):
         counts = Counter(message.get_type() for message in self.hear(seconds))
