@@ -11,7 +11,8 @@ from mpucal.data import Autopilot
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.parameters.mounting import Leveller, mounting, orientation_matrix, tilt_deg
-from mpucal.mavlink.parameters.slots import Correction, compose, find_slot, px4_slot
+from mpucal.mavlink.parameters.plan import Change
+from mpucal.mavlink.parameters.slots import Correction, ardupilot_slot, compose, find_slot, px4_slot
 from mpucal.mavlink.segments import find_recorrection
 from mpucal.result.calibration import Calibration
 
@@ -152,3 +153,13 @@ def test_a_vehicle_on_a_slope_is_not_levelled_to_it():
     assert leveller.measure(turn([0, 11, 0]).T @ [0, 0, -G]) is None
     measured = leveller.measure(turn([0, 9, 0]).T @ [0, 0, -G])
     np.testing.assert_allclose(measured.wanted_deg, [0, 9, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("slot", "scale", "says"),
+    [(ardupilot_slot(1), 1.005, ""), (px4_slot(1, 0), 1.05, ""), (px4_slot(0, 1), 1.005, "a scale so near to 1")],
+)
+def test_a_change_says_what_the_firmware_does_not_use(slot, scale, says):
+    new = Correction(np.full(3, 0.1), np.array([scale, 1.0, 1.0]))
+    change = Change(slot, SAME, new, np.eye(3), None, None, 0.05)
+    assert change.residual == "0.050 m/s^2 in |a|" + (f" (the firmware does not use {says})" if says else "")

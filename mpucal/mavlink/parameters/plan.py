@@ -53,7 +53,11 @@ class Change:
     def residual(self) -> str:
         """Errors that the parameters leave, in words: "0.004 m/s^2 in |a| and 0.02 deg in direction"."""
         direction = "" if self.residual_deg is None else f" and {self.residual_deg:.2f} deg in direction"
-        return f"{self.residual_mps2:.3f} m/s^2 in |a|{direction}"
+        used = self.slot.effective(self.new)
+        unused = ["an offset so near to 0"] if np.any(used.offset != self.new.offset) else []
+        unused += ["a scale so near to 1"] if np.any(used.scale != self.new.scale) else []
+        why = f" (the firmware does not use {' or '.join(unused)})" if unused else ""
+        return f"{self.residual_mps2:.3f} m/s^2 in |a|{direction}{why}"
 
     @property
     def improves(self) -> bool:
