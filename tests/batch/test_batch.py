@@ -122,6 +122,7 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path):
 def test_a_worker_that_comes_back_late_is_waited_for():
     """Wait longer than dask does by default, which is 0 s here."""
     import dask
+    import distributed  # noqa: F401  its own settings have to be there before one is changed
 
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
         (first,) = client.run(os.getpid).values()

@@ -35,7 +35,7 @@ assert_type(calibration.quality["reasons"][0]["code"], str)
 assert_type(calibration.fit["converged"], bool)
 assert_type(calibration.inverse, Vector)
 if calibration.verdict == "refused":
-    raise SystemExit([reason["remedy"] for reason in calibration.quality["reasons"]])
+    raise SystemExit([reason.get("remedy") for reason in calibration.quality["reasons"]])
 
 assert_type(calibration.apply(acc), Vector)
 assert_type(calibration.apply([0.0, 0.0, 9.8], temperature_c=25.0), Vector)
