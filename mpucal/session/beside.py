@@ -8,6 +8,10 @@ import sys
 from contextlib import suppress
 from typing import Any
 
+# NumPy's libraries read these as they are loaded. Matrices are small here: a second thread would wait for the first,
+# and take its core from the loop that reads the sensor.
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
 
 def start_beside(module: str, text: bool = False) -> subprocess.Popen[Any]:
     """Start the process; it ends with this program, however that ends, because its stdin is closed then.
@@ -42,8 +46,3 @@ def end_beside(process: subprocess.Popen[Any]) -> None:
 def describe_end(code: int) -> str:
     """Describe how a process ended, by its exit code: after `the process ...`."""
     return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-
-
-# NumPy's libraries read these as they are loaded. Matrices are small here: a second thread would wait for the first,
-# and take its core from the loop that reads the sensor.
-ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
