@@ -30,6 +30,14 @@ SETTINGS = Settings("accel", 9.80665)
 LONG_S = 60
 
 
+def changed(settings):
+    """Return a context with changed settings of dask."""
+    import dask
+    import distributed  # noqa: F401  what is set before its settings are loaded takes them along when it is put back
+
+    return dask.config.set(settings)
+
+
 @pytest.fixture(scope="module")
 def client():
     """A worker, a process of its own, and a client of its scheduler."""
@@ -102,14 +110,12 @@ row.compute_digest = lambda path: os._exit(1) if path.stem == "deadly" else comp
 @pytest.mark.slow
 def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path):
     """Several recordings make a task; each is tried alone after that."""
-    import dask
-
     paths = [f"/none/{i}.mcap" for i in range(100)]
     paths[40] = "/none/deadly.mcap"
     journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
     (mortal := tmp_path / "mortal.py").write_text(MORTAL)
     config = {"distributed.scheduler.allowed-failures": 0, "distributed.worker.preload": [str(mortal)]}
-    with dask.config.set(config), local_client(3) as client:
+    with changed(config), local_client(3) as client:
         *_, progress = run_batch(paths, client, journal, SETTINGS)
     assert (progress.done, progress.failed) == (100, 100)
     errors = [row["error"] for row in journal.rows(paths)]
@@ -121,10 +127,7 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path):
 @pytest.mark.slow  # those that are killed while they start are told in the gate
 def test_a_worker_that_comes_back_late_is_waited_for():
     """Wait longer than dask does by default, which is 0 s here."""
-    import dask
-    import distributed  # noqa: F401  its own settings have to be there before one is changed
-
-    with dask.config.set({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
+    with changed({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
         (first,) = client.run(os.getpid).values()
         os.kill(first, signal.SIGKILL)
         begun = monotonic()
@@ -208,13 +211,9 @@ def test_the_page_names_what_is_odd(tmp_path):
 
 
 def test_workers_that_are_killed_while_they_start_are_told(tmp_path, capfd):
-    import dask
-    import distributed  # noqa: F401 - see below
-
-    # the settings of `distributed` are loaded: what is set before would take them along when it is put back
     (deadly := tmp_path / "deadly.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n")
     words = ["batch", str(FIXTURES / "sessions" / "mpu6050.mcap"), "-o", str(tmp_path / "fleet"), "--workers", "1"]
-    with dask.config.set({"distributed.worker.preload": [str(deadly)]}):
+    with changed({"distributed.worker.preload": [str(deadly)]}):
         assert call(words) == 3
     assert re.fullmatch(
         r"mpucal: the workers were ended while they started \(.*\): free memory .*\n", capfd.readouterr().err
