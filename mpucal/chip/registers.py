@@ -27,7 +27,6 @@ INT_ENABLE: Final = 0x38
 INT_STATUS: Final = 0x3A
 ACCEL_XOUT_H: Final = 0x3B
 TEMP_OUT_H: Final = 0x41
-GYRO_XOUT_H: Final = 0x43
 SIGNAL_PATH_RESET: Final = 0x68
 USER_CTRL: Final = 0x6A
 PWR_MGMT_1: Final = 0x6B
