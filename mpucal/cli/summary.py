@@ -14,7 +14,7 @@ from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import free_name
 from ..origin import Origin
-from ..page.result import Result
+from ..page.state import Result
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.keys import ACCELEROMETER_FORMULA

@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from ..terminal.console import Console
 from ..terminal.keys import Keys
 from .address import Address, qr_code
 from .feed import Feed
-from .result import Result
+from .state import Result
 
 ASK_EVERY_S = 0.1
 
@@ -54,11 +54,9 @@ class TeeConsole:
         """Return the keys of both that were pressed since the last call."""
         return [*self._console.pressed(), *self._feed.pressed()]
 
-    @contextmanager
-    def listening(self) -> Iterator[None]:
+    def listening(self) -> AbstractContextManager[None]:
         """Listen to the terminal's keys."""
-        with self._console.listening():
-            yield
+        return self._console.listening()
 
     def hung_up(self, stop: bool) -> None:
         """Stop showing the session in the terminal, which was closed; the page stays."""

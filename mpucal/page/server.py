@@ -65,6 +65,7 @@ class Server(ThreadingHTTPServer):
     Attributes
     ----------
     latest : values of the page. results : path of each by name. ending : True once the session has ended.
+    clients : number of those that follow the session.
 
     Raises
     ------
@@ -91,20 +92,16 @@ class Server(ThreadingHTTPServer):
         self.ending = False
         self.pressed, self._counted = pressed, counted
         self._free = threading.Semaphore(CONNECTIONS)
-        self._clients, self._counting = 0, threading.Lock()
+        self.clients, self._counting = 0, threading.Lock()
 
-    @property
-    def clients(self) -> int:
-        """Number of clients that follow the session."""
-        return self._clients
-
-    def enter(self) -> bool:
-        """Count one client more; return False if there are too many."""
-        return self._count(1)
-
-    def leave(self) -> None:
-        """Count one client less."""
-        self._count(-1)
+    def count(self, more: int) -> bool:
+        """Count clients that come (1) or leave (-1); return False if there are too many."""
+        with self._counting:
+            if self.clients + more > CLIENTS:
+                return False
+            self.clients += more
+            self._counted(self.clients)
+            return True
 
     def verify_request(self, request: Any, client_address: Any) -> bool:
         """Return True if there is a thread left for the request."""
@@ -126,14 +123,6 @@ class Server(ThreadingHTTPServer):
         """Ignore clients that are gone; report anything else, which is a bug."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
-
-    def _count(self, more: int) -> bool:
-        with self._counting:
-            if self._clients + more > CLIENTS:
-                return False
-            self._clients += more
-            self._counted(self._clients)
-            return True
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -229,7 +218,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def _events(self) -> None:
         """Send all latest values, then their changes; a slow client skips changes, which are not queued."""
-        if not self.server.enter():
+        if not self.server.count(1):
             self.send_error(HTTPStatus.SERVICE_UNAVAILABLE)
             return
         try:
@@ -242,7 +231,7 @@ class Handler(BaseHTTPRequestHandler):
                 version, changed = self.server.latest.since(version, LAST_BEAT_S if self.server.ending else BEAT_S)
                 self.wfile.write(f"data: {json.dumps(changed)}\n\n".encode())
         finally:
-            self.server.leave()
+            self.server.count(-1)
 
 
 class LatestValues:

@@ -1,9 +1,9 @@
-"""State of the page as JSON: the terminal's view of the session, with each event as in `--json-events`."""
+"""State of the page as JSON: the terminal's view of the session, each event as in `--json-events`, and the result."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any
 
 from ..session.boards import KINDS
@@ -11,6 +11,23 @@ from ..session.events import Knowledge
 from ..terminal.console import count, groups, plain
 from ..terminal.view import View
 from ..terminal.voice import Said, in_words
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result of a session or a check, as the page shows it.
+
+    Attributes
+    ----------
+    verdict : one word or two. estimated_error : a sentence. reasons : as calibration.json has them.
+    values : name of each row of the table, and its cells for x, y and z. summary : further text.
+    """
+
+    verdict: str
+    estimated_error: str = ""
+    reasons: Sequence[Mapping[str, object]] = ()
+    values: Sequence[tuple[str, Sequence[str]]] = ()
+    summary: str = ""
 
 
 def state(view: View, said: Said | None = None) -> dict[str, Any]:

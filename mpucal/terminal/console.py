@@ -6,8 +6,8 @@ import json
 import math
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol, TextIO
 
@@ -111,11 +111,9 @@ class Lines:
         """Return the keys that were pressed since the last call."""
         return self._keys.pressed()
 
-    @contextmanager
-    def listening(self) -> Iterator[None]:
+    def listening(self) -> AbstractContextManager[None]:
         """Take the first Ctrl-C as a key press within the context; see Keys."""
-        with self._keys.listening():
-            yield
+        return self._keys.listening()
 
     def hung_up(self, stop: bool) -> None:
         """Print on the log from now on; with `stop`, act as at Ctrl-C."""

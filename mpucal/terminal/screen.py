@@ -144,6 +144,7 @@ class Painter:
         self._out = out
         self._on_terminal = out.isatty()
         self._console = Console(file=out)
+        self._colours = COLOR_SYSTEMS.get(self._console.color_system or "")
         self._painted: list[str] = []
         self._size = (0, 0)
         self._shown = False
@@ -187,20 +188,11 @@ class Painter:
         return len(text)
 
     def _encoded(self, line: Text) -> str:
-        system = self._console.color_system
-        colours = COLOR_SYSTEMS[system] if system else None
-        parts = []
         # Text.render applies the styles of spans, but not that of the text itself.
-        base = self._console.get_style(line.style)
-        for segment in Segment.apply_style(line.render(self._console), base):
-            style = segment.style
-            if style is None:
-                parts.append(segment.text)
-                continue
-            if self._console.no_color:
-                style = style.without_color
-            parts.append(style.render(segment.text, color_system=colours))
-        return "".join(parts)
+        segments = Segment.apply_style(line.render(self._console), self._console.get_style(line.style))
+        if self._console.no_color:
+            segments = Segment.remove_color(segments)
+        return "".join(style.render(text, color_system=self._colours) if style else text for text, style, _ in segments)
 
     def _send(self, text: str) -> None:
         # Escape sequences must not get into the log that replaces a closed terminal.

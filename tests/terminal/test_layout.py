@@ -50,6 +50,11 @@ def test_all_that_a_person_needs_is_there(views, size):
     assert BRAILLE.search(drawn)
 
 
+def test_replaced_characters_keep_the_styles_in_their_places(views):
+    rows = [row for row in lines(views["turned"], 80, 24, ASCII) if "+-" in row.plain]
+    assert [row.plain[row.spans[-1].start :][:9] for row in rows] == ["  (target"] * 2
+
+
 def test_on_a_low_screen_the_words_are_left(views):
     drawn = text_of(views["turned"], 40, 12)
     assert not BRAILLE.search("".join(drawn))
