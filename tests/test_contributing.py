@@ -3,15 +3,18 @@
 import json
 import re
 import shutil
+import socket
 import subprocess
 import sys
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mpucal.errors import RefusedError, UsageError
+from mpucal.errors import Abandoned, RefusedError, UsageError
 from mpucal.result.calibration import Calibration
 
 ROOT = Path(__file__).parents[1]
@@ -51,6 +54,8 @@ def add(path, row):
         table.SINKS[made.name] = made
     elif path == "mpucal/sources/table.py":
         table.SOURCES.append(made)
+    elif path == "mpucal/files/recorders.py":
+        table.RECORDERS.append(made)
     elif path == "mpucal/export/forms.py":
         table.FORMS += (made,)
     elif path == "mpucal/files/formats.py":
@@ -83,7 +88,8 @@ def folder(tmp_path_factory):
     made = Calibration(np.diag([1.1, 1.0, 0.9]), np.array([0.5, 0.0, -0.5]))
     made.save(folder / "c.json")
     replace(made, quality={"verdict": "refused"}).save(folder / "refused.json")
-    recipes = [RECIPES[title] for title in ("A sink", "A source", "An export form", "A reader", "A chip")]
+    titles = ("A sink", "A source", "A source of samples", "An export form", "A reader", "A chip")
+    recipes = [RECIPES[title] for title in titles]
     blocks = [block for recipe in recipes for block in recipe.items()]
     for path, text in blocks:
         assert (ROOT / path).exists() != text.startswith('"""')
@@ -125,8 +131,37 @@ def test_a_source(call):
     assert (shown["who_am_i"], shown["chip"]) == (0x68, "MPU-6050")
     assert all("--shelf WHO_AM_I" in call(command, "--help") for command in ("session", "record", "stream", "write"))
     wrong = UsageError.exit_code
-    assert " and --shelf WHO_AM_I." in call("session", code=wrong)
+    assert "--shelf WHO_AM_I and --udp PORT." in call("session", code=wrong)
     assert "--bus and --shelf were given together" in call("session", "--shelf", "0x68", "--bus", "sim", code=wrong)
+
+
+@pytest.fixture
+def port():
+    """A UDP port to which a sensor at rest sends 100 samples a second."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    ended = threading.Event()
+
+    def send():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            while not ended.wait(0.01):
+                sample = {"t": time.monotonic(), "acc": [0.0, 0.0, 9.8], "gyr": [0.0, 0.0, 0.0]}
+                line.sendto(f"{json.dumps(sample)}\n".encode(), ("127.0.0.1", port))
+
+    sensor = threading.Thread(target=send)
+    sensor.start()
+    yield port
+    ended.set()
+    sensor.join()
+
+
+def test_a_source_of_samples(call, port):
+    call("record", "--udp", str(port), "-o", "udp.mcap", "--seconds", "2")
+    shown = json.loads(call("show", "udp.mcap", "--json"))
+    assert (shown["samples"] > 100, shown["chip"]) == (True, "UDP")
+    assert "still for 1 of 10 s" in call("session", "--replay", "udp.mcap", "-o", "again", code=Abandoned.exit_code)
+    assert json.loads(call("show", "--udp", str(port), "--json"))["where"] == "a sensor on UDP"
 
 
 def test_an_export_form(call, folder):

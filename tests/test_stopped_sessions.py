@@ -14,7 +14,7 @@ from mpucal.mavlink.transport import SteadyClock
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
-from mpucal.sources.packet_replay import PacketReplay
+from mpucal.sources.replay import PacketReplay
 from tools.lab import campaign_worlds as worlds
 from tools.processes import quick
 

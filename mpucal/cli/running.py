@@ -30,8 +30,8 @@ def open_runner(source: OpenedSource, capture: Path, person: Console, checking: 
             measuring.note,
             source.plan,
             source.listeners,
-            measuring.go_on,
-            measuring.late,
+            source.go_on,
+            source.is_late,
             ProcessWorker if source.real_time else InlineWorker,
             checking,
         )

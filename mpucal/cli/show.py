@@ -21,7 +21,7 @@ from ..result.blob import Blob
 from ..result.calibration import Calibration
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
-from ..sources.opening import contents, one_of
+from ..sources.opening import one_of, open_source
 from ..sources.table import kinds_for, matching_kinds
 from .arguments import PATH, json_option
 from .loading import load_calibration
@@ -81,7 +81,7 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
                 )
             _show_calibration(where, Calibration.from_blob(held), as_json)
         return
-    facts = contents(options)
+    facts = open_source(options).contents()
     click.echo(json.dumps(facts, indent=2) if as_json else _device_page(facts))
 
 

@@ -24,13 +24,13 @@ class Recorder:
     ----------
     version : number, or a word and a number. A capture of another version of the same driver is decoded, not replayed.
     config : class of the sensor's settings in the head.
-    replay : "module:function" that opens a replay, as mpucal.sources.chip:replayed does.
+    opened : "module:class" of an OpenedSource, whose `replayed` opens a replay.
     decode : "module:function" from accesses, one by one, and a name to a Recording.
     """
 
     version: int | str
     config: type[Config]
-    replay: str
+    opened: str
     decode: str = ""
 
     @property
@@ -39,12 +39,12 @@ class Recorder:
         return _family(self.version)
 
 
-CHIP = Recorder(DRIVER_VERSION, Config, "mpucal.sources.chip:replayed")
-VEHICLE = Recorder(MAVLINK_VERSION, RateOnlyConfig, "mpucal.vehicle.source:replayed")
+CHIP = Recorder(DRIVER_VERSION, Config, "mpucal.sources.chip:OpenedChip")
+VEHICLE = Recorder(MAVLINK_VERSION, RateOnlyConfig, "mpucal.vehicle.source:OpenedVehicle")
 RECORDERS = [
     CHIP,
     VEHICLE,
-    Recorder(IIO_VERSION, RateOnlyConfig, "mpucal.iio_device.source:replayed", "mpucal.iio.decode:decode"),
+    Recorder(IIO_VERSION, RateOnlyConfig, "mpucal.iio_device.source:OpenedIio", "mpucal.iio.decode:decode"),
 ]
 
 

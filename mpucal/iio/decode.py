@@ -22,7 +22,6 @@ from .attributes import (
     TIMESTAMP,
     USUAL_BITS,
     SensorScale,
-    bits_of,
     chip_name,
     mount_matrix,
     parse_number,
@@ -70,7 +69,7 @@ class IioDecoder:
         self._devices: dict[str, _DeviceState] = {}
         self._scales: dict[str, tuple[str, SensorScale]] = {}
         self._streams: dict[str, int] = {}
-        self._aligned: StreamAligner | None = None
+        self._aligned = StreamAligner([])
         self._flips: BitFlipFilter
         self._waiting: tuple[Times, Vector]
         self._gyro_to_accel: Vector | None = None
@@ -111,10 +110,6 @@ class IioDecoder:
             for name in names
             if f"scan_elements/{name}_index" in texts
         }
-
-    def bits(self, device: str, kind: str) -> int | None:
-        """Return the bits of a device's count; see attributes.bits_of."""
-        return bits_of(kind, self.texts(device), self.elements(device))
 
     def scale(self, kind: str) -> tuple[str, SensorScale]:
         """Return the device and the scale of the accelerometer or the gyroscope.
@@ -209,7 +204,7 @@ class IioDecoder:
 
     def _add_frames(self, device: str, data: bytes, t_ns: int) -> None:
         held = self._devices.get(device)
-        if held is None or held.layout is None or self._aligned is None or not data:
+        if held is None or held.layout is None or not data:
             return
         columns = held.layout.columns(data)
         times = columns[TIMESTAMP]
@@ -234,20 +229,17 @@ class IioDecoder:
             self._set_temperature(device, parse_number(channel, text))
             return
         names = [f"{kind}_{axis}" for kind in (ACCEL, GYRO) for axis in AXES]
-        if self._aligned is None or channel not in self._streams:
+        if channel not in names:
+            return
+        if channel not in self._streams:
             self._start(dict.fromkeys(names, 2))
-        if self._aligned is not None and channel in self._streams:
-            scales = self.scale(channel[:-2])[1]
-            count = np.array([[parse_number(channel, text)]])
-            self._aligned.add(
-                self._streams[channel], np.array([t_ns]), np.hstack((count, scales.clipped(count)[:, None]))
-            )
-            if channel == names[-1]:
-                self._deliver()
+        count = np.array([[parse_number(channel, text)]])
+        mark = self.scale(channel[:-2])[1].clipped(count)[:, None]
+        self._aligned.add(self._streams[channel], np.array([t_ns]), np.hstack((count, mark)))
+        if channel == names[-1]:
+            self._deliver()
 
     def _deliver(self) -> None:
-        if self._aligned is None:
-            return
         t_ns, values = self._aligned.take()
         if values.shape[1] > ROW:
             # Polled channels have a count and a mark each.

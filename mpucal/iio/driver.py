@@ -18,7 +18,7 @@ from ..data import Recording, Samples, Sensor
 from ..errors import BusError, ChipError, EndOfCapture, NoAnswer, UsageError
 from .attributes import ACCEL, AXES, GYRO, TEMP
 from .decode import IioDecoder
-from .setup import DeviceAttributes, set_up
+from .setup import DeviceAttributes, FollowedFiles, set_up
 
 DEVICE = re.compile(r"(?:iio:)?(?:device)?(\d+)")
 
@@ -73,6 +73,10 @@ class IioDriver:
     files : of the kernel. devices : their names. config : requested rate and ranges. name : of the recording.
     say : called with remarks for the user: one sentence each, without a full stop.
     trigger : of the buffers; None: their own; POLLED: no buffers, the channels are polled.
+
+    Attributes
+    ----------
+    buffered : True if samples come from buffers; valid after `start`.
     """
 
     def __init__(
@@ -84,20 +88,16 @@ class IioDriver:
         say: Callable[[str], None] = lambda _sentence: None,
         trigger: str | None = None,
     ) -> None:
-        self._files, self._devices, self._config, self._say, self._trigger = files, devices, config, say, trigger
+        self._devices, self._config, self._say, self._trigger = devices, config, say, trigger
         self._decoder = IioDecoder(name)
+        self._files = FollowedFiles(files, self._decoder)
         self._each: list[DeviceAttributes] = []
-        self._buffered = False
-        self._now_ns = self._next_ns = self._fruitless_ns = self._warm_ns = 0
+        self.buffered = False
+        self._next_ns = self._fruitless_ns = self._warm_ns = 0
 
     def now_ns(self) -> int:
         """Return the last time of the host's monotonic clock."""
-        return max([self._now_ns, *(each.now_ns for each in self._each)])
-
-    @property
-    def buffered(self) -> bool:
-        """True if samples come from buffers; valid after `start`."""
-        return self._buffered
+        return self._files.now_ns
 
     def texts(self, device: str) -> dict[str, str]:
         """Return the attributes of a device as they were last read."""
@@ -110,8 +110,7 @@ class IioDriver:
         ------
         BusError : no such device, or it cannot be written. ChipError : no such sensor, or no trigger.
         """
-        self._now_ns = self.now_ns()
-        self._each = [DeviceAttributes(self._files, self._decoder, device) for device in self._devices.each]
+        self._each = [DeviceAttributes(self._files, device) for device in self._devices.each]
         for each in self._each:
             each.read_all(self._kinds(each.device))
         try:
@@ -124,8 +123,8 @@ class IioDriver:
         except (BusError, ChipError):
             self._restore()
             raise
-        self._buffered = all(running)
-        if not self._buffered:
+        self.buffered = all(running)
+        if not self.buffered:
             self._say(
                 "the channels are polled one by one, which is less accurate than a buffer: a driver has a buffer if the"
                 " INT wire is connected, or with a trigger"
@@ -143,13 +142,12 @@ class IioDriver:
         BusError : a device is gone, or did not answer for two seconds. ChipError : its buffer stayed empty for so long.
         """
         begun_ns = self.now_ns()
-        period_ns = round((self._config.period_s if self._buffered else 1 / self._config.rate_hz) * 1e9)
+        period_ns = round((self._config.period_s if self.buffered else 1 / self._config.rate_hz) * 1e9)
         self._next_ns = max(self._next_ns + period_ns, begun_ns)
         self._files.sleep_until(self._next_ns)
-        self._now_ns = max(self._now_ns, self._next_ns)
         trouble: BusError | None = None
         try:
-            if self._buffered:
+            if self.buffered:
                 for each in self._each:
                     each.read_frames()
             else:

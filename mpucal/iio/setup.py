@@ -8,7 +8,7 @@ from contextlib import nullcontext, suppress
 from ..chip.access import Bus, Transaction
 from ..chip.config import Config
 from ..errors import BusError, ChipError, NoAnswer
-from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, full_scale, parse_available
+from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, bits_of, full_scale, parse_available
 from .decode import ENABLE, FREQUENCY, IioDecoder
 
 # Most bytes of one attribute, and of a list of names.
@@ -44,19 +44,41 @@ READ_SUFFIXES = (
 RANGE_TOLERANCE = 1.01
 
 
+class FollowedFiles:
+    """Files of the kernel, each access to which `decoder` follows; `now_ns` is the last time of their clock."""
+
+    def __init__(self, files: Bus, decoder: IioDecoder) -> None:
+        self._files, self._decoder = files, decoder
+        self.now_ns = 0
+
+    def read(self, place: str, count: int) -> bytes:
+        """Read up to `count` bytes of a file."""
+        reply = self._files.read(place, count)
+        self._follow(Transaction("read", place, count, reply.data, reply.t_ns))
+        return reply.data
+
+    def write(self, place: str, text: str) -> None:
+        """Write a file."""
+        data = text.encode()
+        self._follow(Transaction("write", place, len(data), data, self._files.write(place, data)))
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Wait until the clock shows `t_ns`."""
+        self._files.sleep_until(t_ns)
+        self.now_ns = max(self.now_ns, t_ns)
+
+    def _follow(self, access: Transaction) -> None:
+        self.now_ns = max(self.now_ns, access.t_ns)
+        self._decoder.feed(access)
+
+
 class DeviceAttributes:
-    """Attributes and buffer of a device; `decoder` follows each access.
+    """Attributes and buffer of a device; `names` are those of all its attributes."""
 
-    Attributes
-    ----------
-    names : of all its attributes. now_ns : last time of the clock.
-    """
-
-    def __init__(self, files: Bus, decoder: IioDecoder, device: str) -> None:
-        self._files, self._decoder, self.device = files, decoder, device
+    def __init__(self, files: FollowedFiles, device: str) -> None:
+        self._files, self.device = files, device
         self._old: list[tuple[str, str]] = []
         self.names: frozenset[str] = frozenset()
-        self.now_ns = 0
 
     def read_all(self, kinds: Sequence[str]) -> None:
         """Read the attributes of `kinds`, ACCEL and GYRO.
@@ -85,43 +107,30 @@ class DeviceAttributes:
 
     def read(self, name: str, count: int = TEXT_BYTES) -> str:
         """Read the text of an attribute; "": the list of all names."""
-        return self._bytes(f"{self.device}/{name}", count).decode(errors="replace").strip()
+        return self._files.read(f"{self.device}/{name}", count).decode(errors="replace").strip()
 
     def read_frames(self) -> None:
         """Read what the buffer holds, up to FRAMES_BYTES."""
-        self._bytes(self.device, FRAMES_BYTES)
+        self._files.read(self.device, FRAMES_BYTES)
 
     def triggers(self) -> list[str]:
         """Read the names of all triggers."""
-        reply = self._files.read(TRIGGERS, LIST_BYTES)
-        self.now_ns = max(self.now_ns, reply.t_ns)
-        return reply.data.decode(errors="replace").split()
+        return self._files.read(TRIGGERS, LIST_BYTES).decode(errors="replace").split()
 
     def set(self, name: str, text: str) -> str:
         """Write an attribute if its value differs, and return its value afterwards."""
         held = self.read(name)
         if held == text or _equal(held, text):
             return held
-        self._write(name, text)
+        self._files.write(f"{self.device}/{name}", text)
         self._old.append((name, held))
         return self.read(name)
 
     def restore(self) -> None:
         """Write the old values, the last one first; raise BusError if that fails."""
         while self._old:
-            self._write(*self._old.pop())
-
-    def _write(self, name: str, text: str) -> None:
-        place, data = f"{self.device}/{name}", text.encode()
-        t_ns = self._files.write(place, data)
-        self.now_ns = max(self.now_ns, t_ns)
-        self._decoder.feed(Transaction("write", place, len(data), data, t_ns))
-
-    def _bytes(self, place: str, count: int) -> bytes:
-        reply = self._files.read(place, count)
-        self.now_ns = max(self.now_ns, reply.t_ns)
-        self._decoder.feed(Transaction("read", place, count, reply.data, reply.t_ns))
-        return reply.data
+            name, text = self._old.pop()
+            self._files.write(f"{self.device}/{name}", text)
 
 
 def set_up(
@@ -177,7 +186,8 @@ def _set_scales(attributes: DeviceAttributes, kinds: Sequence[str], config: Conf
     """Set the smallest range that is as large as requested, if the sensor has several."""
     wanted = {ACCEL: config.accel_range_g, GYRO: config.gyro_range_dps}
     for kind in kinds:
-        name, bits = f"{kind}_scale", decoder.bits(attributes.device, kind)
+        name = f"{kind}_scale"
+        bits = bits_of(kind, decoder.texts(attributes.device), decoder.elements(attributes.device))
         if bits is None or not {name, f"{name}_available"} <= attributes.names:
             continue
         texts = attributes.read(f"{name}_available").split()

@@ -15,7 +15,6 @@ from typing import Any
 from ..chip.access import Reply
 from ..errors import BusError, CaptureError
 from ..files.mcap import Capture
-from ..files.recorders import DRIVER
 from ..iio import IIO_VERSION
 from ..iio.driver import Devices, IioDriver
 from ..iio.setup import LIST_BYTES, TEXT_BYTES, TRIGGERS
@@ -23,7 +22,7 @@ from ..origin import Origin
 from ..session.plan import Plan
 from ..sources.chain import Chain
 from ..sources.chip import OpenedChip
-from ..sources.host_bus import HostBus, ReadTimer, converting
+from ..sources.host_bus import HostBus, converting
 from ..sources.kind import Request
 from ..sources.opened_source import Say
 from .errors import file_error
@@ -49,13 +48,32 @@ class OpenedIio(OpenedChip):
     """
 
     origin = Origin.DEVICE
+    version = IIO_VERSION
     devices: Devices = NO_DEVICES
     trigger: str | None = None
     rules: Path | None = None
 
     def source_meta(self) -> dict[str, Any]:
         """Return the entries for the head of a capture."""
-        return {**super().source_meta(), DRIVER: IIO_VERSION, META_KEY: [*self.devices, self.trigger]}
+        return {**super().source_meta(), META_KEY: [*self.devices, self.trigger]}
+
+    @classmethod
+    def replayed(
+        cls, capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], /, **how: Any
+    ) -> OpenedIio:
+        """See OpenedSource.
+
+        Raises
+        ------
+        CaptureError : the capture's head does not name the devices.
+        """
+        try:
+            accel, gyro, trigger = capture.meta[META_KEY]
+        except (KeyError, TypeError, ValueError) as error:
+            raise CaptureError(
+                f"the head of {capture.name} does not name the IIO devices", "use `mpucal calibrate`"
+            ) from error
+        return cls(line, plan, **how, devices=Devices(str(accel), str(gyro)), trigger=trigger)
 
     @property
     def where(self) -> str:
@@ -77,22 +95,6 @@ class OpenedIio(OpenedChip):
     def driver(self, bus: Any, name: str, say: Say) -> IioDriver:
         """Make the driver that measures over `bus`."""
         return IioDriver(bus, self.devices, self.plan.config, name, say, self.trigger)
-
-
-def replayed(capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], **how: Any) -> OpenedIio:
-    """Open the replay of devices; see mpucal.sources.chip.replayed.
-
-    Raises
-    ------
-    CaptureError : the capture's head does not name the devices.
-    """
-    try:
-        accel, gyro, trigger = capture.meta[META_KEY]
-    except (KeyError, TypeError, ValueError) as error:
-        raise CaptureError(
-            f"the head of {capture.name} does not name the IIO devices", "use `mpucal calibrate`"
-        ) from error
-    return OpenedIio(line, plan, **how, devices=Devices(str(accel), str(gyro)), trigger=trigger)
 
 
 def open_source(request: Request) -> OpenedIio:
@@ -126,9 +128,9 @@ class IioFiles(HostBus):
     """Files of IIO devices; see Bus."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._open: dict[str, int] = {}
         self._before: dict[str, bytes] = {}
-        self._timer = ReadTimer(self.now_ns)
 
     def check(self, device: str) -> None:
         """Raise BusError if there is no such device."""

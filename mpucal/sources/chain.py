@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, runtime_checkable
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..chip.access import Bus, Reply
 from ..chip.records import ABORT, KEY, RESUMED, SessionEvent
@@ -15,25 +16,53 @@ if TYPE_CHECKING:
 # Time between two parts whose clocks do not tell it.
 PAUSE_NS = 1_000_000_000
 
-
-class _Closable(Protocol):
-    def close(self) -> None: ...
-
-
-Part = TypeVar("Part", bound=_Closable)
+Part = TypeVar("Part", bound=Bus | Transport)
+Item = TypeVar("Item")
 
 
-@runtime_checkable
-class Recorded(Protocol):
-    """A recorded part."""
+class RecordedPart(Generic[Item]):
+    """Recorded part of a session: its accesses or packets in their order, and the session events among them.
+
+    A replay that calls `pending_events` where the session read its keyboard gets each event in its place.
+
+    Parameters
+    ----------
+    is_item : returns True for its accesses or packets. records : as recorded. name : of the capture.
+    """
+
+    def __init__(self, is_item: Callable[[Record], bool], records: Iterable[Record], name: str) -> None:
+        self.name = name
+        self._items: deque[Any] = deque()
+        # Events before each item, and after the last.
+        self._events: deque[list[SessionEvent]] = deque([[]])
+        for record in records:
+            if isinstance(record, SessionEvent):
+                self._events[-1].append(record)
+            elif is_item(record):
+                self._items.append(record)
+                self._events.append([])
+        self._pending = self._events.popleft()
 
     def pending_events(self, name: str) -> list[SessionEvent]:
-        """Return the events of that name that are due, each once."""
-        ...
+        """Return the events of that name recorded before the next item, each once."""
+        pending = [event for event in self._pending if event.name == name and self._is_due(event)]
+        self._pending = [event for event in self._pending if event not in pending]
+        return pending
 
     def unread(self) -> int:
         """Return the number of unread accesses."""
-        ...
+        return len(self._items)
+
+    def close(self) -> None:
+        """Do nothing: no device is open."""
+
+    def _take(self) -> Item:
+        self._pending += self._events.popleft()
+        item: Item = self._items.popleft()
+        return item
+
+    def _is_due(self, _event: SessionEvent) -> bool:
+        return True
 
 
 class Chain(Generic[Part]):
@@ -47,7 +76,7 @@ class Chain(Generic[Part]):
 
     def __init__(self, parts: Sequence[Part], last_ns: int = 0) -> None:
         self._parts, self._last_ns = list(parts), last_ns
-        self._recorded = [isinstance(part, Recorded) for part in parts]
+        self._recorded = [isinstance(part, RecordedPart) for part in parts]
         self._at = 0
 
     @property
@@ -85,7 +114,7 @@ class Chain(Generic[Part]):
     def unread(self) -> int:
         """Return the number of unread accesses in the last part."""
         last = self._parts[-1]
-        return last.unread() if isinstance(last, Recorded) else 0
+        return last.unread() if isinstance(last, RecordedPart) else 0
 
     @property
     def _part(self) -> Part:

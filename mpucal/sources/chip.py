@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..chip.access import Bus
 from ..chip.contents import chip_contents
 from ..chip.driver import Driver
 from ..files.messages import BUS
 from ..origin import Origin
-from ..session.plan import Plan
 from ..session.ports import Source
 from .apart import CAN_FORK, SourceApart
-from .chain import Chain
 from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
 from .replay import Tap
-
-if TYPE_CHECKING:
-    from ..files.mcap import Capture
 
 
 @dataclass
@@ -70,18 +65,8 @@ class OpenedChip(OpenedSource):
 
         driver, event = self.driver(tap, name, tell), recorder.event
         if not (self.apart and CAN_FORK):
-            yield ActiveSource(driver, event, self.go_on, self.is_late)
+            yield ActiveSource(driver, event)
             return
         with closing(SourceApart(driver, tap, self.parts, self.hands)) as source:
             self.hands = (source.hear,)
-            yield ActiveSource(source, event, self.go_on, self.is_late)
-
-
-def replayed(_capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], **how: Any) -> OpenedChip:
-    """Open the replay of a chip.
-
-    Parameters
-    ----------
-    _capture : the first one. line : all that is replayed. _values : of the options. how : attributes of OpenedSource.
-    """
-    return OpenedChip(line, plan, **how)
+            yield ActiveSource(source, event)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
@@ -20,6 +21,9 @@ ADDRESSES = (0x68, 0x69)
 class HostBus:
     """Base of a bus whose clock is the monotonic clock of the host."""
 
+    def __init__(self) -> None:
+        self._timer = ReadTimer(self.now_ns)
+
     def now_ns(self) -> int:
         """Return the time of the clock."""
         return time.monotonic_ns()
@@ -29,9 +33,28 @@ class HostBus:
         time.sleep(max(0, t_ns - time.monotonic_ns()) * 1e-9)
 
 
-def register_after(register: int, count: int) -> int:
-    """Return the register of the byte `count` bytes after the first; FIFO_R_W does not auto-increment."""
-    return register if register == FIFO_R_W else register + count
+class RegisterBus(HostBus, ABC):
+    """Base of a bus that transfers registers in messages of limited length; the time of an access is just before it."""
+
+    def read(self, register: int, count: int) -> Reply:
+        """Read `count` bytes from `register` on, in as few messages as possible; see Bus."""
+        return self._timer.read(register, count, lambda: self._read(register, count))
+
+    def _read(self, register: int, count: int) -> bytes:
+        data = b""
+        while len(data) < count:
+            # FIFO_R_W does not auto-increment.
+            place = register if register == FIFO_R_W else register + len(data)
+            try:
+                data += self._read_part(place, count - len(data))
+            except NoAnswer as error:
+                # The earlier bytes are lost: this must not count as a transfer that was not acknowledged.
+                raise (BusError(error.what, error.remedy) if data else error) from error
+        return data
+
+    @abstractmethod
+    def _read_part(self, register: int, count: int) -> bytes:
+        """Read up to `count` bytes, as many as fit into one message."""
 
 
 def find_chip(path: str, addresses: Sequence[int], who_am_i: Callable[[int], int]) -> int:

@@ -14,16 +14,13 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from ..chip.access import Reply
 from ..chip.families import PARTS
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, HostBus, ReadTimer, converting, find_chip, lock_device, register_after
+from .host_bus import ADDRESSES, TRIES, RegisterBus, converting, find_chip, lock_device
 from .i2c_errors import DEVICES, no_answer_error, opening_error, transfer_error
 from .kind import Request
-
-TRIES = 3
 
 # Longest message of i2c-dev.
 MAX_MESSAGE_BYTES = 8192
@@ -70,7 +67,7 @@ def _known_chip(path: Path) -> str:
     return ""
 
 
-class I2cBus(HostBus):
+class I2cBus(RegisterBus):
     """Chip at one address of an adapter.
 
     Parameters
@@ -86,9 +83,9 @@ class I2cBus(HostBus):
     def __init__(self, adapter: str | int, address: int | None = None) -> None:
         import smbus2  # noqa: PLC0415 - only needed with an I2C bus
 
+        super().__init__()
         self._message = smbus2.i2c_msg
         self._path = f"/dev/i2c-{adapter}" if str(adapter).isdecimal() else str(adapter)
-        self._timer = ReadTimer(self.now_ns)
         self._smbus = smbus2.SMBus()
         try:
             with converting(lambda error: opening_error(error, self._path)):
@@ -104,21 +101,6 @@ class I2cBus(HostBus):
         except BaseException:
             self._smbus.close()
             raise
-
-    def read(self, register: int, count: int) -> Reply:
-        """Read `count` bytes from `register` on, in one message if possible; the time is just before the transfer."""
-        return self._timer.read(register, count, lambda: self._read(register, count))
-
-    def _read(self, register: int, count: int) -> bytes:
-        data = b""
-        with converting(lambda error: transfer_error(error, self._path, self.address)):
-            while len(data) < count:
-                try:
-                    data += self._read_part(register_after(register, len(data)), count - len(data))
-                except OSError as error:
-                    # The earlier bytes are lost: this must not count as a transfer that was not acknowledged.
-                    raise (OSError(errno.EIO, os.strerror(errno.EIO)) if data else error) from error
-        return data
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time just before the transfer."""
@@ -159,8 +141,11 @@ class I2cBus(HostBus):
             return int(self._smbus.read_byte(address))
 
     def _read_part(self, register: int, count: int) -> bytes:
-        """Read up to `count` bytes, as many as fit into one message."""
-        count = min(count, self._longest)
+        with converting(lambda error: transfer_error(error, self._path, self.address)):
+            return self._transfer(register, min(count, self._longest))
+
+    def _transfer(self, register: int, count: int) -> bytes:
+        """Read `count` bytes, or fewer if the adapter refuses so many."""
         if self._blocks:
             return bytes(self._smbus.read_i2c_block_data(self.address, register, count))
         choose, message = self._message.write(self.address, [register]), self._message.read(self.address, count)
@@ -180,5 +165,5 @@ class I2cBus(HostBus):
                 self._repeated_start, self._longest = False, MAX_MESSAGE_BYTES
             else:
                 raise
-            return self._read_part(register, count)
+            return self._transfer(register, min(count, self._longest))
         return bytes(message)

@@ -50,11 +50,8 @@ class SourceKind:
     what : description. option : selects it on the command line; several kinds may share one.
     forms : forms of the option's value, for the help.
     opener : "module:attribute" of a function from a Request to an OpenedSource; imported when it is called.
-    origin : of its samples. Every kind except a file also has `contents() -> dict`, the present content of the sensor
-        in JSON's types, with the key `where`.
-    options : options that identify the source besides `option`. settings : options that configure its sensor.
+    origin : of its samples. options : they identify the source besides `option`. settings : they configure its sensor.
     word : selects this kind if the option's value is this word, or begins with it and a colon.
-    beside : selects this kind if this one of its `options` is given.
     instead : commands that read it and take no source.
     title : title of a session on it; {} is the option's value.
     store : "module:attribute" of a context manager from the options' values to a memory for a calibration, as in
@@ -72,7 +69,6 @@ class SourceKind:
     options: tuple[Option, ...] = ()
     settings: tuple[Option, ...] = ()
     word: str = ""
-    beside: str = ""
     instead: str = ""
     title: str = "{}"
     store: str = ""
@@ -83,8 +79,7 @@ class SourceKind:
     @property
     def flag(self) -> str:
         """Spelling on the command line: `--bus sim`."""
-        beside = next((option.flag for option in self.options if option.name == self.beside), "")
-        return " ".join(filter(None, (self.option.flag, self.word, beside)))
+        return f"{self.option.flag} {self.word}".strip()
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -95,9 +90,7 @@ class SourceKind:
     def matches(self, values: Mapping[str, Any]) -> bool:
         """Return True if the options' values name a source of this kind."""
         value = values.get(self.option.name)
-        if value is None or (self.beside and values.get(self.beside) is None):
-            return False
-        return not self.word or str(value).partition(":")[0] == self.word
+        return value is not None and self.word in ("", str(value).partition(":")[0])
 
 
 @dataclass(frozen=True)

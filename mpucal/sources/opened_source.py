@@ -14,6 +14,7 @@ from .. import __version__
 from ..chip.access import Transaction
 from ..chip.records import LATE, UTC
 from ..errors import CaptureError
+from ..files.recorders import CHIP, DRIVER
 from ..origin import Origin
 from ..result.session_files import CAPTURE
 from ..session.events import Prompt
@@ -22,7 +23,7 @@ from ..session.ports import Note, Operator, ReplayedOperator, Source
 from .chain import Chain
 
 if TYPE_CHECKING:
-    from ..files.mcap import CaptureWriter
+    from ..files.mcap import Capture, CaptureWriter
 
 # Key of a capture's head: the source, to resume the session.
 SOURCE = "source"
@@ -32,18 +33,10 @@ Listener = Callable[[Prompt], None]
 
 
 class ActiveSource(NamedTuple):
-    """Source that is being recorded.
-
-    Attributes
-    ----------
-    note : records session events with it. go_on : begins its next part; False if there is none.
-    late : decides to wait for an answer that is late now, or is not; see Runner.
-    """
+    """Source that is being recorded; `note` records session events with it."""
 
     source: Source
     note: Note
-    go_on: Callable[[], bool] = lambda: False
-    late: Callable[[bool], bool] = bool
 
 
 class NewRecords:
@@ -93,6 +86,7 @@ class OpenedSource(ABC):
     recovered : description of a damaged capture's readable part. capture_name : name of its capture's file.
     words : options that open it again; see Request.words. A session can be resumed only with them.
     real_time : True if its time passes by itself, False if it waits for the program.
+    origin : of its samples. topic : of its captures' records. version : of its driver; see files/recorders.py.
     """
 
     line: Any
@@ -105,6 +99,19 @@ class OpenedSource(ABC):
     real_time: bool = True
     origin: ClassVar[Origin]
     topic: ClassVar[str]
+    version: ClassVar[int | str] = CHIP.version
+
+    @classmethod
+    def replayed(
+        cls, _capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], /, **how: Any
+    ) -> OpenedSource:
+        """Open the replay of such a source.
+
+        Parameters
+        ----------
+        _capture : the first one. line : all that is replayed. _values : of the options. how : further attributes.
+        """
+        return cls(line, plan, **how)
 
     @property
     def parts(self) -> Chain[Any] | None:
@@ -118,7 +125,7 @@ class OpenedSource(ABC):
 
     def source_meta(self) -> dict[str, Any]:
         """Return the entries for the head of a capture."""
-        return {SOURCE: dict(self.words)} if self.words else {}
+        return {DRIVER: self.version, **({SOURCE: dict(self.words)} if self.words else {})}
 
     def talk(self, person: Operator) -> Operator:
         """Return the operator who presses the keys: the given one, or the one in the capture."""
@@ -155,6 +162,15 @@ class OpenedSource(ABC):
     @abstractmethod
     def recorded(self, recorder: NewRecords, name: str, say: Say) -> AbstractContextManager[ActiveSource]:
         """Measure during a `with` block, and record it; `name` is that of the recording."""
+
+    @abstractmethod
+    def contents(self) -> dict[str, Any]:
+        """Read the sensor's present content in JSON's types, with the key `where`; nothing is set up or written.
+
+        Raises
+        ------
+        SourceError : the sensor does not answer.
+        """
 
     def go_on(self) -> bool:
         """Begin the next part; return False if there is none."""

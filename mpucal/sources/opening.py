@@ -43,10 +43,8 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
     if nearly := did_you_mean(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
         raise UsageError(f"{kind.option.flag} {word} is not a known source", f"{kind.forms}{nearly}")
     if kind.origin is not Origin.FILE:
-        for option in _dependent_options(SOURCES):
-            if option.name in given and option not in _dependent_options([kind]):
-                written = given[option.name]
-                raise UsageError(f"{kind.flag} does not take {written}", "remove it", without=written)
+        own = _dependent_options([kind])
+        _refuse(kind.flag, (option.name for option in _dependent_options(SOURCES) if option not in own), given)
     return kind
 
 
@@ -71,9 +69,7 @@ def check_resume_options(given: Mapping[str, str]) -> None:
     UsageError : one was given.
     """
     names = (*(kind.option.name for kind in SOURCES), *_fixed_by_capture(), OUTPUT_FOLDER)
-    for written in (given[name] for name in names if name in given):
-        what = f"--resume does not take {written}: a session keeps its settings and folder"
-        raise UsageError(what, "remove it", without=written)
+    _refuse("--resume", names, given, ": a session keeps its settings and folder")
 
 
 def refuse_fixed_options(request: Request) -> None:
@@ -83,10 +79,16 @@ def refuse_fixed_options(request: Request) -> None:
     ------
     UsageError : one was given.
     """
-    for written in (request.given[name] for name in _fixed_by_capture() if name in request.given):
-        what = f"{request.kind.flag} does not take {written}, which the capture fixes"
-        remedy = "remove it, or use `mpucal calibrate` to fit the capture with other options"
-        raise UsageError(what, remedy, without=written)
+    remedy = "remove it, or use `mpucal calibrate` to fit the capture with other options"
+    _refuse(request.kind.flag, _fixed_by_capture(), request.given, ", which the capture fixes", remedy)
+
+
+def _refuse(
+    flag: str, names: Iterable[str], given: Mapping[str, str], why: str = "", remedy: str = "remove it"
+) -> None:
+    """Raise UsageError if an option of these names was given together with `flag`."""
+    for written in (given[name] for name in names if name in given):
+        raise UsageError(f"{flag} does not take {written}{why}", remedy, without=written)
 
 
 def open_source(
@@ -100,18 +102,6 @@ def open_source(
     """
     kind = matching_kinds(values)[0]
     return _open(Request(kind, values, _plan(values, until_end, kind), given or {}))
-
-
-def contents(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Read the present content of the selected sensor, in JSON's types; nothing is set up or written.
-
-    Raises
-    ------
-    UsageError : impossible values. SourceError : the sensor cannot be opened, or does not answer.
-    """
-    source: Any = open_source(values)
-    facts: dict[str, Any] = source.contents()
-    return facts
 
 
 def reopen_source(words: Mapping[str, Any], plan: Plan) -> OpenedSource:

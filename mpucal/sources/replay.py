@@ -1,43 +1,34 @@
-"""Bus that records every access on another bus, and a bus that answers from the records alone."""
+"""Recorder of the accesses on a bus, and recorded parts of a session that take the place of a bus or a transport."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, TypeVar
 
 from ..chip.access import Bus, Failure, Reply, Transaction
 from ..chip.records import Recorder, SessionEvent
 from ..errors import BusError, BusHeld, CaptureError, EndOfCapture, LateRead, LinkError, NoAnswer
 from ..files.mcap import Record
+from ..mavlink.texts import is_own
+from ..mavlink.tlog import RawPacket
+from ..mavlink.transport import PAUSE_NS, ReceivedBytes
+from .chain import RecordedPart
 
 _RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld, LateRead, LinkError)}
 _RAISES["LinkLost"] = LinkError
 
 
-class ReplayBus:
+class ReplayBus(RecordedPart[Transaction]):
     """Bus that answers the recorded accesses, in their order, with the recorded replies.
 
     It raises EndOfCapture after the last one, CaptureError on another access than the recorded one, and the recorded
     error of an access that failed.
-
-    Parameters
-    ----------
-    records : as recorded. name : of the capture, for messages.
     """
 
     def __init__(self, records: Iterable[Record], name: str = "the capture") -> None:
-        self._name = name
-        self._accesses: list[Transaction] = []
-        # Events before each access, and after the last.
-        self._events: list[list[SessionEvent]] = [[]]
-        for record in records:
-            if isinstance(record, SessionEvent):
-                self._events[-1].append(record)
-            elif isinstance(record, Transaction):
-                self._accesses.append(record)
-                self._events.append([])
-        self._next = 0
-        self._pending = list(self._events[0])
+        super().__init__(lambda record: isinstance(record, Transaction), records, name)
+        self._count = len(self._items)
 
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
@@ -51,33 +42,62 @@ class ReplayBus:
     def sleep_until(self, t_ns: int) -> None:
         """Return at once: the replies carry their times."""
 
-    def close(self) -> None:
-        """Do nothing; `unread` shows if the whole capture was used."""
+    def _next_recorded(self, asked: Transaction) -> Transaction:
+        if not self._items:
+            raise EndOfCapture(f"{self.name} ends before {_words(asked)}")
+        as_asked(asked, self._items[0], f"access {self._count - len(self._items)} of {self.name}")
+        return successful(self._take())
 
-    def pending_events(self, name: str) -> list[SessionEvent]:
-        """Return the events of that name recorded before the next access, each once.
 
-        A replay that calls it where the session read its keyboard gets each event between the same two accesses.
+class PacketReplay(RecordedPart[RawPacket]):
+    """Transport of recorded packets, which come again at their times; those that mpucal itself sent are skipped."""
+
+    datagrams, outward = True, False
+
+    def __init__(self, records: Sequence[Record], name: str) -> None:
+        super().__init__(lambda record: isinstance(record, RawPacket) and not is_own(record.data), records, name)
+        # Times of all records: our own heartbeats show that a vehicle was silent, and the program was not suspended.
+        self._times_ns = [record.t_ns for record in records]
+        self._now_ns, self._end_ns = (self._times_ns[0], self._times_ns[-1]) if records else (0, 0)
+
+    def now_ns(self) -> int:
+        """See Transport."""
+        return self._now_ns
+
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
+        """See Transport.
+
+        Raises
+        ------
+        EndOfCapture : there are no more packets.
         """
-        pending = [event for event in self._pending if event.name == name]
-        self._pending = [event for event in self._pending if event.name != name]
-        return pending
+        if not self._items and until_ns > self._end_ns:
+            raise EndOfCapture(f"{self.name} ends")
+        if not self._items or self._items[0].t_ns >= until_ns:
+            at = bisect_left(self._times_ns, until_ns)
+            next_ns = self._times_ns[at] if at < len(self._times_ns) else until_ns
+            self._now_ns = max(self._now_ns, next_ns if next_ns - until_ns > PAUSE_NS else until_ns)
+            return None
+        packet = self._take()
+        self._now_ns = max(packet.t_ns, self._now_ns)
+        return ReceivedBytes(packet.data, self.name, self._now_ns)
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """Do nothing: no vehicle is there."""
+
+    def restrict(self, address: str | None) -> None:
+        """See Transport."""
 
     def unread(self) -> int:
-        """Return the number of unread accesses."""
-        return len(self._accesses) - self._next
+        """Return 0: what a vehicle sends does not depend on what is read."""
+        return 0
 
-    def _next_recorded(self, asked: Transaction) -> Transaction:
-        if self._next == len(self._accesses):
-            raise EndOfCapture(f"{self._name} ends before {_words(asked)}")
-        recorded = as_asked(asked, self._accesses[self._next], f"access {self._next} of {self._name}")
-        self._next += 1
-        self._pending += self._events[self._next]
-        return successful(recorded)
+    def _is_due(self, event: SessionEvent) -> bool:
+        return event.t_ns <= self._now_ns
 
 
 def as_asked(asked: Transaction, recorded: Transaction, which: str) -> Transaction:
-    """Return a recorded access; CaptureError if the program asked for another one."""
+    """Return a recorded access; CaptureError if the program makes another one."""
     if _words(asked) != _words(recorded):
         raise CaptureError(
             f"the program makes {_words(asked)}, but {which} is {_words(recorded)}",

@@ -19,8 +19,7 @@ from .chain import Chain, ChainedBus, ChainedTransport, split_at_resumes
 from .kind import Request
 from .opened_source import SOURCE, OpenedSource
 from .opening import refuse_fixed_options, reopen_source
-from .packet_replay import PacketReplay
-from .replay import ReplayBus
+from .replay import PacketReplay, ReplayBus
 
 
 def open_source(request: Request) -> OpenedSource:
@@ -42,8 +41,8 @@ def open_source(request: Request) -> OpenedSource:
         refuse_fixed_options(request)
         plan, recorder = Plan.of_capture(first.meta, first.name), recorder_of(first.meta, first.name)
         plan = replace(plan, board=request.plan.board or plan.board)
-    opened: OpenedSource = resolve_name(recorder.replay)(first, _chained(captures), plan, request.values, **how)
-    return opened
+    kind: type[OpenedSource] = resolve_name(recorder.opened)
+    return kind.replayed(first, _chained(captures), plan, request.values, **how)
 
 
 def open_resumed(folder: Path) -> OpenedSource:

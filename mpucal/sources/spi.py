@@ -23,7 +23,7 @@ from ..chip.registers import (
 )
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
-from .host_bus import HostBus, ReadTimer, converting, lock_device, register_after
+from .host_bus import RegisterBus, converting, lock_device
 from .i2c_errors import device_error
 from .kind import Request
 
@@ -41,7 +41,7 @@ def open_source(request: Request) -> OpenedChip:
     return OpenedChip(SpiBus(request.value), request.plan, words=request.words, apart=True)
 
 
-class SpiBus(HostBus):
+class SpiBus(RegisterBus):
     """Chip at one chip select.
 
     Parameters
@@ -55,6 +55,7 @@ class SpiBus(HostBus):
     """
 
     def __init__(self, path: str) -> None:
+        super().__init__()
         try:
             import spidev  # noqa: PLC0415 - only needed with an SPI bus
         except ImportError:
@@ -77,24 +78,19 @@ class SpiBus(HostBus):
             self._device.close()
             raise
         self._has_i2c_if = False
-        self._timer = ReadTimer(self.now_ns)
 
     def read(self, register: int, count: int) -> Reply:
-        """Read `count` bytes from `register` on, in messages of up to 4095 bytes; the time is just before."""
-        reply = self._timer.read(register, count, lambda: self._read(register, count))
+        """Read registers; WHO_AM_I shows the chip's highest clock."""
+        reply = super().read(register, count)
         part = PARTS.get(reply.data[0]) if register == WHO_AM_I else None
         if part is not None:
             self._has_i2c_if = part.family.fifo_en_with_temperature
             self._data_hz = int(min(part.family.spi_data_hz, self._most_hz))
         return reply._replace(data=_change_user_ctrl(register, reply.data, lambda value: value & ~I2C_IF_DIS))
 
-    def _read(self, register: int, count: int) -> bytes:
-        data = b""
+    def _read_part(self, register: int, count: int) -> bytes:
         hz = self._data_hz if register in DATA else REGISTER_HZ
-        while len(data) < count:
-            part = min(count - len(data), MAX_DATA_BYTES)
-            data += self._transfer(bytes([READ | register_after(register, len(data))]) + bytes(part), hz)[1:]
-        return data
+        return self._transfer(bytes([READ | register]) + bytes(min(count, MAX_DATA_BYTES)), hz)[1:]
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time just before the transfer."""

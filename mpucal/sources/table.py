@@ -107,6 +107,15 @@ GYRO_RANGE = Option("gyro_range", "±deg/s.", choices=tuple(map(str, GYRO_RANGES
 CHIP_SETTINGS = (RATE, DLPF, ACCEL_RANGE, GYRO_RANGE)
 
 CHIP = partial(SourceKind, origin=Origin.CHIP, settings=CHIP_SETTINGS)
+ADAPTER = partial(
+    CHIP,
+    what="a chip on a USB adapter",
+    option=BUS,
+    opener="mpucal.sources.usb_i2c:open_source",
+    options=(ADDRESS,),
+    doctor="mpucal.doctor.examine:examine_chip_alone",
+    host="mpucal.doctor.host:examine_adapters",
+)
 DEVICE = partial(
     SourceKind,
     option=IIO,
@@ -144,27 +153,12 @@ SOURCES = [
         title="simulated chip",
         doctor="mpucal.doctor.examine:examine_chip",
     ),
-    CHIP(
-        what="a chip on a USB adapter",
-        option=BUS,
+    ADAPTER(
         word="ftdi",
         forms="ftdi://..., a URL of pyftdi (FT232H); needs the extra usb",
-        opener="mpucal.sources.usb_i2c:open_source",
-        options=(ADDRESS,),
-        doctor="mpucal.doctor.examine:examine_chip_alone",
-        host="mpucal.doctor.host:examine_adapters",
         found="mpucal.sources.usb_i2c:adapters",
     ),
-    CHIP(
-        what="a chip on a USB adapter",
-        option=BUS,
-        word="mcp2221",
-        forms="mcp2221 or mcp2221:SERIAL; needs the extra usb",
-        opener="mpucal.sources.usb_i2c:open_source",
-        options=(ADDRESS,),
-        doctor="mpucal.doctor.examine:examine_chip_alone",
-        host="mpucal.doctor.host:examine_adapters",
-    ),
+    ADAPTER(word="mcp2221", forms="mcp2221 or mcp2221:SERIAL; needs the extra usb"),
     CHIP(
         what="a chip behind a microcontroller with the bridge's firmware",
         option=SERIAL,
@@ -230,8 +224,8 @@ def kinds_for(command: str) -> list[SourceKind]:
 def matching_kinds(values: Mapping[str, Any]) -> list[SourceKind]:
     """Return the kinds that the options' values select: one for each of their options that has a value."""
     selected: dict[Option, SourceKind] = {}
-    # A kind that needs a word or another option has priority over one that does not.
-    for kind in sorted(SOURCES, key=lambda kind: bool(kind.word) + bool(kind.beside)):
+    # A kind that needs a word has priority over one that does not.
+    for kind in sorted(SOURCES, key=lambda kind: bool(kind.word)):
         if kind.matches(values):
             selected[kind.option] = kind
     return [selected[option] for option in unique(kind.option for kind in SOURCES) if option in selected]

@@ -13,11 +13,10 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any, ClassVar
 
-from ..chip.access import Reply
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, HostBus, ReadTimer, find_chip, register_after
+from .host_bus import ADDRESSES, RegisterBus, find_chip
 from .i2c_errors import no_answer_error
 from .kind import Request
 
@@ -27,7 +26,7 @@ MAX_READ_BYTES = 1024
 MCP2221_VENDOR, MCP2221_PRODUCT = 0x04D8, 0x00DD
 
 
-class UsbBus(HostBus):
+class UsbBus(RegisterBus):
     """Chip at one address of a USB adapter.
 
     Parameters
@@ -47,7 +46,8 @@ class UsbBus(HostBus):
     def __init__(self, name: str, address: int | None = None) -> None:
         if find_spec(self.library) is None:
             raise BusError(f"the Python library {self.library} is not installed", "pip install mpucal[usb]")
-        self._name, self._timer = name, ReadTimer(self.now_ns)
+        super().__init__()
+        self._name = name
         try:
             self.connect(name)
         except Exception as error:  # libusb, hidapi and both libraries have their own
@@ -78,23 +78,15 @@ class UsbBus(HostBus):
     def close(self) -> None:
         """Close the adapter."""
 
-    def read(self, register: int, count: int) -> Reply:
-        """Read `count` bytes from `register` on; the time is just before the first transfer."""
-        return self._timer.read(register, count, lambda: self._read(register, count))
-
-    def _read(self, register: int, count: int) -> bytes:
-        data = b""
-        while len(data) < count:
-            place = register_after(register, len(data))
-            data += self._exchange(self.address, place, min(count - len(data), MAX_READ_BYTES))
-        return data
-
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time just before the transfer."""
         t_ns = self.now_ns()
         with self._converting_errors(self.address):
             self.put(self.address, bytes([register]) + data)
         return t_ns
+
+    def _read_part(self, register: int, count: int) -> bytes:
+        return self._exchange(self.address, register, min(count, MAX_READ_BYTES))
 
     def _exchange(self, address: int, register: int, count: int) -> bytes:
         with self._converting_errors(address):

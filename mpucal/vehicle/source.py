@@ -13,7 +13,6 @@ from ..data import Recording, Samples, Sensor
 from ..errors import EndOfCapture, LinkError
 from ..files.mcap import Capture
 from ..files.messages import PACKETS
-from ..files.recorders import DRIVER
 from ..mavlink import MAVLINK_VERSION
 from ..mavlink.link import OWN_SYSTEM, Link, Recorder
 from ..mavlink.log import read_log
@@ -29,7 +28,7 @@ from ..session.plan import Plan
 from ..sources.chain import Chain
 from ..sources.kind import Request
 from ..sources.opened_source import ActiveSource, NewRecords, OpenedSource, Say
-from ..sources.packet_replay import PacketReplay
+from ..sources.replay import PacketReplay
 
 POLL_S = 0.05
 
@@ -88,7 +87,7 @@ class OpenedVehicle(OpenedSource):
     ----------
     system : number of the vehicle. key : signing key, or None. own_system : MAVLink id of mpucal.
     writes : True if the result will be written to the vehicle. prepare : True to prepare a PX4; see Preparation.
-    link : to the vehicle, while it measures.
+    link : to the vehicle, while it measures. end : notes the end of a part.
     """
 
     _: KW_ONLY
@@ -98,8 +97,10 @@ class OpenedVehicle(OpenedSource):
     writes: bool = False
     prepare: bool = False
     link: Link | None = None
+    end: Callable[[], None] = lambda: None
     origin = Origin.VEHICLE
     topic = PACKETS
+    version = MAVLINK_VERSION
 
     @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]:
@@ -108,7 +109,26 @@ class OpenedVehicle(OpenedSource):
 
     def source_meta(self) -> dict[str, Any]:
         """Return the entries for the head of a capture."""
-        return {**super().source_meta(), DRIVER: MAVLINK_VERSION, SYSTEM: self.system, PREPARE: self.prepare}
+        return {**super().source_meta(), SYSTEM: self.system, PREPARE: self.prepare}
+
+    @classmethod
+    def replayed(
+        cls, capture: Capture, line: Chain[Any], plan: Plan, values: Mapping[str, Any], /, **how: Any
+    ) -> OpenedVehicle:
+        """Open the replay of a session as it was, and any other log until its end; see OpenedSource.
+
+        An option names one of several vehicles in a log.
+
+        Raises
+        ------
+        RecordingError : the log has no IMU.
+        """
+        how[SYSTEM], how[PREPARE] = capture.meta.get(SYSTEM, values.get(SYSTEM)), bool(capture.meta.get(PREPARE))
+        packets = [record for record in capture.records if isinstance(record, RawPacket)]
+        if len(packets) < len(capture.records):
+            return cls(line, plan, **how)
+        measured = read_log(packets, capture.name, how[SYSTEM])
+        return OpenedLog(PacketReplay((), capture.name), plan, **how, packets=packets, measured=measured)
 
     @contextmanager
     def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
@@ -118,24 +138,25 @@ class OpenedVehicle(OpenedSource):
         def note(event: str, _t_ns: int = 0, data: Mapping[str, Any] | None = None) -> None:
             recorder.event(event, link.now_ns(), data)
 
-        def go_on() -> bool:
-            if self.parts is None or self.parts.is_last:
-                return False
-            note(END)
-            self.parts.go_on()
-            link.restart()
-            return True
-
-        rate_hz, begun = self.plan.config.rate_hz, lambda: note(BEGUN)
+        rate_hz, begun, self.end = self.plan.config.rate_hz, lambda: note(BEGUN), lambda: note(END)
         source = VehicleSource(link, rate_hz, self.system, say, name, self.writes, self.prepare, begun)
         note(OPENED)
         try:
-            yield ActiveSource(source, note, go_on, self.is_late)
+            yield ActiveSource(source, note)
         finally:
             with suppress(EndOfCapture):
                 source.stop()
             # Nothing came after this time, so that a replay ends its last poll here.
-            note(END)
+            self.end()
+
+    def go_on(self) -> bool:
+        """See OpenedSource."""
+        if self.parts is None or self.parts.is_last or self.link is None:
+            return False
+        self.end()
+        self.parts.go_on()
+        self.link.restart()
+        return True
 
     @contextmanager
     def connected(self, say: Say, record: Recorder = lambda _t_ns, _packet: None) -> Iterator[Link]:
@@ -187,23 +208,6 @@ class OpenedLog(OpenedVehicle):
         for packet in self.packets:
             recorder.packet(*packet)
         yield ActiveSource(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
-
-
-def replayed(capture: Capture, line: Chain[Any], plan: Plan, values: Mapping[str, Any], **how: Any) -> OpenedVehicle:
-    """Open the replay of a vehicle: a session of mpucal as it was, any other log until its end.
-
-    See mpucal.sources.chip.replayed; an option names one of several vehicles in a log.
-
-    Raises
-    ------
-    RecordingError : the log has no IMU.
-    """
-    how[SYSTEM], how[PREPARE] = capture.meta.get(SYSTEM, values.get(SYSTEM)), bool(capture.meta.get(PREPARE))
-    packets = [record for record in capture.records if isinstance(record, RawPacket)]
-    if len(packets) < len(capture.records):
-        return OpenedVehicle(line, plan, **how)
-    measured = read_log(packets, capture.name, how[SYSTEM])
-    return OpenedLog(PacketReplay((), capture.name), plan, **how, packets=packets, measured=measured)
 
 
 def open_source(request: Request) -> OpenedVehicle:

@@ -20,9 +20,12 @@ def decode(accesses, name):
     return Recording.from_arrays(t, np.ones((len(t), 3)), np.zeros((len(t), 3)), name=name)
 
 
-def replayed(capture, line, plan, values, **how):
-    """Return what the module of a source opens."""
-    return capture.name, line.read("loft", 1).data, plan.config, how["real_time"]
+class Opened:
+    """Source that returns what the module of a source opens."""
+
+    @staticmethod
+    def replayed(capture, line, plan, values, **how):
+        return capture.name, line.read("loft", 1).data, plan.config, how["real_time"]
 
 
 def test_a_row_decodes_and_replays_what_its_driver_recorded(tmp_path, monkeypatch):
@@ -35,7 +38,7 @@ def test_a_row_decodes_and_replays_what_its_driver_recorded(tmp_path, monkeypatc
         load(path)
     known = recorders.RECORDERS
     for version in ("pigeon 2", "pigeon 3"):
-        row = recorders.Recorder(version, RateOnlyConfig, f"{__name__}:replayed", f"{__name__}:decode")
+        row = recorders.Recorder(version, RateOnlyConfig, f"{__name__}:Opened", f"{__name__}:decode")
         monkeypatch.setattr(recorders, "RECORDERS", [*known, row])
         assert load(path).t.tolist() == [0, 1, 2, 3, 4]
         if version == META["driver"]:

@@ -26,7 +26,7 @@ from mpucal.mavlink.log import read_log
 from mpucal.mavlink.texts import CHUNK, PREFIX, Note, NoteReader
 from mpucal.mavlink.tlog import RawPacket, TlogFile, encode_tlog
 from mpucal.session.plan import Plan
-from mpucal.sources.packet_replay import PacketReplay
+from mpucal.sources.replay import PacketReplay
 
 START_NS = 1_700_000_000_000_000_000
 

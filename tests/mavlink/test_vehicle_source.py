@@ -14,7 +14,7 @@ from mpucal.mavlink.parameters.mounting import mounting
 from mpucal.mavlink.parameters.slots import ardupilot_slot
 from mpucal.mavlink.requests import check_prearm
 from mpucal.mavlink.vehicle_source import VehicleSource
-from mpucal.sources.packet_replay import PacketReplay
+from mpucal.sources.replay import PacketReplay
 
 
 @pytest.fixture

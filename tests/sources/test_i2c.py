@@ -15,6 +15,7 @@ from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, BusHeld, NoAnswer
 from mpucal.sources.host_bus import lock_device
 from mpucal.sources.i2c import I2cBus, found_chips
+from mpucal.sources.i2c_errors import no_answer_error
 
 
 def measured(bus, config=None, seconds=3):
@@ -142,7 +143,7 @@ def test_a_block_that_is_not_acknowledged_after_another_is_no_transfer_that_took
 
     def fails_after_one(register, count):
         if count < 40:
-            raise OSError(errno.EREMOTEIO, "Remote I/O error")
+            raise no_answer_error("/dev/i2c-1", (0x68,))
         return whole(register, count)
 
     monkeypatch.setattr(bus, "_read_part", fails_after_one)
