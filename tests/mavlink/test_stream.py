@@ -27,7 +27,7 @@ def streams(simulated):
 @pytest.fixture
 def deaf(monkeypatch):
     """deaf(kind) has simulated vehicles ignore messages of that kind."""
-    return lambda kind: monkeypatch.setitem(SimulatedVehicle._HANDLERS, kind, lambda vehicle, message: None)
+    return lambda kind: monkeypatch.delattr(SimulatedVehicle, f"_on_{kind.lower()}")
 
 
 def watched_hz(to, seconds, lowered=None):

@@ -17,7 +17,6 @@ from ...mavlink.requests import SYS_STATUS
 from ...mavlink.rest import ATTITUDE
 from ...vehicle.sink import SAVE_IDS
 from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
-from .imus import BLOCK
 from .options import VehicleOptions
 from .store import INT8, INT16
 
@@ -30,38 +29,23 @@ class LowPass:
 
     Parameters
     ----------
-    cutoffs_hz : (k,) for values (..., k, 3); 0: no filter. most : number of values that come at once.
+    cutoffs_hz : (k,) for values (..., k, 3); 0: no filter.
     """
 
-    def __init__(self, cutoffs_hz: tuple[float, ...], rate_hz: float, most: int) -> None:
+    def __init__(self, cutoffs_hz: tuple[float, ...], rate_hz: float) -> None:
         made = [butterworth(cutoff, rate_hz) if cutoff > 0 else (PASSES, PASSES) for cutoff in cutoffs_hz]
         # Each is (3, k, 1).
         self._b, self._a = np.array(made).transpose(1, 2, 0)[..., None]
-        # Response (most + 1, k) of all following values to one value.
-        left = [np.ones(len(made)), -self._a[1, :, 0]]
-        while len(left) <= most:
-            left.append(-self._a[1, :, 0] * left[-1] - self._a[2, :, 0] * left[-2])
-        response = np.array(left)
-        since = np.subtract.outer(np.arange(most), np.arange(most))
-        self._of_values = np.where(since[..., None] >= 0, response[since], 0.0)
-        self._of_past = np.stack((-self._a[2, :, 0] * response[:-1], response[1:]), axis=1)
-        self._states: Vector | None = None
+        self._past: list[Vector] = []
 
-    def __call__(self, values: Vector, again: int = 0) -> Vector:
-        """Return the filtered `values` (n, ..., k, 3); the filter starts in the steady state of the first one.
-
-        Parameters
-        ----------
-        again : number of the last values that come once more, with others in their places.
-        """
-        n = len(values)
-        if self._states is None:
-            self._states, again = np.repeat(values[:1] / self._a.sum(0), 2, axis=0), 0
-        past = self._states[len(self._states) - again - 2 :][:2]
-        new = np.einsum("ijk,j...kc->i...kc", self._of_values[:n, :n], values)
-        new += np.einsum("ipk,p...kc->i...kc", self._of_past[:n], past)
-        states = self._states = np.concatenate((past, new))
-        return np.asarray(self._b[0] * states[2:] + self._b[1] * states[1:-1] + self._b[2] * states[:-2])
+    def __call__(self, values: Vector) -> Vector:
+        """Return the filtered `values` (n, ..., k, 3); the filter starts in the steady state of the first one."""
+        states = self._past or [values[0] / self._a.sum(0)] * 2
+        for value in values:
+            states.append(value - self._a[1] * states[-1] - self._a[2] * states[-2])
+        self._past = states[-2:]
+        held = np.array(states)
+        return np.asarray(self._b[0] * held[2:] + self._b[1] * held[1:-1] + self._b[2] * held[:-2])
 
 
 def butterworth(cutoff_hz: float, rate_hz: float) -> tuple[Three, Three]:
@@ -120,17 +104,17 @@ class ArduPilot(Firmware):
             self._saved_ids = [int(self.store[slot.sensor_id]) for slot in slots]
         for imu, slot in enumerate(slots):
             self.store[slot.sensor_id] = DEVICE_IDS[imu]
-        self._low_pass = LowPass(tuple(float(self.store[name]) for name in FILTERS), LOOP_HZ, BLOCK)
+        self._low_pass = LowPass(tuple(float(self.store[name]) for name in FILTERS), LOOP_HZ)
         self._ticks = 0
         self._agreed_since: int | None = None
 
-    def correct(self, raw: Vector, again: int) -> Vector:
+    def correct(self, raw: Vector) -> Vector:
         """Return (raw - OFFS) * SCAL in the sensor's axes, turned by R_b and filtered."""
         corrections = [self.correction(imu) for imu in range(self.options.imus)]
         offsets, scales = (np.array(part) for part in zip(*corrections, strict=True))
         in_sensor = raw.copy()
         in_sensor[:, :, 0] = (raw[:, :, 0] - offsets) * scales
-        return self._low_pass(in_sensor @ self.rotation.T, again)
+        return self._low_pass(in_sensor @ self.rotation.T)
 
     def process(self, corrected: Vector) -> None:
         """Compare the accelerometers and learn the first one's bias, once a second."""
@@ -184,7 +168,7 @@ class ArduPilot(Firmware):
         return [wanted.name[:-1] + axis for axis in AXES] if is_vector else [wanted.name]
 
     def correction(self, imu: int) -> tuple[Vector, Vector]:
-        """Return the stored correction, which is in use at once."""
+        """Return the stored correction, in use from the next samples on."""
         return self.store.vector(SLOTS[imu].offset), self.store.vector(SLOTS[imu].scale)
 
     def calibrate(self, how: float) -> bool:

@@ -68,40 +68,28 @@ class Firmware(ABC):
         self.bias = np.zeros(3)
         self.temperature_c = 0.0
         self.armed = False
-        # The next samples, and the same ones under the present corrections.
-        self._raw = self._ahead = np.empty((0, options.imus, 2, 3))
+        # The next samples, under the corrections of the time at which they were drawn.
+        self._ahead = np.empty((0, options.imus, 2, 3))
         self._at = 0
-        self._version = -1
 
     def start(self) -> None:
         """Boot with the stored parameters; the estimator has learnt nothing yet."""
-        self._version = -1
         self.bias = np.zeros(3)
 
     def sense(self, imus: Imus, ticks: int) -> None:
         """Take that many samples, one a tick."""
         while ticks > 0:
-            again = len(self._raw) - self._at
-            if not again:
-                self._raw, self._at = imus.next(), 0
+            if self._at == len(self._ahead):
+                self._ahead, self._at = self.correct(imus.next()), 0
                 self.temperature_c = imus.temperature_c
-            if not again or self._version != self.store.version:
-                self._version = self.store.version
-                self._raw, self._at = self._raw[self._at :], 0
-                self._ahead = self.correct(self._raw, again)
-            n = min(ticks, len(self._raw) - self._at)
+            n = min(ticks, len(self._ahead) - self._at)
             self._at += n
             ticks -= n
             self.process(self._ahead[self._at - n : self._at])
 
     @abstractmethod
-    def correct(self, raw: Vector, again: int) -> Vector:
-        """Return the next samples (n, imus, 2, 3), in the sensors' axes, corrected as in `corrected`.
-
-        Parameters
-        ----------
-        again : number of them that were corrected before, under earlier corrections.
-        """
+    def correct(self, raw: Vector) -> Vector:
+        """Return the next samples (n, imus, 2, 3), in the sensors' axes, corrected as in `corrected`."""
 
     def process(self, corrected: Vector) -> None:
         """Process samples (n, imus, 2, 3), one a tick."""
@@ -142,7 +130,7 @@ class Firmware(ABC):
 
     def store_level(self, roll_pitch_deg: Vector) -> None:
         """Store roll and pitch of the trim."""
-        self.store.set_all(trim_values(self.name, np.append(roll_pitch_deg, self.trim_deg[2])))
+        self.store.update(trim_values(self.name, np.append(roll_pitch_deg, self.trim_deg[2])))
 
     @property
     def mean_force(self) -> Vector:

@@ -81,7 +81,7 @@ class Px4(Firmware):
         """Return the slot that names the sensor by its id."""
         return next((slot for slot in SLOTS if self.store[slot.sensor_id] == DEVICE_IDS[imu]), None)
 
-    def correct(self, raw: Vector, again: int) -> Vector:
+    def correct(self, raw: Vector) -> Vector:
         """Return R_b ((raw - OFF) * SCALE), and of rates R_b (raw - OFF)."""
         in_sensor = np.stack(((raw[:, :, 0] - self._offset) * self._scale, raw[:, :, 1] - self._rates), axis=2)
         return np.asarray(in_sensor @ self.mounting.T)

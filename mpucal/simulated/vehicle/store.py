@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import UserDict
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -13,17 +14,11 @@ from ...mavlink.parameters.encoding import REAL32, Number, Parameter, as_float32
 INT8, INT16 = 2, 4
 
 
-class ParameterStore(dict[str, Number]):
-    """Values by name, with types; floats are kept as float32.
-
-    Attributes
-    ----------
-    version : counts up with every change.
-    """
+class ParameterStore(UserDict[str, Number]):
+    """Values by name, with types; floats are kept as float32."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.version = 0
         self._types: dict[str, int] = {}
 
     def add(self, name: str, value: Number, kind: int = REAL32) -> None:
@@ -37,7 +32,6 @@ class ParameterStore(dict[str, Number]):
             self.add(name, value)
 
     def __setitem__(self, name: str, value: Number) -> None:
-        self.version += 1
         super().__setitem__(name, as_float32(value) if self._types[name] == REAL32 else round(value))
 
     def type(self, name: str) -> int:
@@ -48,14 +42,9 @@ class ParameterStore(dict[str, Number]):
         """Return the values of several parameters."""
         return np.array([float(self[name]) for name in names])
 
-    def set_all(self, values: Mapping[str, float]) -> None:
-        """Set several parameters by name."""
-        for name, value in values.items():
-            self[name] = value
-
     def set_vector(self, names: Sequence[str], values: Vector) -> None:
         """Set several parameters."""
-        self.set_all(dict(zip(names, values.tolist(), strict=True)))
+        self.update(dict(zip(names, values.tolist(), strict=True)))
 
     def parameter(self, name: str) -> Parameter:
         """Return a parameter as it is sent."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterable
+from typing import Any
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
@@ -111,9 +111,9 @@ class SimulatedVehicle:
             # A prompt goes to the hand, not to the firmware.
             kind = packet.message.get_type()
             accepted = kind == "STATUSTEXT" or self.firmware.accepts(packet.message.get_srcSystem())
-            answer = self._HANDLERS.get(kind) if accepted else None
+            answer = getattr(self, f"_on_{kind.lower()}", None) if accepted else None
             if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
-                answer(self, packet.message)
+                answer(packet.message)
 
     def run_until(self, until_us: int) -> list[bytes]:
         """Move on to `until_us`; return the packets that were sent since the last call."""
@@ -198,7 +198,7 @@ class SimulatedVehicle:
         message = dialect().MAVLink_param_value_message(name_bytes(name), value, held.type, held.count, held.index)
         self._send(message)
 
-    def _param_request_read(self, message: Message) -> None:
+    def _on_param_request_read(self, message: Message) -> None:
         store = self.firmware.store
         name = message.param_id
         if message.param_index >= 0:
@@ -208,10 +208,10 @@ class SimulatedVehicle:
         elif self.firmware.bytewise:
             self._param_error(name, 1)
 
-    def _param_request_list(self, message: Message) -> None:
+    def _on_param_request_list(self, message: Message) -> None:
         self._list = deque(self.firmware.store)
 
-    def _param_set(self, message: Message) -> None:
+    def _on_param_set(self, message: Message) -> None:
         echoed = self.firmware.set(from_wire(message, self.firmware.bytewise))
         if isinstance(echoed, int):
             self._param_error(message.param_id, echoed)
@@ -222,11 +222,11 @@ class SimulatedVehicle:
     def _param_error(self, name: str, error: int) -> None:
         self._send(dialect().MAVLink_param_error_message(self.options.system, COMPONENT, name_bytes(name), -1, error))
 
-    def _request_data_stream(self, message: Message) -> None:
+    def _on_request_data_stream(self, message: Message) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
         self._set_intervals(self.firmware.group(rate_hz))
 
-    def _command_long(self, message: Message) -> None:
+    def _on_command_long(self, message: Message) -> None:
         m = dialect()
         handlers = {
             m.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
@@ -277,7 +277,7 @@ class SimulatedVehicle:
             return int(dialect().MAV_RESULT_DENIED)
         return int(dialect().MAV_RESULT_ACCEPTED)
 
-    def _statustext(self, message: Message) -> None:
+    def _on_statustext(self, message: Message) -> None:
         prompt = decode_prompt(message)
         if prompt is not None:
             self.imus.hear(prompt, self._now_us / S_US)
@@ -310,16 +310,6 @@ class SimulatedVehicle:
         self._out.append(bytes(station.pack(m.MAVLink(None, SECOND_STATION, OWN_COMPONENT))))
         self._set_intervals(self.firmware.group(SECOND_STATION_HZ))
 
-    def _file_transfer_protocol(self, message: Message) -> None:
+    def _on_file_transfer_protocol(self, message: Message) -> None:
         reply = self.card.answer(Payload.decode(bytes(message.payload)))
         self._send(dialect().MAVLink_file_transfer_protocol_message(0, 0, 0, bytearray(reply.encode())))
-
-    _HANDLERS: ClassVar[Mapping[str, Callable[[SimulatedVehicle, Message], None]]] = {
-        "PARAM_REQUEST_READ": _param_request_read,
-        "PARAM_REQUEST_LIST": _param_request_list,
-        "PARAM_SET": _param_set,
-        "REQUEST_DATA_STREAM": _request_data_stream,
-        "COMMAND_LONG": _command_long,
-        "STATUSTEXT": _statustext,
-        "FILE_TRANSFER_PROTOCOL": _file_transfer_protocol,
-    }

@@ -11,7 +11,7 @@ def test_each_row_is_filtered_by_its_own_cutoff():
     # the first one has been there for ever
     steps[0] = 0.0
     expected = scipy.signal.lfilter(*scipy.signal.butter(2, 20.0, fs=200.0), steps[:, 0], axis=0)
-    low = LowPass((20.0, 0.0), 200.0, 7)
+    low = LowPass((20.0, 0.0), 200.0)
     found = np.concatenate([low(steps[begin : begin + 7]) for begin in range(0, 49, 7)])
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-12)
     np.testing.assert_array_equal(found[:, 1], steps[:, 1])
