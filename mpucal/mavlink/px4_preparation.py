@@ -13,7 +13,7 @@ from .dialect import dialect
 from .firmwares import PX4
 from .imu import HIGHRES, MESSAGE_ID, decode_reading
 from .link import Link, S
-from .parameters.client import ParameterClient, read_parameters
+from .parameters.client import read_parameters, set_parameter
 from .parameters.encoding import INT32
 from .parameters.slots import all_slots
 from .requests import send_command
@@ -39,14 +39,14 @@ class Preparation:
 
         Raises
         ------
-        EndOfCapture, LinkError : see ParameterClient.set.
+        EndOfCapture, LinkError : see set_parameter.
         """
         if not self._has_ids():
             self._assign_ids()
-        if read_parameters(self._link, (AUTOCAL,), PX4).get(AUTOCAL):
+        if read_parameters(self._link, (AUTOCAL,)).get(AUTOCAL):
             # Noted before it is set: if the answer is lost, it may be 0 all the same.
             self._paused = True
-            ParameterClient(self._link).set(AUTOCAL, 0, INT32)
+            set_parameter(self._link, AUTOCAL, 0, INT32)
             self._say(f"{AUTOCAL} is 0 during the session, and 1 again after it: PX4 learns no offsets meanwhile.")
 
     def release(self) -> None:
@@ -55,12 +55,12 @@ class Preparation:
             return
         self._paused = False
         try:
-            ParameterClient(self._link).set(AUTOCAL, 1, INT32)
+            set_parameter(self._link, AUTOCAL, 1, INT32)
         except LinkError:
             self._say(f"{AUTOCAL} could not be set back: set it to 1 with your ground station.")
 
     def _has_ids(self) -> bool:
-        ids = read_parameters(self._link, [slot.sensor_id for slot in all_slots(PX4)], PX4)
+        ids = read_parameters(self._link, [slot.sensor_id for slot in all_slots(PX4)])
         # Without an answer, the reading of all parameters asks for them again and decides.
         return not ids or any(ids.values())
 

@@ -95,7 +95,7 @@ class VehicleSource:
                 self._say("--prepare is for a PX4 only: nothing was prepared.")
         self._begun()
         self._link.subscribe(self._on_message)
-        parameters = read_stream_parameters(self._link, firmware)
+        parameters = read_stream_parameters(self._link)
         self._check_ids(parameters)
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
         self._stream = self._streams.start()
@@ -226,7 +226,7 @@ class VehicleSource:
                     f"{self._link.vehicle} {self._fault()}",
                     "check its power and the link, and that no other ground station stops its IMU messages",
                 )
-        read_stream_parameters(self._link, self._log.firmware)
+        read_stream_parameters(self._link)
         self._rebooted = False
         self._say(f"{self._link.vehicle} is back, its parameters are read again: go on.")
 

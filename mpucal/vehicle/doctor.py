@@ -64,9 +64,9 @@ def examine_vehicle(source: OpenedVehicle, seconds: float) -> Iterator[Finding]:
             yield _armed(link)
             yield _prearm(link)
             firmware = link.vehicle.family
-            values = read_stream_parameters(link, firmware)
+            values = read_stream_parameters(link)
             yield from _streams(link, values, source.plan.config.rate_hz, seconds)
-            level = read_parameters(link, trim_names(firmware), firmware)
+            level = read_parameters(link, trim_names(firmware))
     except SourceError as error:
         yield Finding.failed("link", error)
         return

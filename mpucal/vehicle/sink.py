@@ -16,11 +16,19 @@ from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.ftp import Storage
 from ..mavlink.link import Link, S
-from ..mavlink.parameters.client import ParameterClient, read_parameters, read_stream_parameters
-from ..mavlink.parameters.document import adapt_to_write, select_imu
+from ..mavlink.parameters.client import read_parameters, read_stream_parameters, require_parameters
 from ..mavlink.parameters.encoding import param_text, params_text, read_parameters_file
 from ..mavlink.parameters.mounting import MOST_DEG, Level, Leveller, trim_names, trim_of
-from ..mavlink.parameters.plan import NOTHING, Change, plan_changes, refused_imus, select_improving, swap_slots
+from ..mavlink.parameters.plan import (
+    NOTHING,
+    Change,
+    adapt_to_write,
+    calibrations_by_imu,
+    plan_changes,
+    refused_imus,
+    select_improving,
+    swap_slots,
+)
 from ..mavlink.parameters.slots import all_slots
 from ..mavlink.parameters.write import NEW, OLD, SwappedSlotsError, Writer, is_partial_write, verify
 from ..mavlink.requests import ArmingMonitor, PrearmState, check_prearm, send_command
@@ -137,9 +145,9 @@ class AutopilotSink:
         ------
         LinkError : they cannot be read. OutputError : they cannot be saved.
         """
-        held = read_stream_parameters(self._link, self._firmware)
+        held = read_stream_parameters(self._link)
         values = {name: value for name, value in held.items() if CORRECTION.search(name)}
-        values |= read_parameters(self._link, trim_names(self._firmware), self._firmware)
+        values |= read_parameters(self._link, trim_names(self._firmware))
         remarks = [f"Accelerometer parameters and level of {self.where} before mpucal wrote new ones"]
         file, text = OLD_PARAM, param_text(values, remarks)
         if self._firmware == PX4:
@@ -205,7 +213,7 @@ class AutopilotSink:
                 level, of_level = (level, TOO_TILTED) if measured is None else (measured, MEASURED_LEVEL)
         new = {name: value for change in planned for name, value in change.slot.values(change.new).items()}
         new |= level.values()
-        now = adapt_to_write(calibration, [change.imu for change in planned], level)
+        now = adapt_to_write(calibration, planned, level)
         with self._storing(now, planned) as paths:
             writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
         imus = " and ".join(str(change.imu) for change in planned)
@@ -272,7 +280,8 @@ class AutopilotSink:
             yield []
             return
         storage = Storage(self._link)
-        files = {FILE.format(FOLDERS[self._firmware], change.imu): select_imu(now, change.imu) for change in planned}
+        of_imu, folder = calibrations_by_imu(now), FOLDERS[self._firmware]
+        files = {FILE.format(folder, change.imu): of_imu[change.imu] for change in planned}
         with nothing_written():
             for path, calibration in files.items():
                 storage.put(path, calibration.blob().encode())
@@ -289,7 +298,7 @@ class AutopilotSink:
         if self._watch.armed:
             raise WriteBackError(f"{NOTHING}: {self.where} is armed", "disarm it, then write again")
         known = {c.slot.sensor_id: c.sensor_id for c in planned if c.sensor_id}
-        for name, held in ParameterClient(self._link).read(tuple(known)).items():
+        for name, held in require_parameters(self._link, tuple(known)).items():
             # 0: the vehicle's parameters were reset
             if held not in (0, known[name]):
                 raise WriteBackError(

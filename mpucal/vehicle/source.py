@@ -174,12 +174,8 @@ class OpenedVehicle(OpenedSource):
     def contents(self) -> dict[str, Any]:
         """Read the vehicle's identity and its accelerometer parameters; nothing is written."""
         with self.connected(lambda _sentence: None) as link:
-            firmware = link.vehicle.family
-            return {
-                "where": str(link.vehicle),
-                "firmware": firmware,
-                "parameters": dict(read_stream_parameters(link, firmware)),
-            }
+            held = read_stream_parameters(link)
+            return {"where": str(link.vehicle), "firmware": link.vehicle.family, "parameters": held}
 
     def _send_prompt(self, prompt: Prompt) -> None:
         """Send the prompt to the vehicle, so that its log contains it."""

@@ -7,9 +7,9 @@ import pytest
 import scipy
 
 from mpucal.errors import EndOfCapture, LinkError, WriteBackError
+from mpucal.mavlink import px4_preparation
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.client import ParameterClient
 from mpucal.mavlink.parameters.mounting import mounting
 from mpucal.mavlink.parameters.slots import ardupilot_slot
 from mpucal.mavlink.requests import check_prearm
@@ -226,14 +226,14 @@ def test_a_px4_that_does_not_lie_level_is_not_asked_to_name_its_sensors(opened):
 
 
 def test_autocal_is_set_back_where_the_answer_to_holding_it_is_lost(opened, monkeypatch):
-    to, set_surely = opened("firmware=px4,imus=1,hand=still", prepare=True), ParameterClient.set
+    to, set_surely = opened("firmware=px4,imus=1,hand=still", prepare=True), px4_preparation.set_parameter
 
-    def lost(self, name, value, kind):
-        set_surely(self, name, value, kind)
+    def lost(link, name, value, kind):
+        set_surely(link, name, value, kind)
         if value == 0:
             raise LinkError("no answer", "ask again")
 
-    monkeypatch.setattr(ParameterClient, "set", lost)
+    monkeypatch.setattr(px4_preparation, "set_parameter", lost)
     with pytest.raises(LinkError):
         to.source.start()
     assert to.vehicle.firmware.store["SENS_IMU_AUTOCAL"] == 0

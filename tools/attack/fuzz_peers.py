@@ -23,7 +23,7 @@ from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.ftp import Payload, Storage
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.client import ParameterClient, stream_parameter_names
+from mpucal.mavlink.parameters.client import read_agreed, stream_parameter_names
 from mpucal.mavlink.requests import ArmingMonitor
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.page.requests import RequestFilter
@@ -185,7 +185,7 @@ def vehicle(data: bytes) -> None:
     link.lock(found[0])
     str(ArmingMonitor(link).armed)
     Storage(link).get("/x")
-    ParameterClient(link).read_agreed(stream_parameter_names(link.vehicle.firmware)[:2])
+    read_agreed(link, stream_parameter_names(link.vehicle.firmware)[:2])
 
 
 def vehicle_says() -> list[bytes]:

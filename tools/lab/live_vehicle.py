@@ -141,7 +141,7 @@ def held(url: str) -> dict[str, float]:
     """Ask the vehicle at another of its ports for the parameters that it holds now, by name."""
     names = [f"SIM_ACC{imu}_{kind}_{a}" for imu in range(1, IMUS + 1) for kind in KINDS_OF_ERROR for a in AXES]
     with closing(_locked(url)) as link:
-        return read_parameters(link, ["SIM_IMU_COUNT", *names], ARDUPILOT) | read_stream_parameters(link, ARDUPILOT)
+        return read_parameters(link, ["SIM_IMU_COUNT", *names]) | read_stream_parameters(link)
 
 
 def needed(held: Mapping[str, float], imu: int) -> Correction:

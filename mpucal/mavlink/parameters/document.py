@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +10,8 @@ import numpy as np
 from ...calibration import calibrate_all
 from ...data import STANDARD_GRAVITY_MPS2, Autopilot, Recording
 from ...result.calibration import Calibration
-from .mounting import Level, mounting
-from .slots import compose, find_slot, slot_of
+from .mounting import mounting
+from .slots import compose, find_slot
 
 AUTOPILOT, OTHERS = "autopilot", "others"
 OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
@@ -62,66 +61,6 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
         "turn_deg": np.degrees(composed.turn_rad).tolist(),
         "mounting": R_b.tolist(),
     }
-
-
-def select_imu(calibration: Calibration, imu: int) -> Calibration:
-    """Return the calibration of one IMU, counted from 1.
-
-    Raises
-    ------
-    KeyError : it holds none.
-    """
-    if calibration.extra.get(AUTOPILOT, {}).get("imu") == imu:
-        return calibration
-    for other in calibration.extra.get(OTHERS, []):
-        if other.get(AUTOPILOT, {}).get("imu") == imu:
-            return Calibration.from_document(other)
-    raise KeyError(imu)
-
-
-def adapt_to_write(calibration: Calibration, imus: Collection[int], level: Level) -> Calibration:
-    """Return the calibration of the streams once the new parameters of `imus` (from 1) and the level are in place.
-
-    The streams are then y' = Q (A y + c) of the y that was calibrated, where Q is the turn of the axes by the level, so
-    D' = Q A D Q^T and b_a' = Q (A b_a + c).
-    """
-    extra = dict(calibration.extra)
-    if OTHERS in extra:
-        extra[OTHERS] = [_adapt(Calibration.from_document(o), imus, level).document() for o in extra[OTHERS]]
-    return _adapt(replace(calibration, extra=extra), imus, level)
-
-
-def _adapt(calibration: Calibration, imus: Collection[int], level: Level) -> Calibration:
-    autopilot = calibration.extra.get(AUTOPILOT, {})
-    if autopilot.get("imu") not in imus:
-        return _turn(calibration, level)
-    slot = slot_of(autopilot["firmware"], autopilot["imu"], autopilot[NEW])
-    old = None if slot is None else slot.correction(autopilot[OLD])
-    new = None if slot is None else slot.correction(autopilot[NEW])
-    if slot is None or old is None or new is None:
-        return _turn(calibration, level)
-    R_b, old = np.array(autopilot["mounting"]), slot.effective(old)
-    A = R_b @ np.diag(new.scale / old.scale) @ R_b.T
-    c = R_b @ (new.scale * (old.offset - new.offset))
-    now = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}
-    extra = {**calibration.extra, AUTOPILOT: now}
-    return _turn(replace(calibration, D=A @ calibration.D, b_a=A @ calibration.b_a + c, extra=extra), level)
-
-
-def _turn(calibration: Calibration, level: Level) -> Calibration:
-    autopilot, Q = calibration.extra.get(AUTOPILOT, {}), level.turn
-    if "mounting" not in autopilot or np.array_equal(Q, np.eye(3)):
-        return calibration
-    names = {name: value for name, value in level.values().items() if name in autopilot[OLD]}
-    now = {**autopilot, OLD: {**autopilot[OLD], **names}, "mounting": (Q @ np.array(autopilot["mounting"])).tolist()}
-    return replace(
-        calibration,
-        D=Q @ calibration.D @ Q.T,
-        b_a=Q @ calibration.b_a,
-        K=Q @ calibration.K @ Q.T,
-        b_omega=Q @ calibration.b_omega,
-        extra={**calibration.extra, AUTOPILOT: now},
-    )
 
 
 def calibrate_vehicle(

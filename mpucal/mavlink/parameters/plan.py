@@ -14,6 +14,7 @@ from ...result.calibration import REFUSED, Calibration
 from ...result.comparison import is_better
 from ..imu import MESSAGE_ID, SCALED, Stream
 from .document import AUTOPILOT, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_DEG, RESIDUAL_OLD, UNCERTAIN
+from .mounting import Level
 from .slots import Correction, Slot, slot_of
 
 NOTHING = "nothing was written"
@@ -127,6 +128,48 @@ def swap_slots(calibration: Calibration, order: Sequence[int], firmware: str) ->
         for other in extra.get(OTHERS, [])
     ]
     return replace(calibration, extra=extra)
+
+
+def calibrations_by_imu(calibration: Calibration) -> dict[int, Calibration]:
+    """Return the calibration of each IMU, counted from 1."""
+    others = map(Calibration.from_document, calibration.extra.get(OTHERS, []))
+    return {each.extra[AUTOPILOT]["imu"]: each for each in (calibration, *others) if AUTOPILOT in each.extra}
+
+
+def adapt_to_write(calibration: Calibration, planned: Sequence[Change], level: Level) -> Calibration:
+    """Return the calibration of the streams once the `planned` changes and the level are in place.
+
+    The streams are then y' = Q (A y + c) of the y that was calibrated, where Q is the turn of the axes by the level, so
+    D' = Q A D Q^T and b_a' = Q (A b_a + c).
+    """
+    changes, extra = {change.imu: change for change in planned}, dict(calibration.extra)
+    if OTHERS in extra:
+        extra[OTHERS] = [_adapt(Calibration.from_document(o), changes, level).document() for o in extra[OTHERS]]
+    return _adapt(replace(calibration, extra=extra), changes, level)
+
+
+def _adapt(calibration: Calibration, changes: Mapping[int, Change], level: Level) -> Calibration:
+    autopilot, Q = calibration.extra.get(AUTOPILOT, {}), level.turn
+    D, b_a = calibration.D, calibration.b_a
+    change = changes.get(autopilot.get("imu"))
+    if change is not None:
+        A = change.mounting @ np.diag(change.new.scale / change.old.scale) @ change.mounting.T
+        c = change.mounting @ (change.new.scale * (change.old.offset - change.new.offset))
+        D, b_a = A @ D, A @ b_a + c
+        autopilot = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}
+    extra = {**calibration.extra, AUTOPILOT: autopilot} if autopilot else calibration.extra
+    if "mounting" not in autopilot or np.array_equal(Q, np.eye(3)):
+        return replace(calibration, D=D, b_a=b_a, extra=extra)
+    names = {name: value for name, value in level.values().items() if name in autopilot[OLD]}
+    turned = {**autopilot, OLD: {**autopilot[OLD], **names}, "mounting": (Q @ np.array(autopilot["mounting"])).tolist()}
+    return replace(
+        calibration,
+        D=Q @ D @ Q.T,
+        b_a=Q @ b_a,
+        K=Q @ calibration.K @ Q.T,
+        b_omega=Q @ calibration.b_omega,
+        extra={**extra, AUTOPILOT: turned},
+    )
 
 
 def _is_writable(document: Mapping[str, Any]) -> bool:

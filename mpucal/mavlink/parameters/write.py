@@ -14,7 +14,7 @@ from ...result.journal import Journal
 from ..link import Link, S
 from ..requests import ArmingMonitor
 from ..rest import RestMeans
-from .client import ParameterClient
+from .client import read_agreed, require_parameters, set_parameter
 from .encoding import as_float32
 from .plan import Change
 from .slots import Slot
@@ -126,7 +126,6 @@ class Writer:
         others: Sequence[str] = (),
     ) -> None:
         self._link, self._monitor, self._slots, self._others = link, monitor, tuple(slots), tuple(others)
-        self._parameters = ParameterClient(link)
         self._journal = journal or Journal()
         self._touched: set[str] = set()
         self.restored = False
@@ -139,7 +138,7 @@ class Writer:
         LinkError : it does not answer, or with two values.
         """
         names = [*(name for slot in self._slots for name in slot.names), *self._others]
-        return {name: float(value) for name, value in self._parameters.read_agreed(names).items()}
+        return read_agreed(self._link, names)
 
     def write(self, old: Mapping[str, float], new: Mapping[str, float], verify: Callable[[], None]) -> None:
         """Set the values of `new` that differ from `old`, read all back, `verify`; restore `old` on any failure.
@@ -172,7 +171,7 @@ class Writer:
             yield None, (name,)
 
     def _set(self, step: Step) -> None:
-        self._parameters.set(step.name, step.value)
+        set_parameter(self._link, step.name, step.value)
         self._touched.add(step.name)
         list(self._link.messages(self._link.now_ns() + step.wait_ns))
 
@@ -181,10 +180,11 @@ class Writer:
             raise WriteBackError("the vehicle was armed meanwhile", "disarm it, then write again")
 
     def _compare(self, values: Mapping[str, float]) -> None:
-        for name, held in self._parameters.find_mismatches(values).items():
-            raise WriteBackError(
-                f"{name} reads back as {held:.9g}, not {values[name]:.9g}", "find out who else writes parameters"
-            )
+        for name, held in require_parameters(self._link, tuple(values)).items():
+            if held != as_float32(values[name]):
+                raise WriteBackError(
+                    f"{name} reads back as {held:.9g}, not {values[name]:.9g}", "find out who else writes parameters"
+                )
 
     def _restore(self, old: Mapping[str, float], failure: BaseException) -> None:
         """Restore `old`, even while armed: half a correction is worse than either; then raise."""
@@ -192,7 +192,7 @@ class Writer:
         remedy = failure.remedy if isinstance(failure, MpucalError) else "start again"
         try:
             for slot, names in self._vectors():
-                held = self._parameters.read(names)
+                held = require_parameters(self._link, names)
                 # A parameter that was refused holds its old value, and would be refused again.
                 changed = [name for name in names if name in self._touched or held[name] != old[name]]
                 for step in _steps(slot, changed, old):
