@@ -8,7 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +75,7 @@ def command(
     if page is not None:
         check_gyroscope(source.plan.config)
     text = CsvText(lambda text: sys.stdout.write(text.decode()))
-    on_page = live_page(page, source_title(options), choose_board(board, source))
+    on_page = nullcontext() if page is None else live_page(page, source_title(options), choose_board(board, source))
     events = JsonLines(sys.stderr, Keys()) if json_events else None
     tell = say if events is None else events.say
     capture = source.measuring(file or Path(os.devnull), tell, now().isoformat())
@@ -96,10 +96,12 @@ def command(
                 _print_json(calibrated, text.utc_ns or 0)
             else:
                 text.write(calibrated)
-            screen.add(samples, calibrated, recording.sensor)
+            if screen is not None:
+                screen.add(samples, calibrated, recording.sensor)
             for contradiction in () if monitor is None else monitor.add(calibrated):
                 _warn(contradiction, events)
-                screen.say(str(contradiction))
+                if screen is not None:
+                    screen.say(str(contradiction))
             sys.stdout.flush()
             measuring.source.forget()
 

@@ -18,7 +18,7 @@ from ..data import Recording, Samples, Sensor
 from ..errors import BusError, ChipError, EndOfCapture, NoAnswer, UsageError
 from .attributes import ACCEL, AXES, GYRO, TEMP
 from .decode import IioDecoder
-from .setup import DeviceAttributes, FollowedFiles, set_up
+from .setup import DeviceSetup, FollowedFiles
 
 DEVICE = re.compile(r"(?:iio:)?(?:device)?(\d+)")
 
@@ -33,6 +33,11 @@ class Devices(NamedTuple):
     def each(self) -> tuple[str, ...]:
         """Devices without duplicates."""
         return tuple(dict.fromkeys(self))
+
+    @property
+    def by_kind(self) -> dict[str, str]:
+        """Device of each sensor, ACCEL and GYRO."""
+        return {ACCEL: self.accel, GYRO: self.gyro}
 
     @classmethod
     def parse(cls, text: str) -> Devices:
@@ -91,7 +96,7 @@ class IioDriver:
         self._devices, self._config, self._say, self._trigger = devices, config, say, trigger
         self._decoder = IioDecoder(name)
         self._files = FollowedFiles(files, self._decoder)
-        self._each: list[DeviceAttributes] = []
+        self._each: list[DeviceSetup] = []
         self.buffered = False
         self._next_ns = self._fruitless_ns = self._warm_ns = 0
 
@@ -110,14 +115,12 @@ class IioDriver:
         ------
         BusError : no such device, or it cannot be written. ChipError : no such sensor, or no trigger.
         """
-        self._each = [DeviceAttributes(self._files, device) for device in self._devices.each]
-        for each in self._each:
-            each.read_all(self._kinds(each.device))
+        self._each = [
+            DeviceSetup(self._files, each, [kind for kind, of in self._devices.by_kind.items() if of == each])
+            for each in self._devices.each
+        ]
         try:
-            running = [
-                set_up(each, self._kinds(each.device), self._config, self._decoder, self._trigger)
-                for each in self._each
-            ]
+            running = [each.start(self._config, self._trigger) for each in self._each]
             if any(running) and not all(running):
                 raise ChipError("one of the two devices has no buffer", "use --trigger none, which polls both")
         except (BusError, ChipError):
@@ -186,12 +189,9 @@ class IioDriver:
             with suppress(BusError, EndOfCapture):
                 each.restore()
 
-    def _kinds(self, device: str) -> tuple[str, ...]:
-        return tuple(kind for kind, of in zip((ACCEL, GYRO), self._devices, strict=True) if of == device)
-
     def _read_channels(self) -> None:
         for each in self._each:
-            for kind in self._kinds(each.device):
+            for kind in each.kinds:
                 for axis in AXES:
                     each.read(f"{kind}_{axis}_raw")
         first = self._each[0]

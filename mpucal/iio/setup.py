@@ -48,7 +48,7 @@ class FollowedFiles:
     """Files of the kernel, each access to which `decoder` follows; `now_ns` is the last time of their clock."""
 
     def __init__(self, files: Bus, decoder: IioDecoder) -> None:
-        self._files, self._decoder = files, decoder
+        self._files, self.decoder = files, decoder
         self.now_ns = 0
 
     def read(self, place: str, count: int) -> bytes:
@@ -69,29 +69,33 @@ class FollowedFiles:
 
     def _follow(self, access: Transaction) -> None:
         self.now_ns = max(self.now_ns, access.t_ns)
-        self._decoder.feed(access)
+        self.decoder.feed(access)
 
 
-class DeviceAttributes:
-    """Attributes and buffer of a device; `names` are those of all its attributes."""
+class DeviceSetup:
+    """Attributes and buffer of a device.
 
-    def __init__(self, files: FollowedFiles, device: str) -> None:
-        self._files, self.device = files, device
+    Parameters
+    ----------
+    kinds : of its sensors that are used, ACCEL and GYRO.
+
+    Attributes
+    ----------
+    names : of all its attributes.
+
+    Raises
+    ------
+    BusError : no such device. ChipError : no such sensor.
+    """
+
+    def __init__(self, files: FollowedFiles, device: str, kinds: Sequence[str]) -> None:
+        self._files, self.device, self.kinds = files, device, kinds
         self._old: list[tuple[str, str]] = []
-        self.names: frozenset[str] = frozenset()
-
-    def read_all(self, kinds: Sequence[str]) -> None:
-        """Read the attributes of `kinds`, ACCEL and GYRO.
-
-        Raises
-        ------
-        BusError : no such device. ChipError : no such sensor.
-        """
         self.names = frozenset(self.read("", LIST_BYTES).split("\n"))
         for kind in kinds:
             if not {f"{kind}_{axis}_raw" for axis in AXES} <= self.names:
                 raise ChipError(
-                    f"{self.device} has no {KINDS[kind]}",
+                    f"{device} has no {KINDS[kind]}",
                     "give the devices of both: --iio accel=iio:deviceN,gyro=iio:deviceM"
                     " (`mpucal doctor --iio iio:device0` names them)",
                 )
@@ -113,10 +117,6 @@ class DeviceAttributes:
         """Read what the buffer holds, up to FRAMES_BYTES."""
         self._files.read(self.device, FRAMES_BYTES)
 
-    def triggers(self) -> list[str]:
-        """Read the names of all triggers."""
-        return self._files.read(TRIGGERS, LIST_BYTES).decode(errors="replace").split()
-
     def set(self, name: str, text: str) -> str:
         """Write an attribute if its value differs, and return its value afterwards."""
         held = self.read(name)
@@ -132,103 +132,96 @@ class DeviceAttributes:
             name, text = self._old.pop()
             self._files.write(f"{self.device}/{name}", text)
 
+    def start(self, config: Config, trigger: str | None) -> bool:
+        """Set rate and ranges, and start the buffer if there is one; return True if a buffer runs.
 
-def set_up(
-    attributes: DeviceAttributes, kinds: Sequence[str], config: Config, decoder: IioDecoder, trigger: str | None
-) -> bool:
-    """Set rate and ranges, and start the buffer if there is one; return True if a buffer runs.
-
-    Raises
-    ------
-    BusError : an attribute cannot be written, or another program reads the buffer. ChipError : no trigger.
-    """
-    names = attributes.names
-    buffered = ENABLE in names and trigger != POLLED
-    if buffered and attributes.read(ENABLE) == "1":
-        raise BusError(
-            f"another program reads the buffer of {attributes.device}",
-            f"stop it (`sudo fuser -v /dev/{attributes.device}` names it), or if there is none:"
-            f" echo 0 | sudo tee /sys/bus/iio/devices/{attributes.device}/{ENABLE}",
-        )
-    # Polling works without permission to write, with the present settings.
-    with nullcontext() if buffered else suppress(BusError):
-        _set_scales(attributes, kinds, config, decoder)
-        _set_rate(attributes, kinds, config)
-    if not buffered:
-        return False
-    if TRIGGER in names:
-        _choose_trigger(attributes, trigger)
-    if CLOCK in names:
-        attributes.set(CLOCK, "monotonic")
-    _enable_channels(attributes, kinds)
-    rate_hz = decoder.rate_hz(attributes.device) or config.rate_hz
-    attributes.set(LENGTH, str(round(BUFFER_S * rate_hz)))
-    if WATERMARK in names:
-        attributes.set(WATERMARK, str(max(1, round(config.period_s * rate_hz))))
-    attributes.set(ENABLE, "1")
-    # A first read reports another program that has the buffer open.
-    attributes.read_frames()
-    return True
-
-
-def _set_rate(attributes: DeviceAttributes, kinds: Sequence[str], config: Config) -> None:
-    """Set the slowest rate that is as fast as requested, else the fastest."""
-    for name in (FREQUENCY, *(f"{kind}_{FREQUENCY}" for kind in kinds)):
-        if name in attributes.names:
-            offered = (
-                parse_available(attributes.read(f"{name}_available")) if f"{name}_available" in attributes.names else []
+        Raises
+        ------
+        BusError : an attribute cannot be written, or another program reads the buffer. ChipError : no trigger.
+        """
+        names = self.names
+        buffered = ENABLE in names and trigger != POLLED
+        if buffered and self.read(ENABLE) == "1":
+            raise BusError(
+                f"another program reads the buffer of {self.device}",
+                f"stop it (`sudo fuser -v /dev/{self.device}` names it), or if there is none:"
+                f" echo 0 | sudo tee /sys/bus/iio/devices/{self.device}/{ENABLE}",
             )
-            wanted = min((hz for hz in offered if hz >= config.rate_hz), default=max(offered, default=config.rate_hz))
-            attributes.set(name, f"{wanted:g}")
+        # Polling works without permission to write, with the present settings.
+        with nullcontext() if buffered else suppress(BusError):
+            self._set_scales(config)
+            self._set_rate(config)
+        if not buffered:
+            return False
+        if TRIGGER in names:
+            self._choose_trigger(trigger)
+        if CLOCK in names:
+            self.set(CLOCK, "monotonic")
+        self._enable_channels()
+        rate_hz = self._files.decoder.rate_hz(self.device) or config.rate_hz
+        self.set(LENGTH, str(round(BUFFER_S * rate_hz)))
+        if WATERMARK in names:
+            self.set(WATERMARK, str(max(1, round(config.period_s * rate_hz))))
+        self.set(ENABLE, "1")
+        # A first read reports another program that has the buffer open.
+        self.read_frames()
+        return True
 
+    def _set_rate(self, config: Config) -> None:
+        """Set the slowest rate that is as fast as requested, else the fastest."""
+        for name in (FREQUENCY, *(f"{kind}_{FREQUENCY}" for kind in self.kinds)):
+            if name in self.names:
+                offered = parse_available(self.read(f"{name}_available")) if f"{name}_available" in self.names else []
+                wanted = min(
+                    (hz for hz in offered if hz >= config.rate_hz), default=max(offered, default=config.rate_hz)
+                )
+                self.set(name, f"{wanted:g}")
 
-def _set_scales(attributes: DeviceAttributes, kinds: Sequence[str], config: Config, decoder: IioDecoder) -> None:
-    """Set the smallest range that is as large as requested, if the sensor has several."""
-    wanted = {ACCEL: config.accel_range_g, GYRO: config.gyro_range_dps}
-    for kind in kinds:
-        name = f"{kind}_scale"
-        bits = bits_of(kind, decoder.texts(attributes.device), decoder.elements(attributes.device))
-        if bits is None or not {name, f"{name}_available"} <= attributes.names:
-            continue
-        texts = attributes.read(f"{name}_available").split()
-        ranges = {text: full_scale(kind, scale, bits) for text in texts for scale in parse_available(text)}
-        enough = {text: value for text, value in ranges.items() if value * RANGE_TOLERANCE >= wanted[kind]}
-        if ranges:
-            attributes.set(name, min(enough, key=enough.__getitem__) if enough else max(ranges, key=ranges.__getitem__))
+    def _set_scales(self, config: Config) -> None:
+        """Set the smallest range that is as large as requested, if the sensor has several."""
+        wanted = {ACCEL: config.accel_range_g, GYRO: config.gyro_range_dps}
+        for kind in self.kinds:
+            name = f"{kind}_scale"
+            bits = bits_of(kind, self._files.decoder.texts(self.device), self._files.decoder.elements(self.device))
+            if bits is None or not {name, f"{name}_available"} <= self.names:
+                continue
+            texts = self.read(f"{name}_available").split()
+            ranges = {text: full_scale(kind, scale, bits) for text in texts for scale in parse_available(text)}
+            enough = {text: value for text, value in ranges.items() if value * RANGE_TOLERANCE >= wanted[kind]}
+            if ranges:
+                self.set(name, min(enough, key=enough.__getitem__) if enough else max(ranges, key=ranges.__getitem__))
 
+    def _choose_trigger(self, trigger: str | None) -> None:
+        """Set the named trigger; without a name keep the present one, or set the device's own."""
+        held = self.read(TRIGGER)
+        if trigger is None and held:
+            return
+        there = self._files.read(TRIGGERS, LIST_BYTES).decode(errors="replace").split()
+        own = f"{self.read('name')}-dev{self.device.removeprefix('iio:device')}"
+        wanted = trigger or (own if own in there else "")
+        if wanted not in there:
+            named = f"no trigger {wanted}" if wanted else f"no trigger for the buffer of {self.device}"
+            listed = (
+                f"available: {', '.join(there)}" if there else "none is available: load iio-trig-hrtimer and create one"
+            )
+            raise ChipError(f"there is {named}", f"use --trigger NAME ({listed}), or --trigger {POLLED}, which polls")
+        self.set(TRIGGER, wanted)
 
-def _choose_trigger(attributes: DeviceAttributes, trigger: str | None) -> None:
-    """Set the named trigger; without a name keep the present one, or set the device's own."""
-    held = attributes.read(TRIGGER)
-    if trigger is None and held:
-        return
-    there = attributes.triggers()
-    own = f"{attributes.read('name')}-dev{attributes.device.removeprefix('iio:device')}"
-    wanted = trigger or (own if own in there else "")
-    if wanted not in there:
-        named = f"no trigger {wanted}" if wanted else f"no trigger for the buffer of {attributes.device}"
-        listed = (
-            f"available: {', '.join(there)}" if there else "none is available: load iio-trig-hrtimer and create one"
-        )
-        raise ChipError(f"there is {named}", f"use --trigger NAME ({listed}), or --trigger {POLLED}, which polls")
-    attributes.set(TRIGGER, wanted)
+    def _enable_channels(self) -> None:
+        """Enable the channels of the sensors, and no others.
 
-
-def _enable_channels(attributes: DeviceAttributes, kinds: Sequence[str]) -> None:
-    """Enable the channels of the sensors, and no others.
-
-    Raises
-    ------
-    ChipError : the buffer has no time stamps.
-    """
-    wanted = {f"scan_elements/{kind}_{axis}_en" for kind in kinds for axis in AXES}
-    stamp = f"scan_elements/{TIMESTAMP}_en"
-    if not wanted | {stamp} <= attributes.names:
-        raise ChipError(f"the buffer of {attributes.device} has no time stamps", f"use --trigger {POLLED}, which polls")
-    wanted |= {stamp, f"scan_elements/{TEMP}_en"}
-    for name in sorted(attributes.names):
-        if name.startswith("scan_elements/") and name.endswith("_en"):
-            attributes.set(name, "1" if name in wanted else "0")
+        Raises
+        ------
+        ChipError : the buffer has no time stamps.
+        """
+        wanted = {f"scan_elements/{kind}_{axis}_en" for kind in self.kinds for axis in AXES}
+        stamp = f"scan_elements/{TIMESTAMP}_en"
+        if not wanted | {stamp} <= self.names:
+            raise ChipError(f"the buffer of {self.device} has no time stamps", f"use --trigger {POLLED}, which polls")
+        wanted |= {stamp, f"scan_elements/{TEMP}_en"}
+        for name in sorted(self.names):
+            if name.startswith("scan_elements/") and name.endswith("_en"):
+                self.set(name, "1" if name in wanted else "0")
 
 
 def _equal(one: str, other: str) -> bool:

@@ -27,7 +27,7 @@ from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
 from ..iio.attributes import ACCEL, AXES, mount_matrix, read_scale
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
-from ..iio.setup import POLLED, DeviceAttributes, FollowedFiles
+from ..iio.setup import POLLED, DeviceSetup, FollowedFiles
 from ..rests.stillness import is_untouched
 from ..result.calibration import Calibration
 from ..result.journal import Journal
@@ -67,8 +67,7 @@ class KernelSink:
     def __init__(self, source: OpenedIio, journal: Journal | None = None) -> None:
         self._source, self._journal = source, journal or Journal()
         self._decoder = IioDecoder("the kernel's driver")
-        self._attributes = DeviceAttributes(FollowedFiles(source.bus, self._decoder), source.devices.accel)
-        self._attributes.read_all([ACCEL])
+        self._attributes = DeviceSetup(FollowedFiles(source.bus, self._decoder), source.devices.accel, [ACCEL])
         name = f"61-mpucal-{source.devices.accel.replace(':', '-')}.rules"
         self._rule = None if source.rules is None else source.rules / name
         self.where = f"{source.devices.accel} ({self._attributes.read('name')})"

@@ -5,6 +5,7 @@ Source: Linux Documentation/driver-api/iio and Documentation/ABI/testing/sysfs-b
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Mapping
 from contextlib import closing, suppress
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..chip.access import Reply
-from ..errors import BusError, CaptureError
+from ..errors import BusError, CaptureError, NoAnswer
 from ..files.mcap import Capture
 from ..iio import IIO_VERSION
 from ..iio.driver import Devices, IioDriver
@@ -25,7 +26,6 @@ from ..sources.chip import OpenedChip
 from ..sources.host_bus import HostBus, converting
 from ..sources.kind import Request
 from ..sources.opened_source import Say
-from .errors import file_error
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
@@ -36,6 +36,7 @@ PERSISTENT_SUFFIX = "_calibbias"
 META_KEY = "iio"
 SHOWN_PREFIXES = ("name", "in_", "sampling", "trigger/")
 NO_DEVICES = Devices("", "")
+GONE_ERRNOS = (errno.ENODEV, errno.ENOENT, errno.ENXIO)
 
 
 @dataclass
@@ -122,6 +123,30 @@ def found_devices() -> list[tuple[str, str]]:
         for path in sorted(SYSFS.glob("iio:device*"))
         if all((path / f"in_{channel}_x_raw").exists() for channel in ("accel", "anglvel"))
     ]
+
+
+def file_error(error: OSError, device: str, name: str = "the buffer", text: str | None = None) -> BusError:
+    """Convert the error of reading the attribute `name` or the buffer, or of writing `text` to an attribute.
+
+    Source: Linux 6.1, drivers/iio/industrialio-buffer.c and industrialio-trigger.c.
+    """
+    verb = "read" if text is None else "write"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        remedy = "run it as root (sudo), or use --trigger none, which polls and writes nothing"
+        return BusError(f"no permission to {verb} {name} of {device}", remedy)
+    if error.errno == errno.EBUSY:
+        remedy = f"stop it (`sudo fuser -v /dev/{device}` names it), and start again"
+        return BusError(f"another program reads the buffer of {device}", remedy)
+    if error.errno in GONE_ERRNOS:
+        remedy = "its driver was unbound or its adapter unplugged: bring it back, and start again"
+        return NoAnswer(f"{device} is gone", remedy)
+    if text is not None and error.errno in (errno.EINVAL, errno.ERANGE):
+        what = f"the driver of {device} does not accept {text!r} for {name}"
+        return BusError(what, "use another --rate, range or --trigger")
+    return BusError(
+        f"the driver of {device} cannot {verb} {name} ({error.strerror})",
+        "check the sensor's wires and supply, and the output of `dmesg`",
+    )
 
 
 class IioFiles(HostBus):

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, cast
 
 from ..errors import OutputError
 from ..session.beside import end_beside, start_beside
@@ -48,10 +48,12 @@ class Feed:
 
     def __init__(self, where: Address, about: Mapping[str, Any], keys: bool = False) -> None:
         self._process = start_beside("mpucal.page.process", text=True)
+        pipes = self._process.stdin, self._process.stdout
+        self._stdin, self._answers = cast("tuple[IO[str], IO[str]]", pipes)
         token = secrets.token_urlsafe(TOKEN_BYTES)
         # The token is no argument of the process, because every user of the computer could read it there.
         self._send({"host": where.host, "port": where.port, "name": where.name, "token": token, "keys": keys})
-        word, _, rest = self._read_line().partition(" ")
+        word, _, rest = self._answers.readline().strip().partition(" ")
         if word != "port":
             self.close()
             raise OutputError(
@@ -114,17 +116,10 @@ class Feed:
         """End the process at once."""
         end_beside(self._process)
 
-    @property
-    def _stdin(self) -> Any:
-        return self._process.stdin
-
     def _send(self, message: Mapping[str, Any]) -> None:
         with suppress(OSError, ValueError):
             self._stdin.write(json.dumps(message, allow_nan=False) + "\n")
             self._stdin.flush()
-
-    def _read_line(self) -> str:
-        return self._process.stdout.readline().strip() if self._process.stdout else ""
 
     def _send_changes(self) -> None:
         old: dict[str, Any] = {}
@@ -144,8 +139,8 @@ class Feed:
             self._closed.wait(LEAST_INTERVAL_S)
 
     def _listen(self) -> None:
-        while line := self._read_line():
-            word, _, rest = line.partition(" ")
+        for line in self._answers:
+            word, _, rest = line.strip().partition(" ")
             if word == "clients":
                 self.visited = True
             elif word == "key":

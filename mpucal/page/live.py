@@ -16,21 +16,15 @@ from .feed import Feed
 
 
 class LivePage:
-    """Page that shows samples four times a second.
+    """Page that shows samples four times a second."""
 
-    Parameters
-    ----------
-    feed : of the page; None: show nothing.
-    """
-
-    def __init__(self, feed: Feed | None) -> None:
+    def __init__(self, feed: Feed) -> None:
         self._feed = feed
+        self.say = feed.say
         self._watch: MotionWatch | None = None
 
     def add(self, raw: Samples, calibrated: Samples, sensor: Sensor) -> None:
         """Show samples, as measured and as calibrated."""
-        if self._feed is None:
-            return
         self._watch = self._watch or MotionWatch(sensor)
         meters = [output for output in self._watch.add(raw) if isinstance(output, Meter)]
         if meters:
@@ -38,23 +32,15 @@ class LivePage:
             acc, gyr = calibrated.acc.mean(axis=0), calibrated.gyr.mean(axis=0)
             self._feed.show(live={"acc": acc.tolist(), "magnitude": float(np.linalg.norm(acc)), "gyr": _known(gyr)})
 
-    def say(self, text: str) -> None:
-        """Show a message."""
-        if self._feed is not None:
-            self._feed.say(text)
-
 
 @contextmanager
-def live_page(where: Address | None, title: str, board: str) -> Iterator[LivePage]:
-    """Yield a page at `where`, which shows nothing if that is None.
+def live_page(where: Address, title: str, board: str) -> Iterator[LivePage]:
+    """Yield a page at `where`.
 
     Raises
     ------
     OutputError : the page cannot be served there.
     """
-    if where is None:
-        yield LivePage(None)
-        return
     feed = Feed(where, {"title": title, "board": board})
     try:
         code = qr_code(feed.url) if sys.stderr.isatty() else ""

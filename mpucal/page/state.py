@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
+from ..result.document import plain
 from ..session.boards import KINDS
 from ..session.events import Knowledge
-from ..terminal.console import count, groups, plain
+from ..terminal.console import count, groups
 from ..terminal.view import View
 from ..terminal.voice import Said, in_words
 
@@ -74,10 +75,4 @@ def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
 
 def changes(new: Mapping[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values that are new or changed, in JSON's own types."""
-    return {name: _json(value) for name, value in new.items() if name not in old or value != old[name]}
-
-
-def _json(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_json(item) for item in value]
-    return plain(asdict(value)) if is_dataclass(value) and not isinstance(value, type) else plain(value)
+    return {name: plain(value) for name, value in new.items() if name not in old or value != old[name]}

@@ -13,7 +13,7 @@ import math
 import re
 import reprlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from datetime import datetime
 from typing import Any
 
@@ -184,7 +184,9 @@ def _array(values: Any, shape: tuple[int, ...]) -> Vector:
 
 
 def plain(value: Any) -> Any:
-    """Return a value of JSON types; NaN and infinities become None."""
+    """Return a value of JSON types: a dataclass as its fields, NaN and infinities as None."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):

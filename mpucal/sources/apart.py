@@ -29,7 +29,7 @@ from .chain import Chain
 from .replay import ReplayBus, Tap, as_asked, successful
 
 CAN_FORK = sys.platform == "linux"
-# Wish of the session, and what the process sends between its last poll and the accesses that stop the sensor.
+# Message by which the session asks the process to stop, and the process marks the end of its polls.
 STOP = None
 
 
@@ -66,7 +66,7 @@ class SourceApart:
         return self._driver.start()
 
     def stop(self) -> None:
-        """Stop the sensor, after the poll at which the process is; what it read beyond this one is dropped."""
+        """Stop the sensor after the present poll of the process; accesses that the session has not read are dropped."""
         if self._followed is not None:
             self._followed.stop_polling()
         self._driver.stop()
@@ -88,7 +88,7 @@ class SourceApart:
             os.setpgid(0, 0)
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.SIG_DFL)
-            # Before all other programs where the user may; it sleeps between two polls.
+            # Real-time priority, if the user may set it; the process sleeps between two polls.
             with suppress(OSError):
                 os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
             outbox = self._tap.recorder = Outbox(session)
@@ -120,7 +120,7 @@ class SourceApart:
 
 
 class Outbox:
-    """Queue in the reading process, which never waits for the session: memory holds what that does not take."""
+    """Queue in the reading process, which never waits for the session; it grows while the session reads nothing."""
 
     def __init__(self, session: Connection) -> None:
         self._queue: SimpleQueue[Any] = SimpleQueue()

@@ -59,7 +59,7 @@ class OpenedChip(OpenedSource):
         tap = Tap(self.bus, recorder)
 
         def tell(text: str) -> None:
-            # Not in the process that reads.
+            # The process that reads shows nothing.
             if tap.recorder is recorder:
                 say(f"  {text}.")
 

@@ -14,7 +14,7 @@ from ..chip.transfer_stats import LATE_REMEDY
 from ..errors import BusError, LateRead, NoAnswer
 from .i2c_errors import no_answer_error
 
-# AD0 low, AD0 high
+# With AD0 low, and with AD0 high.
 ADDRESSES = (0x68, 0x69)
 
 

@@ -72,7 +72,7 @@ class I2cBus(RegisterBus):
 
     Parameters
     ----------
-    adapter : path or number of the adapter. address : of the chip; None tries 0x68, then 0x69.
+    path : of the adapter. address : of the chip; None tries 0x68, then 0x69.
 
     Raises
     ------
@@ -80,12 +80,12 @@ class I2cBus(RegisterBus):
     NoAnswer : nothing acknowledges the address.
     """
 
-    def __init__(self, adapter: str | int, address: int | None = None) -> None:
+    def __init__(self, path: str, address: int | None = None) -> None:
         import smbus2  # noqa: PLC0415 - only needed with an I2C bus
 
         super().__init__()
         self._message = smbus2.i2c_msg
-        self._path = f"/dev/i2c-{adapter}" if str(adapter).isdecimal() else str(adapter)
+        self._path = path
         self._smbus = smbus2.SMBus()
         try:
             with converting(lambda error: opening_error(error, self._path)):

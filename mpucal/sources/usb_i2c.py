@@ -9,9 +9,8 @@ from __future__ import annotations
 import logging
 from abc import abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib.util import find_spec
-from typing import Any, ClassVar
+from contextlib import contextmanager, suppress
+from typing import Any
 
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError
@@ -39,17 +38,16 @@ class UsbBus(RegisterBus):
     acknowledges.
     """
 
-    library: ClassVar[str]
-    # exception of the library if nothing acknowledges
+    # Exception that the library raises if nothing acknowledges.
     missing: type[Exception]
 
     def __init__(self, name: str, address: int | None = None) -> None:
-        if find_spec(self.library) is None:
-            raise BusError(f"the Python library {self.library} is not installed", "pip install mpucal[usb]")
         super().__init__()
         self._name = name
         try:
             self.connect(name)
+        except ImportError as error:
+            raise BusError(f"the Python library {error.name} is not installed", "pip install mpucal[usb]") from error
         except Exception as error:  # libusb, hidapi and both libraries have their own
             raise BusError(
                 f"the USB adapter {name} cannot be opened ({error})",
@@ -108,8 +106,6 @@ class UsbBus(RegisterBus):
 class Ftdi(UsbBus):
     """FT232H, FT2232H or FT4232H, by a URL of pyftdi, such as ftdi://ftdi:232h/1."""
 
-    library = "pyftdi"
-
     def connect(self, name: str) -> None:
         """See UsbBus."""
         from pyftdi.i2c import I2cController, I2cNackError  # noqa: PLC0415 - an extra
@@ -135,8 +131,6 @@ class Ftdi(UsbBus):
 
 class Mcp2221(UsbBus):
     """MCP2221(A) by its name: mcp2221, or mcp2221:SERIAL if there are several."""
-
-    library = "EasyMCP2221"
 
     def connect(self, name: str) -> None:
         """See UsbBus."""
@@ -170,22 +164,19 @@ def open_source(request: Request) -> OpenedChip:
 def adapters() -> list[tuple[str, str]]:
     """List the connected USB adapters of the installed libraries: (value of --bus, description)."""
     found: list[tuple[str, str]] = []
-    if find_spec("pyftdi"):
-        found += _ftdi_adapters()
-    if find_spec("EasyMCP2221"):
-        found += _mcp2221_adapters()
+    for adapters_of in (_ftdi_adapters, _mcp2221_adapters):
+        # A library or a permission may be missing.
+        with suppress(Exception):
+            found += adapters_of()
     return found
 
 
 def _mcp2221_adapters() -> list[tuple[str, str]]:
-    try:
-        import hid  # noqa: PLC0415 - EasyMCP2221's
+    from EasyMCP2221.MCP2221 import hid  # noqa: PLC0415 - an extra
 
-        devices: list[dict[str, Any]] = hid.enumerate(MCP2221_VENDOR, MCP2221_PRODUCT)
-    except Exception:  # hidapi is missing, or there is no permission
-        return []
+    devices: list[dict[str, Any]] = hid.enumerate(MCP2221_VENDOR, MCP2221_PRODUCT)
     several = len(devices) > 1
-    # as the factory sets them, they do not enumerate with their serials
+    # With the factory's settings they do not report their serial numbers over USB.
     return [
         (f"mcp2221:{each['serial_number'] or 'SERIAL'}" if several else "mcp2221", str(each["product_string"]))
         for each in devices
@@ -195,15 +186,11 @@ def _mcp2221_adapters() -> list[tuple[str, str]]:
 def _ftdi_adapters() -> list[tuple[str, str]]:
     from pyftdi.ftdi import Ftdi as Device  # noqa: PLC0415 - an extra
 
-    try:
-        devices = Device.list_devices("ftdi:///?")
-    except Exception:  # libusb is missing, or there is no permission
-        return []
     names = {number: name for name, number in Device.PRODUCT_IDS[Device.FTDI_VENDOR].items()}
     return [
         (
             f"ftdi://ftdi:{names.get(each.pid, hex(each.pid))}:{each.sn or f'{each.bus:x}:{each.address:x}'}/1",
             each.description,
         )
-        for each, _interfaces in devices
+        for each, _interfaces in Device.list_devices("ftdi:///?")
     ]

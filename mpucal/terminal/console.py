@@ -8,10 +8,11 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Protocol, TextIO
 
 from ..report.units import UNKNOWN
+from ..result.document import plain
 from ..session.boards import BOARD
 from ..session.events import Caution, Decision, Direction, Key, Knowledge, Output, Progress, Prompt, Verification
 from ..session.ports import Operator
@@ -139,23 +140,14 @@ class JsonLines(Lines):
 
     def hear(self, output: Output) -> None:
         """Print an output."""
-        self._event(type(output).__name__.lower(), asdict(output))
+        self._event(type(output).__name__.lower(), plain(output))
 
     def say(self, text: str) -> None:
         """Print a message as the event `note`."""
         self._event("note", {"text": text.strip()})
 
     def _event(self, name: str, fields: Mapping[str, Any]) -> None:
-        super().say(json.dumps({"event": name, **plain(fields)}, allow_nan=False))
-
-
-def plain(value: Any) -> Any:
-    """Return a value in JSON's own types; numbers that are not finite become None."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        super().say(json.dumps({"event": name, **fields}, allow_nan=False))
 
 
 @dataclass(frozen=True)

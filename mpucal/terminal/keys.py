@@ -51,7 +51,7 @@ class Keys:
         """Return the keys that were pressed since the last call; never waits."""
         keys = [Key.ABORT] if self._interrupted else []
         self._clear_interrupt()
-        while self._keyboard is not None and _waits(self._keyboard):
+        while self._keyboard is not None and _has_input(self._keyboard):
             try:
                 words = self._typed(self._keyboard)
             except OSError:
@@ -119,7 +119,7 @@ def _windows() -> Any:
         return None
 
 
-def _waits(keyboard: TextIO) -> bool:
+def _has_input(keyboard: TextIO) -> bool:
     """Return True if a key or line can be read without waiting."""
     console = _windows()
     return bool(console.kbhit() if console is not None else select.select([keyboard], [], [], 0.0)[0])

@@ -62,7 +62,7 @@ class Screen:
             self._ring = self._bell
         self._view = self._view.after(output)
         if isinstance(output, Decision | Verification) and not self._open:
-            self.say(f"  {_line_of(output)}")
+            self.say(f"  {output.why if isinstance(output, Decision) else output.text}")
         self._changed.put(None)
 
     def say(self, text: str) -> None:
@@ -125,10 +125,6 @@ class Screen:
             with suppress(Empty):
                 self._closed.get(timeout=LEAST_INTERVAL_S)
                 return
-
-
-def _line_of(output: Decision | Verification) -> str:
-    return output.why if isinstance(output, Decision) else output.text
 
 
 # The alternate screen leaves the terminal's contents as they were; its cursor is hidden.

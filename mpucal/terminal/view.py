@@ -149,13 +149,13 @@ class View:
             case Held():
                 view = replace(self, held=output, countdown=None)
             case Seen():
-                # When the turning starts again, the numbers do as well.
+                # Numbers start again with the turning.
                 kept = tuple(s for s in self.seen if s.paused != output.paused or s.number < output.number)
                 view = replace(self, seen=(*kept, output))
             case Verification():
                 view = replace(self, verified=(*self.verified, output)).noted(output.text)
             case _:
-                # Commands are not shown.
+                # A command is not shown.
                 return self
         return view._at(output.t_s)
 
@@ -201,7 +201,7 @@ class View:
         if self.prompt.kind is PromptKind.ROTATE:
             held = self.waiting
             held_s = math.inf if held is None else held.t_s + held.remaining_s - held.of_s
-            # the first one is flat
+            # The first one is flat.
             done = min(done, 1 + sum(seen.paused and seen.t_s < held_s for seen in self.seen))
         return done, int(p.of)
 
@@ -248,17 +248,17 @@ class View:
             return replace(self, prompt=prompt)
         meter = self.meter
         if meter is not None and prompt.kind not in TURNING:
-            # Perhaps no other meter follows.
+            # There may be no further meter.
             meter = replace(meter, missing_deg=None, turn="", wanted=None)
         view = replace(self, prompt=prompt, meter=meter)
-        # The last orientation of the turning is said to be taken, although the next step has begun.
+        # The headline still shows that the last orientation was taken, although the next step has begun.
         held = self.held if prompt.kind in TURNING else None
         return replace(view, countdown=None, progress=None, caution=None, held=held, verified=())
 
     def _at(self, t_s: float) -> View:
         if self.begun_s is None or self.now_s is None:
             return replace(self, now_s=t_s, begun_s=t_s)
-        # what was computed of earlier samples comes later
+        # Results that were computed from earlier samples arrive late.
         return replace(self, now_s=max(t_s, self.now_s))
 
 

@@ -11,7 +11,7 @@ from .view import HEADLINES, USE_HEADLINES, Moment, View
 
 CONNECTING = "Connecting"
 HOLD = "Hold still"
-# Time for which a change of the moment lasts before it contradicts what was said.
+# Time for which a change of the moment must last before the voice says something that contradicts its last words.
 SETTLED_S = 1.0
 # Interval at which the instruction to turn is repeated; older cautions are not said.
 REPEAT_S = 5.0
@@ -56,7 +56,8 @@ def in_words(view: View) -> str:
 class Voice:
     """Voice that follows the views of one session.
 
-    From "hold" to "taken" nothing else is said. What contradicts the last words waits until it has lasted SETTLED_S.
+    It is silent between "hold" and "taken". Words that contradict the last ones wait until their cause has lasted
+    SETTLED_S.
 
     Attributes
     ----------
@@ -114,7 +115,7 @@ class Voice:
                 self._say(view.confirming or in_words(view), Tone.HOLD)
             case Moment.TURN if view.meter is not None and view.meter.turn and view.waiting is None:
                 due = self._told is not Moment.TURN or view.prompt is not self._prompt or self._quiet_s >= REPEAT_S
-                # The use of the last orientation is said to its end.
+                # The words on the last orientation are not interrupted.
                 first = self._told is Moment.DECIDED and self._quiet_s >= SETTLED_S
                 first = first or self._told in (Moment.CONNECTING, Moment.STEP)
                 if due and (first or self._is_settled):

@@ -19,8 +19,7 @@ from mpucal.iio import decode
 from mpucal.iio.decode import IioDecoder
 from mpucal.iio.driver import Devices, IioDriver
 from mpucal.iio_device import source
-from mpucal.iio_device.errors import file_error
-from mpucal.iio_device.source import IioFiles
+from mpucal.iio_device.source import IioFiles, file_error
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.iio import SimulatedFiles

@@ -25,7 +25,7 @@ from ...data import Samples
 from ...iio.attributes import ACCEL, AXES, GYRO, MPU_SCALES, PRINTED_SCALES, TEMP, TIMESTAMP
 from ...iio.scan_elements import FrameLayout, ScanElement
 from ...iio.setup import TRIGGERS
-from ...iio_device.errors import file_error
+from ...iio_device.source import file_error
 from ..chip import SimulatedBus
 
 RATES_HZ = (10, 20, 50, 100, 200, 500)

@@ -19,7 +19,6 @@ from mpucal.doctor.finding import Finding, Mark
 from mpucal.errors import BusError, NoAnswer
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import FastClock
-from mpucal.sources import usb_i2c
 from mpucal.sources.usb_i2c import Ftdi, Mcp2221, adapters
 
 pytest.importorskip("pyftdi")
@@ -140,6 +139,7 @@ def test_an_adapter_that_is_not_there_is_told(name, plugged):
 
 @pytest.mark.parametrize("name", SPELLED)
 def test_a_missing_library_is_named(name, monkeypatch, capsys):
-    monkeypatch.setattr(usb_i2c, "find_spec", lambda _name: None)
+    monkeypatch.setitem(sys.modules, "pyftdi.i2c", None)
+    monkeypatch.setitem(sys.modules, "EasyMCP2221", None)
     assert run(["show", "--bus", SPELLED[name]]) == BusError.exit_code
     assert "pip install mpucal[usb]" in capsys.readouterr().err
