@@ -61,7 +61,7 @@ class IioDecoder:
 
     Attributes
     ----------
-    gaps : number of places at which samples are missing.
+    gaps : number of places at which samples are missing. sensor : described by the attributes.
     """
 
     def __init__(self, name: str) -> None:
@@ -76,7 +76,7 @@ class IioDecoder:
         self._temperature = np.nan
         self._last_ns: int | None = None
         self._gap_next = False
-        self._sensor = Sensor()
+        self.sensor = Sensor()
         self._samples: list[Samples] = []
         self._new: list[Samples] = []
         self.gaps = 0
@@ -125,18 +125,6 @@ class IioDecoder:
             self._scales[kind] = (device, read_scale(kind, device, self.texts(device), self.elements(device)))
         return self._scales[kind]
 
-    @property
-    def sensor(self) -> Sensor:
-        """Sensor as far as it is known."""
-        t = self._samples[-1].t[-1] - self._samples[0].t[0] if self._samples else 0.0
-        count = sum(map(len, self._samples))
-        warm = [float(np.nanmean(s.temperature_c)) for s in self._samples if np.isfinite(s.temperature_c).any()]
-        return replace(
-            self._sensor,
-            rate_hz=(count - 1) / t if t > 0 else self._sensor.rate_hz,
-            temperature_c=float(np.mean(warm)) if warm else None,
-        )
-
     def rate_hz(self, device: str) -> float | None:
         """Return the rate of a device; None if it has no such attribute."""
         names = (FREQUENCY, f"{ACCEL}_{FREQUENCY}", f"{GYRO}_{FREQUENCY}")
@@ -155,7 +143,12 @@ class IioDecoder:
     def recording(self) -> Recording:
         """Return all samples."""
         samples = Samples.joined(self._samples)
-        return Recording(**vars(samples), sensor=self.sensor, name=self._name)
+        sensor, warm_c = self.sensor, samples.temperature_c[np.isfinite(samples.temperature_c)]
+        if len(samples) > 1:
+            sensor = replace(sensor, rate_hz=(len(samples) - 1) / float(np.ptp(samples.t)))
+        if len(warm_c):
+            sensor = replace(sensor, temperature_c=float(warm_c.mean()))
+        return Recording(**vars(samples), sensor=sensor, name=self._name)
 
     def _has(self, device: str, kind: str) -> bool:
         return any(name.startswith(f"{kind}_") and name.endswith("scale") for name in self.texts(device))
@@ -191,7 +184,7 @@ class IioDecoder:
     def _start(self, widths: dict[str, int]) -> None:
         # The attributes apply from here on; at the end the driver restores the old ones.
         self._scales = {}
-        self._sensor = self._describe_sensor()
+        self.sensor = self._describe_sensor()
         self._streams = {name: i for i, name in enumerate(widths)}
         self._aligned = StreamAligner(list(widths.values()))
         self._flips = BitFlipFilter(ROW)
@@ -279,7 +272,7 @@ class IioDecoder:
 
     def _gaps(self, t_ns: Times) -> np.ndarray:
         """Return (n,) True where the buffer dropped samples; polling has no fixed interval."""
-        rate_hz = self._sensor.rate_hz
+        rate_hz = self.sensor.rate_hz
         steps = np.diff(t_ns, prepend=t_ns[0] if self._last_ns is None else self._last_ns)
         longest_ns = math.inf if rate_hz is None or len(self._streams) > 2 else GAP_INTERVALS * 1e9 / rate_hz
         gaps = np.asarray(steps > longest_ns)

@@ -72,22 +72,22 @@ class Chain(Generic[Part]):
     ----------
     parts : in order; only the last one may be another than a recorded one.
     last_ns : time of the last record: the clock of the last part begins a second later, unless it shows more.
+
+    Attributes
+    ----------
+    resumes : True if the last part is not a recorded one.
     """
 
     def __init__(self, parts: Sequence[Part], last_ns: int = 0) -> None:
         self._parts, self._last_ns = list(parts), last_ns
-        self._recorded = [isinstance(part, RecordedPart) for part in parts]
+        self.resumes = not isinstance(self._parts[-1], RecordedPart)
         self._at = 0
+        self._shift_ns: int | None = None
 
     @property
     def replaying(self) -> bool:
         """True if the present part is a recorded one."""
-        return self._recorded[self._at]
-
-    @property
-    def resumes(self) -> bool:
-        """True if the last part is not a recorded one."""
-        return not self._recorded[-1]
+        return not (self.resumes and self.is_last)
 
     @property
     def is_last(self) -> bool:
@@ -120,37 +120,35 @@ class Chain(Generic[Part]):
     def _part(self) -> Part:
         return self._parts[self._at]
 
+    def _shifted(self, t_ns: int) -> int:
+        """Convert a time of the present part's clock to the session's."""
+        if self.replaying:
+            return t_ns
+        if self._shift_ns is None:
+            self._shift_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
+        return t_ns + self._shift_ns
+
 
 class ChainedBus(Chain[Bus]):
     """Parts of a session with a chip or a driver of the kernel."""
 
-    _shift_ns: int | None = None
-
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
         reply = self._part.read(register, count)
-        return reply if self.replaying else reply._replace(t_ns=self._shifted(reply.t_ns))
+        return reply._replace(t_ns=self._shifted(reply.t_ns))
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
-        t_ns = self._part.write(register, data)
-        return t_ns if self.replaying else self._shifted(t_ns)
+        return self._shifted(self._part.write(register, data))
 
     def sleep_until(self, t_ns: int) -> None:
         """Sleep as Bus does; at once in a replay, and before the first access after it, when the shift is unknown."""
         if self._shift_ns is not None:
             self._part.sleep_until(t_ns - self._shift_ns)
 
-    def _shifted(self, t_ns: int) -> int:
-        if self._shift_ns is None:
-            self._shift_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
-        return t_ns + self._shift_ns
-
 
 class ChainedTransport(Chain[Transport]):
     """Parts of a session with a vehicle."""
-
-    _shift_ns = 0
 
     def __init__(self, parts: Sequence[Transport], last_ns: int) -> None:
         super().__init__(parts, last_ns)
@@ -158,21 +156,18 @@ class ChainedTransport(Chain[Transport]):
 
     def go_on(self) -> bool:
         """See Chain."""
-        if not super().go_on():
-            return False
+        went_on = super().go_on()
         self._take_properties()
-        if not self.replaying:
-            self._shift_ns = max(self._last_ns + PAUSE_NS - self._part.now_ns(), 0)
-        return True
+        return went_on
 
     def now_ns(self) -> int:
         """See Transport."""
-        return self._part.now_ns() + self._shift_ns
+        return self._shifted(self._part.now_ns())
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
-        received = self._part.receive(until_ns - self._shift_ns)
-        return None if received is None else received._replace(t_ns=received.t_ns + self._shift_ns)
+        received = self._part.receive(until_ns - (self._shift_ns or 0))
+        return None if received is None else received._replace(t_ns=self._shifted(received.t_ns))
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""

@@ -1,8 +1,11 @@
 """Fixtures: the kernel's side of an I2C adapter, which answers the ioctls of the real smbus2."""
 
 import ctypes
-import errno
 import os
+import sys
+from dataclasses import dataclass, field
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +18,9 @@ from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
 
-I2C_M_RD = 0x0001
+SPEC = spec_from_file_location("kernels_adapter", Path(__file__).parents[1] / "device" / "harness" / "adapter.py")
+harness = sys.modules["kernels_adapter"] = module_from_spec(SPEC)
+SPEC.loader.exec_module(harness)
 
 
 class StillFeed:
@@ -33,94 +38,43 @@ class StillFeed:
         return rows
 
 
-class Adapter:
-    """Adapter that passes the requests of smbus2 to `bus`, if they are for `address`.
+class Memory:
+    """Part of this process's memory, as Memory of tests/device/harness/umockdev.py is of another's."""
+
+    def __init__(self, address, size):
+        self._address, self._size = address, size
+
+    def at(self, offset, size):
+        return Memory(ctypes.c_void_p.from_address(self._address + offset).value, size)
+
+    def bytes(self):
+        return ctypes.string_at(self._address, self._size)
+
+    def write(self, data, offset=0):
+        ctypes.memmove(self._address + offset, data, len(data))
+
+
+@dataclass
+class Adapter(harness.Adapter):
+    """Adapter that answers the requests of smbus2 in this process.
 
     Attributes
     ----------
-    longest : message that it moves, in bytes. repeats_start : moves two messages in one transfer.
-    failures : errno by ioctl request, raised instead.
-    transfers : [(flags, bytes)] of each I2C_RDWR.
+    failures : errno by ioctl request, raised instead. requests : those that were made.
     """
 
-    def __init__(self, bus, address=0x68):
-        self.bus, self.address = bus, address
-        self.functions = int(smbus2.I2cFunc.I2C | smbus2.I2cFunc.SMBUS_EMUL)
-        self.longest, self.repeats_start = 8192, True
-        self.failures, self.transfers, self.requests = {}, [], []
-        self._chosen = self._register = None
+    failures: dict = field(default_factory=dict)
+    requests: list = field(default_factory=list)
 
     def ioctl(self, fd, request, argument):
         os.fstat(fd)
         self.requests.append(request)
-        if request in self.failures:
-            raise _os_error(self.failures[request])
-        answer = {
-            smbus2.I2C_FUNCS: self._functions,
-            smbus2.I2C_SLAVE: self._choose,
-            smbus2.I2C_SMBUS: self._smbus,
-            smbus2.I2C_RDWR: self._rdwr,
-        }[request]
-        answer(argument)
+        value = argument if isinstance(argument, int) else 0
+        pointer = ctypes.c_void_p(0 if isinstance(argument, int) else ctypes.addressof(argument))
+        number = self.failures.get(request) or self.answer(Memory(ctypes.addressof(pointer), 8), request, value)
+        if number:
+            raise OSError(number, os.strerror(number))
         return 0
-
-    def _functions(self, argument):
-        assert isinstance(argument, ctypes.c_ulong)
-        argument.value = self.functions
-
-    def _choose(self, address):
-        self._chosen = address
-
-    def _smbus(self, argument):
-        self._acknowledge(self._chosen)
-        if argument.size == smbus2.I2C_SMBUS_BYTE:
-            if argument.read_write == smbus2.I2C_SMBUS_WRITE:
-                self._register = argument.command
-            else:
-                argument.data.contents.byte = self.bus.read(self._register, 1).data[0]
-            return
-        block = argument.data.contents.block
-        if argument.size == smbus2.I2C_SMBUS_BYTE_DATA:
-            assert argument.read_write == smbus2.I2C_SMBUS_READ
-            if not self.repeats_start:
-                raise _os_error(errno.EOPNOTSUPP)
-            argument.data.contents.byte = self.bus.read(argument.command, 1).data[0]
-            return
-        assert argument.size == smbus2.I2C_SMBUS_I2C_BLOCK_DATA
-        self.transfers.append([(argument.read_write, block[0])])
-        if argument.read_write == smbus2.I2C_SMBUS_WRITE:
-            self.bus.write(argument.command, bytes(block[1 : 1 + block[0]]))
-        else:
-            block[1 : 1 + block[0]] = list(self.bus.read(argument.command, block[0]).data)
-
-    def _rdwr(self, argument):
-        messages = [argument.msgs[i] for i in range(argument.nmsgs)]
-        if len(messages) > 1 and not self.repeats_start:
-            raise _os_error(errno.EOPNOTSUPP)
-        for message in messages:
-            self._acknowledge(message.addr)
-            if message.len > 8192:
-                raise _os_error(errno.EINVAL)
-            if message.len > self.longest:
-                raise _os_error(errno.EOPNOTSUPP)
-        self.transfers.append([(m.flags, m.len) for m in messages])
-        if any(m.flags & I2C_M_RD for m in messages[:-1]):
-            raise _os_error(errno.EOPNOTSUPP)
-        for message in messages:
-            if message.flags & I2C_M_RD:
-                ctypes.memmove(message.buf, self.bus.read(self._register, message.len).data, message.len)
-                continue
-            self._register, *data = bytes(message)
-            if data:
-                self.bus.write(self._register, bytes(data))
-
-    def _acknowledge(self, address):
-        if address != self.address:
-            raise _os_error(errno.EREMOTEIO)
-
-
-def _os_error(number):
-    return OSError(number, os.strerror(number))
 
 
 @pytest.fixture

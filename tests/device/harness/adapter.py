@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import errno
 import struct
-from dataclasses import dataclass
-from typing import Any
-
-from umockdev import Memory
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from mpucal.errors import BusError, NoAnswer
+
+if TYPE_CHECKING:
+    from umockdev import Memory
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE, I2C_TENBIT, I2C_FUNCS = 0x0701, 0x0702, 0x0703, 0x0704, 0x0705
 I2C_SLAVE_FORCE, I2C_RDWR, I2C_PEC, I2C_SMBUS = 0x0706, 0x0707, 0x0708, 0x0720
@@ -37,7 +38,8 @@ class Adapter:
     ----------
     bus : of the chip. address : of the chip. functions : that the adapter reports.
     bound : addresses that a driver of the kernel holds. pi : one read message at most, and that last.
-    fails : errno of every transfer from now on, 0: none.
+    longest : message that it transfers [bytes]. repeats_start : it transfers two messages at once.
+    fails : errno of every transfer from now on, 0: none. transfers : (flags, bytes) of each message of the last ones.
     """
 
     bus: Any
@@ -45,8 +47,12 @@ class Adapter:
     functions: int = FUNC_I2C | FUNC_SMBUS
     bound: frozenset[int] = frozenset()
     pi: bool = True
+    longest: int = MAX_BYTES
+    repeats_start: bool = True
     fails: int = 0
+    transfers: list[list[tuple[int, int]]] = field(default_factory=list)
     _chosen: int = -1
+    _register: int = 0
 
     def answer(self, memory: Memory, request: int, value: int) -> int:
         """Answer an ioctl: 0, or an errno."""
@@ -60,6 +66,10 @@ class Adapter:
         if request == I2C_RDWR:
             return self._tried(self._rdwr, _there(memory, RDWR.size))
         return 0 if request in (I2C_RETRIES, I2C_TIMEOUT, I2C_TENBIT, I2C_PEC) else errno.ENOTTY
+
+    def is_there(self, address: int) -> bool:
+        """Return True if a chip acknowledges this address."""
+        return address == self.address
 
     def _choose(self, address: int, force: bool) -> int:
         if address > 0x7F:
@@ -81,13 +91,16 @@ class Adapter:
 
     def _smbus(self, argument: Memory) -> int:
         reads, command, size, _ = SMBUS.unpack(argument.bytes())
-        if self._chosen != self.address:
+        if not self.is_there(self._chosen):
             return NOBODY
         if size == QUICK:
             return 0
         if size == BYTE and not reads:
+            self._register = command
             self.bus.write(command, b"")
             return 0
+        if reads and size != BYTE and not self.repeats_start:
+            return errno.EOPNOTSUPP
         data = argument.at(8, UNION_BYTES)
         if data is None or size not in (BYTE, BYTE_DATA, WORD_DATA, I2C_BLOCK_DATA):
             return errno.EOPNOTSUPP
@@ -95,8 +108,9 @@ class Adapter:
         count = {BYTE: 1, BYTE_DATA: 1, WORD_DATA: 2}.get(size) or data.bytes()[0]
         if not 0 < count <= BLOCK_BYTES:
             return errno.EINVAL
+        self.transfers.append([(reads, count)])
         if reads:
-            data.write(self.bus.read(0 if size == BYTE else command, count).data, offset=int(block))
+            data.write(self.bus.read(self._register if size == BYTE else command, count).data, offset=int(block))
         else:
             self.bus.write(command, data.bytes()[int(block) :][:count])
         return 0
@@ -113,19 +127,21 @@ class Adapter:
             return errno.EINVAL
         if self.pi and any(flags & M_RD for _, flags, _, _ in messages[:-1]):
             return errno.EOPNOTSUPP
-        if any(address != self.address for address, _, _, _ in messages):
+        if (count > 1 and not self.repeats_start) or any(length > self.longest for _, _, length, _ in messages):
+            return errno.EOPNOTSUPP
+        if not all(self.is_there(address) for address, _, _, _ in messages):
             return NOBODY
-        register = 0
+        self.transfers.append([(flags, length) for _, flags, length, _ in messages])
         for i, (_, flags, length, _) in enumerate(messages):
             data = table.at(MESSAGE.size * i + 8, length)
             if data is None:
                 return errno.EFAULT
             if flags & M_RD:
-                data.write(self.bus.read(register, length).data)
+                data.write(self.bus.read(self._register, length).data)
             else:
-                register, *values = data.bytes()
+                self._register, *values = data.bytes()
                 if values:
-                    self.bus.write(register, bytes(values))
+                    self.bus.write(self._register, bytes(values))
         return 0
 
 
