@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..chip.families import PARTS, Part
+from ..chip.families import MPU6050, PARTS, Part
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS, mps2_per_lsb, rad_s_per_lsb
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
@@ -165,6 +165,19 @@ def mount_matrix(texts: Texts, kind: str) -> Vector:
         if 0.1 < abs(np.linalg.det(matrix)) < 10:
             return matrix
     raise ChipError(f"{name} is {texts[name]!r}, which is not a mount matrix", "correct the device tree")
+
+
+def read_calibbias(texts: Texts) -> tuple[int, int, int] | None:
+    """Return calibbias, the words of an MPU-6050's offset registers; None without it.
+
+    For the other families the driver reads y and z at wrong addresses.
+    """
+    words = [texts.get(f"{ACCEL}_{axis}_calibbias", "") for axis in AXES]
+    part = part_of(texts)
+    if part is None or part.family is not MPU6050 or not all(word.lstrip("-").isdecimal() for word in words):
+        return None
+    x, y, z = map(int, words)
+    return x, y, z
 
 
 def parse_available(text: str) -> list[float]:

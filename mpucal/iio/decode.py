@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..chip.access import Transaction
-from ..chip.bit_flips import BitFlipFilter
-from ..chip.families import MPU6050
-from ..clocks.sample_clock import NS
-from ..data import Recording, Samples, Sensor, Vector
+from ..data import Recording, Samples, Sensor
 from ..errors import ChipError, RecordingError
 from .attributes import (
     ACCEL,
@@ -20,23 +16,20 @@ from .attributes import (
     GYRO,
     TEMP,
     TIMESTAMP,
-    USUAL_BITS,
     SensorScale,
     chip_name,
     mount_matrix,
     parse_number,
     part_of,
+    read_calibbias,
     read_number,
     read_scale,
 )
-from .scan_elements import FrameLayout, ScanElement, StreamAligner, Times
+from .sample_run import ROW, SampleRun
+from .scan_elements import FrameLayout, ScanElement
 
-# Samples are missing if the next one is so many intervals later.
-GAP_INTERVALS = 1.5
 # A buffer with another clock than the host's monotonic one is off by more.
 OTHER_CLOCK_NS = 5_000_000_000
-# A row of both sensors: three counts and a mark of each.
-ROW = 8
 LISTING = "/"
 ENABLE, FREQUENCY = "buffer/enable", "sampling_frequency"
 
@@ -68,14 +61,8 @@ class IioDecoder:
         self._name = name
         self._devices: dict[str, _DeviceState] = {}
         self._scales: dict[str, tuple[str, SensorScale]] = {}
-        self._streams: dict[str, int] = {}
-        self._aligned = StreamAligner([])
-        self._flips: BitFlipFilter
-        self._waiting: tuple[Times, Vector]
-        self._gyro_to_accel: Vector | None = None
+        self._run: SampleRun | None = None
         self._temperature = np.nan
-        self._last_ns: int | None = None
-        self._gap_next = False
         self.sensor = Sensor()
         self._samples: list[Samples] = []
         self._new: list[Samples] = []
@@ -164,7 +151,7 @@ class IioDecoder:
             accel_range_g=accel.full_scale,
             gyro_range_dps=self.scale(GYRO)[1].full_scale,
             rate_hz=self.rate_hz(device),
-            accel_offsets=self._calibbias(texts),
+            accel_offsets=read_calibbias(texts),
         )
 
     def _start_buffer(self, device: str) -> FrameLayout:
@@ -178,26 +165,22 @@ class IioDecoder:
             raise ChipError(
                 f"the buffer of {device} has no {min(missing)}", "use --trigger none, which polls, and record again"
             )
-        self._start({of: 8 // len(set(devices.values())) for of in devices.values()})
+        self._start({of: ROW // len(set(devices.values())) for of in devices.values()})
         return FrameLayout(enabled.values())
 
-    def _start(self, widths: dict[str, int]) -> None:
+    def _start(self, widths: dict[str, int]) -> SampleRun:
         # The attributes apply from here on; at the end the driver restores the old ones.
         self._scales = {}
         self.sensor = self._describe_sensor()
-        self._streams = {name: i for i, name in enumerate(widths)}
-        self._aligned = StreamAligner(list(widths.values()))
-        self._flips = BitFlipFilter(ROW)
-        self._waiting = np.zeros(0, np.int64), np.zeros((0, ROW))
         accel, gyro = (mount_matrix(self.texts(self.scale(kind)[0]), kind) for kind in (ACCEL, GYRO))
-        self._gyro_to_accel = (
-            None if np.array_equal(accel, gyro) else np.asarray(np.linalg.solve(accel, gyro), np.float64)
-        )
-        self._last_ns, self._gap_next = None, bool(self._samples)
+        turned = None if np.array_equal(accel, gyro) else np.asarray(np.linalg.solve(accel, gyro), np.float64)
+        scales = self.scale(ACCEL)[1], self.scale(GYRO)[1]
+        self._run = SampleRun(*scales, turned, widths, self.sensor.rate_hz, gap_next=bool(self._samples))
+        return self._run
 
     def _add_frames(self, device: str, data: bytes, t_ns: int) -> None:
-        held = self._devices.get(device)
-        if held is None or held.layout is None or not data:
+        held, run = self._devices.get(device), self._run
+        if held is None or held.layout is None or run is None or device not in run.widths or not data:
             return
         columns = held.layout.columns(data)
         times = columns[TIMESTAMP]
@@ -212,8 +195,8 @@ class IioDecoder:
                 parts += [counts, scales.clipped(counts)[:, None]]
         if TEMP in columns:
             self._set_temperature(device, float(columns[TEMP][-1]))
-        self._aligned.add(self._streams[device], times + held.offset_ns, np.concatenate(parts, axis=1))
-        self._deliver()
+        run.add(device, times + held.offset_ns, np.concatenate(parts, axis=1))
+        self._deliver(run)
 
     def _add_count(self, channel: str, text: str, t_ns: int) -> None:
         """Add a polled count of one channel, which has its own time."""
@@ -224,75 +207,26 @@ class IioDecoder:
         names = [f"{kind}_{axis}" for kind in (ACCEL, GYRO) for axis in AXES]
         if channel not in names:
             return
-        if channel not in self._streams:
-            self._start(dict.fromkeys(names, 2))
+        run = self._run
+        if run is None or channel not in run.widths:
+            run = self._start(dict.fromkeys(names, 2))
         count = np.array([[parse_number(channel, text)]])
         mark = self.scale(channel[:-2])[1].clipped(count)[:, None]
-        self._aligned.add(self._streams[channel], np.array([t_ns]), np.hstack((count, mark)))
+        run.add(channel, np.array([t_ns]), np.hstack((count, mark)))
         if channel == names[-1]:
-            self._deliver()
+            self._deliver(run)
 
-    def _deliver(self) -> None:
-        t_ns, values = self._aligned.take()
-        if values.shape[1] > ROW:
-            # Polled channels have a count and a mark each.
-            counts, marks = values[:, ::2], values[:, 1::2]
-            values = np.column_stack((counts[:, :3], marks[:, :3].max(1), counts[:, 3:], marks[:, 3:].max(1)))
-        accel, gyro = self.scale(ACCEL)[1], self.scale(GYRO)[1]
-        # Interpolated counts are rounded too, for the checks of single bits.
-        values[:, 3::4] = np.ceil(values[:, 3::4])
-        t_ns, counts = self._repaired(t_ns, np.round(values))
-        if not len(t_ns):
-            return
-        rates = (counts[:, 4:7] + gyro.offset) * gyro.scale
-        samples = Samples(
-            np.asarray(t_ns * NS, np.float64),
-            (counts[:, :3] + accel.offset) * accel.scale,
-            rates if self._gyro_to_accel is None else rates @ self._gyro_to_accel.T,
-            np.full(len(t_ns), self._temperature),
-            self._gaps(t_ns),
-            counts[:, 3] > 0,
-            counts[:, 7] > 0,
-        )
-        self._last_ns = int(t_ns[-1])
-        self.gaps += int(samples.gap.sum())
-        self._samples.append(samples)
-        self._new.append(samples)
-
-    def _repaired(self, t_ns: Times, rows: Vector) -> tuple[Times, Vector]:
-        """Return times (n,) and rows (n, ROW) without flipped bits; the last row waits while it may hold one."""
-        if max(self.scale(kind)[1].bits or 0 for kind in (ACCEL, GYRO)) > USUAL_BITS:
-            return t_ns, rows
-        before, waiting = self._waiting[0], self._waiting[1].astype(np.int16)
-        repaired = self._flips.repair(rows.astype(np.int16), waiting)
-        t_ns, rows = np.concatenate((before, t_ns)), np.concatenate((waiting, repaired)).astype(np.float64)
-        ready = len(rows) - self._flips.is_open
-        self._waiting = t_ns[ready:], rows[ready:]
-        return t_ns[:ready], rows[:ready]
-
-    def _gaps(self, t_ns: Times) -> np.ndarray:
-        """Return (n,) True where the buffer dropped samples; polling has no fixed interval."""
-        rate_hz = self.sensor.rate_hz
-        steps = np.diff(t_ns, prepend=t_ns[0] if self._last_ns is None else self._last_ns)
-        longest_ns = math.inf if rate_hz is None or len(self._streams) > 2 else GAP_INTERVALS * 1e9 / rate_hz
-        gaps = np.asarray(steps > longest_ns)
-        gaps[0] |= self._gap_next
-        self._gap_next = False
-        return gaps
+    def _deliver(self, run: SampleRun) -> None:
+        samples = run.take(self._temperature)
+        if len(samples):
+            self.gaps += int(samples.gap.sum())
+            self._samples.append(samples)
+            self._new.append(samples)
 
     def _set_temperature(self, device: str, count: float) -> None:
         texts = self.texts(device)
         scale = read_number(texts, f"{TEMP}_scale", default=1.0)
         self._temperature = (count + read_number(texts, f"{TEMP}_offset", default=0.0)) * scale / 1000
-
-    def _calibbias(self, texts: dict[str, str]) -> tuple[int, int, int] | None:
-        words = [texts.get(f"{ACCEL}_{axis}_calibbias", "") for axis in AXES]
-        part = part_of(texts)
-        # For the other families the driver reads y and z at wrong addresses.
-        if part is None or part.family is not MPU6050 or not all(word.lstrip("-").isdecimal() for word in words):
-            return None
-        x, y, z = map(int, words)
-        return x, y, z
 
 
 def decode(accesses: Iterable[Transaction], name: str = "recording") -> Recording:
