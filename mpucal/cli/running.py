@@ -26,7 +26,7 @@ def open_runner(source: OpenedSource, capture: Path, person: Console, checking: 
             person.say(f"  {source.recovered}")
         yield Runner(
             measuring.source,
-            source.talk(person),
+            source.operator(person),
             measuring.note,
             source.plan,
             source.listeners,

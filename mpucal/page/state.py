@@ -34,26 +34,17 @@ class Result:
 def state(view: View, said: Said | None = None) -> dict[str, Any]:
     """Return the view's values and what was `said` last by name, not yet as JSON; see `changes`."""
     return {
+        **vars(view),
         "moment": view.moment,
         "headline": in_words(view),
-        "prompt": view.prompt,
         "said": said,
         "confirming": view.confirming,
         "flat": KINDS[view.board].picture,
-        "meter": view.meter,
         "eye": view.eye._asdict(),
         "countdown": view.waiting,
-        "progress": view.progress,
         "count": None if view.progress is None else count(view.progress),
         "line": view.line,
-        "knowledge": view.knowledge,
         "known": None if view.knowledge is None else known(view.knowledge),
-        "caution": view.caution,
-        "held": view.held,
-        "seen": view.seen,
-        "verified": view.verified,
-        "notes": view.notes,
-        "begun_s": view.begun_s,
     }
 
 

@@ -19,7 +19,7 @@ from ..chip.registers import WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .chip import OpenedChip
 from .host_bus import ADDRESSES, TRIES, RegisterBus, converting, find_chip, lock_device
-from .i2c_errors import DEVICES, no_answer_error, opening_error, transfer_error
+from .i2c_errors import DEVICES, device_error, no_answer_error, other_buses, transfer_error
 from .kind import Request
 
 # Longest message of i2c-dev.
@@ -88,7 +88,7 @@ class I2cBus(RegisterBus):
         self._path = path
         self._smbus = smbus2.SMBus()
         try:
-            with converting(lambda error: opening_error(error, self._path)):
+            with converting(lambda error: device_error(error, path, "I2C bus", "i2c", other_buses())):
                 self._smbus.open(self._path)
             self._blocks = not self._smbus.funcs & smbus2.I2cFunc.I2C
             if self._blocks and not self._smbus.funcs & smbus2.I2cFunc.SMBUS_READ_I2C_BLOCK:

@@ -49,11 +49,6 @@ def device_error(error: OSError, path: str, kind: str, group: str, there: str) -
     return BusError(f"{path} does not work ({error.strerror})", "check the wires and the driver, and start again")
 
 
-def opening_error(error: OSError, path: str) -> BusError:
-    """Convert the error of an adapter at `path` that could not be opened."""
-    return device_error(error, path, "I2C bus", "i2c", _other_buses())
-
-
 def transfer_error(error: OSError, path: str, address: int) -> BusError:
     """Convert the error of a failed transfer with the chip at `address`."""
     if error.errno != errno.EBUSY and path.startswith("/") and not Path(path).exists():
@@ -97,7 +92,7 @@ def _number(path: str) -> str:
     return number if number.isdecimal() else ""
 
 
-def _other_buses() -> str:
+def other_buses() -> str:
     """Return the remedy for a wrong bus: the buses that there are."""
     buses = sorted(str(path) for path in DEVICES.glob("i2c-*"))
     if buses:

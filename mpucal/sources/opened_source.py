@@ -127,7 +127,7 @@ class OpenedSource(ABC):
         """Return the entries for the head of a capture."""
         return {DRIVER: self.version, **({SOURCE: dict(self.words)} if self.words else {})}
 
-    def talk(self, person: Operator) -> Operator:
+    def operator(self, person: Operator) -> Operator:
         """Return the operator who presses the keys: the given one, or the one in the capture."""
         parts = self.parts
         if parts is None:

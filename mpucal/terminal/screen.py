@@ -170,12 +170,11 @@ class Painter:
         if size != self._size:
             self._size, self._painted = size, []
         painted = [self._encoded(line) for line in lines]
-        before = [*self._painted, *[""] * (len(painted) - len(self._painted))]
-        fresh = not self._painted
+        fresh = len(self._painted) != len(painted)
         rows = [
             f"{_ROW.format(k + 1)}{new}{_TO_THE_END}"
-            for k, (old, new) in enumerate(zip(before, painted, strict=False))
-            if new != old or fresh
+            for k, new in enumerate(painted)
+            if fresh or new != self._painted[k]
         ]
         self._painted = painted
         text = ("\x1b[2J" if fresh else "") + "".join(rows) + ("\a" if bell else "")
