@@ -35,9 +35,9 @@ from ..data import (
 EXACTLY = 0.02
 # Odds at which a fault of the bits is believed.
 ODDS = 1e6
-SIGN, BYTE = 0x80, 0x100
+SIGN = 0x80
 
-Counts = NDArray[np.int_]
+Counts = NDArray[np.int32]
 
 
 class Words(NamedTuple):
@@ -82,7 +82,7 @@ def _counts(values: Vector, lsb: float) -> Counts | None:
         # Rates that were not measured are NaN, and fail the comparison.
         if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= ACCEL_COUNTS):
             return None
-    return counts.astype(np.int64)
+    return counts.astype(np.int32)
 
 
 def decode(recording: Recording) -> Decoded:
@@ -112,7 +112,7 @@ def decode(recording: Recording) -> Decoded:
 
 
 def _corrected(counts: Counts) -> Counts:
-    return np.asarray(counts + BYTE * ((counts & SIGN) > 0))
+    return np.asarray(counts + 2 * (counts & SIGN))
 
 
 def _log_odds(counts: Counts, gap: Mask) -> Vector:

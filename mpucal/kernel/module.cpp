@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "../aligned.hpp"
+#include "bits.hpp"
 #include "filter.hpp"
 #include "hand.hpp"
 #include "runs.hpp"
@@ -303,6 +304,25 @@ NB_MODULE(_kernel, m) {
       },
       nb::arg("rate"), nb::arg("bias"), nb::arg("dt"),
       "Return rotation vectors divided by their times (n, 3) of the steps to the last n rates; the bias stays in.");
+
+  m.def(
+      "stuck_odds",
+      [](const nb::ndarray<const std::int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& counts,
+         const nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>& gap,
+         const nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>& edges, double errors,
+         double sound) {
+        const std::size_t n = counts.shape(0), k = edges.size();
+        if (counts.shape(1) != 3 || gap.size() != n || n < 1)
+          throw std::invalid_argument("counts are (n, 3), gap is (n,)");
+        for (std::size_t i = 0; i < k; ++i)
+          if (edges(i) < (i ? edges(i - 1) : 0) || static_cast<std::size_t>(edges(i)) >= n)
+            throw std::invalid_argument("edges rise within the samples");
+        std::vector<double> odds(kBits * k * 3);
+        stuck_odds(aligned(counts), gap.data(), n, aligned(edges), k, errors, sound, odds.data());
+        return give(std::move(odds), {kBits, k, 3});
+      },
+      nb::arg("counts"), nb::arg("gap"), nb::arg("edges"), nb::arg("errors"), nb::arg("sound"),
+      "Return log odds (16, k, 3) that bits of counts (n, 3) are stuck, in pieces of steps from `edges` (k,) on.");
 
   m.def("instruction_set", []() -> std::string { return evaluate == evaluate_portable ? "portable" : "avx2"; },
         "Return the build of the filter in use, portable or avx2.");

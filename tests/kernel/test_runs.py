@@ -54,6 +54,23 @@ def test_moving_statistics_are_of_whole_windows(x, size):
             _kernel.moving_statistics(x, wrong)
 
 
+def test_odds_of_stuck_bits():
+    rng, errors, sound = np.random.default_rng(3), 0.1, 0.98
+    counts, gap = rng.normal(0.0, (3.0, 300.0, 15000.0), (400, 3)).astype(np.int32), np.arange(400) % 97 == 50
+    edges = np.array([0, 133, 134, 260])
+    changed, steps = (counts[1:] ^ counts[:-1]) & 0xFFFF, np.maximum(np.abs(np.diff(counts, axis=0)), 1)
+    for bit in range(16):
+        halves = steps / 2.0**bit
+        share = np.where(halves < 2.0, np.clip(2.0 / halves - 1.0, errors, sound), 0.5)
+        odds = np.log(np.where(changed >> bit & 1, errors / share, (1.0 - errors) / (1.0 - share)))
+        may = changed >= 2 << bit if bit < 15 else np.abs(np.diff(counts & 0x7FFF, axis=0)) > 1 << 14
+        wanted = np.add.reduceat(np.where(may & ~gap[1:, None], odds, 0.0), edges)
+        np.testing.assert_allclose(_kernel.stuck_odds(counts, gap, edges, errors, sound)[bit], wanted, atol=1e-11)
+    for wrong in ([5, 3], [-1], [400]):
+        with pytest.raises(ValueError, match="edges rise"):
+            _kernel.stuck_odds(counts, gap, np.array(wrong), errors, sound)
+
+
 def test_mean_rates_follow_a_coning_body():
     bias, angle, slow, t = np.array([0.1, -0.2, 0.3]), 0.2, 20.0, np.arange(302) / 100.0
     round_, zero = np.stack([np.cos(slow * t), np.sin(slow * t)]), np.zeros_like(t)

@@ -132,6 +132,13 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
         _kernel.moving_mean: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
         _kernel.moving_statistics: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
         _kernel.mean_rates: lambda n, rng: (some(n + 1, rng, 3), np.zeros(3), some(n, rng)),
+        _kernel.stuck_odds: lambda n, rng: (
+            rng.integers(-(1 << 15), 1 << 15, (n, 3)).astype(np.int32),
+            rng.random(n) < 0.1,
+            np.sort(rng.integers(0, n + 1, 4)),
+            0.1,
+            0.98,
+        ),
         _text.lines: lambda n, rng: (some(n, rng, int(rng.integers(0, 5))),),
         _text.numbers: lambda n, rng: (lines(n, rng), 3, [0, 2]),
         _packed.unpacked: lambda n, rng: (bytes(rng.integers(0, 140, n, np.uint8)),),

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...data import Mask, Vector
+from ...kernel import _kernel
 from ...reasons import Reason, reason
 from ..evidence import Evidence
 from ..words import EXACTLY, ODDS, Counts, Words
@@ -25,7 +26,7 @@ ERRORS, SOUND = 0.1, 0.98
 PIECES = 64
 # Fewer dead low bits do not matter; so many on all axes are a byte that was not read, and no coarse sensor.
 DEAD_BITS, LOST_BYTE = 3, 7
-BITS, WORD = 16, 0xFFFF
+BITS = 16
 # Where the counts are not known: so many steps of the other axes make a step that is odd. A smaller one [m/s^2, rad/s]
 # may be that of a float32, which is coarser the larger a value is.
 ODD_STEPS, LEAST_ODD_STEP = 8.0, 1e-3
@@ -91,19 +92,8 @@ def _stuck_bits(counts: Counts, gap: Mask) -> tuple[Mask, Counts]:
 
     Across a gap, as between files of single faces, nothing changes.
     """
-    changed = np.where(gap[1:, None], 0, (counts[1:] ^ counts[:-1]) & WORD)
-    steps = np.abs(np.diff(counts, axis=0))
-    # without its sign a value that passes zero leaps from one end of the range to the other
-    leaps = (np.abs(np.diff(counts & WORD >> 1, axis=0)) > 2**14) & ~gap[1:, None]
-    edges = np.unique(np.linspace(0, len(changed), PIECES, endpoint=False).astype(int))
-    evidence = np.empty((BITS, len(edges), 3))
-    for bit in range(BITS):
-        may = changed >= 2 << bit if bit < BITS - 1 else leaps
-        # A value anywhere in the bit's period, of two halves, crosses its end; longer steps leave the bit to chance.
-        halves = np.maximum(steps, 1) / 2.0**bit
-        sound = np.where(halves < 2.0, np.clip(2.0 / halves - 1.0, ERRORS, SOUND), 0.5)
-        odds = np.where(changed & 1 << bit > 0, np.log(ERRORS / sound), np.log((1.0 - ERRORS) / (1.0 - sound)))
-        evidence[bit] = np.add.reduceat(np.where(may, odds, 0.0), edges)
+    edges = np.unique(np.linspace(0, len(counts) - 1, PIECES, endpoint=False).astype(np.int64))
+    evidence = _kernel.stuck_odds(counts, gap, edges, ERRORS, SOUND)
     # of all pieces from one on
     after = np.cumsum(evidence[:, ::-1], axis=1)[:, ::-1]
     first, stuck = edges[after.argmax(1)], after.max(1) > math.log(ODDS)
