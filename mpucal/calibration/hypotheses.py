@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -69,12 +70,13 @@ class Hypothesis(NamedTuple):
 
 # Every gyroscope's bias walks, and few step or drift steadily.
 RARELY = 0.1
+# Those of one shape over the same groups are beside each other, and computed together.
 HYPOTHESES = (
     Hypothesis("accelerometer", "step"),
     Hypothesis("scale", "step"),
     Hypothesis("mount", "step"),
-    Hypothesis("accelerometer", "walk"),
     Hypothesis("gyroscope", "step", prior=RARELY),
+    Hypothesis("accelerometer", "walk"),
     Hypothesis("gyroscope", "walk"),
     Hypothesis("accelerometer", "pulse"),
     Hypothesis("accelerometer", "each"),
@@ -154,7 +156,12 @@ def explain(parts: Parts, D: Vector) -> list[Explanation]:
     if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
         return []
     groups = {number: _Groups.of(parts, number) for number in {each.groups for each in HYPOTHESES}}
-    found = [_explain(each, groups[each.groups], parts, D) for each in HYPOTHESES if len(groups[each.groups].start) > 1]
+    found = [
+        each
+        for (_, number), alike in groupby(HYPOTHESES, key=lambda each: (each.shape, each.groups))
+        if len(groups[number].start) > 1
+        for each in _explain(list(alike), groups[number], parts, D)
+    ]
     total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # with nothing, whose share is 1
     found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
     found.sort(key=lambda each: -each.weight)
@@ -199,71 +206,69 @@ class _Likelihood(NamedTuple):
 
     Attributes
     ----------
-    eigenvalues, scores : (m, d). follow : (m, d, p), by which theta follows -x.
-    shapes : (m, k, r), which weighs r numbers of each axis in k groups. U : (m, 3 r, d) eigenvectors.
+    eigenvalues, scores : (h, m, d) of h hypotheses. follow : (h, m, d, p), by which theta follows -x.
+    U : (h, m, r, 3, d) eigenvectors, of r numbers of each axis.
     """
 
     eigenvalues: Vector
     scores: Vector
     follow: Vector
-    shapes: Vector
     U: Vector
 
     @classmethod
-    def of(cls, hypothesis: Hypothesis, groups: _Groups, parts: Parts, D: Vector) -> _Likelihood:
-        """Eliminate theta from the parts' scores."""
-        B = _directions(hypothesis.what, D, len(parts.H))
-        to_theta = groups.fisher @ B  # (k, p, 3)
-        k, p = to_theta.shape[:2]
-        across = to_theta.transpose(1, 0, 2).reshape(p, 3 * k)
-        follow = across.T @ parts.covariance
-        S = -(follow @ across).reshape(k, 3, k, 3)
-        S[np.arange(k), :, np.arange(k)] += B.T @ to_theta
-        scores = follow @ parts.left - (groups.gradient @ B).ravel()
+    def of(cls, B: Vector, shapes: Vector, groups: _Groups, parts: Parts) -> _Likelihood:
+        """Eliminate theta from the parts' scores.
 
-        shapes = _shapes(hypothesis.shape, 0.5 * (groups.start + groups.end))
-        m, _, r = shapes.shape
-        weights = shapes.transpose(0, 2, 1).reshape(m * r, k)
-        once = (weights @ S.reshape(k, 9 * k)).reshape(m, r, 3, k, 3).swapaxes(3, 4)
-        twice = (once.reshape(m, 9 * r, k) @ shapes).reshape(m, r, 3, 3, r).swapaxes(3, 4)
-        eigenvalues, U = np.linalg.eigh(twice.reshape(m, 3 * r, 3 * r))
-        U *= (eigenvalues > UNSEEN * eigenvalues.max())[:, None]
-        of_x = (weights @ np.column_stack([scores.reshape(k, 3), follow.reshape(k, 3 * p)])).reshape(m, r, -1)
-        scores, follow = of_x[:, :, :3].reshape(m, 1, 3 * r), of_x[:, :, 3:].reshape(m, 3 * r, p)
-        return cls(np.maximum(eigenvalues, 0.0), (scores @ U)[:, 0], U.swapaxes(1, 2) @ follow, shapes, U)
-
-    def delta(self, m: int, x: Vector) -> Vector:
-        """Return (k, 3) of a shape and x (d,)."""
-        return np.asarray(self.shapes[m] @ (self.U[m] @ x).reshape(-1, 3))
-
-    def mean(self) -> Vector:
-        """Return (m, d, 3), the mean of delta over the groups for each component of x."""
-        m, _, r = self.shapes.shape
-        of_x = self.U.reshape(m, r, 3, -1) * self.shapes.mean(axis=1)[:, :, None, None]
-        return np.asarray(of_x.sum(axis=1).swapaxes(1, 2))
+        B : (h, p, 3) derivatives of the parameters. shapes : (m, k, r) weights of r numbers of each axis in k groups.
+        """
+        (h, p, _), (m, k, r) = B.shape, shapes.shape
+        weights = shapes.swapaxes(1, 2)
+        pairs, weights = (weights[:, :, None] * weights[:, None]).reshape(-1, k), weights.reshape(-1, k)
+        across = (groups.fisher.reshape(-1, p) @ np.hstack(list(B))).reshape(k, p, h, 3).transpose(2, 0, 3, 1)
+        own = across.reshape(h, -1, p) @ B  # (h, 3 k, 3)
+        across = (weights @ across.reshape(h, k, -1)).reshape(h, m, 3 * r, p)
+        follow = across @ parts.covariance
+        S = (pairs @ own.reshape(h, k, 9)).reshape(h, m, r, r, 3, 3).swapaxes(3, 4).reshape(h, m, 3 * r, 3 * r)
+        eigenvalues, U = np.linalg.eigh(S - follow @ across.swapaxes(2, 3))
+        U *= (eigenvalues > UNSEEN * eigenvalues.max(axis=(1, 2), keepdims=True))[:, :, None]
+        of_x = follow @ parts.left - (weights @ (groups.gradient @ B)).reshape(h, m, 3 * r)
+        scores, follow = (of_x[:, :, None] @ U)[:, :, 0], U.swapaxes(2, 3) @ follow
+        return cls(np.maximum(eigenvalues, 0.0), scores, follow, U.reshape(h, m, r, 3, -1))
 
 
-def _explain(hypothesis: Hypothesis, groups: _Groups, parts: Parts, D: Vector) -> Explanation:
-    likelihood = _Likelihood.of(hypothesis, groups, parts, D)
-    q = LARGEST[hypothesis.what] ** 2 * VARIANCES
-    # (m, q, d): by shape, by variance, by component
-    eigenvalues, c = likelihood.eigenvalues[:, None], likelihood.scores[:, None]
-    variance = 1.0 / (eigenvalues + 1.0 / q[:, None])
-    log_p = 0.5 * np.sum(c**2 * variance - np.log1p(q[:, None] * eigenvalues), axis=2)
-    most = float(log_p.max())
+def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vector) -> list[Explanation]:
+    """Return what hypotheses of one shape over the same groups say."""
+    B = np.array([_directions(each.what, D, len(parts.H)) for each in alike])
+    shapes = _shapes(alike[0].shape, 0.5 * (groups.start + groups.end))
+    likelihood = _Likelihood.of(B, shapes, groups, parts)
+    q = np.outer([LARGEST[each.what] ** 2 for each in alike], VARIANCES)[:, None, :, None]
+    # (h, m, q, d): by hypothesis, by shape, by variance, by component
+    eigenvalues, c = likelihood.eigenvalues[:, :, None], likelihood.scores[:, :, None]
+    variance = 1.0 / (eigenvalues + 1.0 / q)
+    x = c * variance
+    log_p = 0.5 * np.sum(c * x - np.log1p(q * eigenvalues), axis=3)
+    most = log_p.max(axis=(1, 2), keepdims=True)
     p = np.exp(log_p - most)
-    evidence = most + float(np.log(p.mean()))
-    p /= p.sum()
-    m, best = (int(i) for i in np.unravel_index(int(log_p.argmax()), log_p.shape))
-    x, B = c[m, 0] * variance[m, best], _directions(hypothesis.what, D, len(parts.H))
-    delta = likelihood.delta(m, x)
+    evidence = most[:, 0, 0] + np.log(p.mean(axis=(1, 2)))
+    p /= p.sum(axis=(1, 2), keepdims=True)
     astray = -likelihood.follow
-    if hypothesis.is_change:
-        astray += likelihood.mean() @ B.T
-    away = np.einsum("mq,mqp->p", p, variance @ astray**2 + ((c * variance) @ astray) ** 2)
-    farthest = np.abs(np.vstack([np.zeros(3), delta]) @ B.T - x @ likelihood.follow[m]).max(axis=0)
-    freed = variance[m, best] @ likelihood.follow[m] ** 2 / np.diag(parts.covariance)
-    return Explanation(hypothesis, evidence, delta, groups.start, groups.end, np.sqrt(away), farthest, freed)
+    if alike[0].is_change:
+        mean = np.sum(likelihood.U * shapes.mean(axis=1)[:, :, None, None], axis=2)  # of delta over the groups
+        astray += mean.swapaxes(2, 3) @ B.swapaxes(1, 2)[:, None]
+    weighed = p[..., None] * x
+    squares = weighed.swapaxes(2, 3) @ x
+    squares[..., range(x.shape[3]), range(x.shape[3])] += np.sum(p[..., None] * variance, axis=2)
+    away = np.sum(astray * (squares @ astray), axis=(1, 2))
+    found = []
+    for k, (hypothesis, of) in enumerate(zip(alike, log_p, strict=True)):
+        m, best = np.unravel_index(of.argmax(), of.shape)
+        likeliest, follow = x[k, m, best], likelihood.follow[k, m]
+        delta = shapes[m] @ (likelihood.U[k, m] @ likeliest)
+        farthest = np.abs(np.vstack([np.zeros(3), delta]) @ B[k].T - likeliest @ follow).max(axis=0)
+        freed = variance[k, m, best] @ follow**2 / np.diag(parts.covariance)
+        times = groups.start, groups.end
+        found.append(Explanation(hypothesis, float(evidence[k]), delta, *times, np.sqrt(away[k]), farthest, freed))
+    return found
 
 
 def _directions(what: What, D: Vector, p: int) -> Vector:

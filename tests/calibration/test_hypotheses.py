@@ -98,7 +98,7 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
     """Compare with the posteriors of theta and x together, for all variances and, of a step or pulse, all times."""
     A, y, parts = linear_parts()
     k, m, p = A.shape
-    told = _explain(Hypothesis("accelerometer", shape), _Groups.of(parts, 5), parts, np.eye(3))
+    (told,) = _explain([Hypothesis("accelerometer", shape)], _Groups.of(parts, 5), parts, np.eye(3))
     windows = [[float(i <= j < i + width) for j in range(k + 1)] for width in (1, 2, 3) for i in range(k + 1)]
     shapes = {
         "walk": [np.tri(k)],
