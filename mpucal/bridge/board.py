@@ -70,7 +70,7 @@ def unframed(encoded):
 
 def is_valid(blob):
     """Return True if `blob` is valid for a reader."""
-    if len(blob) < 188 or blob[:5] != b"MPUC\1" or struct.unpack("<H", blob[6:8])[0] != len(blob):
+    if not 188 <= len(blob) <= MAX_BLOB or blob[:5] != b"MPUC\1" or struct.unpack("<H", blob[6:8])[0] != len(blob):
         return False
     if binascii.crc32(blob[:-4]) != struct.unpack("<I", blob[-4:])[0]:
         return False
@@ -210,7 +210,8 @@ class Bridge:
         self.ticks_us, self.ticks, self.now_us = ticks_us, ticks_us(), 0
         self.piece, self.inbox = bytearray(), []
         self.greeted = self.left = False
-        self.frame_bytes = self.batch = self.seq = self.index = self.drops = self.status = self.pushed_us = 0
+        self.frame_bytes = self.batch = self.seq = self.index = self.drops = self.status = 0
+        self.pushed_us = self.began_us = 0
         self.requests = {
             1: ("<4sBB", self.hello),
             2: ("<BB", self.read),
@@ -255,11 +256,12 @@ class Bridge:
         return self.now_us
 
     def reply(self, status, tail=b""):
-        """Make the payload of a reply, as a list of one."""
-        return [struct.pack("<BI", status, self.clock()) + tail]
+        """Make the payload of a reply, as a list of one; its time is the beginning of the transfer or the request."""
+        return [struct.pack("<BI", status, self.began_us) + tail]
 
     def answer(self, kind, seq, payload):
         """Carry out a request, and return the payloads of its replies."""
+        self.began_us = self.clock()
         if not self.greeted and kind != 1:
             return self.reply(NO_HELLO)
         if kind not in self.requests:
@@ -298,8 +300,7 @@ class Bridge:
         """Read registers."""
         if not 1 <= count <= MAX_READ:
             raise Failed(BAD_PAYLOAD)
-        began = struct.pack("<BI", OK, self.clock())
-        return [began + self.chip.read(register, count)]
+        return self.reply(OK, self.chip.read(register, count))
 
     def burst(self, register, count):
         """Read a register that does not auto-increment, in several replies."""
@@ -307,9 +308,9 @@ class Bridge:
             raise Failed(BAD_PAYLOAD)
         made = []
         for at in range(0, count, MAX_READ):
-            began = struct.pack("<BIH", OK, self.clock(), at)
+            self.began_us = self.clock()
             try:
-                made.append(began + self.chip.read(register, min(MAX_READ, count - at)))
+                made += self.reply(OK, struct.pack("<H", at) + self.chip.read(register, min(MAX_READ, count - at)))
             except Failed as error:
                 return made + self.reply(error.args[0])
         return made
@@ -318,9 +319,8 @@ class Bridge:
         """Write registers."""
         if not 1 <= len(data) <= MAX_WRITE:
             raise Failed(BAD_PAYLOAD)
-        began = struct.pack("<BI", OK, self.clock())
         self.chip.write(register, data)
-        return [began]
+        return self.reply(OK)
 
     def stream(self, frame_bytes, batch, seq):
         """Start or stop pushing the FIFO's content."""
@@ -328,33 +328,33 @@ class Bridge:
             raise Failed(BAD_PAYLOAD)
         self.frame_bytes, self.batch, self.seq = frame_bytes, batch, seq
         self.index = self.status = 0
-        self.pushed_us = self.clock()
+        self.pushed_us = self.began_us
         return self.reply(OK)
 
     def push(self):
         """Return the frames to push, if any are due."""
         now = self.clock()
         late = (now - self.pushed_us & 0xFFFFFFFF) >= BEAT_US
-        if self.status:
-            made = [self.frames(now)] if late else []
-        else:
+        made = []
+        if not self.status:
             try:
-                made = self.drain(now, late)
+                self.drain(made, now, late)
             except Failed as error:
-                made = [self.halt(error.args[0], now)]
+                made.append(self.halt(error.args[0], now))
+        elif late:
+            made.append(self.frames(now))
         if made:
             self.pushed_us = now
         return b"".join(made)
 
-    def drain(self, now, late):
-        """Read a running FIFO if it has enough frames, or the last message is old."""
+    def drain(self, made, now, late):
+        """Read a running FIFO if it has enough frames, or the last message is old; append the messages to `made`."""
         size = self.frame_bytes
         left = struct.unpack(">H", self.chip.read(FIFO_COUNT, 2))[0] // size
         if left > MAX_LOOK:
-            return [self.halt(OVERFLOW, now)]
+            raise Failed(OVERFLOW)
         if left < self.batch and not late:
-            return []
-        made = []
+            return
         while True:
             part = min(left, MAX_READ // size)
             data = self.chip.read(FIFO_R_W, part * size) if part else b""
@@ -363,8 +363,8 @@ class Bridge:
                 break
             made.append(self.frames(now, data, left))
         if self.chip.read(INT_STATUS, 1)[0] & 0x10:
-            return made + [self.halt(OVERFLOW, now)]
-        return made + [self.frames(now, data)]
+            raise Failed(OVERFLOW)
+        made.append(self.frames(now, data))
 
     def halt(self, status, now):
         """Count a loss, and report why the stream halted."""

@@ -14,9 +14,8 @@ from ..chip import registers as reg
 from ..chip.access import Reply
 from ..clocks.sample_clock import poll_phase
 from ..errors import BusError, NoAnswer
-from .fifo_tracker import CONTROLS, FifoTracker
+from .chip_state import CONTROLS, ChipState
 from .link import MS, Link, LinkLost
-from .link_errors import no_chip, no_reply, request_failed
 from .messages import (
     MAX_BURST,
     MAX_READ,
@@ -32,10 +31,10 @@ from .messages import (
     Stream,
     Write,
 )
-from .pending_request import Answer
 from .port import Port
+from .port_errors import WIRES, no_reply, request_failed
 from .read_ahead import ReadAhead
-from .reset_monitor import ResetMonitor
+from .requests import Answer
 
 # Four frames of 14 bytes fill one message.
 BATCH = 4
@@ -64,16 +63,18 @@ class BridgeBus:
     def __init__(self, port: Port, address: int | None = None) -> None:
         self.link = Link(port, self._on_frames)
         self._port = port
-        self._tracker = FifoTracker()
         self._ahead: ReadAhead | None = None
         self._lost = False
         self._requests = 0
-        self._monitor = ResetMonitor(self.link)
+        self._chip = ChipState(self.link)
         self._dead: BusError | None = None
         try:
             self.address = self.link.greet(address or 0).address
             if not self.address:
-                raise NoAnswer(*no_chip(port.name, address))
+                at = f"0x{address:02x}" if address else "0x68 or 0x69"
+                raise NoAnswer(
+                    f"the bridge on {port.name} answers, but no chip answers it at {at} on its I2C bus", WIRES
+                )
         except BaseException:
             port.close()
             raise
@@ -111,10 +112,9 @@ class BridgeBus:
             self._ahead = None
             requests.append(Stream(0, 0))
         requests.append(Write(register, data))
-        self._tracker.on_write(register, data)
-        self._monitor.on_write(register, data)
+        self._chip.on_write(register, data)
         has_stream = bool(self.link.bridge.features & Feature.STREAM)
-        if controls and has_stream and self._ahead is None and self._tracker.frame_bytes:
+        if controls and has_stream and self._ahead is None and self._chip.frame_bytes:
             return self._start_stream(*requests)
         return self._not_after_looks(self._ask(*requests)[-1][-1].t_ns)
 
@@ -158,12 +158,12 @@ class BridgeBus:
         requested one poll earlier, since its reply may be late. The reply's times give the rate of the bridge's clock.
         """
         t_ns = ahead.counted_ns
-        ahead_ns = self._monitor.take_answer()
-        if not self._monitor.is_waiting:
+        ahead_ns = self._chip.take_answer()
+        if not self._chip.is_waiting:
             self._wait_out_of_step()
-            self._monitor.request()
+            self._chip.request()
         overflow = reg.INT_FIFO_OFLOW * ahead.take_overflow()
-        return Reply(bytes([self._monitor.held, 0, overflow]), t_ns, None if ahead_ns is None else t_ns + ahead_ns)
+        return Reply(bytes([self._chip.int_enable, 0, overflow]), t_ns, None if ahead_ns is None else t_ns + ahead_ns)
 
     def _add_overflow(self, reply: Reply, at: int) -> Reply:
         """Return a read with INT_STATUS at `at`, in which losses on the way to the host are added as an overflow."""
@@ -187,8 +187,8 @@ class BridgeBus:
         All are sent at once, since the FIFO must not fill while the host waits for a reply.
         """
         self._lost = False
-        self._monitor.cancel()
-        frame_bytes = self._tracker.frame_bytes
+        self._chip.cancel()
+        frame_bytes = self._chip.frame_bytes
         # Prepared before the request: the first frames may come together with its reply.
         self._ahead = ReadAhead(self.link.seq_of(len(before)), frame_bytes)
         try:
@@ -210,7 +210,7 @@ class BridgeBus:
             try:
                 if self._port.now_ns() >= give_up_ns:
                     raise LinkLost(*no_reply(self._port.name))
-                self._monitor.repeat_if_overdue()
+                self._chip.repeat_if_overdue()
                 self.link.wait(min(give_up_ns, self._port.now_ns() + REPEAT_NS))
             except BusError as error:
                 self._recover(error)

@@ -13,8 +13,6 @@ from itertools import cycle
 from ..clocks.bridge_clock import BridgeClock
 from ..errors import BusError, LinkError
 from .frame import DELIMITER, Deframer, Frame
-from .latency import Latency
-from .link_errors import flooded, no_reply, other_version, restarted
 from .messages import (
     MAJOR,
     MIN_WINDOW,
@@ -31,9 +29,9 @@ from .messages import (
     Status,
     answer_of,
 )
-from .pending_request import Answer, PendingRequest
 from .port import Chunk, Port
-from .port_diagnosis import PortDiagnosis
+from .port_errors import PortDiagnosis, flooded, no_reply
+from .requests import Answer, Latency, PendingRequest
 
 MS = 1_000_000
 # Two and a half times what a bridge needs at most; the line's own latency is added.
@@ -199,7 +197,11 @@ class Link:
                 if asked is None:
                     continue
                 if not isinstance(reply, HelloReply) or reply.major != MAJOR:
-                    raise BusError(*other_version(self.port.name, reply))
+                    theirs = reply.major if isinstance(reply, HelloReply) else 0
+                    raise BusError(
+                        f"the bridge on {self.port.name} speaks version {theirs} of the protocol, and mpucal {MAJOR}",
+                        f"put a newer {'mpucal on this machine' if theirs > MAJOR else 'firmware on the bridge'}",
+                    )
                 self.clock.on_greeting(reply.t_us, chunk.t_ns)
                 self.latency.add(chunk.t_ns - asked.sent_ns)
                 return reply
@@ -220,7 +222,7 @@ class Link:
                 if each.is_answered_by(frame, reply):
                     if reply.status == Status.NO_HELLO:
                         # The bridge's clock began anew, and this time does not belong to it.
-                        raise LinkLost(*restarted(self.port.name))
+                        raise LinkLost(f"the bridge on {self.port.name} was reset", "check its cable and supply")
                     if each.sent == 1 and not each.answers and not isinstance(each.request, STORING):
                         self.latency.add(chunk.t_ns - each.sent_ns)
                     each.answers.append(Answer(reply, self.clock.bus_time(reply.t_us, chunk.t_ns), chunk.t_ns))

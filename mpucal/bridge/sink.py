@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -39,11 +40,11 @@ class BridgeSink:
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
         """Save the old blob to bridge-blob-N.bin, N being its number; `mpucal write` restores it. See Sink."""
-        held, old = self._store.state(), self._store.read()
-        if held is None or old is None:
+        held = self._store.read()
+        if held is None:
             return ()
         path = folder / BRIDGE_BLOB.name.replace("N", str(held.generation))
-        write_atomically(path, old)
+        write_atomically(path, held.data)
         return (path,)
 
     def reason_to_keep(self, calibration: Calibration) -> str | None:
@@ -55,7 +56,7 @@ class BridgeSink:
             )
         held = self._store.read()
         try:
-            old = None if held is None else Calibration.from_blob(Blob.decode(held))
+            old = None if held is None else Calibration.from_blob(Blob.decode(held.data))
         except BlobError:
             return None
         if old is None or is_better(0.0, worst_magnitude_error(calibration, old.D, old.b_a), calibration.magnitude_std):
@@ -73,16 +74,16 @@ class BridgeSink:
                 self._store.erase()
                 self._store.greet()
             self._store.write(new)
-            read_back, held = self._store.read(), self._store.state()
+            held = self._store.read()
         except (BusError, KeyboardInterrupt) as error:
             failure = error if isinstance(error, BusError) else BusError("the write was interrupted", "start again")
-            read_back, held = self._read_after(failure, old, new)
-        if read_back != new or held is None:
+            held = self._read_after(failure, old, new)
+        if held is None or held.data != new:
             raise self._restore(old)
         return Applied(
             calibration,
-            f"{self.where} keeps it as its blob number {held.generation} ({len(new)} bytes, CRC-32 {held.crc:08x}),"
-            " read back and validated by its firmware",
+            f"{self.where} keeps it as its blob number {held.generation} ({len(new)} bytes,"
+            f" CRC-32 {zlib.crc32(new[:-4]):08x}), read back and validated by its firmware",
         )
 
     def _check_chip(self, calibration: Calibration) -> None:
@@ -94,7 +95,7 @@ class BridgeSink:
                 "give the calibration of this chip",
             )
 
-    def _read_after(self, error: BusError, old: bytes | None, new: bytes) -> tuple[bytes, StoredBlob | None]:
+    def _read_after(self, error: BusError, old: StoredBlob | None, new: bytes) -> StoredBlob:
         """Return the content of the memory after `error` if it is the new blob.
 
         Raises
@@ -103,25 +104,26 @@ class BridgeSink:
         """
         try:
             self._store.greet()
-            blob, held = self._store.read(), self._store.state()
+            held = self._store.read()
         except BusError as gone:
             raise WriteBackError(
                 f"{error.what}; it has either the old calibration or the new one, whole",
                 f"connect it again, and check which with mpucal show --serial {self._store.name}",
             ) from gone
-        if blob != new:
+        if held is None or held.data != new:
             holds = "it still has the old calibration" if old else "it still has none"
             raise WriteBackError(f"{error.what}; {holds}", error.remedy) from error
-        return blob, held
+        return held
 
-    def _restore(self, old: bytes | None) -> WriteBackError:
+    def _restore(self, old: StoredBlob | None) -> WriteBackError:
         """Restore the old blob after a wrong read-back; return the error to raise."""
         with suppress(BusError):
             if old is None:
                 self._store.erase()
             else:
-                self._store.write(old)
-            if self._store.read() == old:
+                self._store.write(old.data)
+            held = self._store.read()
+            if (held and held.data) == (old and old.data):
                 holds = "the old calibration is restored" if old else "it has none, as before"
                 return WriteBackError(f"{self.where} does not read back what was stored; {holds}", "try again")
         return WriteBackError(

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError, KeepsNothing
 from ..result.blob import Blob, BlobError
 from .link import Link
-from .link_errors import not_readable, request_failed, without_blob
 from .messages import (
     MAX_CHUNK,
     MAX_READ,
     BlobBegin,
     BlobCommit,
-    BlobCommitReply,
     BlobData,
     BlobErase,
     BlobRead,
@@ -29,18 +26,17 @@ from .messages import (
     Reply,
     Status,
 )
+from .port_errors import request_failed
 
 R = TypeVar("R", bound=Reply)
 CRC_BYTES = 4
 
 
-@dataclass(frozen=True)
-class StoredBlob:
-    """Description of the blob that the bridge stores and has just checked."""
+class StoredBlob(NamedTuple):
+    """Blob that the bridge stores and has just checked, with its number."""
 
     generation: int
-    length: int
-    crc: int
+    data: bytes
 
 
 class BlobStore:
@@ -73,51 +69,42 @@ class BlobStore:
         (reply,) = self._ask(ReadReply, Read(WHO_AM_I, 1))
         return reply.data[0]
 
-    def state(self) -> StoredBlob | None:
-        """Return the description of the valid blob; None without one."""
+    def read(self) -> StoredBlob | None:
+        """Read the valid blob; None without one."""
         self._check_feature()
         reply = self._link.ask(BlobState())[0][-1].reply
         if reply.status == Status.NO_BLOB:
             return None
         state = self._expect(reply, BlobStateReply)
-        return StoredBlob(state.generation, state.length, state.crc)
+        requests = [BlobRead(at, min(MAX_READ, state.length - at)) for at in range(0, state.length, MAX_READ)]
+        parts = self._ask(BlobReadReply, *requests)
+        return StoredBlob(state.generation, b"".join(part.data for part in parts))
 
-    def read(self) -> bytes | None:
-        """Read the blob's bytes; None without one."""
-        stored = self.state()
-        if stored is None:
-            return None
-        requests = [BlobRead(at, min(MAX_READ, stored.length - at)) for at in range(0, stored.length, MAX_READ)]
-        return b"".join(reply.data for reply in self._ask(BlobReadReply, *requests))
-
-    def take(self) -> tuple[int, bytes]:
-        """Read the blob's generation and bytes, and check them.
+    def take(self) -> StoredBlob:
+        """Read the blob, and check it.
 
         Raises
         ------
         BusError : no blob is stored, or it is not valid.
         """
-        stored, blob = self.state(), self.read()
-        if stored is None or blob is None:
+        stored = self.read()
+        if stored is None:
             raise BusError(*request_failed(self.name, Status.NO_BLOB))
         try:
-            Blob.decode(blob)
+            Blob.decode(stored.data)
         except BlobError as error:
-            raise BusError(*not_readable(self.name, str(error))) from error
-        return stored.generation, blob
+            what = f"the data that the bridge on {self.name} stores is not a calibration ({error})"
+            raise BusError(what, "store one again") from error
+        return stored
 
-    def write(self, blob: bytes) -> StoredBlob:
-        """Replace the stored blob, or change nothing; return the bridge's description of the new one.
-
-        The old blob stays valid until the bridge has checked the new one.
-        """
+    def write(self, blob: bytes) -> None:
+        """Replace the stored blob, which stays valid until the bridge has checked the new one, or change nothing."""
         self._check_feature()
         crc = int.from_bytes(blob[-CRC_BYTES:], "little")
         self._ask(Reply, BlobBegin(len(blob)))
         for at in range(0, len(blob), MAX_CHUNK):
             self._ask(Reply, BlobData(at, blob[at : at + MAX_CHUNK]))
-        (reply,) = self._ask(BlobCommitReply, BlobCommit(len(blob), crc))
-        return StoredBlob(reply.generation, len(blob), crc)
+        self._ask(Reply, BlobCommit(len(blob), crc))
 
     def erase(self) -> None:
         """Erase the stored blob, and other data in its place."""
@@ -126,7 +113,10 @@ class BlobStore:
 
     def _check_feature(self) -> None:
         if not self._link.bridge.features & Feature.BLOB:
-            raise KeepsNothing(*without_blob(self.name))
+            raise KeepsNothing(
+                f"the bridge on {self.name} cannot store a calibration",
+                "keep calibration.bin where its firmware reads it",
+            )
 
     def _ask(self, kind: type[R], *requests: Message) -> list[R]:
         return [self._expect(answers[-1].reply, kind) for answers in self._link.ask(*requests)]

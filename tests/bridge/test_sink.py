@@ -38,11 +38,8 @@ class FakeStore:
         self._may_fail("who_am_i")
         return self.chip
 
-    def state(self):
-        return None if self.blob is None else StoredBlob(self.generation, len(self.blob), 0x1234ABCD)
-
     def read(self):
-        return self.blob
+        return None if self.blob is None else StoredBlob(self.generation, self.blob)
 
     def write(self, blob):
         self.written.append(blob)

@@ -421,7 +421,7 @@ def test_the_build_for_an_uno_has_all_talks(switch_on, greeted):
     # what is stored there stays
     left_out = {finding.topic for finding in examine_conformance(link) if finding.mark is Mark.UNKNOWN}
     assert left_out == {name for name, talk in talks().items() if "blob" in talk["needs"]}
-    assert BlobStore(link).read() == BLOB
+    assert BlobStore(link).read().data == BLOB
 
 
 def test_a_narrow_clock_is_extended(tmp_path):

@@ -1,4 +1,4 @@
-"""Request that was sent to a bridge, and the answers that came for it."""
+"""Requests that were sent to a bridge, the answers that came for them, and how long these take."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ from typing import NamedTuple
 from ..chip.registers import FIFO_R_W, INT_STATUS
 from .frame import Frame
 from .messages import REPLY_BIT, BlobRead, BlobReadReply, Burst, BurstReply, Message, Read, ReadReply, Reply, Status
+
+# RFC 6298, 2.3: gains of the smoothed time and its mean deviation, and the number of deviations in a time-out.
+GAIN, DEVIATION_GAIN, DEVIATIONS = 1 / 8, 1 / 4, 4
+# A line with a larger latency cannot carry a session.
+LONGEST_NS = 3_000_000_000
 
 
 class Answer(NamedTuple):
@@ -67,3 +72,24 @@ class PendingRequest:
     def encoded(self) -> bytes:
         """Return its bytes on the line."""
         return Frame(self.request.TYPE, self.seq, self.request.payload()).encode()
+
+
+class Latency:
+    """Smoothed round-trip time of requests: radio, networks and busy hosts delay replies."""
+
+    def __init__(self) -> None:
+        self._mean_ns: float | None = None
+        self._deviation_ns = 0.0
+
+    def add(self, ns: int) -> None:
+        """Add the round-trip time of a request that was sent once."""
+        if self._mean_ns is None:
+            self._mean_ns, self._deviation_ns = ns, ns / 2
+            return
+        self._deviation_ns += DEVIATION_GAIN * (abs(ns - self._mean_ns) - self._deviation_ns)
+        self._mean_ns += GAIN * (ns - self._mean_ns)
+
+    @property
+    def most_ns(self) -> int:
+        """Longest round-trip time to expect; 0 before the first reply."""
+        return min(LONGEST_NS, round((self._mean_ns or 0.0) + DEVIATIONS * self._deviation_ns))
