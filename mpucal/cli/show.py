@@ -177,7 +177,7 @@ def _vehicle_rows(facts: Mapping[str, Any]) -> dict[str, str]:
     values = {name: value for name, value in facts["parameters"].items() if "OFF" in name or "SCAL" in name}
     corrected = [name for name, value in values.items() if value != ("SCAL" in name) and not name.startswith("SENS")]
     holds = f"a correction in {len(corrected)} parameters" if corrected else "no correction of its accelerometers"
-    return {"holds": holds, **{name: f"{value:g}" for name, value in facts["parameters"].items()}}
+    return {"holds": holds, **{name: f"{value:.8g}" for name, value in facts["parameters"].items()}}
 
 
 def _chip_rows(facts: Mapping[str, Any]) -> dict[str, str]:

@@ -47,10 +47,18 @@ def summary(calibration: Calibration) -> str:
         reasons = calibration.quality.get("reasons", [])
         lines = [SENTENCES[calibration.verdict], *(_reason(reason["message"]) for reason in reasons), ""]
     # Scale factor error, bias and misalignment, one column an axis.
-    rows = [("value ± 1 sigma", AXES), *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration))]
+    others = calibration.extra.get("others") or ()
+    rows = [
+        ("IMU 1, value ± 1 sigma" if others else "value ± 1 sigma", AXES),
+        *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration)),
+    ]
     lines += [(f"{name:<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
     if error := estimated_error(calibration):
         lines += ["", textwrap.fill(error, WIDTH)]
+    for imu, other in enumerate(others, start=2):
+        quality = other.get("quality", {})
+        lines += ["", f"The calibration of IMU {imu} is {quality.get('verdict')}."]
+        lines += [_reason(reason["message"]) for reason in quality.get("reasons", ())]
     return "\n".join([*lines, *_fit(calibration)])
 
 

@@ -180,7 +180,9 @@ def _parameters(id_: str, autopilot: Mapping[str, Any]) -> list[str]:
         return []
     rows = [[name, _value(old.get(name)), _value(value)] for name, value in new.items()]
     residual = as_float(autopilot.get("residual_mps2"))
-    error = f" The terms that it lacks leave an error of {residual:.2g} m/s² rms." if math.isfinite(residual) else ""
+    error = (
+        f" The terms that it lacks leave errors of up to {residual:.2g} m/s² in |a|." if math.isfinite(residual) else ""
+    )
     remark = paragraph(
         f"An autopilot has only offsets and scale factors, and applies them itself.{error} "
         "Set them with mpucal write calibration.json autopilot.",

@@ -207,7 +207,7 @@ def _write(topic: str, firmware: str, slot: Slot, values: Values) -> Finding:
         name = BOARD_ROTATION if firmware == PX4 else ORIENTATION
         what = f"the rotation of its board is unknown ({name} is {values.get(name)}), so nothing could be written"
         return Finding(topic, Mark.BAD, what, "set it to a known one, or use --no-write", data)
-    listed = ", ".join(f"{name} {value:.4g}" for name, value in held.items())
+    listed = ", ".join(f"{name}={value:.4g}" for name, value in held.items())
     remedy = f"{slot.sensor_id} is 0: it has no calibration of this sensor yet"
     return Finding.check(topic, bool(sensor_id), f"would change {listed}", remedy, data)
 

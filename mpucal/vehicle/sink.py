@@ -217,7 +217,7 @@ class AutopilotSink:
         with self._storing(now, planned) as paths:
             writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
         imus = " and ".join(str(change.imu) for change in planned)
-        residuals = ", ".join(change.residual for change in planned)
+        residuals = ", ".join(f"{change.residual} (IMU {change.imu})" for change in planned)
         clauses = [
             f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams; they have no"
             f" cross-axis terms, which leaves errors of up to {residuals}",

@@ -138,8 +138,13 @@ class OpenedVehicle(OpenedSource):
         def note(event: str, _t_ns: int = 0, data: Mapping[str, Any] | None = None) -> None:
             recorder.event(event, link.now_ns(), data)
 
+        def say_new(sentence: str) -> None:
+            # The operator of a resumed session was told before what its recorded part says.
+            if not (self.replaying and self.parts is not None and self.parts.resumes):
+                say(sentence)
+
         rate_hz, begun, self.end = self.plan.config.rate_hz, lambda: note(BEGUN), lambda: note(END)
-        source = VehicleSource(link, rate_hz, self.system, say, name, self.writes, self.prepare, begun)
+        source = VehicleSource(link, rate_hz, self.system, say_new, name, self.writes, self.prepare, begun)
         note(OPENED)
         try:
             yield ActiveSource(source, note)

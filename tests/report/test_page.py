@@ -267,7 +267,7 @@ def test_a_vehicle_has_its_parameters_beside_what_they_were_and_each_other_imu(r
     assert rows == once * 2
     assert "AHRS_ORIENTATION" not in page
     assert "ArduPilot &lt;4&gt;" in page
-    assert "0.11 m/s² rms" in page
+    assert "errors of up to 0.11 m/s² in |a|" in page
     assert "MPU-6050: usable" in page
     assert REASON["message"] in page
     assert page.count('<table id="accelerometer') == 2
