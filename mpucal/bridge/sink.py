@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -83,7 +82,7 @@ class BridgeSink:
         return Applied(
             calibration,
             f"{self.where} keeps it as its blob number {held.generation} ({len(new)} bytes,"
-            f" CRC-32 {zlib.crc32(new[:-4]):08x}), read back and validated by its firmware",
+            f" CRC-32 {held.crc:08x}), read back and validated by its firmware",
         )
 
     def _check_chip(self, calibration: Calibration) -> None:

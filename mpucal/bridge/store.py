@@ -38,6 +38,11 @@ class StoredBlob(NamedTuple):
     generation: int
     data: bytes
 
+    @property
+    def crc(self) -> int:
+        """CRC-32 at its end."""
+        return _crc(self.data)
+
 
 class BlobStore:
     """Memory of the bridge behind `link`, which was greeted.
@@ -100,11 +105,10 @@ class BlobStore:
     def write(self, blob: bytes) -> None:
         """Replace the stored blob, which stays valid until the bridge has checked the new one, or change nothing."""
         self._check_feature()
-        crc = int.from_bytes(blob[-CRC_BYTES:], "little")
         self._ask(Reply, BlobBegin(len(blob)))
         for at in range(0, len(blob), MAX_CHUNK):
             self._ask(Reply, BlobData(at, blob[at : at + MAX_CHUNK]))
-        self._ask(Reply, BlobCommit(len(blob), crc))
+        self._ask(Reply, BlobCommit(len(blob), _crc(blob)))
 
     def erase(self) -> None:
         """Erase the stored blob, and other data in its place."""
@@ -125,3 +129,7 @@ class BlobStore:
         if reply.status != Status.OK or not isinstance(reply, kind):
             raise BusError(*request_failed(self.name, reply.status))
         return reply
+
+
+def _crc(blob: bytes) -> int:
+    return int.from_bytes(blob[-CRC_BYTES:], "little")

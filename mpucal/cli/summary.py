@@ -6,9 +6,10 @@ import math
 import re
 import shlex
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
 from ..data import STANDARD_GRAVITY_MPS2
@@ -34,32 +35,41 @@ SAID = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
 # For a terminal of 80 columns.
 WIDTH, LABEL, COLUMN = 79, 23, 18
 SENTENCES = {
-    GOOD: "The calibration is good.",
-    USABLE: "The calibration is usable, with reservations:",
-    REFUSED: "The calibration is refused:",
+    GOOD: "{} is good.",
+    USABLE: "{} is usable, with reservations:",
+    REFUSED: "{} is refused:",
 }
 
 
 def summary(calibration: Calibration) -> str:
-    """Return the verdict with its reasons, the parameters with standard uncertainties, and the estimated error."""
-    lines = []
-    if "verdict" in calibration.quality:
-        reasons = calibration.quality.get("reasons", [])
-        lines = [SENTENCES[calibration.verdict], *(_reason(reason["message"]) for reason in reasons), ""]
+    """Return the verdict with its reasons, the parameters with standard uncertainties, and the estimated error.
+
+    Of further IMUs of a vehicle it has the verdicts with their reasons.
+    """
+    verdict, others = _verdict("The calibration", calibration.quality), calibration.extra.get("others") or ()
+    lines = [*verdict, ""] if verdict else []
     # Scale factor error, bias and misalignment, one column an axis.
-    others = calibration.extra.get("others") or ()
     rows = [
-        ("IMU 1, value ± 1 sigma" if others else "value ± 1 sigma", AXES),
+        (f"{_imu(calibration.extra)}, value ± 1 sigma" if others else "value ± 1 sigma", AXES),
         *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration)),
     ]
     lines += [(f"{name:<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
     if error := estimated_error(calibration):
         lines += ["", textwrap.fill(error, WIDTH)]
-    for imu, other in enumerate(others, start=2):
-        quality = other.get("quality", {})
-        lines += ["", f"The calibration of IMU {imu} is {quality.get('verdict')}."]
-        lines += [_reason(reason["message"]) for reason in quality.get("reasons", ())]
+    for other in others:
+        lines += ["", *_verdict(f"The calibration of {_imu(other)}", other.get("quality", {}))]
     return "\n".join([*lines, *_fit(calibration)])
+
+
+def _verdict(what: str, quality: Mapping[str, Any]) -> list[str]:
+    """Return the verdict on a calibration and its reasons; nothing if it was not judged."""
+    if "verdict" not in quality:
+        return []
+    return [SENTENCES[quality["verdict"]].format(what), *(_reason(each["message"]) for each in quality["reasons"])]
+
+
+def _imu(document: Mapping[str, Any]) -> str:
+    return f"IMU {document.get('autopilot', {}).get('imu', 1)}"
 
 
 def page_result(calibration: Calibration) -> Result:

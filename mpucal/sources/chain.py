@@ -158,6 +158,7 @@ class ChainedTransport(Chain[Transport]):
         """See Chain."""
         went_on = super().go_on()
         self._take_properties()
+        self.now_ns()  # a time to wait for is in the session's clock, too
         return went_on
 
     def now_ns(self) -> int:

@@ -46,7 +46,7 @@ class UsbBus(RegisterBus):
         self._name = name
         try:
             self.connect(name)
-        except ImportError as error:
+        except ModuleNotFoundError as error:
             raise BusError(f"the Python library {error.name} is not installed", "pip install mpucal[usb]") from error
         except Exception as error:  # libusb, hidapi and both libraries have their own
             raise BusError(

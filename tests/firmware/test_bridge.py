@@ -215,6 +215,38 @@ BAD_PAYLOADS = {
 }
 
 
+@pytest.mark.parametrize("program", ["core", "MicroPython"])
+def test_frames_that_were_read_before_a_transfer_failed_are_pushed(program, host, core, tmp_path):
+    class Dying(Chip):
+        fifo_reads = 0
+
+        def read(self, address, first, count):
+            self.fifo_reads += first == 0x74
+            return (Status.NO_ANSWER, b"") if self.fifo_reads > 2 else super().read(address, first, count)
+
+    chip = Dying()
+    bridge = on_micropython(tmp_path, chip)
+    if program == "core":
+        made = host.HostBridge(core, host.Eeprom(), chip.read, chip.write)
+
+        def told(data):
+            said = made.receive(data)
+            for _ in range(3):  # a message each
+                made.now_us += 1000
+                said += made.look()
+            return said
+
+        bridge = Asking(told, chip)
+    bridge.ask(wire.Hello())
+    answers = [
+        wire.answer_of(frame.type, frame.payload)
+        for frame in bridge.frames(Frame(wire.Stream.TYPE, 5, wire.Stream(14, 4).payload()).encode())
+    ]
+    pushed = [each for each in answers if isinstance(each, wire.Frames)]
+    said = [(each.status, each.index, each.drops, len(each.frames)) for each in pushed]
+    assert said == [(Status.OK, 0, 0, 56), (Status.OK, 4, 0, 56), (Status.NO_ANSWER, 8, 1, 0)]
+
+
 def test_a_payload_out_of_its_limits_is_refused(bridge):
     del bridge.chip.written[:]
     for name, (kind, payload) in BAD_PAYLOADS.items():

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mpucal.cli.summary import summary
 from mpucal.data import Autopilot
 from mpucal.errors import LinkError, WriteBackError
 from mpucal.mavlink import rest as rest_monitor
@@ -297,6 +298,9 @@ def test_sensors_without_ids_of_their_own_are_given_theirs_and_a_refused_fit_cha
     assert vehicle.firmware.complaints() == []
     assert [name for name, value in stored(vehicle).items() if value != old[name] and "ACC2" in name] == []
     assert "IMU 2 keeps" in applied.what
+    said = summary(calibration).splitlines()
+    assert ("The calibration is good." in said, "The calibration of IMU 2 is refused:" in said) == (True, True)
+    assert sum(line.startswith("IMU 1, value") for line in said) == 1
 
 
 def test_px4_uses_what_it_stores_though_the_change_is_small():
