@@ -97,9 +97,7 @@ def _residuals(x: Vector, y: Vector, gravity: float, variance: Vector) -> tuple[
 
 
 def _spread(e: Vector, variance: Vector, left: float) -> float:
-    """Return the least spread that explains residuals (k,) with `left` degrees of freedom; 0 where none is left."""
-    if left < 1.0:
-        return 0.0
+    """Return the least spread that explains residuals (k,) with `left` degrees of freedom, or one if less is left."""
     chi2 = np.sum(e**2 / (variance + SPREADS_MPS2[:, None] ** 2), axis=1)
-    enough = np.flatnonzero(chi2 <= left)
+    enough = np.flatnonzero(chi2 <= max(left, 1.0))
     return float(SPREADS_MPS2[enough[0] if len(enough) else -1])

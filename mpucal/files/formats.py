@@ -17,10 +17,10 @@ from ..data import Recording
 from ..errors import OutputError, RecordingError, UsageError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
 from .hints import NO_HINTS, Hints
-from .reading import READ, check_size
+from .reading import READ, check_size, first_bytes, is_text
 from .rows import Rows, Write
 
-FOLDER = "/"
+FOLDER, ANY_TEXT = "/", ".txt"
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,7 @@ class Format:
 
     def matches(self, path: Path) -> bool:
         """Return True if the file or folder looks like this format; it is not read to its end."""
-        suffix = FOLDER if path.is_dir() else path.suffix.lower()
-        return suffix == self.suffix and (not self.recognises or bool(resolve_name(self.recognises)(path)))
+        return _suffix(path) == self.suffix and (not self.recognises or bool(resolve_name(self.recognises)(path)))
 
     def read(self, *paths: Path, hints: Hints = NO_HINTS) -> Recording:
         """Return the whole recording; see load."""
@@ -159,8 +158,7 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
     """
     if not path.exists():
         raise RecordingError(f"there is no file {path}", "check the path")
-    suffix = FOLDER if path.is_dir() else path.suffix.lower()
-    of_suffix = [row for row in FORMATS if row.is_read and row.suffix == suffix]
+    of_suffix = [row for row in FORMATS if row.is_read and row.suffix == _suffix(path)]
     found = recognise(path)
     if hints.given and not (found and found.hinted):
         found = next((row for row in reversed(of_suffix) if row.hinted), found)
@@ -170,10 +168,18 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
                 f"{path} is {what}; it needs no options on how to read it",
                 "leave out --topic, --columns, --units, --accel-range, --gyro-range and --rate",
             )
-    others = [row for row in of_suffix if not row.only_recognised]
+    others = [row for row in of_suffix if not row.only_recognised and row.suffix in (FOLDER, path.suffix.lower())]
     if found is None and not others:
         raise RecordingError(f"{path} is not a recording that mpucal knows", f"give {_suffixes()}")
     return found or others[-1]
+
+
+def _suffix(path: Path) -> str:
+    """Return the suffix of a file's format: that of a table for text of any other suffix, such as .dat or .lvm."""
+    if path.is_dir():
+        return FOLDER
+    suffix = path.suffix.lower()
+    return suffix if any(row.suffix == suffix for row in FORMATS) or not is_text(first_bytes(path)) else ANY_TEXT
 
 
 def written_format(path: Path) -> Format:

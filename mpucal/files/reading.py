@@ -28,6 +28,9 @@ LONGEST_LINE = 1 << 20
 LONGEST_CHUNK = 64 << 20
 # bytes from the beginning of a file by which its format is recognised
 SNIFFED = 1 << 16
+# the share of NUL bytes beyond which a file is binary, of words beyond which a column is no clock, and of empty lines
+# beyond which these are another sensor's
+MOST_ODD = 0.1
 _ONE = threading.RLock()
 
 
@@ -101,6 +104,11 @@ def first_bytes(path: Path, count: int = SNIFFED) -> bytes:
             return file.read(count)
     except OSError:
         return b""
+
+
+def is_text(data: bytes) -> bool:
+    """Return True if bytes seem to be text; a logger that is switched off leaves zeros."""
+    return len(data) > 0 and data.count(b"\0") <= MOST_ODD * len(data)
 
 
 def import_extra(name: str, extra: str, path: Path) -> Any:

@@ -45,6 +45,13 @@ COLUMNS = {
     "date": lambda w, ns: dates(w).astype(str),
     "utc": lambda w, ns: [f"{date}Z" for date in dates(w).astype(str)],
     "clock": lambda w, ns: [f"{date}".partition("T")[2][:8] for date in dates(w)],
+    "clock.": lambda w, ns: [f"{date}".partition("T")[2] for date in dates(w)],
+    "clock,": lambda w, ns: [f"{date}".partition("T")[2].replace(".", ",") for date in dates(w)],
+    "am": lambda w, ns: [f"{date.item():%m/%d/%Y %I:%M:%S.%f %p}" for date in dates(w)],
+    "german": lambda w, ns: [f"{date.item():%d.%m.%Y %H:%M:%S,%f}" for date in dates(w)],
+    "matlab": lambda w, ns: [f"{date.item():%d-%b-%Y %H:%M:%S.%f}" for date in dates(w)],
+    "tick": lambda w, ns: 421 + np.rint(w.t * 1000).astype(int),
+    "epoch": lambda w, ns: ns // 10**6,
     "micros": lambda w, ns: dates(w).astype(int) % 10**6,
     "minutes": lambda w, ns: minutes(w),
     "a": lambda w, ns: w.acc,
@@ -262,6 +269,49 @@ FORMS = {
     ),
     "seconds and nanoseconds": Form(f"header.stamp.sec,header.stamp.nanosec,{AXES}", "sec nanosec a w"),
     "a time under an unknown name": Form(f"Line,Ticks,{AXES}", "i t a w", says="Ticks is taken for the time"),
+    # dates and times of day beside columns whose names are unknown
+    "dates under an unknown name": Form("Quando,pA,pB,pC,qA,qB,qC\n", "utc a w", says=f"{BY_GRAVITY}t,ax"),
+    "times of day beside dates": Form("D,H,pA,pB,pC,qA,qB,qC\n", "2024-05-01 clock. a w", says=f"{BY_GRAVITY}-,t,ax"),
+    "a spreadsheet's own names": Form(
+        "Uhrzeit;Beschl. X;Beschl. Y;Beschl. Z;Drehrate X;Drehrate Y;Drehrate Z\n",
+        *("clock, a dps", "{};" * 6 + "{}\n", "walk.csv", "--columns t,ax"),
+    ),
+    "days first": Form("Zeit;ax;ay;az;gx;gy;gz\n", "german a w", ";"),
+    "hours until noon": Form("Stamp of the day,pA,pB,pC,qA,qB,qC\n", "am g dps", says="accelerations in g"),
+    "MATLAB's dates": Form("Timestamp,X,Y,Z,X_1,Y_1,Z_1\n", "matlab a w"),
+    "MATLAB's durations": Form(f"Time,{AXES}", "t a w", "{} sec,{},{},{},{},{},{}\n", says="times in s,"),
+    "units in each cell": Form(f'"Time",{AXES}', "date a w", '"{}"' + ',"{} m/s²"' * 3 + ',"{} rad/s"' * 3 + "\n"),
+    "an index of dates without a name": Form(f",{AXES}", "utc a w"),
+    "a suffix that no format has": Form("LabVIEW\t\n\nX_Value\tax\tay\taz\tgx\tgy\tgz\n", "t a w", "\t", "walk.lvm"),
+    # lines of a terminal, with its times before them
+    "times of PlatformIO": Form(
+        f"--- Terminal on /dev/ttyUSB0 | 115200 8-N-1\n12:34:56.789 > {AXES}",
+        *("clock. a w", "{} > " + ",".join(["{}"] * 6) + "\n"),
+    ),
+    "times in brackets": Form("", "date a w", "[{}] {},{},{},{},{},{}\n", "walk.log", BY_GRAVITY, edit=("T", " ")),
+    # lines that name some of the numbers, and make a sample together
+    "ESP-IDF": Form(
+        *("I (312) cpu_start: Starting scheduler on PRO CPU.\n", "tick g tick dps"),
+        "I ({}) mpu6050: acce_x:{}, acce_y:{}, acce_z:{}\n"
+        "\033[0;32mI ({}) mpu6050: gyro_x:{}, gyro_y:{}, gyro_z:{}\033[0m\n",
+        "walk.log",
+        "times in ms, accelerations in g and rates in deg/s",
+    ),
+    "Teleplot": Form(
+        "", "epoch a w", ">ax:{0}:{1}\n>ay:{0}:{2}\n>az:{0}:{3}\n>gx:{0}:{4}\n>gy:{0}:{5}\n>gz:{0}:{6}\n", "walk.log"
+    ),
+    "MPU6050_light": Form(
+        *("", "g dps"),
+        "TEMPERATURE: 25.31\nACCELERO  X: {}\tY: {}\tZ: {}\n"
+        "GYRO      X: {}\tY: {}\tZ: {}\nACC ANGLE X: 1.2\tY: 2.1\n===\n",
+        *("walk.txt", "accelerations in g and rates in deg/s", AT_100_HZ),
+    ),
+    "dictionaries": Form(
+        *("", "a dps", "accel: {{'x': {}, 'y': {}, 'z': {}}}\ngyro: {{'x': {}, 'y': {}, 'z': {}}}\n", "walk.txt"),
+        *("rates in deg/s", AT_100_HZ),
+    ),
+    "InfluxDB": Form("", "a w ns", "imu,device=esp32 ax={},ay={},az={},gx={},gy={},gz={} {}\n", "walk.txt"),
+    "tuples": Form("", "g dps", "({}, {}, {}) ({}, {}, {})\n", "walk.txt", BY_GRAVITY, AT_100_HZ),
     "a rate above the names": Form(
         f"# Config: data_rate = 100.0 Hz, filter = 488 Hz, acc_range = 4 g\nLogging Type,1\nWaiting time,3\n{AXES}",
         *("counts", ",", "walk.csv", "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|)", None, IN_COUNTS),

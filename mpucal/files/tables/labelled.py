@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import chain
 
 from .names import ACC, GYR, TIME, first_triple, parse_column_name, parse_header
-from .text import PREAMBLE, TextTable
+from .text import MOMENT, NUMBER, PREAMBLE, TextTable
 
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
-_DATE = r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d:\d\d(?:\.\d{1,9})?"
-_NAME, _NUMBER = (
-    r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})",
-    r"([-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?)",
+_NAME = r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})"
+_PAIR = re.compile(rf"{_NAME}\s?[:=][ \t]{{0,9}}(?:({MOMENT})|({NUMBER}))(?![\w:])")
+# programs' ways to write the time of a line, beside a date at its beginning: ESP-IDF's log, Teleplot, InfluxDB
+_AT = "line_time="
+_TIMES = (
+    (re.compile(rf"^(?={MOMENT}\b)", re.MULTILINE), _AT),
+    (re.compile(r"^[EWIDV] \((\d{1,12})\) ", re.MULTILINE), rf"{_AT}\1, "),
+    (re.compile(r"^>([A-Za-z_]\w{0,40}):(\d{10,19}):", re.MULTILINE), rf"{_AT}\2, \1:"),
+    (re.compile(r"(?<=\d)[ \t](\d{10,19})\r?$", re.MULTILINE), rf", {_AT}\1"),
 )
-_PAIR = re.compile(rf"{_NAME}\"?\s?[:=][ \t]{{0,9}}(?:({_DATE})|{_NUMBER})(?![\w:])")
-_AT = re.compile(rf"^(?={_DATE}\b)", re.MULTILINE)
+_QUOTES = dict.fromkeys(map(ord, "{}'\""))
 # three axes at once: `accel=(9252, -5612, -12084)`, `GYRO: X=0.1,Y=0.2,Z=0.3`, `Acceleration X: 0.1, Y: 0.2, Z: 0.3`
-_CELL = r"([^,()\[\]\n=:]{1,30})"
+_CELL = r"([^,()\[\]\n\t=:]{1,30})"
 _THREE = re.compile(
     rf"(?<!\w)([A-Za-z_]\w{{0,40}})\s?(?:[:=]\s?[(\[]{_CELL},{_CELL},{_CELL}[)\]]"
-    rf"|[:=]?\s?X[:=]{_CELL},\s?Y[:=]{_CELL},\s?Z[:=](?=[\s\d.+-]))"
+    rf"|[:=]?[ \t]{{0,9}}[Xx][:=]{_CELL}[,\t]\s?[Yy][:=]{_CELL}[,\t]\s?[Zz][:=](?=[\s\d.+-]))"
 )
 # as `rostopic echo` and `ros2 topic echo` print messages
 _BETWEEN_RECORDS = "\n---\n"
-# a line for each sensor, as in Adafruit's examples
-_TWO_LINES = re.compile(r"^(Acceleration_x=[^\n]{1,90})\n(?=Rotation_x=)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -68,26 +71,44 @@ def marked_table(text: str, name: str) -> TextTable | None:
 
 
 def labelled_table(text: str, name: str) -> TextTable | None:
-    """Return the table in lines that name each number, without the text between; None if none names all six axes."""
+    """Return the table in lines that name each number, without the text between; None if none name all six axes.
+
+    A sample is a line, or the lines from one that names the first axis to the next such line.
+    """
     text = _join_records(text) if _BETWEEN_RECORDS in text else text
-    text, threes = _THREE.subn(_name_axes, _AT.sub("time=", text))
-    text = _TWO_LINES.sub(r"\1, ", text)
+    text = text.translate(_QUOTES)
+    for pattern, replacement in _TIMES:
+        text = pattern.sub(replacement, text)
+    text, threes = _THREE.subn(_name_axes, text)
     # in a log that names three axes at once, the first such line may come late
-    for line in text.split("\n")[: None if threes > PREAMBLE else PREAMBLE]:
-        header = list(_numbers(line))
-        columns = parse_header(header)
-        if first_triple(columns, ACC) and first_triple(columns, GYR):
-            measured = {header[c.place] for c in columns if c.quantity in (ACC, GYR)}
-            part = re.compile(rf"(?<!\w)(?:{'|'.join(map(re.escape, measured))})\s?[:=]")
-            read, rows, lines = [header[c.place] for c in columns if c.quantity == TIME], [], []
-            for i, row in enumerate(text.split("\n"), 1):
-                found = _numbers(row)
-                whole = measured.union(read) <= found.keys()
-                if whole or part.search(row):
-                    rows.append([found.get(of, "") for of in header] if whole else [])
-                    lines.append(i)
-            return TextTable(name, header, rows, lines, ":")
-    return None
+    begun = [list(_numbers(line)) for line in text.split("\n")[: None if threes > PREAMBLE else PREAMBLE]]
+    together = list(dict.fromkeys(chain(*begun)))
+    header = next((names for names in begun if _names_both(names)), together)
+    if not _names_both(header):
+        return None
+    columns = parse_header(header)
+    measured = [header[c.place] for c in columns if c.quantity in (ACC, GYR)]
+    needed = {*measured, *(header[c.place] for c in columns if c.quantity == TIME)}
+    part = re.compile(rf"(?<!\w)({'|'.join(map(re.escape, measured))})\s?[:=]")
+    lines: list[int] = []
+    records: list[dict[str, str]] = []
+    named: set[str] = set()
+    for i, line in enumerate(text.split("\n"), 1):
+        there = set(part.findall(line))
+        if there and (header is not together or measured[0] in there or there & named):
+            records.append({})
+            lines.append(i)
+            named = set()
+        if records:
+            records[-1] = _numbers(line) | records[-1]
+            named |= there
+    rows = [[found.get(of, "") for of in header] if needed <= found.keys() else [] for found in records]
+    return TextTable(name, header, rows, lines, ":")
+
+
+def _names_both(names: list[str]) -> bool:
+    columns = parse_header(names)
+    return bool(first_triple(columns, ACC) and first_triple(columns, GYR))
 
 
 def _join_records(text: str) -> str:

@@ -33,7 +33,7 @@ def _stems(words: str) -> dict[str, str]:
 # a unit stands only where the program that uses the stem always writes that one
 ACC_STEMS = _stems(
     "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
-    " acce acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
+    " acce accelero acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
 )
 GYR_STEMS = _stems(
     "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"

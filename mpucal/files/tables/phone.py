@@ -249,7 +249,7 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
         raise RecordingError(
             f"{name} holds the columns {', '.join(table.header)}, but no {quantity}", "record both sensors"
         )
-    stream = sensor_stream(table, columns, of)
+    stream = sensor_stream(table, table.clocks(columns), of)
     # of a phone, by the convention of Android and iOS, where a line above names the columns
     named = isinstance(table, TextTable) and table.lines[0] > 1
     is_phones = quantity == GYR and named and not seem_counts(stream.values[stream.complete])

@@ -14,7 +14,7 @@ from ...data import Recording, Vector
 from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, ROLES, Hints
-from ..reading import HELD, check_size, first_bytes, reading
+from ..reading import HELD, MOST_ODD, check_size, first_bytes, reading
 from .clock import FEWEST
 from .guess import guess_columns, is_clock, is_even_clock
 from .labelled import labelled_table, marked_table
@@ -37,7 +37,7 @@ from .names import (
     with_sensor,
 )
 from .streams import index_with_gravity, join_streams, mean_acceleration_unit
-from .text import HEAD, MOST_ODD, PREAMBLE, TextTable, decode_text, find_numeric_table, find_table
+from .text import HEAD, PREAMBLE, TextTable, decode_text, find_numbers, find_numeric_table, find_table
 from .times import Stream
 from .units import BEYOND, QUANTITIES, acceleration_unit, are_counts, seem_counts
 
@@ -82,7 +82,7 @@ def _find(text: str, name: str) -> TextTable | None:
     found = marked_table(text, name) or labelled_table(text, name) or find_table(text, name)
     if found:
         return found
-    found = find_table(text, name, bare=True) or find_numeric_table(text, name, 3)
+    found = find_table(text, name, bare=True) or find_numeric_table(text, name, 3) or find_numbers(text, name)
     return None if found is None else replace(found, header=_with_sensor(found))
 
 
@@ -119,7 +119,8 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     with reading(path):
         check_size(path, HELD * path.stat().st_size)
         text = decode_text(path.read_bytes(), path.name)
-    table = find_table(text, path.name, list(hints.columns.values())) if hints.columns else _find(text, path.name)
+    wanted = [*hints.columns.values()]
+    table = find_table(text, path.name, wanted) or find_numbers(text, path.name) if wanted else _find(text, path.name)
     if not text.strip():
         raise RecordingError(f"{path} is empty", "record it again")
     if table is None:
@@ -157,9 +158,11 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     if not accelerometers:
         raise _missing_sensors(table, columns)
     warm = [column for column in columns if column.quantity == TEMPERATURE]
-    streams = [sensor_stream(table, columns, of, warm) for of in accelerometers]
+    # a rate beside columns without a time says that the times are wrong
+    at = () if hints.columns and hints.rate_hz and "t" not in hints.columns else table.clocks(columns)
+    streams = [sensor_stream(table, at, of, warm) for of in accelerometers]
     chosen = index_with_gravity(streams)
-    acc, a, w = accelerometers[chosen], streams[chosen], sensor_stream(table, columns, gyr) if gyr else None
+    acc, a, w = accelerometers[chosen], streams[chosen], sensor_stream(table, at, gyr) if gyr else None
     a, ios_remarks = _undo_ios_sign(a, acc)
     several = len(accelerometers) > 1
     remarks = [
@@ -179,7 +182,7 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if known and (table.clocks(columns) or hints.rate_hz):
         return columns, ""
-    of = _numbers(table, columns)
+    of = _numbers(table)
     even = [place for place in of if is_even_clock(of[place])]
     if known:
         clocks = [Column(table.header[place], place, TIME) for place in even[:1]]
@@ -192,6 +195,7 @@ def _guess(table: Table, columns: list[Column], hints: Hints) -> tuple[list[Colu
         return columns, ""
     found = dict(zip("t", even, strict=False)) | found
     order = {place: role for role, place in found.items()}
+    order |= {clock.place: "t" for clock in table.clocks(columns)[:1] if "t" not in found}
     words = ",".join(order.get(place, "-") for place in range(max(order) + 1))
     named = (TEMPERATURE, TIME, NANOSECONDS) if table.clocks(columns) else (TEMPERATURE,)
     kept = [c for c in columns if c.quantity in named]
@@ -228,7 +232,7 @@ def _missing_sensors(table: Table, columns: list[Column]) -> RecordingError:
 
 def _likely_options(table: Table, columns: list[Column]) -> str | None:
     """Return options if triples of the columns are the sensors'; empty if they are too few, None without gravity."""
-    of = _numbers(table, columns)
+    of = _numbers(table)
     increasing = [place for place in of if is_clock(of[place])]
     clocks = [c.place for c in table.clocks(columns)] or [place for place in increasing if is_even_clock(of[place])]
     sensors = [place for place in of if place not in {*clocks, *increasing}]
@@ -248,15 +252,13 @@ def _likely_options(table: Table, columns: list[Column]) -> str | None:
     return f"--columns {order}" + (f" --units acc={unit}" if unit else "")
 
 
-def _numbers(table: Table, columns: list[Column]) -> dict[int, Vector]:
-    """Return place -> (n,) of the columns of numbers in whole lines, without the clocks where these hold dates."""
+def _numbers(table: Table) -> dict[int, Vector]:
+    """Return place -> (n,) of the columns of numbers in whole lines."""
     places = table.numeric_places()
-    for left_out in (set[int](), {c.place for c in table.clocks(columns)}):
-        kept = [place for place in places if place not in left_out]
-        with suppress(RecordingError):
-            numbers = table.numbers([Column("", place, "") for place in kept])
-            whole = (np.abs(numbers) < BEYOND**2).all(axis=1)
-            return dict(zip(kept, numbers[whole].T, strict=True)) if whole.any() else {}
+    with suppress(RecordingError):
+        numbers = table.numbers([Column("", place, "") for place in places])
+        whole = (np.abs(numbers) < BEYOND**2).all(axis=1)
+        return dict(zip(places, numbers[whole].T, strict=True)) if whole.any() else {}
     return {}
 
 
@@ -280,7 +282,7 @@ def _undo_ios_sign(stream: Stream, acc: Sequence[Column]) -> tuple[Stream, list[
 
 
 def sensor_stream(
-    table: Table, columns: Sequence[Column], axes: Sequence[Column], warm: Sequence[Column] = ()
+    table: Table, clocks: Sequence[Column], axes: Sequence[Column], warm: Sequence[Column] = ()
 ) -> Stream:
     """Return the samples in one sensor's three columns, and the temperatures beside them; see Stream.
 
@@ -290,7 +292,7 @@ def sensor_stream(
     values = -values if axes[0].sign_flipped else values
     values[~np.isfinite(values)] = np.nan
     empty = np.isnan(values).all(axis=1)
-    clocks = [c for c in table.clocks(columns) if c.clock_of in ("", axes[0].quantity)]
+    clocks = [c for c in clocks if c.clock_of in ("", axes[0].quantity)]
     clock = min(clocks, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit), default=None)
     others = np.count_nonzero(empty) > MOST_ODD * len(values)
     timed = np.ones(len(values), bool) if clock is None else table.has(clock)

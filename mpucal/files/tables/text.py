@@ -17,7 +17,7 @@ import numpy as np
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
-from ..reading import check_size
+from ..reading import MOST_ODD, check_size, is_text
 from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
 from .units import NS, QUANTITIES, find_unit
 
@@ -29,9 +29,6 @@ PREAMBLE = 200
 HEAD = 4096
 # rows by which a column of times is known
 LOOKED_AT = 50
-# the share of NUL bytes beyond which a file is binary, of words beyond which a column is no clock, and of empty lines
-# beyond which these are another sensor's
-MOST_ODD = 0.1
 # a header may begin with such a mark; any other line that does is a comment
 COMMENT = ("#", "%", "//")
 # the share of lines that may be damaged
@@ -46,10 +43,28 @@ BELOW_A_SECOND = ("ms", "us", "ns")
 # names within quotation marks may span lines
 _QUOTED = re.compile(r'"[^"]{0,60}"')
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-# Arduino's serial monitor writes the time before each line
-MONITORED = re.compile(r"^\d\d:\d\d:\d\d\.\d{3} -> ", re.MULTILINE)
+DAY_NS = 86400 * NS
+CLOCK = r"\d\d?:\d\d:\d\d(?:[.,]\d{1,9})?"
+# Serial monitors, terminals and loggers write the time before each line: `12:03:04.123 -> `, `[2024-05-01 12:03:04] `.
+# A blank alone ends it where the line goes on with numbers and another separator.
+MONITORED = re.compile(
+    rf"^\[?(?:(\d{{4}}-\d\d-\d\d)[ T])?({CLOCK})Z?"
+    r"(?:\][ \t]*|[ \t]*-?>[ \t]*|[ \t]+(?=[-+.\d][^\n ]*[,;\t]))",
+    re.MULTILINE,
+)
+COLOUR = re.compile(r"\x1b\[[0-9;]{0,9}m")
 # the hours may be missing
-_TIME_OF_DAY = re.compile(r"(?:(\d\d?):)?(\d\d):(\d\d(?:\.\d+)?)").fullmatch
+_TIME_OF_DAY = re.compile(r"(?:(\d\d?):)?(\d\d):(\d\d(?:\.\d+)?)(?: ?([AaPp])\.?[Mm]\.?)?").fullmatch
+# a date that does not begin with the year, or not as ISO 8601 has it, and a time of day
+_DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.*)").fullmatch
+_ISO = re.compile(r"\d{4}-\d\d-\d\d").match
+_MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
+# a number and its unit in one cell
+_WITH_UNIT = re.compile(r"[-+.\d][-+.,\deE]*( ?[^-+.,\d\s][^\d]{0,9}\d?)").fullmatch
+# among other text; lengths are bounded: the search takes linear time
+NUMBER = r"[-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?"
+MOMENT = rf"(?:\d{{4}}-\d\d-\d\d[ T])?{CLOCK}(?:Z|[+-]\d\d:?\d\d)?"
+_NUMBER_OR_MOMENT = re.compile(rf"(?<![\w.])(?:{MOMENT}|{NUMBER})(?!\w)")
 
 
 @dataclass(frozen=True)
@@ -79,17 +94,22 @@ class TextTable(Table):
         return np.array([column.place < len(row) and bool(row[column.place].strip()) for row in self.rows])
 
     def numeric_places(self) -> list[int]:
-        """See Table; the first row decides, and a date counts as a number."""
+        """See Table; the first row decides."""
         width = int(np.percentile([len(row) for row in self.rows], 100 * MOST_BAD))
-        return [place for place, cell in enumerate(self.rows[0][:width]) if _is_number(cell)]
+        return [place for place, cell in enumerate(self.rows[0][:width]) if _is_number(cell, dates=False)]
 
     def clocks(self, columns: Sequence[Column]) -> list[Column]:
-        """See Table."""
+        """See Table; if none is named, the first column of dates or times of day that changes."""
         # the last of them may be torn
         some = self.rows[:: max(len(self.rows) // LOOKED_AT, 1)][: LOOKED_AT + 1] or self.rows
         cells = [(c, [row[c.place] for row in some if c.place < len(row)]) for c in columns if c.quantity == TIME]
         # a few cells may be damaged
-        return [c for c, of in cells if of and np.mean([*map(_is_number, filter(str.strip, of))] or 1) > 1 - MOST_ODD]
+        named = [c for c, of in cells if of and np.mean([*map(_is_number, filter(str.strip, of))] or 1) > 1 - MOST_ODD]
+        for place, cell in enumerate([] if named else self.rows[0]):
+            dates = {row[place] for row in some if place < len(row) and _is_number(row[place])}
+            if len(dates) > 1 and _is_number(cell) and not _is_number(cell, dates=False):
+                return [Column(self.header[place] if self.header else "", place, TIME)]
+        return named
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """See Table; a cell that a line lacks, or of a few damaged lines, is empty. The error names the line."""
@@ -124,11 +144,15 @@ class TextTable(Table):
         return [at * (1 if unit == "ns" else NS) + part for at, part in zip(found, more, strict=True)], "ns"
 
     def _exact(self, column: Column, kept: Mask) -> list[Decimal]:
-        found, bad = [], []
+        found: list[Decimal] = []
+        bad: list[int] = []
         for i in np.flatnonzero(kept).tolist():
             text = self._cell(i, column)
             try:
-                found.append(_exact(text))
+                at = _exact(text)
+                if found and ":" in text and (at > DAY_NS) != (found[-1] > DAY_NS):
+                    raise ValueError(text)
+                found.append(at)
             except ValueError as error:
                 bad.append(len(found))
                 found.append(found[-1] if found else Decimal(0))
@@ -169,13 +193,27 @@ def _exact(text: str) -> Decimal:
         if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
             return number
     except InvalidOperation:
-        if of_day := _TIME_OF_DAY(text):
-            hours, minutes, seconds = of_day.groups()
-            return ((int(hours or 0) * 60 + int(minutes)) * 60 + Decimal(seconds)) * NS
+        if of_day := _TIME_OF_DAY(_with_point(text)):
+            hours, minutes, seconds, half = of_day.groups()
+            hour = int(hours or 0) if half is None else int(hours or 0) % 12 + 12 * (half in "Pp")
+            return ((hour * 60 + int(minutes)) * 60 + Decimal(seconds)) * NS
+        if (split := _DATE(text)) and not _ISO(text):
+            return _days(split[1], split[3], split[4], split[2]) * DAY_NS + _exact(split[5])
         date = datetime.fromisoformat(text)
         since = date - (EPOCH if date.tzinfo else datetime.min)
         return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
     raise ValueError(text)
+
+
+def _days(first: str, middle: str, last: str, mark: str) -> int:
+    """Return the days since the year 1 of 2024/5/1, 1.5.2024, 01-May-2024 or 5/1/2024, by the mark between them."""
+    if len(first) == len("2024"):
+        first, last = last, first
+    month = _MONTHS.find(middle.lower()) // 3 + 1 if middle.isalpha() else int(middle)
+    day = int(first)
+    if month > 12 or (mark == "/" and day <= 12 and len(last) == len("2024")):
+        day, month = month, day
+    return datetime(int(last), month, day).toordinal() - 1
 
 
 def decode_text(data: bytes, name: str) -> str:
@@ -188,7 +226,7 @@ def decode_text(data: bytes, name: str) -> str:
     if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
         # a spreadsheet's "Unicode text"; the bytes that were read may end within a letter
         text = data.decode("utf-16", "replace")
-    elif data.count(b"\0") > MOST_ODD * len(data):
+    elif data and not is_text(data):
         raise RecordingError(f"{name} is not text", "give a table as text")
     else:
         # a logger that is switched off leaves zeros, and so does one that has not written yet
@@ -201,8 +239,15 @@ def decode_text(data: bytes, name: str) -> str:
     if "\n" not in text:
         text = text.replace("\r", "\n")
     head = _QUOTED.sub(lambda quoted: " ".join(quoted[0].split("\n")), text[:HEAD])
-    text = head + text[HEAD:]
-    return MONITORED.sub("", text) if MONITORED.match(text) else text
+    text = COLOUR.sub("", head + text[HEAD:])
+    begun = text[:HEAD].rstrip("\n")
+    stamped = [*MONITORED.finditer(begun)]
+    if 2 * len(stamped) <= begun.count("\n"):
+        return text
+    rest = begun[stamped[-1].end() :].partition("\n")[0]
+    separator = next((mark for mark in ",;\t" if mark in rest), " ")
+    text = MONITORED.sub(lambda of: f"{f'{of[1]}T' if of[1] else ''}{of[2]}{separator}", text)
+    return re.sub(rf"^[^\s,;]+{re.escape(separator)}\r?$", "", text, flags=re.MULTILINE)
 
 
 def find_table(text: str, name: str, wanted: Sequence[str | int] = (), bare: bool = False) -> TextTable | None:
@@ -283,12 +328,23 @@ def _cells(line: str, separator: str | None) -> list[str]:
         return []
 
 
-def _is_number(cell: str) -> bool:
+def find_numbers(text: str, name: str) -> TextTable | None:
+    """Return the table of the numbers and times in lines that hold equally many, six or more; None if there is none."""
+    found = [(i, _NUMBER_OR_MOMENT.findall(line)) for i, line in enumerate(text.split("\n"), 1)]
+    found = [(i, cells) for i, cells in found if len(cells) >= 2 * len("xyz")]
+    widths = [len(cells) for _, cells in found[:PREAMBLE]]
+    width = max(set(widths), key=widths.count, default=0)
+    rows = [cells if len(cells) == width else [] for _, cells in found]
+    return TextTable(name, [], rows, [i for i, _ in found], ":") if len(rows) > 1 and rows[0] else None
+
+
+def _is_number(cell: str, dates: bool = True) -> bool:
+    """Return True if a cell holds a number, or a date or time of day if `dates`."""
     try:
         _exact(cell)
-    except ValueError:
+        return dates or Decimal(_with_point(cell.strip())).is_finite()
+    except (ValueError, InvalidOperation):
         return False
-    return True
 
 
 def _read(text: str, name: str, header: list[str], first: int, separator: str | None) -> TextTable:
@@ -319,6 +375,10 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
             f"{of} ({unit.strip()})" if unit.strip() else of for of, unit in zip_longest(header, rows[0], fillvalue="")
         ]
         rows, lines = rows[1:], lines[1:]
+    for place, cell in enumerate(rows[0][: len(header)] if rows else []):
+        if (found := _WITH_UNIT(cell)) and find_unit(found[1]):
+            header = [f"{of} ({found[1].strip()})" if i == place else of for i, of in enumerate(header)]
+            rows = [[text.removesuffix(found[1]) if i == place else text for i, text in enumerate(row)] for row in rows]
     return TextTable(name, header, rows, lines, separator)
 
 

@@ -167,8 +167,9 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
     for si in units:
         # the second time with the right smoothing
         hz = [ANY_HZ]
-        while len(hz) < 3 and (factor := rate_factor(np.arange(len(acc)) / hz[-1], acc, gyr)):
-            hz.append(hz[-1] * si / abs(factor))
+        while len(hz) < 3 and (turned := turning(np.arange(len(acc)) / hz[-1], acc, gyr))[1] >= EXPLAINED:
+            # the ratio, as the hand's own acceleration disturbs both turnings and lessens the factor
+            hz.append(hz[-1] * si / turned[2])
         if len(hz) == 3 and LIKELY_HZ[0] < hz[2] < LIKELY_HZ[1] and abs(math.log2(hz[2] / hz[1])) < SETTLED:
             likely.append(float(f"{hz[2]:.3g}"))
     return likely[0] if len(likely) == 1 else None
