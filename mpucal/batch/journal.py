@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,16 @@ from ..errors import OutputError
 class RowJournal:
     """Rows of a batch in a file, the latest of each path; only their positions are in memory.
 
+    Parameters
+    ----------
+    settings : (path) -> text of the settings on which a row depends; a row of other settings does not count.
+
     Raises
     ------
     OutputError : the file cannot be read or written.
     """
 
-    def __init__(self, file: Path, settings: str) -> None:
+    def __init__(self, file: Path, settings: Callable[[str], str]) -> None:
         self._settings = settings
         # path -> offset of its line, and digest of its file
         self._known: dict[str, tuple[int, str | None]] = {}
@@ -43,7 +47,7 @@ class RowJournal:
         with _writing(Path(self._file.name)):
             self._file.seek(0, 2)
             self._known[row["path"]] = (self._file.tell(), row.get("digest"))
-            self._file.write(json.dumps({"settings": self._settings, "row": row}).encode() + b"\n")
+            self._file.write(json.dumps({"settings": self._settings(row["path"]), "row": row}).encode() + b"\n")
             self._file.flush()
 
     def rows(self, paths: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -61,8 +65,9 @@ class RowJournal:
             begin, at = at, at + len(line)
             try:
                 content = json.loads(line)
-                if content["settings"] == self._settings:
-                    self._known[content["row"]["path"]] = (begin, content["row"].get("digest"))
+                path = content["row"]["path"]
+                if content["settings"] == self._settings(path):
+                    self._known[path] = (begin, content["row"].get("digest"))
             except (ValueError, KeyError, TypeError):
                 # the line was cut by a kill
                 continue

@@ -26,7 +26,20 @@ from ..result.calibration import Calibration
 from .locations import compute_digest, fetch
 
 AXES = "xyz"
-TEXTS = ("path", "batch", "digest", "sensor", "recorded", "chip", "model", "verdict", "reasons", "report", "error")
+TEXTS = (
+    "path",
+    "batch",
+    "digest",
+    "sensor",
+    "recorded",
+    "chip",
+    "model",
+    "verdict",
+    "reasons",
+    "report",
+    "error",
+    "options",
+)
 WHOLE = ("who_am_i", "samples")
 MATRICES = ("D", "D_std", "K", "K_std")
 VECTORS = ("b_a", "b_a_std", "b_omega", "b_omega_std")
@@ -58,10 +71,9 @@ class Settings:
     hints: Hints = NO_HINTS
     by_pattern: tuple[tuple[str, Hints], ...] = ()
 
-    @property
-    def key(self) -> str:
-        """Return a text that identifies all that a row depends on besides its file."""
-        hints = f" {self.hints} {self.by_pattern}" if self.hints != NO_HINTS or self.by_pattern else ""
+    def key(self, path: str) -> str:
+        """Return a text that identifies all that the row of a file depends on besides the file."""
+        hints = "" if (found := self.find_hints(path)) == NO_HINTS else f" {found}"
         return f"{__version__} {self.model} {self.gravity!r} {self.gravity_anyway} {bool(self.reports)}{hints}"
 
     def find_hints(self, path: str) -> Hints:
@@ -98,6 +110,7 @@ def make_row(path: str, settings: Settings, known: str | None = None) -> dict[st
                 write_atomically(Path(settings.reports, row["report"]), render(calibration, recording).encode())
     except MpucalError as error:
         row["error"] = str(error).replace(str(local), path)
+        row |= {"options": error.options} if error.options else {}
     except Exception as error:
         # one file must not end a batch of ten thousand
         row["error"] = f"a bug in mpucal, please report it: {type(error).__name__}: {error}"

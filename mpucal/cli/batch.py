@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import glob
+import shlex
 import time
 from collections.abc import Iterator
 from contextlib import closing, nullcontext
@@ -17,14 +19,15 @@ from ..batch.row import Settings
 from ..disk.atomic import write_atomically
 from ..disk.output_folder import OutputFolder
 from ..errors import UsageError
+from . import amended, typed_words
 from .arguments import PATH, output_option
 from .options import fit_options
 from .person import duration, say
-from .recording_options import hint_options, make_hints, read_hints_file
+from .recording_options import hint_options, hint_words, make_hints, read_hints_file
 
 EXAMPLE = "Example: `mpucal batch 'line3/*.mcap' -o fleet --workers 1`"
 EVERY_S = 2.0
-REPORTS = "reports"
+REPORTS, HINTS = "reports", "hints.txt"
 
 
 @click.command("batch", epilog=EXAMPLE)
@@ -81,6 +84,7 @@ def command(
                 say(f"the dashboard is at {client.dashboard_link}")
             _follow(run_batch(paths, client, journal, settings))
         _write_results(folder, paths, journal)
+        _say_options(folder, journal.rows(paths), settings, by_pattern)
     return 0
 
 
@@ -113,3 +117,18 @@ def _write_results(folder: Path, paths: list[str], journal: RowJournal) -> None:
     fleet = make_page(parquet)
     write_atomically(folder / PAGE, fleet.html.encode())
     click.echo(f"{fleet.sentence}\n\nWritten to {folder}: {parquet.name}, {text.name}, {PAGE}")
+
+
+def _say_options(folder: Path, rows: Iterator[dict[str, Any]], settings: Settings, given: Path | None) -> None:
+    """Write a file of hints with the options that the errors of files name, and print the command that uses it."""
+    lines = []
+    for row in rows:
+        if "options" in row:
+            words = amended(["batch", *hint_words(settings.find_hints(row["path"]))], row["options"], "")
+            lines.append(shlex.join([glob.escape(row["path"]), *words[1:]]))
+    if lines:
+        # the first pattern that matches counts
+        before = [] if given is None else given.read_text(encoding="utf-8").splitlines()
+        write_atomically(folder / HINTS, "\n".join([*lines, *before, ""]).encode())
+        again = shlex.join(amended(typed_words(), f"--hints {shlex.quote(str(folder / HINTS))}", ""))
+        say(f"of the files that could not be read, {len(lines)} name options: try `mpucal {again}`")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shlex
 from collections.abc import Callable, Mapping
@@ -95,6 +96,21 @@ def given_hints(options: Mapping[str, Any]) -> Hints:
     # The options of a source have ranges as text.
     ranges = {name: float(value) for name, value in values.items() if name in ("accel_range", "gyro_range")}
     return make_hints({**values, **ranges})
+
+
+def hint_words(hints: Hints) -> list[str]:
+    """Return the words of a command line that give these hints."""
+    words = []
+    for name, hint in NAMES.items():
+        if value := getattr(hints, hint):
+            if isinstance(value, Mapping):
+                # the places of columns count from 1
+                items = ((of, at + 1 if isinstance(at, int) else at) for of, at in value.items())
+                value = ",".join(f"{of}={at}" for of, at in items)
+            if isinstance(value, tuple):
+                value = ":".join(f"{at:g}" for at in value if at < math.inf) + ":" * (value[1] == math.inf)
+            words += [f"--{name.replace('_', '-')}", str(value)]
+    return words
 
 
 def read_hints_file(path: Path) -> tuple[tuple[str, Hints], ...]:

@@ -10,7 +10,7 @@ import pytest
 
 import mpucal as package
 from mpucal.batch.row import Settings, make_row
-from mpucal.cli.recording_options import read_hints_file
+from mpucal.cli.recording_options import hint_words, read_hints_file
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.errors import UsageError
 from mpucal.files.hints import Hints
@@ -48,7 +48,8 @@ def test_a_batch_takes_hints_by_pattern(table, recording, tmp_path):
     assert [pattern for pattern, _ in by_pattern] == ["odd*.csv", "*.txt"]
     assert settings.find_hints("line3/b.txt").rate_hz == 100
     assert settings.find_hints("b.csv") == Hints()
-    assert settings.key != Settings("accel", 9.80665).key
+    plain = Settings("accel", 9.80665)
+    assert [settings.key(name) == plain.key(name) for name in ("b.csv", "odd.csv")] == [True, False]
     # Dask sends settings to a worker by pickle.
     row = make_row(str(table), pickle.loads(pickle.dumps(settings)))
     assert row["samples"] == len(recording)
@@ -57,6 +58,35 @@ def test_a_batch_takes_hints_by_pattern(table, recording, tmp_path):
         (tmp_path / "hints").write_text(f"*.txt --rate 100\n{line}\n")
         with pytest.raises(UsageError, match="line 2 is not a pattern with options"):
             read_hints_file(tmp_path / "hints")
+
+
+def test_a_batch_ends_with_the_command_that_reads_what_it_could_not(mpucal, recording):
+    names = "time,accX,accY,accZ,gyroX (rad/s),gyroY (rad/s),gyroZ (rad/s)"
+    rows = np.column_stack([recording.t, recording.acc, np.degrees(recording.gyr)])
+    for name in ("a[1].csv", "b.csv"):
+        np.savetxt(name, rows, delimiter=",", header=names, comments="")
+    Path("given").write_text("b.csv --span 5:\n")
+    found = mpucal(
+        *["batch", "a[[]1].csv", "b.csv", "-o", "fleet", "--workers", "1", "--model", "accel", "--hints", "given"]
+    )
+    assert "2 could not be read" in found.out
+    command = found.err.splitlines()[-1].partition("try `")[2].removesuffix("`")
+    assert shlex.split(command) == ["mpucal", "batch", *words, "--hints", "fleet/hints.txt"]
+    assert dict(read_hints_file(Path("fleet/hints.txt")))["b.csv"].span is not None
+    assert "0 could not be read" in mpucal(*shlex.split(command)[1:]).out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("--columns t=1,ax=2 --units t=ms,acc=g --accel-range 4.0 --gyro-range 500.0", "--topic /imu --rate 100.0"),
+        *("--columns t=when,ax=a --span 2:7.5", "--span 5:"),
+    ],
+)
+def test_hints_as_the_words_that_give_them(words, tmp_path):
+    (tmp_path / "hints").write_text(f"* {words}")
+    ((_, hints),) = read_hints_file(tmp_path / "hints")
+    assert hint_words(hints) == words.split()
 
 
 def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording):
