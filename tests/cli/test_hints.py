@@ -66,9 +66,8 @@ def test_a_batch_ends_with_the_command_that_reads_what_it_could_not(mpucal, reco
     for name in ("a[1].csv", "b.csv"):
         np.savetxt(name, rows, delimiter=",", header=names, comments="")
     Path("given").write_text("b.csv --span 5:\n")
-    found = mpucal(
-        *["batch", "a[[]1].csv", "b.csv", "-o", "fleet", "--workers", "1", "--model", "accel", "--hints", "given"]
-    )
+    words = ["a[[]1].csv", "b.csv", "-o", "fleet", "--workers", "1", "--model", "accel"]
+    found = mpucal("batch", *words, "--hints", "given")
     assert "2 could not be read" in found.out
     command = found.err.splitlines()[-1].partition("try `")[2].removesuffix("`")
     assert shlex.split(command) == ["mpucal", "batch", *words, "--hints", "fleet/hints.txt"]
