@@ -104,6 +104,9 @@ def _json_arrays(name: str, value: Any) -> Arrays:
     if isinstance(value, list) and any(isinstance(row, dict) for row in value):
         rows = [row if isinstance(row, dict) else {} for row in value]
         value = {key: [row.get(key) for row in rows] for key in dict.fromkeys(chain(*rows))}
+    if isinstance(value, dict) and value and all(key.isdecimal() for key in value):
+        # a column of pandas, by its index
+        value = list(value.values())
     if isinstance(value, dict):
         if {"sensors", "values"} <= value.keys():
             # Edge Impulse's data acquisition format

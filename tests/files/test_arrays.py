@@ -58,6 +58,14 @@ def in_json(document):
 
 
 # the file's name, what writes it there, and text of the recording's `taken`
+
+
+def named(walk):
+    """Return the samples under the names of mpucal's own tables."""
+    columns = np.column_stack([walk.t, walk.acc, walk.gyr]).T.tolist()
+    return dict(zip(["t", "ax", "ay", "az", "gx", "gy", "gz"], columns, strict=True))
+
+
 WRITTEN = {
     "a matrix": ("a.npy", lambda p, w, ns: np.save(p, np.column_stack([w.t, si(w)])), "how gravity turns"),
     "fields": ("a.npy", as_fields, "times in ms"),
@@ -88,6 +96,11 @@ WRITTEN = {
         in_json(
             lambda w: [{"t": t, "acc": dict(zip("xyz", r[:3], strict=True)), "gyro": r[3:]} for t, r in rows_of(w)]
         ),
+        "times in s",
+    ),
+    "JSON's columns by pandas' index": (
+        "a.json",
+        in_json(lambda w: {of: {str(i): v for i, v in enumerate(values)} for of, values in named(w).items()}),
         "times in s",
     ),
     "JSON's columns": (

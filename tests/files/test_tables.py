@@ -50,6 +50,9 @@ COLUMNS = {
     "am": lambda w, ns: [f"{date.item():%m/%d/%Y %I:%M:%S.%f %p}" for date in dates(w)],
     "german": lambda w, ns: [f"{date.item():%d.%m.%Y %H:%M:%S,%f}" for date in dates(w)],
     "matlab": lambda w, ns: [f"{date.item():%d-%b-%Y %H:%M:%S.%f}" for date in dates(w)],
+    "colon": lambda w, ns: [f"{date.item():%H:%M:%S:%f}" for date in dates(w)],
+    "zone": lambda w, ns: [f"{date.item():%Y-%m-%d %H:%M:%S.%f} UTC" for date in dates(w)],
+    "days": lambda w, ns: [f"0 days 00:00:{t:09.6f}" for t in w.t],
     "tick": lambda w, ns: 421 + np.rint(w.t * 1000).astype(int),
     "epoch": lambda w, ns: ns // 10**6,
     "micros": lambda w, ns: dates(w).astype(int) % 10**6,
@@ -282,6 +285,18 @@ FORMS = {
     "MATLAB's durations": Form(f"Time,{AXES}", "t a w", "{} sec,{},{},{},{},{},{}\n", says="times in s,"),
     "units in each cell": Form(f'"Time",{AXES}', "date a w", '"{}"' + ',"{} m/s²"' * 3 + ',"{} rad/s"' * 3 + "\n"),
     "an index of dates without a name": Form(f",{AXES}", "utc a w"),
+    "milliseconds after a colon": Form(f"Time,{AXES}", "colon a w"),
+    "pandas' durations": Form(f",{AXES}", "days a w"),
+    "a zone in letters": Form("created_at,entry_id,f1,f2,f3,f4,f5,f6\n", "zone i a w", says=f"{BY_GRAVITY}t,-,ax"),
+    "ros2 topic echo --csv": Form("", "sec nanosec imu_link 0.0 a w 0.0", says=f"{BY_GRAVITY}t,-,-,-,ax"),
+    "journalctl": Form(
+        *("", "clock. a w", "May 01 {} pi python3[812]: ax={} ay={} az={} gx={} gy={} gz={}\n", "walk.log")
+    ),
+    "a temperature T": Form(
+        *("", "g dps 25.1", "Ax= {}\tAy= {}\tAz= {}\tGx= {}\tGy= {}\tGz= {}\tT= {}\n", "walk.txt", "a rate of 100 Hz"),
+        AT_100_HZ,
+    ),
+    "a rate in a comment": Form(f"# fs = 100 Hz\n# {AXES}", "counts", says="a rate of 100 Hz", atol=IN_COUNTS),
     "a suffix that no format has": Form("LabVIEW\t\n\nX_Value\tax\tay\taz\tgx\tgy\tgz\n", "t a w", "\t", "walk.lvm"),
     # lines of a terminal, with its times before them
     "times of PlatformIO": Form(
@@ -442,6 +457,13 @@ def test_counts_need_a_rate_and_their_ranges_must_fit(read, walk):
         read(AXES, "counts", rate=100, accel_range=2, gyro_range=500)
     with pytest.raises(RecordingError, match=r"gravity turns .* as fast"):
         read(AXES, "counts", rate=100, accel_range=4, gyro_range=2000)
+
+
+def test_counts_beside_an_index_have_no_rate(read, walk):
+    """Take no index for milliseconds: any range of counts would fit these."""
+    found = read("", "i 10.0 counts")
+    assert np.isnan(found.gyr).all()
+    assert "this sample rate is assumed" in found.taken
 
 
 def test_counts_at_the_end_of_the_range_are_clipped(walk, tmp_path):

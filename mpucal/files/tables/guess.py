@@ -55,9 +55,8 @@ def guess_columns(table: Vector, hints: Hints) -> dict[str, int]:
     n, width = table.shape
     if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND**2).all():
         return {}
-    clocks = [place for place in range(width) if is_clock(table[:, place])]
     # an index increases, too
-    clocks.sort(key=lambda place: bool((np.diff(table[:, place]) == 1.0).all()))
+    clocks = [place for place in range(width) if is_clock(table[:, place]) and not _is_index(table[:, place])]
     for at in (*clocks, None):
         t = _seconds(None if at is None else table[:, at], n, hints)
         pairs = _pairs(table, [place for place in range(width) if place != at])
@@ -103,6 +102,11 @@ def is_clock(column: Vector) -> bool:
     return len(steps) > 0 and bool((steps >= 0).all() and (steps > 0).mean() > 0.01)
 
 
+def _is_index(column: Vector) -> bool:
+    """Return True if (n,) numbers count the samples from 0 or 1 on."""
+    return bool(0.0 <= column[0] <= 1.0 and (np.diff(column) == 1.0).all())
+
+
 def is_even_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase with the samples, at a sensor's rate in some unit, and do not count them."""
     if not is_clock(column) or (np.diff(column) == 1.0).all():
@@ -130,7 +134,7 @@ def _pairs(table: Vector, places: list[int]) -> list[tuple[int, ...]]:
 def _turned(table: Vector, pair: Sequence[int], t: Vector, *, any_rate: bool) -> float:
     """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
     acc, gyr = (to_signed(table[:, list(places)]) for places in (pair[:3], pair[3:]))
-    factor, correlation, _ = turning(t, acc, gyr)
+    factor, correlation = turning(t, acc, gyr)
     ratios = [factor / si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS]
     of_a_unit = any_rate or are_counts(gyr) or any(1 / NEAR < ratio < NEAR for ratio in ratios)
     return correlation if factor > 0.0 and of_a_unit else 0.0

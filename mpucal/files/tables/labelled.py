@@ -15,11 +15,12 @@ _PAIR = re.compile(rf"{_NAME}\s?[:=][ \t]{{0,9}}(?:({MOMENT})|({NUMBER}))(?![\w:
 # programs' ways to write the time of a line, beside a date at its beginning: ESP-IDF's log, Teleplot, InfluxDB
 _AT = "line_time="
 _TIMES = (
-    (re.compile(rf"^(?={MOMENT}\b)", re.MULTILINE), _AT),
+    (re.compile(rf"^(?:[\w-]{{1,12}} ){{0,3}}(?={MOMENT}\b)", re.MULTILINE), _AT),
     (re.compile(r"^[EWIDV] \((\d{1,12})\) ", re.MULTILINE), rf"{_AT}\1, "),
     (re.compile(r"^>([A-Za-z_]\w{0,40}):(\d{10,19}):", re.MULTILINE), rf"{_AT}\2, \1:"),
     (re.compile(r"(?<=\d)[ \t](\d{10,19})\r?$", re.MULTILINE), rf", {_AT}\1"),
 )
+_NAMED = re.compile(r"[\w'\"][ \t]{0,9}=|[A-Za-z_'\"][ \t]{0,9}:")
 _QUOTES = dict.fromkeys(map(ord, "{}'\""))
 # three axes at once: `accel=(9252, -5612, -12084)`, `GYRO: X=0.1,Y=0.2,Z=0.3`, `Acceleration X: 0.1, Y: 0.2, Z: 0.3`
 _CELL = r"([^,()\[\]\n\t=:]{1,30})"
@@ -75,6 +76,8 @@ def labelled_table(text: str, name: str) -> TextTable | None:
 
     A sample is a line, or the lines from one that names the first axis to the next such line.
     """
+    if not _NAMED.search(text):
+        return None
     text = _join_records(text) if _BETWEEN_RECORDS in text else text
     text = text.translate(_QUOTES)
     for pattern, replacement in _TIMES:

@@ -45,11 +45,14 @@ from .units import BEYOND, QUANTITIES, acceleration_unit, are_counts, seem_count
 PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
 # above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
 RATE = re.compile(
-    r"(?:^|(?<![a-z])(?:sampl(?:e|ing)|data|output|acquisition|update|sensor|imu|log(?:ging)?|recording))[ _]?"
+    r"(?:^[#%/ ]{0,5}|(?<![a-z])(?:sampl(?:e|ing)|data|output|acquisition|update|sensor|imu|log(?:ging)?|recording))"
+    r"[ _]?"
     r"(?:(?<![a-z])fs|rate|freq\w{0,6})[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
     r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
     re.IGNORECASE | re.MULTILINE,
 )
+# seconds since 1970, and nanoseconds
+STAMP = re.compile(r"(?<![^,])[12]\d{9},\d{1,9}(?![^,])")
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
 FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
 # accelerations from which a program has taken gravity
@@ -92,6 +95,10 @@ def _with_sensor(table: TextTable) -> list[str]:
     The sensor is that of their unit, or of the file's name.
     """
     axes = [parse_axis_name(name) for name in table.header]
+    if not table.header and (stamp := STAMP.search(",".join(table.rows[0]))):
+        # `ros2 topic echo --csv`
+        place = stamp.string.count(",", 0, stamp.start())
+        return [{place: "stamp.sec", place + 1: "stamp.nanosec"}.get(at, "") for at in range(len(table.rows[0]))]
     of_file = axes_of(Path(table.name).stem)
     if not any(axes):
         return of_file if not table.header and len(table.rows[0]) == len("xyz") else table.header
@@ -292,7 +299,7 @@ def sensor_stream(
     values = -values if axes[0].sign_flipped else values
     values[~np.isfinite(values)] = np.nan
     empty = np.isnan(values).all(axis=1)
-    clocks = [c for c in clocks if c.clock_of in ("", axes[0].quantity)]
+    clocks = [c for c in clocks if c.clock_of in ("", axes[0].quantity) and _passes(table, c)]
     clock = min(clocks, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit), default=None)
     others = np.count_nonzero(empty) > MOST_ODD * len(values)
     timed = np.ones(len(values), bool) if clock is None else table.has(clock)
@@ -311,6 +318,14 @@ def sensor_stream(
         lost=0 if others else int((~kept).sum()),
         rate_hz=table.rate_hz,
     )
+
+
+def _passes(table: Table, clock: Column) -> bool:
+    """Return False for a column called t that does not increase, such as a temperature."""
+    if clock.name.strip().lower() != "t":
+        return True
+    steps = np.diff(np.array(table.times(clock, table.has(clock))[0], float))
+    return bool((steps > 0).any() and np.count_nonzero(steps < 0) * FEWEST <= len(steps))
 
 
 def columns_by_hint(header: Sequence[str], hints: Hints) -> list[Column]:

@@ -53,8 +53,10 @@ MONITORED = re.compile(
     re.MULTILINE,
 )
 COLOUR = re.compile(r"\x1b\[[0-9;]{0,9}m")
-# the hours may be missing
-_TIME_OF_DAY = re.compile(r"(?:(\d\d?):)?(\d\d):(\d\d(?:\.\d+)?)(?: ?([AaPp])\.?[Mm]\.?)?").fullmatch
+# the hours may be missing; days are those of pandas' durations, and milliseconds may follow a colon
+_TIME_OF_DAY = re.compile(
+    r"(?:(\d{1,6}) days? )?(?:(\d\d?):)?(\d\d):(\d\d)((?:\.|(?<=\d:\d\d:\d\d):)\d+)?(?: ?([AaPp])\.?[Mm]\.?)?"
+).fullmatch
 # a date that does not begin with the year, or not as ISO 8601 has it, and a time of day
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.*)").fullmatch
 _ISO = re.compile(r"\d{4}-\d\d-\d\d").match
@@ -194,12 +196,13 @@ def _exact(text: str) -> Decimal:
             return number
     except InvalidOperation:
         if of_day := _TIME_OF_DAY(_with_point(text)):
-            hours, minutes, seconds, half = of_day.groups()
+            days, hours, minutes, seconds, below, half = of_day.groups()
             hour = int(hours or 0) if half is None else int(hours or 0) % 12 + 12 * (half in "Pp")
-            return ((hour * 60 + int(minutes)) * 60 + Decimal(seconds)) * NS
+            hour += 24 * int(days or 0)
+            return ((hour * 60 + int(minutes)) * 60 + int(seconds) + Decimal(f"0.{(below or '.0')[1:]}")) * NS
         if (split := _DATE(text)) and not _ISO(text):
             return _days(split[1], split[3], split[4], split[2]) * DAY_NS + _exact(split[5])
-        date = datetime.fromisoformat(text)
+        date = datetime.fromisoformat(re.sub(" (?:UTC|GMT)$", "Z", text))
         since = date - (EPOCH if date.tzinfo else datetime.min)
         return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
     raise ValueError(text)

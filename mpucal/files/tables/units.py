@@ -132,17 +132,21 @@ def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     ----------
     t : (n,) s. acc : in any unit. gyr : in rad/s if the factor is 1.
     """
-    factor, correlation, _ = turning(t, acc, gyr)
+    factor, correlation = turning(t, acc, gyr)
     return factor if correlation >= EXPLAINED else None
 
 
-def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float, float]:
-    """Return the factor of rate_factor, the correlation of both turnings, 0 if there is none, and their ratio."""
+def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
+    """Return the factor of rate_factor, and the correlation of both turnings, 0 if there is none.
+
+    The factor is the ratio of their sizes: the hand's own acceleration disturbs both, so that the regression of one on
+    the other would be too small.
+    """
     # stamps of arrival may repeat
     dt = (float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)) if len(t) >= LEAST_TURNS else 0.0
     width = max(1, round(min(TURN_S / 2 / dt, len(t)))) if dt > 0.0 else len(t)
     if len(t) < LEAST_TURNS * width:
-        return 0.0, 0.0, math.inf
+        return math.inf, 0.0
     kernel = np.full(width, 1.0 / width)
     smooth = np.column_stack([np.convolve(column, kernel, "same") for column in acc.T])
     rates = np.column_stack([np.convolve(column, kernel, "same") for column in gyr.T])
@@ -152,10 +156,10 @@ def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float, float]:
     inner = slice(width, len(t) - width)
     lag = 2 * width
     seen, predicted = (values[inner][lag:] - values[inner][:-lag] for values in (smooth, path))
-    power = float((predicted**2).sum())
-    both = float((seen * predicted).sum())
-    size = math.sqrt(power * float((seen**2).sum()))
-    return (both / power, abs(both) / size, size / power) if size > 0.0 else (0.0, 0.0, math.inf)
+    sizes, both = [math.sqrt(float((each**2).sum())) for each in (seen, predicted)], float((seen * predicted).sum())
+    if 0.0 in sizes:
+        return math.inf, 0.0
+    return math.copysign(sizes[0] / sizes[1], both), abs(both) / (sizes[0] * sizes[1])
 
 
 def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
@@ -167,9 +171,8 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
     for si in units:
         # the second time with the right smoothing
         hz = [ANY_HZ]
-        while len(hz) < 3 and (turned := turning(np.arange(len(acc)) / hz[-1], acc, gyr))[1] >= EXPLAINED:
-            # the ratio, as the hand's own acceleration disturbs both turnings and lessens the factor
-            hz.append(hz[-1] * si / turned[2])
+        while len(hz) < 3 and (factor := rate_factor(np.arange(len(acc)) / hz[-1], acc, gyr)):
+            hz.append(hz[-1] * si / abs(factor))
         if len(hz) == 3 and LIKELY_HZ[0] < hz[2] < LIKELY_HZ[1] and abs(math.log2(hz[2] / hz[1])) < SETTLED:
             likely.append(float(f"{hz[2]:.3g}"))
     return likely[0] if len(likely) == 1 else None
@@ -191,7 +194,7 @@ def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:
     quiet = min(parts, key=lambda part: float(part.std(axis=0).sum()))
     noise, bias = float(quiet.std(axis=0).max()), float(np.abs(quiet.mean(axis=0)).max())
     fastest = float(np.percentile(np.abs(gyr), 99))
-    ratio = turning(t, acc, gyr)[2]
+    ratio = abs(turning(t, acc, gyr)[0])
     likely = [
         unit
         for unit, si in QUANTITIES["gyr"].items()
