@@ -6,8 +6,9 @@ import re
 from dataclasses import dataclass
 from itertools import chain
 
+from .cells import MOMENT, NUMBER
 from .names import ACC, GYR, TIME, first_triple, parse_column_name, parse_header
-from .text import MOMENT, NUMBER, PREAMBLE, TextTable
+from .text import PREAMBLE, TextTable
 
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
 _NAME = r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})"

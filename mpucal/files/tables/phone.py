@@ -16,7 +16,7 @@ import lzma
 import re
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from decimal import Decimal
@@ -31,8 +31,8 @@ from ..reading import HELD, check_size, first_bytes, reading
 from .array_table import ArrayTable, columns_of_arrays, stated_rate
 from .names import ACC, GYR, TIME, Table, first_triple, parse_header, with_sensor
 from .streams import join_streams
-from .table import FLIPPED, columns_by_hint, sensor_stream, stated_rate_hz
-from .text import TextTable, decode_text, find_numeric_table, find_table
+from .table import FLIPPED, columns_by_hint, find_any_table, sensor_stream, stated_rate_hz
+from .text import TextTable, decode_text, find_table
 from .times import Stream
 from .units import NS, acceleration_unit, seem_counts
 
@@ -237,8 +237,10 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
     if isinstance(data, ArrayTable):
         table = data
     else:
-        table = _array_table(data, name) if data.startswith(MATLAB) else _text_table(data, name, list(hinted.values()))
-    if table is None:
+        wanted = list(hinted.values())
+        is_array = data.startswith(MATLAB)
+        table = _array_table(data, name) if is_array else find_any_table(decode_text(data, name), name, wanted)
+    if table is None or (isinstance(table, TextTable) and not table.rows):
         raise RecordingError(
             f"{name} names no columns x, y and z",
             "name its columns in its first line (time, x, y, z), or give their order with --columns t,ax,ay,az",
@@ -262,18 +264,6 @@ def _hinted_columns(hints: Hints, quantity: str) -> dict[str, str | int]:
     of = letter if f"{letter}x" in hints.columns else "a"
     found = {role.replace(of, letter): where for role, where in hints.columns.items() if role[0] in (of, "t")}
     return found if len(found) > 1 else {}
-
-
-def _text_table(data: bytes, name: str, wanted: Sequence[str | int]) -> Table | None:
-    text = decode_text(data, name)
-    table = find_table(text, name, wanted)
-    if table is None and not wanted:
-        table = find_table(text, name, bare=True) or find_numeric_table(text, name, len(UNNAMED) - 1)
-        if table and not table.header:
-            names = iter(UNNAMED[-len(places) :] if len(places := table.numeric_places()) in (3, 4) else ())
-            header = [next(names, "") if place in places else "" for place in range(len(table.rows[0]))]
-            table = replace(table, header=header) if any(header) else None
-    return table if table and table.rows else None
 
 
 def _array_table(data: bytes, name: str) -> Table | None:

@@ -75,13 +75,15 @@ def is_own_table(path: Path) -> bool:
 
 def _begun(path: Path) -> TextTable | None:
     try:
-        return _find(decode_text(first_bytes(path), path.name), path.name)
+        return find_any_table(decode_text(first_bytes(path), path.name), path.name)
     except RecordingError:
         return None
 
 
-def _find(text: str, name: str) -> TextTable | None:
-    """Return the table of named columns, or else of numbers; three are called after the file."""
+def find_any_table(text: str, name: str, wanted: Sequence[str | int] = ()) -> TextTable | None:
+    """Return the table of the `wanted` columns, or of named ones, or else of numbers; see find_table."""
+    if wanted:
+        return find_table(text, name, wanted) or find_numbers(text, name)
     found = marked_table(text, name) or labelled_table(text, name) or find_table(text, name)
     if found:
         return found
@@ -90,7 +92,7 @@ def _find(text: str, name: str) -> TextTable | None:
 
 
 def _with_sensor(table: TextTable) -> list[str]:
-    """Return the header of a table whose columns x, y, z, or three numbers, are those of one sensor; or its own.
+    """Return the header of one sensor's table: of columns x, y, z, or of [time and] three without names; or its own.
 
     The sensor is that of their unit, or of the file's name.
     """
@@ -101,7 +103,10 @@ def _with_sensor(table: TextTable) -> list[str]:
         return [{place: "stamp.sec", place + 1: "stamp.nanosec"}.get(at, "") for at in range(len(table.rows[0]))]
     of_file = axes_of(Path(table.name).stem)
     if not any(axes):
-        return of_file if not table.header and len(table.rows[0]) == len("xyz") else table.header
+        places = table.numeric_places()
+        names = ["time", *of_file][4 - len(places) :] if len(places) in (3, 4) and of_file and not table.header else []
+        found = dict(zip(places, names, strict=False))
+        return [found.get(at, "") for at in range(len(table.rows[0]))] if found else table.header
     units = {axis[1] for axis in axes if axis}
     of = next((of for of in (ACC, GYR) if units & set(QUANTITIES[of])), of_file[0].removesuffix("x") if of_file else "")
     return with_sensor(table.header, of) if of else table.header
@@ -126,8 +131,7 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     with reading(path):
         check_size(path, HELD * path.stat().st_size)
         text = decode_text(path.read_bytes(), path.name)
-    wanted = [*hints.columns.values()]
-    table = find_table(text, path.name, wanted) or find_numbers(text, path.name) if wanted else _find(text, path.name)
+    table = find_any_table(text, path.name, [*hints.columns.values()])
     if not text.strip():
         raise RecordingError(f"{path} is empty", "record it again")
     if table is None:

@@ -1,4 +1,4 @@
-"""Tables as text: the separator, decimal commas, the lines before the header, and cells as exact numbers."""
+"""Tables as text: the separator, the lines before the header, and the times before each line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from decimal import Decimal, InvalidOperation
 from io import StringIO
 from itertools import pairwise, zip_longest
@@ -18,6 +17,7 @@ import numpy as np
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..reading import MOST_ODD, check_size, is_text
+from .cells import CLOCK, DAY_NS, MOMENT, NUMBER, is_number, parse_cell, with_point
 from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
 from .units import NS, QUANTITIES, find_unit
 
@@ -36,15 +36,10 @@ MOST_BAD = 0.01
 # Bytes that a line takes at least while it is read, in CPython on 64 bits: a list (56), its reference and line number
 # (16 and 32), a Decimal of its time (104 and 8). A cell takes a reference and a float64.
 LINE, CELL = 216, 16
-# exponents of numbers beyond this would take all memory as integers
-MOST_DIGITS = 40
 # units of a column beside whole seconds
 BELOW_A_SECOND = ("ms", "us", "ns")
 # names within quotation marks may span lines
 _QUOTED = re.compile(r'"[^"]{0,60}"')
-EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-DAY_NS = 86400 * NS
-CLOCK = r"\d\d?:\d\d:\d\d(?:[.,]\d{1,9})?"
 # Serial monitors, terminals and loggers write the time before each line: `12:03:04.123 -> `, `[2024-05-01 12:03:04] `.
 # A blank alone ends it where the line goes on with numbers and another separator.
 MONITORED = re.compile(
@@ -53,19 +48,8 @@ MONITORED = re.compile(
     re.MULTILINE,
 )
 COLOUR = re.compile(r"\x1b\[[0-9;]{0,9}m")
-# the hours may be missing; days are those of pandas' durations, and milliseconds may follow a colon
-_TIME_OF_DAY = re.compile(
-    r"(?:(\d{1,6}) days? )?(?:(\d\d?):)?(\d\d):(\d\d)((?:\.|(?<=\d:\d\d:\d\d):)\d+)?(?: ?([AaPp])\.?[Mm]\.?)?"
-).fullmatch
-# a date that does not begin with the year, or not as ISO 8601 has it, and a time of day
-_DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.*)").fullmatch
-_ISO = re.compile(r"\d{4}-\d\d-\d\d").match
-_MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
 # a number and its unit in one cell
 _WITH_UNIT = re.compile(r"[-+.\d][-+.,\deE]*( ?[^-+.,\d\s][^\d]{0,9}\d?)").fullmatch
-# among other text; lengths are bounded: the search takes linear time
-NUMBER = r"[-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?"
-MOMENT = rf"(?:\d{{4}}-\d\d-\d\d[ T])?{CLOCK}(?:Z|[+-]\d\d:?\d\d)?"
 _NUMBER_OR_MOMENT = re.compile(rf"(?<![\w.])(?:{MOMENT}|{NUMBER})(?!\w)")
 
 
@@ -98,7 +82,7 @@ class TextTable(Table):
     def numeric_places(self) -> list[int]:
         """See Table; the first row decides."""
         width = int(np.percentile([len(row) for row in self.rows], 100 * MOST_BAD))
-        return [place for place, cell in enumerate(self.rows[0][:width]) if _is_number(cell, dates=False)]
+        return [place for place, cell in enumerate(self.rows[0][:width]) if is_number(cell, dates=False)]
 
     def clocks(self, columns: Sequence[Column]) -> list[Column]:
         """See Table; if none is named, the first column of dates or times of day that changes."""
@@ -106,10 +90,10 @@ class TextTable(Table):
         some = self.rows[:: max(len(self.rows) // LOOKED_AT, 1)][: LOOKED_AT + 1] or self.rows
         cells = [(c, [row[c.place] for row in some if c.place < len(row)]) for c in columns if c.quantity == TIME]
         # a few cells may be damaged
-        named = [c for c, of in cells if of and np.mean([*map(_is_number, filter(str.strip, of))] or 1) > 1 - MOST_ODD]
+        named = [c for c, of in cells if of and np.mean([*map(is_number, filter(str.strip, of))] or 1) > 1 - MOST_ODD]
         for place, cell in enumerate([] if named else self.rows[0]):
-            dates = {row[place] for row in some if place < len(row) and _is_number(row[place])}
-            if len(dates) > 1 and _is_number(cell) and not _is_number(cell, dates=False):
+            dates = {row[place] for row in some if place < len(row) and is_number(row[place])}
+            if len(dates) > 1 and is_number(cell) and not is_number(cell, dates=False):
                 return [Column(self.header[place] if self.header else "", place, TIME)]
         return named
 
@@ -120,7 +104,7 @@ class TextTable(Table):
             for i, row in enumerate(self.rows):
                 text = row[column.place].strip() if column.place < len(row) else ""
                 try:
-                    found[i, j] = float(_with_point(text)) if text else np.nan
+                    found[i, j] = float(with_point(text)) if text else np.nan
                 except ValueError:
                     bad.append((i, column, text))
         if len({i for i, *_ in bad}) > MOST_BAD * len(self.rows):
@@ -132,7 +116,7 @@ class TextTable(Table):
         found, unit = self._exact(column, kept), column.unit
         parts = [c for c in self.columns if c.quantity == NANOSECONDS and unit == "s"]
         try:
-            Decimal(_with_point(self._cell(int(kept.argmax()), column).strip()))
+            Decimal(with_point(self._cell(int(kept.argmax()), column).strip()))
         except InvalidOperation:
             unit = "ns"
             below = [c for c in self.columns if c.quantity == TIME and c.unit in BELOW_A_SECOND and c != column]
@@ -151,7 +135,7 @@ class TextTable(Table):
         for i in np.flatnonzero(kept).tolist():
             text = self._cell(i, column)
             try:
-                at = _exact(text)
+                at = parse_cell(text)
                 if found and ":" in text and (at > DAY_NS) != (found[-1] > DAY_NS):
                     raise ValueError(text)
                 found.append(at)
@@ -180,43 +164,6 @@ class TextTable(Table):
             f"{self.name}: line {self.lines[i]}: {name} is {text!r}, which is not a number",
             "correct that line or leave it out",
         )
-
-
-def _with_point(text: str) -> str:
-    """Return a number's text with a decimal point in place of a comma."""
-    return text.replace(",", ".") if "," in text and "." not in text else text
-
-
-def _exact(text: str) -> Decimal:
-    """Return a number, or a date's ns since 1970 (since the year 1 without a zone), or a time of day's ns."""
-    text = text.strip()
-    try:
-        number = Decimal(_with_point(text))
-        if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
-            return number
-    except InvalidOperation:
-        if of_day := _TIME_OF_DAY(_with_point(text)):
-            days, hours, minutes, seconds, below, half = of_day.groups()
-            hour = int(hours or 0) if half is None else int(hours or 0) % 12 + 12 * (half in "Pp")
-            hour += 24 * int(days or 0)
-            return ((hour * 60 + int(minutes)) * 60 + int(seconds) + Decimal(f"0.{(below or '.0')[1:]}")) * NS
-        if (split := _DATE(text)) and not _ISO(text):
-            return _days(split[1], split[3], split[4], split[2]) * DAY_NS + _exact(split[5])
-        date = datetime.fromisoformat(re.sub(" (?:UTC|GMT)$", "Z", text))
-        since = date - (EPOCH if date.tzinfo else datetime.min)
-        return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
-    raise ValueError(text)
-
-
-def _days(first: str, middle: str, last: str, mark: str) -> int:
-    """Return the days since the year 1 of 2024/5/1, 1.5.2024, 01-May-2024 or 5/1/2024, by the mark between them."""
-    if len(first) == len("2024"):
-        first, last = last, first
-    month = _MONTHS.find(middle.lower()) // 3 + 1 if middle.isalpha() else int(middle)
-    day = int(first)
-    if month > 12 or (mark == "/" and day <= 12 and len(last) == len("2024")):
-        day, month = month, day
-    return datetime(int(last), month, day).toordinal() - 1
 
 
 def decode_text(data: bytes, name: str) -> str:
@@ -273,7 +220,7 @@ def find_table(text: str, name: str, wanted: Sequence[str | int] = (), bare: boo
                     names & (plain | {of.partition("(")[0].strip() for of in plain})
                 )
             elif places:
-                found = len(cells) > max(places) and all(_is_number(cells[place]) for place in places)
+                found = len(cells) > max(places) and all(is_number(cells[place]) for place in places)
             elif bare:
                 found = {axis[0] for cell in cells if (axis := parse_axis_name(cell))} == {0, 1, 2}
             else:
@@ -309,7 +256,7 @@ def find_numeric_table(text: str, name: str, least: int) -> TextTable | None:
     for first, (line, following) in enumerate(pairwise(begun)):
         for separator in SEPARATORS:
             cells, more = _cells(line, separator), _cells(following, separator)
-            alike = [_is_number(one) and _is_number(other) for one, other in zip(cells, more, strict=False)]
+            alike = [is_number(one) and is_number(other) for one, other in zip(cells, more, strict=False)]
             marked = all(one == other for one, other, number in zip(cells, more, alike, strict=False) if not number)
             if sum(alike) >= least and len(more) == len(cells) and (marked or sum(alike) >= 2 * len("xyz")):
                 above = _cells(begun[first - 1], separator) if first else []
@@ -339,15 +286,6 @@ def find_numbers(text: str, name: str) -> TextTable | None:
     width = max(set(widths), key=widths.count, default=0)
     rows = [cells if len(cells) == width else [] for _, cells in found]
     return TextTable(name, [], rows, [i for i, _ in found], ":") if len(rows) > 1 and rows[0] else None
-
-
-def _is_number(cell: str, dates: bool = True) -> bool:
-    """Return True if a cell holds a number, or a date or time of day if `dates`."""
-    try:
-        _exact(cell)
-        return dates or Decimal(_with_point(cell.strip())).is_finite()
-    except (ValueError, InvalidOperation):
-        return False
 
 
 def _read(text: str, name: str, header: list[str], first: int, separator: str | None) -> TextTable:
@@ -387,4 +325,4 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
 
 def _are_units(cells: list[str]) -> bool:
     """Return True if a line below the header holds the units."""
-    return any(map(find_unit, cells)) and not any(_is_number(cell) for cell in cells)
+    return any(map(find_unit, cells)) and not any(is_number(cell) for cell in cells)

@@ -1,0 +1,75 @@
+"""Cells of a table of text as exact numbers: numbers with a point or a comma, dates, and times of day in ns."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+from decimal import Decimal, InvalidOperation
+
+from .units import NS
+
+# exponents of numbers beyond this would take all memory as integers
+MOST_DIGITS = 40
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+DAY_NS = 86400 * NS
+CLOCK = r"\d\d?:\d\d:\d\d(?:[.,]\d{1,9})?"
+# among other text; lengths are bounded: the search takes linear time
+NUMBER = r"[-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?"
+MOMENT = rf"(?:\d{{4}}-\d\d-\d\d[ T])?{CLOCK}(?:Z|[+-]\d\d:?\d\d)?"
+# the hours may be missing; days are those of pandas' durations, and milliseconds may follow a colon
+_TIME_OF_DAY = re.compile(
+    r"(?:(\d{1,6}) days? )?(?:(\d\d?):)?(\d\d):(\d\d)((?:\.|(?<=\d:\d\d:\d\d):)\d+)?(?: ?([AaPp])\.?[Mm]\.?)?"
+).fullmatch
+# a date that does not begin with the year, or not as ISO 8601 has it, and a time of day
+_DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.*)").fullmatch
+_ISO = re.compile(r"\d{4}-\d\d-\d\d").match
+_MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
+
+
+def with_point(text: str) -> str:
+    """Return a number's text with a decimal point in place of a comma."""
+    return text.replace(",", ".") if "," in text and "." not in text else text
+
+
+def parse_cell(text: str) -> Decimal:
+    """Return a number, or a date's ns since 1970 (since the year 1 without a zone), or a time of day's ns.
+
+    Raises
+    ------
+    ValueError : it is none of these.
+    """
+    text = text.strip()
+    try:
+        number = Decimal(with_point(text))
+        if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
+            return number
+    except InvalidOperation:
+        date, of_day = (None, text) if _ISO(text) or not (split := _DATE(text)) else (split, split[5])
+        if found := _TIME_OF_DAY(with_point(of_day)):
+            days, hours, minutes, seconds, below, half = found.groups()
+            hour = int(hours or 0) if half is None else int(hours or 0) % 12 + 12 * (half in "Pp")
+            at = ((24 * int(days or 0) + hour) * 60 + int(minutes)) * 60 + int(seconds)
+            before = _days(*date.groups()[:4]) if date else 0
+            return before * DAY_NS + (at + Decimal(f"0.{(below or '.0')[1:]}")) * NS
+        moment = datetime.fromisoformat(re.sub(" (?:UTC|GMT)$", "Z", text))
+        since = moment - (EPOCH if moment.tzinfo else datetime.min)
+        return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
+    raise ValueError(text)
+
+
+def _days(first: str, mark: str, middle: str, last: str) -> int:
+    """Return the days since the year 1 of 2024/5/1, 1.5.2024, 01-May-2024 or 5/1/2024, by the mark between them."""
+    day, month, year = (last, middle, first) if len(first) == len("2024") else (first, middle, last)
+    if mark == "/" and day == first and int(first) <= len(_MONTHS) // 3:
+        day, month = middle, first
+    months = _MONTHS.find(month.lower()) // 3 + 1 if month.isalpha() else int(month)
+    return datetime(int(year), months, int(day)).toordinal() - 1
+
+
+def is_number(cell: str, dates: bool = True) -> bool:
+    """Return True if a cell holds a number, or a date or time of day if `dates`."""
+    try:
+        parse_cell(cell)
+        return dates or Decimal(with_point(cell.strip())).is_finite()
+    except (ValueError, InvalidOperation):
+        return False
