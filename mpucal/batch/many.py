@@ -157,11 +157,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
     import dask  # noqa: PLC0415
     from distributed.deploy.spec import close_clusters  # noqa: PLC0415
 
-    with (
-        TemporaryDirectory(prefix="mpucal-") as scratch,
-        dask.config.set(RESTART_CONFIG),
-        ExitStack() as stack,
-    ):
+    with TemporaryDirectory(prefix="mpucal-") as scratch, dask.config.set(RESTART_CONFIG), ExitStack() as stack:
         try:
             cluster = distributed.LocalCluster(
                 n_workers=workers,

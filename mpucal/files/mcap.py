@@ -321,10 +321,7 @@ class CaptureReader:
                     self._count_block(block)
                     yield block
         if not headed:
-            raise CaptureError(
-                f"{self._path} lacks the metadata of a capture",
-                _REMEDY,
-            )
+            raise CaptureError(f"{self._path} lacks the metadata of a capture", _REMEDY)
         self.recovered = None if finished else self._recovery_sentence(size - whole)
 
     def _block(self, channel: Channel | None, message: Message) -> Accesses | Record | None:
@@ -334,18 +331,14 @@ class CaptureReader:
             return decode_message(channel.topic, channel.message_encoding, message.log_time, message.data)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise CaptureError(
-                f"{self._path} holds an invalid message on {channel.topic} ({error})",
-                _REMEDY,
+                f"{self._path} holds an invalid message on {channel.topic} ({error})", _REMEDY
             ) from error
 
     def _check(self, magic: bytes) -> None:
         if not magic:
             raise CaptureError(f"{self._path} is empty", "record it again")
         if magic != MCAP0_MAGIC:
-            raise CaptureError(
-                f"{self._path} is not an MCAP file",
-                _REMEDY,
-            )
+            raise CaptureError(f"{self._path} is not an MCAP file", _REMEDY)
 
     def _count_block(self, block: Accesses | Record) -> None:
         if isinstance(block, Accesses):
@@ -406,7 +399,6 @@ def _meta(item: Metadata, path: Path) -> dict[str, Any]:
         raise CaptureError(f"the metadata of {path} are damaged ({error})", "record it again") from error
     if version > VERSION:
         raise CaptureError(
-            f"{path} is a capture of version {version}, but this mpucal reads versions up to {VERSION}",
-            "update mpucal",
+            f"{path} is a capture of version {version}, but this mpucal reads versions up to {VERSION}", "update mpucal"
         )
     return meta

@@ -459,6 +459,11 @@ def test_counts_need_a_rate_and_their_ranges_must_fit(read, walk):
         read(AXES, "counts", rate=100, accel_range=4, gyro_range=2000)
 
 
+def test_one_number_on_each_line_is_to_be_pivoted(read):
+    with pytest.raises(RecordingError, match="one number on each line: export a column for each axis"):
+        read("result,table,_start,_stop,_time,_value,_field\n", "_result 0 utc utc utc t ax")
+
+
 def test_counts_beside_an_index_have_no_rate(read, walk):
     """Take no index for milliseconds: any range of counts would fit these."""
     found = read("", "i 10.0 counts")

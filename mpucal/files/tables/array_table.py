@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,10 +12,20 @@ from numpy.typing import NDArray
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
-from .names import TIME, Column, Table, Times, axes_of
+from .names import TIME, Column, Table, Times, axes_of, parse_header
 
 # columns of a matrix of samples; a wider matrix has the samples as columns
 WIDEST = 64
+# the columns of one sensor's table without names, as data sets have them
+UNNAMED = ["time", "x", "y", "z"]
+# above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
+RATE = re.compile(
+    r"(?:^[#%/ ]{0,5}|(?<![a-z])(?:sampl(?:e|ing)|data|output|acquisition|update|sensor|imu|log(?:ging)?|recording))"
+    r"[ _]?"
+    r"(?:(?<![a-z])fs|rate|freq\w{0,6})[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
+    r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
+    re.IGNORECASE | re.MULTILINE,
+)
 
 
 @dataclass(frozen=True)
@@ -22,6 +33,14 @@ class ArrayTable(Table):
     """A table whose columns are arrays (n,) under their names."""
 
     arrays: Mapping[str, NDArray[Any]]
+
+    @classmethod
+    def of(cls, name: str, arrays: Mapping[str, NDArray[Any]]) -> ArrayTable | None:
+        """Return the table of a file's arrays; None if it has no columns of numbers."""
+        columns = columns_of_arrays(arrays)
+        header = list(columns) if len(columns) != len(UNNAMED) or parse_header(list(columns)) else UNNAMED
+        found = dict(zip(header, columns.values(), strict=True))
+        return cls(name, header, found, rate_hz=stated_rate_hz(_single_numbers(arrays))) if columns else None
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """See Table."""
@@ -80,13 +99,19 @@ def columns_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[A
     return found
 
 
-def stated_rate(arrays: Mapping[str, NDArray[Any]]) -> str:
+def _single_numbers(arrays: Mapping[str, NDArray[Any]]) -> str:
     """Return the single numbers among arrays as lines of text, of which one may state the sample rate."""
     single = {name.rpartition(".")[2]: array for name, array in arrays.items() if array.size == 1}
     numbers = {name: array.item() for name, array in single.items() if array.dtype.kind in "iuf"}
     if numbers.get("interval_ms"):
         numbers["rate"] = 1000.0 / numbers["interval_ms"]
     return "\n".join(f"{name}: {number}" for name, number in numbers.items())
+
+
+def stated_rate_hz(text: str) -> float | None:
+    """Return the sample rate that a text states; None if it states none."""
+    found = RATE.search(text)
+    return float(found[1]) if found else None
 
 
 def tables_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ArrayTable]:

@@ -28,10 +28,10 @@ from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..hints import NO_HINTS, Hints
 from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import HELD, check_size, first_bytes, reading
-from .array_table import ArrayTable, columns_of_arrays, stated_rate
+from .array_table import ArrayTable
 from .names import ACC, GYR, TIME, Table, first_triple, parse_header, with_sensor
 from .streams import join_streams
-from .table import FLIPPED, columns_by_hint, find_any_table, sensor_stream, stated_rate_hz
+from .table import FLIPPED, columns_by_hint, find_any_table, sensor_stream
 from .text import TextTable, decode_text, find_table
 from .times import Stream
 from .units import NS, acceleration_unit, seem_counts
@@ -48,8 +48,6 @@ OF_FILE = ".table"
 SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|face|side)(?![a-z])")
 # MATLAB's spelling of a hyphen in a name
 HYPHEN = "0x2d"
-# the columns of a table without names, as data sets have them; the time may be missing
-UNNAMED = ["time", "x", "y", "z"]
 # RuntimeError includes NotImplementedError, of an unknown compression
 _DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
 
@@ -236,10 +234,10 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
     table: Table | None
     if isinstance(data, ArrayTable):
         table = data
+    elif data.startswith(MATLAB):
+        table = ArrayTable.of(name, dict(read_matlab_arrays(data, Path(name))))
     else:
-        wanted = list(hinted.values())
-        is_array = data.startswith(MATLAB)
-        table = _array_table(data, name) if is_array else find_any_table(decode_text(data, name), name, wanted)
+        table = find_any_table(decode_text(data, name), name, list(hinted.values()))
     if table is None or (isinstance(table, TextTable) and not table.rows):
         raise RecordingError(
             f"{name} names no columns x, y and z",
@@ -264,12 +262,3 @@ def _hinted_columns(hints: Hints, quantity: str) -> dict[str, str | int]:
     of = letter if f"{letter}x" in hints.columns else "a"
     found = {role.replace(of, letter): where for role, where in hints.columns.items() if role[0] in (of, "t")}
     return found if len(found) > 1 else {}
-
-
-def _array_table(data: bytes, name: str) -> Table | None:
-    arrays = dict(read_matlab_arrays(data, Path(name)))
-    columns, rate_hz = columns_of_arrays(arrays), stated_rate_hz(stated_rate(arrays))
-    header = list(columns) if len(columns) != len(UNNAMED) or parse_header(list(columns)) else UNNAMED
-    if not columns:
-        return None
-    return ArrayTable(name, header, dict(zip(header, columns.values(), strict=True)), rate_hz=rate_hz)

@@ -10,16 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data import (
-    ACCEL_COUNTS,
-    GYRO_COUNTS,
-    GYRO_RANGES_DPS,
-    STANDARD_GRAVITY_MPS2,
-    Mask,
-    Recording,
-    Sensor,
-    Vector,
-)
+from ...data import ACCEL_COUNTS, GYRO_COUNTS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Sensor, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from ..rows import make_recording
@@ -47,13 +38,7 @@ def index_with_gravity(streams: Sequence[Stream]) -> int:
     return next((i for i, values in enumerate(whole) if len(values) and units.acceleration_unit(values)), 0)
 
 
-def join_streams(
-    acc: Stream,
-    gyr: Stream | None,
-    hints: Hints,
-    name: str,
-    remarks: Sequence[str] = (),
-) -> Recording:
+def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remarks: Sequence[str] = ()) -> Recording:
     """Return the recording of an accelerometer's and a gyroscope's stream, with NaN where a sample lacks a number.
 
     Rates whose range, unit or times neither the file nor the turning of gravity shows are left out (NaN).

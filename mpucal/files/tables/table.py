@@ -15,6 +15,7 @@ from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import HELD, MOST_ODD, check_size, first_bytes, reading
+from .array_table import stated_rate_hz
 from .clock import FEWEST
 from .guess import guess_columns, is_clock, is_even_clock
 from .labelled import labelled_table, marked_table
@@ -43,20 +44,14 @@ from .units import BEYOND, QUANTITIES, acceleration_unit, are_counts, seem_count
 
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
-# above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
-RATE = re.compile(
-    r"(?:^[#%/ ]{0,5}|(?<![a-z])(?:sampl(?:e|ing)|data|output|acquisition|update|sensor|imu|log(?:ging)?|recording))"
-    r"[ _]?"
-    r"(?:(?<![a-z])fs|rate|freq\w{0,6})[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
-    r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
-    re.IGNORECASE | re.MULTILINE,
-)
 # seconds since 1970, and nanoseconds
 STAMP = re.compile(r"(?<![^,])[12]\d{9},\d{1,9}(?![^,])")
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
 FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
 # accelerations from which a program has taken gravity
 WITHOUT_GRAVITY = re.compile(r"\s*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
+# columns of a table with a line for each number
+FIELD, VALUE = "field", "value"
 # stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
 IN_G_ON_IOS, EITHER_SIGN = "accelerometeruncalibrated_", "totalacceleration_"
 
@@ -149,12 +144,6 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     return recording_from_table(table, hints)
 
 
-def stated_rate_hz(text: str) -> float | None:
-    """Return the sample rate that a text states; None if it states none."""
-    found = RATE.search(text)
-    return float(found[1]) if found else None
-
-
 def recording_from_table(table: Table, hints: Hints) -> Recording:
     """Return the recording in a table that holds both sensors.
 
@@ -226,6 +215,12 @@ def _missing_sensors(table: Table, columns: list[Column]) -> RecordingError:
         return RecordingError(
             f"{table.name} holds no columns of an accelerometer; its columns are {_list_names(table.header)}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
+        )
+    if {FIELD, VALUE} <= {name.strip(" _").lower() for name in table.header}:
+        return RecordingError(
+            f"{table.name} holds one number on each line",
+            'export a column for each axis, as by InfluxDB\'s pivot(rowKey: ["_time"], columnKey: ["_field"],'
+            ' valueColumn: "_value")',
         )
     options = _likely_options(table, columns)
     if options is None:
