@@ -14,11 +14,10 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..hints import ROLES, Hints
-from .clock import sample_period
+from .clock import FEWEST, sample_period
 from .units import (
     ANY_HZ,
     BEYOND,
-    COUNTS,
     EXPLAINED,
     FASTEST_HZ,
     FEWEST_PER_G,
@@ -26,19 +25,18 @@ from .units import (
     QUANTITIES,
     acceleration_unit,
     are_counts,
+    gyro_unit,
     time_unit,
     to_signed,
     turning,
     typical_size,
 )
 
-FEWEST, WIDEST = 200, 16
+WIDEST = 16
 # relative error of |a| at rest that is still nearly 1 g: the scale factors and biases of usual sensors
 ONE_G = 0.04
 # largest distance of the quartiles of |a|, over its median: gravity, with the biases of an uncalibrated sensor
 MOST_SCATTER = 0.75
-# factor by which the speed may differ from a unit's
-NEAR = 2.0
 # correlation of a clock with the number of its samples, even if a logger paused for a tenth of the time
 EVEN = 0.99
 # a correlation that is less by as much is no worse
@@ -55,7 +53,6 @@ def guess_columns(table: Vector, hints: Hints) -> dict[str, int]:
     n, width = table.shape
     if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND**2).all():
         return {}
-    # an index increases, too
     clocks = [place for place in range(width) if is_clock(table[:, place]) and not _is_index(table[:, place])]
     for at in (*clocks, None):
         t = _seconds(None if at is None else table[:, at], n, hints)
@@ -103,13 +100,13 @@ def is_clock(column: Vector) -> bool:
 
 
 def _is_index(column: Vector) -> bool:
-    """Return True if (n,) numbers count the samples from 0 or 1 on."""
-    return bool(0.0 <= column[0] <= 1.0 and (np.diff(column) == 1.0).all())
+    """Return True if (n,) numbers count the samples, and so are no times in ms."""
+    return bool((np.diff(column) == 1.0).all())
 
 
 def is_even_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase with the samples, at a sensor's rate in some unit, and do not count them."""
-    if not is_clock(column) or (np.diff(column) == 1.0).all():
+    if not is_clock(column) or _is_index(column):
         return False
     correlation = float(np.corrcoef(column, np.arange(len(column)))[0, 1])
     return correlation > EVEN and bool(time_unit(sample_period(column)))
@@ -135,6 +132,5 @@ def _turned(table: Vector, pair: Sequence[int], t: Vector, *, any_rate: bool) ->
     """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
     acc, gyr = (to_signed(table[:, list(places)]) for places in (pair[:3], pair[3:]))
     factor, correlation = turning(t, acc, gyr)
-    ratios = [factor / si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS]
-    of_a_unit = any_rate or are_counts(gyr) or any(1 / NEAR < ratio < NEAR for ratio in ratios)
+    of_a_unit = any_rate or are_counts(gyr) or gyro_unit(factor)
     return correlation if factor > 0.0 and of_a_unit else 0.0

@@ -21,8 +21,6 @@ from .units import COUNTS, QUANTITIES, resolve_unit
 
 # octaves: half way to the next range, which leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
-# octaves by which the range that the turning of gravity shows may differ from a real one
-SURE_RANGE = 0.35
 OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
@@ -256,7 +254,7 @@ def _gyro_range_dps(factor: float | None) -> float | None:
         return None
     dps = math.degrees(abs(factor)) * GYRO_COUNTS
     nearest = min(GYRO_RANGES_DPS, key=lambda each: abs(math.log2(dps / each)))
-    return nearest if abs(math.log2(dps / nearest)) < SURE_RANGE else round(dps)
+    return nearest if abs(math.log2(dps / nearest)) < ANOTHER_RANGE else round(dps)
 
 
 def _wrong_rates(name: str, factor: float, of: str, hints: Hints, remedy: str, options: str) -> RecordingError:
