@@ -464,6 +464,12 @@ def test_one_number_on_each_line_is_to_be_pivoted(read):
         read("result,table,_start,_stop,_time,_value,_field\n", "_result 0 utc utc utc t ax")
 
 
+def test_counts_of_an_analog_accelerometer_have_an_offset(read, walk):
+    whole = replace(walk, acc=np.rint(512 + 102 / G * walk.acc))
+    with pytest.raises(RecordingError, match=r"turn about 5[\d.]+, 5[\d.]+, 5[\d.]+ in place of zero: subtract"):
+        read("ms,ax,ay,az\n", "ms a", of=whole)
+
+
 def test_counts_beside_an_index_have_no_rate(read, walk):
     """Take no index for milliseconds: any range of counts would fit these."""
     found = read("", "i 10.0 counts")

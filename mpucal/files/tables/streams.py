@@ -156,6 +156,11 @@ def _left_out(t: Vector, why: str) -> tuple[Vector, str, Mask]:
 def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str, Mask]:
     """Return (n, 3) m/s^2, how they were read, and (n,) True where one is clipped."""
     values, said = stream.values, hints.units.get("acc", stream.unit)
+    if (centre := units.offset(values)) is not None:
+        raise RecordingError(
+            f"{name}: the accelerations turn about {', '.join(f'{at:.4g}' for at in centre)} in place of zero",
+            "subtract from each axis what its converter gives at 0 g, such as half of its range",
+        )
     size = units.typical_size(values)[0]
     seen = units.acceleration_unit(values)
     if said == COUNTS or (not said and units.are_counts(values) and (not seen or hints.accel_range_g)):

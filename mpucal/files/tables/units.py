@@ -105,6 +105,17 @@ def typical_size(values: Vector) -> tuple[float, float]:
     return size, high - low
 
 
+def offset(values: Vector) -> Vector | None:
+    """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is outside; None otherwise.
+
+    Each axis has to cover more than the radius, so that the sphere is determined.
+    """
+    x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), (values**2).sum(axis=1), rcond=None)
+    radius, scatter = typical_size(values - x[:3])
+    known = scatter < SCATTER * radius < SCATTER * float(np.ptp(values, axis=0).min())
+    return x[:3] if known and radius < float(np.linalg.norm(x[:3])) else None
+
+
 def to_signed(values: Vector) -> Vector:
     """Return (n, 3) 16-bit counts with their sign, if they were read as unsigned or count from the lowest value."""
     if values.min() < 0 or not ACCEL_COUNTS <= values.max() < 2 * ACCEL_COUNTS or not (values == np.rint(values)).all():
