@@ -16,8 +16,8 @@ from mpucal.recheck.observed import CALIBRATED, PARAMETERS, apply_errors, observ
 from mpucal.recheck.update import update_biases
 from mpucal.recheck.watch import LEAST_RESTS, RESTS, DriftMonitor
 from mpucal.result.correlation import NAMES
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
-from tools.lab.scenarios.sensors import hand_sensor
+from tools.lab.scenarios.recordings import hand_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2, hand_sensor
 
 TRUTH = hand_sensor(np.random.default_rng(3)).symmetric()[0]
 CALIBRATION = mpucal.Calibration(

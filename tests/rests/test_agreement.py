@@ -10,7 +10,7 @@ from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
 from mpucal.session.step import HOLD_S, PauseDetector
-from tools.lab.scenarios.recordings import attitude
+from tools.lab.scenarios.body import attitudes, board_from_world
 
 RATE_HZ, FLAT_S, MOVE_S, GRAVITY_MPS2 = 100.0, 6.0, 1.0, 9.81
 
@@ -30,7 +30,7 @@ def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
         omega.append(np.sqrt(2.0) * tremor_rad_s * np.sin(2.0 * np.pi * hertz * t[:, None] + phase))
     omega.append(omega[1])
     rates = np.concatenate(omega)
-    up = attitude(rates, 1.0 / RATE_HZ)[:-1, :, 2]
+    up = board_from_world(attitudes(rates, 1.0 / RATE_HZ))[:-1, :, 2]
     acc = GRAVITY_MPS2 * up + 0.02 * rng.standard_normal(up.shape)
     gyr = rates + 0.002 * rng.standard_normal(rates.shape)
     t = np.arange(len(acc)) / RATE_HZ

@@ -9,7 +9,8 @@ from mpucal.data import Samples, Sensor
 from mpucal.session.events import Checked, FitKind, Learnt, Tried
 from mpucal.session.live_fits import Fits, SampleStore, Task
 from mpucal.session.plan import Plan
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.recordings import hand_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2
 
 SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
 NONE = Samples.empty()

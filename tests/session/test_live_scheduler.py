@@ -15,7 +15,8 @@ from mpucal.errors import Abandoned
 from mpucal.session.events import FitKind, RequestFit
 from mpucal.session.live_scheduler import FitScheduler, InlineWorker, ProcessWorker
 from mpucal.session.plan import Plan
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.recordings import hand_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2
 
 SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
 PLAN = Plan(gravity=GRAVITY_MPS2)

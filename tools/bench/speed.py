@@ -22,7 +22,8 @@ from mpucal.data import Recording
 from mpucal.kernel import _kernel
 from mpucal.rests.flat import flat_statistics
 from tools.lab.reference import evaluate_hand_reference, evaluate_reference
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2
 from tools.lab.table import plain_table, show
 
 from .timing import median_s, peak_bytes

@@ -29,9 +29,9 @@ from mpucal.simulated.sensor import SensorTruth
 
 from .judge import rms
 from .runner import Trial, names_of
-from .scenarios.course import direction
-from .scenarios.recordings import CHECK_S, FLAT_S, GRAVITY_MPS2, hand_scenario
-from .scenarios.sensors import hand_sensor
+from .scenarios.course import FLAT_S, direction
+from .scenarios.recordings import CHECK_S, hand_scenario
+from .scenarios.sensors import GRAVITY_MPS2, hand_sensor
 from .table import Column, Row, over
 
 DAYS, TEMPERATURE_C = 5.0, 25.0

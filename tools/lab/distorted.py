@@ -23,11 +23,12 @@ from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
+from mpucal.simulated.rotation import up_in_board
 from mpucal.simulated.sensor import SensorTruth
 
 from .judge import followed, sph_rms, tilts_deg
 from .runner import Trial, each_seed
-from .scenarios.sensors import euler_rotation, non_orthogonality
+from .scenarios.sensors import draw_D
 from .table import Column, Row, grouped, over, show, table
 
 GAIN, SKEW_RAD, MISALIGNMENT_RAD, BIAS_MPS2 = 0.1, np.radians(5.0), np.radians(3.0), 1.0
@@ -54,19 +55,13 @@ def captured(path: Path, gravity: float) -> tuple[Recording, Vector]:
         if "quat" not in file:
             raise RecordingError(f"{path}: it holds no quat", "give a recording with optical motion capture")
         recording = Recording.from_arrays(file["t"], file["acc"], file["gyr"], name=path.stem)
-        w, x, y, z = np.asarray(file["quat"], float).T
-    # the last row of the rotation from sensor to earth: the earth's z in the sensor's axes
-    up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z], axis=1)
-    return with_masks(recording), gravity * up
+        return with_masks(recording), gravity * up_in_board(np.asarray(file["quat"], float))
 
 
 def distortion(seed: int) -> tuple[Vector, Vector]:
     """Return D (3, 3) and b_a (3,) [m/s^2] of a seed."""
     rng = np.random.default_rng(seed)
-    gain = 1.0 + rng.uniform(-GAIN, GAIN, 3)
-    skew = rng.uniform(-SKEW_RAD, SKEW_RAD, 3)
-    turn = rng.uniform(-MISALIGNMENT_RAD, MISALIGNMENT_RAD, 3)
-    return np.diag(gain) @ non_orthogonality(*skew) @ euler_rotation(-turn), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
+    return draw_D(rng, GAIN, SKEW_RAD, MISALIGNMENT_RAD), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
 
 
 def of_seed(

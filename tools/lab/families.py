@@ -22,7 +22,8 @@ from mpucal.result.calibration import GOOD, REFUSED, USABLE
 
 from .judge import judged, judgement, rms
 from .runner import Trial
-from .scenarios.family import GRAVITY_MPS2, Wanted, simulate
+from .scenarios.family import Wanted, drawn
+from .scenarios.sensors import GRAVITY_MPS2
 from .scenarios.table import FAMILIES, of_families
 from .table import VERDICTS, Column, Row, count, frequencies, grouped, known, over, show, table
 
@@ -40,7 +41,7 @@ def of_seed(item: tuple[str, int], *, model: str = "auto") -> Row:
     """Simulate a family's name and a seed, calibrate and compare."""
     name, seed = item
     family = FAMILIES[name]
-    simulated, gravity = simulate(family, seed), family.told_gravity or GRAVITY_MPS2
+    simulated, gravity = drawn(family, seed), family.told_gravity or GRAVITY_MPS2
     try:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=gravity)
     except Exception as error:  # after any error the other runs continue, and the exit code is 1

@@ -31,8 +31,8 @@ from mpucal.result.calibration import REFUSED
 from .judge import followed, judged, judgement, sph_rms, tilts_deg
 from .rivals import Estimate, Rests, Unfit, aligned_ellipsoid, ellipsoid, six_positions
 from .runner import Trial, names_of
-from .scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
-from .scenarios.sensors import hand_sensor, paper_sensor
+from .scenarios.recordings import Simulated, hand_scenario, paper_scenario
+from .scenarios.sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
 from .table import Column, Row, cell, frequencies, grouped, known, over, plain_table, show, table
 
 # NIS is 3 for data that conform to the model, and tens if the fit ended in a wrong optimum

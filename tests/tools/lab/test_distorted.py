@@ -3,7 +3,8 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.simulated.sensor import SensorTruth, density
 from tools.lab import distorted
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, paper_scenario
+from tools.lab.scenarios.recordings import paper_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2
 
 
 def there_and_back(x, sign=1.0):

@@ -10,7 +10,7 @@ from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
 from mpucal.session.step import HOLD_S, PauseDetector
-from tools.lab.scenarios.family import simulate
+from tools.lab.scenarios.family import drawn
 from tools.lab.scenarios.table import FAMILIES
 
 LARGEST_PART = 60  # samples
@@ -36,7 +36,7 @@ def agree(name, seed):
 
     None without a flat segment.
     """
-    recording = with_masks(simulate(FAMILIES[name], seed).recording)
+    recording = with_masks(drawn(FAMILIES[name], seed).recording)
     segment = recording.flat or find_flat(recording)
     if segment is None or segment[1] == len(recording):
         return None

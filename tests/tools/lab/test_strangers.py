@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tools.lab import rivals, strangers
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.recordings import hand_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """Motions of a board besides its turns: the hand that holds it, and what that hand stands in.
 
-Each is a function of the course and a generator: (n, 3) m/s^2 of the pivot in the world, z up, and (n, 3) rad/s in the
-body; 0.0 for none.
+Each of the latter is a function of the course and a generator: (n, 3) m/s^2 of the pivot in the world, z up, and (n, 3)
+rad/s in the body; 0.0 for none.
 """
 
 from __future__ import annotations
@@ -13,47 +13,53 @@ import numpy as np
 
 from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
 from mpucal.simulated.disturbance import JERK_MPS2, SWAY_HZ, TREMOR_HZ, HandDisturbance
+from mpucal.simulated.legs import minimum_jerk
 
-from .body import PIVOT_HZ
-from .course import FLAT_S, Course, Rng, Span, direction, within
+from .course import FLAT_S, Course, Rng, Span, band_noise, direction
 
+PIVOT_HZ = (0.05, 0.4)
 Push = tuple[Vector | float, Vector | float]
 Around = Callable[[Course, Rng], Push]
 
 
 @dataclass(frozen=True)
 class Hand(HandDisturbance):
-    """A hand with the sensor on a lever; `passes`: how often the pivot changes place, as from one hand to the other."""
+    """A hand with the sensor on a lever.
+
+    Attributes
+    ----------
+    jerk_s : least and greatest duration of a jerk. passes : times that the pivot changes place, as between two hands.
+    """
 
     lever_m: Span = (0.1, 0.3)
+    jerk_s: Span = (0.05, 0.15)
     passes: int = 0
-
-    def push(self, course: Course, rng: Rng) -> Push:
-        """Return sway and jerks while it moves, and tremor while it holds."""
-        n, step_s, moving = len(course.omega), course.step_s, course.moving[:, None]
-        world = self.sway_mps2 * moving * within(n, step_s, SWAY_HZ, rng) if self.sway_mps2 else np.zeros((n, 3))
-        for start in np.flatnonzero(rng.random(n) < self.jerks_per_s * step_s * course.moving).tolist():
-            length = min(int(rng.uniform(0.05, 0.15) / step_s), n - start)
-            pulse = np.sin(np.pi * (np.arange(length) + 0.5) / max(length, 1))
-            world[start : start + length] += rng.uniform(*JERK_MPS2) * pulse[:, None] * direction(rng)
-        holding = course.after_flat[:, None] * (1.0 - moving)
-        omega: Vector | float = 0.0
-        if self.tremor_mps2 or self.tremor_rad_s:
-            world += self.tremor_mps2 * holding * within(n, step_s, TREMOR_HZ, rng)
-            omega = self.tremor_rad_s * holding * within(n, step_s, TREMOR_HZ, rng)
-        return world, omega
 
     def lever(self, course: Course, rng: Rng) -> Vector:
         """Return the sensor's place from the pivot (n, 3) [m], in the body."""
-        n = len(course.omega)
-        r = np.tile(rng.uniform(*self.lever_m) * direction(rng), (n, 1))
-        if self.wobble:
-            rms = self.wobble * np.linalg.norm(r[0]) / np.sqrt(3.0)
-            r += rms * course.moving[:, None] * within(n, course.step_s, PIVOT_HZ, rng)
+        n, along, length = len(course.omega), direction(rng), rng.uniform(*self.lever_m)
+        # an rms of wobble * length over three axes
+        travel = self.wobble * length / np.sqrt(3.0) * band_noise(n, course.step_s, PIVOT_HZ, rng)
+        r = length * along + course.moving[:, None] * travel
         for at in rng.uniform(FLAT_S, course.t[-1], self.passes):
-            share = np.clip((course.t - at) / 0.6, 0.0, 1.0)
-            r += (share**3 * (10 - 15 * share + 6 * share**2))[:, None] * rng.uniform(*self.lever_m) * direction(rng)
-        return r
+            share = minimum_jerk((course.t - at) / 0.6)
+            r += share[:, None] * rng.uniform(*self.lever_m) * direction(rng)
+        return np.asarray(r)
+
+    def acceleration(self, course: Course, rng: Rng) -> Vector:
+        """Return sway and jerks while it moves, and tremor while it holds (n, 3) [m/s^2], in the body."""
+        n, step_s = len(course.omega), course.step_s
+        a = self.sway_mps2 * course.moving[:, None] * band_noise(n, step_s, SWAY_HZ, rng)
+        for start in np.flatnonzero(rng.random(n) < self.jerks_per_s * step_s * course.moving).tolist():
+            length = min(int(rng.uniform(*self.jerk_s) / step_s), n - start)
+            peak = direction(rng) * rng.uniform(*JERK_MPS2)
+            a[start : start + length] += np.sin(np.pi * (np.arange(length) + 0.5) / max(length, 1))[:, None] * peak
+        return np.asarray(a + self.tremor_mps2 * course.holding[:, None] * band_noise(n, step_s, TREMOR_HZ, rng))
+
+    def tremor(self, course: Course, rng: Rng) -> Vector:
+        """Return the rates (n, 3) [rad/s] of the tremor."""
+        noise = band_noise(len(course.omega), course.step_s, TREMOR_HZ, rng)
+        return np.asarray(self.tremor_rad_s * course.holding[:, None] * noise)
 
 
 def walking(course: Course, rng: Rng, bounce_mps2: float = 1.0) -> Push:
@@ -61,7 +67,7 @@ def walking(course: Course, rng: Rng, bounce_mps2: float = 1.0) -> Push:
 
     bounce_mps2 : up and down; half of it goes sideways at half the rate.
     """
-    cadence = 2.0 * (1.0 + 0.05 * within(len(course.omega), course.step_s, (0.05, 0.3), rng)[:, 0])
+    cadence = 2.0 * (1.0 + 0.05 * band_noise(len(course.omega), course.step_s, (0.05, 0.3), rng)[:, 0])
     phase = 2 * np.pi * np.cumsum(cadence) * course.step_s
     a = np.empty((len(phase), 3))
     a[:, 0] = 0.3 * np.sin(phase + rng.uniform(0, 6.28))
@@ -80,7 +86,7 @@ def vibration(
 ) -> Push:
     """Run a motor: rms_mps2 an axis within band_hz, and `dps` of rates; `flat_too`: it runs from the start."""
     n, runs = len(course.omega), 1.0 if flat_too else course.after_flat[:, None]
-    a, w = within(n, course.step_s, band_hz, rng), within(n, course.step_s, band_hz, rng)
+    a, w = band_noise(n, course.step_s, band_hz, rng), band_noise(n, course.step_s, band_hz, rng)
     return rms_mps2 * runs * a, np.radians(dps) * runs * w
 
 
@@ -127,7 +133,7 @@ def swing(course: Course, rng: Rng, length_m: float = 2.2, deg: float = 10.0) ->
 
 def carried(course: Course, rng: Rng, rms_mps2: float = 0.2, band_hz: Span = (0.1, 0.5)) -> Push:
     """Ride in a boat or train: slow accelerations of rms_mps2 an axis within band_hz, the flat segment included."""
-    return rms_mps2 * within(len(course.omega), course.step_s, band_hz, rng), 0.0
+    return rms_mps2 * band_noise(len(course.omega), course.step_s, band_hz, rng), 0.0
 
 
 def thumps(course: Course, rng: Rng, peak_mps2: float = 30.0) -> Push:

@@ -41,6 +41,11 @@ class Course:
         """Return (n,) 0 while the board lies flat at first, and 1 after."""
         return (self.t >= FLAT_S).astype(float)
 
+    @property
+    def holding(self) -> Vector:
+        """Return (n,) 0 to 1, how much a hand holds it still."""
+        return self.after_flat * (1.0 - self.moving)
+
 
 Motion = Callable[[float, Rng], Course]
 
@@ -127,9 +132,14 @@ def continuous(
 ) -> Course:
     """Draw turns all the time about every axis: Gaussian rates within band_hz, rms_dps an axis."""
     n = round((FLAT_S + seconds) / step_s)
-    moving = np.clip((step_s * np.arange(0.5, n) - FLAT_S) / FADE_S, 0.0, 1.0)
-    moving *= moving * (3.0 - 2.0 * moving)
-    return Course(step_s, np.radians(rms_dps) * moving[:, None] * within(n, step_s, band_hz, rng), moving)
+    moving = begun(step_s * np.arange(0.5, n))
+    return Course(step_s, np.radians(rms_dps) * moving[:, None] * band_noise(n, step_s, band_hz, rng), moving)
+
+
+def begun(t: Vector) -> Vector:
+    """Return (n,) 0 until the flat segment ends, and 1 from FADE_S later on."""
+    share = np.clip((t - FLAT_S) / FADE_S, 0.0, 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 def spins(
@@ -177,14 +187,12 @@ def trapezoid(share: Vector, ramp: float) -> Vector:
     return np.asarray(np.clip(np.minimum(share, 1.0 - share) / ramp, 0.0, 1.0) / (1.0 - ramp))
 
 
-def within(n: int, step_s: float, band_hz: Span, rng: Rng) -> Vector:
-    """Draw (n, 3) Gaussian noise between two frequencies, of expected rms 1 an axis."""
-    # lengths of few prime factors, a multiple of 1024 steps
-    padded = -(-n // 1024) * 1024
-    frequency = np.arange(padded // 2 + 1) / (padded * step_s)
-    inside = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= band_hz[1]))
-    spectrum = np.zeros((3, len(frequency)), complex)
-    # an irfft takes each line twice, and divides by its length
-    scale = padded / (2.0 * np.sqrt(max(len(inside), 1)))
-    spectrum[:, inside] = scale * (rng.standard_normal((3, len(inside))) + 1j * rng.standard_normal((3, len(inside))))
-    return np.ascontiguousarray(np.fft.irfft(spectrum, padded)[:, :n].T)
+def band_noise(n: int, step_s: float, band_hz: Span, rng: Rng) -> Vector:
+    """Draw (n, 3) Gaussian noise between two frequencies, of rms 1 an axis."""
+    frequency = np.fft.rfftfreq(n, step_s)
+    band = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    spectrum = np.zeros((len(frequency), 3), complex)
+    spectrum[band] = rng.standard_normal((band.sum(), 3)) + 1j * rng.standard_normal((band.sum(), 3))
+    noise = np.fft.irfft(spectrum, n, axis=0)
+    scaled: Vector = noise / np.sqrt((noise**2).mean(0))
+    return scaled

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mpucal.data import Recording, Sensor
+from mpucal.data import Recording, Sensor, Vector
 from mpucal.simulated import rotation
 from mpucal.simulated.sensor import SensorTruth
 
 from .around import Around, Hand
-from .body import attitudes, specific_force
-from .course import Course, Motion, Rng, poses
+from .body import attitudes, board_from_world, lever_acceleration, specific_force
+from .course import FLAT_S, Motion, Rng, poses
 from .faults import Digits, Fault, Readings, Timing
 from .sensors import Chip, Sampling
-
-GRAVITY_MPS2 = 9.81
-TEMPERATURE_C = 25.0
 
 
 class Wanted(Enum):
@@ -46,7 +45,7 @@ class Family:
     faults, digits, timing : what befalls values, words and their delivery, in this order each.
     told_gravity : m/s^2, what the calibration is told; None: the truth.
     flat_known : the recording says which samples lay flat; otherwise that is to be found.
-    lying_deg : how far from level the flat segment lies at most.
+    lying_deg : how far from level the flat segment lies at most. temperature_c : that it records at first.
     """
 
     name: str
@@ -62,23 +61,66 @@ class Family:
     told_gravity: float | None = None
     flat_known: bool = False
     lying_deg: float = 5.0
+    temperature_c: float = 25.0
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """A recording, and the sensor to compare with: in the body frame in which K is symmetric, means where it moved."""
+    """A recording and its truth.
+
+    Attributes
+    ----------
+    truth : in the body frame in which K is symmetric, as an estimator finds it; of a sensor that changed, the mean.
+    specific_force : (n, 3) m/s^2, R(x_t) g without the hand's acceleration. attitude : (n, 3, 3), R(x_t).
+    """
 
     recording: Recording
     truth: SensorTruth
+    specific_force: Vector
+    attitude: Vector
 
 
-def simulate(family: Family, seed: int) -> Simulated:
+def drawn(family: Family, seed: int) -> Simulated:
     """Simulate the recording that a seed draws; other families draw other hands and sensors of the same seed."""
-    rng = np.random.default_rng([seed, zlib.crc32(family.name.encode())])
-    of_sensor, of_motion, of_noise, of_faults, of_digits, of_timing = rng.spawn(6)
-    truth = family.chip.draw(of_sensor, GRAVITY_MPS2)
-    course = family.motion(family.sampling.step_s, of_motion)
-    readings = _measured(family, truth, course, of_motion, of_noise)
+    return simulate(family, np.random.default_rng([seed, zlib.crc32(family.name.encode())]))
+
+
+def simulate(family: Family, rng: Rng, truth: SensorTruth | None = None) -> Simulated:
+    """Simulate the recording of a sensor, drawn unless given.
+
+    The sensor, the motion, the hand, its tremor and the noise of one generator are the same whatever the others are.
+    """
+    of_sensor, of_motion, of_hand, of_tremor, of_noise, *of_damage = rng.spawn(8)
+    sampling, hand, truth = family.sampling, family.hand, truth or family.chip.draw(of_sensor)
+    step_s, per_sample = sampling.step_s, sampling.per_sample
+    course = family.motion(step_s, of_motion)
+    omega, world = course.omega, np.zeros_like(course.omega)
+    for around in family.around:
+        push, rates = around(course, of_motion)
+        world, omega = world + push, omega + rates
+    tilt = np.append(np.radians(family.lying_deg) * of_motion.uniform(-1.0, 1.0, 2), 0.0)
+    heading = np.array([0.0, 0.0, of_motion.uniform(-3.0, 3.0)])
+    # what the tremor's rates do on the lever is part of its acceleration
+    shaken = lever_acceleration(omega, hand.lever(course, of_hand), step_s) + hand.acceleration(course, of_hand)
+    omega = omega + hand.tremor(course, of_tremor)
+    q = attitudes(omega, step_s, rotation.product(rotation.exp(heading), rotation.exp(-tilt)))
+    force = specific_force(q, truth.gravity, world) + shaken
+    acc, gyr = sampling.measured(truth, force, omega, of_noise)
+    middle = slice(per_sample // 2, len(acc) * per_sample, per_sample)
+    moved = course.t[middle], course.moving[middle], force[middle]
+    temperature_c = np.full(len(acc), family.temperature_c)
+    readings = Readings(*moved, acc, gyr, temperature_c, truth, family.chip.ranges)
+    recording, rows, truth = _delivered(family, readings, of_damage)
+    truth, Q = truth.symmetric()
+    R = board_from_world(q[middle])
+    return Simulated(recording, truth, truth.gravity * (R[..., 2] @ Q.T)[rows], (Q @ R)[rows])
+
+
+def _delivered(
+    family: Family, readings: Readings, rngs: Sequence[Rng]
+) -> tuple[Recording, NDArray[np.intp], SensorTruth]:
+    """Return the recording of readings that faults befall, which of them it holds, and the truth of their sensor."""
+    of_faults, of_digits, of_timing = rngs
     for fault in family.faults:
         readings = fault(readings, of_faults)
     y, clipped = np.hstack((readings.acc, readings.gyr)), np.zeros((len(readings.t), 6), bool)
@@ -91,46 +133,18 @@ def simulate(family: Family, seed: int) -> Simulated:
     for timing in family.timing:
         t, kept = timing(t, of_timing)
         rows = rows[kept]
-    last_flat = int(np.searchsorted(readings.t[rows], 0.95 * readings.turning_share(0.0)))
     recording = Recording.from_arrays(
         t,
         y[rows, :3],
         y[rows, 3:],
-        flat=(0, last_flat) if family.flat_known else None,
+        flat=(0, int(np.searchsorted(readings.t[rows], FLAT_S))) if family.flat_known else None,
         temperature_c=readings.temperature_c[rows],
         acc_clipped=clipped[rows, :3].any(axis=1),
         gyr_clipped=clipped[rows, 3:].any(axis=1),
         sensor=_sensor(family),
-        name=f"{family.name} {seed}",
+        name=family.name,
     )
-    return Simulated(recording, readings.truth.symmetric()[0])
-
-
-def _measured(family: Family, truth: SensorTruth, course: Course, of_motion: Rng, of_noise: Rng) -> Readings:
-    """Return what a sensor reads whose truth is D, b_a, K, b_omega and white noise."""
-    sampling, omega = family.sampling, course.omega
-    world = np.zeros_like(omega)
-    for around in (family.hand.push, *family.around):
-        push, rates = around(course, of_motion)
-        world, omega = world + push, omega + rates
-    lying = np.append(np.radians(family.lying_deg) * of_motion.uniform(-1.0, 1.0, 2), of_motion.uniform(-3.0, 3.0))
-    q = attitudes(omega, sampling.step_s, rotation.exp(lying))
-    lever = family.hand.lever(course, of_motion)
-    force = specific_force(q, omega, sampling.step_s, truth.gravity, lever, world)
-    acc = sampling.accelerometer(force @ truth.D.T + truth.b_a, truth.accel_noise_density, of_noise)
-    gyr = sampling.gyroscope(omega @ np.linalg.inv(truth.K).T + truth.b_omega, truth.gyro_noise_density, of_noise)
-    n, per_sample = len(acc), sampling.per_sample
-    middle = slice(per_sample // 2, n * per_sample, per_sample)
-    return Readings(
-        t=course.t[middle],
-        moving=course.moving[middle],
-        force=force[middle],
-        acc=acc,
-        gyr=gyr,
-        temperature_c=np.full(n, TEMPERATURE_C),
-        truth=truth,
-        ranges=family.chip.ranges,
-    )
+    return recording, rows, readings.truth
 
 
 def _sensor(family: Family) -> Sensor:

@@ -10,9 +10,8 @@ import scipy
 from numpy.typing import NDArray
 
 from mpucal.calibration.rotation import rotation
-from mpucal.chip.families import MPU6050
 from mpucal.data import STANDARD_GRAVITY_MPS2, Mask, Vector
-from mpucal.simulated.sensor import FULL_SCALE, SensorTruth, density
+from mpucal.simulated.sensor import SensorTruth, density
 
 Counts = NDArray[np.int32]
 
@@ -24,33 +23,14 @@ def paper_sensor(rng: np.random.Generator, rate_hz: float = 100.0) -> SensorTrut
 
     The paper draws the noise of a sample, which is then the same at any `rate_hz`.
     """
-    gain = rng.uniform(0.5, 1.5, 3)
-    skew, misalignment = np.radians(rng.uniform(-30, 30, 3)), np.radians(rng.uniform(-10, 10, 3))
     return SensorTruth(
-        D=np.diag(gain) @ non_orthogonality(*skew) @ euler_rotation(-misalignment),
+        D=draw_D(rng, 0.5, np.radians(30.0), np.radians(10.0)),
         b_a=rng.uniform(-1, 1, 3),
         K=np.eye(3),
         b_omega=rng.uniform(-1, 1, 3),
         gravity=GRAVITY_MPS2,
         accel_noise_density=density(np.sqrt(rng.uniform(1e-3, 1e-1, 3)), rate_hz),
         gyro_noise_density=density(np.sqrt(rng.uniform(1e-3, 1e-2, 3)), rate_hz),
-    )
-
-
-def hand_sensor(rng: np.random.Generator, perfect_gyro: bool = False) -> SensorTruth:
-    """Draw an MPU-6050 as they are sold."""
-    gain = rng.uniform(0.97, 1.03, 3)
-    skew, misalignment = rng.uniform(-0.02, 0.02, 3), np.radians(rng.uniform(-2, 2, 3))
-    b_a, b_omega = rng.uniform(-0.08, 0.08, 3) * STANDARD_GRAVITY_MPS2, np.radians(rng.uniform(-20, 20, 3))
-    error = np.where(np.eye(3, dtype=bool), rng.uniform(-0.03, 0.03, (3, 3)), rng.uniform(-0.02, 0.02, (3, 3)))
-    return SensorTruth(
-        D=np.diag(gain) @ non_orthogonality(*skew) @ euler_rotation(-misalignment),
-        b_a=b_a,
-        K=np.eye(3) if perfect_gyro else np.asarray(np.linalg.inv(np.eye(3) + error)),
-        b_omega=b_omega,
-        gravity=GRAVITY_MPS2,
-        accel_noise_density=MPU6050.accel_noise_ug * 1e-6 * STANDARD_GRAVITY_MPS2,
-        gyro_noise_density=float(np.radians(MPU6050.gyro_noise_dps)),
     )
 
 
@@ -62,7 +42,7 @@ class Chip:
     ----------
     gain, cross, misaligned_deg, bias_mg : of the accelerometer, relative, rad, deg and mg.
     gyro_gain, gyro_cross, gyro_bias_dps : of the gyroscope.
-    accel_noise_ug, gyro_noise_dps : densities, per sqrt(Hz); each sensor's own is 0.7 to 1.4 times that.
+    accel_noise_ug, gyro_noise_dps : densities, per sqrt(Hz). noisier : each sensor's own in units of that.
     accel_range_g, gyro_range_dps, bits : as it is set; 0 bits: floating point of no limit.
     steps : m/s^2 and rad/s of a count, where that does not follow from range and bits, as in a log of few decimals.
     name, message : what the recording says it is, and which MAVLink message carried it.
@@ -83,20 +63,20 @@ class Chip:
     steps: tuple[float, float] | None = None
     name: str | None = "MPU-6050"
     message: str | None = None
+    noisier: tuple[float, float] = (0.7, 1.4)
 
-    def draw(self, rng: np.random.Generator, gravity: float) -> SensorTruth:
+    def draw(self, rng: np.random.Generator, gravity: float = GRAVITY_MPS2) -> SensorTruth:
         """Draw a sensor, in the gyroscope's own frame."""
-        gains = np.diag(1.0 + rng.uniform(-self.gain, self.gain, 3))
-        skew = non_orthogonality(*rng.uniform(-self.cross, self.cross, 3))
-        turn = euler_rotation(np.radians(rng.uniform(-self.misaligned_deg, self.misaligned_deg, 3)))
-        error = rng.uniform(-self.gyro_cross, self.gyro_cross, (3, 3))
-        np.fill_diagonal(error, rng.uniform(-self.gyro_gain, self.gyro_gain, 3))
-        noisy = rng.uniform(0.7, 1.4, 2)
+        D = draw_D(rng, self.gain, self.cross, np.radians(self.misaligned_deg))
+        b_a = rng.uniform(-self.bias_mg, self.bias_mg, 3) * 1e-3 * STANDARD_GRAVITY_MPS2
+        b_omega = np.radians(rng.uniform(-self.gyro_bias_dps, self.gyro_bias_dps, 3))
+        gains, crosses = (rng.uniform(-most, most, (3, 3)) for most in (self.gyro_gain, self.gyro_cross))
+        noisy = rng.uniform(*self.noisier, 2)
         return SensorTruth(
-            D=gains @ skew @ turn,
-            b_a=rng.uniform(-self.bias_mg, self.bias_mg, 3) * 1e-3 * STANDARD_GRAVITY_MPS2,
-            K=np.asarray(np.linalg.inv(np.eye(3) + error)),
-            b_omega=np.radians(rng.uniform(-self.gyro_bias_dps, self.gyro_bias_dps, 3)),
+            D=D,
+            b_a=b_a,
+            K=np.asarray(np.linalg.inv(np.eye(3) + np.where(np.eye(3, dtype=bool), gains, crosses))),
+            b_omega=b_omega,
             gravity=gravity,
             accel_noise_density=self.accel_noise_ug * noisy[0] * 1e-6 * STANDARD_GRAVITY_MPS2,
             gyro_noise_density=float(np.radians(self.gyro_noise_dps * noisy[1])),
@@ -118,6 +98,11 @@ class Chip:
         end = 2 ** (self.bits - 1)
         counts = np.clip(np.rint(y / self.step), -end, end - 1).astype(np.int32)
         return counts, (counts == -end) | (counts == end - 1)
+
+
+# an MPU-6050 as they are sold, at 2 g
+BY_HAND = Chip(noisier=(1.0, 1.0), accel_range_g=2.0)
+hand_sensor = BY_HAND.draw
 
 
 @dataclass(frozen=True)
@@ -144,12 +129,19 @@ class Sampling:
     @property
     def per_sample(self) -> int:
         """Return the fine steps in a sample."""
-        return max(2, math.ceil(self.fine_hz / self.rate_hz))
+        return max(1, math.ceil(self.fine_hz / self.rate_hz))
 
     @property
     def step_s(self) -> float:
         """Return the true length of a fine step [s]."""
         return 1.0 / (self.rate_hz * (1.0 + self.clock_error) * self.per_sample)
+
+    def measured(
+        self, truth: SensorTruth, force: Vector, omega: Vector, rng: np.random.Generator
+    ) -> tuple[Vector, Vector]:
+        """Return what the sensor reads (m, 3) [m/s^2, rad/s] of specific force and rates (n, 3)."""
+        acc = self.accelerometer(force @ truth.D.T + truth.b_a, truth.accel_noise_density, rng)
+        return acc, self.gyroscope(omega @ np.linalg.inv(truth.K).T + truth.b_omega, truth.gyro_noise_density, rng)
 
     def accelerometer(self, y: Vector, density: float | Vector, rng: np.random.Generator) -> Vector:
         """Return samples (m, 3) of y (n, 3), through its mount, late and noisy."""
@@ -201,9 +193,8 @@ def euler_rotation(angles_rad: Vector) -> Vector:
     return np.asarray(x @ y @ z)
 
 
-def quantise(y: Vector, step: float) -> tuple[Vector, Mask]:
-    """Round y (n, 3) to 16-bit counts of size `step`; return it, and True (n,) where an axis is at full scale."""
-    if step == 0.0:
-        return y, np.zeros(len(y), bool)
-    counts = np.clip(np.rint(y / step), -FULL_SCALE, FULL_SCALE - 1)
-    return counts * step, ((counts == -FULL_SCALE) | (counts == FULL_SCALE - 1)).any(axis=1)
+def draw_D(rng: np.random.Generator, gain: float, skew_rad: float, misaligned_rad: float) -> Vector:  # noqa: N802
+    """Draw D of scale factor errors, skewed axes and a misalignment, uniform within these limits."""
+    gains, skew = 1.0 + rng.uniform(-gain, gain, 3), rng.uniform(-skew_rad, skew_rad, 3)
+    turn = rng.uniform(-misaligned_rad, misaligned_rad, 3)
+    return np.asarray(np.diag(gains) @ non_orthogonality(*skew) @ euler_rotation(-turn))

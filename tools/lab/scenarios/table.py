@@ -21,7 +21,7 @@ from .around import Hand
 from .family import PLAIN, SHARP, Family
 from .sensors import Chip, Sampling
 
-TREMBLING = Hand(tremor_mps2=0.1, tremor_rad_s=math.radians(0.6))
+TREMBLING = Hand(tremor_mps2=0.12, tremor_rad_s=math.radians(0.6))
 # what turns about the sensor itself, and shakes nothing
 STEADY = Hand(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=0.0)
 QUIET = Chip(accel_noise_ug=1.0, gyro_noise_dps=1e-4, bits=0, name=None)
@@ -66,7 +66,7 @@ _PLAIN = (
     CONTINUOUS,
     but(POSES, "phone poses", chip=PHONE, hand=TREMBLING, sampling=Sampling(100.0)),
     but(CONTINUOUS, "phone continuous", chip=PHONE, sampling=Sampling(100.0)),
-    but(POSES, "poses 2 kHz", sampling=Sampling(2000.0)),
+    but(POSES, "poses 2 kHz", sampling=Sampling(2000.0, fine_hz=4000.0)),
     but(POSES, "poses 3 ms late", sampling=Sampling(delay_ms=3.0)),
     but(POSES, "poses 10 ms late", sampling=Sampling(delay_ms=10.0)),
     but(CONTINUOUS, "continuous 3 ms late", sampling=Sampling(delay_ms=3.0)),

@@ -8,9 +8,9 @@ import pytest
 
 from mpucal.calibration.rotation import rotation
 from tools.lab.judge import sph_rms
-from tools.lab.scenarios.body import lever_acceleration
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, attitude, hand_scenario, paper_scenario
-from tools.lab.scenarios.sensors import hand_sensor, paper_sensor
+from tools.lab.scenarios.body import attitudes, board_from_world, lever_acceleration
+from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
 
 SHARED = Path(__file__).parents[4].parent / "shared" / "simulated"
 # each is simulated once, and changed by no test
@@ -72,7 +72,7 @@ def test_a_levers_acceleration_is_the_second_derivative_of_its_path():
     t = step_s * np.arange(20000)[:, None]
     omega = np.concatenate([1.2 * np.sin(1.7 * t), 0.8 * np.cos(0.9 * t), 1.5 * np.sin(0.4 * t + 1)], axis=1)
     r = np.array([0.1, -0.2, 0.15]) + 0.05 * np.concatenate([np.sin(2 * t), np.cos(t), np.sin(3 * t)], axis=1)
-    R = attitude(0.5 * (omega[1:] + omega[:-1]), step_s)
+    R = board_from_world(attitudes(0.5 * (omega[1:] + omega[:-1]), step_s))
     path = (np.swapaxes(R, -1, -2) @ r[..., None])[..., 0]
     from_path = (path[2:] - 2 * path[1:-1] + path[:-2]) / step_s**2
     in_body = (R[1:-1] @ from_path[..., None])[..., 0]
