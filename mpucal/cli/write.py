@@ -56,4 +56,4 @@ def command(
         click.echo(applied.calibration.json(), nl=False)
         return
     click.echo(f"Done: {applied.what}.")
-    click.echo(f"Written to {path} (and .bin): the calibration that the sensor needs from now on.")
+    click.echo(f"Written to {path} (and .bin): the calibration of its readings after this write.")

@@ -102,7 +102,7 @@ class VehicleSource:
         self._rows = []
         # What was rebooted between two parts is back.
         self._rebooted &= first
-        self._lost_before = self._link.lost
+        self._received, self._lost_before = 0, self._link.lost
         self._heard_ns = self._sampled_ns = self._link.now_ns()
         return sensor_of(self._stream, firmware, parameters, self._rate_hz)
 
@@ -183,13 +183,11 @@ class VehicleSource:
     def _report_loss(self) -> None:
         """Say once that the link loses packets."""
         lost = self._link.lost - self._lost_before
-        sent = self._received + lost
-        if self._loss_reported or sent < LOSS_AFTER or lost < LOSS_SHARE * sent:
+        share = loss_share(self._received, lost)
+        if self._loss_reported or self._received + lost < LOSS_AFTER or share < LOSS_SHARE:
             return
         self._loss_reported = True
-        self._say(
-            f"The link loses {100 * self._link.lost / sent:.0f} % of the packets: a nearer or faster one is better."
-        )
+        self._say(f"The link loses {100 * share:.0f} % of the packets: a nearer or faster one is better.")
 
     def _report_changes(self) -> None:
         """Say that parameters were changed while the vehicle streamed, once for all that changed together."""
@@ -246,6 +244,11 @@ class VehicleSource:
         heard = now_ns - self._heard_ns < SILENT_NS
         what, since_ns = ("no IMU messages", self._sampled_ns) if heard else ("nothing", self._heard_ns)
         return f"has sent {what} for {(now_ns - since_ns) // S} s"
+
+
+def loss_share(received: int, lost: int) -> float:
+    """Return the share of a vehicle's packets that were lost; 0 where one that came late made `lost` negative."""
+    return max(lost, 0) / max(received + lost, 1)
 
 
 def lock_to_vehicle(link: Link, system: int | None, say: Callable[[str], None]) -> Vehicle:

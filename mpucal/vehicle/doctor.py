@@ -23,7 +23,7 @@ from ..mavlink.parameters.slots import Slot, Values, find_slot
 from ..mavlink.requests import ArmingMonitor, ask, check_prearm, encode_command
 from ..mavlink.stream import MOST, Streams
 from ..mavlink.transport import US
-from ..mavlink.vehicle_source import LOSS_SHARE
+from ..mavlink.vehicle_source import LOSS_SHARE, loss_share
 from ..rests.flat import flat_statistics
 from ..session.lay_flat import STAND, put_down
 from .source import OpenedVehicle
@@ -152,9 +152,9 @@ def _streams(link: Link, values: Values, rate_hz: float, seconds: float) -> Iter
 
 
 def _loss(lost: int, received: int) -> Finding:
-    share = max(lost, 0) / max(received + lost, 1)
-    what = f"{100 * share:.1f} % of {received + lost} packets lost"
-    data = {"packets": received, "lost": lost}
+    share = loss_share(received, lost)
+    what = f"{100 * share:.1f} % of {received + max(lost, 0)} packets lost"
+    data = {"packets": received, "lost": max(lost, 0)}
     return Finding.check("link", share < LOSS_SHARE, what, "use a nearer or faster one", data)
 
 

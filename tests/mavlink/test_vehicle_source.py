@@ -147,6 +147,22 @@ def test_arming_is_reported_at_once_and_does_not_end_the_session(opened):
     assert len(to.said) == 2
 
 
+@pytest.mark.parametrize("parts", [1, 2])
+def test_the_share_of_lost_packets_is_that_of_the_part_in_which_it_is_reported(opened, parts):
+    to = opened("imus=1,hand=still")
+    to.link.lost = 100_000
+    for _ in range(parts):
+        started(to, 25)
+    assert not [text for text in to.said if "loses" in text]
+    to.link.lost += 300
+    polled(to.source, 0.1)
+    share = 300 / (300 + to.source._received)
+    assert [text for text in to.said if "loses" in text] == [
+        f"The link loses {100 * share:.0f} % of the packets: a nearer or faster one is better."
+    ]
+    assert 0.05 < share < 0.15
+
+
 def test_after_a_reboot_its_streams_are_asked_for_again_and_join(opened):
     to = opened("imus=2,fault=reboot@6")
     t = started(to, 13)
