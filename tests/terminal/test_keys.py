@@ -1,5 +1,6 @@
 import os
 import pty
+import select
 import signal
 import termios
 
@@ -80,5 +81,7 @@ def test_a_key_that_was_typed_for_the_session_is_not_left_for_the_shell(terminal
     person, program = terminal
     with Keys(program, single=True).listening():
         person.write(b"x")
+        # the kernel hands a key to the program's end a moment later
+        assert select.select([program], [], [], 10.0)[0]
     os.set_blocking(program.fileno(), False)
     assert program.read(1) is None
