@@ -127,8 +127,9 @@ def _say_options(folder: Path, rows: Iterator[dict[str, Any]], settings: Setting
             words = amended(["batch", *hint_words(settings.find_hints(row["path"]))], row["options"], "")
             lines.append(shlex.join([glob.escape(row["path"]), *words[1:]]))
     if lines:
-        # the first pattern that matches counts
-        before = [] if given is None else given.read_text(encoding="utf-8").splitlines()
-        write_atomically(folder / HINTS, "\n".join([*lines, *before, ""]).encode())
+        # the first pattern that matches counts; what a person wrote into the folder's file stays
+        files = [file for file in (given, folder / HINTS) if file is not None and file.exists()]
+        before = [line for file in files for line in file.read_text(encoding="utf-8").splitlines()]
+        write_atomically(folder / HINTS, "\n".join([*dict.fromkeys([*lines, *before]), ""]).encode())
         again = shlex.join(amended(typed_words(), f"--hints {shlex.quote(str(folder / HINTS))}", ""))
         say(f"of the files that could not be read, {len(lines)} name options: try `mpucal {again}`")

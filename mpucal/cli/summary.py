@@ -65,7 +65,10 @@ def _verdict(what: str, quality: Mapping[str, Any]) -> list[str]:
     """Return the verdict on a calibration and its reasons; nothing if it was not judged."""
     if "verdict" not in quality:
         return []
-    return [SENTENCES[quality["verdict"]].format(what), *(_reason(each["message"]) for each in quality["reasons"])]
+    return [
+        SENTENCES[quality["verdict"]].format(what),
+        *(_reason(each["message"]) for each in quality.get("reasons", ())),
+    ]
 
 
 def _imu(document: Mapping[str, Any]) -> str:

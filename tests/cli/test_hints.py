@@ -67,11 +67,14 @@ def test_a_batch_ends_with_the_command_that_reads_what_it_could_not(mpucal, reco
         np.savetxt(name, rows, delimiter=",", header=names, comments="")
     Path("given").write_text("b.csv --span 5:\n")
     words = ["a[[]1].csv", "b.csv", "-o", "fleet", "--workers", "1", "--model", "accel"]
+    Path("fleet").mkdir()
+    Path("fleet/hints.txt").write_text("other.csv --rate 50\n")
     found = mpucal("batch", *words, "--hints", "given")
     assert "2 could not be read" in found.out
     command = found.err.splitlines()[-1].partition("try `")[2].removesuffix("`")
     assert shlex.split(command) == ["mpucal", "batch", *words, "--hints", "fleet/hints.txt"]
-    assert dict(read_hints_file(Path("fleet/hints.txt")))["b.csv"].span is not None
+    kept = dict(read_hints_file(Path("fleet/hints.txt")))
+    assert kept["b.csv"].span is not None and kept["other.csv"].rate_hz == 50.0
     assert "0 could not be read" in mpucal(*shlex.split(command)[1:]).out
 
 
