@@ -7,13 +7,12 @@ from collections.abc import Callable, Sequence
 from ..data import Samples
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
-from ..rests.windows import Windows
+from ..rests.windows import WINDOW_S, Windows
 from .aims import FLAT_S
 from .boards import BOARD, KINDS
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
 from .step import PATIENCE_S, SAY_AGAIN_S, Step
 
-WINDOW_S = 0.5
 # Least rest after which Enter goes on, and whose end is worth a caution.
 SHORTEST_S = 2.0
 # Least rest in a recording without a session, whose person knew of no countdown.

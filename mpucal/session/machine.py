@@ -147,7 +147,7 @@ class Machine:
             case State.ROTATE if self._flat is not None:
                 self._coverage = Coverage()
                 self._step = (
-                    CheckPoses(self._flat, self._plan.board)
+                    CheckPoses(self._flat, self._plan)
                     if self._checking
                     else Rotate(self._flat, self._aim, self._plan, self._coverage)
                 )

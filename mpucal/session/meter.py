@@ -13,7 +13,7 @@ from ..rests.stillness import Detector, Moved
 from ..rests.windows import Window, Windows
 from .attitude import Attitude, canonical, compose, from_vector, rotate, turned_up, yaw_between
 from .events import Caution, Direction, Meter, Output, Quaternion, down_of
-from .step import SAY_AGAIN_S, WINDOW_S
+from .step import HAND_WINDOW_S, SAY_AGAIN_S
 
 NEAR_RANGE = 0.8
 
@@ -28,7 +28,7 @@ class MotionWatch:
 
     def __init__(self, sensor: Sensor) -> None:
         self._sensor = sensor
-        self._windows = Windows(WINDOW_S)
+        self._windows = Windows(HAND_WINDOW_S)
         self._stillness = Detector(HAND)
         self._attitude, self._guide = Attitude(), TurnGuide()
         self._still = False

@@ -10,9 +10,8 @@ import numpy as np
 
 from ..data import Samples, Vector
 from ..rests.windows import Windows
-from .aims import SIDES, VERIFY_PLACED, Aim, directions
-from .boards import describe, describe_tilt
-from .coverage import DISTINCT_RAD, Coverage
+from .aims import SIDES, VERIFY_PLACED, Aim
+from .coverage import Coverage
 from .events import (
     Checked,
     Direction,
@@ -66,21 +65,20 @@ class Rotate(PoseStep):
 
     def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         asks = not (plan.tilt_only or plan.until_end)
-        super().__init__(flat, placed_s=PLACED_S if asks and aim.sides else None)
-        self._aim, self._plan, self._coverage = aim, plan, coverage
+        super().__init__(flat, plan, placed_s=PLACED_S if asks and aim.sides else None)
+        self._aim, self._coverage = aim, coverage
         self._passes = Windows(PASS_WINDOW_S, spread=False)
         acc = np.array(flat.acc)
         self._coverage.paused.add(acc)
         self._coverage.passed.add(acc)
         self._coverage.rested.add(acc)
-        self._directions = directions(down_of(acc), plan.tilt_only)
         self._knowledge: Knowledge | None = None
         self._requested = False
         self._advised_run = -1
         self._known_number = 0
         self._held: tuple[Pause, Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
-        self.prompt = self._prompt_for(self._coverage.paused.farthest_down(self._directions))
+        self.prompt = self._prompt_for(self._farthest(self._coverage.paused))
 
     def add(self, samples: Samples) -> list[Output | Turned]:
         """Return the outputs for `samples`; Turned comes last and ends the step."""
@@ -127,8 +125,7 @@ class Rotate(PoseStep):
             if side is not None:
                 down = side
             elif self._plan.tilt_only or knowledge.down == self.prompt.down:
-                others = self._directions @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)
-                down = self._coverage.paused.farthest_down(self._directions[others])
+                down = self._farthest(self._coverage.paused)
             self.prompt = self._prompt_for(down)
             outputs.append(self.prompt)
         return outputs
@@ -252,6 +249,4 @@ class Rotate(PoseStep):
         if self._plan.until_end:
             text = "Turn the board through many different orientations, tilted ones too, and hold each for 2 s."
             return Prompt(PromptKind.ROTATE, text)
-        words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
-        text = f"Turn the board: {words}, then hold it still."
-        return Prompt(PromptKind.ROTATE, text, triple(down))
+        return self._ask_for(PromptKind.ROTATE, down, "Turn the board: {}, then hold it still.")

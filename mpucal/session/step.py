@@ -13,6 +13,9 @@ from ..data import Samples, Vector
 from ..rests.limits import HAND, UNTOUCHED
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
+from .aims import directions
+from .boards import describe, describe_tilt
+from .coverage import DISTINCT_RAD, Directions
 from .events import (
     Caution,
     Checked,
@@ -23,13 +26,16 @@ from .events import (
     Learnt,
     Output,
     Prompt,
+    PromptKind,
     Rested,
     Stopped,
     Tried,
     Turned,
     Use,
     down_of,
+    triple,
 )
+from .plan import Plan
 
 # Events that end a step; such an event comes last in its outputs.
 End = Rested | Turned | Finished | Stopped
@@ -46,7 +52,7 @@ class Step:
     prompt : the last one. checked : result of the verification; None before it is known, or if the person skipped it.
     """
 
-    prompt: Prompt
+    prompt = Prompt(PromptKind.REST, "")
     checked: Checked | None = None
 
     @property
@@ -75,7 +81,8 @@ class Step:
         return [self.prompt]
 
 
-WINDOW_S = 0.25
+# Length of a window for the rests of a hand, which are short.
+HAND_WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
 # A vehicle that is put down is left there for longer: no tremor moves its readings over the steps of its streams. The
@@ -87,8 +94,8 @@ REMIND_S = 8.0
 PATIENCE_S, VERIFY_PATIENCE_S = 60.0, 40.0
 # Session time after which the answer of a fit is taken.
 WAIT_S = 0.5
-# A board this near to the wanted orientation is in it.
-WANTED_RAD = math.radians(15.0)
+# A board this near to the wanted orientation is in it; a person who holds it this near meant that orientation.
+WANTED_RAD, MEANT_RAD = math.radians(15.0), math.radians(25.0)
 USE_TEXTS = {
     Use.TAKEN: "taken",
     Use.USEFUL: "not the one asked for, but useful",
@@ -114,17 +121,14 @@ class Pause:
     countdown: Countdown | None = None
 
 
-def is_wanted(acc: Vector, wanted: Direction | None, near_rad: float = WANTED_RAD) -> bool:
+def is_near(acc: Vector, wanted: Direction | None, near_rad: float) -> bool:
     """Return True if the mean acceleration (3,) of a pause is within `near_rad` of the wanted orientation."""
-    if wanted is None:
-        return False
-    cosine = float(-acc @ np.asarray(wanted)) / max(float(np.linalg.norm(acc)), 1e-9)
-    return cosine >= math.cos(near_rad)
+    return wanted is not None and math.acos(max(min(float(np.dot(down_of(acc), wanted)), 1.0), -1.0)) <= near_rad
 
 
 def classify_use(acc: Vector, wanted: Direction | None, new: bool) -> Use:
     """Return the use of a pause with the mean acceleration `acc` (3,), in an orientation that is `new` or not."""
-    if is_wanted(acc, wanted):
+    if is_near(acc, wanted, WANTED_RAD):
         return Use.TAKEN
     return Use.USEFUL if new else Use.SEEN
 
@@ -146,20 +150,33 @@ class PoseStep(Step):
 
     Parameters
     ----------
-    flat : the flat rest. hold_s, placed_s : see PauseDetector.
+    flat : the flat rest. plan : settings of the session. hold_s, placed_s : see PauseDetector.
     """
 
-    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+    def __init__(self, flat: Rested, plan: Plan, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+        self._plan = plan
         self._pauses = PauseDetector(flat, hold_s, placed_s)
+        self._directions = directions(down_of(np.array(flat.acc)), plan.tilt_only)
         self._begun_s: float | None = None
         self._prompted_s = 0.0
-        self._number = 0
 
     def resumed(self) -> Sequence[Output]:
         """See Step."""
         self._begun_s = None
         self._pauses.forget()
         return super().resumed()
+
+    def _farthest(self, seen: Directions) -> Vector:
+        """Return the direction farthest from all `seen`, at least DISTINCT_RAD from the one that is asked for."""
+        others = self._directions
+        if self.prompt.down is not None:
+            others = others[others @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)]
+        return seen.farthest_down(others)
+
+    def _ask_for(self, kind: PromptKind, down: Vector, text: str) -> Prompt:
+        """Return the prompt to point `down` (3,) down; the words for the orientation replace {} in `text`."""
+        words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
+        return Prompt(kind, text.format(words), triple(down))
 
     def _remind(self, t_s: float, since_s: float, what: str) -> list[Output]:
         """Return the prompt as a caution, if it is REMIND_S since the last one and since `since_s`."""
@@ -183,7 +200,7 @@ class PauseDetector:
         silent = np.zeros(3)
         self._hands = Detector(UNTOUCHED, (silent, silent), bias=np.array(flat.gyr))
         self._touched: deque[bool] = deque(maxlen=NEWEST)
-        self._windows = Windows(WINDOW_S)
+        self._windows = Windows(HAND_WINDOW_S)
         self._stillness = Detector(HAND, bias=np.array(flat.gyr), learns=True)
         self._last_run: int | None = None
 
@@ -206,7 +223,7 @@ class PauseDetector:
             if not isinstance(sight, Still) or sight.run <= self._last_run:
                 continue
             hold_s, remaining = self._hold_s if any(self._touched) else self._placed_s, None
-            if sight.seconds < hold_s + WINDOW_S - 1e-6:
+            if sight.seconds < hold_s + HAND_WINDOW_S - 1e-6:
                 remaining = Countdown(window.end_s, max(hold_s - sight.seconds, 0.0), hold_s, paused=False)
             acc = np.asarray(sight.acc)
             pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, hold_s, remaining))

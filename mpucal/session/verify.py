@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
-from .aims import ALL_AROUND, VERIFY_PLACED, Aim, directions, unseen_rad
-from .boards import BOARD, describe, describe_tilt
-from .coverage import DISTINCT_RAD, Coverage, Directions
+from .aims import VERIFY_PLACED, Aim, unseen_rad
+from .coverage import SAME_RAD, Coverage, Directions
 from .events import (
     Caution,
     Checked,
@@ -26,14 +23,14 @@ from .events import (
     Rested,
     Tried,
     Use,
-    down_of,
-    triple,
 )
 from .plan import Plan
 from .step import (
     ENOUGH,
     HOLD_S,
+    MEANT_RAD,
     PATIENCE_S,
+    USE_TEXTS,
     VERIFY_PATIENCE_S,
     WAIT_S,
     Pause,
@@ -41,20 +38,82 @@ from .step import (
     classify_use,
     countdown,
     held,
-    is_wanted,
+    is_near,
 )
+
+
+class NewPoses(PoseStep):
+    """Base of the steps that ask for `of` orientations that were not seen, and take any new one.
+
+    Parameters
+    ----------
+    flat : the flat rest. plan : settings of the session. of : number of orientations.
+    seen : the orientations so far, to which the new ones are added. apart_rad : least angle of a new one from each.
+    hold_s : time for which each is to be held.
+    """
+
+    def __init__(
+        self, flat: Rested, plan: Plan, of: int, seen: Directions, apart_rad: float, hold_s: float = HOLD_S
+    ) -> None:
+        super().__init__(flat, plan, hold_s)
+        self._of, self._seen, self._apart_rad, self._hold_s = of, seen, apart_rad, hold_s
+        self._number = 0
+        # No orientation is taken once there are enough, or it is too late for more.
+        self._closed = False
+        self.prompt = self._next()
+
+    def _take(self, samples: Samples) -> list[Output]:
+        """Return the outputs for the pauses that `samples` show."""
+        outputs: list[Output] = []
+        for pause in self._pauses.add(samples):
+            if self._closed:
+                break
+            new = not self._seen.near(pause.acc, self._apart_rad)
+            # An orientation that was seen is of no use, even if it is the wanted one.
+            use = classify_use(pause.acc, self.prompt.down, new) if new else Use.SEEN
+            outputs += countdown(pause, use)
+            if pause.seconds >= self._hold_s - 1e-6:
+                self._pauses.leave(pause.run)
+                self._prompted_s = pause.t_s
+                outputs += [held(pause, use), *(self._count(pause, use) if new else self._seen_already(pause))]
+        return outputs
+
+    def _count(self, pause: Pause, use: Use) -> list[Output]:
+        """Count a new orientation; return the progress, and the next prompt where more are asked for."""
+        self._seen.add(pause.acc)
+        self._number += 1
+        left_s = (self._of - self._number) * (pause.t_s - (self._begun_s or pause.t_s))
+        self._begun_s = pause.t_s
+        text = f"held {self._number} of {self._of}" + ("" if use is Use.TAKEN else f": {USE_TEXTS[use]}")
+        self._closed = self._number == self._of
+        outputs: list[Output] = [Progress(pause.t_s, self._number, self._of, text, left_s or None)]
+        if not self._closed:
+            self.prompt = self._next()
+            outputs.append(self.prompt)
+        return outputs
+
+    def _seen_already(self, pause: Pause) -> list[Output]:
+        """Return a caution; if the requested orientation was already seen, request a different one."""
+        meant = is_near(pause.acc, self.prompt.down, MEANT_RAD)
+        if meant:
+            self.prompt = self._next()
+        caution = Caution(pause.t_s, "seen_already", "this orientation was seen already", self.prompt.text)
+        return [caution, self.prompt] if meant else [caution]
+
+    def _next(self) -> Prompt:
+        """Return a prompt for the next orientation."""
+        raise NotImplementedError
+
 
 # Bias and scale factor errors bend raw directions by up to a tenth: these must be farther apart by that.
 BENT = 1.1
-# A hand that is this near to the requested orientation meant to be there.
-ASKED_FOR_RAD = math.radians(25.0)
 # Session time after which the first calibration is taken; the person turns the board meanwhile.
 TRY_WAIT_S = 3.0
 # Number of orientations that may be requested in place of ones that the calibration has seen after all.
 MOST_MORE = 2
 
 
-class Verify(PoseStep):
+class Verify(NewPoses):
     """Step that asks for `aim.verify` new orientations, or VERIFY_PLACED, and compares the first calibration with them.
 
     Parameters
@@ -64,14 +123,11 @@ class Verify(PoseStep):
     """
 
     def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
-        super().__init__(flat)
-        self._plan, self._coverage = plan, coverage
-        self._of = VERIFY_PLACED if coverage.placed else aim.verify
-        self._directions = directions(down_of(np.array(flat.acc)), plan.tilt_only)
+        of = VERIFY_PLACED if coverage.placed else aim.verify
+        super().__init__(flat, plan, of, coverage.rested, BENT * unseen_rad(plan.tilt_only))
         self._refusal: Finished | None = None
-        self._requested, self._more = False, MOST_MORE
+        self._more = MOST_MORE
         self._now_s = 0.0
-        self.prompt = self._next()
 
     def begin(self) -> list[Output]:
         """See Step."""
@@ -84,18 +140,16 @@ class Verify(PoseStep):
             self._begun_s = self._prompted_s = t_s
         if self._refusal is not None:
             return [self._refusal] if t_s - self._begun_s >= PATIENCE_S else []
-        outputs: list[Output | Finished] = []
-        for pause in self._pauses.add(samples):
-            use = self._classify_use(pause)
-            outputs += [] if self._requested else countdown(pause, use)
-            outputs += self._hold(pause, use)
-        if self._requested:
+        waits = self._closed
+        outputs: list[Output | Finished] = [*self._take(samples)]
+        if waits:
             return outputs
-        outputs += self._remind(t_s, self._prompted_s, "this orientation has not been held yet")
-        if t_s - self._begun_s < VERIFY_PATIENCE_S:
-            return outputs
-        if self._number:
-            self._requested = True
+        if not self._closed:
+            outputs += self._remind(t_s, self._prompted_s, "this orientation has not been held yet")
+            if t_s - self._begun_s < VERIFY_PATIENCE_S:
+                return outputs
+            self._closed = self._number > 0
+        if self._closed:
             return [*outputs, RequestFit(FitKind.CHECK, WAIT_S, self._of)]
         not_shown = reason("verification_failed", "not_shown")
         self.checked = Checked((), None, not_shown)
@@ -125,9 +179,9 @@ class Verify(PoseStep):
         """Take the comparison with the new orientations."""
         if checked.agrees is None and self._number >= self._of and self._more:
             # The fit has seen one of these orientations after all: another one replaces it.
-            self._more, self._requested, self._begun_s = self._more - 1, False, None
+            self._more, self._closed, self._begun_s = self._more - 1, False, None
             self._number = self._of - 1
-            self.prompt = self._next(self.prompt)
+            self.prompt = self._next()
             return [self.prompt]
         self.checked = checked
         if checked.reason is None:
@@ -145,51 +199,10 @@ class Verify(PoseStep):
         )
         return [self.prompt, Caution(self._now_s, "refused", against.what, against.remedy)]
 
-    def _hold(self, pause: Pause, use: Use) -> list[Output | Finished]:
-        if self._requested or pause.seconds < HOLD_S - 1e-6:
-            return []
-        self._pauses.leave(pause.run)
-        self._prompted_s = pause.t_s
-        if use is Use.SEEN:
-            return [held(pause, use), *self._seen_already(pause)]
-        self._coverage.paused.add(pause.acc)
-        self._coverage.rested.add(pause.acc)
-        self._number += 1
-        left_s = (self._of - self._number) * (pause.t_s - (self._begun_s or pause.t_s))
-        self._begun_s = pause.t_s
-        useful = "" if use is Use.TAKEN else ": not the one asked for, but useful"
-        text = f"held {self._number} of {self._of}{useful}"
-        progress = Progress(pause.t_s, self._number, self._of, text, left_s or None)
-        if self._number == self._of:
-            self._requested = True
-            return [held(pause, use), progress, RequestFit(FitKind.CHECK, WAIT_S, self._of)]
-        self.prompt = self._next(self.prompt)
-        return [held(pause, use), progress, self.prompt]
-
-    def _classify_use(self, pause: Pause) -> Use:
-        """Return SEEN if the fit already used this orientation, even when it was requested."""
-        if self._coverage.rested.near(pause.acc, BENT * unseen_rad(self._plan.tilt_only)):
-            return Use.SEEN
-        return classify_use(pause.acc, self.prompt.down, new=True)
-
-    def _seen_already(self, pause: Pause) -> list[Output | Finished]:
-        """Return a caution; if the requested orientation was already seen, request a different one."""
-        asked_for = is_wanted(pause.acc, self.prompt.down, ASKED_FOR_RAD)
-        if asked_for:
-            self.prompt = self._next(self.prompt)
-        what = "the calibration has seen this orientation already"
-        caution = Caution(pause.t_s, "seen_already", what, self.prompt.text)
-        return [caution, self.prompt] if asked_for else [caution]
-
-    def _next(self, last: Prompt | None = None) -> Prompt:
-        """Return a prompt for the direction farthest from all rests, at least DISTINCT_RAD from the `last` one."""
-        candidates = self._directions
-        if last is not None:
-            candidates = candidates[candidates @ np.array(last.down) < math.cos(DISTINCT_RAD)]
-        down = self._coverage.rested.farthest_down(candidates)
-        words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
-        number = f"{self._number + 1} of {self._of}"
-        return Prompt(PromptKind.VERIFY, f"Verification {number}: {words}, then hold it still.", triple(down))
+    def _next(self) -> Prompt:
+        """See NewPoses; the direction farthest from all rests is asked for."""
+        text = f"Verification {self._number + 1} of {self._of}: {{}}, then hold it still."
+        return self._ask_for(PromptKind.VERIFY, self._farthest(self._seen), text)
 
 
 ORIENTATIONS = 3
@@ -199,57 +212,29 @@ CHECK_HOLD_S = 2.0
 OTHER_WAY = 0.1
 
 
-class CheckPoses(PoseStep):
+class CheckPoses(NewPoses):
     """Step that asks for the orientations that would show most, and takes any new one."""
 
-    def __init__(self, flat: Rested, board: str = BOARD) -> None:
-        super().__init__(flat, CHECK_HOLD_S)
-        self._board = board
-        self._shown = Directions()
-        self._shown.add(np.array(flat.acc))
-        self.prompt = self._next()
+    def __init__(self, flat: Rested, plan: Plan) -> None:
+        seen = Directions(SAME_RAD)
+        seen.add(np.array(flat.acc))
+        super().__init__(flat, plan, ORIENTATIONS, seen, unseen_rad(plan.tilt_only), CHECK_HOLD_S)
 
     def add(self, samples: Samples) -> list[Output | Finished]:
         """Return the outputs for `samples`; Finished comes last and ends the step."""
         t_s = float(samples.t[-1])
         if self._begun_s is None:
             self._begun_s = self._prompted_s = t_s
-        outputs: list[Output | Finished] = []
-        for pause in self._pauses.add(samples):
-            if self._number < ORIENTATIONS:
-                outputs += self._hold(pause)
-        if self._number == ORIENTATIONS:
-            return [*outputs, Finished(f"{ORIENTATIONS} orientations: done")]
+        outputs = self._take(samples)
+        if self._closed:
+            return [*outputs, Finished(f"{self._of} orientations: done")]
         if t_s - self._begun_s >= VERIFY_PATIENCE_S:
             return [*outputs, Finished(f"no new orientation for {VERIFY_PATIENCE_S:.0f} s")]
         return [*outputs, *self._remind(t_s, self._prompted_s, "no new orientation for a while")]
 
-    def _hold(self, pause: Pause) -> list[Output]:
-        new = not self._shown.near(pause.acc)
-        use = classify_use(pause.acc, self.prompt.down, new) if new else Use.SEEN
-        outputs: list[Output] = [*countdown(pause, use)]
-        if pause.seconds < CHECK_HOLD_S - 1e-6:
-            return outputs
-        self._pauses.leave(pause.run)
-        self._prompted_s = pause.t_s
-        outputs.append(held(pause, use))
-        if not new:
-            seen = Caution(pause.t_s, "seen_already", "this orientation was shown already", self.prompt.text)
-            return [*outputs, seen]
-        self._shown.add(pause.acc)
-        self._number += 1
-        self._begun_s = pause.t_s
-        outputs.append(Progress(pause.t_s, self._number, ORIENTATIONS, f"held {self._number} of {ORIENTATIONS}"))
-        if self._number < ORIENTATIONS:
-            self.prompt = self._next()
-            outputs.append(self.prompt)
-        return outputs
-
     def _next(self) -> Prompt:
-        """Return a prompt for the axis that differs most from all orientations shown: a bias shows along either way."""
-        along = -ALL_AROUND @ self._shown.units.T
-        down = ALL_AROUND[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
-        number = f"{self._number + 1} of {ORIENTATIONS}"
-        words = describe(triple(down), self._board)
-        text = f"Orientation {number}: {words}, or any other new one, then hold it still for 2 s."
-        return Prompt(PromptKind.VERIFY, text, triple(down))
+        """See NewPoses; the axis that differs most from all those shown: a bias shows along either way."""
+        along = -self._directions @ self._seen.units.T
+        down = self._directions[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
+        text = f"Orientation {self._number + 1} of {self._of}: {{}}, or any other new one, then hold it still for 2 s."
+        return self._ask_for(PromptKind.VERIFY, down, text)

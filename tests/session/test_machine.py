@@ -331,7 +331,7 @@ def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, v
     assert verifying.state is State.VERIFY
     cautions = [caution for caution in verifying.of(Caution) if caution.code == "seen_already"]
     assert len(cautions) >= 4
-    assert all((c.what, c.do) == ("the calibration has seen this orientation already", asked.text) for c in cautions)
+    assert all((c.what, c.do) == ("this orientation was seen already", asked.text) for c in cautions)
     assert verifying.of(Prompt)[-1] == asked
     verifying.feed(board.still(40.0))
     assert verifying.machine.checked.agrees is None
