@@ -110,7 +110,14 @@ def of_rows(acc: Vector, gyr: Vector, start_s: float = 0.0, end_s: float = 1.0, 
 
 def _of_rows(acc: Vector, gyr: Vector) -> tuple[Vector, Vector, Vector, Vector, Vector]:
     """Return (..., 3) of rows (..., n, 3), in the order of a window's fields: gyr, acc_sd, gyr_sd, acc_noise, acc."""
-    return gyr.mean(-2), acc.std(-2), gyr.std(-2), _noise(acc), acc.mean(-2)
+    # Both sensors at once, and the mean once: a session does this for each window.
+    rows = np.concatenate((acc, gyr), axis=-1)
+    n = rows.shape[-2]
+    mean = np.add.reduce(rows, -2) / n
+    rows -= mean[..., None, :]
+    rows *= rows
+    sd = np.sqrt(np.add.reduce(rows, -2) / n)
+    return mean[..., 3:], sd[..., :3], sd[..., 3:], _noise(acc), mean[..., :3]
 
 
 def _window(samples: Samples, first: int, last: int, length_s: float, spread: bool) -> Window:
@@ -134,7 +141,9 @@ def _noise(rows: Vector) -> Vector:
     n = rows.shape[-2] - ORDER
     if n <= 0:
         return np.zeros((*rows.shape[:-2], 3))
-    sizes = np.sort(np.abs(np.diff(rows, ORDER, axis=-2)), axis=-2)
+    for _ in range(ORDER):
+        rows = rows[..., 1:, :] - rows[..., :-1, :]
+    sizes = np.sort(np.abs(rows), axis=-2)
     return np.asarray(sizes[..., n // 2, :] * (OF_NORMAL / math.sqrt(SQUARES)))
 
 
