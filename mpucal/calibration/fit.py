@@ -12,6 +12,7 @@ from .parameters import D_NAMES
 
 if TYPE_CHECKING:
     from .parts import Parts
+    from .slip import Slip
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Fit:
     parts : scores of the parts of the recording at the estimate; None where they are not known.
     delay_s : delay of the accelerometer behind the gyroscope; 0 where the model does not estimate it.
     spread_mps2 : error of a rest's |a| beside noise and tremor, of an estimate from the rests alone.
+    slip : slip of the mount that the rests show, or None.
     """
 
     D: Vector
@@ -46,6 +48,7 @@ class Fit:
     parts: Parts | None = None
     delay_s: float = 0.0
     spread_mps2: float = 0.0
+    slip: Slip | None = None
 
     def std(self, *names: str) -> Vector:
         """Return standard deviations of the named parameters, NaN for those that were not estimated."""

@@ -38,6 +38,7 @@ from .parameters import HAND
 from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, preprocess
 from .problem import Problem
+from .slip import find_slip
 from .theta import Prior, Theta
 from .transitions import leverages, miss_variances, q_scale, transitions_of
 
@@ -78,7 +79,8 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
     parts = parts_of(problem, minimum, prior)
     minimum = _with_honest_information(minimum, noise, search.prepared, fine)
     known = undetermined(minimum.covariance()) if minimum.free.all() else ()
-    return replace(minimum, iterations=iterations).as_fit(known, parts)
+    fit = replace(minimum, iterations=iterations).as_fit(known, parts)
+    return replace(fit, slip=find_slip(transitions_of(fine, minimum.theta), fine.problem.series.dt))
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.linalg import norm
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...reasons import Reason, reason
@@ -18,9 +19,9 @@ LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 
 
 def few_orientations(e: Evidence) -> Reason | None:
-    """Find directions that the data leave open, where the model holds."""
+    """Find directions that the data leave open, where the model holds; after a slip, more orientations do not help."""
     rms = _model_rms(e)
-    if rms is not None and rms <= GOOD_RMS_MPS2:
+    if e.estimate.slip is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
         return None
     if e.uncertainty is None or rms is None:
         return reason("few_orientations", "nothing_known")
@@ -76,6 +77,9 @@ def contradiction(e: Evidence) -> Reason | None:
     if claim is None or e.uncertainty is None or inconsistent(e) is not None:
         return None
     rms, change, disturbed = e.uncertainty.rms_mps2, claim.change, _is_disturbed(e)
+    if (slip := e.estimate.slip) is not None:
+        begin, end = _since_the_start(e, slip.span)
+        return reason("inconsistent", "change", bool(e.gravity * norm(slip.delta) > CHANGED_MPS2), begin=begin, end=end)
     if change is not None and not disturbed and claim.error("change") > LEAST_CHANGE_MPS2:
         begin, end = _since_the_start(e, change.span)
         if change.hypothesis.what != "accelerometer":

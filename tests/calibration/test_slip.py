@@ -1,0 +1,42 @@
+"""Slip of the mount: found where the board slips between two rests, and told as what it is; a lost turn is none."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate, estimate
+from mpucal.calibration.rotation import turned
+
+G = 9.82
+
+
+def slipped(recording, at_s, axis=(0.6, -0.6, 0.53), deg=3.0):
+    """Rotate the accelerometer against the gyroscope from `at_s` [s] on."""
+    R = turned(np.radians(deg) * np.array([axis]) / np.linalg.norm(axis))
+    return replace(
+        recording, acc=np.where((recording.t >= recording.t[0] + at_s)[:, None], recording.acc @ R.T, recording.acc)
+    )
+
+
+@pytest.mark.parametrize(("seed", "at_s"), [(1, 27.0), (2, 30.0), (3, 33.0)])
+def test_a_mount_that_slips_between_rests_is_told_with_its_time(hand, seed, at_s):
+    calibration = calibrate(slipped(hand(seed, "pose12").recording, at_s), "auto", G)
+    (reason,) = calibration.quality["reasons"]
+    assert (calibration.verdict, reason["code"]) == ("refused", "inconsistent")
+    begin, end = map(float, re.findall(r"(\d+) s", reason["message"]))
+    assert begin - 1.0 <= at_s <= end + 1.0
+
+
+@pytest.mark.parametrize("motion", ["continuous", "pose12", "pose7"])
+def test_a_mount_that_holds_does_not_slip(hand, motion):
+    assert estimate(hand(1, motion).recording, "auto", G)[0].fit.slip is None
+
+
+def test_a_turn_that_the_gyroscope_lost_is_no_slip(hand):
+    """Two seconds without rates, in the middle of a recording, in which the board goes on turning."""
+    recording = hand(1, "pose12").recording
+    lost = abs(recording.t - recording.t[0] - 27.0) < 1.0
+    gyr = np.where(lost[:, None], 0.0, recording.gyr)
+    assert estimate(replace(recording, gyr=gyr), "auto", G)[0].fit.slip is None
