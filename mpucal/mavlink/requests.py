@@ -67,6 +67,7 @@ COMPLAINTS_NS, TRIES = 3 * S // 2, 3
 PREFIXES = ("PreArm: ", "Preflight Fail: ", "Arm: ")
 # PX4 gives most of its reasons as events (EVENT, 410), whose words are in its component metadata.
 IN_EVENTS = "its events say why, as QGroundControl shows them"
+WITHOUT_REASON = "would not arm, and gives no reason: see the messages in its ground station"
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class PrearmState:
     def __str__(self) -> str:
         if self.complaints:
             return "would not arm: " + "; ".join(self.complaints)
-        return {True: "would arm", False: "would not arm", None: "does not say whether it would arm"}[self.ready]
+        return {True: "would arm", False: WITHOUT_REASON, None: "does not say whether it would arm"}[self.ready]
 
 
 class ArmingMonitor:
@@ -139,8 +140,8 @@ def check_prearm(link: Link) -> PrearmState:
                 ready = _is_ready(message, is_px4)
             if message.get_type() == "STATUSTEXT" and message.text.startswith(PREFIXES):
                 complaints.append(message.text.partition(": ")[2])
-        if ready is not None:
-            break
+        if ready or (ready is False and (complaints or is_px4)):
+            break  # else an answer, or its reasons, got lost
     if ready is False and not complaints and is_px4:
         complaints.append(IN_EVENTS)
     return PrearmState(ready, tuple(dict.fromkeys(complaints)))

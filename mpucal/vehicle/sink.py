@@ -269,7 +269,10 @@ class AutopilotSink:
         end_ns = self._link.now_ns() + READY_NS
         stays = {complaint for complaint in before.complaints if not INCONSISTENT.search(complaint)}
         now = self._await_prearm()
-        while not now.ready and not set(now.complaints) <= stays and self._link.now_ns() < end_ns:
+        while not now.ready and self._link.now_ns() < end_ns:
+            # one that would not arm and gives no reason yet is still starting
+            if set(now.complaints) <= stays and (now.complaints or now.ready is None):
+                break
             now = check_prearm(self._link)
         return now
 

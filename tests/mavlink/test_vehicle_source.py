@@ -275,3 +275,19 @@ def test_px4_says_whether_it_would_arm_though_it_does_not_list_the_check(simulat
     px4 = simulated(f"firmware=px4{words}")
     assert not px4.vehicle.firmware.sys_status().onboard_control_sensors_present & 0x10000000
     assert check_prearm(px4.link).ready is not bool(words)
+
+
+def test_a_reason_that_got_lost_on_the_link_is_asked_for_again(simulated, monkeypatch):
+    uncalibrated = simulated("firmware=ardupilot,INS_ACCOFFS_X=0,INS_ACCOFFS_Y=0,INS_ACCOFFS_Z=0")
+    (complaint,) = uncalibrated.vehicle.firmware.complaints()
+    send, lost = uncalibrated.vehicle._send, []
+
+    def lose_first_reason(message):
+        if message.get_type() == "STATUSTEXT" and not lost:
+            lost.append(message)
+        else:
+            send(message)
+
+    monkeypatch.setattr(uncalibrated.vehicle, "_send", lose_first_reason)
+    state = check_prearm(uncalibrated.link)
+    assert (state.ready, [f"PreArm: {each}" for each in state.complaints], len(lost)) == (False, [complaint], 1)
