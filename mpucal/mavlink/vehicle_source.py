@@ -259,7 +259,7 @@ def lock_to_vehicle(link: Link, system: int | None, say: Callable[[str], None]) 
     NoAnswer, LinkError : see Link.listen. UsageError : see choose_vehicle.
     """
     vehicle = choose_vehicle(link.listen(), system)
-    say(f"This is {vehicle}; requests and parameters are sent to it alone.")
+    say(f"This is {vehicle}; nothing is sent to any other.")
     link.lock(vehicle)
     return vehicle
 
