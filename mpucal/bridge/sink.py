@@ -81,8 +81,10 @@ class BridgeSink:
             raise self._restore(old)
         return Applied(
             calibration,
-            f"{self.where} keeps it as its blob number {held.generation} ({len(new)} bytes,"
-            f" CRC-32 {held.crc:08x}), read back and validated by its firmware",
+            (
+                f"{self.where} keeps it as its blob number {held.generation} ({len(new)} bytes,"
+                f" CRC-32 {held.crc:08x}), read back and validated by its firmware",
+            ),
         )
 
     def _check_chip(self, calibration: Calibration) -> None:

@@ -19,7 +19,7 @@ from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from ..sources.table import matching_kinds
 from .options import decorated
-from .person import ask, ask_in_doubt, confirm, say
+from .person import ask, ask_in_doubt, confirm, say, say_done
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -79,5 +79,5 @@ def write_back(
     agree, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
     device = make_device(options, yes, say)
     for applied in write_to_all(kinds, calibration, device, folder, record, agree, sinks, in_doubt):
-        click.echo(f"Done: {applied.what}.", err=as_json)
+        say_done(applied.clauses, as_json)
         yield applied

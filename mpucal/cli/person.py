@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import click
 
@@ -12,6 +13,12 @@ from ..errors import WriteBackError
 def say(text: str) -> None:
     """Print a sentence on stderr."""
     click.echo(f"mpucal: {text.strip()}", err=True)
+
+
+def say_done(clauses: Sequence[str], err: bool = False) -> None:
+    """Print what was done, a line for each clause, on stdout or on stderr."""
+    told = ";\n  ".join(clauses)
+    click.echo(f"Done: {told}.", err=err)
 
 
 def duration(seconds: float) -> str:

@@ -14,7 +14,7 @@ from .arguments import calibration_argument, json_option, output_option, yes_opt
 from .destination import check_sink, make_device, sink_flags
 from .loading import at_gravity_of, force_option, load_trusted
 from .options import check_source, source_options
-from .person import ask, say
+from .person import ask, say, say_done
 
 EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`"
 
@@ -48,12 +48,12 @@ def command(
             say(f"{objection}.")
         ask(f"Write {calibration} to {sink.where}?", yes)
         if written is None:
-            click.echo(f"Done: {put_back(kind, sink, calibration, into.path, say)}.")
+            say_done([put_back(kind, sink, calibration, into.path, say)])
             return
         path = into.path / kind.after_write(calibration.stem)
         applied = write_to(kind, sink, written, into.path, file_recorder(path), say)
     if as_json:
         click.echo(applied.calibration.json(), nl=False)
         return
-    click.echo(f"Done: {applied.what}.")
+    say_done(applied.clauses)
     click.echo(f"Written to {path} (and .bin): the calibration of its readings after this write.")

@@ -107,7 +107,7 @@ class KernelSink:
             rule = self._write_matrix(texts["name"], matrix)
         mg = ", ".join(f"{1000 * value:+.0f}" for value in applied / STANDARD_GRAVITY_MPS2)
         bias = f"calibbias now subtracts ({mg}) mg, read back and verified in the samples" if words else why
-        return Applied(replace(calibration, applied_in_hardware=applied), f"{self.where}: {bias}; {rule}")
+        return Applied(replace(calibration, applied_in_hardware=applied), (f"{self.where}: {bias}", rule))
 
     def _write_matrix(self, name: str, matrix: str) -> str:
         """Write a rule of udev for D; return a clause on the result."""

@@ -144,8 +144,11 @@ class ChipSink:
         bias = ", ".join(f"{1000 * value:+.0f}" for value in applied / STANDARD_GRAVITY_MPS2)
         return Applied(
             replace(calibration, applied_in_hardware=applied),
-            f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract ({bias}) mg,"
-            f" read back and verified in the samples; {VOLATILE}",
+            (
+                f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract ({bias}) mg,"
+                " read back and verified in the samples",
+                VOLATILE,
+            ),
         )
 
     def _blocks(self) -> tuple[OffsetRegisters, ...]:

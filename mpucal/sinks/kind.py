@@ -115,11 +115,16 @@ class Applied:
     Attributes
     ----------
     calibration : the written one, with the parts that the device applies from now on.
-    what : a clause for the user: what was written where, and how it was checked.
+    clauses : for the user: what was written where, and how it was checked.
     """
 
     calibration: Calibration
-    what: str
+    clauses: tuple[str, ...]
+
+    @property
+    def what(self) -> str:
+        """Sentence of all clauses."""
+        return "; ".join(self.clauses)
 
 
 class Sink(Protocol):

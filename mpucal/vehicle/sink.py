@@ -225,7 +225,7 @@ class AutopilotSink:
             *self._finish(before, first, level),
             *_unchanged_clauses(possible, planned, refused_imus(calibration)),
         ]
-        return Applied(now, "; ".join([*clauses, *paths]))
+        return Applied(now, (*clauses, *paths))
 
     def _does_stand_level(self, standing_deg: Vector) -> bool:
         """Return True if the user says that the vehicle stands as it should hover."""

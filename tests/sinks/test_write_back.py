@@ -53,7 +53,7 @@ class Registers:
         except BusError as error:
             self.held = old
             raise WriteBackError(f"{error.what}; the old state holds", error.remedy) from error
-        return Applied(replace(calibration, applied_in_hardware=self.held), "it is written")
+        return Applied(replace(calibration, applied_in_hardware=self.held), ("it is written",))
 
     def put_back(self, kept):
         self.held = np.array(json.loads(kept.read_text()))
