@@ -33,59 +33,67 @@ class Key(StrEnum):
     ABORT = "abort"
 
 
+class Event:
+    """Input of the state machine."""
+
+
+class End(Event):
+    """Event that a step derives from the samples, and that ends it; it comes last in the step's outputs."""
+
+
 # Events from outside: the source, the person and the fits.
 
 
 @dataclass(frozen=True)
-class Connected:
+class Connected(Event):
     """The sensor answered and measures."""
 
     sensor: Sensor
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measured(Event):
     """Samples arrived; they carry the session's time."""
 
     samples: Samples
 
 
 @dataclass(frozen=True)
-class Tick:
+class Tick(Event):
     """The source was polled at `t_s`, on the clock of the samples' times."""
 
     t_s: float
 
 
 @dataclass(frozen=True)
-class Enough:
+class Enough(Event):
     """The person says to go on now."""
 
 
 @dataclass(frozen=True)
-class Abort:
+class Abort(Event):
     """The person wants to stop."""
 
 
 @dataclass(frozen=True)
-class SourceEnded:
+class SourceEnded(Event):
     """The source delivers no more samples: `why` is what failed, or None at the end of a recording."""
 
     why: str | None = None
 
 
 @dataclass(frozen=True)
-class Redo:
+class Redo(Event):
     """The person wants to turn the board again, without laying it flat again."""
 
 
 @dataclass(frozen=True)
-class Resumed:
+class Resumed(Event):
     """The source resumed; the board's motion in between is unknown."""
 
 
 @dataclass(frozen=True)
-class Learnt:
+class Learnt(Event):
     """The uncertainties were computed, as requested; with `advice`, also the orientation that helps most."""
 
     knowledge: Knowledge
@@ -93,7 +101,7 @@ class Learnt:
 
 
 @dataclass(frozen=True)
-class Tried:
+class Tried(Event):
     """The first calibration, from the turning alone, was computed: its verdict, and the likeliest reason against it."""
 
     verdict: str
@@ -101,7 +109,7 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class Checked:
+class Checked(Event):
     """The first calibration was compared with the new orientations.
 
     Attributes
@@ -115,25 +123,25 @@ class Checked:
     reason: Reason | None = None
 
 
+Answer = Learnt | Tried | Checked
+
+
 @dataclass(frozen=True)
-class Fitted:
+class Fitted(Event):
     """The final calibration was computed; its verdict is good, usable or refused."""
 
     verdict: str
 
 
 @dataclass(frozen=True)
-class Written:
+class Written(Event):
     """The results are in their files."""
 
     names: tuple[str, ...]
 
 
-# Events that the session's steps derive from the samples; the table has them like the others.
-
-
 @dataclass(frozen=True)
-class Rested:
+class Rested(End):
     """The board lay still for long enough; `acc` [m/s^2] and `gyr` [rad/s] are the means meanwhile."""
 
     still_s: float
@@ -142,46 +150,25 @@ class Rested:
 
 
 @dataclass(frozen=True)
-class Turned:
+class Turned(End):
     """The turning has ended; the verification follows."""
 
     why: str
 
 
 @dataclass(frozen=True)
-class Finished:
+class Finished(End):
     """The measuring has ended; the final calibration follows."""
 
     why: str
 
 
 @dataclass(frozen=True)
-class Stopped:
+class Stopped(End):
     """The session cannot go on; `why` says what happened, `remedy` what to do next."""
 
     why: str
     remedy: str
-
-
-Event = (
-    Connected
-    | Measured
-    | Tick
-    | Enough
-    | Redo
-    | Abort
-    | SourceEnded
-    | Resumed
-    | Learnt
-    | Tried
-    | Checked
-    | Fitted
-    | Written
-    | Rested
-    | Turned
-    | Finished
-    | Stopped
-)
 
 
 # Outputs.
@@ -429,3 +416,5 @@ class Forget:
 
 Command = RequestFit | Forget
 Output = Prompt | Progress | Meter | Countdown | Held | Caution | Seen | Knowledge | Verification | Decision | Command
+# Outputs of a step; an event that ends the step comes last.
+Outputs = list[Output | End]

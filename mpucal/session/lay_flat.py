@@ -10,7 +10,7 @@ from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import WINDOW_S, Windows
 from .aims import FLAT_S
 from .boards import BOARD, KINDS
-from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped, triple
+from .events import Caution, Countdown, Output, Outputs, Progress, Prompt, PromptKind, Rested, Stopped, triple
 from .step import PATIENCE_S, SAY_AGAIN_S, Step
 
 # Least rest after which Enter goes on, and whose end is worth a caution.
@@ -57,9 +57,9 @@ class LayFlat(Step):
         self._cautioned_s = 0.0
         self._motion = ""
 
-    def add(self, samples: Samples) -> list[Output | Rested | Stopped]:
+    def add(self, samples: Samples) -> Outputs:
         """Return the outputs for `samples`; Rested or Stopped comes last and ends the step."""
-        outputs: list[Output | Rested | Stopped] = []
+        outputs: Outputs = []
         for window in self._windows.add(samples):
             if self._begun_s is None:
                 self._begun_s = self._cautioned_s = window.start_s
@@ -83,7 +83,7 @@ class LayFlat(Step):
         self._still, self._begun_s = None, None
         return super().resumed()
 
-    def enough(self) -> list[Rested]:
+    def enough(self) -> Outputs:
         """Return the stillness so far, unless it is too short to go on with."""
         return [self._rested(self._still)] if self._still is not None and self._still.seconds >= SHORTEST_S else []
 

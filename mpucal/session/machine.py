@@ -11,39 +11,15 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Samples
+from . import events
 from .aims import select_aim
 from .boards import speak_of, usual_board
 from .coverage import Coverage
-from .events import (
-    Abort,
-    Checked,
-    Connected,
-    Decision,
-    Enough,
-    Event,
-    Finished,
-    Fitted,
-    Forget,
-    Learnt,
-    Measured,
-    Output,
-    Prompt,
-    PromptKind,
-    Redo,
-    Rested,
-    Resumed,
-    SourceEnded,
-    Stopped,
-    Tick,
-    Tried,
-    Turned,
-    Written,
-)
 from .lay_flat import LayFlat
 from .meter import MotionWatch
 from .plan import Plan
 from .rotate import Rotate
-from .step import End, Step
+from .step import Step
 from .table import MEASURING, State, next_state
 from .verify import CheckPoses, Verify
 
@@ -52,8 +28,8 @@ SILENT_S = 5.0
 # A longer time between two polls means that the computer was stopped or suspended.
 ASKED_S = 2.0
 
-REST = Prompt(PromptKind.REST, "You can put the board down.")
-COMPUTING = Prompt(PromptKind.REST, "You can put the board down. The calibration is being computed.")
+REST = events.Prompt(events.PromptKind.REST, "You can put the board down.")
+COMPUTING = events.Prompt(events.PromptKind.REST, "You can put the board down. The calibration is being computed.")
 ABORTED = "the session was interrupted"
 START_AGAIN = "start again when you are ready"
 
@@ -77,18 +53,18 @@ class Machine:
         self._step: Step = LayFlat()
         self._coverage = Coverage()
         self._watch: MotionWatch | None = None
-        self._flat: Rested | None = None
+        self._flat: events.Rested | None = None
         self._samples = self._flat_samples = 0
         self._sampled_s: float | None = None
         self._ticked_s: float | None = None
         self._away_s = 0.0
 
     @property
-    def checked(self) -> Checked | None:
+    def checked(self) -> events.Checked | None:
         """Result of the verification; None where there was none."""
         return self._step.checked
 
-    def handle(self, event: Event) -> list[Output]:
+    def handle(self, event: events.Event) -> list[events.Output]:
         """Process one event; return the outputs.
 
         Raises
@@ -99,47 +75,50 @@ class Machine:
         outputs = [*self._react(event, begins), *(self._begin() if begins else [])]
         return [speak_of(output, self._plan.board) for output in outputs]
 
-    def _react(self, event: Event, begins: bool) -> Sequence[Output]:
+    def _react(self, event: events.Event, begins: bool) -> Sequence[events.Output]:
         """Return the outputs for an event, which begins the state that it led to, or not."""
         match event:
-            case Measured(samples):
+            case events.Measured(samples):
                 return self._measured(samples) if len(samples) else []
-            case Tick(t_s):
+            case events.Tick(t_s):
                 return self._tick(t_s)
-            case Connected(sensor):
+            case events.Connected(sensor):
                 self._aim, self._watch = select_aim(self._plan.target, sensor), MotionWatch(sensor)
                 self._plan = replace(self._plan, board=self._plan.board or usual_board(sensor.origin))
-            case Rested(still_s):
+            case events.Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples
                 if self._watch is not None:
                     self._watch.flat()
-                return [Decision(f"flat and still for {still_s:.0f} s: done")]
-            case Turned(why) | Finished(why):
-                return [Decision(why)]
-            case Enough() if self.state in MEASURING:
+                return [events.Decision(f"flat and still for {still_s:.0f} s: done")]
+            case events.Turned(why) | events.Finished(why):
+                return [events.Decision(why)]
+            case events.Enough() if self.state in MEASURING:
                 return self._dispatch(self._step.enough())
-            case Redo() if begins:
+            case events.Redo() if begins:
                 # Its samples are dropped, those of the flat rest are kept.
-                again = Decision("the turning starts again; what was turned so far is discarded")
-                return [again, Forget(self._flat_samples, self._samples)]
-            case Resumed():
+                again = events.Decision("the turning starts again; what was turned so far is discarded")
+                return [again, events.Forget(self._flat_samples, self._samples)]
+            case events.Resumed():
                 self._sampled_s = self._ticked_s = None
-                return [Decision("the session resumes where it stopped"), *([] if begins else self._step.resumed())]
-            case Learnt() | Tried() | Checked():
+                return [
+                    events.Decision("the session resumes where it stopped"),
+                    *([] if begins else self._step.resumed()),
+                ]
+            case events.Learnt() | events.Tried() | events.Checked():
                 return self._dispatch(self._step.answer(event))
-            case Stopped(why, remedy):
-                return [Decision(why, remedy)]
-            case Abort():
-                return [Decision(ABORTED, START_AGAIN)]
-            case SourceEnded(why):
+            case events.Stopped(why, remedy):
+                return [events.Decision(why, remedy)]
+            case events.Abort():
+                return [events.Decision(ABORTED, START_AGAIN)]
+            case events.SourceEnded(why):
                 return [self._ended(why)]
-            case Fitted(verdict):
-                return [Decision(f"the calibration is {verdict}")]
-            case Written(names):
-                return [Decision(f"wrote {', '.join(names)}")]
+            case events.Fitted(verdict):
+                return [events.Decision(f"the calibration is {verdict}")]
+            case events.Written(names):
+                return [events.Decision(f"wrote {', '.join(names)}")]
         return []
 
-    def _begin(self) -> Sequence[Output]:
+    def _begin(self) -> Sequence[events.Output]:
         """Begin the step of the present state, if it has one; return the first outputs."""
         match self.state:
             case State.LAY_FLAT:
@@ -159,7 +138,7 @@ class Machine:
                 return []
         return self._step.begin()
 
-    def _measured(self, samples: Samples) -> list[Output]:
+    def _measured(self, samples: Samples) -> list[events.Output]:
         # After a long silence the person starts the present prompt again, and its time limit starts again, too.
         first_s, last_s = float(samples.t[0]), float(samples.t[-1])
         before_s = first_s if self._sampled_s is None else self._sampled_s
@@ -172,17 +151,17 @@ class Machine:
         meters = self._watch.add(samples, self._step.wanted) if self._watch else []
         return [*again, *meters, *self._dispatch(self._step.add(samples))]
 
-    def _dispatch(self, items: Sequence[Output | End]) -> list[Output]:
+    def _dispatch(self, items: events.Outputs) -> list[events.Output]:
         """Return the outputs of a step; its events change the state, and add their outputs."""
-        outputs: list[Output] = []
+        outputs: list[events.Output] = []
         for item in items:
-            if isinstance(item, End):
+            if isinstance(item, events.End):
                 outputs += self.handle(item)
             else:
                 outputs.append(item)
         return outputs
 
-    def _tick(self, t_s: float) -> list[Output]:
+    def _tick(self, t_s: float) -> list[events.Output]:
         if self._sampled_s is None:
             self._sampled_s = t_s
         if self._ticked_s is not None:
@@ -193,14 +172,14 @@ class Machine:
             return []
         why = f"the sensor sent no samples for {SILENT_S:.0f} s"
         if self._flat:
-            return self.handle(Finished(why))
-        return self.handle(Stopped(why, "check the wiring, then start again"))
+            return self.handle(events.Finished(why))
+        return self.handle(events.Stopped(why, "check the wiring, then start again"))
 
-    def _ended(self, why: str | None) -> Decision:
+    def _ended(self, why: str | None) -> events.Decision:
         if self.state is State.CALIBRATE:
             what = f"the source failed while the board was turned ({why})" if why else "the source ended"
-            return Decision(f"{what}; {'checking' if self._checking else 'calibrating'} with the data so far")
+            return events.Decision(f"{what}; {'checking' if self._checking else 'calibrating'} with the data so far")
         if why:
-            return Decision(why)
+            return events.Decision(why)
         remedy = "record it again: flat and still first, then turned through varied orientations"
-        return Decision("the source ended before the board was turned", remedy)
+        return events.Decision("the source ended before the board was turned", remedy)

@@ -10,29 +10,11 @@ import numpy as np
 
 from ..data import Samples, Vector
 from ..rests.windows import Windows
+from . import events
 from .aims import SIDES, VERIFY_PLACED, Aim
 from .coverage import Coverage
-from .events import (
-    Checked,
-    Direction,
-    FitKind,
-    Knowledge,
-    Learnt,
-    Output,
-    Progress,
-    Prompt,
-    PromptKind,
-    RequestFit,
-    Rested,
-    Seen,
-    Tried,
-    Turned,
-    Use,
-    down_of,
-    triple,
-)
 from .plan import Plan
-from .step import ENOUGH, HOLD_S, PATIENCE_S, PLACED_S, WAIT_S, End, Pause, PoseStep, classify_use, countdown, held
+from .step import ENOUGH, HOLD_S, PATIENCE_S, PLACED_S, WAIT_S, Pause, PoseStep
 
 PASS_WINDOW_S = 0.1
 # Least length of a pause. A fit uses shorter rests, too.
@@ -63,7 +45,7 @@ class Rotate(PoseStep):
     plan : with until_end, nothing is asked for. coverage : empty; the orientations of the turning are added to it.
     """
 
-    def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
+    def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         asks = not (plan.tilt_only or plan.until_end)
         super().__init__(flat, plan, placed_s=PLACED_S if asks and aim.sides else None)
         self._aim, self._coverage = aim, coverage
@@ -72,15 +54,15 @@ class Rotate(PoseStep):
         self._coverage.paused.add(acc)
         self._coverage.passed.add(acc)
         self._coverage.rested.add(acc)
-        self._knowledge: Knowledge | None = None
+        self._knowledge: events.Knowledge | None = None
         self._requested = False
         self._advised_run = -1
         self._known_number = 0
-        self._held: tuple[Pause, Use] | None = None
+        self._held: tuple[Pause, events.Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
         self.prompt = self._prompt_for(self._farthest(self._coverage.paused))
 
-    def add(self, samples: Samples) -> list[Output | Turned]:
+    def add(self, samples: Samples) -> events.Outputs:
         """Return the outputs for `samples`; Turned comes last and ends the step."""
         if self._begun_s is None:
             self._begun_s = self._new_s = self._known_s = self._reported_s = self._prompted_s = float(samples.t[0])
@@ -88,7 +70,7 @@ class Rotate(PoseStep):
             steady = window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2
             if steady and self._coverage.passed.add(window.acc):
                 self._new_s = window.end_s
-        outputs: list[Output | Turned] = []
+        outputs: events.Outputs = []
         for pause in self._pauses.add(samples):
             outputs += self._hold(pause)
         self._t_s = t_s = float(samples.t[-1])
@@ -96,26 +78,26 @@ class Rotate(PoseStep):
         turned = None if self._plan.until_end else self._time_out(t_s)
         return [*outputs, turned] if turned else outputs
 
-    def answer(self, event: Learnt | Tried | Checked) -> list[Output | Turned]:
+    def answer(self, event: events.Answer) -> events.Outputs:
         """Return the outputs for new uncertainties; Turned comes last and ends the step."""
-        return self._learn(event.knowledge, event.advice) if isinstance(event, Learnt) else []
+        return self._learn(event.knowledge, event.advice) if isinstance(event, events.Learnt) else []
 
-    def enough(self) -> Sequence[End]:
+    def enough(self) -> events.Outputs:
         """See Step; the turning alone is verified, unless the source is recorded until its end."""
-        return super().enough() if self._plan.until_end else [Turned(ENOUGH)]
+        return super().enough() if self._plan.until_end else [events.Turned(ENOUGH)]
 
-    def _learn(self, knowledge: Knowledge, advice: bool) -> list[Output | Turned]:
+    def _learn(self, knowledge: events.Knowledge, advice: bool) -> events.Outputs:
         self._knowledge, self._requested, self._known_number = knowledge, False, self._coverage.number
-        outputs: list[Output | Turned] = [knowledge]
+        outputs: events.Outputs = [knowledge]
         if self._plan.until_end:
             return outputs
         if advice and self._held is not None:
             # The output goes out now, so it has the time of the last samples and not that of the pause.
-            outputs.append(replace(held(*self._held), t_s=self._t_s))
+            outputs.append(replace(self._held[0].held(self._held[1]), t_s=self._t_s))
         if self._is_enough():
             # Tilts leave some parameters at their prior: the target does not apply to them.
             what = "enough tilts seen" if self._plan.tilt_only else "target reached"
-            return [*outputs, Turned(f"{what}: {knowledge.words}")]
+            return [*outputs, events.Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._prompted_s = knowledge.t_s
             side = self._next_side()
@@ -135,7 +117,7 @@ class Rotate(PoseStep):
         if not self._coverage.placed:
             return None
         left = (side for side in SIDES if not self._coverage.paused.near(-side))
-        return next((side for side in left if triple(side) != self.prompt.down), None)
+        return next((side for side in left if events.triple(side) != self.prompt.down), None)
 
     @property
     def _least(self) -> int:
@@ -144,53 +126,53 @@ class Rotate(PoseStep):
         return TILTS if self._plan.tilt_only else self._aim.least
 
     @property
-    def wanted(self) -> Direction | None:
+    def wanted(self) -> events.Direction | None:
         """Unit vector that is to point down; where nothing is asked for, the one that would help most."""
         if self.prompt.down is not None or self._knowledge is None:
             return self.prompt.down
         return self._knowledge.down
 
-    def resumed(self) -> Sequence[Output]:
+    def resumed(self) -> Sequence[events.Output]:
         """See Step."""
         self._requested = False
         prompt = super().resumed()
         return [] if self._plan.until_end else prompt
 
-    def _hold(self, pause: Pause) -> list[Output | Turned]:
+    def _hold(self, pause: Pause) -> events.Outputs:
         # A pause that the coverage has counted is not new any more: its use was decided before.
         if self._held is None or self._held[0].run != pause.run or pause.seconds < PAUSE_S - 1e-6:
-            self._held = pause, classify_use(pause.acc, self.prompt.down, not self._coverage.paused.near(pause.acc))
+            self._held = pause, pause.use(self.prompt.down, not self._coverage.paused.near(pause.acc))
         # The advice ends the countdown of its pause, also where a bump had delayed it.
         advised = pause.run <= self._advised_run
-        outputs: list[Output | Turned] = [*countdown(pause, self._held[1])] if self._requested or not advised else []
+        outputs: events.Outputs = [*pause.counting(self._held[1])] if self._requested or not advised else []
         if pause.seconds >= REST_S - 1e-6:
             self._coverage.rested.add(pause.acc)
         if pause.seconds >= PAUSE_S - 1e-6 and self._coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
-            outputs.append(Seen(pause.t_s, len(self._coverage.paused), down_of(pause.acc), paused=True))
+            outputs.append(events.Seen(pause.t_s, len(self._coverage.paused), events.down_of(pause.acc), paused=True))
         if self._plan.until_end or self._requested or advised:
             return outputs
         if pause.seconds >= pause.hold_s - WAIT_S - 1e-6:
             first = len(self._coverage.paused) <= 2  # the flat rest, and this one
             self._coverage.placed = pause.hold_s > HOLD_S and (self._coverage.placed or first)
             self._advised_run = pause.run
-            outputs.append(self._request(FitKind.ADVISE, pause.t_s))
+            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s))
         return outputs
 
-    def _request(self, kind: FitKind, t_s: float) -> RequestFit:
+    def _request(self, kind: events.FitKind, t_s: float) -> events.RequestFit:
         self._requested, self._known_s = True, t_s
-        return RequestFit(kind, WAIT_S)
+        return events.RequestFit(kind, WAIT_S)
 
-    def _periodic(self, t_s: float) -> list[Output]:
+    def _periodic(self, t_s: float) -> list[events.Output]:
         """Return the request of the next fit, the progress and the reminder, each if its time has come."""
-        outputs: list[Output] = []
+        outputs: list[events.Output] = []
         new = self._coverage.number > self._known_number and not self._plan.until_end
         if not self._requested and t_s - self._known_s >= (KNOW_EVERY_S if new else SHOW_EVERY_S):
-            outputs.append(self._request(FitKind.KNOW, t_s))
+            outputs.append(self._request(events.FitKind.KNOW, t_s))
         if t_s - self._reported_s >= REPORT_EVERY_S:
             self._reported_s = t_s
             done = min(self._coverage.number, self._least)
-            outputs.append(Progress(t_s, done, self._least, self._count(), self._estimate_left_s(t_s)))
+            outputs.append(events.Progress(t_s, done, self._least, self._count(), self._estimate_left_s(t_s)))
         if not self._plan.until_end:
             outputs += self._remind(t_s, self._new_s, "no new orientation for a while")
         return outputs
@@ -237,16 +219,16 @@ class Rotate(PoseStep):
             return self._coverage.number >= self._least
         return self._coverage.varied and self._is_certain()
 
-    def _time_out(self, t_s: float) -> Turned | None:
+    def _time_out(self, t_s: float) -> events.Turned | None:
         known = f": {self._knowledge.words}" if self._knowledge else ""
         if t_s - self._new_s >= PATIENCE_S:
-            return Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self._coverage.number} seen{known}")
+            return events.Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self._coverage.number} seen{known}")
         if self._begun_s is not None and t_s - self._begun_s >= self._aim.longest_s:
-            return Turned(f"time limit of {self._aim.longest_s:.0f} s for turning reached{known}")
+            return events.Turned(f"time limit of {self._aim.longest_s:.0f} s for turning reached{known}")
         return None
 
-    def _prompt_for(self, down: Vector) -> Prompt:
+    def _prompt_for(self, down: Vector) -> events.Prompt:
         if self._plan.until_end:
             text = "Turn the board through many different orientations, tilted ones too, and hold each for 2 s."
-            return Prompt(PromptKind.ROTATE, text)
-        return self._ask_for(PromptKind.ROTATE, down, "Turn the board: {}, then hold it still.")
+            return events.Prompt(events.PromptKind.ROTATE, text)
+        return self._ask_for(events.PromptKind.ROTATE, down, "Turn the board: {}, then hold it still.")

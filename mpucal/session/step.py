@@ -13,32 +13,12 @@ from ..data import Samples, Vector
 from ..rests.limits import HAND, UNTOUCHED
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
+from . import events
 from .aims import directions
 from .boards import describe, describe_tilt
 from .coverage import DISTINCT_RAD, Directions
-from .events import (
-    Caution,
-    Checked,
-    Countdown,
-    Direction,
-    Finished,
-    Held,
-    Learnt,
-    Output,
-    Prompt,
-    PromptKind,
-    Rested,
-    Stopped,
-    Tried,
-    Turned,
-    Use,
-    down_of,
-    triple,
-)
 from .plan import Plan
 
-# Events that end a step; such an event comes last in its outputs.
-End = Rested | Turned | Finished | Stopped
 ENOUGH = "you chose to go on"
 # Least time between two cautions of one kind.
 SAY_AGAIN_S = 5.0
@@ -52,31 +32,31 @@ class Step:
     prompt : the last one. checked : result of the verification; None before it is known, or if the person skipped it.
     """
 
-    prompt = Prompt(PromptKind.REST, "")
-    checked: Checked | None = None
+    prompt = events.Prompt(events.PromptKind.REST, "")
+    checked: events.Checked | None = None
 
     @property
-    def wanted(self) -> Direction | None:
+    def wanted(self) -> events.Direction | None:
         """Unit vector that is to point down; None if no orientation is asked for."""
         return self.prompt.down
 
-    def begin(self) -> Sequence[Output]:
+    def begin(self) -> Sequence[events.Output]:
         """Return the first outputs."""
         return [self.prompt]
 
-    def add(self, samples: Samples) -> Sequence[Output | End]:
+    def add(self, samples: Samples) -> events.Outputs:
         """Return the outputs for `samples`."""
         raise NotImplementedError
 
-    def answer(self, event: Learnt | Tried | Checked) -> Sequence[Output | End]:
+    def answer(self, event: events.Answer) -> events.Outputs:
         """Return the outputs for the answer of a fit; none if another step requested it."""
         return []
 
-    def enough(self) -> Sequence[End]:
+    def enough(self) -> events.Outputs:
         """Return the end of the step at the person's wish, if there is enough to go on with."""
-        return [Finished(ENOUGH)]
+        return [events.Finished(ENOUGH)]
 
-    def resumed(self) -> Sequence[Output]:
+    def resumed(self) -> Sequence[events.Output]:
         """Start again after a gap, in which the board may have been moved."""
         return [self.prompt]
 
@@ -97,9 +77,9 @@ WAIT_S = 0.5
 # A board this near to the wanted orientation is in it; a person who holds it this near meant that orientation.
 WANTED_RAD, MEANT_RAD = math.radians(15.0), math.radians(25.0)
 USE_TEXTS = {
-    Use.TAKEN: "taken",
-    Use.USEFUL: "not the one asked for, but useful",
-    Use.SEEN: "seen already",
+    events.Use.TAKEN: "taken",
+    events.Use.USEFUL: "not the one asked for, but useful",
+    events.Use.SEEN: "seen already",
 }
 
 
@@ -118,31 +98,29 @@ class Pause:
     acc: Vector
     run: int
     hold_s: float = HOLD_S
-    countdown: Countdown | None = None
+    countdown: events.Countdown | None = None
 
+    def is_near(self, wanted: events.Direction | None, near_rad: float) -> bool:
+        """Return True if the board is within `near_rad` of the wanted orientation."""
+        if wanted is None:
+            return False
+        return math.acos(max(min(float(np.dot(events.down_of(self.acc), wanted)), 1.0), -1.0)) <= near_rad
 
-def is_near(acc: Vector, wanted: Direction | None, near_rad: float) -> bool:
-    """Return True if the mean acceleration (3,) of a pause is within `near_rad` of the wanted orientation."""
-    return wanted is not None and math.acos(max(min(float(np.dot(down_of(acc), wanted)), 1.0), -1.0)) <= near_rad
+    def use(self, wanted: events.Direction | None, new: bool) -> events.Use:
+        """Return the use of the pause, in an orientation that is `new` or not."""
+        if self.is_near(wanted, WANTED_RAD):
+            return events.Use.TAKEN
+        return events.Use.USEFUL if new else events.Use.SEEN
 
+    def held(self, use: events.Use) -> events.Held:
+        """Return the output for a pause that was long enough."""
+        return events.Held(self.t_s, use, events.down_of(self.acc), USE_TEXTS[use])
 
-def classify_use(acc: Vector, wanted: Direction | None, new: bool) -> Use:
-    """Return the use of a pause with the mean acceleration `acc` (3,), in an orientation that is `new` or not."""
-    if is_near(acc, wanted, WANTED_RAD):
-        return Use.TAKEN
-    return Use.USEFUL if new else Use.SEEN
-
-
-def held(pause: Pause, use: Use) -> Held:
-    """Return the output for a pause that was long enough."""
-    return Held(pause.t_s, use, down_of(pause.acc), USE_TEXTS[use])
-
-
-def countdown(pause: Pause, use: Use) -> list[Countdown]:
-    """Return the countdown of a pause, if its orientation is of use."""
-    if pause.countdown is None or use is Use.SEEN:
-        return []
-    return [replace(pause.countdown, elsewhere=use is Use.USEFUL)]
+    def counting(self, use: events.Use) -> list[events.Countdown]:
+        """Return the countdown, if the orientation is of use."""
+        if self.countdown is None or use is events.Use.SEEN:
+            return []
+        return [replace(self.countdown, elsewhere=use is events.Use.USEFUL)]
 
 
 class PoseStep(Step):
@@ -153,14 +131,14 @@ class PoseStep(Step):
     flat : the flat rest. plan : settings of the session. hold_s, placed_s : see PauseDetector.
     """
 
-    def __init__(self, flat: Rested, plan: Plan, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+    def __init__(self, flat: events.Rested, plan: Plan, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
         self._plan = plan
         self._pauses = PauseDetector(flat, hold_s, placed_s)
-        self._directions = directions(down_of(np.array(flat.acc)), plan.tilt_only)
+        self._directions = directions(events.down_of(np.array(flat.acc)), plan.tilt_only)
         self._begun_s: float | None = None
         self._prompted_s = 0.0
 
-    def resumed(self) -> Sequence[Output]:
+    def resumed(self) -> Sequence[events.Output]:
         """See Step."""
         self._begun_s = None
         self._pauses.forget()
@@ -173,17 +151,17 @@ class PoseStep(Step):
             others = others[others @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)]
         return seen.farthest_down(others)
 
-    def _ask_for(self, kind: PromptKind, down: Vector, text: str) -> Prompt:
+    def _ask_for(self, kind: events.PromptKind, down: Vector, text: str) -> events.Prompt:
         """Return the prompt to point `down` (3,) down; the words for the orientation replace {} in `text`."""
-        words = (describe_tilt if self._plan.tilt_only else describe)(triple(down), self._plan.board)
-        return Prompt(kind, text.format(words), triple(down))
+        words = (describe_tilt if self._plan.tilt_only else describe)(events.triple(down), self._plan.board)
+        return events.Prompt(kind, text.format(words), events.triple(down))
 
-    def _remind(self, t_s: float, since_s: float, what: str) -> list[Output]:
+    def _remind(self, t_s: float, since_s: float, what: str) -> list[events.Output]:
         """Return the prompt as a caution, if it is REMIND_S since the last one and since `since_s`."""
         if t_s - max(since_s, self._prompted_s) < REMIND_S:
             return []
         self._prompted_s = t_s
-        return [Caution(t_s, "not_turned", what, self.prompt.text)]
+        return [events.Caution(t_s, "not_turned", what, self.prompt.text)]
 
 
 class PauseDetector:
@@ -195,7 +173,7 @@ class PauseDetector:
     placed_s : the same where nobody touches the board; None: `hold_s`.
     """
 
-    def __init__(self, flat: Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+    def __init__(self, flat: events.Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
         self._hold_s, self._placed_s = hold_s, placed_s or hold_s
         silent = np.zeros(3)
         self._hands = Detector(UNTOUCHED, (silent, silent), bias=np.array(flat.gyr))
@@ -224,7 +202,7 @@ class PauseDetector:
                 continue
             hold_s, remaining = self._hold_s if any(self._touched) else self._placed_s, None
             if sight.seconds < hold_s + HAND_WINDOW_S - 1e-6:
-                remaining = Countdown(window.end_s, max(hold_s - sight.seconds, 0.0), hold_s, paused=False)
+                remaining = events.Countdown(window.end_s, max(hold_s - sight.seconds, 0.0), hold_s, paused=False)
             acc = np.asarray(sight.acc)
             pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, hold_s, remaining))
         return pauses

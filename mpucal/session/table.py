@@ -6,26 +6,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from types import MappingProxyType
 
-from .events import (
-    Abort,
-    Checked,
-    Connected,
-    Enough,
-    Event,
-    Finished,
-    Fitted,
-    Learnt,
-    Measured,
-    Redo,
-    Rested,
-    Resumed,
-    SourceEnded,
-    Stopped,
-    Tick,
-    Tried,
-    Turned,
-    Written,
-)
+from . import events
 
 
 class State(StrEnum):
@@ -44,46 +25,50 @@ class State(StrEnum):
 # States that need samples.
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
 # Events that a state takes and that leave it as it is.
-_KEYS = (Enough, Redo)
-_SAMPLES = (Measured, Tick, Resumed, Enough)
-TAKEN: Mapping[State, tuple[type[Event], ...]] = MappingProxyType(
+_KEYS = (events.Enough, events.Redo)
+_SAMPLES = (events.Measured, events.Tick, events.Resumed, events.Enough)
+TAKEN: Mapping[State, tuple[type[events.Event], ...]] = MappingProxyType(
     {
         State.CONNECT: _KEYS,
-        State.LAY_FLAT: (*_SAMPLES, Redo),
-        State.ROTATE: (*_SAMPLES, Learnt),
-        State.VERIFY: (*_SAMPLES, Learnt, Tried, Checked),
+        State.LAY_FLAT: (*_SAMPLES, events.Redo),
+        State.ROTATE: (*_SAMPLES, events.Learnt),
+        State.VERIFY: (*_SAMPLES, events.Learnt, events.Tried, events.Checked),
         State.CALIBRATE: _KEYS,
         State.WRITE: _KEYS,
     }
 )
 # Events that begin a state, which may be the present one. An event that neither table names is illegal in that state.
-TRANSITIONS: Mapping[State, Mapping[type[Event], State]] = MappingProxyType(
+TRANSITIONS: Mapping[State, Mapping[type[events.Event], State]] = MappingProxyType(
     {
-        State.CONNECT: {Connected: State.LAY_FLAT, SourceEnded: State.ABORTED, Abort: State.ABORTED},
+        State.CONNECT: {
+            events.Connected: State.LAY_FLAT,
+            events.SourceEnded: State.ABORTED,
+            events.Abort: State.ABORTED,
+        },
         State.LAY_FLAT: {
-            Rested: State.ROTATE,
-            Stopped: State.ABORTED,
-            SourceEnded: State.ABORTED,
-            Abort: State.ABORTED,
+            events.Rested: State.ROTATE,
+            events.Stopped: State.ABORTED,
+            events.SourceEnded: State.ABORTED,
+            events.Abort: State.ABORTED,
         },
         State.ROTATE: {
-            Redo: State.ROTATE,
-            Turned: State.VERIFY,
-            Finished: State.CALIBRATE,
-            SourceEnded: State.CALIBRATE,
-            Abort: State.ABORTED,
+            events.Redo: State.ROTATE,
+            events.Turned: State.VERIFY,
+            events.Finished: State.CALIBRATE,
+            events.SourceEnded: State.CALIBRATE,
+            events.Abort: State.ABORTED,
         },
         State.VERIFY: {
-            Redo: State.ROTATE,
-            Finished: State.CALIBRATE,
-            SourceEnded: State.CALIBRATE,
-            Abort: State.ABORTED,
+            events.Redo: State.ROTATE,
+            events.Finished: State.CALIBRATE,
+            events.SourceEnded: State.CALIBRATE,
+            events.Abort: State.ABORTED,
         },
-        State.CALIBRATE: {Fitted: State.WRITE, Abort: State.ABORTED},
-        State.WRITE: {Written: State.DONE, Abort: State.ABORTED},
+        State.CALIBRATE: {events.Fitted: State.WRITE, events.Abort: State.ABORTED},
+        State.WRITE: {events.Written: State.DONE, events.Abort: State.ABORTED},
         State.DONE: {},
         # Resumed after a board that was never still, for example: there is no flat rest yet.
-        State.ABORTED: {Resumed: State.LAY_FLAT},
+        State.ABORTED: {events.Resumed: State.LAY_FLAT},
     }
 )
 
@@ -92,7 +77,7 @@ class IllegalEvent(Exception):  # noqa: N818 - named by what went wrong
     """Event that is not legal in the machine's state: a programming error of its owner."""
 
 
-def next_state(state: State, event: Event) -> tuple[State, bool]:
+def next_state(state: State, event: events.Event) -> tuple[State, bool]:
     """Return the state after an event, and True if the event begins it.
 
     Raises

@@ -7,39 +7,11 @@ import numpy as np
 from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
+from . import events
 from .aims import VERIFY_PLACED, Aim, unseen_rad
 from .coverage import SAME_RAD, Coverage, Directions
-from .events import (
-    Caution,
-    Checked,
-    Finished,
-    FitKind,
-    Learnt,
-    Output,
-    Progress,
-    Prompt,
-    PromptKind,
-    RequestFit,
-    Rested,
-    Tried,
-    Use,
-)
 from .plan import Plan
-from .step import (
-    ENOUGH,
-    HOLD_S,
-    MEANT_RAD,
-    PATIENCE_S,
-    USE_TEXTS,
-    VERIFY_PATIENCE_S,
-    WAIT_S,
-    Pause,
-    PoseStep,
-    classify_use,
-    countdown,
-    held,
-    is_near,
-)
+from .step import ENOUGH, HOLD_S, MEANT_RAD, PATIENCE_S, USE_TEXTS, VERIFY_PATIENCE_S, WAIT_S, Pause, PoseStep
 
 
 class NewPoses(PoseStep):
@@ -53,7 +25,7 @@ class NewPoses(PoseStep):
     """
 
     def __init__(
-        self, flat: Rested, plan: Plan, of: int, seen: Directions, apart_rad: float, hold_s: float = HOLD_S
+        self, flat: events.Rested, plan: Plan, of: int, seen: Directions, apart_rad: float, hold_s: float = HOLD_S
     ) -> None:
         super().__init__(flat, plan, hold_s)
         self._of, self._seen, self._apart_rad, self._hold_s = of, seen, apart_rad, hold_s
@@ -62,45 +34,45 @@ class NewPoses(PoseStep):
         self._closed = False
         self.prompt = self._next()
 
-    def _take(self, samples: Samples) -> list[Output]:
+    def _take(self, samples: Samples) -> list[events.Output]:
         """Return the outputs for the pauses that `samples` show."""
-        outputs: list[Output] = []
+        outputs: list[events.Output] = []
         for pause in self._pauses.add(samples):
             if self._closed:
                 break
             new = not self._seen.near(pause.acc, self._apart_rad)
             # An orientation that was seen is of no use, even if it is the wanted one.
-            use = classify_use(pause.acc, self.prompt.down, new) if new else Use.SEEN
-            outputs += countdown(pause, use)
+            use = pause.use(self.prompt.down, new) if new else events.Use.SEEN
+            outputs += pause.counting(use)
             if pause.seconds >= self._hold_s - 1e-6:
                 self._pauses.leave(pause.run)
                 self._prompted_s = pause.t_s
-                outputs += [held(pause, use), *(self._count(pause, use) if new else self._seen_already(pause))]
+                outputs += [pause.held(use), *(self._count(pause, use) if new else self._seen_already(pause))]
         return outputs
 
-    def _count(self, pause: Pause, use: Use) -> list[Output]:
+    def _count(self, pause: Pause, use: events.Use) -> list[events.Output]:
         """Count a new orientation; return the progress, and the next prompt where more are asked for."""
         self._seen.add(pause.acc)
         self._number += 1
         left_s = (self._of - self._number) * (pause.t_s - (self._begun_s or pause.t_s))
         self._begun_s = pause.t_s
-        text = f"held {self._number} of {self._of}" + ("" if use is Use.TAKEN else f": {USE_TEXTS[use]}")
+        text = f"held {self._number} of {self._of}" + ("" if use is events.Use.TAKEN else f": {USE_TEXTS[use]}")
         self._closed = self._number == self._of
-        outputs: list[Output] = [Progress(pause.t_s, self._number, self._of, text, left_s or None)]
+        outputs: list[events.Output] = [events.Progress(pause.t_s, self._number, self._of, text, left_s or None)]
         if not self._closed:
             self.prompt = self._next()
             outputs.append(self.prompt)
         return outputs
 
-    def _seen_already(self, pause: Pause) -> list[Output]:
+    def _seen_already(self, pause: Pause) -> list[events.Output]:
         """Return a caution; if the requested orientation was already seen, request a different one."""
-        meant = is_near(pause.acc, self.prompt.down, MEANT_RAD)
+        meant = pause.is_near(self.prompt.down, MEANT_RAD)
         if meant:
             self.prompt = self._next()
-        caution = Caution(pause.t_s, "seen_already", "this orientation was seen already", self.prompt.text)
+        caution = events.Caution(pause.t_s, "seen_already", "this orientation was seen already", self.prompt.text)
         return [caution, self.prompt] if meant else [caution]
 
-    def _next(self) -> Prompt:
+    def _next(self) -> events.Prompt:
         """Return a prompt for the next orientation."""
         raise NotImplementedError
 
@@ -122,18 +94,18 @@ class Verify(NewPoses):
     plan : a person who can press keys is offered to turn the board again where that may help.
     """
 
-    def __init__(self, flat: Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
+    def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         of = VERIFY_PLACED if coverage.placed else aim.verify
         super().__init__(flat, plan, of, coverage.rested, BENT * unseen_rad(plan.tilt_only))
-        self._refusal: Finished | None = None
+        self._refusal: events.Finished | None = None
         self._more = MOST_MORE
         self._now_s = 0.0
 
-    def begin(self) -> list[Output]:
+    def begin(self) -> list[events.Output]:
         """See Step."""
-        return [RequestFit(FitKind.TRY, TRY_WAIT_S), self.prompt]
+        return [events.RequestFit(events.FitKind.TRY, TRY_WAIT_S), self.prompt]
 
-    def add(self, samples: Samples) -> list[Output | Finished]:
+    def add(self, samples: Samples) -> events.Outputs:
         """Return the outputs for `samples`; Finished comes last and ends the step."""
         t_s = self._now_s = float(samples.t[-1])
         if self._begun_s is None:
@@ -141,7 +113,7 @@ class Verify(NewPoses):
         if self._refusal is not None:
             return [self._refusal] if t_s - self._begun_s >= PATIENCE_S else []
         waits = self._closed
-        outputs: list[Output | Finished] = [*self._take(samples)]
+        outputs: events.Outputs = [*self._take(samples)]
         if waits:
             return outputs
         if not self._closed:
@@ -150,32 +122,32 @@ class Verify(NewPoses):
                 return outputs
             self._closed = self._number > 0
         if self._closed:
-            return [*outputs, RequestFit(FitKind.CHECK, WAIT_S, self._of)]
+            return [*outputs, events.RequestFit(events.FitKind.CHECK, WAIT_S, self._of)]
         not_shown = reason("verification_failed", "not_shown")
-        self.checked = Checked((), None, not_shown)
-        return [*outputs, Finished(not_shown.what)]
+        self.checked = events.Checked((), None, not_shown)
+        return [*outputs, events.Finished(not_shown.what)]
 
-    def answer(self, event: Learnt | Tried | Checked) -> list[Output | Finished]:
+    def answer(self, event: events.Answer) -> events.Outputs:
         """Take the first calibration, or its comparison with the new orientations; the rotation's come too late."""
         match event:
-            case Tried():
+            case events.Tried():
                 return self._tried(event)
-            case Checked():
+            case events.Checked():
                 return self._check(event)
         return []
 
-    def enough(self) -> list[Finished]:
+    def enough(self) -> events.Outputs:
         """See Step."""
-        return [self._refusal or Finished(f"{ENOUGH}: not verified")]
+        return [self._refusal or events.Finished(f"{ENOUGH}: not verified")]
 
-    def _tried(self, tried: Tried) -> list[Output | Finished]:
+    def _tried(self, tried: events.Tried) -> events.Outputs:
         """Take the first calibration; one that is refused needs no verification."""
         if tried.verdict != REFUSED or tried.reason is None:
             return []
-        self.checked = Checked((), False, tried.reason)
-        return self._refused(Finished(f"not verified: {tried.reason.message}"), tried.reason)
+        self.checked = events.Checked((), False, tried.reason)
+        return self._refused(events.Finished(f"not verified: {tried.reason.message}"), tried.reason)
 
-    def _check(self, checked: Checked) -> list[Output | Finished]:
+    def _check(self, checked: events.Checked) -> events.Outputs:
         """Take the comparison with the new orientations."""
         if checked.agrees is None and self._number >= self._of and self._more:
             # The fit has seen one of these orientations after all: another one replaces it.
@@ -185,24 +157,24 @@ class Verify(NewPoses):
             return [self.prompt]
         self.checked = checked
         if checked.reason is None:
-            agreement = Finished("verified: the new orientations agree with the predicted uncertainty")
+            agreement = events.Finished("verified: the new orientations agree with the predicted uncertainty")
             return [*checked.verifications, agreement]
-        return [*checked.verifications, *self._refused(Finished(checked.reason.what), checked.reason)]
+        return [*checked.verifications, *self._refused(events.Finished(checked.reason.what), checked.reason)]
 
-    def _refused(self, refusal: Finished, against: Reason) -> list[Output | Finished]:
+    def _refused(self, refusal: events.Finished, against: Reason) -> events.Outputs:
         """Return the refusal, or offer to turn the board again, where that may help and somebody can answer."""
         if not self._plan.attended or not KINDS[against.code].turn_again:
             return [refusal]
         self._refusal, self._begun_s = refusal, None
-        self.prompt = Prompt(
-            PromptKind.AGAIN, "Turn the board again from the start (r), or end with the refusal (Enter)?"
+        self.prompt = events.Prompt(
+            events.PromptKind.AGAIN, "Turn the board again from the start (r), or end with the refusal (Enter)?"
         )
-        return [self.prompt, Caution(self._now_s, "refused", against.what, against.remedy)]
+        return [self.prompt, events.Caution(self._now_s, "refused", against.what, against.remedy)]
 
-    def _next(self) -> Prompt:
+    def _next(self) -> events.Prompt:
         """See NewPoses; the direction farthest from all rests is asked for."""
         text = f"Verification {self._number + 1} of {self._of}: {{}}, then hold it still."
-        return self._ask_for(PromptKind.VERIFY, self._farthest(self._seen), text)
+        return self._ask_for(events.PromptKind.VERIFY, self._farthest(self._seen), text)
 
 
 ORIENTATIONS = 3
@@ -215,26 +187,26 @@ OTHER_WAY = 0.1
 class CheckPoses(NewPoses):
     """Step that asks for the orientations that would show most, and takes any new one."""
 
-    def __init__(self, flat: Rested, plan: Plan) -> None:
+    def __init__(self, flat: events.Rested, plan: Plan) -> None:
         seen = Directions(SAME_RAD)
         seen.add(np.array(flat.acc))
         super().__init__(flat, plan, ORIENTATIONS, seen, unseen_rad(plan.tilt_only), CHECK_HOLD_S)
 
-    def add(self, samples: Samples) -> list[Output | Finished]:
+    def add(self, samples: Samples) -> events.Outputs:
         """Return the outputs for `samples`; Finished comes last and ends the step."""
         t_s = float(samples.t[-1])
         if self._begun_s is None:
             self._begun_s = self._prompted_s = t_s
         outputs = self._take(samples)
         if self._closed:
-            return [*outputs, Finished(f"{self._of} orientations: done")]
+            return [*outputs, events.Finished(f"{self._of} orientations: done")]
         if t_s - self._begun_s >= VERIFY_PATIENCE_S:
-            return [*outputs, Finished(f"no new orientation for {VERIFY_PATIENCE_S:.0f} s")]
+            return [*outputs, events.Finished(f"no new orientation for {VERIFY_PATIENCE_S:.0f} s")]
         return [*outputs, *self._remind(t_s, self._prompted_s, "no new orientation for a while")]
 
-    def _next(self) -> Prompt:
+    def _next(self) -> events.Prompt:
         """See NewPoses; the axis that differs most from all those shown: a bias shows along either way."""
         along = -self._directions @ self._seen.units.T
         down = self._directions[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
         text = f"Orientation {self._number + 1} of {self._of}: {{}}, or any other new one, then hold it still for 2 s."
-        return self._ask_for(PromptKind.VERIFY, down, text)
+        return self._ask_for(events.PromptKind.VERIFY, down, text)

@@ -8,30 +8,18 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+from ..session import events
 from ..session.attitude import rotate
 from ..session.boards import BOARD, flat_description
-from ..session.events import (
-    Caution,
-    Countdown,
-    Decision,
-    Direction,
-    Held,
-    Knowledge,
-    Meter,
-    Output,
-    Progress,
-    Prompt,
-    PromptKind,
-    Quaternion,
-    Seen,
-    Use,
-    Verification,
-)
 
 # Time for which the headline shows the use of the last orientation in place of the next turn. At 240 words a minute a
 # word is read in 0.25 s; this one comes with a tone and a tick that stays.
-USE_SHOWN_S = {Use.TAKEN: 0.5, Use.USEFUL: 1.2, Use.SEEN: 1.2}
-USE_HEADLINES = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
+USE_SHOWN_S = {events.Use.TAKEN: 0.5, events.Use.USEFUL: 1.2, events.Use.SEEN: 1.2}
+USE_HEADLINES = {
+    events.Use.TAKEN: "TAKEN",
+    events.Use.USEFUL: "NOT THAT ONE, BUT USEFUL",
+    events.Use.SEEN: "SEEN ALREADY",
+}
 # Angle from the wanted orientation below which the headline asks to hold still, also where the board comes to rest: it
 # turns by less than their difference from one meter to the next (0.25 s). A board that passes by is not held.
 NEAR_DEG, NEAR_HELD_DEG, RESTS_DPS, PASSES_DPS = 15.0, 20.0, 20.0, 70.0
@@ -42,15 +30,15 @@ PREFERRED_S = 0.4
 # Time from the end of a countdown until the session has decided about the orientation.
 DECIDED_S = 2.0
 HEADLINES = {
-    PromptKind.LAY_FLAT: "LAY FLAT",
-    PromptKind.ROTATE: "TURN IT",
-    PromptKind.VERIFY: "CHECK",
-    PromptKind.AGAIN: "AGAIN?",
-    PromptKind.REST: "PUT IT DOWN",
+    events.PromptKind.LAY_FLAT: "LAY FLAT",
+    events.PromptKind.ROTATE: "TURN IT",
+    events.PromptKind.VERIFY: "CHECK",
+    events.PromptKind.AGAIN: "AGAIN?",
+    events.PromptKind.REST: "PUT IT DOWN",
 }
 CONNECTING = "WAIT"
 # Prompts that ask for one orientation.
-TURNING = (PromptKind.ROTATE, PromptKind.VERIFY)
+TURNING = (events.PromptKind.ROTATE, events.PromptKind.VERIFY)
 
 
 # Eyes [deg] from which a board is seen, in the order of preference, and the least visible share of its face: of another
@@ -67,14 +55,14 @@ class Eye(NamedTuple):
     tilt_deg: float = _TILTS_DEG[0]
 
     @property
-    def axes(self) -> tuple[Direction, Direction, Direction]:
+    def axes(self) -> tuple[events.Direction, events.Direction, events.Direction]:
         """Unit vectors of the room across, up and toward the eye."""
         turn, tilt = math.radians(self.turn_deg), math.radians(self.tilt_deg)
         x, y = math.sin(turn), math.cos(turn)
         up = (x * math.sin(tilt), y * math.sin(tilt), math.cos(tilt))
         return (y, -x, 0.0), up, (-x * math.cos(tilt), -y * math.cos(tilt), math.sin(tilt))
 
-    def moved(self, attitudes: Sequence[Quaternion]) -> Eye:
+    def moved(self, attitudes: Sequence[events.Quaternion]) -> Eye:
         """Return the eye for a board in these attitudes: this one, unless it sees one of them nearly edge-on."""
         faces = [rotate(attitude, (0.0, 0.0, 1.0)) for attitude in attitudes]
 
@@ -90,7 +78,7 @@ class Eye(NamedTuple):
 FRONT = Eye()
 
 
-def dot(a: Direction, b: Direction) -> float:
+def dot(a: events.Direction, b: events.Direction) -> float:
     """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -119,40 +107,40 @@ class View:
     title: str = "mpucal"
     board: str = BOARD
     eye: Eye = FRONT
-    prompt: Prompt | None = None
-    meter: Meter | None = None
-    countdown: Countdown | None = None
-    progress: Progress | None = None
-    knowledge: Knowledge | None = None
-    caution: Caution | None = None
-    held: Held | None = None
-    seen: tuple[Seen, ...] = ()
-    verified: tuple[Verification, ...] = ()
+    prompt: events.Prompt | None = None
+    meter: events.Meter | None = None
+    countdown: events.Countdown | None = None
+    progress: events.Progress | None = None
+    knowledge: events.Knowledge | None = None
+    caution: events.Caution | None = None
+    held: events.Held | None = None
+    seen: tuple[events.Seen, ...] = ()
+    verified: tuple[events.Verification, ...] = ()
     notes: tuple[str, ...] = ()
     begun_s: float | None = None
     now_s: float | None = None
 
-    def after(self, output: Output) -> View:
+    def after(self, output: events.Output) -> View:
         """Return the view after another output."""
         match output:
-            case Prompt():
+            case events.Prompt():
                 return self._prompted(output)
-            case Decision(why, _):
+            case events.Decision(why, _):
                 return self.noted(why)
-            case Meter():
-                laying = self.prompt is not None and self.prompt.kind is PromptKind.LAY_FLAT
+            case events.Meter():
+                laying = self.prompt is not None and self.prompt.kind is events.PromptKind.LAY_FLAT
                 wanted = _LAID if laying else output.wanted or output.attitude
                 view = replace(self, meter=output, eye=self.eye.moved((output.attitude, wanted)))
-            case Countdown() | Progress() | Knowledge() | Caution():
+            case events.Countdown() | events.Progress() | events.Knowledge() | events.Caution():
                 latest: dict[str, Any] = {type(output).__name__.lower(): output}
                 view = replace(self, **latest)
-            case Held():
+            case events.Held():
                 view = replace(self, held=output, countdown=None)
-            case Seen():
+            case events.Seen():
                 # Numbers start again with the turning.
                 kept = tuple(s for s in self.seen if s.paused != output.paused or s.number < output.number)
                 view = replace(self, seen=(*kept, output))
-            case Verification():
+            case events.Verification():
                 view = replace(self, verified=(*self.verified, output)).noted(output.text)
             case _:
                 # A command is not shown.
@@ -169,7 +157,7 @@ class View:
         return 0.0 if self.begun_s is None or self.now_s is None else self.now_s - self.begun_s
 
     @property
-    def waiting(self) -> Countdown | None:
+    def waiting(self) -> events.Countdown | None:
         """Countdown that runs, until the board moves or it is not renewed; after its end, until the decision."""
         if self.countdown is None or self.now_s is None:
             return None
@@ -180,11 +168,11 @@ class View:
         return None if over else self.countdown
 
     @property
-    def wanted(self) -> Direction | None:
+    def wanted(self) -> events.Direction | None:
         """Unit vector that is to point down, if one orientation is wanted."""
         if self.prompt is None or self.prompt.kind not in TURNING:
             return None
-        if self.prompt.down is not None or self.prompt.kind is PromptKind.VERIFY or self.knowledge is None:
+        if self.prompt.down is not None or self.prompt.kind is events.PromptKind.VERIFY or self.knowledge is None:
             return self.prompt.down
         return self.knowledge.down
 
@@ -198,7 +186,7 @@ class View:
         if p is None or self.prompt is None or self.prompt.kind not in TURNING:
             return 0, 0
         done = int(p.done)
-        if self.prompt.kind is PromptKind.ROTATE:
+        if self.prompt.kind is events.PromptKind.ROTATE:
             held = self.waiting
             held_s = math.inf if held is None else held.t_s + held.remaining_s - held.of_s
             # The first one is flat.
@@ -208,7 +196,7 @@ class View:
     @property
     def confirming(self) -> str:
         """Question to confirm while the board is laid flat, else empty."""
-        if self.prompt is None or self.prompt.kind is not PromptKind.LAY_FLAT or self.meter is None:
+        if self.prompt is None or self.prompt.kind is not events.PromptKind.LAY_FLAT or self.meter is None:
             return ""
         return flat_description(self.meter.down, self.board)
 
@@ -230,9 +218,9 @@ class View:
         # Before the countdown begins, the headline says what to do for it.
         held_s = waiting.of_s - waiting.remaining_s if waiting is not None and not waiting.paused else 0.0
         counting = held_s > (PREFERRED_S if waiting is not None and waiting.elsewhere else 0.0)
-        if waiting is not None and counting and self.prompt.kind is not PromptKind.REST:
+        if waiting is not None and counting and self.prompt.kind is not events.PromptKind.REST:
             word = "NEW: HOLD" if waiting.elsewhere else "HOLD"
-            word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else word
+            word = "STILL" if self.prompt.kind is events.PromptKind.LAY_FLAT else word
             return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s) or ''}".rstrip()
         if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < USE_SHOWN_S[self.held.use]:
             return Moment.DECIDED, USE_HEADLINES[self.held.use]
@@ -243,7 +231,7 @@ class View:
             return Moment.NEAR, "HOLD STILL"
         return Moment.TURN, _turn_headline(self.meter.turn)
 
-    def _prompted(self, prompt: Prompt) -> View:
+    def _prompted(self, prompt: events.Prompt) -> View:
         if self.prompt is not None and self.prompt.kind is prompt.kind:
             return replace(self, prompt=prompt)
         meter = self.meter
