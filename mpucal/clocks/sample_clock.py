@@ -176,58 +176,47 @@ def make_increasing(t_s: Vector, step_s: float) -> Vector:
     return np.asarray(np.maximum.accumulate(t_s - ramp) + ramp, np.float64)
 
 
-class PolledClock:
-    """Times of samples as SampleClock has them, each the time of its own read.
-
-    Parameters
-    ----------
-    nominal_hz : rate until there are two samples.
-    """
+class PolledClock(SampleClock):
+    """Times of samples that are read one by one: each look is the read of one sample, which has its time."""
 
     def __init__(self, nominal_hz: float) -> None:
-        self._nominal_hz = nominal_hz
-        self._t_ns = array("q")
-        self._begins: list[int] = []
-        self._forgotten = self._steps = self._elapsed_ns = 0
-
-    @property
-    def segment(self) -> int:
-        """Number of the current segment: a run of samples without a gap."""
-        return self._forgotten + len(self._begins) - 1
+        super().__init__(nominal_hz)
+        self._past_steps = self._past_ns = 0
 
     def begin_segment(self) -> None:
-        """Begin a segment: at the start, and after samples were lost."""
-        self._begins.append(len(self._t_ns))
+        """See SampleClock."""
+        self._past_steps, self._past_ns = self._passed()
+        super().begin_segment()
 
     def forget(self) -> None:
         """Forget all segments except the current one."""
-        self._forgotten += len(self._begins[:-1])
-        del self._t_ns[: self._begins[-1]]
-        self._begins = [0]
-
-    def add(self, t_ns: Whole, taken: Whole) -> None:
-        """Add the times (n,) of the reads of samples number `taken` (n,), from 1, of the current segment."""
-        for t, number in zip(t_ns.tolist(), taken.tolist(), strict=True):
-            if number > 1:
-                self._steps += 1
-                self._elapsed_ns += t - self._t_ns[-1]
-            self._t_ns.append(t)
+        self._forgotten += len(self._segments[:-1])
+        self._segments = self._segments[-1:]
 
     def is_late(self, t_ns: int) -> bool:
         """Return True if samples were missed before one that is read at `t_ns`; two samples are needed for the rate."""
-        within = len(self._t_ns) > self._begins[-1]
-        return bool(within and self._steps) and t_ns - self._t_ns[-1] > GAP_INTERVALS / self.rate_hz / NS
+        reads_ns = self._segments[-1].looks_ns
+        known = bool(reads_ns and self._passed()[0])
+        return known and t_ns - reads_ns[-1] > GAP_INTERVALS / self.rate_hz / NS
 
     @property
     def rate_hz(self) -> float:
-        """Samples a second, without the gaps."""
-        return self._steps / (self._elapsed_ns * NS) if self._elapsed_ns else self._nominal_hz
+        """Samples a second, without the gaps; the nominal ones until there are two."""
+        steps, ns = self._passed()
+        return steps / (ns * NS) if ns else self._nominal_hz
 
     def times_s(self, segment: Whole, index: Whole) -> Vector:
         """Return the times (n,) of samples `index` (n,), from 0 in their `segment` (n,)."""
-        at = np.array(self._begins)[segment - self._forgotten] + index
-        return np.array([self._t_ns[i] for i in at]) * NS
+        places = zip((segment - self._forgotten).tolist(), index.tolist(), strict=True)
+        return np.array([self._segments[at].looks_ns[i] for at, i in places]) * NS
 
     def final(self) -> Times:
         """Return `times_s`: later reads do not improve the times."""
         return self.times_s
+
+    def _passed(self) -> tuple[int, int]:
+        """Return the number of steps from one sample to the next, and the time that they took."""
+        reads_ns = self._segments[-1].looks_ns if self._segments else ()
+        if not reads_ns:
+            return self._past_steps, self._past_ns
+        return self._past_steps + len(reads_ns) - 1, self._past_ns + reads_ns[-1] - reads_ns[0]
