@@ -2,7 +2,8 @@
 
 The bridge pushes the FIFO's content ahead of the driver: FIFO_COUNT and FIFO_R_W are answered from a buffer, each count
 with the time at which the bridge read it, and losses on the way show as an overflow in INT_STATUS. A FIFO that was
-started without a reset is not read ahead, so that the driver can see it fill.
+started without a reset is not read ahead, so that the driver can see it fill. During a stream the driver reads
+INT_STATUS together with INT_ENABLE only (chip/driver.py).
 """
 
 from __future__ import annotations
@@ -12,14 +13,13 @@ from contextlib import suppress
 
 from ..chip import registers as reg
 from ..chip.access import Reply
+from ..chip.driver import STATUS_BYTES
 from ..clocks.sample_clock import poll_phase
 from ..errors import BusError, NoAnswer
 from .chip_state import CONTROLS, ChipState
 from .link import MS, Link, LinkLost
 from .messages import (
-    MAX_BURST,
     MAX_READ,
-    MAX_WRITE,
     Burst,
     BurstReply,
     Feature,
@@ -87,34 +87,29 @@ class BridgeBus:
             return Reply(held.to_bytes(2, "big"), t_ns, host_ns)
         if ahead is not None and register == reg.FIFO_R_W:
             return Reply(*ahead.pop(count))
-        if register == reg.FIFO_R_W:
-            try:
-                return self._read_now(register, count)
-            except NoAnswer as error:
-                # A bridge makes several transfers of it, and the first may have taken bytes.
-                raise BusError(error.what, error.remedy) from error
-        at = reg.INT_STATUS - register
-        if ahead is not None and register == reg.INT_ENABLE and at == count - 1:
+        if ahead is not None and (register, count) == (reg.INT_ENABLE, STATUS_BYTES):
             return self._read_status(ahead)
-        if not 0 <= at < count:
-            return self._read_now(register, count)
+        at = reg.INT_STATUS - register
         if at == count - 1:
             self._wait_out_of_step()
-        return self._add_overflow(self._read_now(register, count), at)
+        reply = self._read_now(register, count)
+        if self._lost and 0 <= at < count:
+            self._lost, data = False, bytearray(reply.data)
+            data[at] |= reg.INT_FIFO_OFLOW
+            reply = reply._replace(data=bytes(data))
+        return reply
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time."""
-        if len(data) > MAX_WRITE:
-            raise BusError(f"a bridge writes at most {MAX_WRITE} bytes at once, not {len(data)}", "write less at once")
         requests: list[Message] = []
-        controls = not CONTROLS.isdisjoint(range(register, register + len(data)))
+        controls = register in CONTROLS
         if controls and self._ahead is not None:
             self._ahead = None
             requests.append(Stream(0, 0))
         requests.append(Write(register, data))
         self._chip.on_write(register, data)
         has_stream = bool(self.link.bridge.features & Feature.STREAM)
-        if controls and has_stream and self._ahead is None and self._chip.frame_bytes:
+        if controls and has_stream and self._chip.fills_with_frames:
             return self._start_stream(*requests)
         return self._not_after_looks(self._ask(*requests)[-1][-1].t_ns)
 
@@ -144,8 +139,6 @@ class BridgeBus:
         self._wait(lambda host_ns: until_ns - host_ns)
 
     def _read_now(self, register: int, count: int) -> Reply:
-        if count > MAX_BURST:
-            raise BusError(f"a bridge reads at most {MAX_BURST} bytes at once, not {count}", "read less at once")
         answers = [answer for several in self._ask(*_reads(register, count)) for answer in several]
         begun_ns, host_ns = answers[0].t_ns, answers[0].host_ns
         shown_ns = self._not_after_looks(begun_ns)
@@ -165,19 +158,6 @@ class BridgeBus:
         overflow = reg.INT_FIFO_OFLOW * ahead.take_overflow()
         return Reply(bytes([self._chip.int_enable, 0, overflow]), t_ns, None if ahead_ns is None else t_ns + ahead_ns)
 
-    def _add_overflow(self, reply: Reply, at: int) -> Reply:
-        """Return a read with INT_STATUS at `at`, in which losses on the way to the host are added as an overflow."""
-        if self._ahead is not None:
-            if reply.data[at] & reg.INT_FIFO_OFLOW:
-                # The read cleared the flag, so that the bridge does not see it.
-                self._ahead.lose(reply.t_ns, reply.host_ns or 0)
-            lost = self._ahead.take_overflow()
-        else:
-            lost, self._lost = self._lost, False
-        data = bytearray(reply.data)
-        data[at] |= reg.INT_FIFO_OFLOW * lost
-        return reply._replace(data=bytes(data))
-
     def _not_after_looks(self, t_ns: int) -> int:
         return t_ns if self._ahead is None else self._ahead.not_after_looks(t_ns)
 
@@ -188,11 +168,10 @@ class BridgeBus:
         """
         self._lost = False
         self._chip.cancel()
-        frame_bytes = self._chip.frame_bytes
         # Prepared before the request: the first frames may come together with its reply.
-        self._ahead = ReadAhead(self.link.seq_of(len(before)), frame_bytes)
+        self._ahead = ReadAhead(self.link.seq_of(len(before)))
         try:
-            answers = self._ask(*before, Stream(frame_bytes, BATCH))
+            answers = self._ask(*before, Stream(reg.FRAME_BYTES, BATCH))
         except BusError:
             if self._ahead is not None:
                 self._ahead = None
@@ -238,7 +217,8 @@ class BridgeBus:
         for several in answers:
             status = several[-1].reply.status
             if status != Status.OK:
-                kind = NoAnswer if status == Status.NO_ANSWER else BusError
+                # A burst is several transfers, and the first ones may have taken bytes.
+                kind = NoAnswer if status == Status.NO_ANSWER and len(several) == 1 else BusError
                 raise kind(*request_failed(self._port.name, status))
         return answers
 

@@ -11,17 +11,8 @@ from .link import Link
 from .messages import Read, ReadReply
 from .requests import PendingRequest
 
-# Bytes that each bit of FIFO_EN adds to a frame; the lowest three enable other chips, of unknown size.
-FRAME_PARTS = (
-    (reg.FIFO_EN_ACCEL, 6),
-    (reg.FIFO_EN_TEMP, 2),
-    (reg.FIFO_EN_XG, 2),
-    (reg.FIFO_EN_YG, 2),
-    (reg.FIFO_EN_ZG, 2),
-)
-OTHER_CHIPS = 0x07
-# On an ICM-20602 and its like, these bits add the temperature and the whole gyroscope too.
-WHOLE_FRAME = {row.fifo_en_frame: reg.FRAME_BYTES for row in FAMILIES if row.fifo_en_with_temperature}
+# Values of FIFO_EN with which a frame has FRAME_BYTES.
+WHOLE_FRAME = frozenset(row.fifo_en_frame for row in FAMILIES)
 # A write to one of these may stop the FIFO or change its content.
 CONTROLS = frozenset((reg.FIFO_EN, reg.USER_CTRL, reg.SIGNAL_PATH_RESET, reg.PWR_MGMT_1))
 
@@ -41,30 +32,28 @@ class ChipState:
         self.int_enable = 0
         self._link = link
         self._pending: PendingRequest | None = None
-        self._held = dict.fromkeys(CONTROLS, 0)
+        self._fifo_en = self._user_ctrl = 0
         self._begins_with_a_frame = False
 
     def on_write(self, register: int, data: bytes) -> None:
-        """Take note of `data` written from `register` on."""
-        for at, value in enumerate(data, register):
-            if at == reg.PWR_MGMT_1 and value & reg.PWR_MGMT_1_DEVICE_RESET:
-                self._held = dict.fromkeys(CONTROLS, 0)
-                self._begins_with_a_frame = False
-            elif at in CONTROLS:
-                self._held[at] = value
-            elif at == reg.INT_ENABLE:
-                self.int_enable = value
-            if at == reg.USER_CTRL and value & reg.USER_CTRL_FIFO_RESET:
-                self._begins_with_a_frame = True
+        """Take note of a write of one of the registers, which the driver writes one by one."""
+        value = data[0]
+        if register == reg.PWR_MGMT_1 and value & reg.PWR_MGMT_1_DEVICE_RESET:
+            self._fifo_en = self._user_ctrl = 0
+            self._begins_with_a_frame = False
+        elif register == reg.FIFO_EN:
+            self._fifo_en = value
+        elif register == reg.USER_CTRL:
+            self._user_ctrl = value
+            self._begins_with_a_frame |= bool(value & reg.USER_CTRL_FIFO_RESET)
+        elif register == reg.INT_ENABLE:
+            self.int_enable = value
 
     @property
-    def frame_bytes(self) -> int:
-        """Length of the frames to drain; 0 if the FIFO does not run, or does not begin with a frame."""
-        enabled = self._held[reg.FIFO_EN]
-        runs = self._held[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN and not enabled & OTHER_CHIPS
-        if not (runs and self._begins_with_a_frame):
-            return 0
-        return WHOLE_FRAME.get(enabled) or sum(size for bit, size in FRAME_PARTS if enabled & bit)
+    def fills_with_frames(self) -> bool:
+        """True if the FIFO runs, and begins with a whole frame."""
+        runs = self._fifo_en in WHOLE_FRAME and self._user_ctrl & reg.USER_CTRL_FIFO_EN
+        return bool(runs and self._begins_with_a_frame)
 
     @property
     def is_waiting(self) -> bool:

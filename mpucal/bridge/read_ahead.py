@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from ..chip.registers import FRAME_BYTES
 from .messages import MAX_BATCH, Frames, Status
 
 INDEX_WRAP = 2**16
@@ -28,19 +29,18 @@ class ReadAhead:
 
     Parameters
     ----------
-    seq : of the STREAM that started it. frame_bytes : of one frame.
+    seq : of the STREAM that started it.
 
     Attributes
     ----------
     counted_ns : time of the last `count`.
     """
 
-    def __init__(self, seq: int, frame_bytes: int) -> None:
+    def __init__(self, seq: int) -> None:
         self.seq = seq
         self.counted_ns = 0
         self._counted_host_ns = 0
         self._counted = bytearray()
-        self._frame_bytes = frame_bytes
         self._looks: deque[Look] = deque()
         self._begun: list[Frames] = []
         self._begun_t_ns = 0
@@ -55,7 +55,7 @@ class ReadAhead:
             self.lose(t_ns, host_ns)
             return
         self._drops = frames.drops
-        self._next_index = (frames.index + len(frames.frames) // self._frame_bytes) % INDEX_WRAP
+        self._next_index = (frames.index + len(frames.frames) // FRAME_BYTES) % INDEX_WRAP
         self._begun.append(frames)
         self._begun_t_ns = t_ns
         if frames.left == 0:
@@ -82,7 +82,7 @@ class ReadAhead:
         """
         while self._looks and not (self._counted and self._looks[0].lost):
             look = self._looks[0]
-            if self._counted and len(self._counted) + len(look.data) > MAX_BATCH * self._frame_bytes:
+            if self._counted and len(self._counted) + len(look.data) > MAX_BATCH * FRAME_BYTES:
                 break
             self._looks.popleft()
             self._counted += look.data
@@ -113,12 +113,12 @@ class ReadAhead:
 
     def _continues(self, frames: Frames) -> bool:
         """Return True if no frames were lost before these."""
-        if frames.status != Status.OK or len(frames.frames) % self._frame_bytes:
+        if frames.status != Status.OK or len(frames.frames) % FRAME_BYTES:
             return False
         if frames.index != self._next_index or self._drops not in (None, frames.drops):
             return False
         # Messages of one look have the same time, and count down.
         return not self._begun or (
             frames.t_us == self._begun[-1].t_us
-            and frames.left + len(frames.frames) // self._frame_bytes == self._begun[-1].left
+            and frames.left + len(frames.frames) // FRAME_BYTES == self._begun[-1].left
         )

@@ -13,11 +13,8 @@ from .port import Port
 CTRL_A, CTRL_B, CTRL_C, CTRL_D = b"\x01", b"\x02", b"\x03", b"\x04"
 BANNER = b"raw REPL; CTRL-B to exit\r\n>"
 REBOOT = b"soft reboot\r\n"
-RAW_PASTE, PASTE_ACCEPTED, PASTE_REFUSED = b"\x05A\x01", b"R\x01", b"R\x00"
+RAW_PASTE, PASTE_ACCEPTED = b"\x05A\x01", b"R\x01"
 WINDOW_FREED = 0x01
-STARTED = b"OK"
-# Pieces and pauses for a board whose UART has no flow control.
-PIECE_BYTES, PIECE_NS = 128, 10_000_000
 
 S = 1_000_000_000
 ASK_NS, ANSWER_NS, BOOT_NS, COMPILE_NS = S, 2 * S, 15 * S, 10 * S
@@ -68,26 +65,17 @@ class RawRepl:
         ------
         BusError : the program ends before that, or the board does not accept it.
         """
-        text = program.encode()
         self._port.write(RAW_PASTE)
-        answer = self._read(2)
-        if answer == PASTE_ACCEPTED:
-            self._paste(text)
-        else:
-            if answer != PASTE_REFUSED:
-                # MicroPython before 1.14 takes the request for a line, and shows its banner.
-                self._expect(b"\n>", ANSWER_NS)
-            self._type(text)
+        if self._read(2) != PASTE_ACCEPTED:
+            raise self._does_not_run("it knows no raw-paste mode")
+        self._paste(program.encode())
         until_ns = self._port.now_ns() + COMPILE_NS
         while b"\0" not in self._received:
             ended = self._received.count(CTRL_D) >= 2
             if ended or not self._receive(until_ns):
                 words = self._received.replace(CTRL_D, b"\n").decode("ascii", "replace").split("\n")
                 why = next((line.strip() for line in reversed(words) if len(line.strip()) > 1), "no output")
-                raise BusError(
-                    f"MicroPython on {self._port.name} does not run the bridge ({why})",
-                    "install MicroPython 1.20 or later, or use a board with more memory",
-                )
+                raise self._does_not_run(why)
         del self._received[: self._received.index(b"\0") + 1]
 
     def leave(self) -> None:
@@ -124,13 +112,6 @@ class RawRepl:
         self._port.write(CTRL_D)
         self._expect(CTRL_D, COMPILE_NS)
 
-    def _type(self, text: bytes) -> None:
-        for at in range(0, len(text), PIECE_BYTES):
-            self._port.write(text[at : at + PIECE_BYTES])
-            self._receive(self._port.now_ns() + PIECE_NS)
-        self._port.write(CTRL_D)
-        self._expect(STARTED, COMPILE_NS)
-
     def _expect(self, words: bytes, within_ns: int) -> None:
         """Wait for `words`, and drop everything up to their end."""
         if not self._wait_for(words, within_ns):
@@ -152,6 +133,10 @@ class RawRepl:
         data = bytes(self._received[:count])
         del self._received[:count]
         return data
+
+    def _does_not_run(self, why: str) -> BusError:
+        what = f"MicroPython on {self._port.name} does not run the bridge ({why})"
+        return BusError(what, "install MicroPython 1.20 or later, or use a board with more memory")
 
     def _silent(self) -> NoRepl:
         return NoRepl(f"MicroPython on {self._port.name} stopped answering", "press its reset button, and try again")

@@ -17,8 +17,8 @@ PACKAGE, VERSION = "@micropython/micropython-webassembly-pyscript", "1.27.0"
 STEP_NS, MOST = 10_000_000, 255
 TICKS = 2**30
 ENODEV = 19
-# from MicroPython's documentation of the raw REPL: the request for raw paste, and the answers to it
-RAW_PASTE, BANNER, WINDOW = b"\x05A\x01", b"raw REPL; CTRL-B to exit\r\n>", 128
+# from MicroPython's documentation of the raw REPL: the request for raw paste, and the size of its window
+RAW_PASTE, WINDOW = b"\x05A\x01", 128
 
 
 @pytest.fixture(scope="session")
@@ -50,14 +50,14 @@ class NodeBoard:
     Attributes
     ----------
     chip : a bus on the board's I2C(0); None: nothing is connected.
-    raw_paste : "taken", "refused", or "unknown" as before MicroPython 1.14. MicroPython in node has no raw paste:
-        where it is taken, this class frees the window and passes on what was pasted.
+    raw_paste : MicroPython in node has no raw paste; if True, this class frees the window and passes on what was
+        pasted.
     busy : True until Ctrl-C comes: a main.py runs.
     """
 
     name, bauds = "the board", (115_200,)
 
-    def __init__(self, package, chip, clock, raw_paste="taken", busy=False):
+    def __init__(self, package, chip, clock, raw_paste=True, busy=False):
         self.chip, self._clock, self._raw_paste, self._busy = chip, clock, raw_paste, busy
         self._pasted, self._room = None, 0
         words = ["node", str(Path(__file__).with_name("board.mjs")), str(package)]
@@ -88,10 +88,8 @@ class NodeBoard:
             self._busy, data = b"\x03" not in data, data.partition(b"\x03")[2]
         if self._pasted is not None:
             self._paste(data)
-        elif data != RAW_PASTE or self._raw_paste == "refused":
+        elif data != RAW_PASTE or not self._raw_paste:
             self._input += data
-        elif self._raw_paste == "unknown":
-            self._output += BANNER
         else:
             self._output += b"R\x01" + WINDOW.to_bytes(2, "little") + b"\x01"
             self._pasted, self._room = b"", 2 * WINDOW

@@ -50,10 +50,9 @@ def test_it_samples_at_one_kilohertz_and_leaves_the_repl_as_it_was(rig, board, n
     assert said.split() == [b"6", b"*", b"7", b"42", b">>>"]
 
 
-@pytest.mark.parametrize("raw_paste", ["refused", "unknown"])
-def test_a_program_that_runs_gives_way_on_older_boards_too(raw_paste, board, rig):
+def test_a_program_that_runs_gives_way(board, rig):
     made = rig()
-    there = board(made.chip, made.clock, raw_paste=raw_paste, busy=True)
+    there = board(made.chip, made.clock, busy=True)
     assert BridgeBus(MicroPythonPort(there)).read(0x75, 1).data == b"\x68"
 
 
@@ -93,6 +92,11 @@ def test_a_board_that_cannot_run_it_says_why(board, monkeypatch, tmp_path):
     monkeypatch.setattr(pasting, "PROGRAM", tmp_path / "board.py")
     with pytest.raises(BusError, match=r"does not run the bridge \(MemoryError: memory allocation failed\)"):
         MicroPythonPort(board())
+
+
+def test_a_board_without_raw_paste_is_too_old(board):
+    with pytest.raises(BusError, match=r"it knows no raw-paste mode\): install MicroPython 1.20 or later"):
+        MicroPythonPort(board(raw_paste=False))
 
 
 def test_pins_are_two(capsys):
