@@ -138,12 +138,6 @@ class OddOffsets(ChipError):  # noqa: N818 - reads as the sentence it is
 class ChipReset(ChipError):  # noqa: N818 - reads as the sentence it is
     """The chip lost its settings during the measurement, and its samples are invalid."""
 
-    def __init__(self) -> None:
-        super().__init__(
-            "the chip lost its settings during the measurement: it was reset",
-            "its supply drops out: check wires, connectors, and motors on the same supply, then start again",
-        )
-
 
 class OutputError(MpucalError):
     """A result cannot be written to the requested place."""

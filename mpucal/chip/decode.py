@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,9 @@ from . import registers as reg
 from .access import Transaction
 from .accesses import Accesses
 from .families import Part
-from .fifo import FifoDecoder, FifoFault
+from .fifo import FifoDecoder
 from .identity import Behaviour
+from .losses import Loss
 from .settings import Settings
 
 Words = tuple[int, int, int]
@@ -42,7 +44,7 @@ class Decoder:
         self.fifo: FifoDecoder | None = None
         self._before_reset: dict[int, int] = {}
         self._accel_offsets: Words | None = None
-        self.fault: FifoFault | None = None
+        self.fault: Loss | None = None
 
     @property
     def corrected(self) -> tuple[Words, Words] | None:
@@ -66,7 +68,12 @@ class Decoder:
         return self._evidence.part(self._held[reg.WHO_AM_I])
 
     def feed(self, transaction: Transaction | Accesses) -> None:
-        """Take one access, which may have failed, or many."""
+        """Take one access, which may have failed, or many.
+
+        Raises
+        ------
+        RecordingError : the FIFO starts with settings that are unknown, or that changed.
+        """
         if isinstance(transaction, Accesses):
             self._feed_many(transaction)
             return
@@ -74,9 +81,9 @@ class Decoder:
         if transaction.error is not None or not transaction.data:
             return
         if transaction.op == "read":
-            self.feed_read(transaction.register, transaction.data, transaction.t_ns, transaction.host_ns)
+            self._feed_read(transaction.register, transaction.data, transaction.t_ns, transaction.host_ns)
         else:
-            self.feed_write(transaction.register, transaction.data)
+            self._feed_write(transaction.register, transaction.data)
 
     def _feed_many(self, accesses: Accesses) -> None:
         """Decode runs of ordinary polls at once, and the other accesses one by one."""
@@ -91,8 +98,7 @@ class Decoder:
                 at = min(last, at + ACCESSES_A_POLL)
         self._feed_each(accesses, at, len(accesses))
 
-    def feed_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
-        """Take `data` read from `register` on at `t_ns`; `host_ns` as in Reply."""
+    def _feed_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None) -> None:
         if self.fifo is None:
             self._hold(register, data)
             self._evidence.observe(register, data, self._held)
@@ -115,13 +121,7 @@ class Decoder:
         else:
             self._hold(register, data)
 
-    def feed_write(self, register: int, data: bytes) -> None:
-        """Take `data` written from `register` on.
-
-        Raises
-        ------
-        RecordingError : the FIFO starts with settings that are unknown, or that changed.
-        """
+    def _feed_write(self, register: int, data: bytes) -> None:
         if register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET:
             self._evidence.reset()
             self._before_reset = self._before_reset or dict(self._held)
@@ -201,18 +201,22 @@ def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
     return [(int(part[0]), int(part[-1]) + ACCESSES_A_POLL) for part in np.split(at, cuts) if len(part)]
 
 
-def decode(accesses: Iterable[Transaction | Accesses], name: str = "recording") -> Recording:
+def decode(accesses: Iterable[Any], name: str = "recording", decoder_of: Callable[[str], Any] = Decoder) -> Recording:
     """Decode `accesses` to a recording; they may be cut off at the end.
+
+    Parameters
+    ----------
+    decoder_of : class of the decoder: Decoder, or IioDecoder.
 
     Raises
     ------
     RecordingError : the FIFO starts with unknown settings, or there are fewer than two samples.
-    ChipError : an unknown chip.
+    ChipError : an unknown chip, or attributes that are not plausible.
     """
-    decoder = Decoder(name)
+    decoder = decoder_of(name)
     for each in accesses:
         decoder.feed(each)
-    recording = decoder.recording()
+    recording: Recording = decoder.recording()
     if len(recording) < 2:
         raise RecordingError(f"{name} holds {len(recording)} samples", "record for longer")
     return recording

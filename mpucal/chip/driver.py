@@ -21,13 +21,13 @@ from .access import Bus
 from .config import Config
 from .decode import Decoder
 from .families import Part
-from .fifo import FifoDecoder, FifoFault
+from .fifo import FifoDecoder
 from .identity import describe_mismatch
+from .losses import Loss, TransferStats, remedy_of
 from .offsets import PLACES
 from .port import Port
 from .settings import Settings
 from .setup import configure, is_configured, probe, read_identity, reset, restart_fifo, stop_fifo, wake
-from .transfer_stats import REMEDY, TransferStats
 
 DRIVER_VERSION = 6
 
@@ -95,7 +95,7 @@ class Driver:
         self._next_poll_ns = 0
         self._need = Need.NOTHING
         self._fruitless_ns = 0
-        self.faults: Counter[FifoFault] = Counter()
+        self.faults: Counter[Loss] = Counter()
         self._frame_ns = math.inf
 
     def now_ns(self) -> int:
@@ -177,9 +177,10 @@ class Driver:
             stop_fifo(self._port)
         fifo = self._decoder.fifo
         if fifo is not None and fifo.repaired > MAX_REPAIRED_SHARE * fifo.accepted:
-            self._say(f"a bit had flipped on the bus in {fifo.repaired} samples, which were repaired: {REMEDY}")
+            flipped = f"a bit had flipped on the bus in {fifo.repaired} samples, which were repaired"
+            self._say(f"{flipped}: {Loss.FLIPPED.remedy}")
         if self._port.stats.errors:
-            self._say(f"{self._port.stats}: {self._port.stats.remedy}")
+            self._say(f"{self._port.stats}: {remedy_of(self._port.stats.errors)}")
 
     def _read_before_reset(self) -> None:
         # The reset reloads the factory's trim. These reads put earlier corrections into the capture.
@@ -208,7 +209,7 @@ class Driver:
         self._plan_next_poll()
         settings = self.settings
         if count >= settings.part.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
-            self.faults[FifoFault.OVERFLOW] += 1
+            self.faults[Loss.OVERFLOW] += 1
             return Need.RESTART
         frames = count // settings.frame_bytes
         try:
@@ -242,12 +243,12 @@ class Driver:
         if fault is None:
             return Need.NOTHING
         self.faults[fault] += 1
-        return Need.SET_UP if fault is FifoFault.STUCK else Need.RESTART
+        return Need.SET_UP if fault is Loss.STUCK else Need.RESTART
 
     def _check_pace(self) -> None:
         """Raise BusError if the chip makes frames faster than the quickest read moved them, after several overflows."""
         rate_hz = self.settings.nominal_rate_hz
-        if self.faults[FifoFault.OVERFLOW] < REPEATED_OVERFLOWS or not 1e9 <= self._frame_ns * rate_hz < math.inf:
+        if self.faults[Loss.OVERFLOW] < REPEATED_OVERFLOWS or not 1e9 <= self._frame_ns * rate_hz < math.inf:
             return
         raise BusError(
             f"the bus moves {1e9 / self._frame_ns:.0f} samples a second, but the chip takes {rate_hz:g}",
@@ -257,7 +258,7 @@ class Driver:
     def _recover(self) -> None:
         """Restart the FIFO; before that, set up a chip that lost its settings or repeats itself."""
         if self._need is not Need.SET_UP and not is_configured(self._port, self.settings):
-            self.faults[FifoFault.LOST] += 1
+            self.faults[Loss.RESET] += 1
             self._need = Need.SET_UP
         if self._need is Need.SET_UP:
             self._set_up_again()
@@ -303,16 +304,9 @@ class Driver:
         """Return the error that explains two seconds without a valid sample."""
         chip = self.settings.part.chip
         if not is_configured(self._port, self.settings):
-            return ChipError(
-                f"the {chip} lost its settings several times",
-                "its supply breaks down: check the wires and connectors, then start again",
-            )
-        if self.faults and self.faults.most_common(1)[0][0] is FifoFault.STUCK:
-            return ChipError(
-                f"the {chip} repeats one sample: not even the noise changes",
-                "switch its supply off and on, check its solder joints and start again; if it happens again,"
-                " replace the chip",
-            )
+            return ChipError(f"the {chip} lost its settings several times", Loss.RESET.remedy)
+        if self.faults and self.faults.most_common(1)[0][0] is Loss.STUCK:
+            return ChipError(f"the {chip} repeats one sample: not even the noise changes", Loss.STUCK.remedy)
         return ChipError(
             f"the {chip} gave no valid sample for {DEAD_NS * 1e-9:g} s",
             "switch its supply off and on, use a slower bus or a lower rate, and start again",

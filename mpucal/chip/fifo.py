@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from ..clocks.sample_clock import NS, PolledClock, SampleClock, Times, Whole, ma
 from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
 from .bit_flips import BitFlipFilter, Counts
+from .losses import Loss
 from .settings import Settings
 
 FULL_SCALE_COUNT = 32767
@@ -34,16 +34,6 @@ DROPPED_FRAMES = 2
 STUCK_FRAMES, STUCK_S = 10, 0.05
 # Step between two times that the regression would put in the wrong order, in sample intervals.
 LEAST_STEP = 0.1
-
-
-class FifoFault(StrEnum):
-    """Reason to discard what was read from the FIFO."""
-
-    OVERFLOW = "overflow"
-    MISALIGNED = "misaligned"
-    STUCK = "stuck"
-    LATE = "late"
-    LOST = "lost its settings"
 
 
 @dataclass(frozen=True)
@@ -69,8 +59,7 @@ class FifoDecoder:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        clock = PolledClock if settings.polled else SampleClock
-        self._clock: SampleClock | PolledClock = clock(settings.nominal_rate_hz)
+        self._clock = (PolledClock if settings.polled else SampleClock)(settings.nominal_rate_hz)
         self._host = HostClock()
         self._runs: list[Run] = []
         self._taken = 0
@@ -109,7 +98,7 @@ class FifoDecoder:
         """Add bytes that were read from the FIFO."""
         self._pending += data
 
-    def finish_poll(self, overflow: bool, lost: bool = False) -> FifoFault | None:
+    def finish_poll(self, overflow: bool, lost: bool = False) -> Loss | None:
         """Accept what the poll read, or return why not; then only a reset helps.
 
         Equal frames at the end wait until a different one follows them, and one that may be flipped for the next.
@@ -119,23 +108,23 @@ class FifoDecoder:
         self._pending.clear()
         self._look = None
         if lost:
-            return FifoFault.LOST
+            return Loss.RESET
         if overflow:
-            return FifoFault.OVERFLOW
+            return Loss.OVERFLOW
         if self._odd_bytes or len(data) % self.settings.frame_bytes:
-            return FifoFault.MISALIGNED
+            return Loss.MISALIGNED
         if look is not None and isinstance(self._clock, PolledClock) and self._clock.is_late(look[0]):
-            return FifoFault.LATE
+            return Loss.LATE
         frames = np.frombuffer(data, ">i2").reshape(-1, self.settings.frame_words).astype(np.int16)
         kept = self._flips.repair(frames[max(DROPPED_FRAMES - self._read, 0) :], self._waiting)
         if not self._is_aligned(kept):
-            return FifoFault.MISALIGNED
+            return Loss.MISALIGNED
         self._read += len(frames)
         kept = np.concatenate((self._waiting, kept))
         # the first frame of each run of equal ones
         begins = np.flatnonzero(np.concatenate(([True], (kept[1:] != kept[:-1]).any(axis=1)))[: len(kept)])
         if (np.diff(begins, append=len(kept)) >= self._stuck_frames).any():
-            return FifoFault.STUCK
+            return Loss.STUCK
         if look is not None:
             self._clock.add(*np.array([look]).T)
         self._accept(kept, len(kept) - int(begins[-1]) if len(begins) else 0)

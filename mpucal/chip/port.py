@@ -1,14 +1,13 @@
-"""Access to one chip's registers over any bus, with retries; every access is fed to a decoder."""
+"""Access to a bus with retries: the registers of a chip, or the files of a kernel driver; a decoder follows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
 from ..errors import BusError, NoAnswer
-from .access import Bus
-from .decode import Decoder
-from .transfer_stats import TransferStats
+from .access import Bus, Transaction
+from .losses import TransferStats
 
 TRIES = 3
 RETRY_NS = 1_000_000
@@ -16,24 +15,36 @@ RETRY_NS = 1_000_000
 T = TypeVar("T")
 
 
+class Follower(Protocol):
+    """Decoder of the accesses of a driver."""
+
+    def feed(self, access: Transaction, /) -> None:
+        """Take one access."""
+        ...
+
+
 class Port:
-    """Reads and writes of one chip, each of which `decoder` follows if it succeeded.
+    """Reads and writes of one bus, each of which `decoder` follows if it succeeded.
 
     Every method raises BusError if a transfer failed, and EndOfCapture at the end of a replay.
+
+    Parameters
+    ----------
+    tries : number of times that a failed access is tried.
 
     Attributes
     ----------
     stats : counts the transfers. now_ns : last known time of the bus's clock.
     """
 
-    def __init__(self, bus: Bus, decoder: Decoder, stats: TransferStats | None = None) -> None:
+    def __init__(self, bus: Bus, decoder: Follower, stats: TransferStats | None = None, tries: int = TRIES) -> None:
         self.stats = TransferStats() if stats is None else stats
         self.now_ns = 0
         self._bus = bus
-        self._decoder = decoder
+        self._decoder, self._tries = decoder, tries
 
-    def read(self, register: int, count: int) -> bytes:
-        """Read `count` bytes from `register` on, in up to three tries."""
+    def read(self, register: Any, count: int) -> bytes:
+        """Read `count` bytes from `register` on, or up to `count` of a file."""
         return self._tried(lambda: self._read(register, count))
 
     def read_destructive(self, register: int, count: int) -> bytes:
@@ -43,21 +54,19 @@ class Port:
         """
         return self._tried(lambda: self._read(register, count), NoAnswer)
 
-    def _read(self, register: int, count: int) -> bytes:
-        reply = self._bus.read(register, count)
-        self.now_ns = max(self.now_ns, reply.t_ns)
-        self._decoder.feed_read(register, reply.data, reply.t_ns, reply.host_ns)
-        return reply.data
+    def _read(self, register: Any, count: int) -> bytes:
+        data, t_ns, host_ns = self._bus.read(register, count)
+        self._follow(Transaction("read", register, count, data, t_ns, None, host_ns))
+        return data
 
     def write(self, register: int, value: int) -> None:
-        """Write one byte, in up to three tries."""
+        """Write one byte."""
         self.write_block(register, bytes([value]))
 
-    def write_block(self, register: int, data: bytes) -> None:
-        """Write `data` from `register` on in one transfer, in up to three tries."""
+    def write_block(self, register: Any, data: bytes) -> None:
+        """Write `data` from `register` on in one transfer, or to a file."""
         t_ns = self._tried(lambda: self._bus.write(register, data))
-        self.now_ns = max(self.now_ns, t_ns)
-        self._decoder.feed_write(register, data)
+        self._follow(Transaction("write", register, len(data), data, t_ns))
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bus's clock shows `t_ns`."""
@@ -68,9 +77,13 @@ class Port:
         """Wait `ns` nanoseconds of bus time."""
         self.sleep_until(self.now_ns + ns)
 
+    def _follow(self, access: Transaction) -> None:
+        self.now_ns = max(self.now_ns, access.t_ns)
+        self._decoder.feed(access)
+
     def _tried(self, access: Callable[[], T], after: type[BusError] = BusError) -> T:
         """Make an access and count it, again after errors of the kind `after`."""
-        left = TRIES
+        left = self._tries
         while True:
             self.stats.transfers += 1
             try:

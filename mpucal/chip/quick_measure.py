@@ -14,6 +14,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import BoardMoved, BusError, ChipReset
 from ..rests.stillness import is_untouched
 from . import registers as reg
+from .losses import Loss
 from .port import Port
 
 SETTLE_NS = 100_000_000
@@ -96,4 +97,4 @@ def read_counts(port: Port, words: int) -> Vector:
 def check_registers(port: Port, register: int, value: bytes) -> None:
     """Raise ChipReset if two reads from `register` on do not give `value`: a single one may have a bit error."""
     if all(port.read(register, len(value)) != value for _ in range(2)):
-        raise ChipReset
+        raise ChipReset("the chip lost its settings during the measurement: it was reset", Loss.RESET.remedy)

@@ -17,14 +17,13 @@ from ..chip.config import MOST_POLLED_HZ, Config
 from ..chip.decode import Decoder
 from ..chip.driver import NO_FIFO, Driver
 from ..chip.families import PARTS, Family, Part
-from ..chip.fifo import FifoFault
 from ..chip.identity import describe_mismatch
+from ..chip.losses import Loss, TransferStats, remedy_of
 from ..chip.offsets import PLACES, OffsetRegisters, OffsetResponse, measure_offset_response, restore
 from ..chip.port import Port
 from ..chip.quick_measure import PATIENCE, temporary_measurement
 from ..chip.self_test import run_self_test
 from ..chip.setup import read_identity
-from ..chip.transfer_stats import REMEDY, TransferStats
 from ..data import Sensor
 from ..errors import BoardMoved, ChipError, ChipReset, OddOffsets, SourceError
 from ..session.ports import polled
@@ -41,14 +40,6 @@ UNMOVED = 0.05
 MOVED = "the board moved"
 # Attempts to measure at rest, after a board that was not put down in the first wait.
 IMPATIENCE = 3
-# Causes of gaps, and their remedies.
-CAUSES = {
-    FifoFault.OVERFLOW: ("the FIFO overflowed: it was read too late", "end other programs, or take a lower --rate"),
-    FifoFault.LATE: ("a sample was read too late", "end other programs, or take a lower --rate"),
-    FifoFault.MISALIGNED: ("the frames in the FIFO slipped", REMEDY),
-    FifoFault.LOST: ("the chip lost its settings: it was reset", "its supply breaks down: check its wires, and motors"),
-    FifoFault.STUCK: ("the sensor repeated itself", "if that happens again and again, replace the chip"),
-}
 
 
 def examine(
@@ -96,7 +87,7 @@ def _transfers(stats: TransferStats, always: bool = False) -> Iterator[Finding]:
     data = {"transfers": stats.transfers, "retries": stats.retries, "errors": dict(stats.errors)}
     if always or (stats.errors and stats.error_share < MOST):
         mark = Mark.BAD if stats.error_share > MANY else Mark.NOTE
-        yield Finding.check("transfers", not stats.errors, str(stats), stats.remedy, data, mark)
+        yield Finding.check("transfers", not stats.errors, str(stats), remedy_of(stats.errors), data, mark)
 
 
 def _examine_chip(
@@ -114,18 +105,17 @@ def _examine_chip(
     deque(polled(driver, seconds), maxlen=0)
     recording = driver.recording()
     if len(recording) > config.rate_hz:
-        yield from examine_stream(recording, config.rate_hz, seconds, family)
+        yield from examine_stream(recording, config.rate_hz, seconds, family, remedy_of(driver.faults))
     else:
         yield Finding(
             "stream", Mark.BAD, f"{len(recording)} samples in {seconds:g} s", "check the wires and the supply"
         )
-    for fault, times in driver.faults.items():
-        yield Finding(
-            "gaps", Mark.BAD, f"{times} × {CAUSES[fault][0]}", CAUSES[fault][1], {"fault": fault, "times": times}
-        )
+    for loss, times in driver.faults.items():
+        yield Finding("gaps", Mark.BAD, f"{times} × {loss.what}", loss.remedy, {"fault": loss, "times": times})
     if driver.repaired:
         what = f"{driver.repaired} of {len(recording)} samples had a bit flipped on the bus, and were set right"
-        yield Finding("bit errors", Mark.BAD, what, REMEDY, {"flipped": driver.repaired, "samples": len(recording)})
+        data = {"flipped": driver.repaired, "samples": len(recording)}
+        yield Finding("bit errors", Mark.BAD, what, Loss.FLIPPED.remedy, data)
     driver.stop()
     by_who_am_i = PARTS.get(sensor.who_am_i or 0)
     consistent = by_who_am_i is not None and by_who_am_i.family.name == family.name

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..chip.families import Family
+from ..chip.losses import Loss
 from ..clocks.sample_clock import RATE_TOLERANCE
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from .dead_axes import dead_axes, live_axes
@@ -29,12 +30,19 @@ LOW_HZ, HIGH_HZ = (1.0, 12.0), (20.0, 40.0)
 TREMBLES = 2.0
 
 
-def examine_stream(recording: Recording, nominal_hz: float, seconds: float, family: Family | None) -> Iterator[Finding]:
-    """Examine `seconds` of samples at rest; family : None if the data sheet is not known."""
+def examine_stream(
+    recording: Recording, nominal_hz: float, seconds: float, family: Family | None, remedy: str
+) -> Iterator[Finding]:
+    """Examine `seconds` of samples at rest.
+
+    Parameters
+    ----------
+    family : None if the data sheet is not known. remedy : for gaps.
+    """
     if recording.sensor.clock_ppm is not None:
         yield examine_clock("bridge's clock", recording.sensor.clock_ppm, float(recording.sensor.clock_std or np.nan))
     yield _rate(recording, nominal_hz)
-    yield _losses(recording, seconds)
+    yield _losses(recording, seconds, remedy)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
     hz = float(recording.sensor.rate_hz or nominal_hz)
     yield from dead_axes(recording)
@@ -97,17 +105,15 @@ def _find_rate_change(recording: Recording) -> tuple[float, float, float] | None
     return float(recording.t[at] - recording.t[0]), 1.0 / first, 1.0 / last
 
 
-def _losses(recording: Recording, asked_s: float) -> Finding:
+def _losses(recording: Recording, asked_s: float, remedy: str) -> Finding:
     gaps, seconds = int(recording.gap.sum()), float(recording.t[-1] - recording.t[0])
     data = {"samples": len(recording), "seconds": seconds, "gaps": gaps}
     samples = f"{len(recording)} samples in {seconds:.1f} s"
     if gaps:
-        remedy = "shorten the wires, check connectors and supply, or slow the bus down"
         return Finding("losses", Mark.BAD, f"{gaps} gap{'' if gaps == 1 else 's'} in {samples}", remedy, data)
     complete = seconds > asked_s - ENDS_S
     late = "" if complete else f", though {asked_s:g} s were asked for"
-    remedy = "the samples began late: close other programs on this computer, and measure again"
-    return Finding.check("losses", complete, f"none of {samples}{late}", remedy, data)
+    return Finding.check("losses", complete, f"none of {samples}{late}", Loss.LATE.remedy, data)
 
 
 def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str) -> Finding:

@@ -46,7 +46,7 @@ def load_capture(*paths: Path) -> Recording:
     elif recorder is CHIP:
         recording = decode(session.accesses(), session.name)
     else:
-        recording = resolve_name(recorder.decode)(one_by_one(session.accesses()), session.name)
+        recording = decode(one_by_one(session.accesses()), session.name, resolve_name(recorder.decoder))
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
     if len(recording) < 2:

@@ -25,13 +25,13 @@ class Recorder:
     version : number, or a word and a number. A capture of another version of the same driver is decoded, not replayed.
     config : class of the sensor's settings in the head.
     opened : "module:class" of an OpenedSource, whose `replayed` opens a replay.
-    decode : "module:function" from accesses, one by one, and a name to a Recording.
+    decoder : "module:class" of the decoder of its accesses.
     """
 
     version: int | str
     config: type[Config]
     opened: str
-    decode: str = ""
+    decoder: str = ""
 
     @property
     def family(self) -> str:
@@ -39,12 +39,12 @@ class Recorder:
         return _family(self.version)
 
 
-CHIP = Recorder(DRIVER_VERSION, Config, "mpucal.sources.chip:OpenedChip")
+CHIP = Recorder(DRIVER_VERSION, Config, "mpucal.sources.chip:OpenedChip", "mpucal.chip.decode:Decoder")
 VEHICLE = Recorder(MAVLINK_VERSION, RateOnlyConfig, "mpucal.vehicle.source:OpenedVehicle")
 RECORDERS = [
     CHIP,
     VEHICLE,
-    Recorder(IIO_VERSION, RateOnlyConfig, "mpucal.iio_device.source:OpenedIio", "mpucal.iio.decode:decode"),
+    Recorder(IIO_VERSION, RateOnlyConfig, "mpucal.iio_device.source:OpenedIio", "mpucal.iio.decode:IioDecoder"),
 ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -227,19 +226,3 @@ class IioDecoder:
         texts = self.texts(device)
         scale = read_number(texts, f"{TEMP}_scale", default=1.0)
         self._temperature = (count + read_number(texts, f"{TEMP}_offset", default=0.0)) * scale / 1000
-
-
-def decode(accesses: Iterable[Transaction], name: str = "recording") -> Recording:
-    """Decode `accesses` to a recording; they may be cut off at the end.
-
-    Raises
-    ------
-    RecordingError : fewer than two samples. ChipError : attributes that are not plausible.
-    """
-    decoder = IioDecoder(name)
-    for access in accesses:
-        decoder.feed(access)
-    recording = decoder.recording()
-    if len(recording) < 2:
-        raise RecordingError(f"{name} holds {len(recording)} samples", "record for longer")
-    return recording

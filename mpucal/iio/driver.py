@@ -14,11 +14,13 @@ from typing import NamedTuple
 from ..chip.access import Bus
 from ..chip.config import Config
 from ..chip.driver import DEAD_NS
+from ..chip.losses import Loss
+from ..chip.port import Port
 from ..data import Recording, Samples, Sensor
 from ..errors import BusError, ChipError, EndOfCapture, NoAnswer, UsageError
 from .attributes import ACCEL, AXES, GYRO, TEMP
 from .decode import IioDecoder
-from .setup import DeviceSetup, FollowedFiles
+from .setup import DeviceSetup
 
 DEVICE = re.compile(r"(?:iio:)?(?:device)?(\d+)")
 
@@ -35,9 +37,10 @@ class Devices(NamedTuple):
         return tuple(dict.fromkeys(self))
 
     @property
-    def by_kind(self) -> dict[str, str]:
-        """Device of each sensor, ACCEL and GYRO."""
-        return {ACCEL: self.accel, GYRO: self.gyro}
+    def kinds(self) -> dict[str, list[str]]:
+        """Sensors of each device: ACCEL, GYRO or both."""
+        by_kind = {ACCEL: self.accel, GYRO: self.gyro}
+        return {each: [kind for kind, device in by_kind.items() if device == each] for each in self.each}
 
     @classmethod
     def parse(cls, text: str) -> Devices:
@@ -95,7 +98,7 @@ class IioDriver:
     ) -> None:
         self._devices, self._config, self._say, self._trigger = devices, config, say, trigger
         self._decoder = IioDecoder(name)
-        self._files = FollowedFiles(files, self._decoder)
+        self._files = Port(files, self._decoder, tries=1)
         self._each: list[DeviceSetup] = []
         self.buffered = False
         self._next_ns = self._fruitless_ns = self._warm_ns = 0
@@ -115,10 +118,7 @@ class IioDriver:
         ------
         BusError : no such device, or it cannot be written. ChipError : no such sensor, or no trigger.
         """
-        self._each = [
-            DeviceSetup(self._files, each, [kind for kind, of in self._devices.by_kind.items() if of == each])
-            for each in self._devices.each
-        ]
+        self._each = [DeviceSetup(self._files, self._decoder, *each) for each in self._devices.kinds.items()]
         try:
             running = [each.start(self._config, self._trigger) for each in self._each]
             if any(running) and not all(running):
@@ -178,10 +178,7 @@ class IioDriver:
     def stop(self) -> None:
         """Stop the buffers, and restore the attributes."""
         if self._decoder.gaps:
-            self._say(
-                f"samples are missing in {self._decoder.gaps} places: the kernel's buffer overran, or the trigger fired"
-                " late; a lower --rate helps"
-            )
+            self._say(f"samples are missing in {self._decoder.gaps} places: {Loss.KERNEL.what}; {Loss.KERNEL.remedy}")
         self._restore()
 
     def _restore(self) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 
-from ..chip.access import Bus, Transaction
 from ..chip.config import Config
+from ..chip.port import Port
 from ..errors import BusError, ChipError, NoAnswer
 from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, bits_of, full_scale, parse_available
 from .decode import ENABLE, FREQUENCY, IioDecoder
@@ -44,40 +44,12 @@ READ_SUFFIXES = (
 RANGE_TOLERANCE = 1.01
 
 
-class FollowedFiles:
-    """Files of the kernel, each access to which `decoder` follows; `now_ns` is the last time of their clock."""
-
-    def __init__(self, files: Bus, decoder: IioDecoder) -> None:
-        self._files, self.decoder = files, decoder
-        self.now_ns = 0
-
-    def read(self, place: str, count: int) -> bytes:
-        """Read up to `count` bytes of a file."""
-        reply = self._files.read(place, count)
-        self._follow(Transaction("read", place, count, reply.data, reply.t_ns))
-        return reply.data
-
-    def write(self, place: str, text: str) -> None:
-        """Write a file."""
-        data = text.encode()
-        self._follow(Transaction("write", place, len(data), data, self._files.write(place, data)))
-
-    def sleep_until(self, t_ns: int) -> None:
-        """Wait until the clock shows `t_ns`."""
-        self._files.sleep_until(t_ns)
-        self.now_ns = max(self.now_ns, t_ns)
-
-    def _follow(self, access: Transaction) -> None:
-        self.now_ns = max(self.now_ns, access.t_ns)
-        self.decoder.feed(access)
-
-
 class DeviceSetup:
     """Attributes and buffer of a device.
 
     Parameters
     ----------
-    kinds : of its sensors that are used, ACCEL and GYRO.
+    files : of the kernel, which `decoder` follows. kinds : of its sensors that are used, ACCEL and GYRO.
 
     Attributes
     ----------
@@ -88,8 +60,8 @@ class DeviceSetup:
     BusError : no such device. ChipError : no such sensor.
     """
 
-    def __init__(self, files: FollowedFiles, device: str, kinds: Sequence[str]) -> None:
-        self._files, self.device, self.kinds = files, device, kinds
+    def __init__(self, files: Port, decoder: IioDecoder, device: str, kinds: Sequence[str]) -> None:
+        self._files, self._decoder, self.device, self.kinds = files, decoder, device, kinds
         self._old: list[tuple[str, str]] = []
         self.names = frozenset(self.read("", LIST_BYTES).split("\n"))
         for kind in kinds:
@@ -122,15 +94,17 @@ class DeviceSetup:
         held = self.read(name)
         if held == text or _equal(held, text):
             return held
-        self._files.write(f"{self.device}/{name}", text)
+        self._write(name, text)
         self._old.append((name, held))
         return self.read(name)
 
     def restore(self) -> None:
         """Write the old values, the last one first; raise BusError if that fails."""
         while self._old:
-            name, text = self._old.pop()
-            self._files.write(f"{self.device}/{name}", text)
+            self._write(*self._old.pop())
+
+    def _write(self, name: str, text: str) -> None:
+        self._files.write_block(f"{self.device}/{name}", text.encode())
 
     def start(self, config: Config, trigger: str | None) -> bool:
         """Set rate and ranges, and start the buffer if there is one; return True if a buffer runs.
@@ -158,7 +132,7 @@ class DeviceSetup:
         if CLOCK in names:
             self.set(CLOCK, "monotonic")
         self._enable_channels()
-        rate_hz = self._files.decoder.rate_hz(self.device) or config.rate_hz
+        rate_hz = self._decoder.rate_hz(self.device) or config.rate_hz
         self.set(LENGTH, str(round(BUFFER_S * rate_hz)))
         if WATERMARK in names:
             self.set(WATERMARK, str(max(1, round(config.period_s * rate_hz))))
@@ -182,7 +156,7 @@ class DeviceSetup:
         wanted = {ACCEL: config.accel_range_g, GYRO: config.gyro_range_dps}
         for kind in self.kinds:
             name = f"{kind}_scale"
-            bits = bits_of(kind, self._files.decoder.texts(self.device), self._files.decoder.elements(self.device))
+            bits = bits_of(kind, self._decoder.texts(self.device), self._decoder.elements(self.device))
             if bits is None or not {name, f"{name}_available"} <= self.names:
                 continue
             texts = self.read(f"{name}_available").split()

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import replace
 
 from ..chip.families import PARTS
+from ..chip.losses import Loss
 from ..doctor.finding import Finding, Mark
 from ..doctor.measure import examine_stream
 from ..errors import SourceError
@@ -51,10 +52,9 @@ def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
         # Polled channels have no rate of their own.
         nominal_hz = rate_hz if driver.buffered else recording.rate_hz
         # The driver's time stamps are those of its interrupts: the whole is uncertain by half an interval at each end.
-        sensor = replace(recording.sensor, clock_std=0.5 / len(recording))
-        yield from examine_stream(
-            replace(recording, sensor=sensor), nominal_hz, seconds, None if part is None else part.family
-        )
+        recording = replace(recording, sensor=replace(recording.sensor, clock_std=0.5 / len(recording)))
+        family = None if part is None else part.family
+        yield from examine_stream(recording, nominal_hz, seconds, family, Loss.KERNEL.remedy)
     else:
         what = f"{len(recording)} samples in {seconds:g} s"
         yield Finding("stream", Mark.BAD, what, "look in `dmesg` for the driver and its interrupts")

@@ -20,6 +20,7 @@ import numpy as np
 
 from ..chip.config import Config
 from ..chip.offsets import Words, word_difference
+from ..chip.port import Port
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..disk.atomic import write_atomically
 from ..errors import ChipError, OutputError
@@ -27,7 +28,7 @@ from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
 from ..iio.attributes import ACCEL, AXES, mount_matrix, read_scale
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
-from ..iio.setup import POLLED, DeviceSetup, FollowedFiles
+from ..iio.setup import POLLED, DeviceSetup
 from ..rests.stillness import is_untouched
 from ..result.calibration import Calibration
 from ..result.journal import Journal
@@ -67,7 +68,8 @@ class KernelSink:
     def __init__(self, source: OpenedIio, journal: Journal | None = None) -> None:
         self._source, self._journal = source, journal or Journal()
         self._decoder = IioDecoder("the kernel's driver")
-        self._attributes = DeviceSetup(FollowedFiles(source.bus, self._decoder), source.devices.accel, [ACCEL])
+        files = Port(source.bus, self._decoder, tries=1)
+        self._attributes = DeviceSetup(files, self._decoder, source.devices.accel, [ACCEL])
         name = f"61-mpucal-{source.devices.accel.replace(':', '-')}.rules"
         self._rule = None if source.rules is None else source.rules / name
         self.where = f"{source.devices.accel} ({self._attributes.read('name')})"

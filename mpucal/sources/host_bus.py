@@ -9,8 +9,8 @@ from contextlib import contextmanager
 
 from ..chip.access import Reply
 from ..chip.families import PARTS
+from ..chip.losses import Loss
 from ..chip.registers import ACCEL_XOUT_H, FIFO_COUNT_H, FIFO_R_W
-from ..chip.transfer_stats import LATE_REMEDY
 from ..errors import BusError, LateRead, NoAnswer
 from .i2c_errors import no_answer_error
 
@@ -143,10 +143,9 @@ class ReadTimer:
             self._shortest_ns[register, count] = shortest_ns
             if took_ns - shortest_ns <= LATE_NS or not _is_timed(register, count):
                 return Reply(data, t_ns)
-        raise LateRead(
-            f"a read took {(took_ns - shortest_ns) / 1e6:.0f} ms longer than usual, so that its time is not known",
-            LATE_REMEDY,
-        )
+        longer_ms = (took_ns - shortest_ns) / 1e6
+        what = f"a read took {longer_ms:.0f} ms longer than usual, so that its time is not known"
+        raise LateRead(what, Loss.DELAYED.remedy)
 
 
 def _is_timed(register: int | str, count: int) -> bool:

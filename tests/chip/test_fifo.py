@@ -9,7 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mpucal.chip.families import part_of
-from mpucal.chip.fifo import DROPPED_FRAMES, FifoDecoder, FifoFault
+from mpucal.chip.fifo import DROPPED_FRAMES, FifoDecoder
+from mpucal.chip.losses import Loss
 from mpucal.chip.settings import Settings
 
 SETTINGS = Settings(part_of(0x68), smplrt_div=4, dlpf_cfg=3, fs_sel=1, afs_sel=1)
@@ -95,17 +96,17 @@ def test_samples_do_not_depend_on_how_polls_cut_them(sizes, equal):
 def test_misaligned_frames_are_noticed_at_the_first(shift):
     decoder = fresh()
     stream = packed(*[(100, -200, 8192, -2000, 950, -900, 700)] * 6)
-    assert poll(decoder, stream[shift : shift + 5 * 14], 1) is FifoFault.MISALIGNED
+    assert poll(decoder, stream[shift : shift + 5 * 14], 1) is Loss.MISALIGNED
     assert len(decoder.take()) == 0
 
 
 @pytest.mark.parametrize(
     ("data", "overflow", "fault"),
     [
-        pytest.param(packed(QUIET), True, FifoFault.OVERFLOW, id="overflow while reading"),
-        pytest.param(b"", True, FifoFault.OVERFLOW, id="overflow before"),
-        pytest.param(packed(QUIET)[:-1], False, FifoFault.MISALIGNED, id="a part of a frame"),
-        pytest.param(packed(QUIET, (*QUIET[:3], -1500, *QUIET[4:])), False, FifoFault.MISALIGNED, id="jump"),
+        pytest.param(packed(QUIET), True, Loss.OVERFLOW, id="overflow while reading"),
+        pytest.param(b"", True, Loss.OVERFLOW, id="overflow before"),
+        pytest.param(packed(QUIET)[:-1], False, Loss.MISALIGNED, id="a part of a frame"),
+        pytest.param(packed(QUIET, (*QUIET[:3], -1500, *QUIET[4:])), False, Loss.MISALIGNED, id="jump"),
     ],
 )
 def test_a_poll_that_is_not_accepted_leaves_a_gap(data, overflow, fault):
@@ -126,7 +127,7 @@ def test_a_frame_that_repeats_itself_is_not_delivered(cut):
     faults = [poll(decoder, packed(*before, *stuck[:cut]), 1)]
     if faults[0] is None:
         faults.append(poll(decoder, packed(*stuck[cut:]), 2))
-    assert faults[-1] is FifoFault.STUCK
+    assert faults[-1] is Loss.STUCK
     # The first frame of the run may be a valid one.
     assert len(decoder.take()) == (0 if len(faults) == 1 else 4 if cut == 1 else 3)
     decoder.reset()

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from mpucal.chip.access import Transaction
 from mpucal.chip.config import Config
+from mpucal.chip.decode import decode
 from mpucal.errors import BusError, ChipError, MpucalError, NoAnswer, UsageError
-from mpucal.iio import decode
 from mpucal.iio.decode import IioDecoder
 from mpucal.iio.driver import Devices, IioDriver
 from mpucal.iio_device import source
@@ -127,7 +127,7 @@ def test_polled_channels_are_interpolated_to_common_times(tree):
         for i, channel in enumerate(CHANNELS):
             t_ns = row * 10_000_000 + i * 1_000_000
             accesses.append(Transaction("read", f"iio:device0/{channel}_raw", 4096, b"%d" % (t_ns // 100_000), t_ns))
-    recording = decode.decode(accesses)
+    recording = decode(accesses, decoder_of=IioDecoder)
     assert len(recording) == 19
     np.testing.assert_allclose(np.ptp(recording.acc, axis=1), 0, atol=1e-12)
     np.testing.assert_allclose(recording.acc[:, 0] / (9.80665 / 16384), recording.t * 1e4)
@@ -246,7 +246,7 @@ def test_damaged_accesses_are_decoded_or_reported(accesses, data):
         text = data.draw(st.sampled_from([*ODD_TEXTS, None]))
         damaged[i : i + 1] = [] if text is None else [replace(damaged[i], data=text)]
     with suppress(MpucalError):
-        decode.decode(damaged)
+        decode(damaged, decoder_of=IioDecoder)
 
 
 def test_an_attribute_that_a_driver_does_not_answer_is_left_out(monkeypatch):
