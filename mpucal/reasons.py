@@ -42,12 +42,14 @@ class Reason:
     Attributes
     ----------
     code : key of KINDS. what, remedy : a clause each: what is wrong, what to do. refuse : the calibration is refused.
+    span : s since the recording began, in which it happened; None for what is wrong throughout.
     """
 
     code: str
     what: str
     remedy: str
     refuse: bool
+    span: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.code not in KINDS:
@@ -103,7 +105,7 @@ class Kind:
 
 
 def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: object) -> Reason:
-    """Return a reason, with `numbers` in the places of its sentence.
+    """Return a reason, with `numbers` in the places of its sentence, of which `begin` and `end` are its span.
 
     Raises
     ------
@@ -113,11 +115,14 @@ def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: obje
     if (refuse is None) == (row.refuse is None):
         raise ValueError(f"{code}, {sentence}: either the table or the check decides on a refusal, not both")
     decided = bool(refuse if row.refuse is None else row.refuse)
-    return Reason(code, row.what.format(**numbers), row.remedy.format(**numbers), decided)
+    begin, end = numbers.get("begin"), numbers.get("end")
+    span = (begin, end) if isinstance(begin, float) and isinstance(end, float) else None
+    return Reason(code, row.what.format(**numbers), row.remedy.format(**numbers), decided, span)
 
 
-# after a reason against the gyroscope, where an estimate is possible without it
+# after a reason against the gyroscope, or against a part of the recording, where an estimate is possible without it
 OF_RESTS = ": D and b_a are estimated from the rests alone, in the accelerometer's own axes"
+OF_A_PART = ": D and b_a are estimated from what was recorded {when} {seconds:.0f} s alone"
 
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 KINDS: Mapping[str, Kind] = {code: Kind.of(rows) for code, rows in _TABLE.items()}

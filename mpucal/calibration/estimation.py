@@ -1,4 +1,4 @@
-"""Estimation of a recording: with the gyroscope, from the rests alone, or from the part before a sensor clipped."""
+"""Estimation of a recording: with the gyroscope, from the rests alone, or from a part of it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
-from ..reasons import OF_RESTS, Reason
+from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
 from .checks import CONTRADICTED, NO_GYROSCOPE, find_gyroscope_fault, find_reasons, is_unusable
+from .checks.estimate import GOOD_RMS_MPS2
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hypotheses import SURE, Explanation, explain, gyroscope_change, remove_change
@@ -34,8 +35,8 @@ def estimate(
 ) -> tuple[Evidence, Mapping[str, str]]:
     """Estimate as `calibrate` does; return the evidence, with the fit and its covariance, and the model and why.
 
-    Where the gyroscope is at fault and the rests suffice, the estimate uses the rests alone. Where a sensor was at the
-    end of its range and the part before is good by itself, the estimate uses that part.
+    Where the gyroscope is at fault and the rests suffice, the estimate uses the rests alone. Where the sensor changed,
+    or was at the end of its range, and a part without that is good by itself, the estimate uses that part.
 
     Raises
     ------
@@ -53,11 +54,13 @@ def estimate(
         return whole
     at_fault = find_gyroscope_fault(whole[0])
     if at_fault is None:
-        return _before_clipping(whole[0]) or whole
+        return _of_a_part(whole[0]) or whole
     of_rests = _of_rests(before, at_fault)
     if refusing := tuple(reason for reason in find_reasons(of_rests) if reason.refuse):
+        if NO_GYROSCOPE.reason(before) is not None:
+            return replace(whole[0], against_rests=refusing), whole[1]
         # other faults of the gyroscope can be mended, and then the rests need not be enough
-        return (replace(whole[0], against_rests=refusing) if NO_GYROSCOPE.reason(before) else whole[0]), whole[1]
+        return _of_a_part(whole[0]) or whole
     if at_fault == CONTRADICTED.reason(whole[0]) and _is_known_better(whole[0], of_rests):
         return whole
     return of_rests, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
@@ -69,22 +72,35 @@ def _is_known_better(evidence: Evidence, other: Evidence) -> bool:
     return is_trustworthy(evidence) and own < others
 
 
-def _before_clipping(evidence: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
-    """Return the estimate up to the last rest before a sensor was at the end of its range; None if it is not good."""
-    recording, flat = evidence.recording, evidence.flat
+def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
+    """Return the estimate of a part, from rest to rest, that is good by itself; None where there is none, or no need.
+
+    The part after what changed the sensor is of what it is now. The part before is used only where all of the recording
+    tells less than a good calibration. The part before a sensor was at the end of its range needs no reservation.
+    """
+    recording, flat = whole.recording, whole.flat
+    changed = next((reason for reason in find_reasons(whole) if reason.span is not None), None)
     clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
-    if flat is None or not len(clipped):
+    if flat is None or (changed is None and not len(clipped)):
         return None
-    ends = RestFinder(recording, flat).typical()[:, 1]
-    calm = recording.part(0, int(ends[ends <= clipped[0]].max(initial=0)))
-    if len(calm) <= flat.last:
-        return None
-    of_calm, chosen = _with_gyroscope(replace(evidence, recording=calm, flat=None, fit=None, model="auto", claim=None))
-    if of_calm.fit is None or find_reasons(of_calm):
-        return None
-    seconds = calm.t[-1] - calm.t[0]
-    left_out = f"; a sensor was at the end of its range later, and what follows {seconds:.1f} s is left out"
-    return of_calm, {**chosen, "why": chosen["why"] + left_out}
+    t, (starts, ends) = recording.t - recording.t[0], RestFinder(recording, flat).typical().T
+    span = None if changed is None else changed.span
+    first, last = (clipped[0], len(t)) if span is None else np.searchsorted(t, span)
+    before = "before", "what follows", 0, int(ends[ends <= first].max(initial=0))
+    after = "after", "what precedes", int(starts[starts >= last].min(initial=len(t))), len(t)
+    known = whole.uncertainty is not None and whole.uncertainty.rms_mps2 <= GOOD_RMS_MPS2
+    for when, left_out, begin, end in [before] if changed is None else [after] if known else [after, before]:
+        if end - begin <= flat.n:
+            continue
+        seconds = t[end - 1] if when == "before" else t[begin]
+        part, chosen = _with_gyroscope(replace(whole.part(begin, end), model="auto"))
+        if part.fit is None or find_reasons(part):
+            continue
+        if changed is not None:
+            what = changed.what + OF_A_PART.format(when=when, seconds=seconds)
+            part = replace(part, changed=replace(changed, what=what, refuse=False))
+        return part, {**chosen, "why": f"{chosen['why']}; {left_out} {seconds:.1f} s is left out"}
+    return None
 
 
 def _of_rests(before: Evidence, at_fault: Reason) -> Evidence:
@@ -105,8 +121,9 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None
     end = None if flat is None else find_reset(recording, flat)
     if end is not None:
-        recording = recording.part(0, end)
-    before = replace(before, recording=recording, flat=flat)
+        before = before.part(0, end)
+        recording = before.recording
+    before = replace(before, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
     choice, explanations, freed = _fit(recording, flat, gravity, model)

@@ -38,6 +38,8 @@ class Evidence:
 
     gravity_anyway : the caller confirms a gravity [m/s^2] outside the range found on Earth.
     gyroscope : why the estimate uses the rests alone; None where it does not, or where that was asked for.
+    changed : what changed the sensor before or after the part of the recording that the estimate uses alone, or None.
+    first : sample of the whole recording with which this one begins.
     decoded : the recording's words, before anything was masked, and how they were corrected.
     against_rests : why it cannot use the rests alone, where nothing else was recorded.
     """
@@ -50,8 +52,21 @@ class Evidence:
     claim: UncertaintyClaim | None = None
     gravity_anyway: bool = False
     gyroscope: Reason | None = None
+    changed: Reason | None = None
+    first: int = 0
     decoded: Decoded | None = None
     against_rests: tuple[Reason, ...] = ()
+
+    def part(self, first: int, last: int) -> Evidence:
+        """Return the evidence of the samples first..last-1, before their estimation."""
+        decoded = None if self.decoded is None else self.decoded.part(first, last)
+        recording = self.recording.part(first, last)
+        return replace(self, recording=recording, first=first, decoded=decoded, flat=None, fit=None, claim=None)
+
+    @property
+    def is_of_now(self) -> bool:
+        """True if the sensor did not change after what the estimate uses."""
+        return self.changed is None or self.first > 0
 
     @property
     def rest(self) -> Flat:

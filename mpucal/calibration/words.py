@@ -46,6 +46,10 @@ class Words(NamedTuple):
     counts: Counts
     lsb: float
 
+    def part(self, first: int, last: int) -> Words:
+        """Return the words of the samples first..last-1."""
+        return self._replace(counts=self.counts[first:last])
+
 
 class Decoded(NamedTuple):
     """Recording of true words.
@@ -57,6 +61,11 @@ class Decoded(NamedTuple):
     recording: Recording
     words: tuple[Words | None, Words | None]
     corrected: str = ""
+
+    def part(self, first: int, last: int) -> Decoded:
+        """Return the samples first..last-1."""
+        acc, gyr = (None if each is None else each.part(first, last) for each in self.words)
+        return Decoded(self.recording.part(first, last), (acc, gyr), self.corrected)
 
 
 def _words_of(recording: Recording) -> tuple[Words | None, Words | None]:

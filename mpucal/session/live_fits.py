@@ -96,15 +96,16 @@ class Fits:
         self._tried, self._since = evidence, len(recording)
         reasons = find_reasons(evidence)
         # The rests may suffice for an estimate; without a gyroscope nothing can be verified.
-        told = verdict(reasons) if evidence.gyroscope is None else REFUSED
+        told = verdict(reasons) if evidence.gyroscope is None and evidence.is_of_now else REFUSED
         return Tried(told, _most_specific_reason(reasons, evidence.recording))
 
     def _check(self, of: int) -> Event:
         evidence = self._tried
         if evidence is None or evidence.fit is None or evidence.flat is None:
             return Checked((), False, reason("verification_failed", "nothing"))
-        recording = with_masks(self._store.recording())
-        rests = new_orientations(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
+        recording, first = with_masks(self._store.recording()), evidence.first
+        after = recording.part(first, len(recording))
+        rests = new_orientations(after, evidence.flat, evidence.fit, self._plan.gravity, self._since - first)
         unseen = select_unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
         contradiction = next((against for against in find_reasons(evidence) if against.code == CONTRADICTION), None)
         return judge_verification(rests, unseen[:of], of, recording, contradiction)

@@ -90,7 +90,7 @@ def find_reasons(e: Evidence) -> list[Reason]:
         return [only[0], *e.against_rests]
     # A fit with the gyroscope exists only where the recording is usable.
     rows = [row for row in TABLE if not (row.of_gyroscope if of_rests else row.unusable and e.fit is not None)]
-    reasons = [*([] if e.gyroscope is None else [e.gyroscope]), *_found(e, rows)]
+    reasons = [known for known in (e.gyroscope, e.changed) if known is not None] + [*_found(e, rows)]
     return sorted(reasons, key=lambda reason: not reason.refuse)
 
 

@@ -58,7 +58,7 @@ def _stuck(e: Evidence, words: Words | None, values: Vector, sensor: str, unit: 
     if words is None:
         low = _odd_steps(values)
     else:
-        stuck, first = _stuck_bits(words.counts[: len(values)], e.recording.gap)
+        stuck, first = _stuck_bits(words.counts, e.recording.gap)
         low = _low_bits(stuck, first, words.lsb)
         # a single bit is told from one that lacks, among the low ones, all below it
         one = np.argwhere(stuck & ~np.logical_and.accumulate(stuck, axis=0))

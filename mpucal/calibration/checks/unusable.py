@@ -130,7 +130,7 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
     """Find an axis of the accelerometer that is constant, throughout or for seconds while the others show a turn."""
     axes = _constant_axes(e, e.recording.acc, e.rest.Sigma_a, QUIETEST_ACC_MPS2)
     if axes:
-        return reason("bits_stuck", "constant", axes=axes, when="in every sample")
+        return reason("bits_stuck", "constant", axes=axes)
     if np.sqrt(e.rest.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.origin is Origin.VEHICLE:
         return None  # data that are computed, or rounded on their way, repeat
     least, t = max(round(STUCK_S * e.recording.rate_hz), FEWEST_SAMPLES), e.recording.t - e.recording.t[0]
@@ -138,8 +138,7 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
         for first, last in true_runs(np.diff(column) == 0.0).tolist():
             turn = np.ptp(e.recording.acc[first : last + 1], axis=0).max()
             if last + 1 - first >= least and turn > LEAST_TURN_RAD * e.gravity:
-                when = f"from {t[first]:.0f} to {t[last]:.0f} s"
-                return reason("bits_stuck", "constant", axes=axis, when=when)
+                return reason("bits_stuck", "frozen", axis=axis, begin=float(t[first]), end=float(t[last]))
     return None
 
 
