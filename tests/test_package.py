@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 import mpucal
 from mpucal.calibration import MODELS
 from mpucal.cli import commands
-from mpucal.simulated.chip.options import PARSERS
+from mpucal.simulated.chip.options import ChipOptions
 
 PROJECT = Path(__file__).parents[1]
 DECLARED = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]
@@ -65,7 +65,7 @@ def test_links_lead_somewhere(text):
     assert [link for link in links if not (page.parent / link).exists()] == []
 
 
-@pytest.mark.parametrize(("page", "names"), [("method.md", MODELS), ("simulated-chip.md", PARSERS)])
+@pytest.mark.parametrize(("page", "names"), [("method.md", MODELS), ("simulated-chip.md", ChipOptions.parsers())])
 def test_a_page_names_each(page, names):
     text = (PROJECT / "docs" / page).read_text(encoding="utf-8")
     assert [name for name in names if f"`{name}`" not in text] == []

@@ -36,6 +36,24 @@ class Stance:
     grip: float
 
 
+@dataclass(frozen=True)
+class Manner:
+    """Manner of a hand.
+
+    Attributes
+    ----------
+    grip : with which it pauses in an orientation. speed : of its moves, relative to the usual.
+    mishap : of the sensor, while it turns.
+    """
+
+    grip: float = IN_THE_HAND
+    speed: float = 1.0
+    mishap: type[Mishap] = Mishap
+
+
+USUAL = Manner()
+
+
 class Hand:
     """Base of all hands; a kind overrides the behaviour in which it differs.
 
@@ -48,19 +66,16 @@ class Hand:
     mishap : of the sensor in this hand.
     """
 
-    MISHAP: type[Mishap] = Mishap
-    GRIP = IN_THE_HAND
-    SPEED = 1.0
-
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, manner: Manner = USUAL) -> None:
         self._rng, self._reaction_rng = rng.spawn(2)
+        self._manner = manner
         self._prompts: deque[tuple[int, Prompt]] = deque()
         self._last: tuple[str, tuple[float, float, float] | None] | None = None
         self._leg: Leg = Hold(0, 0, IN_THE_HAND)
         self._task = "hold_still"
         self._down: Vector | None = None
         self._moved = False
-        self.mishap = self.MISHAP()
+        self.mishap = manner.mishap()
 
     def first_stance(self) -> Stance:
         """Return the board as it is picked up, with a random tilt."""
@@ -123,7 +138,7 @@ class Hand:
         """Return moves and pauses alternately; `aim` gives each move."""
         self._moved = not self._moved
         if self._moved:
-            return self.move(now, self.aim(now), self.GRIP)
+            return self.move(now, self.aim(now), self._manner.grip)
         return self.pause(now, PAUSE_S)
 
     def aim(self, now: Stance) -> Vector:
@@ -137,7 +152,7 @@ class Hand:
     def move(self, now: Stance, turn_rad: Vector, grip: float) -> Leg:
         """Return a leg that turns the board about a fixed axis; beyond 130 deg it takes longer."""
         longer = max(1.0, float(np.linalg.norm(turn_rad)) / TURN_RAD[1])
-        seconds = MOVE_S * longer / self.SPEED * self._rng.uniform(0.9, 1.1)
+        seconds = MOVE_S * longer / self._manner.speed * self._rng.uniform(0.9, 1.1)
         return Move(now.step, now.step + steps(seconds), turn_rad, (now.grip, grip))
 
     def turn_to(self, now: Stance, down: Vector, twist_rad: float = 0.0) -> Vector:

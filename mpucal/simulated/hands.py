@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import cycle
 from itertools import product as combinations
 
@@ -12,15 +13,15 @@ import numpy as np
 from ..data import Vector
 from . import rotation
 from .disturbance import Knock, Slip, Warmth
-from .hand import IN_THE_HAND, ON_THE_TABLE, PAUSE_S, TURN_RAD, Hand, Stance
+from .hand import IN_THE_HAND, ON_THE_TABLE, PAUSE_S, TURN_RAD, USUAL, Hand, Manner, Stance
 from .legs import Leg, Move, Tumble, steps
 
 
 class Guided(Hand):
     """Hand that turns to the requested orientation and waits there; without one it varies faces, edges and corners."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
-        super().__init__(rng)
+    def __init__(self, rng: np.random.Generator, manner: Manner = USUAL) -> None:
+        super().__init__(rng, manner)
         corners = np.array([c for c in combinations((-1.0, 0.0, 1.0), repeat=3) if any(c)])
         self._places = corners / np.linalg.norm(corners, axis=1, keepdims=True)
         self._visited: list[Vector] = []
@@ -56,23 +57,13 @@ class Guided(Hand):
         return turn
 
 
-class Placing(Guided):
-    """Hand that sets the board down in each orientation, and lets go of it."""
-
-    GRIP = ON_THE_TABLE
-
-
-class Wandering(Guided):
+class Wandering(Hand):
     """Hand that pauses in random orientations, whatever is requested."""
 
     def aim(self, now: Stance) -> Vector:
         """Return a turn by 50 to 130 deg about a random axis."""
         axis = self._rng.normal(size=3)
         return np.asarray(axis / np.linalg.norm(axis) * self._rng.uniform(*TURN_RAD))
-
-    def rotate(self, now: Stance) -> Leg:
-        """Return moves and pauses alternately."""
-        return Hand.rotate(self, now)
 
 
 class Repeating(Guided):
@@ -91,7 +82,7 @@ class Repeating(Guided):
             self._arrived = not self._arrived
             if self._arrived:
                 return self.pause(now, PAUSE_S)
-            return self.move(now, self.turn_to(now, self.inaccurate(next(self._again, down))), self.GRIP)
+            return self.move(now, self.turn_to(now, self.inaccurate(next(self._again, down))), IN_THE_HAND)
         leg = super().rotate(now)
         if not isinstance(leg, Move) and not any(np.array_equal(down, pose) for pose in self._shown):
             self._shown.append(down)
@@ -105,30 +96,6 @@ class OneAxis(Wandering):
     def aim(self, now: Stance) -> Vector:
         """Return a turn by 50 to 130 deg about x."""
         return np.array([self._rng.uniform(*TURN_RAD), 0.0, 0.0])
-
-
-class Hasty(Guided):
-    """Hand that follows the guidance four times as fast."""
-
-    SPEED = 4.0
-
-
-class Slipping(Guided):
-    """Hand that holds the board by its sensor, whose accelerometer slips on its mount."""
-
-    MISHAP = Slip
-
-
-class Knocking(Guided):
-    """Hand that knocks the board against something."""
-
-    MISHAP = Knock
-
-
-class Warming(Guided):
-    """Hand in the sun."""
-
-    MISHAP = Warmth
 
 
 class Random(Hand):
@@ -170,17 +137,19 @@ class Restless(Guided):
         return Move(now.step, now.step + steps(self._rng.uniform(0.3, 0.7)), turn, (now.grip, IN_THE_HAND))
 
 
-HANDS: dict[str, type[Hand]] = {
+HANDS: dict[str, Callable[[np.random.Generator], Hand]] = {
     "guided": Guided,
-    "placing": Placing,
+    # lets go of the board in each orientation
+    "placing": partial(Guided, manner=Manner(grip=ON_THE_TABLE)),
     "random": Random,
     "wandering": Wandering,
     "repeating": Repeating,
     "still": Motionless,
     "restless": Restless,
     "one_axis": OneAxis,
-    "hasty": Hasty,
-    "slipping": Slipping,
-    "knocking": Knocking,
-    "warming": Warming,
+    "hasty": partial(Guided, manner=Manner(speed=4.0)),
+    # the mishap comes while it turns, instead of at the time of a fault
+    "slipping": partial(Guided, manner=Manner(mishap=Slip)),
+    "knocking": partial(Guided, manner=Manner(mishap=Knock)),
+    "warming": partial(Guided, manner=Manner(mishap=Warmth)),
 }

@@ -1,11 +1,13 @@
-"""Parsers of `sim:key=value,...`, shared by the options of the simulated chip and the simulated vehicle."""
+"""Options `sim:key=value,...`: their base, and parsers of values that the chip's and the vehicle's share."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, ClassVar, Self, get_origin, get_type_hints
 
 from ..errors import UsageError, did_you_mean
 from .faults import Fault, Where, fault_kinds
@@ -15,38 +17,52 @@ FAULT = "fault"
 Parser = tuple[Callable[[str], Any], str]
 
 
-def parse_options(
-    text: str, parsers: Mapping[str, Parser], seed: int | None, others: str | None = None
-) -> dict[str, Any]:
-    """Return the values of `sim` or `sim:key=value,...` by key; faults that are given more than once add up.
+@dataclass(frozen=True)
+class SimulationOptions:
+    """Base of the options of a simulation: each field is a key, `Annotated` with its parser, unless it is REST."""
 
-    Parameters
-    ----------
-    seed : of its own option. others : key under which numbers with a name in capitals are collected.
+    # the field that takes numbers whose names are in capitals
+    REST: ClassVar[str | None] = None
 
-    Raises
-    ------
-    UsageError : an unknown key or value, a key given twice, or two seeds.
-    """
-    values: dict[str, Any] = {} if others is None else {others: {}}
-    words = text.partition(":")[2]
-    for word in words.split(",") if words else []:
-        key, equals, value = word.partition("=")
-        named = others is not None and key.isupper()
-        if not equals or not (named or key in parsers):
-            more = "" if others is None else ", or a parameter's name"
-            keys = f"its keys are {', '.join(parsers)}{more}{did_you_mean(key, parsers)}"
-            raise UsageError(f"sim: does not know {word!r}", keys)
-        made = _value(key, value, (number, "a number") if named else parsers[key])
-        if named:
-            values[str(others)][key] = made
-        elif key in values and key != FAULT:
-            raise UsageError(f"sim: {key} is given twice", "give it once")
-        else:
-            values[key] = (*values.get(key, ()), *made) if key == FAULT else made
-    if seed is not None and values.setdefault("seed", seed) != seed:
-        raise UsageError(f"sim: seed={values['seed']} and --seed {seed} differ", "give one of them")
-    return values
+    @classmethod
+    @cache
+    def parsers(cls) -> dict[str, Parser]:
+        """Return the parser of each key."""
+        hints = get_type_hints(cls, include_extras=True)
+        return {key: hint.__metadata__[0] for key, hint in hints.items() if get_origin(hint) is Annotated}
+
+    @classmethod
+    def parse(cls, text: str, seed: int | None = None) -> Self:
+        """Parse `sim` or `sim:key=value,...`; faults that are given more than once add up.
+
+        Parameters
+        ----------
+        seed : of its own option.
+
+        Raises
+        ------
+        UsageError : an unknown key or value, a key given twice, or two seeds.
+        """
+        parsers, rest = cls.parsers(), dict[str, float]()
+        values: dict[str, Any] = {} if cls.REST is None else {cls.REST: rest}
+        words = text.partition(":")[2]
+        for word in words.split(",") if words else []:
+            key, equals, value = word.partition("=")
+            named = cls.REST is not None and key.isupper()
+            if not equals or not (named or key in parsers):
+                more = "" if cls.REST is None else ", or a parameter's name"
+                keys = f"its keys are {', '.join(parsers)}{more}{did_you_mean(key, parsers)}"
+                raise UsageError(f"sim: does not know {word!r}", keys)
+            made = _value(key, value, (number, "a number") if named else parsers[key])
+            if named:
+                rest[key] = made
+            elif key in values and key != FAULT:
+                raise UsageError(f"sim: {key} is given twice", "give it once")
+            else:
+                values[key] = (*values.get(key, ()), *made) if key == FAULT else made
+        if seed is not None and values.setdefault("seed", seed) != seed:
+            raise UsageError(f"sim: seed={values['seed']} and --seed {seed} differ", "give one of them")
+        return cls(**values)
 
 
 def _value(key: str, text: str, parser: Parser) -> Any:

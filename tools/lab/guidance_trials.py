@@ -31,7 +31,7 @@ from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress,
 from mpucal.session.meter import TURN_WORDS
 from mpucal.session.plan import Plan
 from mpucal.simulated import rotation as quaternions
-from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
+from mpucal.simulated.hand import IN_THE_HAND, MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import HANDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
@@ -82,7 +82,7 @@ class WordFollower(Guided):
             axis = quaternions.product(quaternions.product(q, axis), quaternions.conjugate(q))
         miss = self._rng.normal(size=3)
         miss *= MISS_RAD * math.sqrt(self._rng.uniform()) / np.linalg.norm(miss)
-        leg = self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, self.GRIP)
+        leg = self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, IN_THE_HAND)
         self._turned_s = leg.last * STEP_S
         return leg
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +12,7 @@ from ...data import STANDARD_GRAVITY_MPS2
 from ...session.plan import Plan
 from ...sources.chip import OpenedChip
 from ...sources.kind import Request
-from ..disturbance import ARMS, Mishap
+from ..disturbance import ARMS
 from ..faults import begin_mishaps
 from ..hands import HANDS
 from ..motion import Motion
@@ -31,7 +30,6 @@ def open_simulated(
     gravity: float = STANDARD_GRAVITY_MPS2,
     seed: int | None = None,
     clock: SimulatedClock | None = None,
-    mishaps: Sequence[Mishap] = (),
 ) -> SimulatedBus:
     """Return the simulated chip that `sim:key=value,...` describes.
 
@@ -39,7 +37,6 @@ def open_simulated(
     ----------
     text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, arm, pace, fault, rate_error_ppm, D, b_a, K,
         b_omega, noise, temperature_c, khz. gravity : m/s^2 at the board. seed : of its own option.
-    mishaps : of the sensor, besides the faults of the text.
     clock : in place of that of `pace`.
 
     Raises
@@ -49,8 +46,8 @@ def open_simulated(
     options = ChipOptions.parse(text, seed)
     truth = _truth(options, gravity)
     of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
-    mishaps = (*begin_mishaps(options.fault), *mishaps)
-    motion = Motion(HANDS[options.hand](of_hand), of_motion, gravity, mishaps, ARMS[options.arm])
+    hand, mishaps = HANDS[options.hand](of_hand), begin_mishaps(options.fault)
+    motion = Motion(hand, of_motion, gravity, mishaps, ARMS[options.arm])
     model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
     if options.who_am_i is not None:
         model = replace(model, who_am_i=options.who_am_i)

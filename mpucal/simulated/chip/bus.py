@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,24 +19,8 @@ from ..sensor import SensorTruth
 from .chip import Chip
 
 
-class SimulatedClock(Protocol):
-    """Time in ns since the bus was opened."""
-
-    def now(self) -> int:
-        """Return the time."""
-        ...
-
-    def spend(self, ns: int) -> None:
-        """Spend `ns` on a transfer."""
-        ...
-
-    def sleep_until(self, t_ns: int) -> None:
-        """Wait until `t_ns`."""
-        ...
-
-
 class FastClock:
-    """Clock that only waiting moves on: waits return at once, and each run is the same."""
+    """Time in ns since the bus was opened, which only waiting moves on: waits return at once, each run is the same."""
 
     def __init__(self) -> None:
         self._now = 0
@@ -77,7 +61,8 @@ class RealClock:
         return time.monotonic_ns() - self._opened
 
 
-CLOCKS: dict[str, type[FastClock] | type[RealClock]] = {"fast": FastClock, "real": RealClock}
+SimulatedClock = FastClock | RealClock
+CLOCKS: dict[str, type[SimulatedClock]] = {"fast": FastClock, "real": RealClock}
 
 
 class FaultInjector:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Annotated
 
 import numpy as np
 
@@ -11,55 +11,11 @@ from ...data import Vector
 from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_CHIP, Fault, Where
 from ..hands import HANDS
-from ..option_text import FAULT, Parser, at_least, faults, number, one_of, parse_options, whole
+from ..option_text import SimulationOptions, at_least, faults, number, one_of, whole
 from .bus import CLOCKS, KHZ
 from .models import MODELS, OFFSETS
 
-
-@dataclass(frozen=True)
-class ChipOptions:
-    """Options of a simulated chip and its hand; None: drawn from the seed.
-
-    Attributes
-    ----------
-    chip, hand, arm, pace : a name each. who_am_i : another identity than the chip's own.
-    offsets : scale of the accelerometer offsets in LSB/g, or readonly.
-    seed : of the sensor, its noise and the hand. rate_error_ppm : of the sample clock.
-    D, K : (3, 3). b_a [m/s^2], b_omega [rad/s] : (3,).
-    fault : faults with their times. noise : factor of the data sheet's densities. temperature_c : of the die.
-    khz : bit rate of the bus.
-    """
-
-    chip: str = "mpu6050"
-    who_am_i: int | None = None
-    offsets: str = "2048"
-    seed: int = 0
-    hand: str = "guided"
-    arm: str = USUAL_ARM
-    pace: str = "fast"
-    rate_error_ppm: float | None = None
-    D: Vector | None = None
-    b_a: Vector | None = None
-    K: Vector | None = None
-    b_omega: Vector | None = None
-    fault: tuple[Fault, ...] = ()
-    noise: float = 1.0
-    temperature_c: float | None = None
-    khz: float = KHZ
-
-    @classmethod
-    def parse(cls, text: str, seed: int | None = None) -> Self:
-        """Parse `sim` or `sim:key=value,...`; vectors and matrices are by row, as 0.1/0.2/0.3.
-
-        Parameters
-        ----------
-        seed : of its own option.
-
-        Raises
-        ------
-        UsageError : an unknown key or value, a key given twice, or two seeds.
-        """
-        return cls(**parse_options(text, PARSERS, seed))
+MATRIX = "nine numbers with / between them, by row, that can be inverted"
 
 
 def _positive(text: str) -> float:
@@ -85,21 +41,35 @@ def _matrix(text: str) -> Vector:
     return matrix
 
 
-PARSERS: dict[str, Parser] = {
-    "chip": one_of(MODELS),
-    "who_am_i": (_identity, "a byte such as 0x68"),
-    "offsets": one_of(OFFSETS),
-    "seed": whole(0),
-    "hand": one_of(HANDS),
-    "arm": one_of(ARMS),
-    "pace": one_of(CLOCKS),
-    FAULT: faults(*OF_CHIP, Where.DEFECT, Where.HAND),
-    "rate_error_ppm": (number, "a number"),
-    "D": (_matrix, "nine numbers with / between them, by row, that can be inverted"),
-    "b_a": (_vector, "three numbers with / between them, in m/s^2"),
-    "K": (_matrix, "nine numbers with / between them, by row, that can be inverted"),
-    "b_omega": (_vector, "three numbers with / between them, in rad/s"),
-    "noise": at_least(0),
-    "temperature_c": (number, "a number of degrees Celsius"),
-    "khz": (_positive, "a number above 0"),
-}
+@dataclass(frozen=True)
+class ChipOptions(SimulationOptions):
+    """Options of a simulated chip and its hand; None: drawn from the seed.
+
+    Vectors and matrices are given by row, as 0.1/0.2/0.3.
+
+    Attributes
+    ----------
+    chip, hand, arm, pace : a name each. who_am_i : another identity than the chip's own.
+    offsets : scale of the accelerometer offsets in LSB/g, or readonly.
+    seed : of the sensor, its noise and the hand. rate_error_ppm : of the sample clock.
+    D, K : (3, 3). b_a [m/s^2], b_omega [rad/s] : (3,).
+    fault : faults with their times. noise : factor of the data sheet's densities. temperature_c : of the die.
+    khz : bit rate of the bus.
+    """
+
+    chip: Annotated[str, one_of(MODELS)] = "mpu6050"
+    who_am_i: Annotated[int | None, (_identity, "a byte such as 0x68")] = None
+    offsets: Annotated[str, one_of(OFFSETS)] = "2048"
+    seed: Annotated[int, whole(0)] = 0
+    hand: Annotated[str, one_of(HANDS)] = "guided"
+    arm: Annotated[str, one_of(ARMS)] = USUAL_ARM
+    pace: Annotated[str, one_of(CLOCKS)] = "fast"
+    fault: Annotated[tuple[Fault, ...], faults(*OF_CHIP, Where.DEFECT, Where.HAND)] = ()
+    rate_error_ppm: Annotated[float | None, (number, "a number")] = None
+    D: Annotated[Vector | None, (_matrix, MATRIX)] = None
+    b_a: Annotated[Vector | None, (_vector, "three numbers with / between them, in m/s^2")] = None
+    K: Annotated[Vector | None, (_matrix, MATRIX)] = None
+    b_omega: Annotated[Vector | None, (_vector, "three numbers with / between them, in rad/s")] = None
+    noise: Annotated[float, at_least(0)] = 1.0
+    temperature_c: Annotated[float | None, (number, "a number of degrees Celsius")] = None
+    khz: Annotated[float, (_positive, "a number above 0")] = KHZ
