@@ -6,14 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mpucal.calibration.masks import with_masks
 from mpucal.data import Recording
-from mpucal.errors import RecordingError
-from mpucal.rests.flat import find_flat, flat_statistics
-from mpucal.rests.intervals import RestFinder
 from mpucal.result.calibration import Calibration
 
-LEAST_REST_S = 1.0
+from .rivals import SHORTEST_S, Rests, Unfit
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:
@@ -25,14 +21,10 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
 
     Raises
     ------
-    RecordingError : the board rests neither at the start nor at the end.
+    Unfit : the board does not rest at the start, or, if it has to, at the end.
     """
-    recording = with_masks(recording)
-    flat = recording.flat or find_flat(recording)
-    if flat is None:
-        raise RecordingError(f"{recording.name}: no rest to begin with", "give a recording that begins at rest")
-    runs = RestFinder(recording, flat_statistics(recording, flat)).typical()
-    runs = runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * recording.rate_hz]
+    rests = Rests.of(recording)
+    recording, flat, runs = rests.recording, (rests.flat.first, rests.flat.last), rests.runs
     n, middle = len(recording), (flat[1] + len(recording)) // 2
     inner = runs[(runs[:, 0] > flat[1]) & (np.abs(runs.mean(1) - middle) < 0.25 * n)]
     if len(inner):
@@ -41,8 +33,8 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
         return replace(recording.part(0, cut), flat=flat), replace(recording.part(cut, n), flat=(0, last - cut))
     # a rest that began before the cut is cut, too
     first, last = np.maximum(runs[-1], middle).tolist() if len(runs) else (n, n)
-    if last < 0.9 * n or last - first < LEAST_REST_S * recording.rate_hz:
-        raise RecordingError(f"{recording.name}: no second rest", "give a recording that ends at rest")
+    if last < 0.9 * n or last - first < SHORTEST_S * recording.rate_hz:
+        raise Unfit("no second rest")
     backwards = reversed_in_time(recording.part(middle, n))
     return replace(recording.part(0, middle), flat=flat), replace(backwards, flat=(n - last, n - first))
 

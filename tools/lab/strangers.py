@@ -75,7 +75,7 @@ def halves_z(recording: Recording, gravity: float) -> tuple[float, ...]:
     """Return (12,) how the calibrations of the halves differ; empty where there are none."""
     try:
         one, other = (mpucal.calibrate(half, gravity=gravity) for half in halves(recording))
-    except MpucalError:
+    except (MpucalError, Unfit):
         return ()
     return agreement(one, other)
 
