@@ -1,37 +1,103 @@
-"""Each kind of chip that is claimed gives a good calibration; tests of tools/lab show the name of each part.
+"""Chips that are claimed: with faults and without, each ends in a true calibration or a true refusal.
 
-Sessions on chips of three families are in test_session_replay.py and cli/test_session.py.
+Each part is simulated from its row: the driver calls it by its name and knows its temperature. Sessions with faults are
+those of the campaign, and their replays those of test_session_replay.py.
 """
 
-import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-import mpucal
-from mpucal.__main__ import run
 from mpucal.calibration import calibrate
 from mpucal.calibration.hand import fit_hand
 from mpucal.chip.config import Config
+from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
+from mpucal.chip.families import PARTS
+from mpucal.errors import SourceError
 from mpucal.rests.flat import find_flat, flat_statistics
+from mpucal.result.calibration import GOOD
 from mpucal.session.events import Prompt, PromptKind
+from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
+from mpucal.sources.replay import Tap
+from tools.lab.sessions import NOTHING, Session, SilentOperator, by_command, judge_session
 
-# one of each behaviour; a part that differs by its identity alone is left out
-CHIPS = {
-    "mpu6500": "MPU-6500",
-    "mpu6500_512": "MPU-6500",
-    "mpu6880": "MPU-6880",
-    "clone98": "ICM-20689",
-    "icm20690": "ICM-20690",
-    "icm20602": "ICM-20602",
-    "mpu6886": "MPU-6886",
-    "mpu6050,fault=no_fifo": "MPU-6050",
-}
-TURNED = ("icm20690", "mpu6050,fault=no_fifo")
+FAULTS = tuple(fault_kinds(*OF_CHIP))
+HALF = -(-len(FAULTS) // 2)
+CHIPS = ("mpu6050", "mpu6500", "clone98")
+RECORDED_S, RATE_HZ, POLL_S = 45, 50.0, 0.2
+CODES, FARTHEST_Z = (0, 3, 4, 5), 6.0
+
+
+def recorded(words):
+    """Record a chip for so long, as far as it gives samples, and calibrate."""
+    plan = Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True)
+    bus, accesses, said = open_simulated(words), [], ""
+    tapped = Tap(bus, SimpleNamespace(transaction=accesses.append))
+    try:
+        Runner(Driver(tapped, plan.config), SilentOperator(), lambda *_: None, plan, (bus.hear,)).record(RECORDED_S)
+    except SourceError as error:
+        said = str(error)
+    try:
+        recording = decode(accesses)
+    except SourceError as error:
+        return Session(code=SourceError.exit_code, said=said or str(error))
+    return Session(calibrate(recording), bus.truth_document(), recording, said=said)
+
+
+@pytest.mark.parametrize("number", range(HALF))
+@settings(max_examples=1)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_no_pair_of_faults_makes_a_wrong_calibration_good(number, seed):
+    """Each fault strikes a recorded chip, beside another one; what is calibrated afterwards is true, or refused."""
+    rng = np.random.default_rng([seed, number])
+    faults = [Fault(name, round(float(rng.uniform(0.0, RECORDED_S)), 2)) for name in FAULTS[number::HALF]]
+    done = recorded(f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}")
+    ended = judge_session("", seed, done, "" if done.code in CODES else f"exit code {done.code}")
+    assert not ended.wrong, (faults, seed, ended)
+    assert ended.verdict != GOOD or max(map(abs, ended.z)) <= FARTHEST_Z, (faults, seed, ended)
+    assert ended.verdict != NOTHING or ended.said
+
+
+def parts():
+    """Each part as --bus sim: names it, with its name and the source of its row; revision C is one more."""
+    by_family = {model.family: name for name, model in reversed(MODELS.items())}
+    for who_am_i, part in PARTS.items():
+        yield f"{by_family[part.family]},who_am_i={who_am_i:#04x}", part.chip, part.family.source
+    yield "mpu6050c", "MPU-6050C", PARTS[0x68].family.source
+
+
+@pytest.mark.parametrize(("words", "name", "source"), [*parts()])
+def test_a_part_has_its_name_its_temperature_and_a_source(words, name, source):
+    bus = open_simulated(f"sim:chip={words},seed=4,temperature_c=27")
+    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    driver = Driver(bus, Config())
+    found = driver.start()
+    end_ns = driver.now_ns() + 5e8
+    while driver.now_ns() < end_ns:
+        driver.poll()
+    assert (found.chip, bool(source)) == (name, True)
+    assert driver.recording().temperature_c.mean() == pytest.approx(27, abs=0.3)
+    driver.stop()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "name", "source"), [*parts()])
+def test_a_session_on_a_part_ends_good(words, name, source):
+    done, document = by_command("--bus", f"sim:chip={words}", "--seed", "4", "--rate", "50", "--model", "hand")
+    assert (done.calibration.verdict, document["sensor"]["chip"]) == (GOOD, name), source
+    np.testing.assert_allclose(done.calibration.D, done.truth["D"], atol=2e-3)
+
+
 FLAT_S, TURNED_S = 12.0, 75.0
 
 
@@ -48,32 +114,16 @@ def turned(chip):
     return driver.recording(), np.array(bus.truth_document()["D"])
 
 
-# the others differ from these by what tests/chip shows: identity, ranges, size of the FIFO
-@pytest.mark.parametrize(
-    "chip", [name if name in TURNED else pytest.param(name, marks=pytest.mark.slow) for name in CHIPS]
-)
-def test_each_chip_is_named_and_its_calibration_is_good(chip):
+@pytest.mark.parametrize(("chip", "name"), [("icm20690", "ICM-20690"), ("mpu6050,fault=no_fifo", "MPU-6050")])
+def test_a_chip_with_samples_of_its_own_gives_a_good_calibration(chip, name):
+    """The other parts differ from these, and from the chips above, by what tests/chip shows."""
     recording, D = turned(chip)
-    assert recording.sensor.chip == CHIPS[chip]
+    assert recording.sensor.chip == name
     assert recording.temperature_c.mean() == pytest.approx(27, abs=0.3)
     assert not recording.gap.any()
     found = calibrate(recording, model="hand")
-    assert found.verdict == "good"
+    assert found.verdict == GOOD
     assert np.abs(found.D - D).max() < 3e-3
-
-
-@pytest.mark.slow
-def test_a_session_without_a_fifo_is_replayed_to_the_bit(tmp_path, capsys):
-    def session(*words):
-        run(["session", *words, "--yes", "--json", "--json-events"])
-        return {key: value for key, value in json.loads(capsys.readouterr().out).items() if key != "created"}
-
-    made = tmp_path / "made"
-    words = ["--bus", "sim:fault=no_fifo/nack@9", "--seed", "4", "--rate", "25", "--target", "quick", "--model", "hand"]
-    found = session(*words, "-o", str(made))
-    assert session("--replay", str(made), "-o", str(tmp_path / "again")) == found
-    assert [reason["code"] for reason in found["quality"]["reasons"]] == ["data_lost"]
-    assert mpucal.load(made / "capture.mcap").gap.sum() == 1
 
 
 @pytest.mark.slow

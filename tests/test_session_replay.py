@@ -1,4 +1,4 @@
-"""A session and its replay: the same words, the same bits; on chips of two families."""
+"""A session and its replay: the same words, the same bits; on each kind of source of registers."""
 
 import json
 from pathlib import Path
@@ -6,28 +6,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import mpucal
 from mpucal.__main__ import run
 from mpucal.files.mcap import read_capture
 
 SESSIONS = Path(__file__).parents[1] / "fixtures" / "sessions"
 NAMES = sorted(path.stem for path in SESSIONS.glob("*.mcap"))
+LSB_MPS2 = 4 * 9.80665 / 32768
 
 
 class Outcome:
-    """Output, result and capture of a session."""
+    """Output and result of a session, and its folder."""
 
     def __init__(self, folder, out, err):
         events = [json.loads(line) for line in err.splitlines()]
         self.said = [event for event in events if event["event"] in ("prompt", "decision")]
-        document = json.loads(out)
-        self.format = document["format"]
-        self.sensor = document["sensor"]
-        self.verdict = document["quality"]["verdict"]
-        self.D = np.array(document["accelerometer"]["D"])
-        self.b_a = np.array(document["accelerometer"]["b_a"])
-        self.samples = document["fit"]["samples"]
-        self.folder = folder
-        self.records = read_capture(folder / "capture.mcap").records
+        # the last decision names the files that a session leaves
+        assert self.said.pop()["why"].startswith("wrote ")
+        self.document = {key: value for key, value in json.loads(out).items() if key != "created"}
+        self.D = np.array(self.document["accelerometer"]["D"])
+        self.capture, self.truth = folder / "capture.mcap", folder / "truth.json"
 
 
 @pytest.fixture
@@ -45,43 +43,46 @@ def session(capsys, tmp_path, monkeypatch):
     return call
 
 
-def without_writing(said):
-    """Return the events without the last decision, which names the files that a session leaves."""
-    assert said[-1]["why"].startswith("wrote ")
-    return said[:-1]
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_a_stored_session_replays(session, name):
     """Machines read JSON alone, and a folder that nobody named is named by the chip."""
     stored = json.loads((SESSIONS / f"{name}.json").read_text())
     replayed = session("once", "--replay", SESSIONS / f"{name}.mcap")
-    assert without_writing(replayed.said) == stored["said"]
-    assert replayed.format == "mpucal.calibration"
-    assert replayed.folder.name.startswith(f"{replayed.sensor['chip'].lower()}-")
-    assert (replayed.verdict, replayed.samples) == (stored["verdict"], stored["samples"])
+    document = replayed.document
+    assert replayed.said == stored["said"]
+    assert document["format"] == "mpucal.calibration"
+    assert replayed.capture.parent.name.startswith(f"{document['sensor']['chip'].lower()}-")
+    assert (document["quality"]["verdict"], document["fit"]["samples"]) == (stored["verdict"], stored["samples"])
     np.testing.assert_allclose(replayed.D, stored["D"], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(replayed.b_a, stored["b_a"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(document["accelerometer"]["b_a"], stored["b_a"], rtol=0, atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("chip", "model", "name"),
-    [("mpu6500", "hand", "MPU-6500"), ("clone98", "accel", "ICM-20689")],
-    ids=["mpu6500-hand", "clone98-accel"],
+    ("source", "chip", "model", "codes"),
+    [
+        pytest.param(["--iio", "sim:temperature_c=27"], "MPU-6050", "hand", [], id="iio"),
+        *(
+            pytest.param(["--bus", f"sim:temperature_c=27,{keys}"], *others, marks=pytest.mark.slow, id=keys)
+            for keys, *others in (
+                ("chip=mpu6500", "MPU-6500", "hand", []),
+                ("chip=clone98", "ICM-20689", "accel", ["inconsistent"]),
+                ("fault=no_fifo/nack@9", "MPU-6050", "hand", ["data_lost"]),
+            )
+        ),
+    ],
 )
-def test_a_replay_equals_its_session_to_the_last_bit(session, chip, model, name):
-    """Replay two chips' sessions; that of an MPU-6050 is in tests/cli/test_session.py."""
-    bus = f"sim:chip={chip},temperature_c=27"
-    live = session("live", "--bus", bus, "--seed", 5, "--rate", 25, "--target", "quick", "--model", model)
-    assert live.sensor["chip"] == name
-    assert live.sensor["temperature_c"] == pytest.approx(27, abs=0.3)
-    if model != "accel":
-        truth = json.loads((live.folder / "truth.json").read_text())
-        assert live.verdict == "good"
-        assert np.abs(live.D - truth["D"]).max() < 2e-3
-    replayed = session("replayed", "--replay", live.folder / "capture.mcap")
-    assert without_writing(replayed.said) == without_writing(live.said)
-    assert replayed.records == live.records
-    assert np.array_equal(replayed.D, live.D)
-    assert np.array_equal(replayed.b_a, live.b_a)
+def test_a_replay_equals_its_session_to_the_last_bit(session, source, chip, model, codes):
+    """Replay sessions on each kind of access to samples; on an MPU-6050's FIFO: tests/cli/test_session.py."""
+    live = session("live", *source, "--seed", 4, "--rate", 25, "--target", "quick", "--model", model)
+    sensor, found = live.document["sensor"], mpucal.load(live.capture)
+    assert (sensor["chip"], sensor["accel_range_g"], sensor["gyro_range_dps"]) == (chip, 4, 500)
+    assert sensor["temperature_c"] == pytest.approx(27, abs=0.3)
+    assert [reason["code"] for reason in live.document["quality"]["reasons"]] == codes
+    assert found.gap.sum() == codes.count("data_lost")
+    # counts, whatever the scale: nothing was lost on the way
+    np.testing.assert_allclose(found.acc / LSB_MPS2, np.round(found.acc / LSB_MPS2), atol=1e-2)
+    if model == "hand":
+        assert np.abs(live.D - json.loads(live.truth.read_text())["D"]).max() < 2e-3
+    replayed = session("replayed", "--replay", live.capture)
+    assert (replayed.said, replayed.document) == (live.said, live.document)
+    assert read_capture(replayed.capture).records == read_capture(live.capture).records
