@@ -19,7 +19,7 @@ from mpucal.files import load
 from mpucal.session.plan import Plan
 from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
-from tools.lab.recorded_chip import open_recorded
+from tools.lab.feeds import open_recorded
 
 PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"

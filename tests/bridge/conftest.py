@@ -7,7 +7,6 @@ import threading
 import tty
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from mpucal.bridge import bus, link
@@ -18,23 +17,10 @@ from mpucal.simulated.chip import SimulatedBus
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
+from tools.lab import feeds
 from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
 MS = 1_000_000
-
-
-class NumberedFeed:
-    """Samples 0, 1, 2, ... in accelerometer x; the other words are constant."""
-
-    def __init__(self):
-        self.next = 0
-
-    def samples(self, edges_s, setting):
-        n = len(edges_s) - 1
-        rows = np.tile(np.array([0, -34, 8192, -2000, 56, -78, 90], np.int16), (n, 1))
-        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
-        self.next += n
-        return rows
 
 
 class Rig(SimpleNamespace):
@@ -42,7 +28,7 @@ class Rig(SimpleNamespace):
 
     def new_chip(self):
         """Replace the chip by one that was just switched on."""
-        self.chip = SimulatedBus(Chip(MODELS[self.model], NumberedFeed(), 2500.0, FactoryTrim()), self.clock)
+        self.chip = SimulatedBus(Chip(MODELS[self.model], feeds.NumberedFeed(), 2500.0, FactoryTrim()), self.clock)
 
     def new_bridge(self, boot_ns=0, **how):
         """Make a bridge that was just switched on, with the present chip."""
@@ -98,13 +84,13 @@ def started(rig):
 @pytest.fixture(scope="session")
 def numbered():
     """Kind of feed whose samples are numbered."""
-    return NumberedFeed
+    return feeds.NumberedFeed
 
 
 @pytest.fixture(scope="session")
 def numbers():
     """Returns the numbers of the feed's samples in a recording."""
-    return lambda recording: np.rint(recording.acc[:, 0] / recording.acc[0, 2] * 8192).astype(int)
+    return feeds.numbers
 
 
 @pytest.fixture(scope="session")

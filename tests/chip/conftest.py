@@ -15,21 +15,7 @@ from mpucal.simulated.chip.bus import FastClock, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.sources.replay import Tap
-
-
-class NumberedFeed:
-    """Samples 0, 1, 2, ... in accelerometer x; the other words are constant."""
-
-    def __init__(self):
-        self.next = 0
-
-    def samples(self, edges_s, setting):
-        n = len(edges_s) - 1
-        one_g = round(32768 / setting.accel_range_g)
-        rows = np.tile(np.array([0, -700, one_g, -2000, 1500, -1600, 1700], np.int16), (n, 1))
-        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
-        self.next += n
-        return rows
+from tools.lab import feeds
 
 
 class Rig:
@@ -41,7 +27,7 @@ class Rig:
 
     def __init__(self, model="mpu6050", rate_error_ppm=3000.0):
         self.clock, self.transactions = FastClock(), []
-        self.chip = Chip(MODELS[model], NumberedFeed(), rate_error_ppm, FactoryTrim((-1500, 2001, 700)))
+        self.chip = Chip(MODELS[model], feeds.NumberedFeed(), rate_error_ppm, FactoryTrim((-1500, 2001, 700)))
         self.inner = SimulatedBus(self.chip, self.clock)
         self.before: dict[tuple[str, int], Callable] = {}
         self.bus = Tap(self, self)
@@ -141,7 +127,7 @@ def stream():
 @pytest.fixture(scope="session")
 def numbers():
     """Returns the numbers of the feed's samples in a recording."""
-    return lambda samples: np.rint(samples.acc[:, 0] / 9.80665 * 8192).astype(int)
+    return feeds.numbers
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.sources.apart import CAN_FORK, SourceApart
 from mpucal.sources.chain import ChainedBus
 from mpucal.sources.replay import ReplayBus, Tap
-from tools.lab.recorded_chip import open_recorded
+from tools.lab.feeds import open_recorded
 
 pytestmark = pytest.mark.skipif(not CAN_FORK, reason="only Linux forks here")
 

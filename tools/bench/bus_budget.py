@@ -21,14 +21,14 @@ from mpucal.chip.access import Bus, Transaction
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.chip.families import MPU6500
-from mpucal.data import Recording, Vector
+from mpucal.data import Recording
 from mpucal.files.mcap import read_capture
 from mpucal.simulated.chip.bus import FastClock, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
-from mpucal.simulated.sensor import Counts, Setting
 from mpucal.sources.replay import Tap
 from mpucal.sources.spi import DATA, REGISTER_HZ
+from tools.lab.feeds import NUMBERS, NumberedFeed, numbers
 
 from .timing import used
 
@@ -43,21 +43,6 @@ BUDGETS = (
     ("mpu6500", 1000, 0.010),
     ("mpu6500", 4000, 0.010),
 )
-
-
-class NumberedFeed:
-    """Samples 0, 1, 2, ... in accelerometer x, modulo 30000."""
-
-    def __init__(self) -> None:
-        self.next = 0
-
-    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
-        """Return the next samples of a board at rest."""
-        n = len(edges_s) - 1
-        rows = np.tile(np.array([0, 0, round(32768 / setting.accel_range_g), -2000, 0, 0, 0], np.int16), (n, 1))
-        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
-        self.next += n
-        return rows
 
 
 class JitterClock(FastClock):
@@ -114,8 +99,7 @@ def polled(bus: Bus, rate_hz: float, seconds: float) -> tuple[Driver, list[Trans
 
 def lost(recording: Recording) -> int:
     """Return how many samples are missing between the first and the last."""
-    number = np.rint(recording.acc[:, 0] / 9.80665 * 8192).astype(int)
-    return int(((np.diff(number) % 30000) - 1).sum())
+    return int((np.diff(numbers(recording)) % NUMBERS - 1).sum())
 
 
 def rate_error_ppm(rate_hz: float, seconds: float, seeds: int) -> float:

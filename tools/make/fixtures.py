@@ -122,28 +122,28 @@ def without_date(dated: Path, capture: Path) -> None:
                 writer.transaction(record)
 
 
-def measured(bus: Bus) -> tuple[Recording, str | None]:
-    """Return the recording of ten seconds on `bus`, or until the driver gives up, and why it gave up."""
-    driver = Driver(bus, FAULTY.config)
+def measured(bus: Bus, config: Config = FAULTY.config, until_s: float = END_S) -> tuple[Recording, SourceError | None]:
+    """Return the recording of a bus from its start until a time, or until the driver gives up, and why it gave up."""
+    driver, why = Driver(bus, config), None
     try:
         driver.start()
-        while driver.now_ns() < END_S * 1e9:
+        while driver.now_ns() < until_s * 1e9:
             driver.poll()
+        driver.stop()
     except EndOfCapture:
-        return driver.recording(), None
+        pass
     except SourceError as error:
-        return driver.recording(), str(error)
-    driver.stop()
-    return driver.recording(), None
+        why = error
+    return driver.recording(), why
 
 
-def made_of_it(recording: Recording, why: str | None) -> dict[str, Any]:
+def made_of_it(recording: Recording, why: SourceError | None) -> dict[str, Any]:
     """Return the expected result of a recording as JSON."""
     return {
         "samples": len(recording),
         "gaps": int(recording.gap.sum()),
         "rate_hz": recording.sensor.rate_hz,
-        "gave_up": why,
+        "gave_up": None if why is None else str(why),
     }
 
 

@@ -12,32 +12,17 @@ from hypothesis import strategies as st
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
-from mpucal.chip.driver import Driver
-from mpucal.errors import BusError, BusHeld, ChipError, NoAnswer
+from mpucal.errors import BusError, BusHeld, NoAnswer
 from mpucal.files.mcap import read_capture
 from mpucal.simulated.chip.bus import FastClock, FaultInjector, SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.sources.replay import ReplayBus
+from tools.lab.feeds import CONSTANT, NumberedFeed, numbers
+from tools.make.fixtures import made_of_it, measured
 
 CAPTURES = Path(__file__).parents[3] / "fixtures" / "faults"
-TRUE = (-700, 1500, -1600, 1700)
-
-
-class NumberedFeed:
-    """Feed of samples 0, 1, 2, ... in accelerometer x; every other word is constant, but for its scale."""
-
-    def __init__(self):
-        self.next = 0
-
-    def samples(self, edges_s, setting):
-        n = len(edges_s) - 1
-        row = [0, TRUE[0], round(32768 / setting.accel_range_g), -2000, *TRUE[1:]]
-        rows = np.tile(np.array(row, np.int16), (n, 1))
-        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
-        self.next += n
-        return rows
 
 
 def suffering(*faults, model="mpu6050", seed=0):
@@ -72,21 +57,6 @@ def test_a_transfer_fails_as_linux_would_tell_it(name, kind, number, over):
             bus.read(reg.WHO_AM_I, 1)
 
 
-def measured(bus, seconds=6.0, config=None):
-    driver = Driver(bus, config or Config())
-    try:
-        driver.start()
-        while driver.now_ns() < seconds * 1e9:
-            driver.poll()
-    except (BusError, ChipError) as error:
-        return driver.recording(), error
-    return driver.recording(), None
-
-
-def numbers(recording):
-    return np.rint(recording.acc[:, 0] / 9.80665 * 8192).astype(int)
-
-
 @pytest.mark.parametrize(
     ("name", "gaps", "lost_s"),
     [
@@ -100,7 +70,7 @@ def numbers(recording):
     ],
 )
 def test_a_passing_fault_is_a_gap_at_most(name, gaps, lost_s):
-    recording, error = measured(suffering(Fault(name, 2.5)), config=Config(rate_hz=100))
+    recording, error = measured(suffering(Fault(name, 2.5)), Config(rate_hz=100), 6.0)
     assert error is None
     assert gaps <= recording.gap.sum() <= 2 * gaps
     lost = np.diff(numbers(recording)) != 1
@@ -126,13 +96,13 @@ places = st.builds(
 )
 def test_delivered_samples_are_true_under_all_faults(faults, model, rate_hz, seed):
     """Every run ends in samples or in a message; only a noisy bus may make single values wrong."""
-    recording, error = measured(suffering(*faults, model=model, seed=seed), 4.5, Config(rate_hz=rate_hz))
+    recording, error = measured(suffering(*faults, model=model, seed=seed), Config(rate_hz=rate_hz), 4.5)
     assert error is None or error.remedy
     assert (np.diff(recording.t) > 0).all()
     if not len(recording):
         return
-    gyr = np.rint(np.degrees(recording.gyr) * 65.5).astype(int)
-    true = (gyr == TRUE[1:]).all(axis=1) & (np.rint(recording.acc[:, 1] / 9.80665 * 8192) == TRUE[0])
+    words = np.column_stack((recording.acc[:, 1] / 9.80665 * 8192, np.degrees(recording.gyr) * 65.5))
+    true = (np.rint(words) == [CONSTANT[i] for i in (1, 4, 5, 6)]).all(axis=1)
     if any(fault.kind.flips for fault in faults):
         assert true.mean() > 0.9
         return
@@ -149,18 +119,11 @@ def test_the_capture_of_a_fault_replays(name):
     capture = read_capture(CAPTURES / f"{name}.mcap")
     found = json.loads((CAPTURES / f"{name}.json").read_text())
     bus = ReplayBus(capture.records, name)
-    driver, why = Driver(bus, Config(rate_hz=50)), None
-    try:
-        driver.start()
-        while driver.now_ns() < 10e9:
-            driver.poll()
-        driver.stop()
-    except BusError as error:
-        why = str(error)
-    recording = driver.recording()
+    recording, error = measured(bus)
     assert bus.unread() == 0
-    assert (len(recording), recording.gap.sum(), why) == (found["samples"], found["gaps"], found["gave_up"])
-    assert recording.sensor.rate_hz == pytest.approx(found["rate_hz"], rel=1e-9)
+    again = made_of_it(recording, error)
+    assert again.pop("rate_hz") == pytest.approx(found.pop("rate_hz"), rel=1e-9)
+    assert again == found
     decoded = decode(capture.records, name)
     assert np.array_equal(decoded.t, recording.t)
     assert np.array_equal(decoded.acc, recording.acc)

@@ -1,11 +1,11 @@
-"""Simulated chip that serves the counts of a recording."""
+"""Feeds of a simulated chip: numbered samples, and the counts of a recording."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from mpucal.data import Vector
+from mpucal.data import STANDARD_GRAVITY_MPS2, Samples, Vector
 from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.models import MODELS
@@ -14,6 +14,32 @@ from mpucal.simulated.sensor import FULL_SCALE, Counts, Setting
 RECORDED_C = 25.0
 # A driver that has not identified the chip yet may set it otherwise.
 UNSET_S = 1.0
+
+# of the words but accelerometer x and z
+CONSTANT = {1: -700, 3: -2000, 4: 1500, 5: -1600, 6: 1700}
+NUMBERS = 30000
+
+
+class NumberedFeed:
+    """Feed with the number of the sample in accelerometer x, modulo NUMBERS, 1 g in z, and CONSTANT."""
+
+    def __init__(self) -> None:
+        self._next = 0
+
+    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
+        """Return the next samples."""
+        n = len(edges_s) - 1
+        rows = np.zeros((n, 7), np.int16)
+        rows[:, 0] = np.arange(self._next, self._next + n) % NUMBERS
+        rows[:, 2] = round(FULL_SCALE / setting.accel_range_g)
+        rows[:, list(CONSTANT)] = list(CONSTANT.values())
+        self._next += n
+        return rows
+
+
+def numbers(samples: Samples) -> NDArray[np.int_]:
+    """Return the numbers of samples that were measured at ±4 g."""
+    return np.rint(samples.acc[:, 0] / STANDARD_GRAVITY_MPS2 * FULL_SCALE / 4.0).astype(int)
 
 
 def open_recorded(
