@@ -6,9 +6,9 @@ See firmware_protocol.md, "Messages"; each class is the table of its name there.
 from __future__ import annotations
 
 import struct
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import ClassVar, Self
+from typing import ClassVar, Self, dataclass_transform
 
 MAGIC = b"MPUB"
 MAJOR, MINOR = 1, 0
@@ -59,9 +59,9 @@ class Feature(IntFlag):
 _KINDS: dict[int, type[Message]] = {}
 
 
-@dataclass(frozen=True)
+@dataclass_transform(frozen_default=True)
 class Message:
-    """Base of the messages: the fixed fields in FORMAT's order, then the bytes of TAIL, if it has one.
+    """Base of the messages, which are dataclasses: the fixed fields in FORMAT's order, then the bytes of TAIL, if any.
 
     A subclass with a `code` is a message of that type: requests are below 0x80, and what a bridge sends is above.
     """
@@ -77,6 +77,7 @@ class Message:
         if form is not None:
             cls.FORMAT = struct.Struct(form)
         cls.TAIL = tail
+        dataclass(frozen=True)(cls)
 
     def payload(self) -> bytes:
         """Encode the payload.
@@ -85,7 +86,7 @@ class Message:
         ------
         MessageError : a value does not fit its field.
         """
-        values = list(astuple(self))
+        values = list(vars(self).values())
         tail = values.pop() if self.TAIL else b""
         try:
             return self.FORMAT.pack(*values) + bytes(tail)
@@ -107,7 +108,6 @@ class Message:
         return cls(*cls.FORMAT.unpack_from(payload), *tail)
 
 
-@dataclass(frozen=True)
 class Hello(Message, code=0x01, form="<4s B B B"):
     """Greeting; with `address` 0 the bridge tries both."""
 
@@ -117,7 +117,6 @@ class Hello(Message, code=0x01, form="<4s B B B"):
     address: int = 0
 
 
-@dataclass(frozen=True)
 class Read(Message, code=0x02, form="<B B"):
     """Request to read `count` registers from `register` on."""
 
@@ -125,7 +124,6 @@ class Read(Message, code=0x02, form="<B B"):
     count: int
 
 
-@dataclass(frozen=True)
 class Burst(Message, code=0x03, form="<B H"):
     """Request to read `count` bytes from a register that does not auto-increment."""
 
@@ -133,7 +131,6 @@ class Burst(Message, code=0x03, form="<B H"):
     count: int
 
 
-@dataclass(frozen=True)
 class Write(Message, code=0x04, form="<B", tail=True):
     """Request to write `data` from `register` on."""
 
@@ -141,7 +138,6 @@ class Write(Message, code=0x04, form="<B", tail=True):
     data: bytes
 
 
-@dataclass(frozen=True)
 class Stream(Message, code=0x05, form="<B B"):
     """Request to push frames of `frame_bytes` from the FIFO, `batch` or more at a time; 0 stops it."""
 
@@ -157,7 +153,6 @@ class BlobState(Message, code=0x10):
     """Request for the state of the stored blob."""
 
 
-@dataclass(frozen=True)
 class BlobRead(Message, code=0x11, form="<H B"):
     """Request for `count` bytes of the stored blob."""
 
@@ -165,14 +160,12 @@ class BlobRead(Message, code=0x11, form="<H B"):
     count: int
 
 
-@dataclass(frozen=True)
 class BlobBegin(Message, code=0x12, form="<H"):
     """Announcement of a blob of `length` bytes."""
 
     length: int
 
 
-@dataclass(frozen=True)
 class BlobData(Message, code=0x13, form="<H", tail=True):
     """Part of the announced blob."""
 
@@ -180,7 +173,6 @@ class BlobData(Message, code=0x13, form="<H", tail=True):
     data: bytes
 
 
-@dataclass(frozen=True)
 class BlobCommit(Message, code=0x14, form="<H I"):
     """End of the announced blob; `crc` is its CRC-32."""
 
@@ -192,7 +184,6 @@ class BlobErase(Message, code=0x15):
     """Request to erase the stored blob."""
 
 
-@dataclass(frozen=True)
 class Reply(Message, form="<B I"):
     """Beginning of every message of a bridge; a failed request may have no more.
 
@@ -203,7 +194,6 @@ class Reply(Message, form="<B I"):
     t_us: int
 
 
-@dataclass(frozen=True)
 class HelloReply(Reply, code=Hello.TYPE | REPLY_BIT, form="<B I 4s B B B B B H 16s"):
     """Description of the bridge: version, the chip's address (0: none answers), features and limits."""
 
@@ -217,14 +207,12 @@ class HelloReply(Reply, code=Hello.TYPE | REPLY_BIT, form="<B I 4s B B B B B H 1
     name: bytes
 
 
-@dataclass(frozen=True)
 class ReadReply(Reply, code=Read.TYPE | REPLY_BIT, tail=True):
     """Bytes that were read."""
 
     data: bytes
 
 
-@dataclass(frozen=True)
 class BurstReply(Reply, code=Burst.TYPE | REPLY_BIT, form="<B I H", tail=True):
     """Part of a burst, from `offset` on."""
 
@@ -244,7 +232,6 @@ class LeaveReply(Reply, code=Leave.TYPE | REPLY_BIT):
     """Confirmation that the program ends."""
 
 
-@dataclass(frozen=True)
 class BlobStateReply(Reply, code=BlobState.TYPE | REPLY_BIT, form="<B I I H I"):
     """State of the stored blob, which the bridge has just checked."""
 
@@ -253,7 +240,6 @@ class BlobStateReply(Reply, code=BlobState.TYPE | REPLY_BIT, form="<B I I H I"):
     crc: int
 
 
-@dataclass(frozen=True)
 class BlobReadReply(Reply, code=BlobRead.TYPE | REPLY_BIT, tail=True):
     """Bytes of the stored blob."""
 
@@ -268,7 +254,6 @@ class BlobDataReply(Reply, code=BlobData.TYPE | REPLY_BIT):
     """Confirmation of a part, which is in the slot that is not in use."""
 
 
-@dataclass(frozen=True)
 class BlobCommitReply(Reply, code=BlobCommit.TYPE | REPLY_BIT, form="<B I I"):
     """Confirmation that the new blob is valid and in use."""
 
@@ -279,7 +264,6 @@ class BlobEraseReply(Reply, code=BlobErase.TYPE | REPLY_BIT):
     """Confirmation that no blob is stored."""
 
 
-@dataclass(frozen=True)
 class Frames(Reply, code=0xC0, form="<B I H H B", tail=True):
     """Content of the FIFO; `left` more frames that were counted at `t_us` follow. `status`: why the stream halted."""
 
