@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from ..errors import BusError, LinkError
+from ..sources.i2c_errors import device_error
 from .messages import Status
 
 AUTOPILOT = re.compile("ardupilot|px4", re.IGNORECASE)
@@ -56,23 +57,17 @@ def request_failed(port: str, status: int) -> tuple[str, str]:
 
 def opening_error(error: Exception, port: str) -> BusError:
     """Convert the error of a port that did not open."""
-    number, words = getattr(error, "errno", None), str(error)
-    if number == errno.ENOENT or (number is None and "No such file" in words):
-        return BusError(f"there is no serial port {port}", other_ports())
-    if number == errno.EACCES or "Permission denied" in words:
-        return BusError(
-            f"no permission to use {port}",
-            "add yourself to its group: sudo usermod -aG dialout $USER, then log in again",
-        )
-    if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in words:
+    number = getattr(error, "errno", None)
+    if number in (errno.ENOENT, errno.EACCES, errno.EPERM) and isinstance(error, OSError):
+        return device_error(error, port, "a serial port", "dialout", other_ports())
+    if number in (errno.EBUSY, errno.EAGAIN):
         return BusError(f"another program uses {port}", "close it (a serial monitor, perhaps), then try again")
-    if number in (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ETIMEDOUT) or "://" in port:
-        return BusError(
-            f"cannot connect to {port} ({_reason(error)})", "check the address, and that a server runs there"
-        )
-    if isinstance(error, ValueError) or number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR, None):
-        return BusError(f"{port} is not a serial port ({_reason(error)})", other_ports())
-    return BusError(f"cannot open {port} ({_reason(error)})", other_ports())
+    if "://" in port:
+        what, remedy = f"cannot connect to {port}", "check the address, and that a server runs there"
+    else:
+        odd = number in (None, errno.ENOTTY, errno.EINVAL, errno.EISDIR)
+        what, remedy = f"{port} is not a serial port" if odd else f"cannot open {port}", other_ports()
+    return BusError(f"{what} ({_reason(error)})", remedy)
 
 
 def port_gone(port: str) -> LinkError:

@@ -88,7 +88,7 @@ class I2cBus(RegisterBus):
         self._path = path
         self._smbus = smbus2.SMBus()
         try:
-            with converting(lambda error: device_error(error, path, "I2C bus", "i2c", other_buses())):
+            with converting(lambda error: device_error(error, path, "an I2C bus", "i2c", other_buses())):
                 self._smbus.open(self._path)
             self._blocks = not self._smbus.funcs & smbus2.I2cFunc.I2C
             if self._blocks and not self._smbus.funcs & smbus2.I2cFunc.SMBUS_READ_I2C_BLOCK:

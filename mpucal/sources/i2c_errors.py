@@ -36,16 +36,22 @@ _TRANSFER = {
 
 
 def device_error(error: OSError, path: str, kind: str, group: str, there: str) -> BusError:
-    """Convert the error of the device at `path`, an I2C bus or an SPI device; `there` : remedy for a wrong path."""
+    """Convert the error of the device at `path`.
+
+    Parameters
+    ----------
+    kind : such as "an I2C bus". group : of the users who may use it. there : remedy for a wrong path.
+    """
+    name = kind.partition(" ")[2]
     if error.errno == errno.ENOENT:
-        return BusError(f"there is no {kind} {path}", there)
+        return BusError(f"there is no {name} {path}", there)
     if error.errno in (errno.EACCES, errno.EPERM):
         remedy = f"add yourself to its group: `sudo usermod -aG {group} $USER`, then log in again"
         return BusError(f"no permission to use {path}", remedy)
     if error.errno in (errno.ENOTTY, errno.EISDIR, errno.EINVAL):
-        return BusError(f"{path} is not an {kind}", there)
+        return BusError(f"{path} is not {kind}", there)
     if error.errno in (errno.ENXIO, errno.ENODEV, errno.ESHUTDOWN):
-        return BusError(f"the {kind} {path} is gone", "plug it in or load its driver, and start again")
+        return BusError(f"the {name} {path} is gone", "plug it in or load its driver, and start again")
     return BusError(f"{path} does not work ({error.strerror})", "check the wires and the driver, and start again")
 
 
