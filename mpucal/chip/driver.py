@@ -52,6 +52,8 @@ REPEATED_OVERFLOWS = 3
 STATUS_BYTES = reg.INT_STATUS - reg.INT_ENABLE + 1
 # The status and a sample of a chip without a FIFO, in one read.
 SAMPLE_BYTES = reg.ACCEL_XOUT_H + reg.FRAME_BYTES - reg.INT_ENABLE
+# Reads whose times are those of samples: first register and number of bytes. They may be repeated.
+TIMED_READS = frozenset(((reg.FIFO_COUNT_H, 2), (reg.INT_ENABLE, SAMPLE_BYTES)))
 NO_FIFO = "the chip's FIFO stays empty: its samples are read one by one, with the computer's times"
 
 

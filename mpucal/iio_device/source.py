@@ -186,7 +186,8 @@ class IioFiles(HostBus):
         if not name:
             return self._buffer(device, count)
         with converting(lambda error: file_error(error, device, name)):
-            reply = self._timer.read(register, count, lambda: (SYSFS / register).read_bytes()[:count])
+            is_sample = name.endswith("_raw")
+            reply = self.timed_read(register, count, is_sample, lambda: (SYSFS / register).read_bytes()[:count])
         # The driver reads the count from the chip in between.
         return reply._replace(t_ns=(reply.t_ns + self.now_ns()) // 2)
 

@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from ..chip.access import Reply
+from ..chip.driver import TIMED_READS
 from ..chip.families import PARTS
 from ..chip.losses import Loss
-from ..chip.registers import ACCEL_XOUT_H, FIFO_COUNT_H, FIFO_R_W
+from ..chip.registers import FIFO_R_W
 from ..errors import BusError, LateRead, NoAnswer
 from .i2c_errors import no_answer_error
 
@@ -18,11 +19,38 @@ from .i2c_errors import no_answer_error
 ADDRESSES = (0x68, 0x69)
 
 
+TRIES = 3
+# Excess over the shortest read: two samples at 1 kHz, and more than a transfer varies by.
+LATE_NS = 2_000_000
+
+
 class HostBus:
     """Base of a bus whose clock is the monotonic clock of the host."""
 
     def __init__(self) -> None:
-        self._timer = ReadTimer(self.now_ns)
+        self._shortest_ns: dict[tuple[int | str, int], int] = {}
+
+    def timed_read(self, place: int | str, count: int, matters: bool, transfer: Callable[[], bytes]) -> Reply:
+        """Make the read `transfer` of `count` bytes from `place` on, with the time just before it.
+
+        If the time `matters`, a delayed read is repeated: the time is early by at most LATE_NS more than that of the
+        shortest read of as many bytes.
+
+        Raises
+        ------
+        LateRead : the time matters, and all tries were delayed.
+        """
+        for _ in range(TRIES):
+            t_ns = self.now_ns()
+            data = transfer()
+            took_ns = self.now_ns() - t_ns
+            shortest_ns = min(took_ns, self._shortest_ns.get((place, count), took_ns))
+            self._shortest_ns[place, count] = shortest_ns
+            if took_ns - shortest_ns <= LATE_NS or not matters:
+                return Reply(data, t_ns)
+        longer_ms = (took_ns - shortest_ns) / 1e6
+        what = f"a read took {longer_ms:.0f} ms longer than usual, so that its time is not known"
+        raise LateRead(what, Loss.DELAYED.remedy)
 
     def now_ns(self) -> int:
         """Return the time of the clock."""
@@ -38,7 +66,7 @@ class RegisterBus(HostBus, ABC):
 
     def read(self, register: int, count: int) -> Reply:
         """Read `count` bytes from `register` on, in as few messages as possible; see Bus."""
-        return self._timer.read(register, count, lambda: self._read(register, count))
+        return self.timed_read(register, count, (register, count) in TIMED_READS, lambda: self._read(register, count))
 
     def _read(self, register: int, count: int) -> bytes:
         data = b""
@@ -108,48 +136,3 @@ def lock_device(handle: int | None, chip: str, remedy: str = "end it", address: 
         raise BusError(f"another mpucal uses {chip}", remedy) from error
     except (ImportError, OSError, TypeError):
         return
-
-
-TRIES = 3
-# Excess over the shortest read: two samples at 1 kHz, and more than a transfer varies by.
-LATE_NS = 2_000_000
-# Attributes of a kernel driver that are samples end so.
-RAW = "_raw"
-
-
-class ReadTimer:
-    """Makes reads with the time just before each, and repeats a delayed one whose time matters.
-
-    The time of a sample or of a count of samples is early by at most LATE_NS more than that of the shortest read of as
-    many bytes.
-    """
-
-    def __init__(self, now_ns: Callable[[], int]) -> None:
-        self._now_ns = now_ns
-        self._shortest_ns: dict[tuple[int | str, int], int] = {}
-
-    def read(self, register: int | str, count: int, transfer: Callable[[], bytes]) -> Reply:
-        """Make the read `transfer` of `count` bytes from `register` on, or of the file of this name.
-
-        Raises
-        ------
-        LateRead : the time matters, and all tries were delayed.
-        """
-        for _ in range(TRIES):
-            t_ns = self._now_ns()
-            data = transfer()
-            took_ns = self._now_ns() - t_ns
-            shortest_ns = min(took_ns, self._shortest_ns.get((register, count), took_ns))
-            self._shortest_ns[register, count] = shortest_ns
-            if took_ns - shortest_ns <= LATE_NS or not _is_timed(register, count):
-                return Reply(data, t_ns)
-        longer_ms = (took_ns - shortest_ns) / 1e6
-        what = f"a read took {longer_ms:.0f} ms longer than usual, so that its time is not known"
-        raise LateRead(what, Loss.DELAYED.remedy)
-
-
-def _is_timed(register: int | str, count: int) -> bool:
-    """Return True if the time of the read is that of samples; then it may be repeated, too."""
-    if isinstance(register, str):
-        return register.endswith(RAW)
-    return register == FIFO_COUNT_H or register <= ACCEL_XOUT_H < register + count

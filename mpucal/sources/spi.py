@@ -10,17 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..chip import registers as reg
 from ..chip.access import Reply
 from ..chip.families import PARTS
-from ..chip.registers import (
-    ACCEL_XOUT_H,
-    FIFO_R_W,
-    FRAME_BYTES,
-    PWR_MGMT_1,
-    PWR_MGMT_1_DEVICE_RESET,
-    USER_CTRL,
-    WHO_AM_I,
-)
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
 from .host_bus import RegisterBus, converting, lock_device
@@ -33,7 +25,7 @@ I2C_IF_DIS = 0x10
 I2C_IF, I2C_IF_OFF = 0x70, 0x40
 # Size of spidev's buffer, less the byte of the address.
 MAX_DATA_BYTES = 4095
-DATA = (*range(ACCEL_XOUT_H, ACCEL_XOUT_H + FRAME_BYTES), FIFO_R_W)
+DATA = (*range(reg.ACCEL_XOUT_H, reg.ACCEL_XOUT_H + reg.FRAME_BYTES), reg.FIFO_R_W)
 
 
 def open_source(request: Request) -> OpenedChip:
@@ -82,7 +74,7 @@ class SpiBus(RegisterBus):
     def read(self, register: int, count: int) -> Reply:
         """Read registers; WHO_AM_I shows the chip's highest clock."""
         reply = super().read(register, count)
-        part = PARTS.get(reply.data[0]) if register == WHO_AM_I else None
+        part = PARTS.get(reply.data[0]) if register == reg.WHO_AM_I else None
         if part is not None:
             self._has_i2c_if = part.family.fifo_en_with_temperature
             self._data_hz = int(min(part.family.spi_data_hz, self._most_hz))
@@ -97,8 +89,8 @@ class SpiBus(RegisterBus):
         t_ns = self.now_ns()
         off = 0 if self._has_i2c_if else I2C_IF_DIS
         self._transfer(bytes([register]) + _change_user_ctrl(register, data, lambda value: value | off), REGISTER_HZ)
-        reset = register == PWR_MGMT_1 and data[0] & PWR_MGMT_1_DEVICE_RESET
-        if self._has_i2c_if and register == PWR_MGMT_1 and not reset:
+        reset = register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET
+        if self._has_i2c_if and register == reg.PWR_MGMT_1 and not reset:
             self._transfer(bytes([I2C_IF, I2C_IF_OFF]), REGISTER_HZ)
         return t_ns
 
@@ -112,12 +104,12 @@ class SpiBus(RegisterBus):
 
     def _error(self, error: OSError) -> BusError:
         there = "enable SPI (`dtparam=spi=on` on a Raspberry Pi), and give a /dev/spidevB.C that supports mode 3"
-        return device_error(error, self._path, "SPI device", "spi", there)
+        return device_error(error, self._path, "an SPI device", "spi", there)
 
 
 def _change_user_ctrl(register: int, data: bytes, change: Callable[[int], int]) -> bytes:
     """Return `data` from `register` on, with the byte of USER_CTRL changed if it is in it."""
-    at = USER_CTRL - register
-    if register == FIFO_R_W or not 0 <= at < len(data):
+    at = reg.USER_CTRL - register
+    if register == reg.FIFO_R_W or not 0 <= at < len(data):
         return data
     return data[:at] + bytes([change(data[at])]) + data[at + 1 :]

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
-from mpucal.chip.driver import Driver
+from mpucal.chip.driver import TIMED_READS, Driver
 from mpucal.chip.port import TRIES
 from mpucal.data import Samples
 from mpucal.errors import BusError, BusHeld, ChipError, EndOfCapture, NoAnswer
 from mpucal.simulated.chip import open_simulated
-from mpucal.sources.host_bus import LATE_NS, ReadTimer
+from mpucal.sources.host_bus import LATE_NS, HostBus
 from mpucal.sources.replay import ReplayBus
 
 CHIPS = ["mpu6050", "mpu6500", "mpu6500_512", "clone98", "icm20690", "icm20602", "mpu6886"]
@@ -309,7 +309,8 @@ def test_a_late_host_does_not_count_as_a_slow_bus(started):
 def test_every_time_is_right_whatever_is_paused(rig, stream, numbers, same, monkeypatch):
     """Pause this computer between the time of a read and its transfer: times that are too early are not used."""
     made, times_s, rng = rig(), [], np.random.default_rng(1)
-    timer, feed = ReadTimer(made.clock.now), made.chip._feed
+    timer, feed = HostBus(), made.chip._feed
+    timer.now_ns = made.clock.now
     read, samples = made.inner.read, feed.samples
 
     def transfer(register, count):
@@ -322,9 +323,12 @@ def test_every_time_is_right_whatever_is_paused(rig, stream, numbers, same, monk
         return samples(edges_s, setting)
 
     monkeypatch.setattr(feed, "samples", timed)
-    monkeypatch.setattr(
-        made.inner, "read", lambda register, count: timer.read(register, count, lambda: transfer(register, count))
-    )
+
+    def timed_read(register, count):
+        matters = (register, count) in TIMED_READS
+        return timer.timed_read(register, count, matters, lambda: transfer(register, count))
+
+    monkeypatch.setattr(made.inner, "read", timed_read)
     driver = made.driver()
     driver.start()
     stream(driver, 3)

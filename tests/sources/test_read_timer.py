@@ -4,22 +4,24 @@ from itertools import count
 
 import pytest
 
-from mpucal.chip import registers as reg
-from mpucal.chip.driver import SAMPLE_BYTES, STATUS_BYTES
 from mpucal.errors import LateRead
-from mpucal.sources.host_bus import TRIES, ReadTimer
+from mpucal.sources.host_bus import TRIES, HostBus
 
 USUAL_NS = 400_000
 
 
-class Host:
-    """Clock with transfers of given durations, and then of the usual one."""
+class Host(HostBus):
+    """Bus with a clock of its own and transfers of given durations, and then of the usual one."""
 
     def __init__(self):
-        self.now_ns, self.takes_ns, self.read = 0, [], count()
+        super().__init__()
+        self.t_ns, self.takes_ns, self.read = 0, [], count()
+
+    def now_ns(self):
+        return self.t_ns
 
     def transfer(self):
-        self.now_ns += self.takes_ns.pop(0) if self.takes_ns else USUAL_NS
+        self.t_ns += self.takes_ns.pop(0) if self.takes_ns else USUAL_NS
         return bytes([next(self.read)])
 
 
@@ -30,8 +32,7 @@ def host():
 
 @pytest.fixture
 def read(host):
-    stamp = ReadTimer(lambda: host.now_ns)
-    read = lambda register=reg.FIFO_COUNT_H, count=2: stamp.read(register, count, host.transfer)  # noqa: E731
+    read = lambda matters=True: host.timed_read(0x72, 2, matters, host.transfer)  # noqa: E731
     read()
     return read
 
@@ -43,21 +44,9 @@ def test_of_nothing_but_pauses_no_time_is_known(host, read):
     assert next(host.read) == 1 + TRIES
 
 
-@pytest.mark.parametrize(
-    ("register", "count", "tries"),
-    [
-        (reg.FIFO_COUNT_H, 2, 2),
-        (reg.ACCEL_XOUT_H, 14, 2),
-        (reg.INT_ENABLE, SAMPLE_BYTES, 2),
-        ("iio:device0/in_accel_x_raw", 4096, 2),
-        (reg.INT_ENABLE, STATUS_BYTES, 1),
-        (reg.FIFO_R_W, 512, 1),
-        ("iio:device0/in_accel_scale", 4096, 1),
-    ],
-)
-def test_only_what_is_a_time_of_samples_is_read_again(host, read, register, count, tries):
-    read(register, count)
+@pytest.mark.parametrize(("matters", "tries"), [(True, 2), (False, 1)])
+def test_only_a_read_whose_time_matters_is_made_again(host, read, matters, tries):
     host.takes_ns = [14_000_000]
     before = next(host.read)
-    read(register, count)
+    read(matters)
     assert next(host.read) - before - 1 == tries
