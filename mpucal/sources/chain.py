@@ -82,6 +82,7 @@ class Chain(Generic[Part]):
         self._parts, self._last_ns = list(parts), last_ns
         self.resumes = not isinstance(self._parts[-1], RecordedPart)
         self._at = 0
+        # Of the last part's clock, if it is not a recorded one and its time is known.
         self._shift_ns: int | None = None
 
     @property
@@ -120,13 +121,10 @@ class Chain(Generic[Part]):
     def _part(self) -> Part:
         return self._parts[self._at]
 
-    def _shifted(self, t_ns: int) -> int:
-        """Convert a time of the present part's clock to the session's."""
-        if self.replaying:
-            return t_ns
-        if self._shift_ns is None:
-            self._shift_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
-        return t_ns + self._shift_ns
+    def _begin_clock(self, now_ns: int) -> None:
+        """Let the clock of a part that is not a recorded one, which shows `now_ns`, continue the session's."""
+        if self._shift_ns is None and not self.replaying:
+            self._shift_ns = max(self._last_ns + PAUSE_NS - now_ns, 0)
 
 
 class ChainedBus(Chain[Bus]):
@@ -141,6 +139,11 @@ class ChainedBus(Chain[Bus]):
         """See Bus."""
         return self._shifted(self._part.write(register, data))
 
+    def _shifted(self, t_ns: int) -> int:
+        # A bus shows its time only in its replies: the first one begins the clock.
+        self._begin_clock(t_ns)
+        return t_ns + (self._shift_ns or 0)
+
     def sleep_until(self, t_ns: int) -> None:
         """Sleep as Bus does; at once in a replay, and before the first access after it, when the shift is unknown."""
         if self._shift_ns is not None:
@@ -152,23 +155,23 @@ class ChainedTransport(Chain[Transport]):
 
     def __init__(self, parts: Sequence[Transport], last_ns: int) -> None:
         super().__init__(parts, last_ns)
-        self._take_properties()
+        self._begin_part()
 
     def go_on(self) -> bool:
         """See Chain."""
         went_on = super().go_on()
-        self._take_properties()
-        self.now_ns()  # a time to wait for is in the session's clock, too
+        self._begin_part()
         return went_on
 
     def now_ns(self) -> int:
         """See Transport."""
-        return self._shifted(self._part.now_ns())
+        return self._part.now_ns() + (self._shift_ns or 0)
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
-        received = self._part.receive(until_ns - (self._shift_ns or 0))
-        return None if received is None else received._replace(t_ns=self._shifted(received.t_ns))
+        shift_ns = self._shift_ns or 0
+        received = self._part.receive(until_ns - shift_ns)
+        return None if received is None else received._replace(t_ns=received.t_ns + shift_ns)
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""
@@ -178,7 +181,8 @@ class ChainedTransport(Chain[Transport]):
         """See Transport."""
         self._part.restrict(address)
 
-    def _take_properties(self) -> None:
+    def _begin_part(self) -> None:
+        self._begin_clock(self._part.now_ns())
         self.name, self.datagrams, self.outward = self._part.name, self._part.datagrams, self._part.outward
 
 
