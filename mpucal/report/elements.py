@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from html import escape as without_marks
+from pathlib import Path
 from typing import Any
 
 from ..errors import escape_controls
-from .style import CSS
+
+CSS = (Path(__file__).parent / "report.css").read_text(encoding="utf-8")
 
 
 def escape(text: str) -> str:
@@ -21,7 +23,7 @@ def document(title: str, heading: str, *content: str) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{CSS}</style>\n</head>\n<body>\n<main>\n"
         f"<h1>{escape(heading)}</h1>\n{''.join(content)}</main>\n</body>\n</html>\n"
     )
 

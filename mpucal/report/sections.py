@@ -178,7 +178,9 @@ def _parameters(id_: str, autopilot: Mapping[str, Any]) -> list[str]:
     old, new = autopilot.get("params_old") or {}, autopilot.get("params_new") or {}
     if not new:
         return []
-    rows = [[name, _value(old.get(name)), _value(value)] for name, value in new.items()]
+    rows = [
+        [name, *(quantity(each, "") or "unknown" for each in (old.get(name), value))] for name, value in new.items()
+    ]
     residual = as_float(autopilot.get("residual_mps2"))
     error = (
         f" The terms that it lacks leave errors of up to {residual:.2g} m/s² in |a|." if math.isfinite(residual) else ""
@@ -189,8 +191,3 @@ def _parameters(id_: str, autopilot: Mapping[str, Any]) -> list[str]:
         note=True,
     )
     return [table(id_, f"parameters of {autopilot.get('firmware', 'the autopilot')}", ["", "old", "new"], rows), remark]
-
-
-def _value(value: Any) -> str:
-    known = as_float(value)
-    return f"{known:.6g}" if math.isfinite(known) else "unknown"
