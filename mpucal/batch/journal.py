@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from ..disk.location import mode_of_existing
+from ..disk.atomic import mode_of_existing
 from ..errors import OutputError
 
 

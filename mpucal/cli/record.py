@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..disk.location import check_free
+from ..disk.atomic import check_free
 from ..errors import Abandoned, OutputError, SourceError
 from ..result.clock import stamp
 from ..sources.opening import open_source

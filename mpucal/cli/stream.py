@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from ..data import Samples
-from ..disk.location import check_free
+from ..disk.atomic import check_free
 from ..errors import EndOfCapture
 from ..files.csv import CsvText
 from ..files.tables.units import NS

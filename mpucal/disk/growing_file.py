@@ -9,8 +9,7 @@ from threading import Event, Thread
 from typing import IO
 
 from ..errors import OutputError
-from .atomic import sync_folder
-from .location import current_path
+from .atomic import current_path, sync_folder
 
 EVERY_S = 1.0
 

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Self
 
 from ..errors import OutputError
-from .atomic import make_folders, sync_folder
-from .location import current_path
+from .atomic import current_path, make_folders, sync_folder
 
 
 class OutputFolder:

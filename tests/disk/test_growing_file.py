@@ -8,7 +8,7 @@ import pytest
 
 from mpucal.chip.access import Transaction
 from mpucal.disk.growing_file import GrowingFile
-from mpucal.disk.location import check_free
+from mpucal.disk.atomic import check_free
 from mpucal.errors import OutputError
 from mpucal.files.mcap import CaptureWriter
 
