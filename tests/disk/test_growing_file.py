@@ -7,8 +7,8 @@ from functools import partial
 import pytest
 
 from mpucal.chip.access import Transaction
-from mpucal.disk.growing_file import GrowingFile
 from mpucal.disk.atomic import check_free
+from mpucal.disk.growing_file import GrowingFile
 from mpucal.errors import OutputError
 from mpucal.files.mcap import CaptureWriter
 

@@ -20,6 +20,16 @@ def fill(name: str, **values: object) -> str:
     return Template(text).substitute(values)
 
 
+def row(values: Iterable[float], form: str) -> str:
+    """Return numbers in a `form` such as ".9g", with commas between them."""
+    return ", ".join(f"{value:{form}}" for value in values)
+
+
+def rows(matrix: Iterable[Iterable[float]], form: str, brackets: str) -> str:
+    """Return the rows of a matrix, a line each within `brackets`, with commas between them."""
+    return ",\n".join(f"    {brackets[0]}{row(values, form)}{brackets[1]}" for values in matrix)
+
+
 def yaml_row(values: Iterable[float]) -> str:
     """Return a sequence of numbers for YAML."""
     return f"[{', '.join(map(yaml_number, values))}]"
