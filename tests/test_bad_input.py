@@ -113,14 +113,14 @@ session --resume x -o y                             | --resume does not take -o
 write c.json diary --bus sim                        | 'chip'
 write c.json bridge --mavlink sim                   | --mavlink sim has no bridge
 write c.json chip --bus sim --store                 | --store was given, and the chip's offset registers
-show                                                | nothing to show was named: give a file
+show                                                | neither a file nor a source was given: give a file
 show x.json --bus sim                               | a file and --bus were given together
 show --bus sim --columns t,ax,ay,az,gx,gy,gz        | --columns say how a file is read, and a device was given
-check c.json                                        | neither a recording nor a source was given
-check c.json walk.npz --bus sim                     | a file and a source were given together
+check c.json                                        | neither a file nor a source was given
+check c.json walk.npz --bus sim                     | a file and --bus were given together
 check c.json walk.npz --to chip                     | --to was given without -o and a source
-noise                                               | neither a recording nor a source was given
-noise lying.npz --bus sim                           | a file and a source were given together
+noise                                               | neither a file nor a source was given
+noise lying.npz --bus sim                           | a file and --bus were given together
 firmware                                            | takes one of -o DIR and --flash PORT
 firmware -o x --flash y                             | takes one of -o DIR and --flash PORT
 """

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from ..result.session_files import DOCUMENT
 
-F = TypeVar("F", bound=Callable[..., Any])
+Decorator = Callable[[Any], Any]
+
+
+def together(*options: Decorator) -> Decorator:
+    """Return the decorator of several options, which a command's help lists in this order."""
+
+    def decorate(command: Any) -> Any:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
 
 
 class CalibrationPath(click.Path):
@@ -31,11 +42,11 @@ noise_option = click.option("--noise", metavar="FILE", type=PATH, help="noise.js
 yes_option = click.option("--yes", is_flag=True, help="Ask no questions.")
 
 
-def output_option(name: str, metavar: str, text: str, required: bool = False) -> Callable[[F], F]:
+def output_option(name: str, metavar: str, text: str, required: bool = False) -> Decorator:
     """Return the option -o, a path that the command takes as `name`."""
     return click.option("-o", name, metavar=metavar, type=PATH, required=required, help=text)
 
 
-def json_option(text: str) -> Callable[[F], F]:
+def json_option(text: str) -> Decorator:
     """Return the option --json, which the command takes as `as_json`."""
     return click.option("--json", "as_json", is_flag=True, help=text)

@@ -12,7 +12,7 @@ from ..disk.output_folder import OutputFolder
 from ..errors import RefusedError
 from ..files import load
 from ..files.formats import readable_formats
-from ..mavlink.parameters.document import AUTOPILOT, calibrate_vehicle
+from ..mavlink.parameters.document import calibrate_vehicle
 from ..result.calibration import REFUSED
 from ..result.noise import Noise, with_noise
 from ..result.session_files import BLOB
@@ -20,7 +20,7 @@ from ..session.results import check_owner, result_files, save
 from .arguments import PATH, json_option, noise_option, output_option
 from .options import fit_options
 from .recording_options import hint_options, make_hints, say_interpretation
-from .summary import command_again, files_written, next_after_refusal, summary
+from .summary import next_steps, summary
 
 EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibrate walk.npz --json`"
 
@@ -67,11 +67,8 @@ def command(
         click.echo(calibration.json(), nl=False)
     else:
         click.echo(summary(calibration))
-        again = command_again(calibration, folder, recording)
-        if paths:
-            click.echo("\n" + files_written(paths, again, of_vehicle=AUTOPILOT in calibration.extra))
-        elif calibration.verdict == REFUSED:
-            click.echo("\n" + next_after_refusal(again))
+        if steps := next_steps(calibration, paths, recording):
+            click.echo(f"\n{steps}")
     if calibration.verdict != REFUSED:
         return 0
     if folder is not None and (folder / BLOB.name).exists():

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -18,27 +18,27 @@ from ..sinks.write_back import Recorder, write_to_all
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from ..sources.table import matching_kinds
-from .options import decorated
+from .arguments import together
 from .person import ask, ask_in_doubt, confirm, say, say_done
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def session_sink_options(command: F) -> F:
-    """Add --to and --no-write."""
-    to_help = f"Where to write the result, may be repeated; {default_sinks()}."
-    return decorated(
-        command,
-        click.option("--to", "sinks", type=click.Choice([FILE, *SINKS]), multiple=True, help=to_help),
-        click.option("--no-write", is_flag=True, help="Write only files."),
+session_sink_options = together(
+    click.option(
+        "--to",
+        "sinks",
+        type=click.Choice([FILE, *SINKS]),
+        multiple=True,
+        help=f"Where to write the result, may be repeated; {default_sinks()}.",
+    ),
+    click.option("--no-write", is_flag=True, help="Write only files."),
+)
+# the options that belong to one kind of sink, such as --store
+sink_flags = together(
+    *(
+        click.option(f"--{flag.name}", is_flag=True, help=f"{kind.name}: {flag.help}")
+        for kind in SINKS.values()
+        for flag in kind.flags
     )
-
-
-def sink_flags(command: F) -> F:
-    """Add the options that belong to one kind of sink, such as --store."""
-    flags = [(kind.name, flag) for kind in SINKS.values() for flag in kind.flags]
-    options = (click.option(f"--{flag.name}", is_flag=True, help=f"{name}: {flag.help}") for name, flag in flags)
-    return decorated(command, *options)
+)
 
 
 def make_device(options: Mapping[str, Any], yes: bool, say: Say = say) -> Device:

@@ -6,7 +6,7 @@ import math
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -21,8 +21,7 @@ from ..sources import opening
 from ..sources.kind import Option, SourceKind
 from ..sources.table import SOURCES, kinds_for, matching_kinds, unique
 from . import typed_words, with_option
-
-F = TypeVar("F", bound=Callable[..., Any])
+from .arguments import Decorator, together
 
 
 class Parsed(click.ParamType[Any]):
@@ -57,13 +56,6 @@ class Finite(click.FloatRange):
 ABOVE_ZERO = Finite(min=0.0, min_open=True)
 
 
-def decorated(command: F, *options: Callable[[F], F]) -> F:
-    """Return the command with options, which its help lists in this order."""
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
 def parse_gravity(text: str) -> float:
     """Parse a local gravity in m/s²."""
     try:
@@ -91,7 +83,7 @@ def check_gravity(gravity: float, anyway: bool) -> None:
     )
 
 
-def source_options(name: str, settings: bool = True) -> Callable[[F], F]:
+def source_options(name: str, settings: bool = True) -> Decorator:
     """Return the options of the sources that the command `name` takes; those of other sources are hidden.
 
     Hidden options are parsed, so that they are refused with a reason.
@@ -109,10 +101,10 @@ def source_options(name: str, settings: bool = True) -> Callable[[F], F]:
         forms = [kind.forms for kind in taken if kind.option is option]
         declared.append(_click_option(option, _sentence(", or ".join(forms)), hidden=not forms))
     declared += [_click_option(option, option.help) for option in unique(belonging)]
-    return lambda command: decorated(command, *declared)
+    return together(*declared)
 
 
-def _click_option(option: Option, text: str, hidden: bool = False) -> Callable[[F], F]:
+def _click_option(option: Option, text: str, hidden: bool = False) -> Decorator:
     bare: dict[str, Any] = {} if option.bare is None else {"is_flag": False, "flag_value": option.bare}
     return click.option(
         option.flag,
@@ -133,45 +125,37 @@ def _sentence(words: str) -> str:
     return f"{words if ':' in first else words[:1].upper() + words[1:]}."
 
 
-def fit_options(command: F) -> F:
-    """Add --gravity-anyway, --gravity and --model."""
-    return decorated(
-        command,
-        click.option("--gravity-anyway", is_flag=True, help="Allow a gravity outside the range found on Earth."),
-        click.option(
-            "--gravity",
-            metavar="MPS2",
-            type=Parsed(parse_gravity),
-            default=STANDARD_GRAVITY_MPS2,
-            show_default=True,
-            help="Local gravity [m/s²].",
-        ),
-        click.option(
-            "--model", type=click.Choice(MODELS), default="auto", show_default=True, help="Parameters to estimate."
-        ),
-    )
-
-
-def aim_options(command: F) -> F:
-    """Add --target and --tilt-only."""
-    std = AIMS[NORMAL].target
-    return decorated(
-        command,
-        click.option(
-            "--target",
-            type=click.Choice(tuple(AIMS)),
-            default=NORMAL,
-            show_default=True,
-            help=f"Required accuracy (1 sigma): {NORMAL} is {std.bias_mg:g} mg of bias, {std.gain_pct:g} % of scale"
-            f" factor error, {std.misalignment_deg:g} deg of misalignment.",
-        ),
-        click.option(
-            "--tilt-only",
-            is_flag=True,
-            help="For boards that cannot be turned upside down: use tilts only; parameters that tilts do not show keep "
-            "their defaults.",
-        ),
-    )
+fit_options = together(
+    click.option("--gravity-anyway", is_flag=True, help="Allow a gravity outside the range found on Earth."),
+    click.option(
+        "--gravity",
+        metavar="MPS2",
+        type=Parsed(parse_gravity),
+        default=STANDARD_GRAVITY_MPS2,
+        show_default=True,
+        help="Local gravity [m/s²].",
+    ),
+    click.option(
+        "--model", type=click.Choice(MODELS), default="auto", show_default=True, help="Parameters to estimate."
+    ),
+)
+_STD = AIMS[NORMAL].target
+aim_options = together(
+    click.option(
+        "--target",
+        type=click.Choice(tuple(AIMS)),
+        default=NORMAL,
+        show_default=True,
+        help=f"Required accuracy (1 sigma): {NORMAL} is {_STD.bias_mg:g} mg of bias, {_STD.gain_pct:g} % of scale"
+        f" factor error, {_STD.misalignment_deg:g} deg of misalignment.",
+    ),
+    click.option(
+        "--tilt-only",
+        is_flag=True,
+        help="For boards that cannot be turned upside down: use tilts only; parameters that tilts do not show keep "
+        "their defaults.",
+    ),
+)
 
 
 def check_gyroscope(config: Config) -> None:
@@ -196,16 +180,17 @@ def given_options() -> dict[str, str]:
 
 
 def check_input(file: Path | None, options: Mapping[str, Any], name: str) -> list[SourceKind]:
-    """Return the kinds of sources that are given; UsageError unless it is either a recording or sources.
+    """Return the kinds of sources that are given; UsageError unless it is either a file or one source.
 
     Parameters
     ----------
     name : of the command.
     """
     kinds = matching_kinds(options)
-    if (file is None) == (not kinds):
-        what = "a file and a source were given together" if kinds else "neither a recording nor a source was given"
-        raise UsageError(what, f"give a recording, or {opening.one_of(kinds_for(name))}")
+    given = [*(["a file"] if file is not None else []), *(kind.option.flag for kind in kinds)]
+    if len(given) != 1:
+        what = f"{' and '.join(given)} were given together" if given else "neither a file nor a source was given"
+        raise UsageError(what, f"give a file, or {opening.one_of(kinds_for(name))}")
     return kinds
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,31 +12,28 @@ from ..page.address import LOOPBACK, Address, parse_address
 from ..session.boards import BOARD, BOARDS, usual_board
 from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
-from .options import Parsed, decorated
+from .arguments import together
+from .options import Parsed
 
 if TYPE_CHECKING:
     from ..page.console import ResultCallback
 
-F = TypeVar("F", bound=Callable[..., Any])
 UNPACED = "pace=fast"
 # Key of --board among the options of a source.
 BOARD_KIND = "board"
 
 
-def page_options(command: F) -> F:
-    """Add --page and --board."""
-    return decorated(
-        command,
-        click.option(
-            "--page",
-            metavar="lan|HOST:PORT",
-            type=Parsed(parse_address),
-            is_flag=False,
-            flag_value=LOOPBACK,
-            help="Show it on a page in a browser, on this computer or (lan, HOST:PORT) in its network.",
-        ),
-        click.option("--board", type=click.Choice(BOARDS), help=f"Board to draw and to speak of; default: {BOARD}."),
-    )
+page_options = together(
+    click.option(
+        "--page",
+        metavar="lan|HOST:PORT",
+        type=Parsed(parse_address),
+        is_flag=False,
+        flag_value=LOOPBACK,
+        help="Show it on a page in a browser, on this computer or (lan, HOST:PORT) in its network.",
+    ),
+    click.option("--board", type=click.Choice(BOARDS), help=f"Board to draw and to speak of; default: {BOARD}."),
+)
 
 
 def choose_board(board: str | None, source: OpenedSource) -> str:

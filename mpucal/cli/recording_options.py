@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -15,20 +16,11 @@ from ..arguments import read_limited
 from ..errors import UsageError
 from ..files.hints import Hints, parse_columns, parse_span, parse_units
 from ..files.reading import MOST_MB, VARIABLE, allowed_bytes
-from .options import ABOVE_ZERO, Parsed, decorated, given_options
+from .arguments import Decorator, together
+from .options import ABOVE_ZERO, Parsed, given_options
 from .person import say
 
-F = TypeVar("F", bound=Callable[..., Any])
 MOST_BYTES = 1 << 20
-NAMES = {
-    "topic": "topic",
-    "columns": "columns",
-    "units": "units",
-    "accel_range": "accel_range_g",
-    "gyro_range": "gyro_range_dps",
-    "rate": "rate_hz",
-    "span": "span",
-}
 
 
 def _allow(_context: click.Context, _option: click.Parameter, megabytes: int | None) -> None:
@@ -43,42 +35,41 @@ _MOST = click.option(
     callback=_allow,
     help=f"Limit of the memory for reading; default: ${VARIABLE}, or {MOST_MB}.",
 )
+# hint: its option
+_OPTIONS = {
+    "topic": click.option("--topic", metavar="NAME", help="Topic of a bag; two, the accelerometer's first: ONE,OTHER."),
+    "columns": click.option(
+        "--columns",
+        metavar="COLUMNS",
+        type=Parsed(parse_columns),
+        help="Columns of a table: t=NAME,ax=NAME,..., or their order: t,ax,ay,az,gx,gy,gz.",
+    ),
+    "units": click.option(
+        "--units",
+        metavar="UNITS",
+        type=Parsed(parse_units),
+        help="Units of a table or a bag: t=ms,acc=g,gyr=deg/s.",
+    ),
+    "accel_range_g": click.option("--accel-range", metavar="G", type=ABOVE_ZERO, help="Full scale of counts [g]."),
+    "gyro_range_dps": click.option(
+        "--gyro-range", metavar="DPS", type=ABOVE_ZERO, help="Full scale of counts [deg/s]."
+    ),
+    "rate_hz": click.option("--rate", metavar="HZ", type=ABOVE_ZERO, help="Rate of samples without times [Hz]."),
+    "span": click.option(
+        "--span",
+        metavar="FROM:TO",
+        type=Parsed(parse_span),
+        help="Read this part of a recording alone: s since its first sample; one may be left out.",
+    ),
+}
+_UNIT = re.compile("_(g|dps|hz)$")
+# name of an option in a command: hint
+NAMES = {_UNIT.sub("", hint): hint for hint in _OPTIONS}
 
 
-def hint_options(*left_out: str) -> Callable[[F], F]:
+def hint_options(*left_out: str) -> Decorator:
     """Return the options for all of NAMES but those `left_out`, which the command has already, and --most-mb."""
-    options = {
-        "topic": click.option(
-            "--topic", metavar="NAME", help="Topic of a bag; two, the accelerometer's first: ONE,OTHER."
-        ),
-        "columns": click.option(
-            "--columns",
-            metavar="COLUMNS",
-            type=Parsed(parse_columns),
-            help="Columns of a table: t=NAME,ax=NAME,..., or their order: t,ax,ay,az,gx,gy,gz.",
-        ),
-        "units": click.option(
-            "--units",
-            metavar="UNITS",
-            type=Parsed(parse_units),
-            help="Units of a table or a bag: t=ms,acc=g,gyr=deg/s.",
-        ),
-        "accel_range": click.option("--accel-range", metavar="G", type=ABOVE_ZERO, help="Full scale of counts [g]."),
-        "gyro_range": click.option(
-            "--gyro-range", metavar="DPS", type=ABOVE_ZERO, help="Full scale of counts [deg/s]."
-        ),
-        "rate": click.option("--rate", metavar="HZ", type=ABOVE_ZERO, help="Rate of samples without times [Hz]."),
-        "span": click.option(
-            "--span",
-            metavar="FROM:TO",
-            type=Parsed(parse_span),
-            help="Read this part of a recording alone: s since its first sample; one may be left out.",
-        ),
-    }
-
-    return lambda command: decorated(
-        command, _MOST, *(option for name, option in options.items() if name not in left_out)
-    )
+    return together(_MOST, *(_OPTIONS[hint] for name, hint in NAMES.items() if name not in left_out))
 
 
 def make_hints(options: Mapping[str, Any]) -> Hints:

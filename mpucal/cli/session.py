@@ -12,7 +12,7 @@ import click
 
 from ..data import Recording
 from ..errors import MpucalError, RefusedError
-from ..mavlink.parameters.document import AUTOPILOT, calibrate_vehicle
+from ..mavlink.parameters.document import calibrate_vehicle
 from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import warn_unset
@@ -41,7 +41,7 @@ from .options import (
 from .page import BOARD_KIND, choose_board, page_options, with_page
 from .person import say
 from .running import open_runner
-from .summary import command_again, files_written, page_result, summary
+from .summary import next_steps, page_result, summary
 
 # Words of remedies that are replaced where the session can be resumed.
 AGAIN = "start again"
@@ -111,11 +111,9 @@ def command(
         files = [into.capture, *paths]
         show_result(page_result(calibration), files)
         if not as_json:
-            of_vehicle = AUTOPILOT in calibration.extra
             if not json_events:
                 click.echo(err=True)
-            steps = files_written(files, command_again(calibration, into.path), calibration.verdict, of_vehicle)
-            click.echo(f"{summary(calibration)}\n\n{steps}")
+            click.echo(f"{summary(calibration)}\n\n{next_steps(calibration, files, source=source.words)}")
         record = session_recorder(into.path, calibration, recording, source.truth())
         device = {**options, "gravity": source.plan.gravity, "model": source.plan.model}
         latest = calibration

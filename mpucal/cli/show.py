@@ -21,11 +21,10 @@ from ..result.blob import Blob
 from ..result.calibration import Calibration
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
-from ..sources.opening import one_of, open_source
-from ..sources.table import kinds_for, matching_kinds
+from ..sources.opening import open_source
 from .arguments import PATH, json_option
 from .loading import load_calibration
-from .options import check_source, given_options, source_options
+from .options import check_input, check_source, given_options, source_options
 from .person import say
 from .recording_options import NAMES, hint_options, make_hints, say_interpretation
 from .summary import formula, slope, summary
@@ -48,13 +47,7 @@ parameters are read; nothing is written.
 @json_option("Print JSON.")
 def command(file: Path | None, as_json: bool, **options: Any) -> None:
     """Show the file or the device that is given."""
-    sources = matching_kinds(options)
-    places = [*(["a file"] if file is not None else []), *(kind.option.flag for kind in sources)]
-    if len(places) != 1:
-        raise UsageError(
-            f"{' and '.join(places)} were given together" if places else "nothing to show was named",
-            f"give a file, or {one_of(kinds_for('show'))}",
-        )
+    check_input(file, options, "show")
     if file is None:
         if hints := [spelling for name, spelling in given_options().items() if name in NAMES]:
             raise UsageError(f"{' and '.join(hints)} say how a file is read, and a device was given", "leave them out")

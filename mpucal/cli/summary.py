@@ -9,17 +9,21 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import free_name
+from ..mavlink.parameters.document import AUTOPILOT
 from ..origin import Origin
 from ..page.state import Result
+from ..report.elements import as_float
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.keys import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
+from ..sources.table import matching_kinds
 from . import amended, typed_words, with_option
 
 OUTPUT, NOT_AGAIN = "-o", frozenset({"--replay", "--resume"})
@@ -67,7 +71,10 @@ def _verdict(what: str, quality: Mapping[str, Any]) -> list[str]:
         return []
     return [
         SENTENCES[quality["verdict"]].format(what),
-        *(_reason(each["message"]) for each in quality.get("reasons", ())),
+        *(
+            textwrap.fill(f"  - {each['message']}.", WIDTH, subsequent_indent="    ")
+            for each in quality.get("reasons", ())
+        ),
     ]
 
 
@@ -86,17 +93,46 @@ def page_result(calibration: Calibration) -> Result:
     )
 
 
-def command_again(calibration: Calibration, folder: Path | None, recording: Path | None = None) -> str:
+def next_steps(
+    calibration: Calibration,
+    paths: Sequence[Path],
+    recording: Path | None = None,
+    source: Mapping[str, Any] = MappingProxyType({}),
+) -> str:
+    """Return the list of files that were written to `paths`, and what to do next; see command_again."""
+    again = command_again(calibration, paths[0].parent if paths else None, recording, source)
+    how = f"run\n  {again}" if again else "give the same command again."
+    refused = f"Next: follow the remedy above, and {how}"
+    if not paths:
+        return refused if calibration.verdict == REFUSED else ""
+    folder = paths[0].parent
+    lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
+    if all(path.name != BLOB.name for path in paths):
+        return "\n".join([*lines, f"Look at {folder / REPORT.name}.", "", refused])
+    lines += [
+        "Next:",
+        f"  look at      {folder / REPORT.name}",
+        f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT.name}").apply(acc)',
+    ]
+    # an autopilot takes parameters
+    if AUTOPILOT not in calibration.extra:
+        lines.append(f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)")
+    if calibration.verdict == USABLE:
+        lines.append(f"  better       follow the remedies above, and run {again or 'it again'}")
+    return "\n".join(lines)
+
+
+def command_again(
+    calibration: Calibration, folder: Path | None, recording: Path | None, source: Mapping[str, Any]
+) -> str:
     """Return the command line that was typed, as it is for another measurement; empty if it is the same.
 
     The results get a free name, and so does `recording`, unless a remedy says how to read it. A range at whose end the
     chip was is replaced by the next larger one. A replay and a resumed session cannot be measured again: a new session
-    can.
+    can, on the same source if that is known by the options `source` (see Request.words).
     """
     typed = typed_words()
-    if NOT_AGAIN.intersection(typed):
-        return "mpucal session"
-    words = list(typed)
+    words = _session_words(source) if NOT_AGAIN.intersection(typed) else list(typed)
     reasons = calibration.quality.get("reasons", ())
     said = SAID.search(" ".join(reason.get("remedy", "") for reason in reasons))
     if recording is not None and said:
@@ -113,38 +149,19 @@ def command_again(calibration: Calibration, folder: Path | None, recording: Path
     return "" if words == typed else f"mpucal {shlex.join(words)}"
 
 
+def _session_words(source: Mapping[str, Any]) -> list[str]:
+    """Return the words of a command line for a session on a source."""
+    words = ["session"]
+    for option in (each for kind in matching_kinds(source) for each in (kind.option, *kind.options)):
+        if (value := source.get(option.name)) is not None:
+            words += [option.flag] if value == option.bare else [option.flag, str(value)]
+    return words
+
+
 def _free_file(path: Path) -> Path:
     """Return `path` with the first free number before its suffix."""
     names = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
     return next(name for name in names if not name.exists())
-
-
-def next_after_refusal(again: str) -> str:
-    """Return what to do after a refusal, with the whole command if it is another one."""
-    how = f"run\n  {again}" if again else "give the same command again."
-    return f"Next: follow the remedy above, and {how}"
-
-
-def files_written(paths: Sequence[Path], again: str, verdict: str = GOOD, of_vehicle: bool = False) -> str:
-    """Return the list of files, and the next steps; `again` is the command for another measurement, see above."""
-    folder = paths[0].parent
-    lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
-    if any(path.name == BLOB.name for path in paths):
-        lines += [
-            "Next:",
-            f"  look at      {folder / REPORT.name}",
-            f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT.name}").apply(acc)',
-            # an autopilot takes parameters
-            *([] if of_vehicle else [f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)"]),
-            *(
-                [f"  better       follow the remedies above, and run {again or 'it again'}"]
-                if verdict == USABLE
-                else []
-            ),
-        ]
-    else:
-        lines += [f"Look at {folder / REPORT.name}.", "", next_after_refusal(again)]
-    return "\n".join(lines)
 
 
 def formula(calibration: Calibration) -> str:
@@ -168,20 +185,12 @@ def slope(calibration: Calibration) -> str:
     )
 
 
-def _reason(message: str) -> str:
-    return textwrap.fill(f"  - {message}.", WIDTH, subsequent_indent="    ")
-
-
 def _fit(calibration: Calibration) -> list[str]:
     fit = calibration.fit
     if "samples" not in fit:
         return []
     return [
         "",
-        f"Model {fit.get('model')}: {fit['samples']} samples in {_number(fit.get('seconds')):.1f} s,"
-        f" gravity {_number(fit.get('gravity')):.5f} m/s².",
+        f"Model {fit.get('model')}: {fit['samples']} samples in {as_float(fit.get('seconds')):.1f} s,"
+        f" gravity {as_float(fit.get('gravity')):.5f} m/s².",
     ]
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)

@@ -134,7 +134,7 @@ def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
         (["session", "--serial"], 2, "no serial port was named"),
         (["session", "--serial", "/dev/there-is-none"], 3, "there is no serial port /dev/there-is-none"),
         (["show", "--serial"], 2, "no serial port was named"),
-        (["show"], 2, "nothing to show was named"),
+        (["show"], 2, "neither a file nor a source was given"),
         (["show", "x.json", "--serial", "x"], 2, "a file and --serial were given together"),
         (["write", str(BLOB), "bridge", "--bus", "sim"], 2, "give --serial PORT"),
     ],

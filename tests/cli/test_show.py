@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mpucal.cli import TYPED
-from mpucal.cli.summary import command_again, formula, next_after_refusal, summary
+from mpucal.cli.summary import command_again, formula, next_steps, summary
 from mpucal.data import Sensor
 from mpucal.result.calibration import Calibration
 
@@ -68,8 +68,8 @@ AGAIN = {
     "a range joined": ("session --gyro-range=500 --bus 1", ("gyro_clipped",), f"{BUS} --gyro-range 1000"),
     "the largest": (BUS, ("accel_clipped",), ""),
     "both": (f"{BUS} -o seven", ("accel_clipped", "gyro_clipped"), f"{BUS} -o seven-2 --gyro-range 1000"),
-    "a replay": ("session --replay a.mcap", ("gyro_clipped",), "session"),
-    "a resumed one": ("session --resume seven", (), "session"),
+    "a replay": ("session --replay a.mcap", ("gyro_clipped",), "session --gyro-range 1000"),
+    "a resumed one": ("session --resume seven", (), "session --serial /dev/ttyUSB0 --address 104 --micropython"),
     "a file": (
         "calibrate walk.csv --model hand -o seven",
         ("gyro_clipped",),
@@ -87,9 +87,11 @@ def test_the_command_for_another_measurement_is_never_the_same_one(tmp_path, mon
     with click.Context(click.Command("mpucal")) as context:
         context.meta[TYPED] = typed.split()
         file = Path("walk.csv") if "walk.csv" in typed else None
-        found = command_again(calibration(quality=quality, sensor=sensor), Path("seven"), file)
-    assert found == (f"mpucal {again}" if again else "")
-    assert next_after_refusal(found).endswith(f"run\n  mpucal {again}" if again else "give the same command again.")
+        source = {"serial": "/dev/ttyUSB0", "address": 104, "micropython": ""} if "--resume" in typed else {}
+        made = calibration(quality=quality, sensor=sensor)
+        assert command_again(made, Path("seven"), file, source) == (f"mpucal {again}" if again else "")
+        steps = next_steps(made, [Path("seven", "report.html")], file, source)
+    assert steps.endswith(f"run\n  mpucal {again}" if again else "give the same command again.")
 
 
 def test_the_folder_of_a_session_is_its_calibration(mpucal, session):
