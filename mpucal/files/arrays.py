@@ -17,9 +17,9 @@ from .hints import NO_HINTS, Hints
 from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
 from .reading import HELD, check_size, first_bytes, import_extra, reading
-from .tables.array_table import ArrayTable, tables_of_arrays
+from .tables.array_table import table_of_arrays, tables_of_arrays
+from .tables.load import recording_from_table
 from .tables.phone import is_pair, recording_of_tables
-from .tables.table import recording_from_table
 
 _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is what with --columns t=NAME,ax=NAME,..."
 Arrays = Iterator[tuple[str, NDArray[Any]]]
@@ -60,7 +60,7 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise RecordingError(f"{path} is not a whole file of arrays ({said})", _REMEDY) from error
     if not hints.columns and is_pair(tables := tables_of_arrays(found)):
         return recording_of_tables(path.name, tables, hints)
-    table = ArrayTable.of(path.name, found)
+    table = table_of_arrays(path.name, found)
     if table is None:
         raise RecordingError(f"{path.name} holds no columns of numbers", _REMEDY)
     return recording_from_table(table, hints)

@@ -93,7 +93,7 @@ def _others(
 
 
 _TEXTS = ".csv .txt .log .tsv"
-_TABLE = ("another program's table", "tables.table:load_table", "tables.table:is_table")
+_TABLE = ("another program's table", "tables.load:load_table", "tables.load:is_table")
 _TWO = ("a phone's tables", "tables.phone:load_two_tables", "tables.phone:is_one_of_two_tables")
 _ARCHIVE = ("a phone's tables", "tables.phone:load_archive_of_tables", "tables.phone:is_archive_of_tables")
 _PHONE = ("the folder of a phone's tables", "tables.phone:load_folder_of_tables", "tables.phone:is_folder_of_tables")
@@ -125,7 +125,7 @@ FORMATS = (
         "a table",
         rows=f"{_HERE}.csv:csv_rows",
         writer=f"{_HERE}.csv:csv_file",
-        recognises=f"{_HERE}.tables.table:is_own_table",
+        recognises=f"{_HERE}.tables.load:is_own_table",
         only_recognised=True,
     ),
     *_others(_TEXTS, *_TABLE, only=False),

@@ -24,6 +24,7 @@ from .imu import NOT_MEASURED
 from .mcap import CALIBRATED, FORMAT
 from .reading import first_bytes, import_extra
 from .rows import Rows
+from .tables.cells import since_first
 from .tables.streams import join_streams
 from .tables.times import Stream
 from .tables.units import COUNTS, NS, acceleration_unit
@@ -185,7 +186,8 @@ class _Messages:
             whole = values[np.isfinite(values).all(axis=1)]
             seen = acceleration_unit(whole) if len(whole) else ""
             unit = seen if seen and seen != COUNTS else "m/s^2"
-        return Stream(np.array(times, np.int64), values, "ns", unit)
+        ticks, origin = since_first(np.array(times, np.int64))
+        return Stream(ticks, values, origin, "ns", unit)
 
 
 _NAMES = {"acc": "acceleration", "gyr": "rate"}

@@ -11,7 +11,6 @@ import os
 import struct
 from collections.abc import Iterable
 from contextlib import redirect_stdout
-from dataclasses import replace
 from io import BufferedReader, FileIO, StringIO
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
 from .npz import DAMAGED
 from .reading import import_extra, reading
+from .tables.cells import since_first
 from .tables.streams import join_streams
 from .tables.times import Stream
 from .tables.units import SLOWEST_HZ
@@ -84,9 +84,9 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
             return join_streams(acc, gyr, hints, path.name, remarks=[remark, more, damage])
         if (COMBINED, 0) in topics and hints.topic != ACCEL:
             combined = topics[COMBINED, 0]
-            acc = _stream(combined, [f"accelerometer_m_s2[{axis}]" for axis in range(3)], "m/s^2")
+            names = [f"accelerometer_m_s2[{axis}]" for axis in range(3)]
+            acc = _stream(combined, names, "m/s^2", _later_us(combined))
             gyr = _stream(combined, [f"gyro_rad[{axis}]" for axis in range(3)], "rad/s")
-            acc = replace(acc, times=np.asarray(acc.times) + _later_us(combined))
             slow = f"{ACCEL} is logged too slowly" if raw and not fast else ""
             remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
             return join_streams(acc, gyr, hints, path.name, remarks=[remark, slow, damage])
@@ -108,13 +108,14 @@ def _is_fast(data: Any) -> bool:
     return len(steps) > 0 and float(np.median(steps)) * 1e-6 <= 1 / SLOWEST_HZ
 
 
-def _stream(data: Any, names: Iterable[str], unit: str) -> Stream:
+def _stream(data: Any, names: Iterable[str], unit: str, later_us: NDArray[np.int64] | int = 0) -> Stream:
     # 0 means that the driver does not know the time of the sample; sensor_combined lacks the field
     times = data.get("timestamp_sample", data["timestamp"])
     # a damaged log may hold NaN, and times of another type
     with np.errstate(invalid="ignore"):
         values: Vector = np.column_stack([np.asarray(data[name], float) for name in names])
-        return Stream(np.asarray(times if np.all(times) else data["timestamp"], np.int64), values, "us", unit)
+        ticks, origin = since_first(np.asarray(times if np.all(times) else data["timestamp"], np.int64) + later_us)
+    return Stream(ticks, values, origin, "us", unit)
 
 
 def _later_us(combined: Any) -> NDArray[np.int64]:

@@ -36,7 +36,7 @@ ONE = "repeats one sample of accelerations at one time: record it again"
     [
         (np.where(FIRST, np.datetime64("NaT"), DATES), "t.* lacks a time"),
         (np.where(FIRST, np.inf, TIMES), "times that are not finite"),
-        (np.full(N, np.inf), ONE),
+        (np.full(N, np.inf), "times that are not finite"),
         (np.where(FIRST, -1.7e308, 1.7e308 + TIMES), f"times that are not finite|{ONE}"),
         (np.zeros(N), ONE),
         (["2026-11-22T12:00:00"] * N, ONE),

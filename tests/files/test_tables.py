@@ -459,9 +459,41 @@ def test_counts_need_a_rate_and_their_ranges_must_fit(read, walk):
         read(AXES, "counts", rate=100, accel_range=4, gyro_range=2000)
 
 
-def test_one_number_on_each_line_is_to_be_pivoted(read):
-    with pytest.raises(RecordingError, match="one number on each line: export a column for each axis"):
-        read("result,table,_start,_stop,_time,_value,_field\n", "_result 0 utc utc utc t ax")
+@pytest.mark.parametrize(
+    ("head", "before", "of"),
+    [
+        ("time,sensor,accuracy,x,y,z\n", "{}", ("ACCELEROMETER,3", "GYROSCOPE,3", "LINEAR_ACCELERATION,3")),
+        ("", "{}", ("acc", "gyr", "user acc")),
+        ("# Version: 3\n# UncalAccel,utcTimeMillis,x,y,z\n", "", ("UncalAccel,{}", "UncalGyro,{}", "LinearAccel,{}")),
+    ],
+    ids=["named", "without names", "the sensor first"],
+)
+def test_lines_that_name_their_sensor(head, before, of, walk, assert_same, tmp_path):
+    """Read a line for each sensor, beside lines of a sensor without gravity."""
+    text = head
+    for ms, acc, gyr in zip(np.rint(walk.t * 1000).astype(int), walk.acc, walk.gyr, strict=True):
+        for word, values in zip(of, (acc, gyr, gyr), strict=True):
+            text += ",".join(filter(None, [before.format(ms), word.format(ms), *map(repr, values.tolist())])) + "\n"
+    (tmp_path / "log.txt").write_text(text)
+    assert_same(mpucal.load(tmp_path / "log.txt"), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_lines_that_name_their_axis(walk, assert_same, tmp_path):
+    """Read a table with a line for each number, as InfluxDB exports it, also where two samples have one time."""
+    ms = np.rint(walk.t * 1000).astype(int)
+    ms[7] = ms[6]
+    text = "#datatype,long,dateTime:RFC3339,double,string\n#default,,,,\n,table,_time,_value,_field,host\n"
+    for k, (name, values) in enumerate(
+        zip(AXES.strip().split(","), np.column_stack([walk.acc, walk.gyr]).T, strict=True)
+    ):
+        lines_of = zip(ms.tolist(), values.tolist(), strict=True)
+        text += "".join(
+            f",{k},2024-05-01T12:00:{at // 1000:02}.{at % 1000:03}Z,{value!r},{name},pi\n" for at, value in lines_of
+        )
+    (tmp_path / "export.csv").write_text(text)
+    found = mpucal.load(tmp_path / "export.csv")
+    assert_same(found, walk, 1e-9, 1e-9, 0.011)
+    assert "its lines of one time were joined" in found.taken
 
 
 def test_counts_of_an_analog_accelerometer_have_an_offset(read, walk):

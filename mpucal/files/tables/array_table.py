@@ -1,84 +1,33 @@
-"""Tables whose columns are arrays, from NumPy, MATLAB or a data frame."""
+"""Arrays of NumPy, MATLAB, Parquet or JSON as tables."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data import Mask, Vector
-from ...errors import RecordingError
-from .names import TIME, Column, Table, Times, axes_of, parse_header
+from .names import axes_of, parse_header
+from .table import Table
+from .text import stated_rate_hz
 
+Arrays = Mapping[str, NDArray[Any]]
 # columns of a matrix of samples; a wider matrix has the samples as columns
 WIDEST = 64
 # the columns of one sensor's table without names, as data sets have them
 UNNAMED = ["time", "x", "y", "z"]
-# above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
-RATE = re.compile(
-    r"(?:^[#%/ ]{0,5}|(?<![a-z])(?:sampl(?:e|ing)|data|output|acquisition|update|sensor|imu|log(?:ging)?|recording))"
-    r"[ _]?"
-    r"(?:(?<![a-z])fs|rate|freq\w{0,6})[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
-    r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
-    re.IGNORECASE | re.MULTILINE,
-)
 
 
-@dataclass(frozen=True)
-class ArrayTable(Table):
-    """A table whose columns are arrays (n,) under their names."""
-
-    arrays: Mapping[str, NDArray[Any]]
-
-    @classmethod
-    def of(cls, name: str, arrays: Mapping[str, NDArray[Any]]) -> ArrayTable | None:
-        """Return the table of a file's arrays; None if it has no columns of numbers."""
-        columns = columns_of_arrays(arrays)
-        header = list(columns) if len(columns) != len(UNNAMED) or parse_header(list(columns)) else UNNAMED
-        found = dict(zip(header, columns.values(), strict=True))
-        return cls(name, header, found, rate_hz=stated_rate_hz(_single_numbers(arrays))) if columns else None
-
-    def numbers(self, columns: Sequence[Column]) -> Vector:
-        """See Table."""
-        arrays = [self.arrays[self.header[column.place]] for column in columns]
-        try:
-            # a signalling NaN becomes a quiet one
-            with np.errstate(invalid="ignore"):
-                return np.column_stack([array.astype(float) for array in arrays] or [np.zeros((0, 0))])
-        except (TypeError, ValueError) as error:
-            raise RecordingError(
-                f"{columns[0].name} and the like do not hold numbers ({error})", "write numbers"
-            ) from error
-
-    def numeric_places(self) -> list[int]:
-        """See Table."""
-        return [place for place, name in enumerate(self.header) if self.arrays[name].dtype.kind in "iuf"]
-
-    def has(self, column: Column) -> Mask:
-        """See Table."""
-        return np.ones(len(self.arrays[self.header[column.place]]), bool)
-
-    def clocks(self, columns: Sequence[Column]) -> list[Column]:
-        """See Table; an index of pandas may have no name, and is a clock if it holds dates."""
-        kinds = [self.arrays[name].dtype.kind for name in self.header]
-        named = [c for c in columns if c.quantity == TIME and kinds[c.place] in "iufMm"]
-        return named or [Column(name, i, TIME) for i, name in enumerate(self.header) if kinds[i] in "mM"][:1]
-
-    def times(self, column: Column, kept: Mask) -> tuple[Times, str]:
-        """See Table."""
-        times = self.arrays[self.header[column.place]][kept]
-        if times.dtype.kind in "Mm":
-            if np.isnat(times).any():
-                raise RecordingError(f"{column.name or 'the index'} lacks a time", "leave those lines out")
-            return times.astype(f"{times.dtype.kind}8[ns]").astype(np.int64), "ns"
-        return times.astype(np.int64) if times.dtype.kind in "iu" else times, column.unit
+def table_of_arrays(name: str, arrays: Arrays) -> Table | None:
+    """Return the table of a file's arrays; None if it has no columns of numbers."""
+    columns = _columns(arrays)
+    header = list(columns) if len(columns) != len(UNNAMED) or parse_header(list(columns)) else UNNAMED
+    rate_hz = stated_rate_hz(_single_numbers(arrays))
+    return Table(name, header, [*columns.values()], rate_hz=rate_hz) if columns else None
 
 
-def columns_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def _columns(arrays: Arrays) -> dict[str, NDArray[Any]]:
     """Return name -> (n,) for the arrays of the largest number of samples."""
     tables = {}
     for name, array in arrays.items():
@@ -99,7 +48,7 @@ def columns_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[A
     return found
 
 
-def _single_numbers(arrays: Mapping[str, NDArray[Any]]) -> str:
+def _single_numbers(arrays: Arrays) -> str:
     """Return the single numbers among arrays as lines of text, of which one may state the sample rate."""
     single = {name.rpartition(".")[2]: array for name, array in arrays.items() if array.size == 1}
     numbers = {name: array.item() for name, array in single.items() if array.dtype.kind in "iuf"}
@@ -108,13 +57,7 @@ def _single_numbers(arrays: Mapping[str, NDArray[Any]]) -> str:
     return "\n".join(f"{name}: {number}" for name, number in numbers.items())
 
 
-def stated_rate_hz(text: str) -> float | None:
-    """Return the sample rate that a text states; None if it states none."""
-    found = RATE.search(text)
-    return float(found[1]) if found else None
-
-
-def tables_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ArrayTable]:
+def tables_of_arrays(arrays: Arrays) -> dict[str, Table]:
     """Return each structure, or timetable, of arrays (n,) as a table under its name."""
     found: dict[str, dict[str, NDArray[Any]]] = {}
     for name, array in arrays.items():
@@ -122,7 +65,7 @@ def tables_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, ArrayTable
         if of and array.ndim and array.size == max(array.shape):
             found.setdefault(of, {})[field] = array.ravel()
     return {
-        of: ArrayTable(of, list(fields), fields)
+        of: Table(of, list(fields), [*fields.values()])
         for of, fields in found.items()
         if len({len(array) for array in fields.values()}) == 1
     }

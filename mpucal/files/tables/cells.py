@@ -1,15 +1,25 @@
-"""Cells of a table of text as exact numbers: numbers with a point or a comma, dates, and times of day in ns."""
+"""Cells of a column as exact numbers: of text with a point or a comma, dates and times of day, or of arrays."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from decimal import Decimal, InvalidOperation
+from enum import Enum
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...data import Vector
+from ..reading import MOST_ODD
 from .units import NS
 
 # exponents of numbers beyond this would take all memory as integers
 MOST_DIGITS = 40
+# cells by which a column's kind is known
+LOOKED_AT = 50
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 DAY_NS = 86400 * NS
 CLOCK = r"\d\d?:\d\d:\d\d(?:[.,]\d{1,9})?"
@@ -24,6 +34,29 @@ _TIME_OF_DAY = re.compile(
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.*)").fullmatch
 _ISO = re.compile(r"\d{4}-\d\d-\d\d").match
 _MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
+
+Cells = Sequence[str] | NDArray[Any]
+
+
+class Kind(Enum):
+    """Content of most cells of a column."""
+
+    NUMBER = "numbers"
+    MOMENT = "dates or times of day"
+    WORD = "words, or nothing"
+
+
+def kind_of(cells: Cells) -> Kind:
+    """Return the kind of a column by some of its cells, of which a few may be damaged, and the last torn."""
+    if isinstance(cells, np.ndarray):
+        return {"M": Kind.MOMENT, "m": Kind.MOMENT, "i": Kind.NUMBER, "u": Kind.NUMBER, "f": Kind.NUMBER}.get(
+            cells.dtype.kind, Kind.WORD
+        )
+    some = [cell for cell in cells[:: max(len(cells) // LOOKED_AT, 1)][: LOOKED_AT + 1] if cell.strip()]
+    for kind, dates in ((Kind.NUMBER, False), (Kind.MOMENT, True)):
+        if some and sum(is_number(cell, dates) for cell in some) > (1 - MOST_ODD) * len(some):
+            return kind
+    return Kind.WORD
 
 
 def with_point(text: str) -> str:
@@ -73,3 +106,12 @@ def is_number(cell: str, dates: bool = True) -> bool:
         return dates or Decimal(with_point(cell.strip())).is_finite()
     except (ValueError, InvalidOperation):
         return False
+
+
+def since_first(times: NDArray[Any]) -> tuple[Vector, Decimal]:
+    """Return exact times (n,) as floats since the first, and the first."""
+    if not len(times):
+        return np.zeros(0), Decimal(0)
+    # infinite times are refused where their steps are needed
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(times - times[0], float), Decimal(str(times[0]))

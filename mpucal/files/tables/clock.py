@@ -100,9 +100,13 @@ def are_gaps(t: Vector | Numbers) -> Mask:
 
 def sample_period(stamps: Vector, number: Numbers | None = None) -> float:
     """Return the sample period of (n,) stamps that may come in bursts, repeat or be late, in their unit."""
-    lag = min(LAG, max((len(stamps) - 1) // STRETCHES, 1))
-    apart = lag if number is None else number[lag:] - number[:-lag]
-    return float(np.median((stamps[lag:] - stamps[:-lag]) / apart)) if len(stamps) > 1 else 0.0
+    # of samples at one stamp, the first: a rounded stamp has just changed
+    new = np.flatnonzero(np.diff(stamps, prepend=np.nan) != 0.0)
+    if len(new) < 2:
+        return 0.0
+    lag = max(min(LAG * len(new) // len(stamps), (len(new) - 1) // STRETCHES), 1)
+    at, count = stamps[new], new if number is None else number[new]
+    return float(np.median((at[lag:] - at[:-lag]) / (count[lag:] - count[:-lag])))
 
 
 def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
@@ -121,7 +125,9 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
         return own
     gap, late = _gaps(stamps, number, period)
     lag = min(LAG, n // STRETCHES)
-    if _square(late[lag:] - late[:-lag], OUTLIERS) > FOLLOWS_A_LINE * lag * _square(off, SELDOM):
+    # of rounded stamps, few steps are none
+    seldom = min(SELDOM, float(np.mean(steps > 0.0)) / 2)
+    if _square(late[lag:] - late[:-lag], OUTLIERS) > FOLLOWS_A_LINE * lag * _square(off, seldom):
         return own
     clock, segment = SampleClock(1.0 / period), np.cumsum(gap)
     index = number - number[np.maximum.accumulate(np.where(gap, np.arange(n), 0))]

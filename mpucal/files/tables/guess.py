@@ -53,7 +53,7 @@ def guess_columns(table: Vector, hints: Hints) -> dict[str, int]:
     n, width = table.shape
     if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND**2).all():
         return {}
-    clocks = [place for place in range(width) if is_clock(table[:, place]) and not _is_index(table[:, place])]
+    clocks = [place for place in range(width) if is_clock(table[:, place]) and not is_index(table[:, place])]
     for at in (*clocks, None):
         t = _seconds(None if at is None else table[:, at], n, hints)
         pairs = _pairs(table, [place for place in range(width) if place != at])
@@ -99,14 +99,14 @@ def is_clock(column: Vector) -> bool:
     return len(steps) > 0 and bool((steps >= 0).all() and (steps > 0).mean() > 0.01)
 
 
-def _is_index(column: Vector) -> bool:
+def is_index(column: Vector) -> bool:
     """Return True if (n,) numbers count the samples, and so are no times in ms."""
     return bool((np.diff(column) == 1.0).all())
 
 
 def is_even_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase with the samples, at a sensor's rate in some unit, and do not count them."""
-    if not is_clock(column) or _is_index(column):
+    if not is_clock(column) or is_index(column):
         return False
     correlation = float(np.corrcoef(column, np.arange(len(column)))[0, 1])
     return correlation > EVEN and bool(time_unit(sample_period(column)))

@@ -1,14 +1,27 @@
-"""Lines that name each number, as sketches print for Arduino's serial plotter, or that begin with a program's mark."""
+"""Lines that name each number or their sensor, as sketches and databases write them, or begin with a program's mark."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
-from .cells import MOMENT, NUMBER
-from .names import ACC, GYR, TIME, first_triple, parse_column_name, parse_header
-from .text import PREAMBLE, TextTable
+from .cells import MOMENT, NUMBER, Kind
+from .guess import is_clock
+from .names import (
+    ACC,
+    GYR,
+    TIME,
+    WITHOUT_GRAVITY,
+    Column,
+    axes_of,
+    first_triple,
+    parse_axis_name,
+    parse_column_name,
+    parse_header,
+)
+from .table import Table
+from .text import PREAMBLE, table_of_rows
 
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
 _NAME = r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})"
@@ -21,16 +34,20 @@ _TIMES = (
     (re.compile(r"^>([A-Za-z_]\w{0,40}):(\d{10,19}):", re.MULTILINE), rf"{_AT}\2, \1:"),
     (re.compile(r"(?<=\d)[ \t](\d{10,19})\r?$", re.MULTILINE), rf", {_AT}\1"),
 )
-_NAMED = re.compile(r"[\w'\"][ \t]{0,9}=|[A-Za-z_'\"][ \t]{0,9}:")
 _QUOTES = dict.fromkeys(map(ord, "{}'\""))
-# three axes at once: `accel=(9252, -5612, -12084)`, `GYRO: X=0.1,Y=0.2,Z=0.3`, `Acceleration X: 0.1, Y: 0.2, Z: 0.3`
-_CELL = r"([^,()\[\]\n\t=:]{1,30})"
+# three axes at once, below their sensor or beside it: `accel=(9252, -5612, -12084)`, `GYRO: X=0.1,Y=0.2,Z=0.3`,
+# `Accel  x 0.1  y 0.2  z 9.8`
+_AXES = (rf"(?:{axis}[ \t]{{0,9}}[:=]?[ \t]{{0,9}})?({NUMBER}|nan)" for axis in ("[Xx]", "[Yy]", "[Zz]"))
 _THREE = re.compile(
-    rf"(?<!\w)([A-Za-z_]\w{{0,40}})\s?(?:[:=]\s?[(\[]{_CELL},{_CELL},{_CELL}[)\]]"
-    rf"|[:=]?[ \t]{{0,9}}[Xx][:=]{_CELL}[,\t]\s?[Yy][:=]{_CELL}[,\t]\s?[Zz][:=](?=[\s\d.+-]))"
+    r"(?<![\w.])([A-Za-z_]\w{0,40})[ \t]{0,9}[:=]?\s{0,3}[(\[]?[ \t]{0,9}"
+    + r"(?:[ \t]{0,9}[,;|][ \t]{0,9}|[ \t]{1,9})".join(_AXES)
+    + r"(?![\w.])"
 )
 # as `rostopic echo` and `ros2 topic echo` print messages
 _BETWEEN_RECORDS = "\n---\n"
+# different words in a column that names the sensor of each line
+MOST_WORDS = 40
+VALUE = "value"
 
 
 @dataclass(frozen=True)
@@ -61,32 +78,24 @@ MARKED = (
 )
 
 
-def marked_table(text: str, name: str) -> TextTable | None:
+def marked_table(text: str, name: str) -> Table | None:
     """Return the table in lines that begin with a program's mark; None if there are none."""
     for each in MARKED:
         whole = text if text.endswith("\n") else text[: text.rfind("\n") + 1]
-        found = re.findall(each.pattern, whole, re.MULTILINE)
-        if found:
-            rows = [line.replace(",", " ").split() for line in found]
-            return TextTable(name, each.columns.split(), rows, [*range(1, len(rows) + 1)], ":", each.ranges)
+        rows = [line.replace(",", " ").split() for line in re.findall(each.pattern, whole, re.MULTILINE)]
+        if rows:
+            found = table_of_rows(name, each.columns.split(), rows, [*range(1, len(rows) + 1)])
+            return replace(found, ranges=each.ranges)
     return None
 
 
-def labelled_table(text: str, name: str) -> TextTable | None:
+def labelled_table(text: str, name: str) -> Table | None:
     """Return the table in lines that name each number, without the text between; None if none name all six axes.
 
     A sample is a line, or the lines from one that names the first axis to the next such line.
     """
-    if not _NAMED.search(text):
-        return None
-    text = _join_records(text) if _BETWEEN_RECORDS in text else text
-    text = text.translate(_QUOTES)
-    for pattern, replacement in _TIMES:
-        text = pattern.sub(replacement, text)
-    text, threes = _THREE.subn(_name_axes, text)
-    # in a log that names three axes at once, the first such line may come late
-    begun = [list(_numbers(line)) for line in text.split("\n")[: None if threes > PREAMBLE else PREAMBLE]]
-    together = list(dict.fromkeys(chain(*begun)))
+    begun = [list(_numbers(line)) for line in _label("\n".join(text.split("\n", PREAMBLE)[:PREAMBLE]))]
+    together = list(dict.fromkeys(name for names in begun for name in names))
     header = next((names for names in begun if _names_both(names)), together)
     if not _names_both(header):
         return None
@@ -97,7 +106,7 @@ def labelled_table(text: str, name: str) -> TextTable | None:
     lines: list[int] = []
     records: list[dict[str, str]] = []
     named: set[str] = set()
-    for i, line in enumerate(text.split("\n"), 1):
+    for i, line in enumerate(_label(text), 1):
         there = set(part.findall(line))
         if there and (header is not together or measured[0] in there or there & named):
             records.append({})
@@ -107,12 +116,21 @@ def labelled_table(text: str, name: str) -> TextTable | None:
             records[-1] = _numbers(line) | records[-1]
             named |= there
     rows = [[found.get(of, "") for of in header] if needed <= found.keys() else [] for found in records]
-    return TextTable(name, header, rows, lines, ":")
+    return table_of_rows(name, header, rows, lines)
 
 
 def _names_both(names: list[str]) -> bool:
     columns = parse_header(names)
     return bool(first_triple(columns, ACC) and first_triple(columns, GYR))
+
+
+def _label(text: str) -> list[str]:
+    """Return the lines of a text with `NAME=` before each number whose name stands elsewhere."""
+    text = _join_records(text) if _BETWEEN_RECORDS in text else text
+    text = text.translate(_QUOTES)
+    for pattern, replacement in _TIMES:
+        text = pattern.sub(replacement, text)
+    return _THREE.sub(_name_axes, text).split("\n")
 
 
 def _join_records(text: str) -> str:
@@ -131,13 +149,45 @@ def _join_records(text: str) -> str:
 
 
 def _name_axes(found: re.Match[str]) -> str:
-    """Return `NAME_x=..., NAME_y=..., NAME_z=` of three axes at once."""
-    of, *cells = filter(None, found.groups())
-    cells = [*cells, ""][:3]
-    return ", ".join(f"{of}_{axis}={cell}" for axis, cell in zip("xyz", cells, strict=True))
+    """Return `NAME_x=..., NAME_y=..., NAME_z=...` of a sensor's three numbers; other words as they are."""
+    named = zip(axes_of(found[1]), found.groups()[1:], strict=False)
+    return ", ".join(f"{axis}={cell}" for axis, cell in named) or found[0]
 
 
 def _numbers(line: str) -> dict[str, str]:
     """Return name -> number or date of a line."""
     found = ((name, date or number) for name, date, number in _PAIR.findall(line))
     return {name if parse_column_name(name, 0) else name.split()[-1]: number for name, number in found}
+
+
+def pivot(table: Table) -> Table | None:
+    """Return a table whose lines name their sensor, or their axis, with a column for each axis; None for others.
+
+    Lines of one time are a sample.
+    """
+    for place in table.places(Kind.WORD):
+        words = [word for word in dict.fromkeys(table.cells[place]) if word and not WITHOUT_GRAVITY.match(word)]
+        names = {word: [word] if parse_header([word]) else axes_of(word) for word in words[:MOST_WORDS]}
+        if _names_both(list(chain(*names.values()))):
+            break
+    else:
+        return None
+    numbers = {at: table.numbers([Column("", at, "")])[:, 0] for at in table.places(Kind.NUMBER)}
+    increasing = [Column(TIME, at, TIME) for at, of in numbers.items() if is_clock(of)]
+    clocks = sorted(table.clocks(table.columns) or increasing, key=lambda clock: clock.rank)
+    free = [at for at in numbers if at not in {clock.place for clock in (*clocks, *increasing)}]
+    called = [at for at in free if parse_axis_name(table.name_of(at)) or table.name_of(at).strip("_").lower() == VALUE]
+    if not clocks or not free:
+        return None
+    records: dict[str, list[dict[str, str]]] = {}
+    for time, word, *row in zip(*(table.cells[at] for at in (clocks[0].place, place, *(called or free))), strict=True):
+        if word in names:
+            found = dict(zip(names[word], row, strict=False))
+            # a second sample at one time is another one
+            at_once = records.setdefault(time, [])
+            record = next((each for each in at_once if not found.keys() & each.keys()), None)
+            at_once.append(found) if record is None else record.update(found)
+    header = list(dict.fromkeys(chain(*names.values())))
+    rows = [[time, *(each.get(name, "") for name in header)] for time, at_once in records.items() for each in at_once]
+    made = table_of_rows(table.name, [clocks[0].name or TIME, *header], rows, [*range(1, len(rows) + 1)])
+    return replace(made, remarks=(*table.remarks, "its lines of one time were joined"))

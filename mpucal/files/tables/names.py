@@ -8,19 +8,13 @@ Toolbox's gFx and wx, ulog2csv's accelerometer_m_s2[0], Betaflight's gyroADC[0],
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from decimal import Decimal
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...data import Mask, Vector
+from ...data import Vector
 from .units import QUANTITIES, find_unit
-
-Times = Sequence[Decimal] | NDArray[Any]
 
 TIME, NANOSECONDS, ACC, GYR, TEMPERATURE = "t", "nanoseconds", "acc", "gyr", "temperature_c"
 
@@ -43,7 +37,7 @@ GYR_STEMS = _stems(
 TIME_STEMS = _stems(
     "headerstamp:ns stamp epoch timestampsample:us timestamp timestamps time times t ts timesincestart"
     " timesincestartin secondselapsed:s elapsed elapsedtime seconds:s sec:s millis:ms micros:us rtctime datetime date"
-    " secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s timestampsec:s sampletimefine:0.1ms"
+    " secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s timestampsec:s sampletimefine"
 )
 # the part below a second, in a column beside whole seconds: builtin_interfaces/Time, and ROS 1's time
 _STAMPS = ("", "stamp", "headerstamp", "timestamp")
@@ -56,6 +50,8 @@ TEMPERATURE_STEMS = tuple(
 COLDEST_C, WARMEST_C = -60.0, 130.0
 # iOS has the opposite sign of specific force: at rest it reads -1 g along the axis that points upwards
 FLIPPED_STEMS = ("accelerometeracceleration",)
+# accelerations from which a program has taken gravity
+WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
 _TIME_UNITS = ("", *QUANTITIES[TIME])
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
 BY_A_WORD = len(TIME_STEMS)
@@ -93,61 +89,6 @@ class Column:
     rank: int = 0
     clock_of: str = ""
     sign_flipped: bool = False
-
-
-@dataclass(frozen=True)
-class Table(ABC):
-    """Columns of numbers under their names.
-
-    Attributes
-    ----------
-    name : of the file, for messages. header : the columns' names; empty if it has none.
-    rate_hz : the sample rate, if the file states it.
-    """
-
-    name: str
-    header: list[str]
-    rate_hz: float | None = field(default=None, kw_only=True)
-
-    @property
-    def columns(self) -> list[Column]:
-        """Return the columns whose names are known."""
-        return parse_header(self.header)
-
-    @property
-    def remarks(self) -> list[str]:
-        """Return notes to the user on how the table was read."""
-        return []
-
-    @abstractmethod
-    def numbers(self, columns: Sequence[Column]) -> Vector:
-        """Return (n, k) numbers; NaN where a cell is empty.
-
-        Raises
-        ------
-        RecordingError : a cell is not a number.
-        """
-
-    @abstractmethod
-    def numeric_places(self) -> list[int]:
-        """Return the places of the columns that hold numbers."""
-
-    @abstractmethod
-    def clocks(self, columns: Sequence[Column]) -> list[Column]:
-        """Return those of `columns` that hold times."""
-
-    @abstractmethod
-    def times(self, column: Column, kept: Mask) -> tuple[Times, str]:
-        """Return the exact times of the lines in `kept` (n,), and their unit, empty if unknown; dates are in ns.
-
-        Raises
-        ------
-        RecordingError : one is not a time.
-        """
-
-    @abstractmethod
-    def has(self, column: Column) -> Mask:
-        """Return (n,) True where a row has a cell in a column."""
 
 
 def parse_column_name(name: str, place: int) -> Column | None:

@@ -28,11 +28,13 @@ from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..hints import NO_HINTS, Hints
 from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import HELD, check_size, first_bytes, reading
-from .array_table import ArrayTable
-from .names import ACC, GYR, TIME, Table, first_triple, parse_header, with_sensor
+from .array_table import table_of_arrays
+from .columns import columns_by_hint
+from .load import FLIPPED, find_any_table, sensor_stream
+from .names import ACC, GYR, TIME, first_triple, parse_header, with_sensor
 from .streams import join_streams
-from .table import FLIPPED, columns_by_hint, find_any_table, sensor_stream
-from .text import TextTable, decode_text, find_table
+from .table import Table
+from .text import decode_text, find_named_table
 from .times import Stream
 from .units import NS, acceleration_unit, seem_counts
 
@@ -84,7 +86,7 @@ def is_one_of_two_tables(path: Path) -> bool:
         if {of[0] for of in alike if of and of[2] == found[2]} != {ACC, GYR}:
             return False
         begun = first_bytes(path)
-        table = None if begun.startswith(MATLAB) else find_table(decode_text(begun, path.name), path.name)
+        table = None if begun.startswith(MATLAB) else find_named_table(decode_text(begun, path.name), path.name)
     except (OSError, RecordingError):
         return False
     return table is None or not all(first_triple(table.columns, quantity) for quantity in NAMES)
@@ -127,13 +129,13 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
 
 
-def is_pair(tables: Mapping[str, ArrayTable]) -> bool:
+def is_pair(tables: Mapping[str, Table]) -> bool:
     """Return True if two tables are called as an accelerometer's and a gyroscope's, and have clocks of their own."""
     timed = any(column.quantity == TIME for table in tables.values() for column in table.columns)
     return timed and bool(_pairs(map(_as_file, tables)))
 
 
-def recording_of_tables(name: str, tables: Mapping[str, ArrayTable], hints: Hints) -> Recording:
+def recording_of_tables(name: str, tables: Mapping[str, Table], hints: Hints) -> Recording:
     """Return the recording in a pair of tables in a file."""
     found = {_as_file(of): table for of, table in tables.items()}
     return _recording(name, found, found.__getitem__, "", hints)
@@ -174,7 +176,7 @@ def _pairs(names: Iterable[str]) -> list[dict[str, tuple[str, int]]]:
 
 
 def _recording(
-    name: str, names: Iterable[str], read: Callable[[str], bytes | ArrayTable], wanted: str, hints: Hints
+    name: str, names: Iterable[str], read: Callable[[str], bytes | Table], wanted: str, hints: Hints
 ) -> Recording:
     """Return the recording in the pair of tables that holds `wanted`, or in the first."""
     pairs = _pairs(names)
@@ -229,21 +231,21 @@ def _holds_gravity(stream: Stream) -> bool:
     return seem_counts(values) or (len(values) > 0 and bool(acceleration_unit(values)))
 
 
-def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) -> Stream:
+def _stream(name: str, data: bytes | Table, quantity: str, hints: Hints) -> Stream:
     hinted = _hinted_columns(hints, quantity)
     table: Table | None
-    if isinstance(data, ArrayTable):
+    if isinstance(data, Table):
         table = data
     elif data.startswith(MATLAB):
-        table = ArrayTable.of(name, dict(read_matlab_arrays(data, Path(name))))
+        table = table_of_arrays(name, dict(read_matlab_arrays(data, Path(name))))
     else:
         table = find_any_table(decode_text(data, name), name, list(hinted.values()))
-    if table is None or (isinstance(table, TextTable) and not table.rows):
+    if table is None or not len(table):
         raise RecordingError(
             f"{name} names no columns x, y and z",
             "name its columns in its first line (time, x, y, z), or give their order with --columns t,ax,ay,az",
         )
-    columns = columns_by_hint(table.header, replace(hints, columns=hinted)) if hinted else table.columns
+    columns = columns_by_hint(table.header, hinted) if hinted else table.columns
     of = first_triple(columns, quantity) or first_triple(parse_header(with_sensor(table.header, quantity)), quantity)
     if not of:
         raise RecordingError(
@@ -251,7 +253,7 @@ def _stream(name: str, data: bytes | ArrayTable, quantity: str, hints: Hints) ->
         )
     stream = sensor_stream(table, table.clocks(columns), of)
     # of a phone, by the convention of Android and iOS, where a line above names the columns
-    named = isinstance(table, TextTable) and table.lines[0] > 1
+    named = len(table.lines) > 0 and table.lines[0] > 1
     is_phones = quantity == GYR and named and not seem_counts(stream.values[stream.complete])
     return replace(stream, unit="rad/s") if is_phones and not stream.unit else stream
 

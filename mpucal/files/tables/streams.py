@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,14 +26,32 @@ OF_COUNTS = "in counts of"
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # quartile distance of |a| over its median, beyond which the median is that of a motion
 SHAKING = 0.25
-# samples over which shaking averages out: a few of its periods at the rates of most loggers
-SHAKEN = 100
 
 
 def index_with_gravity(streams: Sequence[Stream]) -> int:
     """Return the index of the first accelerometer that measures gravity; 0 if none does."""
     whole = (s.values[s.complete] for s in streams)
     return next((i for i, values in enumerate(whole) if len(values) and units.acceleration_unit(values)), 0)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Samples in SI units.
+
+    Attributes
+    ----------
+    values : (n, 3) m/s^2 or rad/s. said : how they were read. clipped : (n,) True where one is at the end of its range.
+    """
+
+    values: Vector
+    said: str
+    clipped: Mask
+
+    @classmethod
+    def of(cls, values: Vector, scale: float, said: str, *, counts: bool = False) -> Reading:
+        """Return values times `scale`; counts are clipped at the ends of 16 bits."""
+        ends = (values >= ACCEL_COUNTS - 1) | (values <= -ACCEL_COUNTS)
+        return cls(values * scale, said, np.asarray(ends.any(axis=1) & counts))
 
 
 def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remarks: Sequence[str] = ()) -> Recording:
@@ -52,29 +70,16 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
     """
     left_out = "without rates" if gyr is None else ""
     gyr = replace(acc, values=np.zeros_like(acc.values), unit="rad/s") if gyr is None else gyr
-    for stream, what in ((acc, "accelerations"), (gyr, "rates")):
-        if np.count_nonzero(stream.complete) < 2:
-            raise RecordingError(f"{name} holds {np.count_nonzero(stream.complete)} {what}", "record for longer")
-        beyond = (np.abs(stream.values) >= units.BEYOND).any(axis=1)
-        if beyond.any():
-            raise RecordingError(
-                f"{name}: the {what} of sample {int(beyond.argmax())} are not a sensor's", "leave that sample out"
-            )
-    acc, gyr = (
-        replace(s, values=_among(s.complete, units.to_signed(s.values[s.complete]), np.nan))
-        if s.unit in ("", COUNTS)
-        else s
-        for s in (acc, gyr)
-    )
-    rate_remark, untimed = "", acc.times is None or gyr.times is None
-    alike = len(acc.values) == len(gyr.values) and np.array_equal(acc.number, gyr.number)
+    acc, gyr = _checked(acc, "accelerations", name), _checked(gyr, "rates", name)
+    untimed, alike = acc.ticks is None or gyr.ticks is None, np.array_equal(acc.number, gyr.number)
+    of_rate = ""
     if untimed:
         hints = replace(hints, rate_hz=hints.rate_hz or acc.rate_hz)
-    if hints.rate_hz is None and untimed:
+    if untimed and hints.rate_hz is None:
         hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints) if alike else None)
-        rate_remark = "this sample rate is that at which its rates turn gravity"
+        of_rate = "this sample rate is that at which its rates turn gravity"
         if hints.rate_hz is None:
-            rate_remark = "this sample rate is assumed, as nothing shows it (--rate HZ)"
+            of_rate = "this sample rate is assumed, as nothing shows it (--rate HZ)"
             left_out = left_out or "without rates"
     new = [are_new(stream.at_once, stream.values) for stream in (acc, gyr)]
     if untimed and alike:
@@ -89,26 +94,26 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         complete = complete & gyr.complete
         if np.count_nonzero(complete) < 2:
             raise RecordingError(f"{name} lacks a number in nearly every sample", "record it again")
-        values = gyr.values[complete]
+        rates = gyr.values[complete]
     else:
         t = clock.t[complete]
-        part, values, lost_rates, joined = times.interpolate_rates(t, clock_gyr, gyr.values, gyr.complete, name)
+        part, rates, lost_rates, joined = times.interpolate_rates(t, clock_gyr, gyr.values, gyr.complete, name)
         inside = np.flatnonzero(complete)[part]
         kept, gap = slice(int(inside[0]), int(inside[-1]) + 1), gap.copy()
         gap[inside] |= lost_rates
-    complete = complete[kept]
-    t = clock.t[kept]
-    a, of_a, a_clipped = _accelerations(replace(acc, values=acc.values[kept][complete]), hints, name)
+    complete, t, values = complete[kept], clock.t[kept], acc.values[kept][complete[kept]]
     if left_out:
-        w, of_w, w_clipped = _left_out(t[complete], left_out)
+        a = _accelerations(values, acc.unit, hints, name)
+        w = Reading.of(rates, math.nan, left_out)
     else:
-        of_counts = of_a.startswith(OF_COUNTS)
-        w, of_w, w_clipped = _rates(t[complete], a, values, gyr.unit, hints, name, of_counts=of_counts)
+        rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
+        a = _accelerations(values, acc.unit, hints, name, beside_counts=rate_of.show_counts)
+        w = rate_of.read(beside_counts=a.said.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
     repeated, lost = int((~new[0]).sum()), max(acc.lost, gyr.lost)
     said = [
-        f"{name} was read with {of_times}, accelerations {of_a} and {of_w}",
-        rate_remark,
+        f"{name} was read with {of_times}, accelerations {a.said} and {w.said}",
+        of_rate,
         *remarks,
         f"{repeated} repeated samples were left out" if repeated else "",
         f"{lost} lines that lack a number were left out" if lost else "",
@@ -118,17 +123,32 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
     ]
     recording = make_recording(
         t=t,
-        acc=_among(complete, a, np.nan),
-        gyr=_among(complete, w, np.nan),
+        acc=_among(complete, a.values, np.nan),
+        gyr=_among(complete, w.values, np.nan),
         temperature_c=None if acc.temperature_c is None else acc.temperature_c[kept],
         gap=gap[kept],
-        acc_clipped=_among(complete, a_clipped, False),
-        gyr_clipped=_among(complete, w_clipped, False),
+        acc_clipped=_among(complete, a.clipped, False),
+        gyr_clipped=_among(complete, w.clipped, False),
         sensor=Sensor(accel_range_g=hints.accel_range_g, gyro_range_dps=hints.gyro_range_dps),
         name=name,
         taken="; ".join(filter(None, said)) + ".",
     )
     return replace(recording, utc_ns=times.utc_ns(acc, of_t))
+
+
+def _checked(stream: Stream, what: str, name: str) -> Stream:
+    """Return a stream whose counts have their sign, if it holds numbers that a sensor may give."""
+    if np.count_nonzero(stream.complete) < 2:
+        raise RecordingError(f"{name} holds {np.count_nonzero(stream.complete)} {what}", "record for longer")
+    beyond = (np.abs(stream.values) >= units.BEYOND).any(axis=1)
+    if beyond.any():
+        raise RecordingError(
+            f"{name}: the {what} of sample {int(beyond.argmax())} are not a sensor's", "leave that sample out"
+        )
+    if stream.unit not in ("", COUNTS):
+        return stream
+    signed = units.to_signed(stream.values[stream.complete])
+    return replace(stream, values=_among(stream.complete, signed, np.nan))
 
 
 def _among(complete: Mask, values: NDArray[Any], missing: float) -> NDArray[Any]:
@@ -149,23 +169,24 @@ def _rate_hz(acc: Stream, gyr: Stream, hints: Hints) -> float | None:
     return units.likely_rate_hz(acc.values[complete], values, unit)
 
 
-def _left_out(t: Vector, why: str) -> tuple[Vector, str, Mask]:
-    return np.full((len(t), 3), np.nan), why, np.zeros(len(t), bool)
+def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside_counts: bool = False) -> Reading:
+    """Return (n, 3) accelerations, in the unit `said` by the file, in SI units.
 
-
-def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str, Mask]:
-    """Return (n, 3) m/s^2, how they were read, and (n,) True where one is clipped."""
-    values, said = stream.values, hints.units.get("acc", stream.unit)
+    Parameters
+    ----------
+    beside_counts : the rates are counts, so that whole numbers of some 1000 for 1 g are not mg.
+    """
+    said = hints.units.get("acc", said)
     if (centre := units.offset(values)) is not None:
         raise RecordingError(
             f"{name}: the accelerations turn about {', '.join(f'{at:.4g}' for at in centre)} in place of zero",
             "subtract from each axis what its converter gives at 0 g, such as half of its range",
         )
-    size = units.typical_size(values)[0]
-    seen = units.acceleration_unit(values)
-    if said == COUNTS or (not said and units.are_counts(values) and (not seen or hints.accel_range_g)):
-        return _scale_counts(values, hints, name, size)
-    near = "" if seen or said else mean_acceleration_unit(values)
+    size, seen = units.typical_size(values)[0], units.acceleration_unit(values)
+    unclear = not seen or hints.accel_range_g or (beside_counts and seen == "mg")
+    if said == COUNTS or (not said and unclear and units.are_counts(values)):
+        return _scaled_counts(values, hints, name, size)
+    near = "" if seen or said else units.mean_acceleration_unit(values)
     if near:
         raise RecordingError(
             f"{name}: |a| varies too much to show its unit; on average it would be gravity in {near}",
@@ -181,25 +202,13 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     likely = likely or not (values == np.rint(values)).all()
     seen = hints.units.get("acc", (seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
-    return values * QUANTITIES["acc"][unit], f"in {unit}", np.zeros(len(values), bool)
+    return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}")
 
 
-def mean_acceleration_unit(values: Vector) -> str:
-    """Return the unit in which (n, 3) accelerations are gravity on average; empty if there is none."""
-    whole = values[np.isfinite(values).all(axis=1)]
-    return units.acceleration_unit(_averaged(whole)) if len(whole) > 1 else ""
-
-
-def _averaged(values: Vector) -> Vector:
-    """Return means of adjacent samples (n, 3): shaking averages out, and gravity does not."""
-    width = min(SHAKEN, len(values) // 2)
-    return np.column_stack([np.convolve(axis, np.full(width, 1 / width), "valid") for axis in values.T])
-
-
-def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
-    """Return the same of (n, 3) counts, whose median magnitude is `size`."""
+def _scaled_counts(values: Vector, hints: Hints, name: str, size: float) -> Reading:
+    """Return (n, 3) counts, whose median magnitude is `size`, in SI units."""
     if units.typical_size(values)[1] > SHAKING * size:
-        size = units.typical_size(_averaged(values))[0]
+        size = units.typical_size(units.averaged(values))[0]
     per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
     scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
@@ -210,47 +219,77 @@ def _scale_counts(values: Vector, hints: Hints, name: str, size: float) -> tuple
             f"--accel-range {ACCEL_COUNTS / per_g:g}" if hints.accel_range_g else "",
         )
     by = "" if hints.accel_range_g else " (by |a|)"
-    return values * scale, f"{OF_COUNTS} ±{range_g:g} g{by}", _is_clipped(values)
+    return Reading.of(values, scale, f"{OF_COUNTS} ±{range_g:g} g{by}", counts=True)
 
 
-def _rates(
-    t: Vector, a: Vector, values: Vector, said: str, hints: Hints, name: str, of_counts: bool
-) -> tuple[Vector, str, Mask]:
-    """Return (n, 3) rad/s, how they were read, and (n,) True where one is clipped.
+class _Rates:
+    """Rates of a gyroscope beside the accelerations that they turn.
 
     Parameters
     ----------
-    said : their unit as the file names it. of_counts : True if the accelerations are counts.
+    t : (n,) s. acc : (n, 3) in any unit. values : (n, 3) rates at these times. stream : the rates as the file has them.
     """
-    said = hints.units.get("gyr", said)
-    if said == COUNTS or (not said and units.are_counts(values) and (hints.gyro_range_dps or of_counts)):
-        range_dps = hints.gyro_range_dps or _gyro_range_dps(units.rate_factor(t, a, values))
+
+    def __init__(self, t: Vector, acc: Vector, values: Vector, stream: Stream, hints: Hints, name: str) -> None:
+        self._t, self._acc, self._values, self._hints, self._name = t, acc, values, hints, name
+        self._said = hints.units.get("gyr", stream.unit)
+        self._factor = units.rate_factor(t, acc, values)
+        self._seen = hints.units.get("gyr", units.gyro_unit(self._factor))
+        self._whole = not self._said and units.are_counts(stream.values[stream.complete])
+
+    @property
+    def show_counts(self) -> bool:
+        """Return True if they are whole numbers that turn gravity as rates in no unit do."""
+        return self._whole and bool(self._factor and not self._seen)
+
+    def read(self, *, beside_counts: bool) -> Reading:
+        """Return them in SI units; `beside_counts` if the accelerations are counts."""
+        of_counts = self.show_counts or (self._whole and (beside_counts or self._hints.gyro_range_dps is not None))
+        if self._said == COUNTS or of_counts:
+            return self._counts()
+        said, seen, factor = self._said, self._seen, self._factor
+        at_rest = "" if said or seen or factor else units.resting_gyro_unit(self._t, self._acc, self._values)
+        if at_rest:
+            by = "(by their noise and bias, as gravity hardly turns)"
+            return Reading.of(self._values, QUANTITIES["gyr"][at_rest], f"rates in {at_rest} {by}")
+        if not said and not seen and not (factor and self._hints.rate_hz):
+            return self._left_out("their unit (--units gyr=UNIT)")
+        if factor and not seen:
+            known = [unit for unit in QUANTITIES["gyr"] if unit != COUNTS]
+            of = said or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))
+            remedy = f"their unit with --units {' or '.join(f'gyr={unit}' for unit in known)}"
+            raise self._wrong(factor / QUANTITIES["gyr"][of], of, remedy, f"--units gyr={of}")
+        unit = resolve_unit(self._name, "gyr", said, seen, "the turning of gravity")
+        return Reading.of(self._values, QUANTITIES["gyr"][unit], f"rates in {unit}{self._sign_remark()}")
+
+    def _counts(self) -> Reading:
+        range_dps = self._hints.gyro_range_dps or _gyro_range_dps(self._factor)
         if range_dps is None:
-            return _left_out(t, "rates left out, because nothing shows the range of their counts (--gyro-range DPS)")
+            return self._left_out("the range of their counts (--gyro-range DPS)")
         scale, of = np.radians(range_dps) / GYRO_COUNTS, f"counts of ±{range_dps:g} deg/s"
-        factor = units.rate_factor(t, a, values * scale)
-        if factor and is_wrong_full_scale(abs(factor)) and "gyr" not in hints.units:
-            fits = f"--gyro-range {_gyro_range_dps(factor * scale):g}"
+        if self._factor and is_wrong_full_scale(abs(self._factor) / scale) and "gyr" not in self._hints.units:
+            fits = f"--gyro-range {_gyro_range_dps(self._factor):g}"
             remedy = "the --gyro-range that the sensor had (if it was this one: --units gyr=counts)"
-            raise _wrong_rates(name, factor, of, hints, remedy, fits)
-        by = "" if hints.gyro_range_dps else " (by how gravity turns)"
-        return values * scale, f"rates in {of}{by}{_sign_remark(factor)}", _is_clipped(values)
-    factor = units.rate_factor(t, a, values)
-    seen = hints.units.get("gyr", units.gyro_unit(factor))
-    at_rest = "" if said or seen or factor else units.resting_gyro_unit(t, a, values)
-    if at_rest:
-        by = "(by their noise and bias, as gravity hardly turns)"
-        return values * QUANTITIES["gyr"][at_rest], f"rates in {at_rest} {by}", np.zeros(len(values), bool)
-    if not said and not seen and not (factor and hints.rate_hz):
-        return _left_out(t, "rates left out, because nothing shows their unit (--units gyr=UNIT)")
-    if factor and not seen:
-        known = [unit for unit in QUANTITIES["gyr"] if unit != COUNTS]
-        of = said or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))
-        units_known = " or ".join(f"gyr={unit}" for unit in known)
-        factor /= QUANTITIES["gyr"][of]
-        raise _wrong_rates(name, factor, of, hints, f"their unit with --units {units_known}", f"--units gyr={of}")
-    unit = resolve_unit(name, "gyr", said, seen, "the turning of gravity")
-    return values * QUANTITIES["gyr"][unit], f"rates in {unit}{_sign_remark(factor)}", np.zeros(len(values), bool)
+            raise self._wrong(self._factor / scale, of, remedy, fits)
+        by = "" if self._hints.gyro_range_dps else " (by how gravity turns)"
+        return Reading.of(self._values, scale, f"rates in {of}{by}{self._sign_remark()}", counts=True)
+
+    def _left_out(self, unknown: str) -> Reading:
+        return Reading.of(self._values, math.nan, f"rates left out, because nothing shows {unknown}")
+
+    def _wrong(self, factor: float, of: str, remedy: str, options: str) -> RecordingError:
+        rate_hz = self._hints.rate_hz
+        of_times = f"--rate {rate_hz / abs(factor):.3g}" if rate_hz else "--units t=UNIT"
+        return RecordingError(
+            f"{self._name}: gravity turns {abs(factor):.2g} times as fast as rates in {of}",
+            f"give {remedy}, or for the times {of_times}",
+            options,
+        )
+
+    def _sign_remark(self) -> str:
+        """Return a remark if the signs of axes are wrong; `calibrate` refuses those and names them."""
+        flipped = self._factor is not None and self._factor < 0
+        return " (but gravity turns the other way: an axis has the wrong sign)" if flipped else ""
 
 
 def _gyro_range_dps(factor: float | None) -> float | None:
@@ -262,25 +301,6 @@ def _gyro_range_dps(factor: float | None) -> float | None:
     return nearest if abs(math.log2(dps / nearest)) < ANOTHER_RANGE else round(dps)
 
 
-def _wrong_rates(name: str, factor: float, of: str, hints: Hints, remedy: str, options: str) -> RecordingError:
-    of_times = f"--rate {hints.rate_hz / abs(factor):.3g}" if hints.rate_hz else "--units t=UNIT"
-    return RecordingError(
-        f"{name}: gravity turns {abs(factor):.2g} times as fast as rates in {of}",
-        f"give {remedy}, or for the times {of_times}",
-        options,
-    )
-
-
-def _sign_remark(factor: float | None) -> str:
-    """Return a remark if the signs of axes are wrong; `calibrate` refuses those and names them."""
-    return " (but gravity turns the other way: an axis has the wrong sign)" if factor and factor < 0 else ""
-
-
 def is_wrong_full_scale(ratio: float) -> bool:
     """Return True if a ratio that should be 1 is 0, or nearer to 2, 4, 8 or an inverse of these."""
     return ratio == 0.0 or abs(math.log2(ratio)) > ANOTHER_RANGE
-
-
-def _is_clipped(values: Vector) -> Mask:
-    """Return (n,) True where one of (n, 3) counts is at the end of the range."""
-    return np.asarray(((values >= ACCEL_COUNTS - 1) | (values <= -ACCEL_COUNTS)).any(axis=1))

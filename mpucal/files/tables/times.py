@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import compress, pairwise
-from typing import Any
 
 import numpy as np
 
@@ -15,13 +13,14 @@ from ...errors import RecordingError
 from ..hints import Hints
 from . import units
 from .clock import FEWEST, Clock, Numbers, are_gaps, fit_clock, sample_period
-from .names import Times
-from .units import NS, QUANTITIES, resolve_unit
+from .units import DAYS, NS, QUANTITIES, resolve_unit
 
 # s between two files, or parts of one, without a common clock: longer than the gaps that a bus leaves
 GAP_S = 15.0
 # s by which times go back where a logger began anew; a sample that was merely delayed is less late
 ANEW_S = 1.0
+# of counters of ms or us in a microcontroller, and the most usual steps from before an overflow to after it
+COUNTER_BITS, OVERFLOW_STEPS = (16, 32), 100.0
 # ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
 UTC_NS = (10**18, 41 * 10**17)
 
@@ -32,16 +31,18 @@ class Stream:
 
     Attributes
     ----------
-    times : (n,) exact: decimals, integers or floats; None if the file has none.
-    values : (n, 3), NaN where a number is missing. time_unit, unit : as the file names them; empty if it does not.
+    ticks : (n,) times since `origin`, the first of them; None if the file has none.
+    values : (n, 3), NaN where a number is missing.
+    time_unit, unit : as the file names them; empty if it does not.
     zero_ns : the time of day at time 0, in ns since 1970, if another file tells it.
     places : (n,) of the samples in the order of measurement, with holes where lines without a sample are between.
     temperature_c : (n,), if the file has it. lost : number of lines that hold no sample and no time.
     rate_hz : the sample rate, if the file states it.
     """
 
-    times: Times | None
+    ticks: Vector | None
     values: Vector
+    origin: Decimal = Decimal(0)
     time_unit: str = ""
     unit: str = ""
     zero_ns: int | None = None
@@ -64,26 +65,24 @@ class Stream:
         """Return the samples where `mask` (n,) is True; with times, the others are repeated ones, and take no time."""
         if mask.all():
             return self
-        times, number, warm = self.times, self.number, self.temperature_c
-        if times is not None:
-            times = times[mask] if isinstance(times, np.ndarray) else list(compress(times, mask))
-            number = number - np.cumsum(~mask)
+        ticks, number, warm = self.ticks, self.number, self.temperature_c
+        if ticks is not None:
+            ticks, number = ticks[mask], number - np.cumsum(~mask)
         warm = None if warm is None else warm[mask]
-        return replace(self, times=times, values=self.values[mask], places=number[mask], temperature_c=warm)
+        return replace(self, ticks=ticks, values=self.values[mask], places=number[mask], temperature_c=warm)
 
     @property
     def at_once(self) -> Mask | None:
         """Return (n - 1,) True where a sample has the time of the one before; None without times."""
-        return None if self.times is None else np.array([b == a for a, b in pairwise(self.times)], bool)
+        return None if self.ticks is None else self.ticks[1:] == self.ticks[:-1]
 
 
 def utc_ns(stream: Stream, of_t: str) -> int | None:
     """Return the time of day of the first sample, ns since 1970; None if its time is not one."""
     unit = of_t.removeprefix("times in ").partition(",")[0]
-    if stream.times is None or unit not in QUANTITIES["t"]:
+    if stream.ticks is None or unit not in QUANTITIES["t"] or unit == DAYS:
         return None
-    first = round(Decimal(str(stream.times[0])) * round(QUANTITIES["t"][unit] * NS)) + (stream.zero_ns or 0)
-    return plausible_utc_ns(first)
+    return plausible_utc_ns(round(stream.origin * round(QUANTITIES["t"][unit] * NS)) + (stream.zero_ns or 0))
 
 
 def plausible_utc_ns(ns: int) -> int | None:
@@ -98,12 +97,12 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     ------
     RecordingError : the unit is not known, or times are not finite or decrease.
     """
-    if stream.times is None or first.times is None:
+    if stream.ticks is None or first.ticks is None:
         rate_hz = hints.rate_hz or units.ANY_HZ
         return Clock(stream.number / rate_hz, are_gaps(stream.number), rate_hz), f"a rate of {rate_hz:g} Hz"
-    ticks = _since(stream.times, first.times[0])
-    if not (np.abs(ticks) < units.BEYOND**2).all():
+    if not (np.abs(stream.ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
+    ticks, wraps = _unwrap(stream.ticks + float(stream.origin - first.origin))
     step, named = sample_period(ticks), hints.units.get("t", stream.time_unit)
     # milliseconds are whole numbers: a fraction of them is a slow recording's second
     slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
@@ -112,7 +111,8 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     t = ticks * QUANTITIES["t"][unit]
     anew, said = np.flatnonzero(np.diff(t) < -ANEW_S) + 1, f"times in {unit}"
     back = np.flatnonzero(np.diff(t) < 0) + 1
-    if len(back) * FEWEST > len(t) or (len(anew) and not _are_equal(stream.times, first.times)):
+    alike = stream.origin == first.origin and np.array_equal(stream.ticks, first.ticks)
+    if len(back) * FEWEST > len(t) or (len(anew) and not alike):
         at = int(back[0])
         raise RecordingError(
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
@@ -121,22 +121,21 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     for at in anew.tolist():
         t[at:] += t[at - 1] + GAP_S - t[at]
     said += f", which begin anew {len(anew)} times" if len(anew) else ""
+    said += f", whose counter overflows {wraps} times" if wraps else ""
     # a clock that was set back, or a sample that came late
     kept = t >= np.maximum.accumulate(t)
     return fit_clock(np.interp(stream.number, stream.number[kept], t[kept]), stream.number), said
 
 
-def _are_equal(one: Times, other: Times) -> bool:
-    return len(one) == len(other) and all(a == b for a, b in zip(one, other, strict=True))
-
-
-def _since(times: Times, origin: Any) -> Vector:
-    """Return times (n,) since `origin` as floats."""
-    if isinstance(times, np.ndarray):
-        # to_seconds refuses infinite times
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(times - origin, float)
-    return np.array([float(time - origin) for time in times])
+def _unwrap(ticks: Vector) -> tuple[Vector, int]:
+    """Return times (n,) of which a counter of COUNTER_BITS overflowed as if it had not, and how often it did."""
+    steps = np.diff(ticks)
+    usual = float(np.median(np.abs(steps))) if len(steps) else 0.0
+    for size in (2.0**bits for bits in COUNTER_BITS):
+        over = (steps < 0.0) & (steps + size >= 0.0) & (steps + size <= OVERFLOW_STEPS * usual)
+        if over.any():
+            return ticks + size * np.append(0, np.cumsum(over)), int(over.sum())
+    return ticks, 0
 
 
 def interpolate_rates(

@@ -15,12 +15,12 @@ from ...data import ACCEL_COUNTS, GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
 from ...errors import RecordingError
 
 NS = 1_000_000_000
-COUNTS = "counts"
+COUNTS, DAYS = "counts", "days"
 # counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
 FEWEST_PER_G, MOST_PER_G = 8, 14
 # quantity -> unit -> SI
 QUANTITIES = {
-    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4},
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4, DAYS: 86400.0},
     "acc": {"m/s^2": 1.0, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1000, COUNTS: math.nan},
     "gyr": {"rad/s": 1.0, "deg/s": math.radians(1), "mdeg/s": math.radians(1e-3), COUNTS: math.nan},
 }
@@ -29,11 +29,12 @@ _SPELLED = {
     "ms": "ms msec millis millisec millisecond milliseconds",
     "us": "us usec micros microsec microsecond microseconds",
     "ns": "ns nsec nanos nanosec nanosecond nanoseconds",
+    DAYS: "d day days",
     "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/(s2) m/s**2 meters/second2 m/sec2",
-    "g": "g gs g-force gforce gee g0",
+    "g": "g gs g's g-force gforce gee g0",
     "mg": "mg milli-g millig",
     "rad/s": "rad/s radpers rads-1 radps rads rad/sec radians/s rps rad",
-    "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s deg",
+    "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s degrees/sec deg",
     "mdeg/s": "mdeg/s mdps",
     COUNTS: "counts count lsb raw adc",
 }
@@ -55,6 +56,8 @@ LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 SCATTER = 0.45
 # a rate to try on samples without times, and the rates of most loggers
 ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
+# samples over which shaking averages out: a few of its periods at the rates of most loggers
+SHAKEN = 100
 # octaves by which a sample rate may change in the second round
 SETTLED = 0.25
 # the fastest rate of a hand and of usual sensors
@@ -97,6 +100,18 @@ def acceleration_unit(acc: Vector) -> str:
         return ""
     units = QUANTITIES["acc"].items()
     return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
+
+
+def mean_acceleration_unit(values: Vector) -> str:
+    """Return the unit in which (n, 3) accelerations are gravity on average; empty if there is none."""
+    whole = values[np.isfinite(values).all(axis=1)]
+    return acceleration_unit(averaged(whole)) if len(whole) > 1 else ""
+
+
+def averaged(values: Vector) -> Vector:
+    """Return means of adjacent samples (n, 3): shaking averages out, and gravity does not."""
+    width = min(SHAKEN, len(values) // 2)
+    return np.column_stack([np.convolve(axis, np.full(width, 1 / width), "valid") for axis in values.T])
 
 
 def typical_size(values: Vector) -> tuple[float, float]:

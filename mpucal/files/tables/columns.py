@@ -1,0 +1,148 @@
+"""Choice of a table's columns: by the user's hints, by their names, or by physics; or the hints that would help."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from ...data import Vector
+from ...errors import RecordingError
+from ..hints import ROLES, Hints
+from .cells import Kind
+from .guess import guess_columns, is_clock, is_even_clock
+from .names import ACC, GYR, TEMPERATURE, TIME, WITHOUT_GRAVITY, Column, first_triple, parse_column_name
+from .table import Table
+from .units import BEYOND, acceleration_unit, are_counts, mean_acceleration_unit
+
+NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
+_GIVE_VALUES = "export the accelerometer's own values and the rates of the gyroscope"
+
+
+def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
+    """Return the columns of a table that are read, and a remark on those that names do not show.
+
+    Raises
+    ------
+    RecordingError : it has no column that the user names, or none of them is known to be an accelerometer.
+    """
+    if hints.columns:
+        return columns_by_hint(table.header, hints.columns), ""
+    columns, remark = table.columns, ""
+    named, clocks = bool(first_triple(columns, ACC) and first_triple(columns, GYR)), table.clocks(columns)
+    hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
+    if not (named and (clocks or hints.rate_hz)):
+        of = _numbers(table)
+        even = [place for place in of if is_even_clock(of[place])]
+        if named:
+            columns = [*columns, *(Column(table.header[place], place, TIME) for place in even[:1])]
+            remark = "".join(f"{table.name_of(place)} is taken for the time" for place in even[:1])
+        elif found := _guess(of, hints):
+            times = {} if clocks else dict(zip("t", even, strict=False))
+            found = times | {role: place for role, place in found.items() if role != "t" or not clocks}
+            order = _order(found | ({"t": clocks[0].place} if clocks else {}))
+            by = "how gravity turns" if "gx" in found else "the length of gravity"
+            warm = [c for c in columns if c.quantity == TEMPERATURE]
+            columns = [*columns_by_hint(table.header, found), *clocks, *warm]
+            remark = f"its columns were guessed from {by}: --columns {order}"
+    if not first_triple(columns, ACC):
+        raise _missing_sensors(table, columns)
+    return columns, remark
+
+
+def columns_by_hint(header: Sequence[str], roles: Mapping[str, str | int]) -> list[Column]:
+    """Return the columns that the user names.
+
+    Raises
+    ------
+    RecordingError : the table has no such column.
+    """
+    named = {name.strip(): place for place, name in enumerate(header)}
+    without_unit = {name.partition("(")[0].strip(): place for name, place in named.items()}
+    found = []
+    for role, where in roles.items():
+        place = where if isinstance(where, int) else named.get(where, without_unit.get(where, -1))
+        if place < 0 or (header and place >= len(header)):
+            raise RecordingError(
+                f"there is no column {where + 1 if isinstance(where, int) else where} for {role}",
+                f"name one of {', '.join(named) or 'its columns by their number from 1'} with --columns",
+            )
+        name = header[place] if header else role
+        known = parse_column_name(name, place)
+        quantity = TIME if role == "t" else ACC if role[0] == "a" else GYR
+        unit = known.unit if known and known.quantity == quantity else ""
+        found.append(Column(name, place, quantity, "xyz".find(role[-1]) if role != "t" else 0, unit))
+    return found
+
+
+def _numbers(table: Table) -> dict[int, Vector]:
+    """Return place -> (n,) of the columns of numbers in whole lines."""
+    places = table.places(Kind.NUMBER)
+    with suppress(RecordingError):
+        numbers = table.numbers([Column("", place, "") for place in places])
+        whole = (np.abs(numbers) < BEYOND**2).all(axis=1)
+        return dict(zip(places, numbers[whole].T, strict=True)) if whole.any() else {}
+    return {}
+
+
+def _guess(of: Mapping[int, Vector], hints: Hints) -> dict[str, int]:
+    """Return role -> place among columns of numbers, by physics; see guess_columns."""
+    places = list(of)
+    found = guess_columns(np.column_stack([*of.values()]), hints) if of else {}
+    return {role: places[at] for role, at in found.items()}
+
+
+def _order(roles: Mapping[str, int]) -> str:
+    """Return roles as text in the order of their columns, with `-` for others."""
+    at = {place: role for role, place in roles.items()}
+    return ",".join(at.get(place, "-") for place in range(max(at) + 1))
+
+
+def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
+    names = ", ".join(name.strip() for name in table.header if name.strip()) or "unnamed"
+    if without := [name.strip() for name in table.header if WITHOUT_GRAVITY.match(name)]:
+        what = f"{table.name} holds accelerations without gravity ({', '.join(without)}), and no others"
+        return RecordingError(what, _GIVE_VALUES)
+    if first_triple(columns, GYR):
+        return RecordingError(
+            f"{table.name} holds no columns of an accelerometer; its columns are {names}",
+            "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
+        )
+    options = _likely_options(table, columns)
+    if options is None:
+        what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
+        return RecordingError(what, _GIVE_VALUES)
+    return RecordingError(
+        f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are {names}",
+        f"name its columns in their order with {options or NAMED_BY_ORDER}, and - for one to leave out",
+        options,
+    )
+
+
+def _likely_options(table: Table, columns: Sequence[Column]) -> str | None:
+    """Return options if triples of the columns are the sensors'; empty if they are too few, None without gravity."""
+    of = _numbers(table)
+    increasing = [place for place in of if is_clock(of[place])]
+    clocks = [c.place for c in table.clocks(columns)] or [place for place in increasing if is_even_clock(of[place])]
+    sensors = [place for place in of if place not in {*clocks, *increasing}]
+    triples = [sensors[first : first + 3] for first in range(0, len(sensors) - 2, 3)]
+    values = [np.column_stack([of[place] for place in triple]) for triple in triples]
+    if not triples:
+        return ""
+    acc = next((i for i, each in enumerate(values) if are_counts(each) or mean_acceleration_unit(each)), None)
+    if acc is None:
+        return None
+    # rates are none at times, other than a magnetic field
+    others = sorted((i for i in range(len(triples)) if i != acc), key=lambda i: _steadiness(values[i]))
+    found = [place for i in (acc, *others[:1]) for place in triples[i]]
+    roles = dict(zip(ROLES[1:], found, strict=False)) | dict(zip("t", clocks, strict=False))
+    unit = "" if are_counts(values[acc]) or acceleration_unit(values[acc]) else mean_acceleration_unit(values[acc])
+    return f"--columns {_order(roles)}" + (f" --units acc={unit}" if unit else "")
+
+
+def _steadiness(values: Vector) -> float:
+    """Return the first quartile of the lengths of (n, 3) over their median."""
+    low, size = np.percentile(np.linalg.norm(values, axis=1), [25, 50]).tolist()
+    return low / size if size else 0.0

@@ -1,0 +1,213 @@
+"""A table as a recording: of text, which is found first, and of arrays."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+
+from ...data import Recording, Vector
+from ...errors import RecordingError
+from ..csv import COLUMNS
+from ..hints import NO_HINTS, Hints
+from ..reading import HELD, MOST_ODD, check_size, first_bytes, reading
+from .cells import Kind
+from .clock import FEWEST
+from .columns import find_columns
+from .guess import is_index
+from .labelled import labelled_table, marked_table, pivot
+from .names import (
+    ACC,
+    BY_A_WORD,
+    GYR,
+    TEMPERATURE,
+    Column,
+    axes_of,
+    axis_triples,
+    first_triple,
+    ignored_sensors,
+    parse_axis_name,
+    plausible_celsius,
+    with_sensor,
+)
+from .streams import index_with_gravity, join_streams
+from .table import Table
+from .text import HEAD, PREAMBLE, decode_text, find_bare_table, find_named_table, find_wanted_table, stated_rate_hz
+from .times import Stream
+from .units import QUANTITIES, acceleration_unit, seem_counts
+
+# words of a program's preamble -> units that its names of columns do not say
+PROGRAMS = {"MT Manager version": {"t": "0.1ms", "acc": "m/s^2", "gyr": "rad/s"}}
+# seconds since 1970, and nanoseconds, as the first cells of `ros2 topic echo --csv`
+STAMP = re.compile(r"[12]\d{9},\d{1,9},").match
+FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
+# stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
+IN_G_ON_IOS, EITHER_SIGN = "accelerometeruncalibrated_", "totalacceleration_"
+
+
+def is_table(path: Path) -> bool:
+    """Return True if a file begins as a table of a sensor."""
+    return _begun(path) is not None
+
+
+def is_own_table(path: Path) -> bool:
+    """Return True if a file begins as a table in mpucal's own format and units."""
+    first = next(iter(first_bytes(path).decode("utf-8-sig", "replace").splitlines()), "")
+    named = {name.strip(' "').lower() for name in first.split(",")}
+    table = _begun(path) if set(COLUMNS) <= named else None
+    return table is not None and _may_be_si(table)
+
+
+def _begun(path: Path) -> Table | None:
+    try:
+        return find_any_table(decode_text(first_bytes(path), path.name), path.name)
+    except RecordingError:
+        return None
+
+
+def _may_be_si(table: Table) -> bool:
+    """Return True unless the accelerations show a unit other than m/s^2."""
+    values = table.numbers(first_triple(table.columns, ACC))
+    values = values[np.isfinite(values).all(axis=1)]
+    return len(values) < FEWEST or (not seem_counts(values) and acceleration_unit(values) in ("", "m/s^2"))
+
+
+def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """Return the recording in a table of text.
+
+    Raises
+    ------
+    RecordingError : it cannot be read, or does not say all that is needed; the message names what is missing.
+    """
+    with reading(path):
+        check_size(path, HELD * path.stat().st_size)
+        text = decode_text(path.read_bytes(), path.name)
+    if not text.strip():
+        raise RecordingError(f"{path} is empty", "record it again")
+    table = find_any_table(text, path.name, [*hints.columns.values()])
+    if table is None:
+        raise RecordingError(
+            f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
+            "name them with --columns t=NAME,ax=NAME,... or --columns t,ax,ay,az,gx,gy,gz, and --units",
+        )
+    if not len(table):
+        raise RecordingError(f"{path.name} holds no lines below the names of its columns", "record it again")
+    units = next((units for words, units in PROGRAMS.items() if words in text[:HEAD]), {})
+    return recording_from_table(replace(table, rate_hz=stated_rate_hz(text[:HEAD]), units=units), hints)
+
+
+def find_any_table(text: str, name: str, wanted: Sequence[str | int] = ()) -> Table | None:
+    """Return the table of the `wanted` columns, or of named ones, or else of numbers."""
+    if wanted:
+        return find_wanted_table(text, name, wanted)
+    for find in (marked_table, labelled_table, find_named_table):
+        if (found := find(text, name)) is not None:
+            return found
+    found = find_bare_table(text, name)
+    return found and (pivot(found) or _with_sensor(found))
+
+
+def _with_sensor(table: Table) -> Table:
+    """Return a table of one sensor, whose columns are x, y, z, or [time and] three without names, under its name.
+
+    The sensor is that of their unit, or of the file's name.
+    """
+    header, of_file = table.header, axes_of(Path(table.name).stem)
+    axes = [parse_axis_name(name) for name in header]
+    if not header and len(table) and STAMP(",".join(cells[0] for cells in table.cells)):
+        header = ["stamp.sec", "stamp.nanosec", *[""] * (len(table.cells) - 2)]
+    elif any(axes):
+        units = {axis[1] for axis in axes if axis}
+        shown = [of for of in (ACC, GYR) if units & set(QUANTITIES[of])] + [axis[:-1] for axis in of_file[:1]]
+        header = with_sensor(header, shown[0]) if shown else header
+    elif not header and of_file and len(places := table.places(Kind.NUMBER)) in (3, 4):
+        names = dict(zip(places, ["time", *of_file][-len(places) :], strict=True))
+        header = [names.get(at, "") for at in range(len(table.cells))]
+    return replace(table, header=header)
+
+
+def recording_from_table(table: Table, hints: Hints) -> Recording:
+    """Return the recording in a table that holds both sensors.
+
+    Raises
+    ------
+    RecordingError : it does not say all that is needed; the message names what is missing.
+    """
+    ranges = table.ranges if not (hints.accel_range_g or hints.gyro_range_dps) else None
+    if ranges:
+        hints = replace(hints, accel_range_g=ranges[0], gyro_range_dps=ranges[1])
+    columns, guess_remark = find_columns(table, hints)
+    accelerometers, gyr = axis_triples(columns, ACC), first_triple(columns, GYR)
+    warm = [column for column in columns if column.quantity == TEMPERATURE]
+    # a rate beside columns without a time says that the times are wrong
+    at = () if hints.columns and hints.rate_hz and "t" not in hints.columns else table.clocks(columns)
+    streams = [sensor_stream(table, at, of, warm) for of in accelerometers]
+    chosen = index_with_gravity(streams)
+    acc, a, w = accelerometers[chosen], streams[chosen], sensor_stream(table, at, gyr) if gyr else None
+    a, ios_remark = _undo_ios_sign(a, acc[0].name.strip().lower())
+    several = len(accelerometers) > 1
+    remarks = [
+        f"the accelerometer is {', '.join(column.name.strip() for column in acc)}" if several else "",
+        FLIPPED if acc[0].sign_flipped else ios_remark,
+        *table.remarks,
+        "the ranges are those that MPU6050::initialize() sets" if ranges else "",
+        guess_remark,
+        "" if hints.columns else ignored_sensors(table.header, columns),
+    ]
+    return join_streams(a, w, hints, table.name, remarks)
+
+
+def _undo_ios_sign(stream: Stream, name: str) -> tuple[Stream, str]:
+    """Return the accelerations of Sensor Logger's one table with Android's sign, and a remark on it."""
+    if name.startswith(IN_G_ON_IOS) and acceleration_unit(stream.values[stream.complete]) == "g":
+        return replace(stream, values=-stream.values), FLIPPED
+    unknown = "the sign of the accelerations was kept; if an iPhone recorded them, it is the opposite one, also of b_a"
+    return stream, unknown if name.startswith(EITHER_SIGN) else ""
+
+
+def sensor_stream(
+    table: Table, clocks: Sequence[Column], axes: Sequence[Column], warm: Sequence[Column] = ()
+) -> Stream:
+    """Return the samples in one sensor's three columns, and the temperatures beside them; see Stream.
+
+    Many lines without any number are those of another sensor.
+    """
+    values = table.numbers(axes)
+    values = -values if axes[0].sign_flipped else values
+    values[~np.isfinite(values)] = np.nan
+    empty = np.isnan(values).all(axis=1)
+    others = np.count_nonzero(empty) > MOST_ODD * len(values)
+    units = {column.unit for column in axes}
+    kept, timed = np.asarray(~empty | (not others)), None
+    of_sensor = [clock for clock in clocks if clock.clock_of in ("", axes[0].quantity)]
+    for clock in sorted(of_sensor, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit)):
+        has = kept if others else ~empty | table.has(clock)
+        found = table.times(clock, has)
+        weak = clock.rank == BY_A_WORD or clock.name.strip().lower() == "t"
+        is_time = _increases(found[0]) if weak else True
+        # the numbers of samples are no times
+        if is_time and (found[2] or not is_index(found[0])):
+            kept, timed = has, found
+            break
+    ticks, origin, time_unit = timed or (None, Decimal(0), "")
+    return Stream(
+        ticks,
+        values[kept],
+        origin,
+        time_unit,
+        (units.pop() if len(units) == 1 else "") or table.units.get(axes[0].quantity, ""),
+        places=None if others and timed else np.flatnonzero(kept),
+        temperature_c=plausible_celsius(table.numbers(warm[:1])[kept, 0]) if warm else None,
+        lost=0 if others else int((~kept).sum()),
+        rate_hz=table.rate_hz,
+    )
+
+
+def _increases(ticks: Vector) -> bool:
+    """Return True if times hardly ever decrease, other than a temperature that is called t."""
+    steps = np.diff(ticks)
+    return bool((steps > 0).any() and np.count_nonzero(steps < 0) * FEWEST <= len(steps))
