@@ -15,6 +15,7 @@ from functools import cache
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -201,6 +202,22 @@ def once(tmp_path_factory):
                 make(made)
                 made.rename(folder)
         return folder
+
+    return call
+
+
+@pytest.fixture
+def mpucal(capsys, tmp_path, monkeypatch):
+    """The command, in this process and in an empty folder: its exit code and what it printed."""
+    from mpucal.__main__ import run
+
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        capsys.readouterr()
+        code = run([str(word) for word in words])
+        out, err = capsys.readouterr()
+        return SimpleNamespace(code=code, out=out, err=err)
 
     return call
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 import smbus2
 
-from mpucal.__main__ import run
 from mpucal.chip.driver import Driver
 from mpucal.cli import session as command
 from mpucal.files.mcap import read_capture
@@ -24,15 +23,13 @@ INSTALLED = Path(sys.executable).parent / "mpucal"
 
 
 @pytest.fixture
-def mpucal(capsys, tmp_path, monkeypatch):
+def mpucal(mpucal):
     """Call it here, in an empty folder: exit code and what it said."""
-    monkeypatch.chdir(tmp_path)
 
     def call(*words):
-        code = run([str(word) for word in words])
-        said = capsys.readouterr().err
-        assert "Traceback" not in said
-        return code, said
+        done = mpucal(*words)
+        assert "Traceback" not in done.err
+        return done.code, done.err
 
     return call
 

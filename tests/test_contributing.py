@@ -36,6 +36,16 @@ from pathlib import Path
 
 from mpucal.__main__ import run
 
+TABLES = {
+    "mpucal/sinks/table.py": "SINKS",
+    "mpucal/sources/table.py": "SOURCES",
+    "mpucal/files/recorders.py": "RECORDERS",
+    "mpucal/export/forms.py": "FORMS",
+    "mpucal/files/formats.py": "FORMATS",
+    "mpucal/chip/families.py": "FAMILIES",
+    "mpucal/simulated/chip/models.py": "MODELS",
+}
+
 
 def load(path):
     name = path.removesuffix(".py").replace("/", ".")
@@ -50,23 +60,15 @@ def add(path, row):
     name, made = re.fullmatch(r"(?:(\\w+) = )?(.*)", row.strip(), re.DOTALL).groups()
     made = eval(made, {**vars(table), **known})
     known[name] = made
-    if path == "mpucal/sinks/table.py":
-        table.SINKS[made.name] = made
-    elif path == "mpucal/sources/table.py":
-        table.SOURCES.append(made)
-    elif path == "mpucal/files/recorders.py":
-        table.RECORDERS.append(made)
-    elif path == "mpucal/export/forms.py":
-        table.FORMS += (made,)
-    elif path == "mpucal/files/formats.py":
-        table.FORMATS += (made,)
-    elif path == "mpucal/chip/families.py":
-        table.FAMILIES += (made,)
-        table.PARTS.update({who_am_i: table.Part(chip, who_am_i, made) for who_am_i, chip in made.parts})
-    elif path == "mpucal/simulated/chip/models.py":
-        table.MODELS[made.name] = made
+    held = getattr(table, TABLES[path])
+    if isinstance(held, dict):
+        held[made.name] = made
+    elif isinstance(held, list):
+        held.append(made)
     else:
-        raise ValueError(path)
+        setattr(table, TABLES[path], (*held, made))
+    for who_am_i, chip in getattr(made, "parts", ()):
+        table.PARTS[who_am_i] = table.Part(chip, who_am_i, made)
 
 
 blocks = json.loads(Path("recipes.json").read_text())

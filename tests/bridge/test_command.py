@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import pytest
 
 from mpucal import bridge
-from mpucal.__main__ import run
 from mpucal.bridge.bus import BridgeBus
 from mpucal.bridge.conformance import talks
 from mpucal.bridge.doctor import examine_bridge_and_chip
@@ -36,19 +35,6 @@ def board(monkeypatch):
     made.line.name = made.name
     monkeypatch.setattr(bridge, "SerialPort", lambda _text: made.line)
     return made
-
-
-@pytest.fixture
-def mpucal(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words):
-        capsys.readouterr()
-        code = run(list(words))
-        out, err = capsys.readouterr()
-        return SimpleNamespace(code=code, out=out, err=err)
-
-    return call
 
 
 def test_a_recording(board, mpucal):

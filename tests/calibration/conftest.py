@@ -1,6 +1,6 @@
-"""Recordings with a known truth: of a nearly ideal sensor, of another simulator, and of real sensors."""
+"""Recordings of a nearly ideal sensor with a known truth, and files of others."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +12,6 @@ from tools.lab.scenarios.recordings import paper_scenario
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 G = 9.82
-
-
-@dataclass(frozen=True)
-class Other:
-    """Recording of a simulator that is not the project's, and its truth."""
-
-    recording: Recording
-    truth: SensorTruth
 
 
 def near_ideal(seed=0, D=None, G_gyro=None, **scenario):
@@ -56,32 +48,25 @@ def pick():
 
 
 @pytest.fixture(scope="session")
-def other_simulator():
-    """Return a function that loads a recording of another simulator by its name."""
+def others():
+    """Return a function that loads the arrays of a file of others, by its path without the suffix."""
 
     def load(name):
-        path = SHARED / "simulated" / f"{name}.npz"
+        path = SHARED / f"{name}.npz"
         if not path.exists():
-            pytest.skip("the other simulator's recordings are not beside this checkout")
+            pytest.skip("the recordings of others are not beside this checkout")
         with np.load(path) as file:
-            recording = Recording.from_arrays(
-                file["t"], file["acc"], file["gyr"], flat=(0, int(file["flat_samples"])), name=name
-            )
-            truth = SensorTruth(*(file[f"true_{key}"] for key in ("D", "b_a", "K", "b_omega")), float(file["gravity"]))
-        return Other(recording, truth)
+            return dict(file)
 
     return load
 
 
 @pytest.fixture(scope="session")
-def real():
+def real(others):
     """Return a function that loads a real sensor's recording by its name, without a known flat segment."""
 
     def load(name):
-        path = SHARED / "recordings" / f"{name}.npz"
-        if not path.exists():
-            pytest.skip("the recordings of others are not beside this checkout")
-        with np.load(path) as file:
-            return Recording.from_arrays(file["t"], file["acc"], file["gyr"], name=name)
+        arrays = others(f"recordings/{name}")
+        return Recording.from_arrays(arrays["t"], arrays["acc"], arrays["gyr"], name=name)
 
     return load

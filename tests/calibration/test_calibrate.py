@@ -26,16 +26,16 @@ def test_the_same_recording_twice_gives_the_same_bits(in_hand):
     assert {**first, "created": ""} == {**second, "created": ""}
 
 
-def test_sensors_of_another_simulator_are_found_with_and_without_a_known_flat_segment(other_simulator):
-    other = other_simulator("paper_1")
-    given_flat = calibrate(other.recording, "auto", G)
-    found = calibrate(replace(other.recording, flat=None), "auto", G)
+def test_a_sensor_is_found_with_and_without_a_known_flat_segment():
+    simulated = paper_scenario(1)
+    given_flat = calibrate(simulated.recording, "auto", G)
+    found = calibrate(replace(simulated.recording, flat=None), "auto", G)
     for calibration in (given_flat, found):
         # With the paper's noise, readings are uncertain by 0.08 m/s^2.
         assert {reason["code"] for reason in calibration.quality["reasons"]} <= {"few_orientations"}
         assert calibration.verdict != "refused"
         assert calibration.fit["model"] == "accel"
-        assert sph_rms(other.truth, calibration.D, calibration.b_a) < 0.2
+        assert sph_rms(simulated.truth, calibration.D, calibration.b_a) < 0.2
     # They are nearly equal: ten seconds of rest are not always found whole.
     assert (np.abs(found.D - given_flat.D) < 1.0 * given_flat.D_std).all()
     assert (np.abs(found.b_a - given_flat.b_a) < 1.0 * given_flat.b_a_std).all()

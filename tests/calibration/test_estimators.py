@@ -58,13 +58,13 @@ def ekf_of(problem, theta):
     )
 
 
-def test_the_3_state_filter_equals_the_quaternion_ekf(other_simulator):
+def test_the_3_state_filter_equals_the_quaternion_ekf():
     """Compare D and b_a by both filters from the same samples: within a tenth of a standard deviation.
 
     From the 3-state filter's optimum over all parameters, a Gauss-Newton step of the EKF leads to the EKF's own optimum
     over D and b_a, and this step is compared (a second one is a hundred times smaller).
     """
-    problem = problem_of(other_simulator("paper_2").recording)
+    problem = problem_of(paper_scenario(2).recording)
     flat = problem.flat
     known = Prior.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)))
     minimum = minimise(problem, initialise(problem, flat.b_omega), ACCEL, known, until=1e-8)

@@ -13,8 +13,10 @@ from mpucal.calibration.parameters import B_A_NAMES, BY_NAME, D_NAMES, K_NAMES, 
 from mpucal.calibration.preprocessing import preprocess
 from mpucal.calibration.theta import Theta
 from mpucal.calibration.transitions import leverages, transitions_of
+from mpucal.data import Recording
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
+from mpucal.simulated.sensor import SensorTruth
 from tools.lab.judge import sph_rms
 
 G = 9.82
@@ -185,11 +187,13 @@ def test_of_an_estimate_that_diverged_some_direction_is_next(in_hand):
 
 
 @pytest.mark.parametrize(("name", "limit"), [("pose12_0", 0.008), ("rot_1", 0.07), ("pose6_0", 0.25)])
-def test_another_simulators_hands(other_simulator, name, limit):
-    other = other_simulator(name)
-    calibration = calibrate(other.recording, "auto", other.truth.gravity)
+def test_another_simulators_hands(others, name, limit):
+    of = others(f"simulated/{name}")
+    recording = Recording.from_arrays(of["t"], of["acc"], of["gyr"], flat=(0, int(of["flat_samples"])))
+    calibration = calibrate(recording, "auto", float(of["gravity"]))
     assert calibration.fit["model"] == "hand"
-    assert sph_rms(other.truth, calibration.D, calibration.b_a) < limit
+    truth = SensorTruth(*(of[f"true_{key}"] for key in ("D", "b_a", "K", "b_omega")), float(of["gravity"]))
+    assert sph_rms(truth, calibration.D, calibration.b_a) < limit
     assert (len(calibration.fit["at_prior"]) > 0) == (name == "pose6_0")
 
 

@@ -8,7 +8,6 @@ import json
 import subprocess
 import sys
 import time
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,27 +20,6 @@ from mpucal.files.messages import BUS, PACKETS
 from mpucal.mavlink import MAVLINK_VERSION
 from mpucal.mavlink.tlog import RawPacket
 from tools.processes import quick
-
-
-@dataclass(frozen=True)
-class Result:
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def mpucal(capsys, tmp_path, monkeypatch):
-    """Return a function that calls mpucal in this process, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words):
-        capsys.readouterr()
-        code = run([str(word) for word in words])
-        captured = capsys.readouterr()
-        return Result(code, captured.out, captured.err)
-
-    return call
 
 
 @pytest.fixture(scope="session")
@@ -68,7 +46,7 @@ def called(folder, *words):
     out, err = io.StringIO(), io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = run(list(words))
-    (folder / "result.json").write_text(json.dumps(asdict(Result(code, out.getvalue(), err.getvalue()))))
+    (folder / "result.json").write_text(json.dumps({"code": code, "out": out.getvalue(), "err": err.getvalue()}))
 
 
 @pytest.fixture(scope="session")
@@ -76,7 +54,7 @@ def session(once):
     """Return a whole session on the simulated chip; tests must not change its folder."""
     words = ("session", "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "board")
     folder = once("cli-session", lambda folder: called(folder, *words))
-    result = Result(**json.loads((folder / "result.json").read_text()))
+    result = SimpleNamespace(**json.loads((folder / "result.json").read_text()))
     return SimpleNamespace(folder=folder / "board", result=result)
 
 
@@ -142,6 +120,6 @@ def stopped_at():
                 process.kill()
         for name in ("held", "go"):
             (folder / name).unlink()
-        return Result(process.returncode, "", said.read_text())
+        return SimpleNamespace(code=process.returncode, out="", err=said.read_text())
 
     return call
