@@ -1,14 +1,21 @@
-"""The table of reasons: whole, used, and the only way to make one."""
+"""The table of reasons: whole, used, the only way to make one; and each can be seen as its page says."""
 
 import ast
+import json
+import shlex
+from dataclasses import replace
 from pathlib import Path
 from string import Formatter
 
+import numpy as np
 import pytest
 
 import mpucal
+from mpucal.__main__ import run
+from mpucal.errors import RefusedError
 from mpucal.reasons import KINDS, reason
 
+SESSIONS = Path(__file__).parents[1] / "fixtures" / "sessions"
 PACKAGE = Path(mpucal.__file__).parent
 ALL = {(code, name): row for code, kind in KINDS.items() for name, row in kind.sentences.items()}
 
@@ -61,3 +68,41 @@ def test_who_decides_whether_it_refuses():
     for refuse, of in ((None, ("gyro_clipped", "samples")), (False, ("never_still", "at_all"))):
         with pytest.raises(ValueError, match=of[0]):
             reason(*of, refuse=refuse, count=1, share=0.01)
+
+
+# ---- the commands of the page
+
+
+def codes(quality):
+    return [reason["code"] for reason in quality["reasons"]]
+
+
+SESSION = {code: kind.reproduce for code, kind in KINDS.items() if kind.reproduce.startswith("mpucal session ")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", dict.fromkeys(SESSION.values()), ids=lambda words: words.split()[3])
+def test_a_session_shows_its_reasons(command, capsys, tmp_path):
+    run([*shlex.split(command)[1:], "-o", str(tmp_path / "s"), "--no-write", "--yes", "--json"])
+    found = codes(json.loads(capsys.readouterr().out)["quality"])
+    assert {code for code in SESSION if SESSION[code] == command} <= set(found)
+
+
+def test_merging_what_is_merged_already_shows_its_reason(capsys, tmp_path):
+    words = shlex.split(KINDS["same_data"].reproduce)[1:]
+    file = tmp_path / "calibration.json"
+    mpucal.calibrate(mpucal.load(SESSIONS / "mpu6050.mcap")).save(file)
+    assert run([word.replace("board7/calibration.json", str(file)) for word in words]) == RefusedError.exit_code
+    assert "calibrations 1 and 2 were made of the same recording" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def r():
+    """A good recording."""
+    return mpucal.load(SESSIONS / "mpu6050.mcap")
+
+
+@pytest.mark.parametrize("code", [code for code in KINDS if code not in {*SESSION, "same_data"}])
+def test_a_spoilt_recording_shows_its_reason(r, code):
+    found = eval(KINDS[code].reproduce, {"mpucal": mpucal, "numpy": np, "replace": replace, "r": r})
+    assert code in codes(found.quality)

@@ -1,50 +1,61 @@
+"""Rival methods, and the trial of strangers' recordings that uses one, on a hand's poses of known samples."""
+
 import numpy as np
 import pytest
 
-from mpucal.calibration.rotation import rotation
-from mpucal.data import Recording
-from tools.lab import rivals
-
-GRAVITY, RATE_HZ, HOLD, MOVE = 9.81, 100, 200, 100
-B_A, B_OMEGA = np.array([0.3, -0.2, 0.1]), np.array([0.01, -0.02, 0.03])
-SIX_FACES = np.pi / 2 * np.array([[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, 2]])
-TWELVE_POSES = np.random.default_rng(3).uniform(-1.5, 1.5, (11, 3))
+from tools.lab import rivals, strangers
+from tools.lab.scenarios.recordings import hand_scenario
+from tools.lab.scenarios.sensors import GRAVITY_MPS2
 
 
-def posed(turns, D=None):
-    """Rests with moves by rotation vectors between them, each at a constant rate, and no noise at all."""
-    rates = [np.zeros((5 * HOLD, 3))]
-    for turn in turns:
-        rates += [np.tile(turn * RATE_HZ / MOVE, (MOVE, 1)), np.zeros((HOLD, 3))]
-    omega = np.concatenate(rates)
-    s, step = [np.array([0.0, 0.0, GRAVITY])], rotation(-omega / RATE_HZ)
-    for F in step[:-1]:
-        s.append(F @ s[-1])
-    acc = np.array(s) @ (np.eye(3) if D is None else D).T + B_A
-    gyr = omega + B_OMEGA
-    # a variance of exactly zero is nobody's sensor
-    wiggle = 1e-6 * np.random.default_rng(0).standard_normal(acc.shape)
-    return Recording.from_arrays(np.arange(len(acc)) / RATE_HZ, acc + wiggle, gyr + wiggle, flat=(0, 4 * HOLD))
+@pytest.fixture(scope="module")
+def made():
+    return hand_scenario(1, "pose12", rate_hz=50.0)
 
 
-def test_turned_to_the_gyro_the_ellipsoid_gives_all_of_d():
-    D = (np.eye(3) + np.array([[0.02, 0.01, 0.0], [-0.03, -0.02, 0.02], [0.01, 0.0, 0.03]])) @ rotation(
-        np.array([0.03, -0.02, 0.05])
-    )
-    estimate = rivals.aligned_ellipsoid(rivals.Rests.of(posed(TWELVE_POSES, D)), GRAVITY)
-    np.testing.assert_allclose(estimate.D, D, atol=1e-4)
+def of_runs(made, runs):
+    """Return some of the rests of a recording."""
+    rests = rivals.Rests.of(made.recording)
+    return rivals.Rests(rests.recording, rests.flat, rests.runs[runs])
+
+
+def test_turned_to_the_gyro_the_ellipsoid_gives_all_of_d(made):
+    rests = rivals.Rests.of(made.recording)
+    free, turned = (method(rests, GRAVITY_MPS2) for method in (rivals.ellipsoid, rivals.aligned_ellipsoid))
+    assert np.abs(turned.D - made.truth.D).max() < 0.005 < np.abs(free.D - made.truth.D).max()
+    np.testing.assert_allclose(turned.b_a, made.truth.b_a, atol=0.02)
 
 
 @pytest.mark.parametrize(
-    ("turns", "method", "why"),
+    ("runs", "method", "why"),
     [
-        (SIX_FACES[:3], "six_positions", r"no rest with \+x, -x up"),
-        (SIX_FACES, "ellipsoid", "6 rests, needs 9"),
-        (np.tile([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], (5, 1)), "ellipsoid", "leave the ellipsoid open"),
+        ([0, 1], "six_positions", r"no rest with .*-z up"),
+        (range(6), "ellipsoid", "6 rests, needs 9"),
+        ([0, 1] * 5, "ellipsoid", "leave the ellipsoid open"),
     ],
     ids=["a face missing", "too few rests", "two orientations"],
 )
-def test_data_that_do_not_suit_a_method_are_refused_with_the_reason(turns, method, why):
-    rests = rivals.Rests.of(posed(turns))
+def test_data_that_do_not_suit_a_method_are_refused_with_the_reason(made, runs, method, why):
     with pytest.raises(rivals.Unfit, match=why):
-        getattr(rivals, method)(rests, GRAVITY)
+        getattr(rivals, method)(of_runs(made, runs), GRAVITY_MPS2)
+
+
+def test_a_rest_is_judged_by_an_ellipsoid_of_the_others(made):
+    rests = rivals.Rests.of(made.recording)
+    fitted = rivals.ellipsoid(rests, GRAVITY_MPS2)
+    of_all = np.linalg.norm(np.linalg.solve(fitted.D, (rests.y - fitted.b_a).T), axis=0) - GRAVITY_MPS2
+    assert 1e3 * np.sqrt(np.mean(of_all**2)) < strangers.left_out(rests, GRAVITY_MPS2) < 100.0
+    assert np.isnan(strangers.left_out(of_runs(made, range(6)), GRAVITY_MPS2))
+
+
+@pytest.mark.parametrize(("unit", "tries"), [("", 1), (" (rad/s)", 2)])
+def test_a_try_follows_the_options_of_the_refusal(unit, tries, made, tmp_path):
+    names = ",".join(["time", *(f"acc_{axis}" for axis in "xyz"), *(f"gyro_{axis}{unit}" for axis in "xyz")])
+    recording = made.recording
+    rows = np.column_stack([recording.t, recording.acc, np.degrees(recording.gyr)])
+    np.savetxt(tmp_path / "walk.csv", rows, "%.9g", ",", header=names, comments="")
+    found = strangers.of_path(tmp_path / "walk.csv", gravity=GRAVITY_MPS2)
+    assert found.tries == tries
+    assert found.before > 10.0 * found.after
+    (tmp_path / "note.txt").write_text("no table\n")
+    assert strangers.of_path(tmp_path / "note.txt").tries == 0
