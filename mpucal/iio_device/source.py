@@ -21,11 +21,11 @@ from ..iio.driver import Devices, IioDriver
 from ..iio.setup import LIST_BYTES, TEXT_BYTES, TRIGGERS
 from ..origin import Origin
 from ..session.plan import Plan
-from ..sources.chain import Chain
 from ..sources.chip import OpenedChip
 from ..sources.host_bus import HostBus, converting
 from ..sources.kind import Request
 from ..sources.opened_source import Say
+from ..sources.recorded_parts import RecordedParts
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
@@ -60,7 +60,7 @@ class OpenedIio(OpenedChip):
 
     @classmethod
     def replayed(
-        cls, capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], /, **how: Any
+        cls, capture: Capture, line: RecordedParts[Any], plan: Plan, _values: Mapping[str, Any], /, **how: Any
     ) -> OpenedIio:
         """See OpenedSource.
 

@@ -25,7 +25,7 @@ from ..errors import BusError
 from ..session.beside import describe_end
 from ..session.events import Prompt
 from ..session.ports import Source
-from .chain import Chain
+from .recorded_parts import RecordedParts
 from .replay import ReplayBus, Tap, as_asked, successful
 
 CAN_FORK = sys.platform == "linux"
@@ -43,7 +43,7 @@ class SourceApart:
     """
 
     def __init__(
-        self, driver: Source, tap: Tap, parts: Chain[Any] | None, hands: Sequence[Callable[[Prompt], None]]
+        self, driver: Source, tap: Tap, parts: RecordedParts[Any] | None, hands: Sequence[Callable[[Prompt], None]]
     ) -> None:
         self._driver, self._tap, self._parts, self._hands = driver, tap, parts, hands
         self.poll, self.recording = driver.poll, driver.recording

@@ -20,7 +20,7 @@ from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Note, Operator, ReplayedOperator, Source
-from .chain import Chain
+from .recorded_parts import RecordedParts
 
 if TYPE_CHECKING:
     from ..files.mcap import Capture, CaptureWriter
@@ -46,7 +46,7 @@ class NewRecords:
     a replay keeps the recorded one.
     """
 
-    def __init__(self, writer: CaptureWriter, parts: Chain[Any] | None = None) -> None:
+    def __init__(self, writer: CaptureWriter, parts: RecordedParts[Any] | None = None) -> None:
         self._writer, self._parts, self._has_time = writer, parts, False
 
     @property
@@ -81,7 +81,7 @@ class OpenedSource(ABC):
 
     Attributes
     ----------
-    line : open bus or transport; a Chain in a replay and in a resumed session. plan : of the session.
+    line : open bus or transport; RecordedParts in a replay and in a resumed session. plan : of the session.
     hands : receive the prompts besides the operator. truth : returns the true parameters of a simulated sensor.
     recovered : description of a damaged capture's readable part. capture_name : name of its capture's file.
     words : options that open it again; see Request.words. A session can be resumed only with them.
@@ -103,7 +103,7 @@ class OpenedSource(ABC):
 
     @classmethod
     def replayed(
-        cls, _capture: Capture, line: Chain[Any], plan: Plan, _values: Mapping[str, Any], /, **how: Any
+        cls, _capture: Capture, line: RecordedParts[Any], plan: Plan, _values: Mapping[str, Any], /, **how: Any
     ) -> OpenedSource:
         """Open the replay of such a source.
 
@@ -114,9 +114,9 @@ class OpenedSource(ABC):
         return cls(line, plan, **how)
 
     @property
-    def parts(self) -> Chain[Any] | None:
+    def parts(self) -> RecordedParts[Any] | None:
         """Recorded parts of the session, followed by the sensor itself if it is resumed; None without them."""
-        return self.line if isinstance(self.line, Chain) else None
+        return self.line if isinstance(self.line, RecordedParts) else None
 
     @property
     def listeners(self) -> Sequence[Listener]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, Literal, TypeVar
 
 from ..chip.access import Bus, Failure, Reply, Transaction
@@ -13,34 +13,44 @@ from ..files.mcap import Record
 from ..mavlink.texts import is_own
 from ..mavlink.tlog import RawPacket
 from ..mavlink.transport import PAUSE_NS, ReceivedBytes
-from .chain import RecordedPart
+from .recorded_parts import RecordedParts
 
 _RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld, LateRead, LinkError)}
 _RAISES["LinkLost"] = LinkError
 
 
-class ReplayBus(RecordedPart[Transaction]):
-    """Bus that answers the recorded accesses, in their order, with the recorded replies.
+class ReplayBus(RecordedParts[Transaction]):
+    """Bus that answers the recorded accesses, in their order, with the recorded replies; see RecordedParts.
 
     It raises EndOfCapture after the last one, CaptureError on another access than the recorded one, and the recorded
     error of an access that failed.
     """
 
-    def __init__(self, records: Iterable[Record], name: str = "the capture") -> None:
-        super().__init__(lambda record: isinstance(record, Transaction), records, name)
-        self._count = len(self._items)
-
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
+        if not self.replaying:
+            reply: Reply = self._live.read(register, count)
+            return reply._replace(t_ns=self._shifted(reply.t_ns))
         recorded = self._next_recorded(Transaction("read", register, count, b"", 0))
         return Reply(recorded.data, recorded.t_ns, recorded.host_ns)
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
+        if not self.replaying:
+            return self._shifted(self._live.write(register, data))
         return self._next_recorded(Transaction("write", register, len(data), data, 0)).t_ns
 
     def sleep_until(self, t_ns: int) -> None:
-        """Return at once: the replies carry their times."""
+        """Sleep as Bus does; not in a replay, whose replies carry their times, nor before the first reply after it."""
+        if self._shift_ns is not None:
+            self._live.sleep_until(t_ns - self._shift_ns)
+
+    def _is_item(self, record: Record) -> bool:
+        return isinstance(record, Transaction)
+
+    def _load(self, records: Iterable[Record]) -> None:
+        super()._load(records)
+        self._count = len(self._items)
 
     def _next_recorded(self, asked: Transaction) -> Transaction:
         if not self._items:
@@ -49,20 +59,32 @@ class ReplayBus(RecordedPart[Transaction]):
         return successful(self._take())
 
 
-class PacketReplay(RecordedPart[RawPacket]):
+class PacketReplay(RecordedParts[RawPacket]):
     """Transport of recorded packets, which come again at their times; those that mpucal itself sent are skipped."""
 
     datagrams, outward = True, False
 
-    def __init__(self, records: Sequence[Record], name: str) -> None:
-        super().__init__(lambda record: isinstance(record, RawPacket) and not is_own(record.data), records, name)
+    def go_on(self) -> bool:
+        """See RecordedParts."""
+        goes_on = super().go_on()
+        if not self.replaying:
+            self.name, self.datagrams, self.outward = self._live.name, self._live.datagrams, self._live.outward
+            self._begin_clock(self._live.now_ns())
+        return goes_on
+
+    def _is_item(self, record: Record) -> bool:
+        return isinstance(record, RawPacket) and not is_own(record.data)
+
+    def _load(self, records: Iterable[Record]) -> None:
+        records = list(records)
+        super()._load(records)
         # Times of all records: our own heartbeats show that a vehicle was silent, and the program was not suspended.
-        self._times_ns = [record.t_ns for record in records]
-        self._now_ns, self._end_ns = (self._times_ns[0], self._times_ns[-1]) if records else (0, 0)
+        self._times_ns = [record.t_ns for record in records] or [0]
+        self._now_ns = self._times_ns[0]
 
     def now_ns(self) -> int:
         """See Transport."""
-        return self._now_ns
+        return self._now_ns if self.replaying else self._shifted(self._live.now_ns())
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport.
@@ -71,7 +93,10 @@ class PacketReplay(RecordedPart[RawPacket]):
         ------
         EndOfCapture : there are no more packets.
         """
-        if not self._items and until_ns > self._end_ns:
+        if not self.replaying:
+            received: ReceivedBytes | None = self._live.receive(until_ns - (self._shift_ns or 0))
+            return None if received is None else received._replace(t_ns=self._shifted(received.t_ns))
+        if not self._items and until_ns > self._times_ns[-1]:
             raise EndOfCapture(f"{self.name} ends")
         if not self._items or self._items[0].t_ns >= until_ns:
             at = bisect_left(self._times_ns, until_ns)
@@ -83,10 +108,14 @@ class PacketReplay(RecordedPart[RawPacket]):
         return ReceivedBytes(packet.data, self.name, self._now_ns)
 
     def send(self, data: bytes, address: str | None) -> None:
-        """Do nothing: no vehicle is there."""
+        """See Transport; in a replay no vehicle is there."""
+        if not self.replaying:
+            self._live.send(data, address)
 
     def restrict(self, address: str | None) -> None:
         """See Transport."""
+        if not self.replaying:
+            self._live.restrict(address)
 
     def unread(self) -> int:
         """Return 0: what a vehicle sends does not depend on what is read."""

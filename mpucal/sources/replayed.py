@@ -15,10 +15,10 @@ from ..files.recorders import VEHICLE, recorder_of
 from ..files.tlog import TLOG, read_tlog
 from ..result.session_files import CAPTURE
 from ..session.plan import Plan
-from .chain import Chain, ChainedBus, ChainedTransport, split_at_resumes
 from .kind import Request
 from .opened_source import SOURCE, OpenedSource
 from .opening import refuse_fixed_options, reopen_source
+from .recorded_parts import RecordedParts, split_at_resumes
 from .replay import PacketReplay, ReplayBus
 
 
@@ -42,7 +42,7 @@ def open_source(request: Request) -> OpenedSource:
         plan, recorder = Plan.of_capture(first.meta, first.name), recorder_of(first.meta, first.name)
         plan = replace(plan, board=request.plan.board or plan.board)
     kind: type[OpenedSource] = resolve_name(recorder.opened)
-    return kind.replayed(first, _chained(captures), plan, request.values, **how)
+    return kind.replayed(first, _parts(captures), plan, request.values, **how)
 
 
 def open_resumed(folder: Path) -> OpenedSource:
@@ -62,7 +62,7 @@ def open_resumed(folder: Path) -> OpenedSource:
     live = reopen_source(words, plan)
     return replace(
         live,
-        line=_chained(captures, live.line),
+        line=_parts(captures, live.line),
         plan=plan,
         recovered=_last_recovered(captures),
         capture_name=CAPTURE.numbered(len(captures) + 1),
@@ -85,12 +85,9 @@ def _last_recovered(captures: Sequence[Capture]) -> str | None:
     return next((capture.recovered for capture in reversed(captures) if capture.recovered), None)
 
 
-def _chained(captures: Sequence[Capture], live: Any = None) -> Chain[Any]:
+def _parts(captures: Sequence[Capture], live: Any = None) -> RecordedParts[Any]:
     """Return the recorded parts of a session, followed by its `live` bus or transport, as one."""
-    parts = split_at_resumes((capture.records for capture in captures), more=live is not None)
+    first, *later = split_at_resumes((capture.records for capture in captures), more=live is not None)
     name = captures[0].name
-    last_ns = max((record.t_ns for part in parts for record in part), default=0)
-    last = [live] if live else []
-    if not captures[0].meta or recorder_of(captures[0].meta, name) is VEHICLE:
-        return ChainedTransport([*(PacketReplay(part, name) for part in parts), *last], last_ns)
-    return ChainedBus([*(ReplayBus(part, name) for part in parts), *last], last_ns)
+    of_vehicle = not captures[0].meta or recorder_of(captures[0].meta, name) is VEHICLE
+    return (PacketReplay if of_vehicle else ReplayBus)(first, name, later, live)

@@ -25,9 +25,9 @@ from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
 from ..origin import Origin
 from ..session.events import Prompt
 from ..session.plan import Plan
-from ..sources.chain import Chain
 from ..sources.kind import Request
 from ..sources.opened_source import ActiveSource, NewRecords, OpenedSource, Say
+from ..sources.recorded_parts import RecordedParts
 from ..sources.replay import PacketReplay
 
 POLL_S = 0.05
@@ -113,7 +113,7 @@ class OpenedVehicle(OpenedSource):
 
     @classmethod
     def replayed(
-        cls, capture: Capture, line: Chain[Any], plan: Plan, values: Mapping[str, Any], /, **how: Any
+        cls, capture: Capture, line: RecordedParts[Any], plan: Plan, values: Mapping[str, Any], /, **how: Any
     ) -> OpenedVehicle:
         """Open the replay of a session as it was, and any other log until its end; see OpenedSource.
 

@@ -15,7 +15,6 @@ from mpucal.errors import BusError, EndOfCapture, NoAnswer
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.apart import CAN_FORK, SourceApart
-from mpucal.sources.chain import ChainedBus
 from mpucal.sources.replay import ReplayBus, Tap
 from tools.lab.feeds import open_recorded
 
@@ -136,7 +135,7 @@ def test_a_resumed_session_is_replayed_here_before_the_process_goes_on():
     measure(Driver(before[0], Config()))
 
     def resumed():
-        return ChainedBus([ReplayBus(before[1]), rest()], before[1][-1].t_ns)
+        return ReplayBus(before[1], live=rest())
 
     chain = resumed()
     bus, alone = tapped(chain)

@@ -42,7 +42,7 @@ from mpucal.simulated.vehicle.options import VehicleOptions
 from mpucal.sinks.chip import FORMAT as KEPT
 from mpucal.sinks.chip import REGISTERS, saved_blocks
 from mpucal.sinks.write_back import is_calibration
-from mpucal.sources.chain import split_at_resumes
+from mpucal.sources.recorded_parts import split_at_resumes
 from mpucal.sources.table import SOURCES
 
 from ..lab.dialects import dialects, walk, written

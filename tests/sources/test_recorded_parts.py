@@ -4,7 +4,7 @@ import pytest
 
 from mpucal.chip.access import Reply, Transaction
 from mpucal.chip.records import RESUMED, SessionEvent
-from mpucal.sources.chain import PAUSE_NS, ChainedBus, split_at_resumes
+from mpucal.sources.recorded_parts import PAUSE_NS, split_at_resumes
 from mpucal.sources.replay import ReplayBus
 
 S = 1_000_000_000
@@ -45,7 +45,7 @@ class Young:
 
 def test_a_clock_continues_the_earlier_one():
     young = Young()
-    bus = ChainedBus([ReplayBus([]), young], 7 * S)
+    bus = ReplayBus([read(7)], live=young)
     assert bus.go_on()
     bus.sleep_until(3 * S)
     assert young.slept_ns == []
