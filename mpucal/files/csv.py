@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from io import StringIO
 from pathlib import Path
@@ -22,7 +22,8 @@ from ..errors import RecordingError
 from ._text import lines, numbers
 from .reading import LONGEST_LINE, reading
 from .rows import Rows, Write, check_runs
-from .tables.names import COLDEST_C, WARMEST_C, ignored_sensors, parse_header
+from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
+from .tables.text import decode_text, read_table
 from .tables.times import plausible_utc_ns
 from .tables.units import NS
 
@@ -44,22 +45,16 @@ def csv_rows(path: Path) -> Rows:
 
     Raises
     ------
-    RecordingError : it cannot be read, or its first line lacks a column; of a bad line, with its number, when it is
-        read.
+    RecordingError : it cannot be read, or its first line names a column twice; of bad lines when they are read.
     """
-    try:
-        with reading(path), path.open("rb") as file:
-            begun, second = file.readline(LONGEST_LINE), file.readline(LONGEST_LINE)
-        text = begun.decode("utf-8-sig")
-        # a line may end with a carriage return alone
-        first = StringIO(text, newline="").readline()
-        header = [name.strip().lower() for name in next(csv.reader([first]), [])]
-    except UnicodeDecodeError as error:
-        raise RecordingError(f"{path} is not text", _REMEDY) from error
-    except csv.Error as error:
-        raise _bad_line(path, 1, error) from error
+    with reading(path), path.open("rb") as file:
+        begun, second = file.readline(LONGEST_LINE), file.readline(LONGEST_LINE)
+    text = begun.decode("utf-8-sig", "replace")
+    # a line may end with a carriage return alone
+    first = StringIO(text, newline="").readline()
+    header = [name.strip().lower() for name in next(csv.reader([first]), [])]
     begin = len(begun) - len(text.removeprefix(first).encode())
-    table = _Table(path, begin, len(header), _column_places(header, path))
+    table = _Table(path, begin, header, _column_places(header, path))
     others = ignored_sensors(header, [c for c in parse_header(header) if c.name in table.places])
     return Rows(
         check_runs(table.runs(), path.name),
@@ -94,61 +89,36 @@ def _column_places(header: list[str], path: Path) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class _Table:
-    """The lines of a table from byte `begin` on, with `width` cells each; `places` maps column name to cell."""
+    """The lines of a table from byte `begin` on; `places` maps column name to cell."""
 
     path: Path
     begin: int
-    width: int
+    header: list[str]
     places: dict[str, int]
 
     def runs(self) -> Iterator[Samples]:
         """Yield the samples, a block of lines at a time."""
         with reading(self.path), self.path.open("rb") as file:
             file.seek(self.begin)
-            line = 2
+            line = 1
             for block in _blocks(file, self.path):
-                values = numbers(block, self.width, list(self.places.values()))
-                if values is None:
-                    values = self._parse_slowly(block, line)
+                values = numbers(block, len(self.header), list(self.places.values()))
+                values = self._parse_slowly(block, line) if values is None else values
                 line += block.count(b"\n")
                 if len(values):
                     yield _samples(values, sure=TEMPERATURE in self.places)
 
-    def _parse_slowly(self, block: bytes, line: int) -> Vector:
-        """Return (n, 7 or 8) numbers, parsed with csv and float; `line` is the number of the first line.
+    def _parse_slowly(self, block: bytes, before: int) -> Vector:
+        """Return (n, 7 or 8) numbers of lines of which some lack cells, or hold what only Python reads.
 
         Raises
         ------
-        RecordingError : a cell is not a number; the message names its line.
+        RecordingError : too many cells are not numbers; the message names a line, of which `before` are above.
         """
-        try:
-            rows = csv.reader(StringIO(block.decode(), newline=""))
-        except UnicodeDecodeError as error:
-            raise RecordingError(f"{self.path} is not text from line {line} on", "record it again") from error
-        try:
-            values = [self._numbers(row, line + rows.line_num - 1) for row in rows if any(map(str.strip, row))]
-        except csv.Error as error:
-            raise _bad_line(self.path, line + rows.line_num - 1, error) from error
-        return np.array(values).reshape(-1, len(self.places))
-
-    def _numbers(self, row: list[str], line: int) -> list[float]:
-        """Return the numbers of a row in the order of `places`."""
-        if len(row) != self.width:
-            raise RecordingError(
-                f"{self.path}: line {line} has {len(row)} values where the first line names {self.width}",
-                "complete that line or leave it out",
-            )
-        found = []
-        for name, place in self.places.items():
-            try:
-                # an empty cell is a missing measurement; a time must not be missing
-                found.append(float(row[place]) if row[place].strip() or name == COLUMNS[0] else np.nan)
-            except ValueError as error:
-                raise RecordingError(
-                    f"{self.path}: line {line}: {name} is {row[place]!r}, which is not a number",
-                    "correct that line or leave it out",
-                ) from error
-        return found
+        table = read_table(decode_text(block, self.path.name), str(self.path), self.header, 0, ",")
+        table = replace(table, lines=[before + line for line in table.lines])
+        values = table.numbers([Column(name, place, "") for name, place in self.places.items()])
+        return np.asarray(values[~np.isnan(values).all(axis=1)])
 
 
 def _blocks(file: IO[bytes], path: Path) -> Iterator[bytes]:
@@ -165,10 +135,6 @@ def _blocks(file: IO[bytes], path: Path) -> Iterator[bytes]:
         while block.count(b'"') % 2 and len(block) <= BLOCK + LONGEST_LINE and (more := next_lines()):
             block += more
         yield block
-
-
-def _bad_line(path: Path, line: int, error: csv.Error) -> RecordingError:
-    return RecordingError(f"{path}: line {line} is not a line of a table ({error})", _REMEDY)
 
 
 def _samples(values: Vector, sure: bool) -> Samples:

@@ -25,36 +25,42 @@ def _stems(words: str) -> dict[str, str]:
 
 
 # a unit stands only where the program that uses the stem always writes that one
-ACC_STEMS = _stems(
-    "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
-    " acce accelero acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
-)
-GYR_STEMS = _stems(
-    "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
-    " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate gyroadc:deg/s rotationrate"
-    " motionrotationrate rotation"
-)
-TIME_STEMS = _stems(
-    "headerstamp:ns stamp epoch timestampsample:us timestamp timestamps time times t ts timesincestart"
-    " timesincestartin secondselapsed:s elapsed elapsedtime seconds:s sec:s millis:ms micros:us rtctime datetime date"
-    " secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s timestampsec:s sampletimefine"
-)
-# the part below a second, in a column beside whole seconds: builtin_interfaces/Time, and ROS 1's time
-_STAMPS = ("", "stamp", "headerstamp", "timestamp")
-NANOSECOND_STEMS = tuple(f"{of}{word}" for of in _STAMPS for word in ("nanosec", "nsecs", "nsec"))
+STEMS = {
+    TIME: _stems(
+        "headerstamp:ns stamp epoch timestampsample:us timestamp timestamps time times t ts timesincestart"
+        " timesincestartin secondselapsed:s elapsed elapsedtime seconds:s sec:s millis:ms micros:us rtctime datetime"
+        " date secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s timestampsec:s sampletimefine"
+        " accelerometertimestampsincereboot:s gyrotimestampsincereboot:s"
+    ),
+    # the part below a second, in a column beside whole seconds: builtin_interfaces/Time, and ROS 1's time
+    NANOSECONDS: _stems(
+        "nanosec nsecs nsec stampnanosec stampnsecs stampnsec headerstampnanosec headerstampnsecs headerstampnsec"
+        " timestampnanosec timestampnsecs timestampnsec"
+    ),
+    TEMPERATURE: _stems(
+        "temperature temp imutemp temperaturec tempc imutempc temperaturecelsius tempcelsius imutempcelsius"
+        " temperaturedegc tempdegc imutempdegc t"
+    ),
+    ACC: _stems(
+        "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
+        " acce accelero acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
+    ),
+    GYR: _stems(
+        "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
+        " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate gyroadc:deg/s rotationrate"
+        " motionrotationrate rotation"
+    ),
+}
+UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}
 # SensorLog has a clock for each sensor
 SENSOR_CLOCKS = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
-TEMPERATURE_STEMS = tuple(
-    f"{word}{unit}" for word in ("temperature", "temp", "imutemp") for unit in ("", "c", "celsius", "degc")
-)
 COLDEST_C, WARMEST_C = -60.0, 130.0
 # iOS has the opposite sign of specific force: at rest it reads -1 g along the axis that points upwards
 FLIPPED_STEMS = ("accelerometeracceleration",)
 # accelerations from which a program has taken gravity
 WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
-_TIME_UNITS = ("", *QUANTITIES[TIME])
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
-BY_A_WORD = len(TIME_STEMS)
+BY_A_WORD = len(STEMS[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
 _AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
@@ -110,7 +116,7 @@ def parse_column_name(name: str, place: int) -> Column | None:
         text, unit = tail[1], find_unit(tail[2])
         found = _match_stem(name, place, text, axis, unit)
     words = _CAMEL.sub("_", name).lower()
-    if found is None and axis < 0 and unit in _TIME_UNITS and (unit or _CLOCK.search(words)):
+    if found is None and axis < 0 and unit in UNITS[TIME] and (unit or _CLOCK.search(words)):
         return Column(name, place, TIME, unit=unit, rank=BY_A_WORD)
     return found
 
@@ -126,19 +132,13 @@ def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Colum
     # a field of a structure, such as samples.acc.x
     words += [_plain(text[at + 1 :]) for at, letter in enumerate(text) if letter == "."]
     for word in words:
-        if word in SENSOR_CLOCKS and unit in _TIME_UNITS:
-            return Column(name, place, TIME, unit=unit or "s", clock_of=SENSOR_CLOCKS[word])
-        if word in NANOSECOND_STEMS and not unit:
-            return Column(name, place, NANOSECONDS)
-        if word in TIME_STEMS and axis < 0 and unit in _TIME_UNITS:
-            return Column(name, place, TIME, unit=unit or TIME_STEMS[word], rank=list(TIME_STEMS).index(word))
-        if (word in TEMPERATURE_STEMS and unit in ("", "C")) or (word == "t" and unit == "C"):
-            return Column(name, place, TEMPERATURE)
-        for quantity, stems in ((ACC, ACC_STEMS), (GYR, GYR_STEMS)):
-            for stem, at in _split_axis(word, axis):
-                if stem in stems and unit in ("", *QUANTITIES[quantity]):
-                    rank, flipped = list(stems).index(stem), stem in FLIPPED_STEMS
-                    return Column(name, place, quantity, at, unit or stems[stem], rank, sign_flipped=flipped)
+        for quantity, stems in STEMS.items():
+            of_axes = quantity in (ACC, GYR)
+            for stem, at in _split_axis(word, axis) if of_axes else [(word, axis)]:
+                if stem in stems and unit in UNITS[quantity] and of_axes == (at >= 0):
+                    rank, clock_of = list(stems).index(stem), SENSOR_CLOCKS.get(stem, "")
+                    unit = unit or stems[stem]
+                    return Column(name, place, quantity, at, unit, rank, clock_of, stem in FLIPPED_STEMS)
     return None
 
 

@@ -20,7 +20,9 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from decimal import Decimal
+from itertools import groupby
 from pathlib import Path
+from typing import NamedTuple
 
 from ...data import Recording
 from ...errors import RecordingError
@@ -62,9 +64,9 @@ def is_folder_of_tables(path: Path) -> bool:
 
 def tables_of_sides(names: Iterable[str]) -> list[str]:
     """Return the accelerometer's table of each pair, if pairs are called after the sides of a board; else none."""
-    found = [next(name for name, (quantity, _) in pair.items() if quantity == ACC) for pair in _pairs(names)]
-    of_sides = all((of := _parse(name)) and SIDE.search(of[2]) for name in found)
-    return found if len(found) > 1 and of_sides else []
+    found = [next(member for member in pair if member.quantity == ACC) for pair in _pairs(names)]
+    of_sides = len(found) > 1 and all(SIDE.search(member.rest) for member in found)
+    return [member.name for member in found] if of_sides else []
 
 
 def is_archive_of_tables(path: Path) -> bool:
@@ -79,11 +81,9 @@ def is_archive_of_tables(path: Path) -> bool:
 def is_one_of_two_tables(path: Path) -> bool:
     """Return True if a file is a table of one sensor, beside that of the other."""
     try:
-        names = [child.name for child in path.parent.iterdir()]
-        if (found := _parse(path.name)) is None:
-            return False
-        alike = [_parse(name) for name in names]
-        if {of[0] for of in alike if of and of[2] == found[2]} != {ACC, GYR}:
+        found = _parse(path.name)
+        beside = map(_parse, [child.name for child in path.parent.iterdir()] if found else [])
+        if found is None or {of.quantity for of in beside if of and of.rest == found.rest} != {ACC, GYR}:
             return False
         begun = first_bytes(path)
         table = None if begun.startswith(MATLAB) else find_named_table(decode_text(begun, path.name), path.name)
@@ -132,25 +132,26 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
 def is_pair(tables: Mapping[str, Table]) -> bool:
     """Return True if two tables are called as an accelerometer's and a gyroscope's, and have clocks of their own."""
     timed = any(column.quantity == TIME for table in tables.values() for column in table.columns)
-    return timed and bool(_pairs(map(_as_file, tables)))
+    return timed and bool(_pairs(f"{name}{OF_FILE}" for name in tables))
 
 
 def recording_of_tables(name: str, tables: Mapping[str, Table], hints: Hints) -> Recording:
     """Return the recording in a pair of tables in a file."""
-    found = {_as_file(of): table for of, table in tables.items()}
+    found = {f"{of}{OF_FILE}": table for of, table in tables.items()}
     return _recording(name, found, found.__getitem__, "", hints)
 
 
-def _as_file(table: str) -> str:
-    return f"{table}{OF_FILE}"
+class _Member(NamedTuple):
+    """A table of one sensor: its rank among those of the sensor, and its name without the sensor's word."""
+
+    rest: str
+    quantity: str
+    rank: int
+    name: str
 
 
-def _called(member: str) -> str:
-    return Path(member).name.removesuffix(OF_FILE)
-
-
-def _parse(name: str) -> tuple[str, int, str] | None:
-    """Return the sensor of a table's name, the rank of its word in NAMES, and the name without it; None for others."""
+def _parse(name: str) -> _Member | None:
+    """Return the table of that name; None for other files."""
     path = Path(name)
     if path.suffix.lower() not in (*SUFFIXES, OF_FILE) or "meta" in path.parts[:-1] or path.name.startswith("."):
         return None
@@ -159,19 +160,17 @@ def _parse(name: str) -> tuple[str, int, str] | None:
     for quantity, known in NAMES.items():
         for word in ("".join(words), *words):
             if word in known and not {"linear", "user"} & set(words):
-                return quantity, known.index(word), f"{path.parent}/{stem.replace(word, '', 1) if word in stem else ''}"
+                rest = f"{path.parent}/{stem.replace(word, '', 1) if word in stem else ''}"
+                return _Member(rest, quantity, known.index(word), name)
     return None
 
 
-def _pairs(names: Iterable[str]) -> list[dict[str, tuple[str, int]]]:
-    """Return the tables of each pair, name -> (sensor, rank); all tables as one pair if their names do not agree."""
-    pairs: dict[str, dict[str, tuple[str, int]]] = {}
-    for name in sorted(set(names)):
-        if (found := _parse(name)) is not None:
-            pairs.setdefault(found[2], {})[name] = found[:2]
-    whole = [pairs[rest] for rest in sorted(pairs)]
-    whole += [{name: of for pair in whole for name, of in pair.items()}]
-    both = [pair for pair in whole if {quantity for quantity, _ in pair.values()} == {ACC, GYR}]
+def _pairs(names: Iterable[str]) -> list[list[_Member]]:
+    """Return the tables of each pair, the best of each sensor first; all tables as one if their names do not agree."""
+    members = sorted(filter(None, map(_parse, set(names))))
+    pairs = [list(pair) for _, pair in groupby(members, lambda member: member.rest)]
+    pairs += [sorted(members, key=lambda member: member[1:])]
+    both = [pair for pair in pairs if {member.quantity for member in pair} == {ACC, GYR}]
     return both[:-1] or both
 
 
@@ -180,27 +179,29 @@ def _recording(
 ) -> Recording:
     """Return the recording in the pair of tables that holds `wanted`, or in the first."""
     pairs = _pairs(names)
-    pair = next((pair for pair in pairs if wanted in pair), pairs[0])
+    pair = next((pair for pair in pairs if wanted in {member.name for member in pair}), pairs[0])
     beside = [(member, read(member)) for member in names if member.lower().endswith((METADATA, TIMES_OF_DAY))]
     flipped, zero_ns, remark = _read_app_metadata([(name, data) for name, data in beside if isinstance(data, bytes)])
-    found: dict[str, tuple[str, Stream]] = {}
-    for member, (quantity, _) in sorted(pair.items(), key=lambda item: (item[1][1], item[0])):
-        if quantity in found and (quantity == GYR or _holds_gravity(found[ACC][1])):
-            continue
-        try:
-            stream = _stream(f"{name}/{Path(member).name}" if member != name else name, read(member), quantity, hints)
-        except RecordingError:
-            # another table of that sensor may do
-            if quantity in found or member == [of for of in pair if pair[of][0] == quantity][-1]:
-                raise
-            continue
-        if quantity not in found or _holds_gravity(stream):
-            found[quantity] = member, stream
-    (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
+
+    def stream_of(quantity: str) -> tuple[str, Stream]:
+        """Return the first table that can be read, of an accelerometer with gravity if there is one."""
+        found: list[tuple[str, Stream]] = []
+        members = [member.name for member in pair if member.quantity == quantity]
+        for member in members:
+            try:
+                of = f"{name}/{Path(member).name}" if member != name else name
+                found.append((member, _stream(of, read(member), quantity, hints)))
+            except RecordingError:
+                # another table of that sensor may do
+                if member == members[-1] and not found:
+                    raise
+        return next((of for of in found if quantity == GYR or _holds_gravity(of[1])), found[0])
+
+    (of_acc, acc), (of_gyr, gyr) = stream_of(ACC), stream_of(GYR)
     acc = replace(acc, values=-acc.values if flipped else acc.values, zero_ns=zero_ns)
-    of = f"from {_called(of_acc)} and {_called(of_gyr)}"
+    of = " and ".join(Path(member).name.removesuffix(OF_FILE) for member in (of_acc, of_gyr))
     more = f"of {len(pairs)} pairs of tables, it is the first; give one file of another pair to read that"
-    remarks = [of, more if len(pairs) > 1 and not wanted else "", remark]
+    remarks = [f"from {of}", more if len(pairs) > 1 and not wanted else "", remark]
     return join_streams(acc, gyr, hints, name, remarks=remarks)
 
 

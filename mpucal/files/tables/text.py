@@ -153,10 +153,10 @@ def _find(
                 cells = _with_line_above(_split(above, separator), cells) if separator else cells
                 # a name may hold blanks
                 if (separator or not below or len(below) - len(cells) in (0, 1)) and is_header(cells):
-                    return _read(text, name, cells, number + 1, separator)
+                    return read_table(text, name, cells, number + 1, separator)
             elif is_row is not None and is_row(cells, below):
                 header = _split(above, separator)
-                return _read(text, name, header if len(header) == len(cells) else [], number, separator)
+                return read_table(text, name, header if len(header) == len(cells) else [], number, separator)
     return None
 
 
@@ -209,7 +209,7 @@ def table_of_rows(name: str, header: Cells, rows: list[Cells], lines: list[int],
     return Table(name, header, [cells[:-1] for cells in columns], lines, remarks=remarks)
 
 
-def _read(text: str, name: str, header: Cells, first: int, separator: str | None) -> Table:
+def read_table(text: str, name: str, header: Cells, first: int, separator: str | None) -> Table:
     """Return the table below the first `first` lines."""
     check_size(Path(name), text.count("\n") * (LINE + CELL * len(header)))
     rows, lines = [], []
