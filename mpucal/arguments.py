@@ -28,14 +28,18 @@ Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def check_numbers(values: ArrayLike, key: str, name: str) -> Vector:
-    """Return an array of numbers as float64."""
-    return _as_float(_array(values, key, name), key, name)
+def check_numbers(values: ArrayLike, key: str, name: str, as_given: bool = False) -> Any:
+    """Return an array of numbers, copied as float64; `as_given` : of their own type, such as dates."""
+    try:
+        array = np.asarray(values)
+        return array if as_given else _real(array).copy()
+    except (TypeError, ValueError) as error:
+        raise ArraysError(f"{name}: {key} holds values that are not numbers ({error})", "give numbers") from error
 
 
 def check_column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
     """Return (n,), one value per sample."""
-    array = check_numbers(values, key, name)
+    array: Vector = check_numbers(values, key, name)
     if array.shape != (n,):
         raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n},)", "give one value per sample")
     return array
@@ -48,7 +52,7 @@ def check_mask(values: ArrayLike | None, key: str, n: int, name: str) -> Mask:
 
 def check_rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
     """Return (n, 3) finite numbers."""
-    array = check_numbers(values, key, name)
+    array: Vector = check_numbers(values, key, name)
     if array.shape != (n, 3):
         raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z per sample")
     bad = ~is_plausible(array).all(axis=1)
@@ -66,17 +70,17 @@ def is_plausible(values: ArrayLike) -> Mask:
     return np.asarray(np.abs(values) <= LARGEST)
 
 
-def check_seconds(t: ArrayLike, name: str) -> Vector:
+def check_seconds(times: ArrayLike, name: str) -> Vector:
     """Return increasing times (n,) s; dates become the time since the first one.
 
     Raises
     ------
     ArraysError : they are not times, or do not increase.
     """
-    given = _array(t, "t", name)
+    given = check_numbers(times, "t", name, as_given=True)
     if given.dtype.kind == "M" and given.size:
         given = given - given.flat[0]
-    t = given / np.timedelta64(1, "s") if given.dtype.kind == "m" else _as_float(given, "t", name)
+    t: Vector = given / np.timedelta64(1, "s") if given.dtype.kind == "m" else check_numbers(given, "t", name)
     if t.ndim != 1 or len(t) < 2:
         raise ArraysError(f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds per sample")
     with np.errstate(over="ignore"):
@@ -203,21 +207,6 @@ def read_limited(path: Path, most: int) -> bytes:
     return data
 
 
-def _array(values: ArrayLike, key: str, name: str) -> NDArray[Any]:
-    try:
-        return np.asarray(values)
-    except ValueError as error:
-        raise _no_numbers(key, name, error) from error
-
-
-def _as_float(array: NDArray[Any], key: str, name: str) -> Vector:
-    """Return a copy in float64."""
-    try:
-        return _real(array).copy()
-    except (TypeError, ValueError) as error:
-        raise _no_numbers(key, name, error) from error
-
-
 def _real(array: NDArray[Any]) -> Vector:
     """Return float64; times and complex numbers are refused."""
     if array.dtype.kind in "mMc":
@@ -225,10 +214,6 @@ def _real(array: NDArray[Any]) -> Vector:
     # too large a number becomes infinite, and a signalling NaN a quiet one
     with np.errstate(over="ignore", invalid="ignore"):
         return array.astype(np.float64, copy=False)
-
-
-def _no_numbers(key: str, name: str, error: Exception) -> ArraysError:
-    return ArraysError(f"{name}: {key} holds values that are not numbers ({error})", "give numbers")
 
 
 def _check_time(t: Vector, name: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections import deque
 from contextlib import nullcontext
 from pathlib import Path
@@ -31,13 +30,12 @@ from ..sinks.table import SINKS
 from ..sinks.write_back import file_recorder
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import open_source
-from ..sources.table import source_title
-from ..terminal.console import Console, console
+from ..terminal.console import Console
 from .arguments import PATH, calibration_argument, json_option, output_option, yes_option
 from .destination import write_back
 from .loading import at_gravity_of, force_option, load_calibration, load_trusted
-from .options import check_gyroscope, check_input, check_source, given_options, source_options
-from .page import BOARD_KIND, choose_board, page_options, with_page
+from .options import check_input, check_source, given_options, source_options
+from .page import BOARD_KIND, page_options, show_session
 from .recording_options import given_hints, hint_options, say_interpretation
 from .running import open_runner
 
@@ -98,13 +96,10 @@ def command(
     check_source(click.get_current_context())
     options = {**at_gravity_of(old, options), BOARD_KIND: board}
     source = open_source(options, given_options())
-    check_gyroscope(source.plan.config)
-    board, title = choose_board(board, source), source_title(options)
-    terminal = console(quiet=yes, title=title, board=board)
-    attended = not yes and sys.stdin.isatty() and sys.stderr.isatty()
+    _, shown = show_session(source, options, page, board, yes)
     with (
         nullcontext() if folder is None else SessionFolder(folder, source.capture_name) as into,
-        with_page(terminal, page, source, options, title, board, attended=attended) as (person, show_result),
+        shown as (person, show_result),
     ):
         result, files = _check(old, into, as_json, _measure(source, into, person))
         show_result(Result(result.verdict, summary=result.page()), files)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any
@@ -11,9 +12,10 @@ import click
 from ..page.address import LOOPBACK, Address, parse_address
 from ..session.boards import BOARD, BOARDS, usual_board
 from ..sources.opened_source import OpenedSource
-from ..terminal.console import Console
+from ..sources.table import source_title
+from ..terminal.console import Console, console
 from .arguments import together
-from .options import Parsed
+from .options import Parsed, check_gyroscope
 
 if TYPE_CHECKING:
     from ..page.console import ResultCallback
@@ -41,26 +43,38 @@ def choose_board(board: str | None, source: OpenedSource) -> str:
     return board or source.plan.board or usual_board(source.origin)
 
 
-def with_page(
-    terminal: Console,
-    page: Address | None,
+def show_session(
     source: OpenedSource,
     options: Mapping[str, Any],
-    title: str,
-    board: str,
-    keys: bool = False,
-    as_json: bool = False,
-    attended: bool = False,
-) -> AbstractContextManager[tuple[Console, ResultCallback]]:
-    """Return the terminal, with a page beside it if one is asked for; see `on_page`.
+    page: Address | None,
+    board: str | None,
+    yes: bool,
+    name: str | None = None,
+    beep: bool | None = None,
+    json_events: bool = False,
+    page_keys: bool = False,
+) -> tuple[Console, AbstractContextManager[tuple[Console, ResultCallback]]]:
+    """Return the terminal for a session on `source`, and the context that shows it there and, if asked for, on a page.
 
     A simulation that runs faster than time is shown at the pace of its samples, unless `pace=fast` is given.
+
+    Parameters
+    ----------
+    options : of the source. board, name : of the board, if given. yes : ask no questions. page_keys : see Feed.
+
+    Raises
+    ------
+    UsageError : the settings leave the gyroscope out.
     """
+    check_gyroscope(source.plan.config)
+    title, board = ", ".join(filter(None, (name, source_title(options)))), choose_board(board, source)
+    terminal = console(yes, json_events, beep, title, board)
     if page is None:
-        return nullcontext((terminal, lambda result, paths: None))
+        return terminal, nullcontext((terminal, lambda result, paths: None))
     # The page is slow to load, and most sessions have none.
     from ..page.console import on_page  # noqa: PLC0415
 
     paced = not source.real_time and UNPACED not in str(options.get("bus"))
+    attended = not (yes or json_events) and sys.stdin.isatty() and sys.stderr.isatty()
     about = {"title": title, "board": board}
-    return on_page(terminal, page, about, keys, paced, as_json, attended)
+    return terminal, on_page(terminal, page, about, page_keys, paced, json_events, attended)

@@ -24,21 +24,13 @@ from ..sinks.write_back import session_recorder
 from ..sources.kind import NAME
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import check_resume_options, open_source
-from ..sources.table import matching_kinds, source_title
-from ..terminal.console import Console, console
+from ..sources.table import matching_kinds
+from ..terminal.console import Console
 from ..terminal.hangup import logging_after_hangup
 from .arguments import PATH, json_option, output_option, yes_option
 from .destination import session_sink_options, write_back
-from .options import (
-    aim_options,
-    check_gravity,
-    check_gyroscope,
-    check_source,
-    fit_options,
-    given_options,
-    source_options,
-)
-from .page import BOARD_KIND, choose_board, page_options, with_page
+from .options import aim_options, check_gravity, check_source, fit_options, given_options, source_options
+from .page import BOARD_KIND, page_options, show_session
 from .person import say
 from .running import open_runner
 from .summary import next_steps, page_result, summary
@@ -89,17 +81,12 @@ def command(
     attended = not yes and sys.stdin.isatty()
     source, kinds, options = _open(resume, {**options, NAME: name, BOARD_KIND: board}, sinks, no_write, attended)
     name = name or options.get(NAME)
-    check_gyroscope(source.plan.config)
-    title = f"{name}, {source_title(options)}" if name else source_title(options)
-    board = choose_board(board, source)
-    terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title, board=board)
-    watched = attended and sys.stderr.isatty() and not json_events
-    on_page = with_page(terminal, page, source, options, title, board, page_keys, json_events, watched)
+    terminal, shown = show_session(source, options, page, board, yes, name, beep, json_events, page_keys)
     hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)
     with (
         SessionFolder(resume or folder, source.capture_name, again=resume is not None) as into,
         logging_after_hangup(lambda: into.path / LOG.name, hung_up),
-        on_page as (person, show_result),
+        shown as (person, show_result),
     ):
         # A program that reads the events finds the sinks in calibration.json.
         announcements = [] if json_events else [announce_sinks(kinds, no_write), warn_unset()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,7 +10,7 @@ import numpy as np
 from ..calibration.likelihood import trace
 from ..calibration.preprocessing import Preprocessed, preprocess
 from ..calibration.theta import Theta
-from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..data import Mask, Recording, Vector
 from ..rests.flat import find_flat, flat_statistics
 from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration
@@ -32,11 +31,10 @@ class Track:
         """Return (n,) s since the first sample."""
         return np.asarray(self.recording.t - self.recording.t[0])
 
-    @cached_property
+    @property
     def gravity(self) -> float:
         """Return gravity as the calibration assumed it [m/s^2]."""
-        gravity = self.calibration.fit.get("gravity")
-        return STANDARD_GRAVITY_MPS2 if gravity is None or not math.isfinite(gravity) else float(gravity)
+        return self.calibration.gravity
 
     @cached_property
     def calibrated(self) -> Vector:

@@ -6,31 +6,7 @@ import pytest
 
 from mpucal.data import Samples, Sensor
 from mpucal.reasons import Reason
-from mpucal.session.events import (
-    Abort,
-    Caution,
-    Checked,
-    Connected,
-    Countdown,
-    Decision,
-    Enough,
-    FitKind,
-    Fitted,
-    Forget,
-    Knowledge,
-    Learnt,
-    Measured,
-    Progress,
-    Prompt,
-    PromptKind,
-    Redo,
-    RequestFit,
-    Resumed,
-    Seen,
-    Target,
-    Tick,
-    Tried,
-)
+from mpucal.session import events
 from mpucal.session.machine import Machine
 from mpucal.session.plan import Plan
 from mpucal.session.table import TRANSITIONS, IllegalEvent, State
@@ -43,10 +19,12 @@ FLIPPED = Reason("left_handed", "an axis is flipped", "change its sign", True)
 
 def learnt(overall=0.1, advice=True, down=DOWN):
     three = (overall, overall, overall)
-    wanted = Target(0.1, 0.05, 1.0)
+    wanted = events.Target(0.1, 0.05, 1.0)
     words = "bias to 3 mg"
-    return Learnt(
-        Knowledge(0.0, three, three, three, wanted, three, three, three, overall, down if advice else None, words),
+    return events.Learnt(
+        events.Knowledge(
+            0.0, three, three, three, wanted, three, three, three, overall, down if advice else None, words
+        ),
         advice,
     )
 
@@ -58,31 +36,31 @@ class Session:
     """
 
     def __init__(self, checking=False, **options):
-        self.overall, self.tried, self.checked = None, Tried("good"), Checked((), agrees=True)
+        self.overall, self.tried, self.checked = None, events.Tried("good"), events.Checked((), agrees=True)
         self.machine = Machine(Plan(**options), checking)
-        self.said = self.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0)))
+        self.said = self.machine.handle(events.Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0)))
 
     def feed(self, samples, poll=40):
         for first in range(0, len(samples), poll):
             if self.state not in MEASURING:
                 break
             part = slice(first, first + poll)
-            self.give(Measured(Samples(*(array[part] for array in vars(samples).values()))))
+            self.give(events.Measured(Samples(*(array[part] for array in vars(samples).values()))))
         return self
 
     def give(self, event):
         outputs = self.machine.handle(event)
         self.said += outputs
-        for ask in (output for output in outputs if isinstance(output, RequestFit)):
+        for ask in (output for output in outputs if isinstance(output, events.RequestFit)):
             answer = self.answer(ask.kind)
             if answer is not None and self.state in MEASURING:
                 self.give(answer)
         return self
 
     def answer(self, wish):
-        if wish in (FitKind.KNOW, FitKind.ADVISE):
-            return None if self.overall is None else learnt(self.overall, wish is FitKind.ADVISE)
-        return self.tried if wish is FitKind.TRY else self.checked
+        if wish in (events.FitKind.KNOW, events.FitKind.ADVISE):
+            return None if self.overall is None else learnt(self.overall, wish is events.FitKind.ADVISE)
+        return self.tried if wish is events.FitKind.TRY else self.checked
 
     def of(self, kind):
         return [output for output in self.said if isinstance(output, kind)]
@@ -92,14 +70,14 @@ class Session:
         return self.machine.state
 
     def prompts(self):
-        return [output.kind for output in self.said if isinstance(output, Prompt)]
+        return [output.kind for output in self.said if isinstance(output, events.Prompt)]
 
     def words(self):
         names = ("text", "why", "what")
         return " | ".join(getattr(output, name) for output in self.said for name in names if hasattr(output, name))
 
     def count(self):
-        return [output.done for output in self.said if isinstance(output, Progress)][-1]
+        return [output.done for output in self.said if isinstance(output, events.Progress)][-1]
 
 
 @pytest.fixture(scope="module")
@@ -135,8 +113,8 @@ def test_a_moved_board_restarts_the_countdown_with_a_caution(board, disturb, wha
     session = Session().feed(board.still(8.0)).feed(disturb(board)).feed(board.still(8.0))
     assert session.state is State.LAY_FLAT
     assert what in session.words()
-    assert [caution.code for caution in session.of(Caution)][-1] == "moved"
-    assert max(countdown.remaining_s for countdown in session.of(Countdown)[-16:]) == pytest.approx(9.5, abs=0.6)
+    assert [caution.code for caution in session.of(events.Caution)][-1] == "moved"
+    assert max(countdown.remaining_s for countdown in session.of(events.Countdown)[-16:]) == pytest.approx(9.5, abs=0.6)
     assert session.feed(board.still(3.0)).state is State.ROTATE
 
 
@@ -145,7 +123,7 @@ def test_never_still_for_a_minute_is_abandoned_with_a_reason(board):
     for _ in range(15):
         session.feed(board.still(3.0)).feed(board.turn((1, 0, 0), 0.3, 1.2))
     assert session.state is State.ABORTED
-    last = [output for output in session.said if isinstance(output, Decision)][-1]
+    last = [output for output in session.said if isinstance(output, events.Decision)][-1]
     assert "not still for 10 s within 60 s" in last.why
     assert "deg/s about x" in last.why
     assert "firm" in last.remedy
@@ -161,13 +139,13 @@ def show(session, board, ups):
 def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board, rotating):
     rotating.overall = 0.1
     rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(0.6))
-    assert rotating.prompts().count(PromptKind.ROTATE) == 1
+    assert rotating.prompts().count(events.PromptKind.ROTATE) == 1
     rotating.feed(board.still(0.6))
-    asked = rotating.of(Prompt)[-1]
-    assert (asked.kind, asked.down) == (PromptKind.ROTATE, DOWN)
+    asked = rotating.of(events.Prompt)[-1]
+    assert (asked.kind, asked.down) == (events.PromptKind.ROTATE, DOWN)
     assert asked.text == "Turn the board: on its far edge, chip tilted up (+Y −Z), then hold it still."
-    assert rotating.prompts().count(PromptKind.ROTATE) == 2
-    assert rotating.feed(board.still(3.0)).prompts().count(PromptKind.ROTATE) == 2
+    assert rotating.prompts().count(events.PromptKind.ROTATE) == 2
+    assert rotating.feed(board.still(3.0)).prompts().count(events.PromptKind.ROTATE) == 2
 
 
 def placed(make_board, tremor, target="normal"):
@@ -175,14 +153,14 @@ def placed(make_board, tremor, target="normal"):
     board, session = make_board(), Session()
     board.up = np.array([0.0, 0.0, -1.0])
     session.machine = Machine(Plan(target=target))
-    session.said = session.machine.handle(Connected(Sensor(message="RAW_IMU")))
-    assert "still for 5 s" in session.of(Prompt)[-1].text
+    session.said = session.machine.handle(events.Connected(Sensor(message="RAW_IMU")))
+    assert "still for 5 s" in session.of(events.Prompt)[-1].text
     session.feed(board.still(5.6))
     session.overall = 1.0
     held = []
     while session.state is State.ROTATE and len(held) < 6:
-        held.append(session.of(Prompt)[-1].text.split(": ")[1].split(" (")[0])
-        session.feed(board.turn_to(-np.array(session.of(Prompt)[-1].down)))
+        held.append(session.of(events.Prompt)[-1].text.split(": ")[1].split(" (")[0])
+        session.feed(board.turn_to(-np.array(session.of(events.Prompt)[-1].down)))
         session.feed(board.shaken(3.6, tremor) if tremor else board.still(3.6))
     return session, held
 
@@ -191,7 +169,7 @@ def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board):
     session, held = placed(make_board, 0.0, "best")
     assert held == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
     assert session.state is State.VERIFY
-    assert "Verification 1 of 1" in session.of(Prompt)[-1].text
+    assert "Verification 1 of 1" in session.of(events.Prompt)[-1].text
     # Each side is left alone for three seconds before the next is asked for.
     asked_s = [output.t_s for output in session.said if type(output).__name__ == "Held"]
     assert all(after - before == pytest.approx(1.6 + 3.6, abs=0.3) for before, after in pairwise(asked_s))
@@ -201,40 +179,40 @@ def test_a_vehicle_in_a_hand_is_turned_to_more_orientations(make_board):
     session, held = placed(make_board, 0.15)
     assert len(held) == 6 and session.state is State.ROTATE
     assert held[1] != "on its left side"
-    assert session.of(Progress)[-1].of == 14
+    assert session.of(events.Progress)[-1].of == 14
 
 
 def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, varied):
     rotating.overall = 1.0
     show(rotating, board, varied[:8])
     assert rotating.state is State.ROTATE
-    assert [seen.number for seen in rotating.of(Seen)] == [2, 3, 4, 5, 6, 7, 8, 9]
+    assert [seen.number for seen in rotating.of(events.Seen)] == [2, 3, 4, 5, 6, 7, 8, 9]
     show(rotating, board, varied[8:9])
     assert rotating.state is State.VERIFY
     assert "target reached: bias to 3 mg" in rotating.words()
     full = "orientation 5 of 10 (bars full; more sides confirm them)"
-    assert full in [progress.text for progress in rotating.of(Progress)]
+    assert full in [progress.text for progress in rotating.of(events.Progress)]
 
 
 def test_the_time_that_is_left_follows_the_pace_and_the_information(board, rotating, varied):
     rotating.overall = 0.1
     show(rotating, board, varied[:2])
-    assert {one.left_s for one in rotating.of(Progress)} == {None}
+    assert {one.left_s for one in rotating.of(events.Progress)} == {None}
     show(rotating, board, varied[2:5])
     # 6 of 10 orientations, at 3.6 s for each; the verification needs 3 more.
-    assert rotating.of(Progress)[-1].left_s == pytest.approx(7 * 3.6, abs=3.6)
+    assert rotating.of(events.Progress)[-1].left_s == pytest.approx(7 * 3.6, abs=3.6)
     show(rotating, board, varied[5:7])
-    assert rotating.of(Progress)[-1].text.startswith("orientation 8 of 10")
-    assert rotating.of(Progress)[-1].left_s is None
+    assert rotating.of(events.Progress)[-1].text.startswith("orientation 8 of 10")
+    assert rotating.of(events.Progress)[-1].left_s is None
     rotating.overall = 0.7
     show(rotating, board, varied[7:8])
     # What is known is half of what is needed.
-    assert rotating.of(Progress)[-1].left_s > 8 * 3.6
+    assert rotating.of(events.Progress)[-1].left_s > 8 * 3.6
     rotating.overall = 1.0
     rotating.feed(board.still(6.0))
-    assert rotating.of(Progress)[-1].left_s == pytest.approx(3 * 3.6, abs=3.6)
+    assert rotating.of(events.Progress)[-1].left_s == pytest.approx(3 * 3.6, abs=3.6)
     rotating.feed(board.still(10.0))
-    assert rotating.of(Progress)[-1].left_s is None
+    assert rotating.of(events.Progress)[-1].left_s is None
 
 
 def test_enough_tilts_end_the_turning_and_claim_no_target(board):
@@ -268,7 +246,7 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
 def test_the_target_is_not_enough_without_varied_orientations(board, rotating, ups, why):
     rotating.overall = 1.0
     assert show(rotating, board, ups).state is State.ROTATE
-    assert f"(bars full{why})" in rotating.of(Progress)[-1].text
+    assert f"(bars full{why})" in rotating.of(events.Progress)[-1].text
 
 
 def test_without_the_target_turning_goes_on_for_two_minutes(board, rotating):
@@ -308,31 +286,34 @@ def verifying(board, turned):
 
 
 def test_verifies_in_three_orientations_that_were_not_seen(board, verifying, varied):
-    seen = -np.array([seen.down for seen in verifying.of(Seen)])
+    seen = -np.array([seen.down for seen in verifying.of(events.Seen)])
     for number in (1, 2, 3):
-        asked = verifying.of(Prompt)[-1]
-        assert asked.kind is PromptKind.VERIFY
+        asked = verifying.of(events.Prompt)[-1]
+        assert asked.kind is events.PromptKind.VERIFY
         assert f"{number} of 3" in asked.text
         assert (-seen @ np.array(asked.down)).max() < np.cos(np.radians(25.0))
         verifying.feed(board.turn_to([-v for v in asked.down])).feed(board.still(2.0))
-    requested = [request.kind for request in verifying.of(RequestFit)]
-    assert [kind for kind in requested if kind in (FitKind.TRY, FitKind.CHECK)] == [FitKind.TRY, FitKind.CHECK]
+    requested = [request.kind for request in verifying.of(events.RequestFit)]
+    assert [kind for kind in requested if kind in (events.FitKind.TRY, events.FitKind.CHECK)] == [
+        events.FitKind.TRY,
+        events.FitKind.CHECK,
+    ]
     assert verifying.state is State.CALIBRATE
     assert "agree with the predicted uncertainty" in verifying.words()
     assert verifying.machine.checked.agrees
 
 
 def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, varied):
-    asked = verifying.of(Prompt)[-1]
+    asked = verifying.of(events.Prompt)[-1]
     # 15 deg from one that was seen, and far from what is asked for
     near = np.array(varied[2]) / np.linalg.norm(varied[2])
     aside = near + np.tan(np.radians(15.0)) * np.array([0.0, 1.0, 0.0])
     show(verifying, board, [aside, *varied[3:6]])
     assert verifying.state is State.VERIFY
-    cautions = [caution for caution in verifying.of(Caution) if caution.code == "seen_already"]
+    cautions = [caution for caution in verifying.of(events.Caution) if caution.code == "seen_already"]
     assert len(cautions) >= 4
     assert all((c.what, c.do) == ("this orientation was seen already", asked.text) for c in cautions)
-    assert verifying.of(Prompt)[-1] == asked
+    assert verifying.of(events.Prompt)[-1] == asked
     verifying.feed(board.still(40.0))
     assert verifying.machine.checked.agrees is None
 
@@ -349,20 +330,23 @@ def offered(board, varied):
     """A session in which somebody may press keys, and the new orientations disagree."""
     session = Session(attended=True).feed(board.still(10.6))
     session.overall = 1.0
-    session.checked = Checked((), False, MOVED)
+    session.checked = events.Checked((), False, MOVED)
     show(show(session, board, varied[:9]), board, varied[9:12])
     assert session.state is State.VERIFY
-    assert session.prompts()[-1] is PromptKind.AGAIN
+    assert session.prompts()[-1] is events.PromptKind.AGAIN
     assert "Turn the board again from the start (r)" in session.words()
-    assert (session.of(Caution)[-1].what, session.of(Caution)[-1].do) == ("the sensor moved on its mount", "fasten it")
+    assert (session.of(events.Caution)[-1].what, session.of(events.Caution)[-1].do) == (
+        "the sensor moved on its mount",
+        "fasten it",
+    )
     return session
 
 
 def test_the_board_may_be_turned_again_after_a_refusal(board, offered):
-    offered.feed(board.still(50.0)).give(Redo())
+    offered.feed(board.still(50.0)).give(events.Redo())
     assert offered.state is State.ROTATE
     assert offered.machine.checked is None
-    assert len(offered.of(Forget)) == 1
+    assert len(offered.of(events.Forget)) == 1
 
 
 def test_the_refusal_stays_without_another_turning(board, offered):
@@ -374,30 +358,30 @@ def test_the_refusal_stays_without_another_turning(board, offered):
 
 def test_redo_turns_again_without_laying_flat_again(board, verifying):
     samples = verifying.machine._samples
-    verifying.give(Redo())
+    verifying.give(events.Redo())
     assert verifying.state is State.ROTATE
-    (forget,) = verifying.of(Forget)
+    (forget,) = verifying.of(events.Forget)
     assert forget.last == samples
     assert 1000 <= forget.first <= 1060
-    assert verifying.prompts()[-1] is PromptKind.ROTATE
+    assert verifying.prompts()[-1] is events.PromptKind.ROTATE
 
 
 def test_a_resumed_session_repeats_its_prompt(board, rotating):
     rotating.overall = 0.1
     rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(2.0))
-    wanted = rotating.of(Prompt)[-1]
-    rotating.give(Resumed())
+    wanted = rotating.of(events.Prompt)[-1]
+    rotating.give(events.Resumed())
     assert rotating.state is State.ROTATE
-    assert rotating.of(Prompt)[-1] == wanted
+    assert rotating.of(events.Prompt)[-1] == wanted
     board.silence(20.0)
-    assert rotating.feed(board.still(3.0)).give(Tick(board.t_s)).state is State.ROTATE
+    assert rotating.feed(board.still(3.0)).give(events.Tick(board.t_s)).state is State.ROTATE
 
 
 def test_cautions_are_not_repeated_at_once(board, rotating):
     fast = board.turn((0, 0, 1), 14.0, 2.0)
     fast.gyr_clipped[40:60] = True
     rotating.feed(fast)
-    codes = [caution.code for caution in rotating.of(Caution)]
+    codes = [caution.code for caution in rotating.of(events.Caution)]
     assert codes == ["too_fast", "clipped"]
 
 
@@ -409,15 +393,15 @@ def test_until_end_accepts_a_shorter_rest(board, seconds, state):
 
 
 def test_enter_cuts_the_stillness_short_once_there_is_some(board):
-    session = Session().feed(board.still(1.2)).give(Enough())
+    session = Session().feed(board.still(1.2)).give(events.Enough())
     assert session.state is State.LAY_FLAT
-    assert session.feed(board.still(2.0)).give(Enough()).state is State.ROTATE
+    assert session.feed(board.still(2.0)).give(events.Enough()).state is State.ROTATE
 
 
 def test_silence_before_turning_is_abandoned(board):
-    session = Session().feed(board.still(3.0)).give(Tick(board.t_s + 4.0))
+    session = Session().feed(board.still(3.0)).give(events.Tick(board.t_s + 4.0))
     assert session.state is State.LAY_FLAT
-    assert session.give(Tick(board.t_s + 5.1)).state is State.ABORTED
+    assert session.give(events.Tick(board.t_s + 5.1)).state is State.ABORTED
     assert "no samples for 5 s" in session.words()
 
 
@@ -428,7 +412,9 @@ def test_decides_the_same_however_the_samples_arrive(make_board, varied):
         for up in varied:
             parts += [board.turn_to(up), board.still(2.0)]
         session.feed(Samples.joined(parts), poll)
-        return [output for output in session.said if isinstance(output, Prompt | Decision)], len(session.of(Seen))
+        return [output for output in session.said if isinstance(output, events.Prompt | events.Decision)], len(
+            session.of(events.Seen)
+        )
 
     assert decided(3) == decided(50)
 
@@ -436,11 +422,11 @@ def test_decides_the_same_however_the_samples_arrive(make_board, varied):
 def test_an_illegal_event_changes_no_state():
     machine = Machine()
     with pytest.raises(IllegalEvent):
-        machine.handle(Fitted("good"))
+        machine.handle(events.Fitted("good"))
     assert machine.state is State.CONNECT
-    machine.handle(Connected(Sensor()))
+    machine.handle(events.Connected(Sensor()))
     assert machine.state is State.LAY_FLAT
 
 
 def test_every_state_but_the_last_two_can_be_aborted():
-    assert [state for state in State if Abort not in TRANSITIONS[state]] == [State.DONE, State.ABORTED]
+    assert [state for state in State if events.Abort not in TRANSITIONS[state]] == [State.DONE, State.ABORTED]
