@@ -23,7 +23,7 @@ import numpy as np
 from . import sanitized
 from .fuzz import TODAY
 
-TESTS = ("kernel", "files/test_csv.py", "files/test_protobuf.py", "chip/test_bit_flips.py")
+TESTS = ("kernel", "files/test_own_formats.py", "files/test_mcap.py", "chip/test_bit_flips.py")
 REFUSED = (TypeError, ValueError, OverflowError, MemoryError)
 ODD = (np.nan, np.inf, -np.inf, 5e-324, -0.0, 0.0, 1e308, -1e308, 1e-300, -1.0)
 ODD_NUMBERS = (0, 1, -1, 2, 3, 7, 63, 1 << 31, 1 << 62, (1 << 63) - 1, 1 << 63, (1 << 64) - 1, 6148914691236517206, 0.5)

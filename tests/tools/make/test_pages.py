@@ -36,5 +36,14 @@ def test_what_it_points_at_is_there():
         assert not name or defined(ast.parse(found.read_text(encoding="utf-8")), name), (path, name)
 
 
+def test_the_tests_and_tools_that_a_page_names_are_there():
+    pages = {path: path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}
+    named = {
+        (page.name, path) for page, text in pages.items() for path in re.findall(r"`((?:tests|tools)/[\w/.]+)`", text)
+    }
+    assert len(named) > 20
+    assert [each for each in sorted(named) if not (ROOT / each[1]).exists()] == []
+
+
 def test_what_is_made_is_made_anew():
     assert not list(pages.outdated()), "run `python -m tools.make pages`"
