@@ -14,10 +14,18 @@ from mpucal.sources.opening import open_source
 META = {"driver": "pigeon 2", "plan": {"config": {"rate_hz": 50.0}}}
 
 
-def decode(accesses, name):
-    """Return a sample for each letter, as the module of a source does."""
-    t = np.array([access.t_ns * 1e-9 for access in accesses if access.data])
-    return Recording.from_arrays(t, np.ones((len(t), 3)), np.zeros((len(t), 3)), name=name)
+class Decoder:
+    """Decoder that has a sample for each letter, as the module of a source has one."""
+
+    def __init__(self, name):
+        self._name, self._t = name, []
+
+    def feed(self, access):
+        self._t += [access.t_ns * 1e-9] * bool(access.data)
+
+    def recording(self):
+        n = len(self._t)
+        return Recording.from_arrays(np.array(self._t), np.ones((n, 3)), np.zeros((n, 3)), name=self._name)
 
 
 class Opened:
@@ -38,7 +46,7 @@ def test_a_row_decodes_and_replays_what_its_driver_recorded(tmp_path, monkeypatc
         load(path)
     known = recorders.RECORDERS
     for version in ("pigeon 2", "pigeon 3"):
-        row = recorders.Recorder(version, RateOnlyConfig, f"{__name__}:Opened", f"{__name__}:decode")
+        row = recorders.Recorder(version, RateOnlyConfig, f"{__name__}:Opened", f"{__name__}:Decoder")
         monkeypatch.setattr(recorders, "RECORDERS", [*known, row])
         assert load(path).t.tolist() == [0, 1, 2, 3, 4]
         if version == META["driver"]:
