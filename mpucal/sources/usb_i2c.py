@@ -185,12 +185,9 @@ def _mcp2221_adapters() -> list[tuple[str, str]]:
 
 def _ftdi_adapters() -> list[tuple[str, str]]:
     from pyftdi.ftdi import Ftdi as Device  # noqa: PLC0415 - an extra
+    from pyftdi.usbtools import UsbTools  # noqa: PLC0415 - the same
 
-    names = {number: name for name, number in Device.PRODUCT_IDS[Device.FTDI_VENDOR].items()}
-    return [
-        (
-            f"ftdi://ftdi:{names.get(each.pid, hex(each.pid))}:{each.sn or f'{each.bus:x}:{each.address:x}'}/1",
-            each.description,
-        )
-        for each, _interfaces in Device.list_devices("ftdi:///?")
-    ]
+    # The chip is on the first interface of each.
+    devices = [(device, 1) for device, _interfaces in Device.list_devices()]
+    named = UsbTools.build_dev_strings("ftdi", Device.VENDOR_IDS, Device.PRODUCT_IDS, devices)
+    return [(url, what.strip("()")) for url, what in named]
