@@ -117,7 +117,7 @@ class FifoDecoder:
             return Loss.LATE
         frames = np.frombuffer(data, ">i2").reshape(-1, self.settings.frame_words).astype(np.int16)
         kept = self._flips.repair(frames[max(DROPPED_FRAMES - self._read, 0) :], self._waiting)
-        if not self._is_aligned(kept):
+        if self._temperature_jumps(kept).any():
             return Loss.MISALIGNED
         self._read += len(frames)
         kept = np.concatenate((self._waiting, kept))
@@ -143,11 +143,7 @@ class FifoDecoder:
         if self._read <= DROPPED_FRAMES or len(self._waiting) or self._odd_bytes:
             return 0
         ends = np.cumsum(lengths)
-        odd = (frames[1:] == frames[:-1]).all(axis=1)
-        if not self.settings.accel_only:
-            temperature = frames[:, TEMPERATURE].astype(np.int64)
-            before = temperature[0] if self._temperature is None else self._temperature
-            odd = np.concatenate((odd, [False])) | (np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP)
+        odd = np.concatenate(((frames[1:] == frames[:-1]).all(axis=1), [False])) | self._temperature_jumps(frames)
         plain = int(np.searchsorted(ends, np.argmax(odd), side="right")) if odd.any() else len(lengths)
         plain = self._flips.skip_clean(frames[: ends[plain - 1]], lengths[:plain]) if plain else 0
         if not plain:
@@ -156,12 +152,12 @@ class FifoDecoder:
         self._clock.add(looks_ns[:plain], self._read + ends[:plain])
         self._read += len(kept)
         self._accept(kept, 1)
-        if not self.settings.accel_only:
-            self._temperature = int(temperature[len(kept) - 1])
         return plain
 
     def _accept(self, kept: Counts, equal: int) -> None:
         """Keep all frames except those at the end, of which `equal` are, that the next poll decides on."""
+        if len(kept) and not self.settings.accel_only:
+            self._temperature = int(kept[-1, TEMPERATURE])
         accepted = len(kept) - (equal if equal > 1 else min(int(self._flips.is_open), len(kept)))
         self._waiting = kept[accepted:].copy()
         if not accepted:
@@ -243,15 +239,13 @@ class FifoDecoder:
         times_s, host_s = self._clock.final(), self._host.final()
         return lambda segment, index: host_s(times_s(segment, index))
 
-    def _is_aligned(self, frames: Counts) -> bool:
+    def _temperature_jumps(self, frames: Counts) -> Mask:
+        """Return (n,) True where the temperature jumps, as in a frame that is not aligned."""
         if not len(frames) or self.settings.accel_only:
-            return True
+            return np.zeros(len(frames), bool)
         temperature = frames[:, TEMPERATURE].astype(np.int64)
         before = temperature[0] if self._temperature is None else self._temperature
-        if (np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP).any():
-            return False
-        self._temperature = int(temperature[-1])
-        return True
+        return np.asarray(np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP)
 
     def _after(self, last_t_s: float | None, samples: Samples) -> Samples:
         """Move the samples' times, if needed, so that each is later than `last_t_s`."""
