@@ -141,11 +141,10 @@ class ChipSink:
             reference = self._reference(calibration, response)
             with temporary_measurement(self._port) as measurement:
                 applied = self._apply(calibration, response, reference, measurement)
-        bias = ", ".join(f"{1000 * value:+.0f}" for value in applied / STANDARD_GRAVITY_MPS2)
         return Applied(
             replace(calibration, applied_in_hardware=applied),
             (
-                f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract ({bias}) mg,"
+                f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract ({mg(applied)}) mg,"
                 " read back and verified in the samples",
                 VOLATILE,
             ),
@@ -211,12 +210,9 @@ class ChipSink:
         if not new.write(self._port):
             raise ChipError("the offset registers do not read back as written", "check the wires, and try again")
         after = measurement.rest()
-        expected = np.array(word_difference(new.words, old.words)) / response.lsb_per_g
-        if (np.abs(after - before - expected) > SHIFT_G + SHIFT_SHARE * np.abs(expected)).any():
-            raise ChipError(
-                f"the samples changed by ({_mg(after - before)}) mg, but ({_mg(expected)}) was written",
-                "put the board on a firm surface, and try again",
-            )
+        expected = -_subtraction(new.words, old.words, response)
+        shift = (after - before) * STANDARD_GRAVITY_MPS2
+        check_shift(shift, expected, "put the board on a firm surface, and try again")
         applied = _subtraction(new.words, reference, response)
         _check_gravity(calibration, after, applied)
         return applied
@@ -261,5 +257,13 @@ def saved_blocks(path: Path) -> list[OffsetRegisters]:
     return blocks
 
 
-def _mg(values_g: Vector) -> str:
-    return ", ".join(f"{1000 * value:+.0f}" for value in values_g)
+def check_shift(shift: Vector, expected: Vector, remedy: str) -> None:
+    """Raise ChipError if samples at rest changed by (3,) m/s^2, other than `expected` of what was written."""
+    limit = SHIFT_G * STANDARD_GRAVITY_MPS2 + SHIFT_SHARE * np.abs(expected)
+    if (np.abs(shift - expected) > limit).any():
+        raise ChipError(f"the samples changed by ({mg(shift)}) mg, but ({mg(expected)}) mg were written", remedy)
+
+
+def mg(values: Vector) -> str:
+    """Return (3,) m/s^2 as text in mg."""
+    return ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.0f}" for value in values)
