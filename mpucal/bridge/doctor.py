@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
 from typing import Any
 
-from ..chip.access import Bus
 from ..doctor.bus_speed import LONG_BYTES, median_ms
-from ..doctor.examine import examine
+from ..doctor.examine import examine_chip
 from ..doctor.finding import Finding, Mark
 from ..sources.chip import OpenedChip
 from . import BridgeBus
@@ -22,15 +20,13 @@ SLOW_MS = 35.0
 REMEDY = "firmware_protocol.md has the rule; `python -m tools.make vectors` writes the talks"
 
 
-def examine_bridge(bus: Bus) -> Iterator[Finding]:
+def examine_bridge(bus: BridgeBus) -> Iterator[Finding]:
     """Examine the bridge's reply to HELLO and its serial line; the speed of the I2C bus behind it cannot be measured.
 
     Raises
     ------
     BusError : it does not answer any more.
     """
-    if not isinstance(bus, BridgeBus):
-        raise TypeError("only a BridgeBus has a bridge")
     hello = bus.link.bridge
     pushes, stores = bool(hello.features & Feature.STREAM), bool(hello.features & Feature.BLOB)
     name = hello.name.rstrip(b"\0").decode("ascii", "replace")
@@ -91,5 +87,4 @@ def _run_talk(link: Link, name: str, talk: Talk) -> Finding:
 
 def examine_bridge_and_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
     """Examine a bridge's firmware, its serial line, and the chip behind it."""
-    with closing(source.bus):
-        yield from examine(source.bus, source.plan.config, seconds, examine_bridge)
+    return examine_chip(source, seconds, examine_bridge)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,7 @@ IMPATIENCE = 3
 
 
 def examine(
-    bus: Bus, config: Config, seconds: float, examine_bus: Callable[[Bus], Iterable[Finding]] = examine_speed
+    bus: Bus, config: Config, seconds: float, examine_bus: Callable[[Any], Iterable[Finding]] = examine_speed
 ) -> Iterator[Finding]:
     """Examine a chip, and the bus that leads to it; end early if the chip does not answer.
 
@@ -207,13 +208,14 @@ def _verdict(sensor: Sensor, doubts: list[str]) -> Finding:
     return Finding.check("genuine?", not doubts, what, remedy, {"doubts": doubts})
 
 
-def examine_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
-    """Examine a chip and its I2C bus."""
+def examine_chip(
+    source: OpenedChip, seconds: float, examine_bus: Callable[[Any], Iterable[Finding]] = examine_speed
+) -> Iterator[Finding]:
+    """Examine a chip and its I2C bus; see examine."""
     with closing(source.bus):
-        yield from examine(source.bus, source.plan.config, seconds)
+        yield from examine(source.bus, source.plan.config, seconds, examine_bus)
 
 
 def examine_chip_alone(source: OpenedChip, seconds: float) -> Iterator[Finding]:
     """Examine a chip on an SPI bus or a USB adapter, where times of replies do not show the bus's speed."""
-    with closing(source.bus):
-        yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
+    return examine_chip(source, seconds, lambda _bus: ())

@@ -104,7 +104,7 @@ class RecordedParts(ABC, Generic[Item]):
         return True
 
     def _begin_clock(self, now_ns: int) -> int:
-        """Let the clock of the sensor or vehicle, which shows `now_ns`, continue the session's; return the shift."""
+        """Join the clock of the sensor or vehicle, which shows `now_ns`, to the session's; return the shift."""
         self._shift_ns = max(self._last_ns + PAUSE_NS - now_ns, 0)
         return self._shift_ns
 
