@@ -11,7 +11,7 @@ from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.intervals import true_runs
 from .problem import Series
-from .rotation import lengths
+from .rotation import cross_rows, lengths
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
 RANGE_TOLERANCE, FEWEST_AT_A_RANGE = 2e-3, 2
@@ -50,7 +50,7 @@ def _without_spikes(recording: Recording) -> Vector:
     gyr = recording.gyr
     # Few depart from their neighbours, and by much more than the sample two before: `bent` is twice the departure.
     bent = np.abs(np.diff(gyr, n=2, axis=0))
-    at = np.flatnonzero((bent > 2.0 * LEAST_SPIKE[-1]).any(axis=1))
+    at = np.unique(np.nonzero(bent > 2.0 * LEAST_SPIKE[-1])[0])
     at = 1 + at[(at < 2) | (bent[at] > SPIKES * bent[np.maximum(at - 2, 0)]).any(axis=1)]
     if not len(at):
         return gyr
@@ -80,7 +80,7 @@ def with_masks(recording: Recording) -> Recording:
     # An autopilot's stream comes by radio, and its source says which pauses are more than single lost packets. It is
     # rounded, too, and of a range that no hand reaches: values repeat without being clipped.
     of_a_chip = recording.sensor.origin is not Origin.VEHICLE
-    paused = of_a_chip & (dt > GAP_INTERVALS * np.median(dt[1:]))
+    paused = of_a_chip & (dt > GAP_INTERVALS / recording.rate_hz)
     # A chip whose range is known does not clip at another one.
     acc_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
     acc_ranges = ACC_RANGES if acc_g is None else np.array([acc_g]) * STANDARD_GRAVITY_MPS2
@@ -104,7 +104,7 @@ def find_reset(recording: Recording, flat: Flat) -> int | None:
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
     dt = np.diff(recording.t[flat.last :])[:, None]
     with np.errstate(all="ignore"):
-        missed = lengths(np.diff(acc, axis=0) + np.cross(rate[1:], acc[:-1]) * dt) / np.linalg.norm(flat.y)
+        missed = lengths(np.diff(acc, axis=0) + cross_rows(rate[1:], acc[:-1]) * dt) / np.linalg.norm(flat.y)
         at = np.flatnonzero((missed > RESET_RAD) & ~recording.gap[flat.last + 1 :])
         at = at[(at >= NEIGHBOURS) & (at < len(missed) - NEIGHBOURS)]
         for i in at[(missed[at[:, None] + AROUND] < OF_NEIGHBOURS * missed[at, None]).all(1)]:

@@ -12,14 +12,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import Vector
 from .hypotheses import SURE
 from .rotation import lengths
-from .transitions import DEGREES_OF_FREEDOM, Transition, miss_variances
+from .transitions import DEGREES_OF_FREEDOM, Transition, likely_variances
 
 FEWEST_BESIDE = 3  # transitions before a slip and after it: with fewer, two of a lost gyroscope would look like one
 ITERATIONS = 8
+LEAST_SEEN = 1e-15  # share of the best known direction of x, below which the misses say nothing of one
 
 
 class Slip(NamedTuple):
@@ -40,37 +42,45 @@ def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
     k = len(transitions)
     if k < 2 * FEWEST_BESIDE + 1:
         return None
-    always = _likelihood(transitions, _directions(transitions, k)[:, :, :3])[0]
+    always = _likelihood(transitions, _directions(transitions, np.array([k]))[..., :3])[0][0]
     cost = math.log(SURE) + 1.5 * math.log(2 * k) + math.log(k)  # of three numbers more, and of so many times
-    places = range(FEWEST_BESIDE, k - FEWEST_BESIDE)
-    found = {at: _likelihood(transitions, _directions(transitions, at)) for at in places}
-    at = max(found, key=lambda at: found[at][0])
-    likelihood, x = found[at]
-    if not likelihood > always + cost:
+    places = np.arange(FEWEST_BESIDE, k - FEWEST_BESIDE)
+    likelihood, x = _likelihood(transitions, _directions(transitions, places))
+    best = int(likelihood.argmax())
+    if not likelihood[best] > always + cost:
         return None
-    t, span = np.cumsum(dt), transitions[at].span
-    return Slip((float(t[max(span.start - 1, 0)]), float(t[span.stop - 1])), x[3:] - x[:3])
+    t, span = np.cumsum(dt), transitions[places[best]].span
+    return Slip((float(t[max(span.start - 1, 0)]), float(t[span.stop - 1])), x[best, 3:] - x[best, :3])
 
 
-def _directions(transitions: Sequence[Transition], at: int) -> Vector:
-    """Return derivatives (k, 3, 6) of the misses by the rotation before a slip in transition `at`, and after it."""
+def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> Vector:
+    """Return derivatives (m, k, 3, 6) of the misses by the rotation before a slip, and after it.
+
+    places : (m,) numbers of the transitions in which it may be.
+    """
     v = np.array([each.coming for each in transitions])
     v /= lengths(v)[:, None]
     P = np.eye(3) - v[:, :, None] * v[:, None, :]  # a rotation about gravity is no miss
-    after_start, after_end = (np.arange(len(v)) > at)[:, None, None], (np.arange(len(v)) >= at)[:, None, None]
     PF = P @ [each.F for each in transitions]
-    return np.concatenate([P * ~after_end - PF * ~after_start, P * after_end - PF * after_start], axis=2)
+    k, at = np.arange(len(v)), places[:, None]
+    after_start, after_end = (k > at)[..., None, None], (k >= at)[..., None, None]
+    return np.concatenate([P * ~after_end - PF * ~after_start, P * after_end - PF * after_start], axis=3)
 
 
-def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[float, Vector]:
-    """Return the log likelihood of the misses by Student's t, at the likeliest x of misses + A x, and this x."""
-    miss, x = np.array([each.miss for each in transitions]), np.zeros(A.shape[2])
+def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[Vector, Vector]:
+    """Return the log likelihoods (m,) of misses + A x by Student's t, at the likeliest x, and these x (m, r).
+
+    A : (m, k, 3, r).
+    """
+    misses = np.array([each.miss for each in transitions])
     known = np.array([each.variance for each in transitions])
+    left, nu = misses, DEGREES_OF_FREEDOM
     for _ in range(ITERATIONS):
-        left = [each._replace(miss=m) for each, m in zip(transitions, miss + A @ x, strict=True)]
-        variance = miss_variances(left)
-        weighted = A / variance[:, None, None]
-        x = -np.linalg.lstsq(np.einsum("kij,kil->jl", weighted, A), np.einsum("kij,ki->j", weighted, miss))[0]
-    c = float(np.min(variance / known))
-    z, nu = 0.5 * np.sum((miss + A @ x) ** 2, axis=1) / known, DEGREES_OF_FREEDOM
-    return -float(np.sum(math.log(c) + 0.5 * (nu + 2.0) * np.log1p(2.0 * z / (c * nu)))), x
+        variance = likely_variances(left, known)
+        weighted = (A / variance[..., None, None]).reshape(len(A), -1, A.shape[3]).swapaxes(1, 2)
+        N = weighted @ A.reshape(len(A), -1, A.shape[3])
+        x = -(np.linalg.pinv(N, rcond=LEAST_SEEN, hermitian=True) @ (weighted @ misses.ravel())[..., None])
+        left = misses + (A @ x[:, None])[..., 0]
+    c = np.min(variance / known, axis=-1, keepdims=True)
+    z = 0.5 * np.sum(left**2, axis=-1) / known
+    return -np.sum(np.log(c) + 0.5 * (nu + 2.0) * np.log1p(2.0 * z / (c * nu)), axis=-1), x[..., 0]

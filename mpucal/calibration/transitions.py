@@ -16,7 +16,7 @@ from ..rests.intervals import Intervals, statistics
 from .parameters import NAMES, PLACES
 from .preprocessing import POSE_MPS2, Preprocessed
 from .problem import Series
-from .rotation import cross, lengths, turned
+from .rotation import cross, cross_rows, lengths, turned
 from .theta import UPPER, Theta
 
 SPEED_OF_TREMOR_S = 0.04  # ratio of a tremor's speed to its acceleration
@@ -57,7 +57,7 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     F, leaving, coming = np.array([turned(turns[span]) for span in spans]), leaving[:-1], coming[1:]
     # The miss is the sine of the angle between two directions, along their axis.
     carried = np.einsum("kij,kj->ki", F, leaving)
-    miss = np.cross(carried, coming) / (lengths(carried) * lengths(coming))[:, None]
+    miss = cross_rows(carried, coming) / (lengths(carried) * lengths(coming))[:, None]
     of_gyro = flat.Sigma_omega.mean() * np.array([series.dt[span] @ series.dt[span] for span in spans])
     variance = of_gyro + direction[:-1] + direction[1:]
     if series.q_extra is not None:
@@ -67,7 +67,13 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
 
 
 def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0) -> Vector:
-    """Return the variances (k,) [rad^2 an axis] with which noise explains all misses.
+    """Return the variances (k,) [rad^2 an axis] with which noise explains all misses; see likely_variances."""
+    miss, known = (np.array([getattr(of, name) for of in transitions]) for name in ("miss", "variance"))
+    return likely_variances(miss, known, leverage)
+
+
+def likely_variances(miss: Vector, known: Vector, leverage: Vector | float = 0.0) -> Vector:
+    """Return the variances (..., k) [rad^2 an axis] of misses (..., k, 3) that noise explains, at least `known` (k,).
 
     With z = |miss|^2 / (2 variance), all transitions have a common scale c, the mean of z by Student's t; a lost one
     has a scale of its own.
@@ -75,16 +81,16 @@ def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0
     leverage : (k,), the share that the estimate took of the two degrees of freedom of each miss. The most likely scale,
         for the estimate itself, has none; an honest one counts what is left.
     """
-    z = np.array([0.5 * float(transition.miss @ transition.miss) / transition.variance for transition in transitions])
-    left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(transitions)))), LEAST_LEFT)
-    nu, c = DEGREES_OF_FREEDOM, 1.0
+    z = 0.5 * np.sum(miss * miss, axis=-1) / known
+    left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(known)))), LEAST_LEFT)
+    nu, c = DEGREES_OF_FREEDOM, np.ones((*z.shape[:-1], 1))
     for _ in range(50):
         w, before = (nu + 2.0) / (nu + 2.0 * z / c), c
-        c = max(1.0, 2.0 * float(np.sum(w * z)) / left)
-        if c == before:
+        c = np.maximum(1.0, 2.0 * np.sum(w * z, axis=-1, keepdims=True) / left)
+        if (c == before).all():
             break
     weight = (nu + 2.0) / (nu + 2.0 * z / c)
-    return c / np.where(weight < WORTHLESS, weight, 1.0) * [transition.variance for transition in transitions]
+    return np.asarray(c / np.where(weight < WORTHLESS, weight, 1.0) * known)
 
 
 def q_scale(transitions: list[Transition], variance: Vector, n: int) -> Vector:
@@ -144,8 +150,8 @@ def _rests(prepared: Preprocessed, runs: Intervals, turns: Vector, theta: Theta)
     # A board in a hand turns a little as it rests: each sample is rotated into the axes of either end.
     path = np.zeros((len(recording) + 1, 3))
     np.cumsum(turns, axis=0, out=path[flat.last + 1 :])
-    across = statistics(np.cross(path[1:], (recording.acc - theta.b_a) @ inverse.T), runs)[0]
-    coming, leaving = (s + np.cross(path[at], s) - across for at in (runs[:, 0] + 1, runs[:, 1]))
+    across = statistics(cross_rows(path[1:], (recording.acc - theta.b_a) @ inverse.T), runs)[0]
+    coming, leaving = (s + cross_rows(path[at], s) - across for at in (runs[:, 0] + 1, runs[:, 1]))
     tremor = np.maximum(np.mean(spread - flat.Sigma_a, axis=1), 0.0)
     of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S * recording.rate_hz / n) ** 2
     return coming, leaving, (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / prepared.problem.gravity**2
