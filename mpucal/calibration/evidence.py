@@ -100,6 +100,16 @@ class Evidence:
         return np.asarray((self.recording.acc - self.fit.b_a) @ np.linalg.inv(self.fit.D).T)
 
     @cached_property
+    def magnitude(self) -> Vector:
+        """(n,) m/s^2, |y| of every sample."""
+        return lengths(self.recording.acc)
+
+    @cached_property
+    def median_mps2(self) -> float:
+        """Median of |y| [m/s^2]."""
+        return float(np.median(self.magnitude))
+
+    @cached_property
     def gravity_moved(self) -> float:
         """Largest angle [rad] between the flat mean and a half-second mean after it."""
         return 0.0 if self.flat is None else self._angle_from(self.flat, self.recording.acc[self.flat.last :])

@@ -126,8 +126,8 @@ def _corrected(counts: Counts) -> Counts:
 
 def _log_odds(counts: Counts, gap: Mask) -> Vector:
     """Return (3,) the log odds of a low byte that was taken for signed, by axis."""
-    is_step = ~gap[1:, None]
+    is_step = (~gap[1:]).astype(np.float64)
     steps, corrected = (np.abs(np.diff(each, axis=0)) for each in (counts, _corrected(counts)))
-    same = is_step & (steps == corrected)
-    scale = np.sum(steps, axis=0, where=same) / np.maximum(same.sum(0), 1)
-    return np.asarray(np.sum(steps - corrected, axis=0, where=is_step) / np.maximum(scale, 1.0))
+    same = steps == corrected
+    scale = is_step @ (steps * same) / np.maximum(is_step @ same, 1.0)
+    return np.asarray(is_step @ (steps - corrected) / np.maximum(scale, 1.0))

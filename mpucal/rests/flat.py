@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Recording, Sensor, Vector
+from ..kernel import _kernel
 from .limits import QUIET
 from .stillness import Detector, still_windows
 from .windows import WINDOW_S, cut
@@ -20,6 +21,7 @@ ENOUGH_FLAT_S = 5.0
 # With less variance at rest than this [steps^2], the readings stay on one step or two, and no mean makes them finer.
 UNVARIED = 0.3
 UNIFORM = 1.0 / 12.0  # variance of rounding [steps^2]
+VISIBLE = 699  # fewer changes from one value to the next larger one, among a thousand, are visible steps
 # Share of this variance that a short rest in a hand leaves: noise and tremor, low-passed by an autopilot, cross few
 # steps. From simulated vehicles with low passes of 5 and 20 Hz.
 UNAVERAGED = 0.15
@@ -110,16 +112,9 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
     first, last = flat
     recording = with_rates(recording)
     least_acc, least_gyr = recording.sensor.least_noise
-    acc, gyr = recording.acc[first:last], recording.gyr[first:last]
-    return Flat(
-        first,
-        last,
-        y=acc.mean(0),
-        b_omega=gyr.mean(0),
-        Sigma_a=_variance(acc, recording.acc, max(least_acc, QUIETEST_ACC_MPS2)),
-        Sigma_omega=_variance(gyr, recording.gyr, max(least_gyr, QUIETEST_GYRO_RAD_S)),
-        rounded=rounding_variance(recording.sensor, acc.var(0)),
-    )
+    y, spread_a, Sigma_a = _statistics(recording.acc, flat, max(least_acc, QUIETEST_ACC_MPS2))
+    b_omega, _, Sigma_omega = _statistics(recording.gyr, flat, max(least_gyr, QUIETEST_GYRO_RAD_S))
+    return Flat(first, last, y, b_omega, Sigma_a, Sigma_omega, rounding_variance(recording.sensor, spread_a))
 
 
 def rounding_variance(sensor: Sensor, variance: Vector, least: float = 0.0) -> float:
@@ -131,19 +126,19 @@ def rounding_variance(sensor: Sensor, variance: Vector, least: float = 0.0) -> f
     return UNIFORM * step**2 * (1.0 if (variance < UNVARIED * step**2).any() else least)
 
 
-def _variance(part: Vector, whole: Vector, quietest: float) -> Vector:
-    step = np.array([_step(column) for column in whole.T])
-    away = part - part.mean(0)
-    variance = np.einsum("ij,ij->j", away, away) / (len(part) - 1)
-    return np.asarray(np.maximum(variance, np.maximum(step**2 / 12.0, quietest**2)))
+def _statistics(values: Vector, flat: tuple[int, int], quietest: float) -> tuple[Vector, Vector, Vector]:
+    """Return (3,) the mean of the segment, the variance of its samples, and the least variance of the noise."""
+    mean, variance = _kernel.statistics(np.ascontiguousarray(values), np.array([flat], np.int64))
+    n, least = flat[1] - flat[0], np.maximum(UNIFORM * _steps(values) ** 2, quietest**2)
+    return mean[0], variance[0], np.maximum(variance[0] * n / (n - 1), least)
 
 
-def _step(column: Vector) -> float:
-    """Return the stream's resolution, its smallest difference between two values; 0 where it is as fine as noise.
+def _steps(values: Vector) -> Vector:
+    """Return (3,) the stream's resolutions, the smallest difference between two values; 0 where as fine as noise.
 
     A thousand samples are enough: where nearly all values differ there are no visible steps.
     """
-    values = np.unique(column[:: max(len(column) // 1000, 1)])
-    if len(values) < 2:
-        return 0.0
-    return float(np.min(np.diff(values))) if len(values) < 700 else 0.0
+    steps = np.diff(np.sort(values[:: max(len(values) // 1000, 1)].T))
+    steps[np.count_nonzero(steps, axis=1) >= VISIBLE] = 0.0
+    smallest = np.min(steps, axis=1, where=steps > 0.0, initial=np.inf)
+    return np.where(np.isfinite(smallest), smallest, 0.0)

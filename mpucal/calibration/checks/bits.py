@@ -116,13 +116,13 @@ def _low_bits(stuck: Mask, first: Counts, lsb: float) -> Low | None:
 
 def _odd_steps(values: Vector) -> Low | None:
     """Return the axis that changes in multiples of a step that is many times the step of the other axes."""
-    changes = np.abs(np.diff(values, axis=0))
-    steps = np.min(changes, axis=0, initial=np.inf, where=changes > 0.0)
+    changes = np.abs(np.diff(values.T))
+    steps = np.array([np.min(each[each > 0.0], initial=np.inf) for each in changes])
     axis, finest = int(steps.argmax()), float(np.median(steps))
     step = float(steps[axis])
     if not max(ODD_STEPS * finest, LEAST_ODD_STEP) <= step < np.inf:
         return None
-    places = changes[:, axis] / step
+    places = changes[axis] / step
     if np.abs(places - np.rint(places)).max() > EXACTLY:
         return None
     # Other axes may be as fine as a float, but a word has 16 bits.

@@ -49,14 +49,14 @@ def time_unit(e: Evidence) -> Reason | None:
 
 def accelerometer_unit(e: Evidence) -> Reason | None:
     """Find accelerations in g or counts."""
-    acc = _magnitude(e)
+    acc = e.median_mps2
     if 0.2 * e.gravity < acc < 5.0 * e.gravity:
         return None
     if acc < LEAST_G:
         rate = float(np.median(lengths(e.recording.gyr)))
         if 0.9 * e.gravity < rate < 1.1 * e.gravity:
             return reason("not_raw", "exchanged", magnitude=acc, rate=rate)
-        low, high = np.quantile(lengths(e.recording.acc), (0.25, 0.75))
+        low, high = np.quantile(e.magnitude, (0.25, 0.75))
         if acc == 0.0 or high - low > STEADY * acc:
             return reason("not_raw", "no_gravity", magnitude=acc)
         unit, said = f"a unit about {e.gravity / acc:.4g} times as large", "UNIT"
@@ -67,13 +67,9 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
     )
 
 
-def _magnitude(e: Evidence) -> float:
-    return float(np.median(lengths(e.recording.acc)))
-
-
 def same_magnitude(e: Evidence) -> Reason | None:
     """Find accelerations whose magnitude is the same in every orientation: somebody has normalised them."""
-    size = lengths(e.recording.acc)
+    size = e.magnitude
     if e.gravity_moved < LEAST_TURN_RAD or np.std(size) > LEAST_SPREAD * np.mean(size):
         return None
     degrees = np.rad2deg(e.gravity_moved)
@@ -83,7 +79,7 @@ def same_magnitude(e: Evidence) -> Reason | None:
 def gyroscope_unit(e: Evidence) -> Reason | None:
     """Find rates in deg/s or counts."""
     # With wrong times, or without gravity, no rate explains how gravity turned.
-    if time_unit(e) is not None or _magnitude(e) < LEAST_G:
+    if time_unit(e) is not None or e.median_mps2 < LEAST_G:
         return None
     rates = np.abs(e.recording.gyr)
     if np.mean(rates > np.deg2rad(FASTEST_GYRO_DPS)) <= SELDOM and not e.rates_in_degrees:
@@ -135,9 +131,9 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
         return None  # data that are computed, or rounded on their way, repeat
     least, t = max(round(STUCK_S * e.recording.rate_hz), FEWEST_SAMPLES), e.recording.t - e.recording.t[0]
     for axis, column in zip("xyz", e.recording.acc.T, strict=True):
-        for first, last in true_runs(np.diff(column) == 0.0).tolist():
-            turn = np.ptp(e.recording.acc[first : last + 1], axis=0).max()
-            if last + 1 - first >= least and turn > LEAST_TURN_RAD * e.gravity:
+        runs = true_runs(np.diff(column) == 0.0)
+        for first, last in runs[runs[:, 1] + 1 - runs[:, 0] >= least].tolist():
+            if np.ptp(e.recording.acc[first : last + 1], axis=0).max() > LEAST_TURN_RAD * e.gravity:
                 return reason("bits_stuck", "frozen", axis=axis, begin=float(t[first]), end=float(t[last]))
     return None
 
