@@ -13,11 +13,11 @@ STRAY_US = 5 * S_US
 
 
 class Jump(Enum):
-    """Steps of a clock: none, back to its start by a reboot, or ahead because it was set."""
+    """Steps of a clock: to a later time, to that of a late or repeated packet, or back to its start by a reboot."""
 
     NONE = auto()
+    LATE = auto()
     REBOOT = auto()
-    SET = auto()
 
 
 class VehicleClock:
@@ -58,11 +58,14 @@ class VehicleClock:
         jump = Jump.NONE
         # Compared with all packets, not with the last one: after a pause, old packets are read in a burst.
         if step_us < -LATE_US or self._latest_us + step_us - received_us > self._ahead_us + STRAY_US:
-            jump = Jump.REBOOT if step_us < 0 else Jump.SET
+            # A step ahead is that of a clock which was set.
+            jump = Jump.REBOOT if step_us < 0 else Jump.NONE
             self._offset_us += max(passed_us, 1) - step_us
             step_us = max(passed_us, 1)
         t_us = raw * self._unit_us + self._offset_us
-        if step_us > 0:
+        if step_us <= 0:
+            jump = Jump.LATE
+        else:
             self._raw, self._latest_us, self._received_us = raw, t_us, received_us
             self._ahead_us = max(self._ahead_us, t_us - received_us)
         return t_us, jump

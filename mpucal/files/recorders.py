@@ -63,8 +63,9 @@ def recorder_of(meta: Mapping[str, Any], name: str, same: bool = False) -> Recor
     for recorder in RECORDERS:
         if version == recorder.version or (not same and _family(version) == recorder.family):
             return recorder
+    present = next((recorder.version for recorder in RECORDERS if recorder.family == _family(version)), DRIVER_VERSION)
     raise CaptureError(
-        f"{name} was recorded by version {version} of the driver, and this is {DRIVER_VERSION}",
+        f"{name} was recorded by version {version} of the driver, and this is {present}",
         "use `mpucal calibrate`, which reads captures of every version" if same else "use the mpucal that recorded it",
     )
 

@@ -22,8 +22,11 @@ OWN_SYSTEM, OWN_COMPONENT = 254, 190
 
 S = 1_000_000_000
 LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
-HEARTBEAT_NS = S
+HEARTBEAT_NS, ARMED = S, 128
 SEQUENCE = 256
+# A packet that others overtook is at most LATE numbers late. Numbers start again after a silence, such as a reboot's,
+# which is reported as such.
+LATE, SILENCE_NS = 32, S
 # No network has so many vehicles.
 MOST_SENDERS = 64
 # No bad link brings so many datagrams, or lengths of a packet, without a packet in PATIENCE_NS; a serial line of
@@ -54,6 +57,7 @@ class Link:
     Attributes
     ----------
     lost : number of the vehicle's packets that were lost, by their sequence numbers.
+    armed : True if the vehicle's last HEARTBEAT says that it is armed, None before the first.
     """
 
     def __init__(
@@ -76,7 +80,9 @@ class Link:
         self._seeking = False
         self._next_heartbeat_ns = self._now_ns
         self._sequence: int | None = None
+        self._counted_ns = 0
         self.lost = 0
+        self.armed: bool | None = None
         self._signed = self._unsigned = 0
         self._junk = 0
 
@@ -179,6 +185,8 @@ class Link:
             if (message.get_srcSystem(), message.get_srcComponent()) != (vehicle.system, vehicle.component):
                 continue
             self._count(message)
+            if message.get_type() == "HEARTBEAT":
+                self.armed = bool(message.base_mode & ARMED)
             for listener in self._listeners:
                 listener(message)
             yield message
@@ -189,7 +197,7 @@ class Link:
         self._queue.clear()
         self._before_lock.clear()
         self._listeners.clear()
-        self._vehicle, self._seeking, self._sequence = None, False, None
+        self._vehicle, self._seeking, self._sequence, self.armed = None, False, None, None
         self._now_ns = self._next_heartbeat_ns = max(self._now_ns, self._transport.now_ns())
 
     def close(self) -> None:
@@ -290,12 +298,16 @@ class Link:
         header = message.get_header()
         self._signed += header.incompat_flags & SIGNED
         self._unsigned += not header.incompat_flags & SIGNED
-        step = (header.seq - (header.seq - 1 if self._sequence is None else self._sequence)) % SEQUENCE
-        if 0 < step < SEQUENCE // 2:
+        last = self._sequence
+        if last is None or self._now_ns - self._counted_ns > SILENCE_NS:
+            last = header.seq - 1
+        step = (header.seq - last) % SEQUENCE
+        if 0 < step < SEQUENCE - LATE:
             self._sequence = header.seq
             self.lost += step - 1
         elif step:
             self.lost = max(self.lost - 1, 0)
+        self._counted_ns = self._now_ns
 
     def _new_receiver(self) -> Any:
         """Return a MAVLink for one address: a forged packet must not change the signature times of another address.

@@ -18,11 +18,11 @@ from ..data import Recording
 from ..errors import RecordingError
 from ..rests.flat import find_flat
 from .dialect import Message, Parser, dialect, read_header
-from .firmwares import PX4, Vehicle, preferred_messages, vehicle_of
+from .firmwares import PX4, Vehicle, vehicle_of
 from .imu import HIGHRES, MESSAGE_ID, RAW, Reading, Stream, decode_reading
 from .parameters.encoding import decode_parameter
-from .segments import ALTERING, SETTLED_US, Segment, find_recorrection, join_segments
-from .stream_buffers import Row, StreamBuffers
+from .segments import ALTERING, SETTLED_US, find_recorrection, join_segments
+from .stream_buffers import Row, Segment
 from .tlog import RawPacket
 from .transport import US
 
@@ -68,7 +68,7 @@ class Log:
         if NAME.fullmatch(name) is None or (name not in known and len(known) >= MOST_PARAMETERS):
             return
         if len(now) and name.startswith(ALTERING) and known.get(name, value) != value:
-            now = Segment(dict(known), now.buffers.following())
+            now = now.following()
             self.segments.append(now)
             self.changed.append(name)
             self._changed_ns = self._now_ns
@@ -85,17 +85,19 @@ class Log:
         self._now_ns = received_ns
         content = self._with_own_temperature(content)
         now = self.segments[-1]
-        buffer = now.buffers.of(content.stream)
+        buffer = now.of(content.stream)
         t_us, jump = buffer.clock.unwrap(content.time, received_ns)
         # Each stream's clock shows the same reboot.
         if jump is Jump.REBOOT and len(buffer):
-            after = now.buffers.following() if self._over_reboots else StreamBuffers()
-            now = Segment(dict(now.parameters), after, rebooted=True)
+            now = now.following(rebooted=True)
+            if not self._over_reboots:
+                now.streams.clear()
+                t_us, _ = now.of(content.stream).clock.unwrap(content.time, received_ns)
             self.segments.append(now)
-            buffer = after.of(content.stream)
-            t_us = t_us if self._over_reboots else buffer.clock.unwrap(content.time, received_ns)[0]
-        row = buffer.add(t_us, content)
-        return (None if row is None else self._under_first(row)), jump
+            buffer = now.of(content.stream)
+        row, late = Row(t_us, content), jump is Jump.LATE
+        buffer.add(row, late)
+        return (None if late else self._under_first(row)), jump
 
     def _with_own_temperature(self, content: Reading) -> Reading:
         """Return a reading of IMU 1 with its own temperature: ArduPilot's HIGHRES_IMU has the barometer's."""
@@ -119,9 +121,8 @@ class Log:
 
     def forget(self) -> None:
         """Drop all readings so far, and go on under the same parameters."""
-        self.segments = self.segments[-1:]
+        self.segments = [self.segments[-1].following()]
         self._changed_ns = None
-        self.segments[0].buffers.forget()
 
     def recording(self, name: str) -> Recording:
         """Return the first IMU's recording of the longest segment, with the other IMUs' in `others`.
@@ -133,10 +134,9 @@ class Log:
         RecordingError : it holds no IMU messages that a calibration may take.
         """
         longest = join_segments(self.segments, self.firmware, self._over_reboots)
-        order = preferred_messages(self.firmware, longest.parameters)
-        recordings = longest.buffers.recordings(order, name, self.firmware, longest.parameters)
+        recordings = longest.recordings(self.firmware, name)
         if not recordings:
-            raise _no_imu(name, self.firmware, longest.buffers)
+            raise _no_imu(name, self.firmware, longest)
         first, *others = [replace(recording, flat=find_flat(recording)) for recording in recordings]
         return replace(first, others=tuple(others))
 
@@ -206,8 +206,8 @@ def _not_one(name: str, vehicles: Mapping[tuple[int, int], Vehicle]) -> Recordin
     return RecordingError(f"{name} holds several vehicles: {listed}", "record the one to calibrate alone")
 
 
-def _no_imu(name: str, firmware: str, buffers: StreamBuffers) -> RecordingError:
-    if firmware == PX4 and buffers.streams:
+def _no_imu(name: str, firmware: str, segment: Segment) -> RecordingError:
+    if firmware == PX4 and segment.streams:
         return RecordingError(
             f"{name} holds only PX4's HIGHRES_IMU, from which the estimator's bias is subtracted already",
             "record SCALED_IMU, as `mpucal session --mavlink` does, or clear bits 0 and 1 of EKF2_IMU_CTRL before",

@@ -60,7 +60,7 @@ def send_command(link: Link, number: int, *params: float, timeout_s: float = 1.0
     return ask(link, encode_command(link, number, *params), reply, timeout_s, tries)
 
 
-ARMED, PREARM_CHECK = 128, 0x10000000
+PREARM_CHECK = 0x10000000
 SYS_STATUS = 1
 HEARTBEAT_NS = 5 * S
 COMPLAINTS_NS, TRIES = 3 * S // 2, 3
@@ -88,38 +88,16 @@ class PrearmState:
         return {True: "would arm", False: WITHOUT_REASON, None: "does not say whether it would arm"}[self.ready]
 
 
-class ArmingMonitor:
-    """Listener to a vehicle's HEARTBEAT, whoever reads the link."""
+def is_armed(link: Link) -> bool:
+    """Return True if the vehicle is armed; wait for its first HEARTBEAT.
 
-    def __init__(self, link: Link) -> None:
-        self._link = link
-        self._armed: bool | None = None
-        link.subscribe(self._on_message)
-
-    def _on_message(self, message: Message) -> None:
-        if message.get_type() == "HEARTBEAT":
-            self._armed = is_armed(message)
-
-    @property
-    def armed(self) -> bool:
-        """True if the vehicle is armed; waits for the first HEARTBEAT.
-
-        Raises
-        ------
-        LinkError : none comes.
-        """
-        if self._armed is None:
-            for _ in self._link.messages(self._link.now_ns() + HEARTBEAT_NS):
-                if self._armed is not None:
-                    break
-        if self._armed is None:
-            raise LinkError(f"{self._link.vehicle} sends no heartbeat any more", "check its power and the link")
-        return self._armed
-
-
-def is_armed(heartbeat: Message) -> bool:
-    """Return True if a HEARTBEAT says that its sender is armed."""
-    return bool(heartbeat.base_mode & ARMED)
+    Raises
+    ------
+    LinkError : none comes. EndOfCapture : see Link.messages.
+    """
+    if link.armed is None and all(link.armed is None for _ in link.messages(link.now_ns() + HEARTBEAT_NS)):
+        raise LinkError(f"{link.vehicle} sends no heartbeat any more", "check its power and the link")
+    return bool(link.armed)
 
 
 def check_prearm(link: Link) -> PrearmState:

@@ -6,7 +6,7 @@ With known corrections, the output of an IMU under one is transformed to its out
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..data import Vector
 from .firmwares import EKF2_IMU_CTRL, PX4
 from .parameters.mounting import mounting
 from .parameters.slots import Correction, Slot, Values, find_slot, px4_slot
-from .stream_buffers import StreamBuffers
+from .stream_buffers import Segment
 
 # Prefixes of parameters whose change alters the streams: in a way that is not transformed, or by a correction.
 FIXED = ("INS_GYR", "AHRS_ORIENTATION", "AHRS_CUSTOM", "CUST_ROT", "SENS_BOARD", EKF2_IMU_CTRL)
@@ -23,18 +23,6 @@ ALTERING = (*FIXED, *ACCELEROMETER, "CAL_GYRO")
 # PX4 reports a change up to a second after its streams have it; the parameters of one change come one by one.
 LATE_US = {PX4: 1_500_000}
 SETTLED_US = 500_000
-
-
-@dataclass
-class Segment:
-    """Part of a log under one set of parameters, between reboots; `rebooted`: it began with one."""
-
-    parameters: dict[str, float]
-    buffers: StreamBuffers = field(default_factory=StreamBuffers)
-    rebooted: bool = False
-
-    def __len__(self) -> int:
-        return max((len(b) for b in self.buffers.streams.values()), default=0)
 
 
 @dataclass(frozen=True)
@@ -106,30 +94,31 @@ def join_segments(segments: Sequence[Segment], firmware: str, over_reboots: bool
     cut = follows < len(segments) and not segments[follows].rebooted
     if len(run) == 1 and not (cut and firmware in LATE_US):
         return run[0]
-    made = StreamBuffers()
+    made = Segment(dict(run[-1].parameters))
     for k, segment in enumerate(run):
         skip_us = 0 if k == 0 or segment.rebooted else SETTLED_US
         next_cuts = cut if segment is run[-1] else not run[k + 1].rebooted
-        _add(made, segment, run[-1].parameters, firmware, skip_us, LATE_US.get(firmware, 0) if next_cuts else 0)
-    return Segment(dict(run[-1].parameters), made)
+        _add(made, segment, firmware, skip_us, LATE_US.get(firmware, 0) if next_cuts else 0)
+    return made
 
 
 def _can_join(one: Segment, other: Segment, firmware: str) -> bool:
-    imus = {stream.imu for segment in (one, other) for stream in segment.buffers.streams}
+    imus = {stream.imu for segment in (one, other) for stream in segment.streams}
     if _altering(one.parameters) == _altering(other.parameters):
         return True
     return all(find_recorrection(firmware, imu, one.parameters, other.parameters) is not None for imu in imus)
 
 
-def _add(made: StreamBuffers, segment: Segment, then: Values, firmware: str, skip_us: int, drop_us: int) -> None:
-    same = _altering(segment.parameters) == _altering(then)
-    for stream, buffer in segment.buffers.streams.items():
+def _add(made: Segment, segment: Segment, firmware: str, skip_us: int, drop_us: int) -> None:
+    """Add a segment's readings, without those of its first and last times, as they would be under those of `made`."""
+    same = _altering(segment.parameters) == _altering(made.parameters)
+    for stream, buffer in segment.streams.items():
         times_us, numbers = buffer.rows()
         if not len(times_us):
             continue
         kept = (times_us >= times_us[0] + skip_us) & (times_us <= times_us[-1] - drop_us)
         numbers = numbers[kept]
-        change = None if same else find_recorrection(firmware, stream.imu, segment.parameters, then)
+        change = None if same else find_recorrection(firmware, stream.imu, segment.parameters, made.parameters)
         if change is not None:
             numbers[:, :3], numbers[:, 3:6] = change.acc(numbers[:, :3]), change.gyr(numbers[:, 3:6])
         made.of(stream).extend(times_us[kept], numbers)

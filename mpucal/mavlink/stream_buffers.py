@@ -1,18 +1,18 @@
-"""Buffers of a vehicle's IMU streams, and a recording of each IMU made from them."""
+"""Buffers of a vehicle's IMU streams, and the recording of each IMU that a segment of them gives."""
 
 from __future__ import annotations
 
 import math
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..clocks.vehicle_clock import VehicleClock
 from ..data import Autopilot, Recording, Samples, Sensor, Vector
-from .firmwares import accel_lag_s
+from .firmwares import accel_lag_s, preferred_messages
 from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream
 
 MS_US = 1000
@@ -47,32 +47,22 @@ class StreamBuffer:
         self.clock = clock or VehicleClock(stream.unit_us)
         self._times_us, self._numbers = array("q"), array("d")
         self._in_order = 0
-        self._newest_us: int | None = None
 
     def __len__(self) -> int:
         """Return the number of readings that came in order."""
         return self._in_order
 
-    def add(self, t_us: int, reading: Reading) -> Row | None:
-        """Keep a reading of that time; return its row if it is newer than all before it."""
-        self._times_us.append(t_us)
-        self._numbers.extend(_numbers(reading))
-        if self._newest_us is not None and t_us <= self._newest_us:
-            return None
-        self._newest_us = t_us
-        self._in_order += 1
-        return Row(t_us, reading)
+    def add(self, row: Row, late: bool) -> None:
+        """Keep a reading."""
+        self._times_us.append(row.t_us)
+        self._numbers.extend(_numbers(row.reading))
+        self._in_order += not late
 
     def extend(self, times_us: Vector, numbers: Vector) -> None:
         """Keep (n,) times and (n, NUMBERS) as `rows` returns them."""
         self._times_us.extend(times_us.astype(np.int64).tolist())
         self._numbers.extend(numbers.ravel().tolist())
         self._in_order += len(times_us)
-
-    def forget(self) -> None:
-        """Drop all readings."""
-        del self._times_us[:], self._numbers[:]
-        self._in_order = 0
 
     def rows(self) -> tuple[Vector, Vector]:
         """Return (n,) us, increasing, and (n, NUMBERS): acceleration, rate, temperature."""
@@ -110,51 +100,38 @@ def _samples(numbers: Vector, t_us: Vector, before_us: float | None = None) -> S
     )
 
 
-class StreamBuffers:
-    """Buffers of all streams of a vehicle."""
+@dataclass
+class Segment:
+    """Streams of a vehicle under one set of parameters, between reboots; `rebooted`: they began with one."""
 
-    def __init__(self) -> None:
-        self.streams: dict[Stream, StreamBuffer] = {}
+    parameters: dict[str, float]
+    rebooted: bool = False
+    streams: dict[Stream, StreamBuffer] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return max(map(len, self.streams.values()), default=0)
 
     def of(self, stream: Stream) -> StreamBuffer:
         """Return the buffer of `stream`, an empty one if nothing came of it."""
         return self.streams.setdefault(stream, StreamBuffer(stream))
 
-    def following(self) -> StreamBuffers:
-        """Return empty buffers with the same clocks."""
-        after = StreamBuffers()
-        after.streams = {stream: StreamBuffer(stream, buffer.clock) for stream, buffer in self.streams.items()}
-        return after
+    def following(self, rebooted: bool = False) -> Segment:
+        """Return an empty segment under the same parameters, with the same clocks."""
+        streams = {stream: StreamBuffer(stream, buffer.clock) for stream, buffer in self.streams.items()}
+        return Segment(dict(self.parameters), rebooted, streams)
 
-    def forget(self) -> None:
-        """Drop all readings."""
-        for buffer in self.streams.values():
-            buffer.forget()
-
-    def choose(self, order: Sequence[str]) -> list[StreamBuffer]:
-        """Return the best stream of each IMU, by IMU.
-
-        Parameters
-        ----------
-        order : names of the messages that may be taken, the best first.
-        """
-        chosen = []
+    def recordings(self, firmware: str, name: str) -> list[Recording]:
+        """Return one recording of each IMU, the first IMU's first, by the best message of each."""
+        order, chosen = preferred_messages(firmware, self.parameters), []
         for imu in sorted({stream.imu for stream in self.streams}):
             known = [b for s, b in self.streams.items() if s.imu == imu and s.name in order]
-            most = max((len(b) for b in known), default=0)
+            most = max(map(len, known), default=0)
             enough = [b for b in known if len(b) >= max(MIN_SHARE * most, 2)]
             chosen += [min(enough, key=lambda b: order.index(b.stream.name))] if enough else []
-        return chosen
-
-    def recordings(
-        self, order: Sequence[str], name: str, firmware: str, parameters: Mapping[str, float]
-    ) -> list[Recording]:
-        """Return one recording of each IMU, the first IMU's first; see `choose`."""
-        chosen = self.choose(order)
         exact_us = next((b.rows()[0] for b in chosen if b.stream.name not in SCALED), None)
         made = []
         for buffer in chosen:
-            autopilot = Autopilot(firmware, buffer.stream.imu, buffer.stream.name, parameters)
+            autopilot = Autopilot(firmware, buffer.stream.imu, buffer.stream.name, self.parameters)
             made.append(_recording(buffer, exact_us, autopilot, name))
         return made
 

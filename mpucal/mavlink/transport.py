@@ -65,10 +65,3 @@ class SteadyClock:
     def now_ns(self) -> int:
         """Return ns since 1970, in whole us."""
         return (self._offset_ns + time.monotonic_ns()) // US * US
-
-
-class OnePartner(SteadyClock):
-    """Base of the transports of this computer that lead to one partner."""
-
-    def restrict(self, address: str | None) -> None:
-        """See Transport."""

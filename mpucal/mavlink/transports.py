@@ -7,67 +7,81 @@ import os
 import select
 import socket
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import BusError, LinkError, NoAnswer
-from .transport import OnePartner, ReceivedBytes, SteadyClock, Transport
+from .transport import ReceivedBytes, SteadyClock, Transport
 from .url import Kind, Url
 
+CHUNK = 65536
 RETRY_NS = 500_000_000
+CONNECT_S = 5.0
+# Three IMUs may pile this up in a second in which a fit keeps the processor busy.
+RECEIVE_BUFFER = 4 << 20
 
 
-class ReconnectingTransport(OnePartner):
-    """Transport at `url`; while the other end is away nothing is received, and what is sent is lost.
+class Line(SteadyClock):
+    """TCP connection, or serial line: an autopilot's USB port or a telemetry radio.
 
-    A board on USB may come back as another port: it is looked for by its serial number.
+    While the other end is away nothing is received, and what is sent is lost. A board on USB may come back as another
+    port: it is looked for by its serial number. `name` stays that of `url`, as a link is locked to one address.
 
     Raises
     ------
-    LinkError : it cannot be opened the first time.
+    NoAnswer : nobody listens there. LinkError : no such host or device, or no permission to open it.
     """
 
-    outward = True
+    datagrams, outward = False, True
 
-    def __init__(self, url: Url, opener: Callable[[Url], Transport]) -> None:
+    def __init__(self, url: Url) -> None:
         super().__init__()
-        self._url, self._opener = url, opener
-        self._transport: Transport | None = opener(url)
+        self.name, self._url = str(url), url
+        self._stream: Any = _open_stream(url)
         self._board = _usb_boards().get(_device(url)) if url.kind is Kind.SERIAL else None
         self._next_try_ns = 0
-        self.name, self.datagrams = self._transport.name, self._transport.datagrams
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
-        if self._transport is None:
+        if self._stream is None:
             self._reopen(until_ns)
             return None
-        wait_ns = max(until_ns - self.now_ns(), 0)
         try:
-            received = self._transport.receive(self._transport.now_ns() + wait_ns)
-        except LinkError:
+            data = self._read(until_ns - self.now_ns())
+        except OSError:
             self.close()
             return None
-        # The link is locked to one address, and its times must not jump: both stay those of the first transport.
-        return None if received is None else ReceivedBytes(received.data, self.name, self.now_ns())
+        return ReceivedBytes(data, self.name, self.now_ns()) if data else None
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""
-        if self._transport is not None:
-            try:
-                self._transport.send(data, address)
-            except LinkError:
-                self.close()
+        try:
+            if self._stream is not None:
+                self._stream.write(data)
+        except OSError:
+            self.close()
+
+    def restrict(self, address: str | None) -> None:
+        """See Transport."""
 
     def close(self) -> None:
-        """See Transport."""
-        if self._transport is not None:
-            # A board that comes back would get another name while its old port is open.
-            self._transport.close()
-        self._transport = None
+        """See Transport. A board that comes back would get another name while its old port is open."""
+        if self._stream is not None:
+            self._stream.close()
+        self._stream = None
+
+    def _read(self, wait_ns: int) -> bytes:
+        if not hasattr(self._stream, "fileno"):  # A serial port of Windows has no file descriptor to wait for.
+            self._stream.timeout = max(wait_ns, 0) * 1e-9
+            return bytes(self._stream.read(max(1, self._stream.in_waiting)))
+        if not _is_readable(self._stream, wait_ns):
+            return b""
+        data = bytes(self._stream.read(CHUNK))
+        if not data:
+            raise ConnectionError("the connection was closed")
+        return data
 
     def _reopen(self, until_ns: int) -> None:
         """Try to open it again, at most every RETRY_NS; sleep otherwise."""
@@ -76,16 +90,29 @@ class ReconnectingTransport(OnePartner):
             time.sleep(max(min(until_ns, self._next_try_ns) - now_ns, 0) * 1e-9)
             return
         self._next_try_ns = now_ns + RETRY_NS
+        url: Url | None = self._url
+        if self._board is not None:
+            ports = (device for device, board in _usb_boards().items() if board == self._board)
+            url = next((replace(self._url, host=port) for port in ports), None)
         with suppress(BusError):
-            self._transport = self._opener(self._current_url())
+            self._stream = _open_stream(url) if url else None
 
-    def _current_url(self) -> Url:
-        if self._board is None:
-            return self._url
-        at = next((device for device, board in _usb_boards().items() if board == self._board), None)
-        if at is None:
-            raise LinkError(f"{self._url} is gone", "plug it in again")
-        return self._url if at == _device(self._url) else replace(self._url, host=at)
+
+def _open_stream(url: Url) -> Any:
+    """Open a raw stream, whose reads and writes raise OSError once the other end is gone."""
+    try:
+        if url.kind is Kind.TCP:
+            with socket.create_connection((url.host, url.port), CONNECT_S) as connection:
+                connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                return connection.makefile("rwb", buffering=0)
+        import serial  # noqa: PLC0415
+
+        return serial.Serial(url.host, url.port, timeout=0, write_timeout=1.0, exclusive=True)
+    except (ConnectionRefusedError, TimeoutError) as error:
+        remedy = "start the vehicle or its router, and check host and port"
+        raise NoAnswer(f"nothing answers at {url}", remedy) from error
+    except (OSError, ValueError) as error:
+        raise _cannot_open(url, error) from error
 
 
 def _device(url: Url) -> str:
@@ -99,12 +126,6 @@ def _usb_boards() -> dict[str, tuple[int, int, str]]:
     from serial.tools.list_ports import comports  # noqa: PLC0415
 
     return {p.device: (p.vid, p.pid, p.serial_number) for p in comports() if p.vid and p.serial_number}
-
-
-CHUNK = 65536
-CONNECT_S = 5.0
-# Three IMUs may pile this up in a second in which a fit keeps the processor busy.
-RECEIVE_BUFFER = 4 << 20
 
 
 class Udp(SteadyClock):
@@ -137,7 +158,7 @@ class Udp(SteadyClock):
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport. A partner that refuses our datagrams is not there yet."""
-        if not _readable(self._socket, until_ns - self.now_ns()):
+        if not _is_readable(self._socket, until_ns - self.now_ns()):
             return None
         try:
             data, (host, port) = self._socket.recvfrom(CHUNK)
@@ -165,109 +186,14 @@ class Udp(SteadyClock):
         self._socket.close()
 
 
-class Tcp(OnePartner):
-    """TCP connection to a vehicle or a router.
-
-    Raises
-    ------
-    NoAnswer : nobody listens there. LinkError : the host is unknown.
-    """
-
-    datagrams, outward = False, True
-
-    def __init__(self, url: Url) -> None:
-        super().__init__()
-        self.name = str(url)
-        try:
-            self._socket = socket.create_connection((url.host, url.port), CONNECT_S)
-        except (ConnectionRefusedError, TimeoutError) as error:
-            raise NoAnswer(
-                f"nothing answers at {url}", "start the vehicle or its router, and check host and port"
-            ) from error
-        except OSError as error:
-            raise _cannot_open(url, error) from error
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def receive(self, until_ns: int) -> ReceivedBytes | None:
-        """See Transport."""
-        if not _readable(self._socket, until_ns - self.now_ns()):
-            return None
-        try:
-            data = self._socket.recv(CHUNK)
-        except OSError as error:
-            raise _broken(self.name, error) from error
-        if not data:
-            raise LinkError(f"{self.name} closed the connection", "restart it, then the session")
-        return ReceivedBytes(data, self.name, self.now_ns())
-
-    def send(self, data: bytes, address: str | None) -> None:
-        """See Transport."""
-        try:
-            self._socket.sendall(data)
-        except OSError as error:
-            raise _broken(self.name, error) from error
-
-    def close(self) -> None:
-        """See Transport."""
-        self._socket.close()
-
-
-class Serial(OnePartner):
-    """Serial line: an autopilot's USB port or a telemetry radio.
-
-    Raises
-    ------
-    LinkError : there is no such device, or no permission to open it.
-    """
-
-    datagrams, outward = False, True
-
-    def __init__(self, url: Url) -> None:
-        import serial  # noqa: PLC0415
-
-        super().__init__()
-        self.name = str(url)
-        try:
-            self._port = serial.Serial(url.host, url.port, timeout=0, write_timeout=1.0, exclusive=True)
-        except (OSError, ValueError) as error:
-            raise _cannot_open(url, error) from error
-
-    def receive(self, until_ns: int) -> ReceivedBytes | None:
-        """See Transport."""
-        try:
-            data = self._read(until_ns - self.now_ns())
-        except OSError as error:
-            raise _broken(self.name, error) from error
-        return ReceivedBytes(data, self.name, self.now_ns()) if data else None
-
-    def _read(self, wait_ns: int) -> bytes:
-        if not hasattr(self._port, "fileno"):  # Windows has no file descriptor to wait for.
-            self._port.timeout = max(wait_ns, 0) * 1e-9
-            return bytes(self._port.read(max(1, self._port.in_waiting)))
-        return bytes(self._port.read(CHUNK)) if _readable(self._port, wait_ns) else b""
-
-    def send(self, data: bytes, address: str | None) -> None:
-        """See Transport."""
-        try:
-            self._port.write(data)
-        except OSError as error:
-            raise _broken(self.name, error) from error
-
-    def close(self) -> None:
-        """See Transport."""
-        self._port.close()
-
-
 def open_transport(url: Url) -> Transport:
-    """Open the transport that a URL names; a connection or a device that goes away is opened again.
+    """Open the transport that a URL names.
 
     Raises
     ------
-    LinkError : it cannot be opened.
+    NoAnswer, LinkError : it cannot be opened.
     """
-    if url.kind is Kind.TCP:
-        return ReconnectingTransport(url, Tcp)
-    return ReconnectingTransport(url, Serial) if url.kind is Kind.SERIAL else Udp(url)
+    return Udp(url) if url.kind in (Kind.UDP, Kind.UDPOUT) else Line(url)
 
 
 def _host_port(address: str) -> tuple[str, int]:
@@ -275,7 +201,7 @@ def _host_port(address: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def _readable(channel: Any, wait_ns: int) -> bool:
+def _is_readable(channel: Any, wait_ns: int) -> bool:
     return bool(select.select([channel], [], [], max(wait_ns, 0) * 1e-9)[0])
 
 
@@ -284,10 +210,6 @@ def _cannot_open(url: Url, error: Exception) -> LinkError:
     if url.kind is not Kind.SERIAL:
         remedy = "check host and port, and that no other ground station listens there"
     return LinkError(f"{url} cannot be opened ({_cause(error)})", remedy)
-
-
-def _broken(name: str, error: Exception) -> LinkError:
-    return LinkError(f"the link over {name} broke ({_cause(error)})", "check cable and power, then start again")
 
 
 def _cause(error: Exception) -> str:

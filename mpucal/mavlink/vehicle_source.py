@@ -15,7 +15,6 @@ from .log import Log
 from .parameters.client import read_stream_parameters
 from .parameters.slots import find_slot
 from .px4_preparation import AUTOCAL, Preparation
-from .requests import is_armed
 from .stream import Streams
 from .stream_buffers import Row, samples_of, sensor_of
 from .transport import PAUSE_NS
@@ -132,6 +131,7 @@ class VehicleSource:
         if self._rebooted or self._link.now_ns() - self._sampled_ns >= SILENT_NS:
             self._say(f"{self._link.vehicle} {self._fault()}: wait until it is back, and hold it still meanwhile.")
             self._wait_for_return()
+        self._report_armed()
         self._report_changes()
         self._report_loss()
         return self._take_samples()
@@ -156,8 +156,6 @@ class VehicleSource:
             self._preparation.release()
 
     def _on_message(self, message: Message) -> None:
-        if message.get_type() == "HEARTBEAT":
-            self._report_armed(is_armed(message))
         row, jump = self._log.add(message, self._link.now_ns())
         self._rebooted |= jump is Jump.REBOOT
         if row is not None and row.reading.stream == self._stream:
@@ -171,8 +169,9 @@ class VehicleSource:
             self._last_us = float(rows[-1].t_us)
         return samples
 
-    def _report_armed(self, armed: bool) -> None:
+    def _report_armed(self) -> None:
         """Say each time that the vehicle is armed: the operator who turns it is near its propellers."""
+        armed = bool(self._link.armed)
         if armed and not self._was_armed:
             self._say(
                 f"{self._link.vehicle} was armed: keep clear of its propellers and disarm it;"

@@ -20,7 +20,7 @@ from ..mavlink.log import Log
 from ..mavlink.parameters.client import read_parameters, read_stream_parameters
 from ..mavlink.parameters.mounting import BOARD_ROTATION, ORIENTATION, mounting, trim_names, trim_of
 from ..mavlink.parameters.slots import Slot, Values, find_slot
-from ..mavlink.requests import ArmingMonitor, ask, check_prearm, encode_command
+from ..mavlink.requests import ask, check_prearm, encode_command, is_armed
 from ..mavlink.stream import MOST, Streams
 from ..mavlink.transport import US
 from ..mavlink.vehicle_source import LOSS_SHARE, loss_share
@@ -104,7 +104,7 @@ def _words(version: Message) -> str:
 
 
 def _armed(link: Link) -> Finding:
-    armed = ArmingMonitor(link).armed
+    armed = is_armed(link)
     remedy = "keep clear of its propellers and disarm it: nothing is written to an armed vehicle"
     return Finding.check("armed", not armed, "yes" if armed else "no", remedy, {"armed": armed}, Mark.BAD)
 

@@ -31,7 +31,7 @@ from ..mavlink.parameters.plan import (
 )
 from ..mavlink.parameters.slots import all_slots
 from ..mavlink.parameters.write import NEW, OLD, SwappedSlotsError, Writer, is_partial_write, verify
-from ..mavlink.requests import ArmingMonitor, PrearmState, check_prearm, send_command
+from ..mavlink.requests import PrearmState, check_prearm, is_armed, send_command
 from ..mavlink.rest import Horizon, RestMeans, RestMonitor
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
@@ -105,7 +105,6 @@ class AutopilotSink:
         self._journal = journal or Journal()
         self._store = store
         self._firmware = link.vehicle.family
-        self._watch = ArmingMonitor(link)
 
     @property
     def where(self) -> str:
@@ -124,7 +123,7 @@ class AutopilotSink:
             return None
         old, new = note[OLD], note[NEW]
         slots = [slot for slot in all_slots(self._firmware) if set(slot.names) <= set(old)]
-        writer = Writer(self._link, self._watch, slots, others=[n for n in trim_names(self._firmware) if n in old])
+        writer = Writer(self._link, slots, others=[n for n in trim_names(self._firmware) if n in old])
         held = writer.read()
         interrupted = f"a write to this vehicle was interrupted at {note[AT]}"
         if held == old:
@@ -165,7 +164,7 @@ class AutopilotSink:
                 f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write saved"
             )
         trim = [name for name in trim_names(self._firmware) if name in wanted]
-        writer = Writer(self._link, self._watch, slots, self._journal, trim)
+        writer = Writer(self._link, slots, self._journal, trim)
         with nothing_written():
             old = writer.read()
         writer.write(old, {name: wanted[name] for name in old}, lambda: None)
@@ -196,7 +195,7 @@ class AutopilotSink:
         possible = plan_changes(calibration, self._firmware)
         planned = select_improving(possible)
         slots = [change.slot for change in planned]
-        writer = self._writer = Writer(self._link, self._watch, slots, self._journal, trim_names(self._firmware))
+        writer = self._writer = Writer(self._link, slots, self._journal, trim_names(self._firmware))
         first = possible[0]
         monitor = RestMonitor(self._link, list(dict.fromkeys(change.stream for change in (first, *planned))))
         with nothing_written():
@@ -298,7 +297,7 @@ class AutopilotSink:
 
     def _check(self, planned: Sequence[Change]) -> None:
         """Check that the vehicle is disarmed and has the sensors that were calibrated."""
-        if self._watch.armed:
+        if is_armed(self._link):
             raise WriteBackError(f"{NOTHING}: {self.where} is armed", "disarm it, then write again")
         known = {c.slot.sensor_id: c.sensor_id for c in planned if c.sensor_id}
         for name, held in require_parameters(self._link, tuple(known)).items():

@@ -31,8 +31,8 @@ def test_a_counter_of_32_bits_is_unwrapped(steps, start, unit_us):
     [
         (500.0, 3.0, Jump.REBOOT),
         (5000.0, 0.0, Jump.REBOOT),
-        (20.0, 1.7e9, Jump.SET),
-        (5.0, 4.5, Jump.NONE),
+        (20.0, 1.7e9, Jump.NONE),
+        (5.0, 4.5, Jump.LATE),
         (5.0, 5.5, Jump.NONE),
     ],
     ids=["reboot", "reboot after more than 2^32 us", "time of day set", "late packet", "in order"],

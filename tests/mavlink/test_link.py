@@ -168,14 +168,21 @@ def test_a_loop_that_is_left_early_loses_no_message(script, station):
     assert len(heard) == 20
 
 
-def test_lost_packets_are_counted_late_ones_are_not(script, station):
+@pytest.mark.parametrize(
+    ("come", "lost"),
+    [
+        pytest.param([(0.1 * i, k) for i, k in enumerate([0, 1, 4, 3, 5, 5, 9])], 4, id="2, 6, 7 and 8"),
+        pytest.param([(0.0, 0), (0.9, 201)], 200, id="a long burst"),
+        pytest.param([(0.0, 0), (2.5, 77), (2.6, 79)], 1, id="a reboot, and 78"),
+    ],
+)
+def test_lost_packets_are_counted_late_ones_and_those_of_a_silence_are_not(script, station, come, lost):
     vehicle = station()
-    heartbeat, packets = vehicle.heartbeat(), [vehicle.raw(k) for k in range(10)]
-    come = [0, 1, 4, 3, 5, 5, 9]
-    arriving = [(3.0 + 0.1 * i, HOME, packets[k]) for i, k in enumerate(come)]
+    heartbeat, packets = vehicle.heartbeat(), [vehicle.raw(k) for k in range(256)]
+    arriving = [(3.0 + t, HOME, packets[k]) for t, k in come]
     link, _ = locked(script([(0.5, HOME, heartbeat), *arriving]))
     list(link.messages(9 * S))
-    assert link.lost == 4  # 2, 6, 7 and 8
+    assert link.lost == lost
 
 
 def test_a_request_is_repeated_until_its_own_answer(script, station, decoded):

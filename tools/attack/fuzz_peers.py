@@ -24,7 +24,7 @@ from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.ftp import Payload, Storage
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.client import read_agreed, stream_parameter_names
-from mpucal.mavlink.requests import ArmingMonitor
+from mpucal.mavlink.requests import is_armed
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.page.requests import RequestFilter
 from mpucal.page.server import Handler
@@ -183,7 +183,7 @@ def vehicle(data: bytes) -> None:
     link = Link(HostileVehicle(data), lambda t_ns, packet: None)
     found = link.listen()
     link.lock(found[0])
-    str(ArmingMonitor(link).armed)
+    is_armed(link)
     Storage(link).get("/x")
     read_agreed(link, stream_parameter_names(link.vehicle.firmware)[:2])
 

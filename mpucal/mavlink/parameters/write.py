@@ -12,7 +12,7 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...errors import EndOfCapture, MpucalError, WriteBackError
 from ...result.journal import Journal
 from ..link import Link, S
-from ..requests import ArmingMonitor
+from ..requests import is_armed
 from ..rest import RestMeans
 from .client import read_agreed, require_parameters, set_parameter
 from .encoding import as_float32
@@ -109,7 +109,7 @@ class Writer:
 
     Parameters
     ----------
-    monitor : says whether it is armed. slots : to be written. journal : keeps old and new values meanwhile.
+    slots : to be written. journal : keeps old and new values meanwhile.
     others : names of parameters besides, which the firmware uses as they are set.
 
     Attributes
@@ -118,14 +118,9 @@ class Writer:
     """
 
     def __init__(
-        self,
-        link: Link,
-        monitor: ArmingMonitor,
-        slots: Sequence[Slot],
-        journal: Journal | None = None,
-        others: Sequence[str] = (),
+        self, link: Link, slots: Sequence[Slot], journal: Journal | None = None, others: Sequence[str] = ()
     ) -> None:
-        self._link, self._monitor, self._slots, self._others = link, monitor, tuple(slots), tuple(others)
+        self._link, self._slots, self._others = link, tuple(slots), tuple(others)
         self._journal = journal or Journal()
         self._touched: set[str] = set()
         self.restored = False
@@ -147,7 +142,7 @@ class Writer:
         ------
         WriteBackError : it failed; the message ends with the values that the vehicle has now.
         """
-        if self._monitor.armed:
+        if is_armed(self._link):
             raise WriteBackError("the vehicle is armed, so nothing was written", "disarm it, then write again")
         self._journal.begin({OLD: dict(old), NEW: dict(new)})
         try:
@@ -176,7 +171,7 @@ class Writer:
         list(self._link.messages(self._link.now_ns() + step.wait_ns))
 
     def _check_disarmed(self) -> None:
-        if self._monitor.armed:
+        if is_armed(self._link):
             raise WriteBackError("the vehicle was armed meanwhile", "disarm it, then write again")
 
     def _compare(self, values: Mapping[str, float]) -> None:

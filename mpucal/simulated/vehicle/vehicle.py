@@ -12,9 +12,8 @@ from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
 from ...mavlink.ftp import Payload
-from ...mavlink.link import OWN_COMPONENT, SEQUENCE
+from ...mavlink.link import ARMED, OWN_COMPONENT, SEQUENCE
 from ...mavlink.parameters.encoding import from_wire, name_bytes, to_wire
-from ...mavlink.requests import ARMED
 from ...mavlink.texts import ReceivedPrompt, decode_prompt
 from ..faults import Schedule
 from .ardupilot import ArduPilot
