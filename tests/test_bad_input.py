@@ -109,7 +109,6 @@ session --resume x --bus sim                        | --resume does not take --b
 session --resume x -o y                             | --resume does not take -o
 write c.json diary --bus sim                        | 'chip'
 write c.json bridge --mavlink sim                   | --mavlink sim has no bridge
-write c.json chip --bus sim --store                 | --store was given, and the chip's offset registers
 show                                                | neither a file nor a source was given: give a file
 show x.json --bus sim                               | a file and --bus were given together
 show --bus sim --columns t,ax,ay,az,gx,gy,gz        | --columns say how a file is read, and a device was given

@@ -9,13 +9,11 @@ from typing import Any
 
 import click
 
-from ..errors import UsageError
 from ..result.calibration import Calibration
-from ..sinks.choose import FILE, check_behind, default_sinks
+from ..sinks.choose import FILE, default_sinks
 from ..sinks.kind import Applied, Device, Say, SinkKind
 from ..sinks.table import SINKS
 from ..sinks.write_back import Recorder, write_to_all
-from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from ..sources.table import matching_kinds
 from .arguments import together
@@ -31,32 +29,13 @@ session_sink_options = together(
     ),
     click.option("--no-write", is_flag=True, help="Write only files."),
 )
-# the options that belong to one kind of sink, such as --store
-sink_flags = together(
-    *(
-        click.option(f"--{flag.name}", is_flag=True, help=f"{kind.name}: {flag.help}")
-        for kind in SINKS.values()
-        for flag in kind.flags
-    )
-)
 
 
 def make_device(options: Mapping[str, Any], yes: bool, say: Say = say) -> Device:
-    """Return the device that a command's source options name, with the flags of sinks; `yes` : ask no questions."""
+    """Return the device that a command's source options name; `yes` : ask no questions."""
     kind = matching_kinds(options)[0]
-    flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
-    given = frozenset(name for name in flags if options.get(name))
     opener, answer = partial(open_source, options), partial(confirm, yes=yes)
-    return Device(kind, str(options[kind.option.name]), opener, say, given, answer, options)
-
-
-def check_sink(kind: SinkKind, source: SourceKind, options: Mapping[str, Any]) -> None:
-    """Raise UsageError if the sink is not behind the source, or a flag belongs to another sink."""
-    check_behind(kind, source, f"{kind.name} was named")
-    for other in SINKS.values():
-        for flag in other.flags:
-            if options.get(flag.name) and flag not in kind.flags:
-                raise UsageError(f"--{flag.name} was given, and {kind.where} does not take it", "leave it out")
+    return Device(kind, str(options[kind.option.name]), opener, say, answer, options)
 
 
 def write_back(

@@ -8,10 +8,11 @@ from typing import Any
 import click
 
 from ..disk.output_folder import OutputFolder
+from ..sinks.choose import check_behind
 from ..sinks.table import SINKS
 from ..sinks.write_back import file_recorder, is_calibration, put_back, write_objection, write_to
 from .arguments import calibration_argument, json_option, output_option, yes_option
-from .destination import check_sink, make_device, sink_flags
+from .destination import make_device
 from .loading import at_gravity_of, force_option, load_trusted
 from .options import check_source, source_options
 from .person import ask, say, say_done
@@ -23,7 +24,6 @@ EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`
 @calibration_argument
 @click.argument("to", metavar="|".join(SINKS), type=click.Choice(list(SINKS)))
 @source_options("write")
-@sink_flags
 @output_option("folder", "DIR", "Folder for the saved previous state.")
 @yes_option
 @force_option
@@ -37,7 +37,7 @@ def command(
     write saved it. Exit code 6: refused or failed, nothing was changed.
     """
     kind = SINKS[to]
-    check_sink(kind, check_source(click.get_current_context()), options)
+    check_behind(kind, check_source(click.get_current_context()), f"{kind.name} was named")
     written = load_trusted(calibration, force) if is_calibration(calibration) else None
     with (
         OutputFolder(folder or calibration.parent) as into,

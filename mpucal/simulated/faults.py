@@ -144,7 +144,6 @@ _ROWS = (
     FaultKind("autocal", VEHICLE, "a PX4 with SENS_IMU_AUTOCAL commits the accelerometer offsets that it learnt",
               strike=lambda vehicle: vehicle.learn_offsets()),
     ALWAYS("phantom", VEHICLE, "IMUs that an ArduPilot does not have are sent as zeros"),
-    ALWAYS("no_storage", VEHICLE, "it has no card"),
     ALWAYS("loss", LINK, "one packet in five is lost", share=0.2),
     ALWAYS("reorder", LINK, "one packet in ten is overtaken by three others", share=0.1),
     ALWAYS("duplicate", LINK, "one packet in ten comes twice", share=0.1),

@@ -35,29 +35,19 @@ class Effect(Enum):
 
 
 @dataclass(frozen=True)
-class Flag:
-    """Option of `mpucal write` for one kind of sink: its name and help text."""
-
-    name: str
-    help: str
-
-
-@dataclass(frozen=True)
 class Device:
     """Device of a sink.
 
     Attributes
     ----------
     kind : of the source. name : value of the source's option, such as /dev/i2c-1. open : opens the source.
-    say : shows the user a sentence. flags : names of the given flags.
-    confirm : asks the user. values : of the source's options.
+    say : shows the user a sentence. confirm : asks the user. values : of the source's options.
     """
 
     kind: SourceKind
     name: str
     open: Callable[[], Any]
     say: Say
-    flags: frozenset[str] = frozenset()
     confirm: Confirm = nobody
     values: Mapping[str, Any] = field(default_factory=dict)
 
@@ -72,7 +62,7 @@ class SinkKind:
     where : its name in messages. holds : the part of a calibration that it holds, for the documentation.
     opener : "module:function" of a context manager from a Device to a Sink; imported when it is opened.
     default : a session on such a device writes to it without --to.
-    effect : see Effect. kept : files in which the old state may be saved. flags : see Flag.
+    effect : see Effect. kept : files in which the old state may be saved.
     """
 
     name: str
@@ -83,7 +73,6 @@ class SinkKind:
     default: bool = False
     effect: Effect = Effect.NONE
     kept: tuple[SessionFile, ...] = ()
-    flags: tuple[Flag, ...] = ()
 
     def open(self, device: Device) -> AbstractContextManager[Sink]:
         """Open the sink on `device`; it is closed when the context ends.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..origin import Origin
 from ..result.session_files import SessionFile
-from .kind import Effect, Flag, SinkKind
+from .kind import Effect, SinkKind
 
 CHIP_OFFSETS = SessionFile("chip-offsets.json", "the content of a chip's offset registers before a write")
 # N is the bridge's number of the blob
@@ -59,7 +59,6 @@ SINKS = {
             opener="mpucal.vehicle.sink:open_autopilot",
             effect=Effect.OTHER_STREAM,
             kept=(OLD_PARAM, OLD_PARAMS),
-            flags=(Flag("store", "also store D in the vehicle's storage."),),
         ),
     )
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,6 @@ from ..disk.atomic import write_atomically
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
-from ..mavlink.ftp import Storage
 from ..mavlink.link import Link, S
 from ..mavlink.parameters.client import read_parameters, read_stream_parameters, require_parameters
 from ..mavlink.parameters.encoding import param_text, params_text, read_parameters_file
@@ -23,7 +22,6 @@ from ..mavlink.parameters.plan import (
     NOTHING,
     Change,
     adapt_to_write,
-    calibrations_by_imu,
     plan_changes,
     refused_imus,
     select_improving,
@@ -41,7 +39,6 @@ from ..sinks.old_state import interrupting, nothing_written
 from ..sinks.table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 from .source import OpenedVehicle
 
-FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
 CORRECTION = re.compile(r"ACC\d?(OFFS|SCAL)_[XYZ]$|ACC\d_[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
 # ArduPilot's complaint about sensors with other ids than their calibration's
@@ -74,7 +71,7 @@ def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
     with source.connected(device.say) as link:
         put_down(source.listeners, device.say, STAND)
         journal = Journal.of(AUTOPILOT, device.name)
-        sink = AutopilotSink(link, "store" in device.flags, journal, device.say, device.confirm)
+        sink = AutopilotSink(link, journal, device.say, device.confirm)
         recovered = sink.recover()
         if recovered is not None:
             device.say(recovered)
@@ -87,14 +84,12 @@ class AutopilotSink:
     Parameters
     ----------
     link : locked to the vehicle; the sink leaves it open.
-    store : also save D and b_a, which parameters do not hold in full, as files in the vehicle's storage.
     journal : notes a write. say : shows the user a sentence. confirm : asks the user; see Device.
     """
 
     def __init__(
         self,
         link: Link,
-        store: bool = False,
         journal: Journal | None = None,
         say: Say = lambda _sentence: None,
         confirm: Confirm = nobody,
@@ -103,7 +98,6 @@ class AutopilotSink:
         self._stands_level: bool | None = None
         self._link = link
         self._journal = journal or Journal()
-        self._store = store
         self._firmware = link.vehicle.family
 
     @property
@@ -213,8 +207,7 @@ class AutopilotSink:
         new = {name: value for change in planned for name, value in change.slot.values(change.new).items()}
         new |= level.values()
         now = adapt_to_write(calibration, planned, level)
-        with self._storing(now, planned) as paths:
-            writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
+        writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
         imus = " and ".join(str(change.imu) for change in planned)
         residuals = ", ".join(f"{change.residual} (IMU {change.imu})" for change in planned)
         clauses = [
@@ -224,7 +217,7 @@ class AutopilotSink:
             *self._finish(before, first, level),
             *_unchanged_clauses(possible, planned, refused_imus(calibration)),
         ]
-        return Applied(now, (*clauses, *paths))
+        return Applied(now, tuple(clauses))
 
     def _does_stand_level(self, standing_deg: Vector) -> bool:
         """Return True if the user says that the vehicle stands as it should hover."""
@@ -274,26 +267,6 @@ class AutopilotSink:
                 break
             now = check_prearm(self._link)
         return now
-
-    @contextmanager
-    def _storing(self, now: Calibration, planned: Sequence[Change]) -> Iterator[list[str]]:
-        """Store D and b_a as files in the vehicle, and remove them if the block fails; yield clauses for the user."""
-        if not self._store:
-            yield []
-            return
-        storage = Storage(self._link)
-        of_imu, folder = calibrations_by_imu(now), FOLDERS[self._firmware]
-        files = {FILE.format(folder, change.imu): of_imu[change.imu] for change in planned}
-        with nothing_written():
-            for path, calibration in files.items():
-                storage.put(path, calibration.blob().encode())
-        try:
-            yield [f"{path} in its storage holds D and b_a, read back" for path in files]
-        except WriteBackError:
-            with suppress(LinkError):
-                for path in files:
-                    storage.remove(path)
-            raise
 
     def _check(self, planned: Sequence[Change]) -> None:
         """Check that the vehicle is disarmed and has the sensors that were calibrated."""

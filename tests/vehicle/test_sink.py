@@ -26,7 +26,6 @@ from mpucal.mavlink.requests import send_command
 from mpucal.mavlink.rest import Horizon
 from mpucal.mavlink.texts import ReceivedPrompt, encode_prompt
 from mpucal.mavlink.transport import ReceivedBytes
-from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
@@ -277,14 +276,13 @@ def of_px4(calibration):
         ("ardupilot", ",imus=1", of_px4, "PX4"),
         ("ardupilot", ",fault=arm@3", unchanged, "armed"),
         ("ardupilot", ",imus=1,hand=restless", unchanged, "still"),
-        ("ardupilot", ",fault=no_storage", unchanged, "card"),
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )
 def test_nothing_is_written_that_does_not_belong_there(firmware, words, change, why):
     vehicle, transport, link = vehicle_of(firmware, words)
     with pytest.raises(WriteBackError, match=rf"nothing was written.*{why}"):
-        AutopilotSink(link, store="storage" in words).write(change(calibration_of(vehicle)))
+        AutopilotSink(link).write(change(calibration_of(vehicle)))
     assert transport.sets == 0
 
 
@@ -386,25 +384,14 @@ def test_whatever_happens_at_whichever_step_it_holds_the_old_or_the_new(firmware
     new = {name: np.float32(value) for name, value in calibration.extra["autopilot"]["params_new"].items()}
     fault(transport, number)
     try:
-        AutopilotSink(link, store=True).write(calibration)
+        AutopilotSink(link).write(calibration)
     except WriteBackError as error:
         assert error.exit_code == 6
         assert ("could not be put back" if fault is vanish else "the old parameters are back") in error.what
         assert stored(vehicle) == old or fault is vanish
-        assert vehicle.card.files == {} or fault is vanish
     else:
         held = stored(vehicle)
         assert {name: held[name] for name in new} == new
-
-
-def test_the_whole_d_is_kept_in_the_vehicles_storage():
-    vehicle, _, link = vehicle_of("ardupilot", ",fault=loss")
-    applied = AutopilotSink(link, store=True).write(calibration_of(vehicle))
-    paths = re.findall(r"(\S+) in its storage", applied.what)
-    truth = vehicle.truth_document()
-    for path, expected in zip(paths, (truth, *truth["others"]), strict=True):
-        blob = Blob.decode(vehicle.card.files[path])
-        np.testing.assert_allclose(np.array(blob.D).reshape(3, 3), expected["D"], atol=1e-5)
 
 
 def test_px4s_slots_in_another_order_are_found_by_their_effect():
@@ -520,7 +507,6 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
         ("mixed", "against signing"),
         ("parameters", "the address forged"),
         ("values", "the address forged"),
-        ("ftp", "the address forged"),
     ],
 )
 def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
@@ -536,7 +522,7 @@ def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
     calibration = calibration_of(vehicle)
     new, old = calibration.extra["autopilot"]["params_new"], stored(vehicle)
     try:
-        AutopilotSink(link, store=True).write(calibration)
+        AutopilotSink(link).write(calibration)
     except WriteBackError:
         assert attacker == hostile.FORGED
         assert stored(vehicle) == old

@@ -21,7 +21,6 @@ from mpucal.bridge.store import BlobStore
 from mpucal.chip import registers as reg
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.mavlink.ftp import Payload, Storage
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.client import read_agreed, stream_parameter_names
 from mpucal.mavlink.requests import is_armed
@@ -179,12 +178,11 @@ class HostileVehicle:
 
 
 def vehicle(data: bytes) -> None:
-    """Ask a vehicle for its identity, its parameters and a file."""
+    """Ask a vehicle for its identity, and its parameters."""
     link = Link(HostileVehicle(data), lambda t_ns, packet: None)
     found = link.listen()
     link.lock(found[0])
     is_armed(link)
-    Storage(link).get("/x")
     read_agreed(link, stream_parameter_names(link.vehicle.firmware)[:2])
 
 
@@ -202,11 +200,8 @@ def vehicle_says() -> list[bytes]:
     more = [m.MAVLink_highres_imu_message(20_000 * n, *values, 63) for n in range(40)]
     names = stream_parameter_names("ArduPilot")[:2]
     values = [m.MAVLink_param_value_message(name.encode(), 0.5, 9, 9, 1) for name in names * 3]
-    answers = [Payload(2, 0, 128, b"", requested=4), Payload(3, 0, 128, b"data", requested=5)]
-    answers += [Payload(4, 0, 129, b"\x06", requested=5), Payload(5, 0, 128, b"", requested=1)]
-    files = [m.MAVLink_file_transfer_protocol_message(0, 254, 190, bytearray(one.encode())) for one in answers]
     text = m.MAVLink_statustext_message(6, b'mpucal {"name":"key","data":{"key":"enough"}}', 1, 0)
-    asked = joined(PIECE_OF_VEHICLE, [piece(one) for one in (*[beat] * 3, *files, *values, text, beat)])
+    asked = joined(PIECE_OF_VEHICLE, [piece(one) for one in (*[beat] * 3, *values, text, beat)])
     return [asked, *(joined(PIECE_OF_VEHICLE, [piece(one) for one in (beat, text, *kind)]) for kind in (imus, more))]
 
 

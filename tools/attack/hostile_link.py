@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 from unittest.mock import patch
 
 from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.mavlink.ftp import PAYLOAD
 from mpucal.mavlink.parameters.client import stream_parameter_names
 from mpucal.mavlink.parameters.encoding import from_wire
 from mpucal.mavlink.transport import ReceivedBytes
@@ -99,7 +98,7 @@ class Attacker:
     def ftp(self) -> bytes:
         """Return FILE_TRANSFER_PROTOCOL: random payloads, and replies that look right."""
         rng = self._rng
-        payload = bytearray(rng.randbytes(PAYLOAD))
+        payload = bytearray(rng.randbytes(251))
         if rng.random() < 0.8:
             head = [rng.randrange(64), rng.randrange(3), rng.choice((128, 129))]
             head += [rng.randrange(256), rng.randrange(1, 10), 0, rng.randrange(1 << 12)]

@@ -1,4 +1,4 @@
-"""Hostile MAVLink packets beside a vehicle, during a session that writes back and during `mpucal write --store`.
+"""Hostile MAVLink packets beside a vehicle, during a session that writes back and during `mpucal write`.
 
     python -m tools.attack hostile_vehicle --seeds 9                # a few hours; 18 runs of each kind and attacker
     python -m tools.attack hostile_vehicle --seeds 1 --kinds ids ftp
@@ -68,7 +68,7 @@ def commands(case: Case) -> Iterator[tuple[Path, list[str]]]:
     yield Path("out/calibration.json"), ["session", *link, *QUICK, "-o", "out", "--yes"]
     if case.clean is not None:
         clean = case.clean / "calibration.json"
-        yield clean, ["write", str(clean), "autopilot", *link, "--store", "--yes", "-o", "written"]
+        yield clean, ["write", str(clean), "autopilot", *link, "--yes", "-o", "written"]
 
 
 def under_attack(attack: Attack, words: list[str]) -> int:

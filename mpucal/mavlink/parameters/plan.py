@@ -130,12 +130,6 @@ def swap_slots(calibration: Calibration, order: Sequence[int], firmware: str) ->
     return replace(calibration, extra=extra)
 
 
-def calibrations_by_imu(calibration: Calibration) -> dict[int, Calibration]:
-    """Return the calibration of each IMU, counted from 1."""
-    others = map(Calibration.from_document, calibration.extra.get(OTHERS, []))
-    return {each.extra[AUTOPILOT]["imu"]: each for each in (calibration, *others) if AUTOPILOT in each.extra}
-
-
 def adapt_to_write(calibration: Calibration, planned: Sequence[Change], level: Level) -> Calibration:
     """Return the calibration of the streams once the `planned` changes and the level are in place.
 

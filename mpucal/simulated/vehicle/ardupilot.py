@@ -75,7 +75,6 @@ class ArduPilot(Firmware):
     name = ARDUPILOT
     autopilot = 3
     tick_us = 1_000_000 // LOOP_HZ
-    folder = "/APM/"
     bytewise = False
 
     def __init__(self, options: VehicleOptions) -> None:

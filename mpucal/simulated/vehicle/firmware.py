@@ -42,7 +42,7 @@ class Firmware(ABC):
     Attributes
     ----------
     autopilot : MAV_AUTOPILOT. tick_us : period of its loop. bytewise : see mavlink.parameters.encoding.
-    folder : of its card. store : its parameters.
+    store : its parameters.
     check_is_present : SYS_STATUS lists the pre-arm check as present.
     sends_on_request : it answers MAV_CMD_REQUEST_MESSAGE. streams : message ids and intervals [us] after a start.
     rotation : R_b (3, 3) of the board. mounting : the same with the level that turns the streams.
@@ -54,7 +54,6 @@ class Firmware(ABC):
     autopilot: int
     tick_us: int
     bytewise: bool
-    folder: str
     check_is_present = True
     sends_on_request = True
     streams: tuple[tuple[int, int], ...] = ()

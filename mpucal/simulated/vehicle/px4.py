@@ -35,7 +35,6 @@ class Px4(Firmware):
     name = PX4
     autopilot = 12
     tick_us = 1_000_000 // LOOP_HZ
-    folder = "/fs/microsd/"
     bytewise = True
     check_is_present = sends_on_request = False
     streams = ((HIGHRES_IMU, 20_000), (SYS_STATUS, 1_000_000))

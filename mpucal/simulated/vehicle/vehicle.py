@@ -11,7 +11,6 @@ from typing import Any
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
-from ...mavlink.ftp import Payload
 from ...mavlink.link import ARMED, OWN_COMPONENT, SEQUENCE
 from ...mavlink.parameters.encoding import from_wire, name_bytes, to_wire
 from ...mavlink.texts import ReceivedPrompt, decode_prompt
@@ -21,7 +20,7 @@ from .firmware import Firmware
 from .imus import Imus
 from .options import VehicleOptions
 from .px4 import Px4
-from .store import Card, ParameterStore
+from .store import ParameterStore
 
 
 class StreamTimes:
@@ -90,7 +89,6 @@ class SimulatedVehicle:
         self._now_us = 0
         # Until then it neither sends nor receives, as during a boot.
         self._silent_until_us: float = 0
-        self.card = Card(None if options.has_fault("no_storage") else self.firmware.folder)
         self._schedule = Schedule(options.fault)
         self._out: deque[bytes] = deque()
         self._boot()
@@ -308,7 +306,3 @@ class SimulatedVehicle:
         station = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3)
         self._out.append(bytes(station.pack(m.MAVLink(None, SECOND_STATION, OWN_COMPONENT))))
         self._set_intervals(self.firmware.group(SECOND_STATION_HZ))
-
-    def _on_file_transfer_protocol(self, message: Message) -> None:
-        reply = self.card.answer(Payload.decode(bytes(message.payload)))
-        self._send(dialect().MAVLink_file_transfer_protocol_message(0, 0, 0, bytearray(reply.encode())))
