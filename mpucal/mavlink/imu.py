@@ -64,6 +64,16 @@ class Reading:
     temperature_c: float
 
 
+def live_stream(name: str, imu: int) -> Stream:
+    """Return the stream that shows IMU `imu` of a vehicle whose recording holds messages `name`.
+
+    An ArduPilot logs its messages IMU, and streams the same numbers as RAW_IMU, SCALED_IMU2 and SCALED_IMU3.
+    """
+    if name in MESSAGE_ID:
+        return Stream(name, SCALED.get(name, imu))
+    return Stream(RAW if imu == 1 else f"SCALED_IMU{imu}", imu)
+
+
 def decode_reading(message: Message) -> Reading | None:
     """Return the content of an IMU message, or None if it has no new accelerations and rates or is another message."""
     name = message.get_type()

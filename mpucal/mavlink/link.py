@@ -56,7 +56,8 @@ class Link:
 
     Attributes
     ----------
-    lost : number of the vehicle's packets that were lost, by their sequence numbers.
+    received, lost : number of the vehicle's packets since the lock, and of those lost by their sequence numbers.
+    stations : ids of the other ground stations whose HEARTBEAT came from the vehicle's address.
     armed : True if the vehicle's last HEARTBEAT says that it is armed, None before the first.
     """
 
@@ -81,7 +82,8 @@ class Link:
         self._next_heartbeat_ns = self._now_ns
         self._sequence: int | None = None
         self._counted_ns = 0
-        self.lost = 0
+        self.received = self.lost = 0
+        self.stations: set[int] = set()
         self.armed: bool | None = None
         self._signed = self._unsigned = 0
         self._junk = 0
@@ -90,6 +92,11 @@ class Link:
     def signed_only(self) -> bool:
         """True if the vehicle signs all that it sends, and we have no key."""
         return self._key is None and self._signed > 0 and not self._unsigned
+
+    @property
+    def loss_share(self) -> float:
+        """Share of the vehicle's packets that were lost since the lock."""
+        return self.lost / max(self.received + self.lost, 1)
 
     @property
     def vehicle(self) -> Vehicle:
@@ -133,6 +140,7 @@ class Link:
     def lock(self, vehicle: Vehicle) -> None:
         """Receive from `vehicle` alone from now on, and send to it."""
         self._vehicle = vehicle
+        self.received = self.lost = 0
         self._transport.restrict(vehicle.address)
         for t_ns, address, data in self._before_lock:
             if address in (vehicle.address, None):
@@ -182,10 +190,13 @@ class Link:
                 continue
             self._record(arrived.t_ns, arrived.packet.data)
             message = arrived.packet.message
+            beats = message.get_type() == "HEARTBEAT"
             if (message.get_srcSystem(), message.get_srcComponent()) != (vehicle.system, vehicle.component):
+                if beats and message.type == dialect().MAV_TYPE_GCS:
+                    self.stations |= {message.get_srcSystem()} - {self.own_system}
                 continue
             self._count(message)
-            if message.get_type() == "HEARTBEAT":
+            if beats:
                 self.armed = bool(message.base_mode & ARMED)
             for listener in self._listeners:
                 listener(message)
@@ -296,6 +307,7 @@ class Link:
     def _count(self, message: Message) -> None:
         """Count packets that are missing by their numbers; one that comes late was counted as missing before."""
         header = message.get_header()
+        self.received += 1
         self._signed += header.incompat_flags & SIGNED
         self._unsigned += not header.incompat_flags & SIGNED
         last = self._sequence

@@ -69,7 +69,6 @@ class VehicleSource:
         self._pause_ns = 0
         self._rebooted = False
         self._changes_reported = 0
-        self._received = self._lost_before = 0
         self._loss_reported = self._was_armed = False
 
     def start(self) -> Sensor:
@@ -101,7 +100,6 @@ class VehicleSource:
         self._rows = []
         # What was rebooted between two parts is back.
         self._rebooted &= first
-        self._received, self._lost_before = 0, self._link.lost
         self._heard_ns = self._sampled_ns = self._link.now_ns()
         return sensor_of(self._stream, firmware, parameters, self._rate_hz)
 
@@ -119,7 +117,6 @@ class VehicleSource:
         begun_ns = self._link.now_ns()
         for _ in self._link.messages(begun_ns + POLL_NS):
             self._heard_ns = self._link.now_ns()
-            self._received += 1
         pause_ns = self._link.now_ns() - begun_ns
         if pause_ns > PAUSE_NS:
             # The samples of before are returned first.
@@ -181,9 +178,8 @@ class VehicleSource:
 
     def _report_loss(self) -> None:
         """Say once that the link loses packets."""
-        lost = self._link.lost - self._lost_before
-        share = loss_share(self._received, lost)
-        if self._loss_reported or self._received + lost < LOSS_AFTER or share < LOSS_SHARE:
+        share = self._link.loss_share
+        if self._loss_reported or self._link.received + self._link.lost < LOSS_AFTER or share < LOSS_SHARE:
             return
         self._loss_reported = True
         self._say(f"The link loses {100 * share:.0f} % of the packets: a nearer or faster one is better.")
@@ -243,11 +239,6 @@ class VehicleSource:
         heard = now_ns - self._heard_ns < SILENT_NS
         what, since_ns = ("no IMU messages", self._sampled_ns) if heard else ("nothing", self._heard_ns)
         return f"has sent {what} for {(now_ns - since_ns) // S} s"
-
-
-def loss_share(received: int, lost: int) -> float:
-    """Return the share of a vehicle's packets that were lost; 0 where one that came late made `lost` negative."""
-    return max(lost, 0) / max(received + lost, 1)
 
 
 def lock_to_vehicle(link: Link, system: int | None, say: Callable[[str], None]) -> Vehicle:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..doctor.finding import Finding, Mark
 from ..doctor.measure import examine_clock, examine_gravity
 from ..errors import RecordingError, SourceError
-from ..mavlink.dialect import Message, Parser, dialect, read_header
+from ..mavlink.dialect import Message, dialect
 from ..mavlink.firmwares import FILTERS, PX4, accel_lag_s
 from ..mavlink.link import Link
 from ..mavlink.log import Log
@@ -23,7 +22,7 @@ from ..mavlink.parameters.slots import Slot, Values, find_slot
 from ..mavlink.requests import ask, check_prearm, encode_command, is_armed
 from ..mavlink.stream import MOST, Streams
 from ..mavlink.transport import US
-from ..mavlink.vehicle_source import LOSS_SHARE, loss_share
+from ..mavlink.vehicle_source import LOSS_SHARE
 from ..rests.flat import flat_statistics
 from ..session.lay_flat import STAND, put_down
 from .source import OpenedVehicle
@@ -36,28 +35,10 @@ STOP_IT = "end it, or have it leave the rates and the parameters alone while mpu
 MOVED = "the vehicle moved: put it down on its feet, let go of it, and examine it again"
 
 
-@dataclass
-class Stations:
-    """Recorder of a link's packets that collects the ids of other ground stations, by their HEARTBEATs."""
-
-    own: int
-    found: set[int] = field(default_factory=set)
-
-    def __call__(self, _t_ns: int, packet: bytes) -> None:
-        """Take a packet."""
-        message_id, (system, _) = read_header(packet)
-        if message_id != dialect().MAVLINK_MSG_ID_HEARTBEAT or system == self.own:
-            return
-        for heard in Parser(dialect().MAVLink(None)).datagram(packet):
-            if heard.message.type == dialect().MAV_TYPE_GCS:
-                self.found.add(system)
-
-
 def examine_vehicle(source: OpenedVehicle, seconds: float) -> Iterator[Finding]:
     """Examine a vehicle's link, state and parameters, and `seconds` of its streams, while it stands still."""
-    stations = Stations(source.own_system)
     try:
-        with source.connected(lambda _sentence: None, stations) as link:
+        with source.connected(lambda _sentence: None) as link:
             put_down(source.listeners, lambda _sentence: None, STAND)
             yield _name(link)
             yield _version(link)
@@ -70,9 +51,9 @@ def examine_vehicle(source: OpenedVehicle, seconds: float) -> Iterator[Finding]:
     except SourceError as error:
         yield Finding.failed("link", error)
         return
-    others = ", ".join(f"system {system}" for system in sorted(stations.found))
+    others = ", ".join(f"system {system}" for system in sorted(link.stations))
     what = f"{others} is here, too" if others else "none is heard"
-    yield Finding.check("other stations", not others, what, STOP_IT, {"systems": sorted(stations.found)})
+    yield Finding.check("other stations", not others, what, STOP_IT, {"systems": sorted(link.stations)})
     yield from _filters(values)
     yield _level(firmware, level)
 
@@ -118,22 +99,21 @@ def _prearm(link: Link) -> Finding:
 def _streams(link: Link, values: Values, rate_hz: float, seconds: float) -> Iterator[Finding]:
     """Examine the streams, and which parameters of each IMU a write would change."""
     firmware, said = link.vehicle.family, list[str]()
-    log, clock, received = Log(firmware), HostClock(), 0
+    log, clock = Log(firmware), HostClock()
     streams = Streams(link, firmware, values, rate_hz, said.append)
-    first, lost = streams.start(), link.lost
+    first = streams.start()
     for name, value in values.items():
         log.add_parameter(name, value)
     begun_ns = heard_ns = link.now_ns()
     rebooted = False
     for message in link.messages(begun_ns + round(seconds * 1e9)):
-        received += 1
         row, jump = log.add(message, link.now_ns())
         rebooted |= jump is Jump.REBOOT
         if row is not None and row.reading.stream == first:
             heard_ns = link.now_ns()
             clock.add(np.array([row.t_us * US]), np.array([heard_ns - begun_ns]))
         streams.watch()
-    yield _loss(link.lost - lost, received)
+    yield _loss(link)
     silent_s = (link.now_ns() - heard_ns) / 1e9
     if rebooted or silent_s > SILENT_S:
         what = "it rebooted while it was examined" if rebooted else f"nothing came in the last {silent_s:.0f} s"
@@ -151,11 +131,11 @@ def _streams(link: Link, values: Values, rate_hz: float, seconds: float) -> Iter
         yield from _imu(each, rate_hz)
 
 
-def _loss(lost: int, received: int) -> Finding:
-    share = loss_share(received, lost)
-    what = f"{100 * share:.1f} % of {received + max(lost, 0)} packets lost"
-    data = {"packets": received, "lost": max(lost, 0)}
-    return Finding.check("link", share < LOSS_SHARE, what, "use a nearer or faster one", data)
+def _loss(link: Link) -> Finding:
+    packets = link.received + link.lost
+    what = f"{100 * link.loss_share:.1f} % of {packets} packets lost"
+    data = {"packets": link.received, "lost": link.lost}
+    return Finding.check("link", link.loss_share < LOSS_SHARE, what, "use a nearer or faster one", data)
 
 
 def _imu(recording: Recording, asked_hz: float) -> Iterator[Finding]:

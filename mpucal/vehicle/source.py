@@ -14,7 +14,7 @@ from ..errors import EndOfCapture, LinkError
 from ..files.mcap import Capture
 from ..files.messages import PACKETS
 from ..mavlink import MAVLINK_VERSION
-from ..mavlink.link import OWN_SYSTEM, Link, Recorder
+from ..mavlink.link import OWN_SYSTEM, Link
 from ..mavlink.log import read_log
 from ..mavlink.parameters.client import read_stream_parameters
 from ..mavlink.texts import encode_prompt
@@ -164,15 +164,15 @@ class OpenedVehicle(OpenedSource):
         return True
 
     @contextmanager
-    def connected(self, say: Say, record: Recorder = lambda _t_ns, _packet: None) -> Iterator[Link]:
-        """Lock a link to the vehicle, whose packets only `record` gets.
+    def connected(self, say: Say) -> Iterator[Link]:
+        """Lock a link to the vehicle, and record nothing.
 
         Raises
         ------
         UsageError : several vehicles. NoAnswer, LinkError : see Link.
         """
         with closing(self.line):
-            link = self.link = Link(self.line, record, self.key, self.own_system)
+            link = self.link = Link(self.line, lambda _t_ns, _packet: None, self.key, self.own_system)
             lock_to_vehicle(link, self.system, say)
             yield link
 

@@ -113,11 +113,17 @@ def test_an_id_that_the_vehicle_did_not_say_is_missed(name):
     assert f"did not report {of}" in " ".join(notes)
 
 
+def test_the_calibration_of_a_dataflash_log_is_exported_too():
+    made = of_vehicle("ardupilot", np.diag(GAIN))
+    logged = replace(made, extra={"autopilot": made.extra["autopilot"] | {"message": "IMU"}})
+    assert form("ardupilot").export(logged) == form("ardupilot").export(made)
+
+
 @pytest.mark.parametrize("key", ["mounting", "params_old"])
 def test_a_document_that_no_session_wrote_is_refused(key):
     made = of_vehicle("ardupilot", np.diag(GAIN))
     lacking = {name: value for name, value in made.extra["autopilot"].items() if name != key}
-    with pytest.raises(WriteBackError, match=f"has no {key} of the vehicle"):
+    with pytest.raises(WriteBackError, match=f"not one that a session writes.*{key}"):
         form("ardupilot").export(replace(made, extra=MappingProxyType({"autopilot": lacking})))
 
 

@@ -43,8 +43,7 @@ def test_integers_travel_by_their_bytes_to_px4(kind, data):
     bits = value & 0xFFFFFFFF
     if (bits & 0x7F800000) == 0x7F800000 and bits & 0x007FFFFF and not bits & 0x00400000:
         return
-    parameter = sent("CAL_ACC0_ID", value, kind, True)
-    assert (parameter.value, parameter.index, parameter.count) == (value, 7, 100)
+    assert sent("CAL_ACC0_ID", value, kind, True).value == value
 
 
 @settings(max_examples=30)

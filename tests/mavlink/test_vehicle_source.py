@@ -156,7 +156,7 @@ def test_the_share_of_lost_packets_is_that_of_the_part_in_which_it_is_reported(o
     assert not [text for text in to.said if "loses" in text]
     to.link.lost += 300
     polled(to.source, 0.1)
-    share = 300 / (300 + to.source._received)
+    share = 300 / (300 + to.link.received)
     assert [text for text in to.said if "loses" in text] == [
         f"The link loses {100 * share:.0f} % of the packets: a nearer or faster one is better."
     ]

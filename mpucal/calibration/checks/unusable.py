@@ -41,7 +41,9 @@ def time_unit(e: Evidence) -> Reason | None:
     if step < 1.0 / SLOWEST_HZ:
         return None
     if step < LONGEST_STEP_S:
-        return reason("units_suspect", "slow", step=step, rate=1.0 / step)
+        # A vehicle's messages carry their unit.
+        of_vehicle = e.recording.sensor.origin is Origin.VEHICLE
+        return reason("units_suspect", "slow_stream" if of_vehicle else "slow", step=step, rate=1.0 / step)
     said = "ns" if step > STEP_OF_NANOSECONDS else "us" if step > STEP_OF_MICROSECONDS else "ms"
     unit = {"ns": "nano", "us": "micro", "ms": "milli"}[said]
     return reason("units_suspect", "times", step=step, unit=unit, said=said)

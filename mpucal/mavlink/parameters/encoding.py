@@ -49,14 +49,12 @@ class Parameter:
     Attributes
     ----------
     name : up to 16 characters. value : a float exactly as a float32 holds it, or a whole number.
-    type : MAV_PARAM_TYPE, which PX4 wants back exactly. index, count : its place in the vehicle's list.
+    type : MAV_PARAM_TYPE, which PX4 wants back exactly.
     """
 
     name: str
     value: Number
     type: int = REAL32
-    index: int = -1
-    count: int = 0
 
 
 def as_float32(value: float) -> float:
@@ -84,8 +82,7 @@ def from_wire(message: Message, bytewise: bool) -> Parameter:
         value = BYTEWISE[kind].unpack(_wire_bytes(message))[0]
     elif kind in BYTEWISE and math.isfinite(value):
         value = round(value)
-    index, count = getattr(message, "param_index", -1), getattr(message, "param_count", 0)
-    return Parameter(str(message.param_id), value, kind, int(index), int(count))
+    return Parameter(str(message.param_id), value, kind)
 
 
 def _wire_bytes(message: Message) -> bytes:

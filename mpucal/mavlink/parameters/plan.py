@@ -12,7 +12,7 @@ from ...data import Vector
 from ...errors import WriteBackError
 from ...result.calibration import REFUSED, Calibration
 from ...result.comparison import is_better
-from ..imu import MESSAGE_ID, SCALED, Stream
+from ..imu import Stream, live_stream
 from .document import AUTOPILOT, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_DEG, RESIDUAL_OLD, UNCERTAIN
 from .mounting import Level
 from .slots import Correction, Slot, slot_of
@@ -171,15 +171,7 @@ def _is_writable(document: Mapping[str, Any]) -> bool:
     return verdict != REFUSED and bool(document.get(AUTOPILOT, {}).get(NEW))
 
 
-def _require(autopilot: Mapping[str, Any], *keys: str) -> None:
-    for key in keys:
-        value = autopilot.get(key)
-        if value is None or (key == "message" and not (isinstance(value, str) and value in MESSAGE_ID)):
-            raise WriteBackError(f"{NOTHING}: the calibration has no {key} of the vehicle", "give a session's own")
-
-
 def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
-    _require(autopilot, "imu", "firmware", OLD)
     imu = int(autopilot["imu"])
     if autopilot["firmware"] != firmware:
         raise WriteBackError(
@@ -198,17 +190,16 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
             f"{NOTHING}: {excess}, which {firmware} accepts of its own calibration",
             "check that the vehicle was turned to every side, and the sensor",
         )
-    _require(autopilot, "message", "mounting", RESIDUAL)
-    name = str(autopilot["message"])
+    degrees = autopilot.get(RESIDUAL_DEG)
     return Change(
         slot,
         slot.effective(old),
         new,
-        np.array(autopilot["mounting"]),
-        Stream(name, SCALED.get(name, imu)),
+        np.array(autopilot["mounting"], float).reshape(3, 3),
+        live_stream(str(autopilot["message"]), imu),
         autopilot[OLD].get(slot.sensor_id),
         float(autopilot[RESIDUAL]),
         autopilot.get(RESIDUAL_OLD),
         float(autopilot.get(UNCERTAIN) or 0.0),
-        None if autopilot.get(RESIDUAL_DEG) is None else float(autopilot[RESIDUAL_DEG]),
+        None if degrees is None else float(degrees),
     )

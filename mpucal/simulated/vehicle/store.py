@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ...data import Vector
-from ...mavlink.parameters.encoding import REAL32, Number, Parameter, as_float32
+from ...mavlink.parameters.encoding import REAL32, Number, as_float32
 
 INT8, INT16 = 2, 4
 
@@ -44,7 +44,3 @@ class ParameterStore(UserDict[str, Number]):
     def set_vector(self, names: Sequence[str], values: Vector) -> None:
         """Set several parameters."""
         self.update(dict(zip(names, values.tolist(), strict=True)))
-
-    def parameter(self, name: str) -> Parameter:
-        """Return a parameter as it is sent."""
-        return Parameter(name, self[name], self._types[name], list(self).index(name), len(self))

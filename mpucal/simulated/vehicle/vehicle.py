@@ -190,10 +190,10 @@ class SimulatedVehicle:
         self._out.append(data)
 
     def _send_value(self, name: str) -> None:
-        held = self.firmware.store.parameter(name)
-        value = to_wire(held.value, held.type, self.firmware.bytewise)
-        message = dialect().MAVLink_param_value_message(name_bytes(name), value, held.type, held.count, held.index)
-        self._send(message)
+        store = self.firmware.store
+        kind, index = store.type(name), list(store).index(name)
+        value = to_wire(store[name], kind, self.firmware.bytewise)
+        self._send(dialect().MAVLink_param_value_message(name_bytes(name), value, kind, len(store), index))
 
     def _on_param_request_read(self, message: Message) -> None:
         store = self.firmware.store
