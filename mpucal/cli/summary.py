@@ -15,7 +15,7 @@ from typing import Any
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import free_name
-from ..mavlink.parameters.document import AUTOPILOT
+from ..mavlink.parameters.document import AUTOPILOT, NEW
 from ..origin import Origin
 from ..page.state import Result
 from ..report.elements import as_float
@@ -37,7 +37,7 @@ RANGES = {
 SAID = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
 
 # For a terminal of 80 columns.
-WIDTH, LABEL, COLUMN = 79, 23, 18
+WIDTH, LABEL, COLUMN = 79, 23, 17
 SENTENCES = {
     GOOD: "{} is good.",
     USABLE: "{} is usable, with reservations:",
@@ -57,7 +57,7 @@ def summary(calibration: Calibration) -> str:
         (f"{_imu(calibration.extra)}, value ± 1 sigma" if others else "value ± 1 sigma", AXES),
         *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration)),
     ]
-    lines += [(f"{name:<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
+    lines += [(f"{name:<{LABEL}}" + "".join(f" {cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
     if error := estimated_error(calibration):
         lines += ["", textwrap.fill(error, WIDTH)]
     for other in others:
@@ -114,12 +114,22 @@ def next_steps(
         f"  look at      {folder / REPORT.name}",
         f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT.name}").apply(acc)',
     ]
-    # an autopilot takes parameters
-    if AUTOPILOT not in calibration.extra:
-        lines.append(f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)")
+    # A session writes to its vehicle itself.
+    if not (AUTOPILOT in calibration.extra and source):
+        lines.append(use_in_device(calibration, folder))
     if calibration.verdict == USABLE:
         lines.append(f"  better       follow the remedies above, and run {again or 'it again'}")
     return "\n".join(lines)
+
+
+def use_in_device(calibration: Calibration, folder: Path) -> str:
+    """Return how the calibration in `folder` comes into its device, or why it cannot."""
+    autopilot = calibration.extra.get(AUTOPILOT)
+    if autopilot is None:
+        return f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)"
+    if autopilot.get(NEW):
+        return f"  in a vehicle mpucal write {folder / DOCUMENT.name} autopilot --mavlink URL"
+    return f"  in a vehicle it cannot be written: {autopilot.get('why', 'its parameters are not known')}"
 
 
 def command_again(

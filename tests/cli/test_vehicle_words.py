@@ -4,12 +4,15 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from mpucal.cli import commands
 from mpucal.cli.page import choose_board
+from mpucal.cli.summary import use_in_device
 from mpucal.origin import Origin
+from mpucal.result.calibration import Calibration
 from mpucal.sources.opened_source import SOURCE
 from mpucal.sources.opening import open_source, reopen_source
 
@@ -58,3 +61,19 @@ def test_a_resumed_session_reads_its_signing_key_again_from_any_folder(tmp_path,
     monkeypatch.chdir("/")
     again = reopen_source(words, source.plan)
     assert (again.key, again.system) == (bytes(range(32)), 1)
+
+
+@pytest.mark.parametrize(
+    ("extra", "says"),
+    [
+        ({}, "in firmware  a/calibration.bin"),
+        (
+            {"autopilot": {"params_new": {"INS_ACCOFFS_X": 0.1}}},
+            "mpucal write a/calibration.json autopilot",
+        ),
+        ({"autopilot": {"params_new": {}, "why": "no slot names it"}}, "cannot be written: no slot names it"),
+    ],
+    ids=["chip", "vehicle", "vehicle whose parameters are not known"],
+)
+def test_the_next_step_leads_into_the_device(extra, says):
+    assert says in use_in_device(Calibration(np.eye(3), np.zeros(3), extra=extra), Path("a"))
