@@ -39,7 +39,6 @@ from ..sinks.old_state import interrupting, nothing_written
 from ..sinks.table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 from .source import OpenedVehicle
 
-CORRECTION = re.compile(r"ACC\d?(OFFS|SCAL)_[XYZ]$|ACC\d_[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
 # ArduPilot's complaint about sensors with other ids than their calibration's
 UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)
@@ -116,8 +115,7 @@ class AutopilotSink:
         if note is None:
             return None
         old, new = note[OLD], note[NEW]
-        slots = [slot for slot in all_slots(self._firmware) if set(slot.names) <= set(old)]
-        writer = Writer(self._link, slots, others=[n for n in trim_names(self._firmware) if n in old])
+        writer = Writer(self._link, old)
         held = writer.read()
         interrupted = f"a write to this vehicle was interrupted at {note[AT]}"
         if held == old:
@@ -139,7 +137,7 @@ class AutopilotSink:
         LinkError : they cannot be read. OutputError : they cannot be saved.
         """
         held = read_stream_parameters(self._link)
-        values = {name: value for name, value in held.items() if CORRECTION.search(name)}
+        values = {name: held[name] for slot in all_slots(self._firmware) for name in slot.names if name in held}
         values |= read_parameters(self._link, trim_names(self._firmware))
         remarks = [f"Accelerometer parameters and level of {self.where} before mpucal wrote new ones"]
         file, text = OLD_PARAM, param_text(values, remarks)
@@ -152,13 +150,11 @@ class AutopilotSink:
     def put_back(self, kept: Path) -> str:
         """Restore the parameters from the file of an earlier `keep`; see Restorable."""
         wanted = read_parameters_file(kept)
-        slots = [slot for slot in all_slots(self._firmware) if set(slot.names) <= set(wanted)]
-        if not slots:
+        writer = Writer(self._link, wanted, self._journal)
+        if not writer.slots:
             raise RecordingError(
                 f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write saved"
             )
-        trim = [name for name in trim_names(self._firmware) if name in wanted]
-        writer = Writer(self._link, slots, self._journal, trim)
         with nothing_written():
             old = writer.read()
         writer.write(old, {name: wanted[name] for name in old}, lambda: None)
@@ -177,19 +173,19 @@ class AutopilotSink:
 
     def write(self, calibration: Calibration) -> Applied:
         """Set each parameter, read all back, and verify their effect in the streams; see Sink."""
+        possible = plan_changes(calibration, self._firmware)
         try:
-            return self._write(calibration)
+            return self._write(calibration, possible)
         except WriteBackError as error:
             other = error.__cause__
             if not isinstance(other, SwappedSlotsError) or not self._writer.restored:
                 raise
-        return self._write(swap_slots(calibration, other.order, self._firmware))
+        return self._write(calibration, swap_slots(possible, other.order))
 
-    def _write(self, calibration: Calibration) -> Applied:
-        possible = plan_changes(calibration, self._firmware)
+    def _write(self, calibration: Calibration, possible: Sequence[Change]) -> Applied:
         planned = select_improving(possible)
-        slots = [change.slot for change in planned]
-        writer = self._writer = Writer(self._link, slots, self._journal, trim_names(self._firmware))
+        names = [name for change in planned for name in change.slot.names]
+        writer = self._writer = Writer(self._link, [*names, *trim_names(self._firmware)], self._journal)
         first = possible[0]
         monitor = RestMonitor(self._link, list(dict.fromkeys(change.stream for change in (first, *planned))))
         with nothing_written():

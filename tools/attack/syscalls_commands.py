@@ -22,7 +22,6 @@ from mpucal.files import load
 from mpucal.result.journal import Journal
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.vehicle.store import ParameterStore
-from mpucal.vehicle.sink import CORRECTION
 from tools.processes import Child, Ended, lasting_folder, quick, ready
 
 SIM, VEHICLE = "sim:seed=3,chip=mpu6500,temperature_c=", "sim:seed=7,imus=1"
@@ -46,6 +45,8 @@ WORDS = {
     "noise": ["noise", "in.npz", "-o", "board"],
     "firmware": ["firmware", "-o", "bridge"],
 }
+# the vehicle's parameters that correct its accelerometers
+CORRECTION = re.compile(r"INS_ACC\d?(OFFS|SCAL)_")
 # exit codes of crashes are above SIGNAL; libraries on top of the stack of a crash that did not cause it
 SIGNAL, OUTER = 128, re.compile(r"syscalls[.]so|libc[.]so|libpython|bin/python")
 # folder of the notes of writes

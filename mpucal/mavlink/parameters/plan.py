@@ -103,8 +103,8 @@ def refused_imus(calibration: Calibration) -> tuple[int, ...]:
     return tuple(int(other[AUTOPILOT]["imu"]) for other in others if not _is_writable(other) and other.get(AUTOPILOT))
 
 
-def swap_slots(calibration: Calibration, order: Sequence[int], firmware: str) -> Calibration:
-    """Return the calibration with each IMU's parameters in the slot that acts on it.
+def swap_slots(possible: Sequence[Change], order: Sequence[int]) -> tuple[Change, ...]:
+    """Return the changes with the parameters of each improving one in the slot that acts on its IMU.
 
     With o, k the correction under which the stream was calibrated, o' and k' the new one, and o_p, k_p the old one in
     the other slot: the stream was corrected by o_p and k_p all the time, so that o_p + (k / k_p) (o' - o) and
@@ -114,20 +114,15 @@ def swap_slots(calibration: Calibration, order: Sequence[int], firmware: str) ->
     ----------
     order : for each of the improving changes, the index of the one into whose slot its parameters belong.
     """
-    planned = select_improving(plan_changes(calibration, firmware))
-    documents: dict[int, dict[str, Any]] = {}
+    planned = select_improving(possible)
+    swapped: dict[int, Change] = {}
     for change, index in zip(planned, order, strict=True):
         at = planned[index]
         offset = at.old.offset + change.old.scale / at.old.scale * (change.new.offset - change.old.offset)
         new = at.slot.effective(Correction(offset, change.new.scale * at.old.scale / change.old.scale))
-        documents[change.imu] = {NEW: at.slot.values(new)}
-    extra = dict(calibration.extra)
-    extra[AUTOPILOT] = {**extra[AUTOPILOT], **documents[planned[0].imu]}
-    extra[OTHERS] = [
-        {**other, AUTOPILOT: {**other[AUTOPILOT], **documents.get(other[AUTOPILOT]["imu"], {})}}
-        for other in extra.get(OTHERS, [])
-    ]
-    return replace(calibration, extra=extra)
+        slot = replace(at.slot, imu=change.imu)
+        swapped[change.imu] = replace(change, slot=slot, old=at.old, new=new, sensor_id=at.sensor_id)
+    return tuple(swapped.get(change.imu, change) for change in possible)
 
 
 def adapt_to_write(calibration: Calibration, planned: Sequence[Change], level: Level) -> Calibration:
@@ -150,7 +145,8 @@ def _adapt(calibration: Calibration, changes: Mapping[int, Change], level: Level
         A = change.mounting @ np.diag(change.new.scale / change.old.scale) @ change.mounting.T
         c = change.mounting @ (change.new.scale * (change.old.offset - change.new.offset))
         D, b_a = A @ D, A @ b_a + c
-        autopilot = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}
+        values = change.slot.values(change.new)
+        autopilot = {**autopilot, NEW: values, OLD: {**autopilot[OLD], **values}, RESIDUAL_OLD: autopilot[RESIDUAL]}
     extra = {**calibration.extra, AUTOPILOT: autopilot} if autopilot else calibration.extra
     if "mounting" not in autopilot or np.array_equal(Q, np.eye(3)):
         return replace(calibration, D=D, b_a=b_a, extra=extra)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import permutations
 from typing import NamedTuple
 
@@ -16,8 +16,9 @@ from ..requests import is_armed
 from ..rest import RestMeans
 from .client import read_agreed, require_parameters, set_parameter
 from .encoding import as_float32
+from .mounting import trim_names
 from .plan import Change
-from .slots import Slot
+from .slots import Slot, all_slots
 
 # Tolerances: a step of the stream; standard deviations of the means; part of an attitude change by the gyroscope.
 AGREE_MPS2, SIGMAS, PER_TURN = 0.03, 3.0, 0.05
@@ -109,18 +110,19 @@ class Writer:
 
     Parameters
     ----------
-    slots : to be written. journal : keeps old and new values meanwhile.
-    others : names of parameters besides, which the firmware uses as they are set.
+    names : of the parameters to be written: those of whole slots and of the trim; others are ignored.
+    journal : keeps old and new values meanwhile.
 
     Attributes
     ----------
-    restored : True after a write that failed and whose old parameters are back.
+    slots : to be written. restored : True after a write that failed and whose old parameters are back.
     """
 
-    def __init__(
-        self, link: Link, slots: Sequence[Slot], journal: Journal | None = None, others: Sequence[str] = ()
-    ) -> None:
-        self._link, self._slots, self._others = link, tuple(slots), tuple(others)
+    def __init__(self, link: Link, names: Iterable[str], journal: Journal | None = None) -> None:
+        given, firmware = set(names), link.vehicle.family
+        self.slots = [slot for slot in all_slots(firmware) if given.issuperset(slot.names)]
+        self._others = [name for name in trim_names(firmware) if name in given]
+        self._link = link
         self._journal = journal or Journal()
         self._touched: set[str] = set()
         self.restored = False
@@ -132,8 +134,7 @@ class Writer:
         ------
         LinkError : it does not answer, or with two values.
         """
-        names = [*(name for slot in self._slots for name in slot.names), *self._others]
-        return read_agreed(self._link, names)
+        return read_agreed(self._link, [name for _, names in self._vectors() for name in names])
 
     def write(self, old: Mapping[str, float], new: Mapping[str, float], verify: Callable[[], None]) -> None:
         """Set the values of `new` that differ from `old`, read all back, `verify`; restore `old` on any failure.
@@ -159,7 +160,7 @@ class Writer:
         self._journal.end()
 
     def _vectors(self) -> Iterator[tuple[Slot | None, tuple[str, ...]]]:
-        for slot in self._slots:
+        for slot in self.slots:
             yield slot, slot.offset
             yield slot, slot.scale
         for name in self._others:
