@@ -15,6 +15,7 @@ from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.link import Link, S
+from ..mavlink.parameters import document
 from ..mavlink.parameters.client import read_parameters, read_stream_parameters, require_parameters
 from ..mavlink.parameters.encoding import param_text, params_text, read_parameters_file
 from ..mavlink.parameters.mounting import MOST_DEG, Level, Leveller, trim_names, trim_of
@@ -173,6 +174,9 @@ class AutopilotSink:
 
     def write(self, calibration: Calibration) -> Applied:
         """Set each parameter, read all back, and verify their effect in the streams; see Sink."""
+        # One that may not be written is refused before the vehicle is asked for anything.
+        plan_changes(calibration, self._firmware)
+        calibration = self._turned(calibration)
         possible = plan_changes(calibration, self._firmware)
         try:
             return self._write(calibration, possible)
@@ -181,6 +185,18 @@ class AutopilotSink:
             if not isinstance(other, SwappedSlotsError) or not self._writer.restored:
                 raise
         return self._write(calibration, swap_slots(possible, other.order))
+
+    def _turned(self, calibration: Calibration) -> Calibration:
+        """Return the calibration in the present axes of the streams, which a PX4 that was levelled since has turned."""
+        names, then = trim_names(self._firmware), calibration.extra[document.AUTOPILOT][document.OLD]
+        if self._firmware != PX4 or not then.keys() >= set(names):
+            return calibration
+        with nothing_written():
+            held = require_parameters(self._link, names)
+        level = Level(PX4, trim_of(PX4, then), trim_of(PX4, held))
+        return (
+            calibration if np.array_equal(level.held_deg, level.wanted_deg) else adapt_to_write(calibration, (), level)
+        )
 
     def _write(self, calibration: Calibration, possible: Sequence[Change]) -> Applied:
         planned = select_improving(possible)

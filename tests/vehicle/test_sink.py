@@ -174,9 +174,10 @@ def attitude_deg(vehicle, link):
     return np.degrees(np.mean([(m.roll, m.pitch) for m in heard], axis=0))
 
 
-@pytest.mark.parametrize("firmware", FIRMWARES)
-def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmware):
+@pytest.mark.parametrize(("firmware", "since"), [("ardupilot", False), ("px4", False), ("px4", True)])
+def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmware, since):
     vehicle, _, link = vehicle_of(firmware, ",imus=1")
+    calibration = calibration_of(vehicle)
     assert send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 2) == 0
     # what it learnt of the old offsets
     vehicle.firmware.bias = np.array([0.2, -0.3, 0.1])
@@ -189,8 +190,9 @@ def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmwa
             tilted.append(attitude_deg(vehicle, link))
         return with_yes
 
-    applied = AutopilotSink(link, confirm=agree).write(calibration_of(vehicle))
+    applied = AutopilotSink(link, confirm=agree).write(calibration if since else calibration_of(vehicle))
     assert np.abs(vehicle.firmware.trim_deg - old_deg).max() > 0.5
+    np.testing.assert_allclose(applied.calibration.D, vehicle.truth_document()["D"], atol=1e-6)
     assert np.abs(tilted[0]).max() > 1
     assert np.abs(attitude_deg(vehicle, link)).max() < 0.2
     assert [q.split()[0] for q in questions] == ["system", "Reboot"]
