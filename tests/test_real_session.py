@@ -1,12 +1,10 @@
 """The main job on what a real MPU-6050 measured: counts to registers, registers to a session, that to D and b_a."""
 
-import io
 import json
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +14,7 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.cli.running import open_runner
 from mpucal.files import load
+from mpucal.result.calibration import Calibration
 from mpucal.session.plan import Plan
 from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
@@ -35,25 +34,12 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@dataclass(frozen=True)
-class Outcome:
-    code: int
-    document: dict
-    file: Path
-
-    def reasons(self):
-        return {reason["code"]: reason["message"] for reason in self.document["quality"]["reasons"]}
-
-
-def call(*words):
-    return subprocess.run([*map(str, words)], capture_output=True, text=True, check=False)
-
-
 def outcome(folder, *words):
-    printed = io.StringIO()
-    with redirect_stdout(printed), redirect_stderr(io.StringIO()):
-        code = run([*map(str, words), "-o", str(folder), "--json"])
-    return Outcome(code, json.loads(printed.getvalue()), folder / "calibration.json")
+    """Run a command; return its exit code, and the calibration in its folder with the sentences of its reasons."""
+    code = run([*map(str, words), "-o", str(folder)])
+    found = Calibration.load(folder / "calibration.json")
+    reasons = {reason["code"]: reason["message"] for reason in found.quality["reasons"]}
+    return SimpleNamespace(code=code, found=found, reasons=reasons, file=folder / "calibration.json")
 
 
 def counts_of(archive, name, scales):
@@ -104,23 +90,24 @@ def by_accel(capture):
 
 def transported_deg(*words, recording=RECORDING):
     """Median angle [deg] between gravity as the gyroscope carries it and as the accelerometer says."""
-    done = call(sys.executable, YARDSTICK, recording, *words, "--json")
+    command = [sys.executable, YARDSTICK, recording, *words, "--json"]
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)["median_deg"]
 
 
 def test_the_session_has_reservations_and_names_them(session):
     assert session.code in (0, 5)
-    assert session.document["quality"]["verdict"] in ("usable", "refused")
-    assert session.document["fit"]["samples"] == 10242
-    assert "in 18 samples" in session.reasons()["gyro_clipped"]
-    assert "turn more slowly, or choose a larger range" in session.reasons()["gyro_clipped"]
+    assert session.found.verdict in ("usable", "refused")
+    assert session.found.fit["samples"] == 10242
+    assert "in 18 samples" in session.reasons["gyro_clipped"]
+    assert "turn more slowly, or choose a larger range" in session.reasons["gyro_clipped"]
 
 
 def test_a_model_without_a_hand_says_that_it_does_not_explain_the_data(by_accel):
-    assert by_accel.document["quality"]["verdict"] in ("usable", "refused")
-    assert by_accel.document["fit"]["nis"] > 100
-    assert {"gyro_clipped", "inconsistent"} <= by_accel.reasons().keys()
+    assert by_accel.found.verdict in ("usable", "refused")
+    assert by_accel.found.fit["nis"] > 100
+    assert {"gyro_clipped", "inconsistent"} <= by_accel.reasons.keys()
 
 
 def test_the_gyroscope_carries_gravity_to_where_the_accelerometer_finds_it(session, by_accel):
@@ -131,16 +118,10 @@ def test_the_gyroscope_carries_gravity_to_where_the_accelerometer_finds_it(sessi
 
 def test_what_no_pose_shows_is_not_claimed(session):
     """Poses that never tilt x and y together do not determine their cross-axis terms by |a|."""
-    D_std = np.array(session.document["accelerometer"]["D_std"])
+    D_std = session.found.D_std
     assert D_std[0, 1] > 10 * D_std[0, 0]
     assert D_std[1, 0] > 10 * D_std[1, 1]
-    assert session.document["accelerometer"]["b_a"][2] == pytest.approx(-1.1, abs=0.02)
-
-
-def session_of(folder, recording, poll_s=SELDOM_S):
-    """Run a session on a recording made a capture."""
-    make_capture(recording, folder / "capture.mcap", 9.81, poll_s)
-    return outcome(folder / "board", "session", "--replay", folder / "capture.mcap")
+    assert session.found.b_a[2] == pytest.approx(-1.1, abs=0.02)
 
 
 @pytest.mark.parametrize(("name", "most_deg"), [("mpu9150_a", 0.1), ("imucal_session", 0.15)])
@@ -148,6 +129,7 @@ def session_of(folder, recording, poll_s=SELDOM_S):
 def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
     """Use recordings that lie flat for less than ten seconds; those of the MPU-9150s begin with spikes to 74 m/s^2."""
     recording = RECORDINGS / f"{name}.npz"
-    found = session_of(tmp_path, recording)
-    assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")
+    make_capture(recording, tmp_path / "capture.mcap", 9.81, SELDOM_S)
+    found = outcome(tmp_path / "board", "session", "--replay", tmp_path / "capture.mcap")
+    assert found.code == 0 and found.found.verdict in ("good", "usable")
     assert transported_deg(found.file, "--trim", 0.5, "--gravity", 9.81, recording=recording) <= most_deg

@@ -411,12 +411,6 @@ def test_a_lag_between_the_sensors_is_reported(in_hand, lag_s, words):
 # ---- real recordings, and gravity
 
 
-def test_a_real_gyroscope_that_clipped_is_named(real):
-    verdict, reasons = judged(real("mpu6050_session"))
-    assert verdict == "usable"
-    assert "18 samples" in reasons["gyro_clipped"]
-
-
 def test_missing_rates_drawn_as_a_line_are_lost_data(real):
     recording = real("mpu9150_a")
     gyr, lost, share = recording.gyr.copy(), slice(5000, 6200), np.linspace(0.0, 1.0, 1200)[:, None]

@@ -12,12 +12,11 @@ from mpucal.calibration.rotation import turned
 G = 9.82
 
 
-def slipped(recording, at_s, axis=(0.6, -0.6, 0.53), deg=3.0):
-    """Rotate the accelerometer against the gyroscope from `at_s` [s] on."""
-    R = turned(np.radians(deg) * np.array([axis]) / np.linalg.norm(axis))
-    return replace(
-        recording, acc=np.where((recording.t >= recording.t[0] + at_s)[:, None], recording.acc @ R.T, recording.acc)
-    )
+def slipped(recording, at_s):
+    """Rotate the accelerometer by 3 deg against the gyroscope from `at_s` [s] on."""
+    axis = np.array([[0.6, -0.6, 0.53]])
+    R, after = turned(np.radians(3.0) * axis / np.linalg.norm(axis)), recording.t >= recording.t[0] + at_s
+    return replace(recording, acc=np.where(after[:, None], recording.acc @ R.T, recording.acc))
 
 
 @pytest.mark.parametrize(("seed", "at_s"), [(1, 27.0), (2, 30.0), (3, 33.0)])

@@ -1,5 +1,6 @@
 """Motion of a simulated hand: means over samples, and the behaviour of each kind of hand."""
 
+from functools import reduce
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,49 +22,28 @@ def prompt(kind, down=None):
     return SimpleNamespace(kind=kind, down=down)
 
 
-class Run:
-    """Session with a hand: prompts (s, prompt) at their times, and means over every sample."""
-
-    def __init__(self, kind, prompts, seconds, seed=3):
-        hand, motion = np.random.default_rng(seed).spawn(2)
-        self.motion = Motion(HANDS[kind](hand), motion, GRAVITY)
-        self.first_attitude = self.motion.attitude(0.0)
-        forces, rates, waiting = [], [], list(prompts)
-        for i in range(0, int(seconds / PERIOD_S), POLL):
-            while waiting and waiting[0][0] <= i * PERIOD_S:
-                self.motion.hear(waiting.pop(0)[1], i * PERIOD_S)
-            force, rate = self.motion.means(np.arange(i, i + POLL + 1) * PERIOD_S)
-            forces.append(force)
-            rates.append(rate)
-        self.force, self.rate = np.concatenate(forces), np.concatenate(rates)
-        self.end_s = len(self.force) * PERIOD_S
-
-    def part(self, array, first_s, last_s):
-        return array[int(first_s / PERIOD_S) : int(last_s / PERIOD_S)]
-
-
 def matrix(q):
     """Return SciPy's rotation matrix of a quaternion (w, x, y, z)."""
     return Rotation.from_quat([*q[1:], q[0]]).as_matrix()
 
 
 def product(rates):
-    """Return the product of every sample's turn, as SciPy's matrices, neighbours first."""
-    turns = Rotation.from_rotvec(rates * PERIOD_S).as_matrix()
-    while len(turns) > 1:
-        left = turns[len(turns) // 2 * 2 :]
-        turns = np.concatenate((turns[: len(turns) // 2 * 2 : 2] @ turns[1::2], left))
-    return turns[0]
-
-
-SESSION = ((0.0, prompt("lay_flat")), (12.0, prompt("rotate")))
+    """Return the product of every sample's turn, as SciPy's matrices."""
+    return reduce(np.matmul, Rotation.from_rotvec(rates * PERIOD_S).as_matrix())
 
 
 @pytest.mark.parametrize("kind", ["guided", "random"])
 def test_the_rates_integrate_to_the_attitude(kind):
-    run = Run(kind, SESSION, 20.0)
-    R = matrix(run.first_attitude) @ product(run.rate)
-    error = R.T @ matrix(run.motion.attitude(run.end_s))
+    """Lay the board flat and turn it, and add up every sample's turn."""
+    hand, motion = np.random.default_rng(3).spawn(2)
+    moved = Motion(HANDS[kind](hand), motion, GRAVITY)
+    R = matrix(moved.attitude(0.0))
+    for first in range(0, int(20.0 / PERIOD_S), POLL):
+        # a prompt that comes again is ignored
+        moved.hear(prompt("lay_flat" if first * PERIOD_S < 12.0 else "rotate"), first * PERIOD_S)
+        edges = np.arange(first, first + POLL + 1) * PERIOD_S
+        R = R @ product(moved.means(edges)[1])
+    error = R.T @ matrix(moved.attitude(float(edges[-1])))
     assert np.degrees(np.arccos(min(1.0, (np.trace(error) - 1) / 2))) < 0.02
 
 

@@ -1,30 +1,12 @@
 """Simulated bus: its time, and the driver on it."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from mpucal.chip import registers as reg
 from mpucal.chip.driver import Driver
+from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
-
-
-def prompt(kind):
-    return SimpleNamespace(kind=kind, down=None)
-
-
-def session(bus, seconds, rotate_s=None):
-    """Return a driver's recording of a hand that lays the board flat and, at `rotate_s`, turns it."""
-    driver = Driver(bus)
-    driver.start()
-    bus.hear(prompt("lay_flat"))
-    begin_ns = driver.now_ns()
-    while driver.now_ns() < begin_ns + seconds * 1e9:
-        driver.poll()
-        if rotate_s is not None and driver.now_ns() >= begin_ns + rotate_s * 1e9:
-            bus.hear(prompt("rotate"))
-    return driver.recording()
 
 
 def test_transfers_take_their_time_at_400_khz():
@@ -40,8 +22,12 @@ def test_transfers_take_their_time_at_400_khz():
 @pytest.mark.parametrize("chip", ["mpu6050", "mpu6500", "clone98"])
 def test_the_driver_reads_the_truth_of_a_board_at_rest(chip):
     bus = open_simulated(f"sim:chip={chip},seed=3,rate_error_ppm=4000", gravity=9.82)
-    truth = bus.truth_document()
-    recording = session(bus, 15)
+    truth, driver = bus.truth_document(), Driver(bus)
+    driver.start()
+    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    while driver.now_ns() < 15e9:
+        driver.poll()
+    recording = driver.recording()
     assert not recording.gap.any()
     assert recording.rate_hz == pytest.approx(200 * 1.004, rel=2e-4)
     assert recording.temperature_c.mean() == pytest.approx(truth["temperature_c"], abs=0.05)
