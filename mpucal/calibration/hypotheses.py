@@ -16,6 +16,8 @@ eigenvalues of S and the components c of the scores
 
 The evidence is the mean of p(q)/p(0) over the values of q, and over the times of a step. All hypotheses together are
 beforehand as likely as nothing, and all are weighed against each other: what one common cause explains needs no other.
+But there are two sensors. What surely happened to the gyroscope is taken out of the scores, and the others are weighed
+once more by what is left: a warming chip moves the biases of both.
 
 Source: Kass, Raftery, "Bayes factors" (1995); of random effects, Robinson, "That BLUP is a good thing" (1991).
 """
@@ -28,6 +30,7 @@ from itertools import groupby
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
@@ -104,10 +107,10 @@ class Explanation(NamedTuple):
     delta : (k, 3) by group, m/s^2, 1, rad or rad/s, at the likeliest q and time.
     start, end : (k,) s after the flat segment, of the groups; of sides, the first and last time that each was down.
     away : (p,) rms distance of the estimate from the parameters, if it is true; of a change, from their mean over time.
-    farthest : (p,) largest distance of the parameters from the estimate, before the first group and in any.
+    shift : (1 + k, p) parameters less the estimate, before the first group and in each, at the likeliest q and time.
     freed : (p,) share of itself by which the variance of the estimate grows, if x is estimated too.
     weight : probability among all hypotheses and nothing.
-    is_sure : True for a change of the accelerometer against which all else is unlikely; `away` is `farthest` then.
+    is_sure : True for a change of the accelerometer against which all else is unlikely; `away` is the largest shift.
     """
 
     hypothesis: Hypothesis
@@ -116,7 +119,7 @@ class Explanation(NamedTuple):
     start: Vector
     end: Vector
     away: Vector
-    farthest: Vector
+    shift: Vector
     freed: Vector
     weight: float = 0.0
     is_sure: bool = False
@@ -152,13 +155,27 @@ class Explanation(NamedTuple):
 
 
 def explain(parts: Parts, D: Vector) -> list[Explanation]:
-    """Return what each hypothesis says, the likeliest first; nothing where the fit failed."""
+    """Return what surely happened to the gyroscope, and what the other hypotheses say besides, the likeliest first.
+
+    Nothing where the fit failed.
+    """
     if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
         return []
-    groups = {number: _Groups.of(parts, number) for number in {each.groups for each in HYPOTHESES}}
+    known: list[Explanation] = []
+    while True:
+        found = _weigh([each for each in HYPOTHESES if each not in {of.hypothesis for of in known}], parts, D)
+        if not (found and found[0].hypothesis.what == "gyroscope" and found[0].weight > 1.0 - 1.0 / SURE):
+            return known + found
+        known.append(found[0])
+        parts = _without(parts, found[0])
+
+
+def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Explanation]:
+    """Return what each hypothesis says, weighed against the others and nothing, the likeliest first."""
+    groups = {number: _Groups.of(parts, number) for number in {each.groups for each in hypotheses}}
     found = [
         each
-        for (_, number), alike in groupby(HYPOTHESES, key=lambda each: (each.shape, each.groups))
+        for (_, number), alike in groupby(hypotheses, key=lambda each: (each.shape, each.groups))
         if len(groups[number].start) > 1
         for each in _explain(list(alike), groups[number], parts, D)
     ]
@@ -167,9 +184,19 @@ def explain(parts: Parts, D: Vector) -> list[Explanation]:
     found.sort(key=lambda each: -each.weight)
     changes = [each for each in found if each.hypothesis.kind == "change"]
     if sum(each.weight for each in changes) > 1.0 - 1.0 / SURE:
-        of_sure = changes[0]._replace(weight=1.0, away=changes[0].farthest, is_sure=True)
+        of_sure = changes[0]._replace(weight=1.0, away=np.abs(changes[0].shift).max(axis=0), is_sure=True)
         found = [of_sure if each is changes[0] else each for each in found]
     return found
+
+
+def _without(parts: Parts, known: Explanation) -> Parts:
+    """Return the parts with their scores at the parameters that an explanation gives each of them."""
+    shift = known.shift[1 + np.unique(_group(parts, known.hypothesis.groups), return_inverse=True)[1]]
+    moved = np.einsum("kpq,kq->kp", parts.fisher, shift)
+    besides = parts.H - parts.fisher.sum(axis=0)  # of the prior and the flat mean
+    return replace(
+        parts, gradient=parts.gradient + moved, left=parts.left + moved.sum(axis=0) + besides @ known.shift[0]
+    )
 
 
 def gyroscope_change(explanations: Sequence[Explanation]) -> Explanation | None:
@@ -195,10 +222,15 @@ class _Groups(NamedTuple):
     @classmethod
     def of(cls, parts: Parts, groups: int) -> _Groups:
         """Group the parts by so many stretches of time, or by SIDES."""
-        group = parts.side if groups == SIDES else parts.by_time(min(groups, len(parts)))
+        group = _group(parts, groups)
         first = np.unique(group, return_index=True)[1]
         last = len(group) - 1 - np.unique(group[::-1], return_index=True)[1]
         return cls(*parts.grouped(group), parts.start[first], parts.end[last])
+
+
+def _group(parts: Parts, groups: int) -> NDArray[np.intp]:
+    """Return (k,) the group of each part, in so many stretches of time, or by SIDES."""
+    return parts.side if groups == SIDES else parts.by_time(min(groups, len(parts)))
 
 
 class _Likelihood(NamedTuple):
@@ -264,10 +296,10 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
         m, best = np.unravel_index(of.argmax(), of.shape)
         likeliest, follow = x[k, m, best], likelihood.follow[k, m]
         delta = shapes[m] @ (likelihood.U[k, m] @ likeliest)
-        farthest = np.abs(np.vstack([np.zeros(3), delta]) @ B[k].T - likeliest @ follow).max(axis=0)
+        shift = np.vstack([np.zeros(3), delta]) @ B[k].T - likeliest @ follow
         freed = variance[k, m, best] @ follow**2 / np.diag(parts.covariance)
         times = groups.start, groups.end
-        found.append(Explanation(hypothesis, float(evidence[k]), delta, *times, np.sqrt(away[k]), farthest, freed))
+        found.append(Explanation(hypothesis, float(evidence[k]), delta, *times, np.sqrt(away[k]), shift, freed))
     return found
 
 

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate, estimate
-from mpucal.calibration.hypotheses import HYPOTHESES, LARGEST, VARIANCES, Hypothesis, _explain, _Groups, explain
+from mpucal.calibration.hypotheses import (
+    HYPOTHESES,
+    LARGEST,
+    VARIANCES,
+    Hypothesis,
+    _explain,
+    _Groups,
+    _without,
+    explain,
+)
 from mpucal.calibration.parameters import PLACES
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.quality import judge
@@ -143,6 +152,37 @@ def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
     priors = np.array([each.hypothesis.prior for each in found])
     odds = np.exp([each.evidence for each in found]) * priors / sum(each.prior for each in HYPOTHESES)
     np.testing.assert_allclose([each.weight for each in found], odds / (1.0 + odds.sum()))
+
+
+def test_what_surely_happened_is_taken_out_of_the_scores():
+    A, y, parts = linear_parts()
+    theta = parts.left - parts.gradient.sum(0)  # by the unit prior
+    (step,) = _explain([Hypothesis("accelerometer", "step")], _Groups.of(parts, 5), parts, np.eye(3))
+    there, without = theta + step.shift, _without(parts, step)
+    gradient = -np.einsum("kmp,km->kp", A, y - np.einsum("kmp,kp->km", A, there[1:]))
+    np.testing.assert_allclose(without.gradient, gradient, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(without.left, gradient.sum(0) + there[0], rtol=1e-9, atol=1e-9)
+
+
+def test_of_two_things_that_happened_the_lesser_is_not_hidden_by_the_greater():
+    """Drift of the gyroscope's bias by 3,000 standard deviations of a part, and of the accelerometer's by 300."""
+    rng = np.random.default_rng(4)
+    k, p, m = 48, 18, 12
+    A = rng.standard_normal((k, m, p))
+    delta = np.zeros((k, p))
+    drift = np.arange(k)[:, None] / k
+    delta[:, PLACES["b_omega"]], delta[:, PLACES["b_a"]] = 0.03 * drift, 0.003 * drift[::-1]
+    scale = 1e5
+    H_k = scale**2 * np.einsum("kmp,kmq->kpq", A, A)
+    score = np.einsum("kpq,kq->kp", H_k, delta) + scale * np.einsum("kmp,km->kp", A, rng.standard_normal((k, m)))
+    H = H_k.sum(0) + np.eye(p)
+    gradient = np.einsum("kpq,q->kp", H_k, np.linalg.solve(H, score.sum(0))) - score
+    t = np.arange(k, dtype=float)
+    parts = Parts(gradient, H_k, H, gradient.sum(0), t, t + 1.0, np.zeros(k, np.intp))
+    first, second = explain(parts, np.eye(3))[:2]
+    assert (first.hypothesis.what, second.hypothesis.what) == ("gyroscope", "accelerometer")
+    assert min(first.weight, second.weight) > 0.99
+    assert second.is_sure
 
 
 def test_the_uncertainty_is_the_spread_of_calibrated_measurements():
