@@ -13,7 +13,7 @@ from ..errors import WrongValue
 from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
-from .checks import CONTRADICTED, NO_GYROSCOPE, find_gyroscope_fault, find_reasons, is_unusable
+from .checks import NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
 from .checks.estimate import GOOD_RMS_MPS2
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
@@ -61,8 +61,8 @@ def estimate(
             return replace(whole[0], against_rests=refusing), whole[1]
         # other faults of the gyroscope can be mended, and then the rests need not be enough
         return _of_a_part(whole[0]) or whole
-    if at_fault == CONTRADICTED.reason(whole[0]) and _is_known_better(whole[0], of_rests):
-        return whole
+    if at_fault != OTHER_RANGE.reason(whole[0]) and _is_known_better(whole[0], of_rests):
+        return _of_a_part(whole[0]) or whole
     return of_rests, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
 
 
@@ -76,10 +76,12 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     """Return the estimate of a part, from rest to rest, that is good by itself; None where there is none, or no need.
 
     The part after what changed the sensor is of what it is now. The part before is used only where all of the recording
-    tells less than a good calibration. The part before a sensor was at the end of its range needs no reservation.
+    tells less than a good calibration. The part before a sensor was at the end of its range needs no reservation. But a
+    bias that moved may move on: there the uncertainty of the whole holds what it was and what it is.
     """
     recording, flat = whole.recording, whole.flat
-    changed = next((reason for reason in find_reasons(whole) if reason.span is not None), None)
+    happened = (reason for reason in find_reasons(whole) if reason.span is not None)
+    changed = next((reason for reason in happened if reason.code != "zero_moved"), None)
     clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
     if flat is None or (changed is None and not len(clipped)):
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +31,11 @@ DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
 FEWEST_RESTS = 3  # fewer cannot contradict each other
+SIGNED_PERMUTATIONS = [
+    np.eye(3)[list(order)] * np.array(signs)[:, None]
+    for order in permutations(range(3))
+    for signs in product((1.0, -1.0), repeat=3)
+]
 
 
 @dataclass(frozen=True)
@@ -142,7 +148,7 @@ class Evidence:
         if not path > DEGREES_RATIO * angle > 0.0:
             return False
         turns = self._turns_of_half_seconds(flat)
-        return _miss(turns, 1.0) > CLEARLY * _miss(turns, np.deg2rad(1.0))
+        return _miss(turns, np.eye(3)) > CLEARLY * _miss(turns, np.deg2rad(np.eye(3)))
 
     def _half_seconds(self, flat: Flat) -> tuple[Vector, NDArray[np.int_]]:
         """Return the directions of gravity (k, 2, 3) before and after turns, and the samples (k,) where these begin.
@@ -179,9 +185,18 @@ class Evidence:
             turns = _measured(self._turns_of_half_seconds(self.flat))
         if len(turns) < FEWEST_RESTS:
             return 1.0
-        factor = min((1.0, *OTHER_RANGES), key=lambda factor: _miss(turns, factor))
-        miss = _miss(turns, factor)
-        return factor if miss < MOST_MISS_RAD and _miss(turns, 1.0) > CLEARLY * miss else 1.0
+        by, miss = _least_miss(turns, [factor * np.eye(3) for factor in (1.0, *OTHER_RANGES)])
+        return float(by[0, 0]) if miss < MOST_MISS_RAD else 1.0
+
+    @cached_property
+    def gyro_axes(self) -> Vector | None:
+        """Rotation (3, 3) by right angles, or -1, with which rates explain how gravity turned between rests."""
+        turns = [] if self.flat is None else _measured(self._turns_of_rests(self.flat, np.inf))
+        if len(turns) < FEWEST_RESTS:
+            return None
+        rotations = [M for M in SIGNED_PERMUTATIONS if np.linalg.det(M) > 0.0]
+        by, miss = _least_miss(turns, [np.eye(3), -np.eye(3), *rotations])
+        return by if miss < MOST_MISS_RAD else None
 
     @cached_property
     def gyro_miss(self) -> tuple[float, float]:
@@ -190,7 +205,7 @@ class Evidence:
         The first is that of the turns within the gyroscope's range, the second that of all turns.
         """
         turns = [] if self.flat is None else self._turns_of_rests(self.flat, np.inf)
-        within, of_all = (_miss(t, 1.0) if len(t) >= FEWEST_RESTS else 0.0 for t in (_measured(turns), turns))
+        within, of_all = (_miss(t, np.eye(3)) if len(t) >= FEWEST_RESTS else 0.0 for t in (_measured(turns), turns))
         return within, of_all
 
     def _turn(self, flat: Flat, before: Vector, after: Vector, first: int, last: int) -> _Turn:
@@ -217,9 +232,17 @@ def _measured(turns: list[_Turn]) -> list[_Turn]:
     return [turn for turn in turns if not turn.clipped]
 
 
-def _miss(turns: list[_Turn], factor: float) -> float:
-    """Return the median angle [rad] by which `factor` times the rates miss gravity after the turns."""
-    carried = np.array([turned(-factor * turn.steps) @ turn.before for turn in turns])
+def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
+    """Return which of matrices (3, 3) makes the rates miss least, the first if in doubt, and the median angle [rad]."""
+    misses = [_miss(turns, M) for M in by]
+    least = int(np.argmin(misses))
+    least = least if misses[0] > CLEARLY * misses[least] else 0
+    return by[least], misses[least]
+
+
+def _miss(turns: list[_Turn], by: Vector) -> float:
+    """Return the median angle [rad] by which the rates, multiplied by (3, 3), miss gravity after the turns."""
+    carried = np.array([turned(-turn.steps @ by.T) @ turn.before for turn in turns])
     return float(np.median(_angles(carried, np.array([turn.after for turn in turns]))))
 
 

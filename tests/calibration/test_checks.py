@@ -218,6 +218,18 @@ OF_RESTS = {
         "gyro_off",
         "from where the gyroscope's rates lead it",
     ),
+    "exchanged in both": (
+        "pose12",
+        changed(lambda acc: acc[:, [1, 0, 2]], lambda gyr: gyr[:, [1, 0, 2]]),
+        "left_handed",
+        "the axes of both sensors are left-handed",
+    ),
+    "a late accelerometer": (
+        "pose12",
+        changed(lambda acc: acc[np.maximum(np.arange(len(acc)) - 40, 0)]),
+        "clock_off",
+        "lags behind the gyroscope by",
+    ),
     "far beyond its range": (
         "pose12",
         changed(gyr=lambda gyr: np.clip(gyr, -1.0472, 1.0472)),

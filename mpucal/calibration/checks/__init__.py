@@ -74,12 +74,17 @@ TABLE = (
 # Faults of the gyroscope, for which the rests alone may give an estimate. Without rates, or with rates of another
 # range, the other rows mean nothing.
 NO_GYROSCOPE, OTHER_RANGE = Row(unusable.no_gyroscope), Row(sensor.gyro_range, "fit")
-CONTRADICTED = Row(sensor.gyro_contradicts, "fit")
-AT_FAULT = (NO_GYROSCOPE, Row(unusable.dead_gyroscope, "flat"), OTHER_RANGE, CONTRADICTED)
+AT_FAULT = (
+    NO_GYROSCOPE,
+    Row(unusable.dead_gyroscope, "flat"),
+    OTHER_RANGE,
+    Row(sensor.gyro_contradicts, "fit"),
+    Row(sensor.sensors_lag, "fit"),
+)
 
 
 def find_gyroscope_fault(e: Evidence) -> Reason | None:
-    """Return why the gyroscope cannot be used: not recorded, dead, of another range, or contradicted by the rests."""
+    """Return why the gyroscope may be of no use: not recorded, dead, of another range, contradicted, of other times."""
     return next(_found(e, AT_FAULT), None)
 
 

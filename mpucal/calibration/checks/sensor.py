@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import permutations, product
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from ...data import Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
-from ..evidence import MOST_MISS_RAD, Evidence
+from ..evidence import MOST_MISS_RAD, SIGNED_PERMUTATIONS, Evidence
 from ..parameters import BY_NAME
 from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent
 
@@ -67,8 +66,12 @@ def axes(e: Evidence) -> Reason | None:
     Q = U @ Vt
     if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
         return None
+    return _named_axes(e, max(SIGNED_PERMUTATIONS, key=lambda M: float(abs(np.sum(M * Q)) + 0.01 * np.trace(M))))
+
+
+def _named_axes(e: Evidence, M: Vector) -> Reason:
+    """Return the reason for axes M (3, 3) of the accelerometer against the gyroscope's, or for -M."""
     # (D, u) and (-D, -u) fit equally: the reading of the board that lies face up decides between them.
-    M = max(_SIGNED_PERMUTATIONS, key=lambda M: float(abs(np.sum(M * Q)) + 0.01 * np.trace(M)))
     if not _reads_up(e, M):
         M = -M
     if (np.abs(M) == np.eye(3)).all():
@@ -91,13 +94,6 @@ def _named(axes: Mask) -> str:
     return f"{' and '.join(names)} {'axis' if len(names) == 1 else 'axes'}"
 
 
-_SIGNED_PERMUTATIONS = [
-    np.eye(3)[list(order)] * np.array(signs)[:, None]
-    for order in permutations(range(3))
-    for signs in product((1.0, -1.0), repeat=3)
-]
-
-
 def gyro_range(e: Evidence) -> Reason | None:
     """Find rates that are all a power of two too small or too large for how gravity turned from rest to rest."""
     if (is_trustworthy(e) and _is_within_tolerance(e.estimate.K)) or e.gyro_factor == 1.0:
@@ -113,6 +109,8 @@ def gyro_contradicts(e: Evidence) -> Reason | None:
         return None
     within, of_all = e.gyro_miss
     if within > MOST_MISS_RAD:
+        if (by := e.gyro_axes) is not None:
+            return _named_axes(e, by) if np.linalg.det(by) > 0.0 else reason("left_handed", "both")
         return reason("gyro_off", "contradicts", degrees=np.rad2deg(within))
     return reason("gyro_clipped", "contradicts", degrees=np.rad2deg(of_all)) if of_all > MOST_MISS_RAD else None
 
