@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +22,8 @@ VERDICTS = ("good", "usable", "refused")
 Columns = Mapping[str, Sequence[Any]]
 
 
-@dataclass(frozen=True)
-class FleetPage:
-    """Page and its first sentence."""
-
-    html: str
-    sentence: str
-
-
-def make_page(results: Path) -> FleetPage:
-    """Return the page of results.parquet."""
+def make_page(results: Path) -> tuple[str, str]:
+    """Return the page of results.parquet, and its first sentence."""
     columns: Columns = pq.read_table(results).to_pydict()
     found = parameters(columns)
     sentence = _sentence(columns)
@@ -49,7 +40,7 @@ def make_page(results: Path) -> FleetPage:
         _reports(columns),
     )
     count = len(columns["path"])
-    return FleetPage(document(f"Fleet of {count}", f"{count} recordings", *body), sentence)
+    return document(f"Fleet of {count}", f"{count} recordings", *body), sentence
 
 
 def _sentence(columns: Columns) -> str:

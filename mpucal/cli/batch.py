@@ -114,9 +114,9 @@ def _write_results(folder: Path, paths: list[str], journal: RowJournal) -> None:
     from ..batch.table import write_tables  # noqa: PLC0415
 
     parquet, text = write_tables(folder, journal.rows(paths))
-    fleet = make_page(parquet)
-    write_atomically(folder / PAGE, fleet.html.encode())
-    click.echo(f"{fleet.sentence}\n\nWritten to {folder}: {parquet.name}, {text.name}, {PAGE}")
+    page, sentence = make_page(parquet)
+    write_atomically(folder / PAGE, page.encode())
+    click.echo(f"{sentence}\n\nWritten to {folder}: {parquet.name}, {text.name}, {PAGE}")
 
 
 def _say_options(folder: Path, rows: Iterator[dict[str, Any]], settings: Settings, given: Path | None) -> None:

@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from ..data import Recording, Sensor, Vector
+from ..data import Recording, Vector
 from ..result.calibration import Calibration
-from ..result.correction import make_correction
+from ..result.correction import make_correction, other_who_am_i, same_trim
 from . import drift
 from .hypotheses import NOTHING, Comparison, compare_hypotheses, estimate, p_value
 from .observed import NOISE, Observations, apply_errors, observe
@@ -59,10 +59,9 @@ def check(calibration: Calibration, recording: Recording, days: float | None = N
     UsageError : the calibration was refused, or is of samples of another kind (a chip's own, an autopilot's stream).
     """
     then, now = calibration.sensor, recording.sensor
-    if None not in (then.who_am_i, now.who_am_i) and then.who_am_i != now.who_am_i:
-        message = f"its WHO_AM_I is 0x{now.who_am_i:02x}, and that of the calibrated one was 0x{then.who_am_i:02x}"
+    if message := other_who_am_i(then, now):
         return CheckResult(ANOTHER_SENSOR, "another sensor", message, ANEW)
-    if _is_other_chip(calibration, now):
+    if same_trim(then, now) is False and not np.any(calibration.applied_in_hardware):
         message = (
             f"its offset registers hold {now.accel_offsets}, and the calibrated one's held {then.accel_offsets}:"
             " the factory sets them for each chip"
@@ -177,14 +176,6 @@ def _close_hypotheses(comparison: Comparison) -> tuple[str, ...]:
     if best == NOTHING:
         return ()
     return tuple(name for name, odds in log_odds.items() if name != best and odds > max(log_odds[best] - NEAR, 0.0))
-
-
-def _is_other_chip(calibration: Calibration, sensor: Sensor) -> bool:
-    """Return True if the offset registers hold the trim of another chip; bit 0 of each is reserved."""
-    held = calibration.sensor.accel_offsets, sensor.accel_offsets
-    if held[0] is None or held[1] is None or np.any(calibration.applied_in_hardware):
-        return False
-    return any((one ^ other) & ~1 for one, other in zip(held[0], held[1], strict=True))
 
 
 def days_since(calibration: Calibration, utc_ns: int | None = None) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from ..data import Vector
 from . import error_model
 from .calibration import GOOD, Calibration
+from .correction import same_trim
 from .error_model import AXES
 
 # Of pairs of calibrations of an unchanged sensor, 1 in 100 at most are called different: stated uncertainties hold for
@@ -147,11 +148,10 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
         remarks.append(
             f"They are of two chips: WHO_AM_I of A is 0x{a.sensor.who_am_i:02x}, of B 0x{b.sensor.who_am_i:02x}."
         )
-    held = [c.sensor.accel_offsets for c in (a, b)]
-    if None not in held and held[0] != held[1]:
+    if same_trim(a.sensor, b.sensor) is False:
         remarks.append(
-            f"The offset registers held {held[0]} for A and {held[1]} for B: the biases differ by that, or these are"
-            " two chips."
+            f"The offset registers held {a.sensor.accel_offsets} for A and {b.sensor.accel_offsets} for B: the biases"
+            " differ by that, or these are two chips."
         )
     warm = [c.sensor.temperature_c for c in (a, b)]
     if warm[0] is not None and warm[1] is not None and abs(warm[1] - warm[0]) >= WARMER_C:

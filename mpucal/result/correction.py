@@ -45,32 +45,42 @@ def make_correction(calibration: Calibration, sensor: Sensor, autopilot: Autopil
     if not np.isfinite(calibration.K).all():
         raise UsageError("the calibration lacks K", "give one that has it")
     of = calibration.sensor
-    if None not in (of.who_am_i, sensor.who_am_i) and of.who_am_i != sensor.who_am_i:
-        raise UsageError(
-            f"the calibration is of a chip whose WHO_AM_I is 0x{of.who_am_i:02x}, but that of this chip is"
-            f" 0x{sensor.who_am_i:02x}",
-            "give the calibration of this chip",
-        )
+    if how := other_who_am_i(of, sensor):
+        raise UsageError(f"the calibration is of another chip: {how}", "give the calibration of this chip")
     _check_origin(of, sensor)
     _check_parameters(calibration, autopilot)
     return _with_registers(calibration, sensor)
 
 
+def other_who_am_i(then: Sensor, now: Sensor) -> str:
+    """Return how WHO_AM_I shows that `now` is another sensor than the calibrated one; empty if it does not."""
+    if None in (then.who_am_i, now.who_am_i) or then.who_am_i == now.who_am_i:
+        return ""
+    return f"its WHO_AM_I is 0x{now.who_am_i:02x}, and that of the calibrated one was 0x{then.who_am_i:02x}"
+
+
+def same_trim(then: Sensor, now: Sensor) -> bool | None:
+    """Return True if the offset registers of both held the same words; None if that is not known."""
+    if then.accel_offsets is None or now.accel_offsets is None:
+        return None
+    # bit 0 of an offset register does nothing
+    return all(a | 1 == b | 1 for a, b in zip(then.accel_offsets, now.accel_offsets, strict=True))
+
+
 def _with_registers(calibration: Calibration, sensor: Sensor) -> Correction:
     """Return the correction that removes the bias once, even if a reset of the chip has restored its trim."""
     applied = calibration.applied_in_hardware
-    calibrated, now = calibration.sensor.accel_offsets, sensor.accel_offsets
-    if calibrated is None or now is None:
+    same = same_trim(calibration.sensor, sensor)
+    if same is None:
         remark = "It is assumed that the chip's offset registers still subtract the b_a that was written there."
         return Correction(calibration, (remark,) if np.any(applied) else ())
-    # bit 0 of an offset register does nothing
-    same = all(a | 1 == b | 1 for a, b in zip(calibrated, now, strict=True))
     if same and np.any(applied):
         remark = "The offset registers held the factory trim again: all of b_a is subtracted here."
         return Correction(replace(calibration, applied_in_hardware=np.zeros(3)), (remark,))
     if not same and not np.any(applied):
         raise UsageError(
-            f"the offset registers held {now} while these samples were taken, but {calibrated} during the calibration",
+            f"the offset registers held {sensor.accel_offsets} while these samples were taken, but"
+            f" {calibration.sensor.accel_offsets} during the calibration",
             "give the calibration of this chip, or calibration-on-chip.json, which a write to its registers left",
         )
     return Correction(calibration)

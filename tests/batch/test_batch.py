@@ -200,7 +200,7 @@ def test_the_page_names_what_is_odd(tmp_path):
             row |= {f"b_a_std_{axis}": 0.01 for axis in "xyz"}
             rows.append(row)
     parquet, _ = write_tables(tmp_path, iter(rows))
-    html = make_page(parquet).html
+    html, _ = make_page(parquet)
     outliers = html[html.index('id="outliers"') : html.index("By batch")]
     assert set(re.findall(r"b\d+-\d\.mcap", outliers)) == {"b77-0.mcap", "b77-1.mcap"}
     assert '<a href="reports/r77-1.html">b77-1.mcap</a>' in outliers
