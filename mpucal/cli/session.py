@@ -17,7 +17,7 @@ from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import warn_unset
 from ..result.session_files import DOCUMENT, LOG
-from ..session.results import SessionFolder, check_unfinished
+from ..session.results import SessionFolder, check_unfinished, result_files
 from ..sinks.choose import announce_sinks, choose_sinks, interrupted_writes
 from ..sinks.kind import SinkKind
 from ..sinks.write_back import session_recorder
@@ -152,7 +152,8 @@ def _run(
             calibration = runner.calibrate(recording, fit)
             if name:
                 calibration = replace(calibration, extra={**calibration.extra, NAME: name})
-            return recording, calibration, runner.write(folder.path, calibration, recording, source.truth())
+            files = result_files(calibration, recording, source.truth())
+            return recording, calibration, runner.write(folder.path, files)
     except BaseException as error:
         if kept := folder.kept:
             person.say(f"  The capture is kept in {kept}{_how_to_continue(source, kept.parent, error)}.")

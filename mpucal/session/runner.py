@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from ..chip.records import KEY, RESUMED
 from ..data import Recording, Sensor
@@ -19,7 +18,7 @@ from .live_verification import add_verification
 from .machine import Machine
 from .plan import Plan
 from .ports import Note, Operator, Source, polled
-from .results import result_files, save
+from .results import save
 from .table import State
 
 
@@ -123,26 +122,20 @@ class Runner:
         self._dialogue.feed(Fitted(calibration.verdict))
         return calibration
 
-    def write(
-        self,
-        folder: Path,
-        calibration: Calibration,
-        recording: Recording,
-        truth: Mapping[str, Any] | None = None,
-    ) -> tuple[Path, ...]:
-        """Write the results, all files or none; Abandoned if the person stopped it.
+    def write(self, folder: Path, files: Iterable[tuple[str, bytes]]) -> tuple[Path, ...]:
+        """Write the results as they are made, by name: all files or none; Abandoned if the person stopped it.
 
         Raises
         ------
         OutputError : a file cannot be written.
         """
-        files: dict[str, bytes] = {}
-        for name, data in result_files(calibration, recording, truth):
+        made: dict[str, bytes] = {}
+        for name, data in files:
             self._dialogue.take_keys()
-            files[name] = data
-        written = save(folder, files)
+            made[name] = data
+        written = save(folder, made)
         self._dialogue.take_keys()
-        self._dialogue.feed(Written(tuple(files)))
+        self._dialogue.feed(Written(tuple(made)))
         return written
 
     def _record_accel_alone(self, seconds: float | None) -> int:

@@ -12,6 +12,7 @@ from mpucal.session.events import Decision, Key, Prompt, PromptKind
 from mpucal.session.live_scheduler import InlineWorker
 from mpucal.session.plan import Plan
 from mpucal.session.ports import ReplayedOperator
+from mpucal.session.results import result_files
 from mpucal.session.runner import Runner
 
 RATE_HZ, POLL = 100.0, 10
@@ -128,7 +129,7 @@ def test_ctrl_c_leaves_all_files_or_none(tmp_path, files, left):
     runner, calibration, recording = calibrated(person)
     person.keys = {person.asked + files: [Key.ABORT]}
     with pytest.raises(Abandoned):
-        runner.write(tmp_path, calibration, recording)
+        runner.write(tmp_path, result_files(calibration, recording))
     assert sorted(path.name for path in tmp_path.iterdir()) == left
 
 
