@@ -42,7 +42,7 @@ class Reason:
     Attributes
     ----------
     code : key of KINDS. what, remedy : a clause each: what is wrong, what to do. refuse : the calibration is refused.
-    span : s since the recording began, in which it happened; None for what is wrong throughout.
+    span : s since the recording began, in which the sensor changed; None for other reasons.
     """
 
     code: str
@@ -71,11 +71,15 @@ class Reason:
 
 @dataclass(frozen=True)
 class Sentence:
-    """Sentence of a reason, with {places} for numbers; `refuse` is None if the check decides."""
+    """Sentence of a reason, with {places} for numbers; `refuse` is None if the check decides.
+
+    divides : the sensor is not the same before {begin} and after {end}, and a part of the recording may do.
+    """
 
     what: str
     remedy: str
     refuse: bool | None = None
+    divides: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,8 +108,8 @@ class Kind:
         return "always" if True in refusals else "never"
 
 
-def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: object) -> Reason:
-    """Return a reason, with `numbers` in the places of its sentence, of which `begin` and `end` are its span.
+def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: Any) -> Reason:
+    """Return a reason, with `numbers` in the places of its sentence.
 
     Raises
     ------
@@ -115,8 +119,7 @@ def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: obje
     if (refuse is None) == (row.refuse is None):
         raise ValueError(f"{code}, {sentence}: either the table or the check decides on a refusal, not both")
     decided = bool(refuse if row.refuse is None else row.refuse)
-    begin, end = numbers.get("begin"), numbers.get("end")
-    span = (begin, end) if isinstance(begin, float) and isinstance(end, float) else None
+    span = (float(numbers["begin"]), float(numbers["end"])) if row.divides else None
     return Reason(code, row.what.format(**numbers), row.remedy.format(**numbers), decided, span)
 
 

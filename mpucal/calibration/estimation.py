@@ -80,8 +80,7 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     bias that moved may move on: there the uncertainty of the whole holds what it was and what it is.
     """
     recording, flat = whole.recording, whole.flat
-    happened = (reason for reason in find_reasons(whole) if reason.span is not None)
-    changed = next((reason for reason in happened if reason.code != "zero_moved"), None)
+    changed = next((reason for reason in find_reasons(whole) if reason.span is not None), None)
     clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
     if flat is None or (changed is None and not len(clipped)):
         return None

@@ -15,8 +15,8 @@ from .calibration import GOOD, Calibration
 from .correction import same_trim
 from .error_model import AXES
 
-# Of pairs of calibrations of an unchanged sensor, 1 in 100 at most are called different: stated uncertainties hold for
-# hands and gyroscopes that are worse than the model, and differences of simulated calm hands are 0.6 of them.
+# Of pairs of calibrations of an unchanged sensor, 1 in 100 are called different, over all kinds of recordings of
+# `python -m tools.lab families`. Of calm hands alone fewer are: what they state is of hands in general.
 CONFIDENCE = 0.99
 # Factor by which the uncertainties of a calibration with reservations may be too small. Halves of a real recording with
 # this verdict, of an unchanged sensor, were 1.1 times as far apart as two good ones may be, and there are worse ones.
@@ -64,9 +64,8 @@ class Comparison:
 
     @property
     def limit(self) -> float:
-        """Return the limit of |z| of one number, by Šidák's correction, so that CONFIDENCE holds for all numbers."""
-        count = max(len(self._known), 1)
-        return NormalDist().inv_cdf((1 + CONFIDENCE ** (1 / count)) / 2)
+        """Return the limit of |z| of one number."""
+        return limit_of(max(len(self._known), 1))
 
     @property
     def same(self) -> bool | None:
@@ -108,6 +107,11 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     gyroscope = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
     margin = RESERVED if _has_reservations(a) or _has_reservations(b) else 1.0
     return Comparison(tuple(numbers), tuple(gyroscope), tuple(_remarks(a, b)), margin)
+
+
+def limit_of(count: int) -> float:
+    """Return the limit of |z| of each of so many numbers, by Šidák's correction, so that CONFIDENCE holds for all."""
+    return NormalDist().inv_cdf((1 + CONFIDENCE ** (1 / count)) / 2)
 
 
 def in_body_frame(c: Calibration) -> Calibration:

@@ -12,13 +12,16 @@ limit is broken.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 import mpucal
 from mpucal.errors import MpucalError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
+from mpucal.result.comparison import limit_of
 
 from .judge import judged, judgement, rms
 from .runner import Trial
@@ -86,6 +89,16 @@ def worst_good(runs: Sequence[Row]) -> float | None:
     return max((run.error for run in runs if run.verdict == GOOD), default=None)
 
 
+def told_apart(runs: Sequence[Row]) -> float:
+    """Return the share of pairs of good calibrations that `mpucal diff` would tell apart, were they of one sensor.
+
+    The difference of two has the errors of both; they are compared as if both claimed as much.
+    """
+    z = [np.array(run.z) for run in runs if run.verdict == GOOD]
+    farthest = [float(np.abs(one - other).max()) for one, other in combinations(z, 2)]
+    return float(np.mean(np.array(farthest) > math.sqrt(2.0) * limit_of(len(z[0])))) if farthest else math.nan
+
+
 COLUMNS: dict[str, Column] = {
     **VERDICTS,
     CRASHED: lambda runs: count("verdict", CRASHED)(runs) or "",
@@ -134,6 +147,7 @@ def report(runs: list[Row]) -> int:
     show(table({**lines, ("all", ""): runs}, COLUMNS, title))
     odd = ", ".join(f"{name} {value:.2g}" for name, value in beside(runs).items())
     print(f"rms in claims outside {RMS_CLAIMS[0]}..{RMS_CLAIMS[1]}: {odd or 'none'}")
+    print(f"pairs of good ones that diff would tell apart: {told_apart(runs):.2%}")
     limits = broken(runs)
     print("\n".join(f"BROKEN {limit}" for limit in limits) or "every limit is kept")
     return int(bool(limits))

@@ -79,6 +79,13 @@ def test_limits_that_are_broken_are_told_by_name():
         assert words in told
 
 
+def test_pairs_with_true_uncertainties_are_told_apart_as_often_as_diff_promises():
+    rng = np.random.default_rng(0)
+    runs = [verdict(z=tuple(rng.standard_normal(12))) for _ in range(400)]
+    assert families.told_apart(runs) == pytest.approx(0.01, abs=0.003)
+    assert np.isnan(families.told_apart(runs[:1]))
+
+
 def test_a_gravity_that_is_named_unlikely_is_the_unit_of_the_gains():
     run = families.of_seed(("gravity told 9.2", 100))
     assert run.verdict == "usable" and "gravity_unlikely" in run.reasons
