@@ -17,10 +17,10 @@ from ..disk.atomic import check_not_input
 from ..errors import UsageError
 from ..files import open_rows, open_writer
 from ..files.csv import CsvText
-from ..files.folder import captures_in
 from ..files.formats import formats_in_memory, writable_formats
 from ..files.rows import Rows
 from ..result.correction import make_correction
+from ..result.session_files import captures_in
 from .arguments import PATH, calibration_argument, json_option, output_option
 from .loading import load_calibration
 from .recording_options import hint_options, make_hints, say_interpretation

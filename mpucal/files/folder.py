@@ -13,7 +13,7 @@ import numpy as np
 
 from ..data import Recording, Samples, Vector
 from ..errors import RecordingError
-from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT, SessionFile
+from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
 from . import formats
 from .hints import NO_HINTS, Hints
 from .reading import reading
@@ -24,19 +24,6 @@ from .tables.times import GAP_S
 # of files that may be such recordings
 SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet", ".json", ".jsonl")
 MOST = 500
-
-
-def captures_in(folder: Path, capture: SessionFile = CAPTURE) -> list[Path]:
-    """Return the captures of one kind of session, in order; none if the first is missing."""
-    found: list[Path] = []
-    while (path := folder / capture.numbered(len(found) + 1)).exists():
-        found.append(path)
-    return found
-
-
-def all_captures_in(folder: Path) -> list[Path]:
-    """Return the captures of a session of a chip and of one of a vehicle."""
-    return [*captures_in(folder), *captures_in(folder, CAPTURE_OF_VEHICLE)]
 
 
 def load_folder(folder: Path) -> Recording:
@@ -54,7 +41,7 @@ def folder_rows(folder: Path) -> Rows:
 def _find_session(folder: Path) -> tuple[formats.Format, list[Path]]:
     captured = {row.session: row for row in formats.FORMATS if row.session}
     for capture, row in captured.items():
-        if captures := captures_in(folder, capture):
+        if captures := capture.all_in(folder):
             return row, captures
     none = " and ".join(f"no {capture.name}" for capture in captured)
     raise RecordingError(f"the folder {folder} holds {none}", "give the folder of a session, or a recording in it")

@@ -12,7 +12,7 @@ from ..mavlink.dialect import Parser, dialect
 from ..mavlink.log import read_log
 from ..mavlink.texts import NoteReader, is_own
 from ..mavlink.tlog import RawPacket, TlogFile, encode_tlog
-from .folder import captures_in
+from ..result.session_files import CAPTURE
 from .mcap import Capture, CaptureReader, Record
 from .reading import check_size
 
@@ -62,7 +62,7 @@ def tlog_of(place: Path) -> bytes:
     """
     packets = [
         record
-        for path in captures_in(place) or [place]
+        for path in CAPTURE.all_in(place) or [place]
         for record in CaptureReader(path)
         if isinstance(record, RawPacket)
     ]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import count, takewhile
 from pathlib import Path
 
 
@@ -32,12 +33,13 @@ class SessionFile:
         path = Path(self.name)
         return re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?{re.escape(path.suffix)}", name) is not None
 
+    def all_in(self, folder: Path) -> list[Path]:
+        """Return such files in a folder, in order; none if the first is missing."""
+        return list(takewhile(Path.exists, (folder / self.numbered(number) for number in count(1))))
+
     def free_in(self, folder: Path) -> Path:
         """Return the first path in `folder` that does not exist yet."""
-        number = 1
-        while (path := folder / self.numbered(number)).exists():
-            number += 1
-        return path
+        return folder / self.numbered(len(self.all_in(folder)) + 1)
 
 
 CAPTURE = SessionFile(
@@ -64,3 +66,8 @@ TRUTH = SessionFile("truth.json", "true parameters of a simulated chip")
 LOG = SessionFile("session.log", "messages of a session after its terminal went away")
 
 SESSION_FILES = (CAPTURE, DOCUMENT, BLOB, REPORT, TRUTH, LOG)
+
+
+def captures_in(folder: Path) -> list[Path]:
+    """Return the captures of a session of a chip and of one of a vehicle."""
+    return [*CAPTURE.all_in(folder), *CAPTURE_OF_VEHICLE.all_in(folder)]

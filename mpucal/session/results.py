@@ -16,11 +16,10 @@ from ..data import Recording, Sensor
 from ..disk.atomic import remove_file, write_atomically, write_together
 from ..disk.output_folder import OutputFolder, free_name
 from ..errors import MpucalError, OutputError, UsageError
-from ..files.folder import all_captures_in
 from ..report import render
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import stamp
-from ..result.session_files import BLOB, DOCUMENT, REPORT, TRUTH
+from ..result.session_files import BLOB, DOCUMENT, REPORT, TRUTH, captures_in
 
 
 def result_files(
@@ -69,7 +68,7 @@ def check_owner(folder: Path, calibration: Calibration, read: Path | None, *word
     read : path of the recording that `calibration` was made from; None for other calibrations.
     words : the command line without -o, for the remedy.
     """
-    captures, document = all_captures_in(folder), folder / DOCUMENT.name
+    captures, document = captures_in(folder), folder / DOCUMENT.name
     own = (folder, *(captures if len(captures) == 1 else ()))
     if read is not None and any(read.samefile(each) for each in own if each.exists()):
         return
@@ -107,7 +106,7 @@ class SessionFolder(OutputFolder):
         self._given = given is not None
         self._capture_name = capture_name
         super().__init__(given or Path(f"session-{self._stamp}"), new=given is None)
-        held = [self.capture, self.path / DOCUMENT.name, *([] if again else all_captures_in(self.path))]
+        held = [self.capture, self.path / DOCUMENT.name, *([] if again else captures_in(self.path))]
         if there := next((file.name for file in held if file.exists()), None):
             self.close()
             raise OutputError(

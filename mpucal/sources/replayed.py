@@ -9,11 +9,10 @@ from pkgutil import resolve_name
 from typing import Any
 
 from ..errors import UsageError
-from ..files.folder import all_captures_in
 from ..files.mcap import Capture, read_capture
 from ..files.recorders import VEHICLE, recorder_of
 from ..files.tlog import TLOG, read_tlog
-from ..result.session_files import CAPTURE
+from ..result.session_files import CAPTURE, captures_in
 from ..session.plan import Plan
 from .kind import Request
 from .opened_source import SOURCE, OpenedSource
@@ -52,7 +51,7 @@ def open_resumed(folder: Path) -> OpenedSource:
     ------
     UsageError : no session, or its source cannot be opened again. CaptureError : a damaged head.
     """
-    if not all_captures_in(folder):
+    if not captures_in(folder):
         raise UsageError(f"{folder} does not hold a session", "give the folder of an interrupted session")
     captures = _read(folder)
     words = captures[0].meta.get(SOURCE)
@@ -76,7 +75,7 @@ def _read(place: Path) -> list[Capture]:
     ------
     CaptureError : not a capture.
     """
-    files = all_captures_in(place) or [place]
+    files = captures_in(place) or [place]
     return [read_tlog(file) if file.suffix.lower() == TLOG else read_capture(file) for file in files]
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from mpucal.errors import MpucalError
-from mpucal.files.folder import captures_in
 from mpucal.result.blob import Blob, BlobError
 from mpucal.result.calibration import REFUSED, Calibration
+from mpucal.result.session_files import captures_in
 from tools.processes import CODES, Ended
 
 from .judge import judged, judgement

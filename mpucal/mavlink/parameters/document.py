@@ -10,8 +10,6 @@ import numpy as np
 from ...calibration import calibrate_all
 from ...data import STANDARD_GRAVITY_MPS2, Autopilot, Recording
 from ...result.calibration import Calibration
-from .mounting import mounting
-from .slots import compose, find_slot
 
 AUTOPILOT, OTHERS = "autopilot", "others"
 OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
@@ -28,6 +26,9 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
     hold), and mounting (R_b by row). If the vehicle did not tell what is needed, params_new is empty, and `why` says
     what is missing.
     """
+    from .mounting import mounting  # noqa: PLC0415 - only a vehicle's session needs them
+    from .slots import compose, find_slot  # noqa: PLC0415
+
     document: dict[str, Any] = {
         "firmware": autopilot.firmware,
         "imu": autopilot.imu,
