@@ -62,12 +62,7 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
         if not isinstance(sink, Restorable) or not kept:
             raise OutputError(f"{applied.what}, but {error.what}", error.remedy) from cause
         # without a record, a bias that the device removes would be removed from its samples again
-        try:
-            back = sink.put_back(kept[0])
-        except MemoryError:
-            do = f"restore the old state with `mpucal write {kept[0]} {kind.name} ...`"
-            raise OutputError(f"{applied.what}, but {error.what}", do) from cause
-        raise WriteBackError(f"{error.what}; {back}", error.remedy) from cause
+        raise WriteBackError(f"{error.what}; {sink.put_back(kept[0])}", error.remedy) from cause
 
 
 def write_to_all(
