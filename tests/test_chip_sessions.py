@@ -6,7 +6,6 @@ those of the campaign, and their replays those of test_session_replay.py.
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -42,7 +41,7 @@ def recorded(words):
     """Record a chip for so long, as far as it gives samples, and calibrate."""
     plan = Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True)
     bus, accesses, said = open_simulated(words), [], ""
-    tapped = Tap(bus, SimpleNamespace(transaction=accesses.append))
+    tapped = Tap(bus, accesses.append)
     try:
         Runner(Driver(tapped, plan.config), SilentOperator(), lambda *_: None, plan, (bus.hear,)).record(RECORDED_S)
     except SourceError as error:

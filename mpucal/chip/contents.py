@@ -12,7 +12,6 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2
 from . import registers as reg
 from .access import Bus
-from .decode import Decoder
 from .families import PARTS
 from .offsets import PLACES, OffsetRegisters
 from .port import Port
@@ -27,7 +26,7 @@ def chip_contents(bus: Bus) -> dict[str, Any]:
     ------
     BusError : a transfer failed.
     """
-    port = Port(bus, Decoder("the chip"))
+    port = Port(bus)
     who_am_i = port.read(reg.WHO_AM_I, 1)[0]
     gyro, accel = port.read(reg.GYRO_CONFIG, 2)
     asleep = bool(port.read(reg.PWR_MGMT_1, 1)[0] & reg.PWR_MGMT_1_SLEEP)

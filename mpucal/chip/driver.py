@@ -91,7 +91,7 @@ class Driver:
     ) -> None:
         self._say = say
         self._decoder = Decoder(name)
-        self._port = Port(bus, self._decoder, stats)
+        self._port = Port(bus, self._decoder.feed, stats)
         self._config = config or Config()
         self._polls = 0
         self._next_poll_ns = 0

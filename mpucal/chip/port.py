@@ -1,9 +1,9 @@
-"""Access to a bus with retries: the registers of a chip, or the files of a kernel driver; a decoder follows."""
+"""Access to a bus with retries: the registers of a chip, or the files of a kernel driver."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from ..errors import BusError, NoAnswer
 from .access import Bus, Transaction
@@ -15,16 +15,8 @@ RETRY_NS = 1_000_000
 T = TypeVar("T")
 
 
-class Follower(Protocol):
-    """Decoder of the accesses of a driver."""
-
-    def feed(self, access: Transaction, /) -> None:
-        """Take one access."""
-        ...
-
-
 class Port:
-    """Reads and writes of one bus, each of which `decoder` follows if it succeeded.
+    """Reads and writes of one bus, each of which is passed to `follow` if it succeeded.
 
     Every method raises BusError if a transfer failed, and EndOfCapture at the end of a replay.
 
@@ -37,11 +29,17 @@ class Port:
     stats : counts the transfers. now_ns : last known time of the bus's clock.
     """
 
-    def __init__(self, bus: Bus, decoder: Follower, stats: TransferStats | None = None, tries: int = TRIES) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        follow: Callable[[Transaction], object] = lambda _access: None,
+        stats: TransferStats | None = None,
+        tries: int = TRIES,
+    ) -> None:
         self.stats = TransferStats() if stats is None else stats
         self.now_ns = 0
         self._bus = bus
-        self._decoder, self._tries = decoder, tries
+        self._follow, self._tries = follow, tries
 
     def read(self, register: Any, count: int) -> bytes:
         """Read `count` bytes from `register` on, or up to `count` of a file."""
@@ -56,7 +54,7 @@ class Port:
 
     def _read(self, register: Any, count: int) -> bytes:
         data, t_ns, host_ns = self._bus.read(register, count)
-        self._follow(Transaction("read", register, count, data, t_ns, None, host_ns))
+        self._pass_on(Transaction("read", register, count, data, t_ns, None, host_ns))
         return data
 
     def write(self, register: int, value: int) -> None:
@@ -66,7 +64,7 @@ class Port:
     def write_block(self, register: Any, data: bytes) -> None:
         """Write `data` from `register` on in one transfer, or to a file."""
         t_ns = self._tried(lambda: self._bus.write(register, data))
-        self._follow(Transaction("write", register, len(data), data, t_ns))
+        self._pass_on(Transaction("write", register, len(data), data, t_ns))
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bus's clock shows `t_ns`."""
@@ -77,9 +75,9 @@ class Port:
         """Wait `ns` nanoseconds of bus time."""
         self.sleep_until(self.now_ns + ns)
 
-    def _follow(self, access: Transaction) -> None:
+    def _pass_on(self, access: Transaction) -> None:
         self.now_ns = max(self.now_ns, access.t_ns)
-        self._decoder.feed(access)
+        self._follow(access)
 
     def _tried(self, access: Callable[[], T], after: type[BusError] = BusError) -> T:
         """Make an access and count it, again after errors of the kind `after`."""

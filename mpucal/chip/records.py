@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
-
-from .access import Transaction
+from typing import Any
 
 # Names of session events. KEY holds the key under its own name; LATE: an answer was late; FORGET: samples
 # first..last-1 are not used; RESUMED: the session was resumed; UTC: the time of day, ns since 1970.
@@ -28,11 +26,3 @@ class SessionEvent:
     name: str
     t_ns: int
     data: Mapping[str, Any] = field(default_factory=dict)
-
-
-class Recorder(Protocol):
-    """Receiver of register accesses."""
-
-    def transaction(self, transaction: Transaction) -> None:
-        """Record one access."""
-        ...

@@ -15,7 +15,6 @@ import numpy as np
 
 from ..chip.access import Bus
 from ..chip.config import MOST_POLLED_HZ, Config
-from ..chip.decode import Decoder
 from ..chip.driver import NO_FIFO, Driver
 from ..chip.families import PARTS, Family, Part
 from ..chip.identity import describe_mismatch
@@ -53,7 +52,7 @@ def examine(
     seconds : time to observe its samples; the board is to lie still. examine_bus : yields the findings about the bus.
     """
     stats = TransferStats()
-    port = Port(bus, Decoder("doctor"), stats)
+    port = Port(bus, stats=stats)
     patience = IMPATIENCE
     try:
         # Nothing is written to a chip that is not known.

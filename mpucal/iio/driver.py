@@ -98,7 +98,7 @@ class IioDriver:
     ) -> None:
         self._devices, self._config, self._say, self._trigger = devices, config, say, trigger
         self._decoder = IioDecoder(name)
-        self._files = Port(files, self._decoder, tries=1)
+        self._files = Port(files, self._decoder.feed, tries=1)
         self._each: list[DeviceSetup] = []
         self.buffered = False
         self._next_ns = self._fruitless_ns = self._warm_ns = 0

@@ -68,7 +68,7 @@ class KernelSink:
     def __init__(self, source: OpenedIio, journal: Journal | None = None) -> None:
         self._source, self._journal = source, journal or Journal()
         self._decoder = IioDecoder("the kernel's driver")
-        files = Port(source.bus, self._decoder, tries=1)
+        files = Port(source.bus, self._decoder.feed, tries=1)
         self._attributes = DeviceSetup(files, self._decoder, source.devices.accel, [ACCEL])
         name = f"61-mpucal-{source.devices.accel.replace(':', '-')}.rules"
         self._rule = None if source.rules is None else source.rules / name

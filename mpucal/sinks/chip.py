@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from ..chip.access import Bus
-from ..chip.decode import Decoder
 from ..chip.families import PARTS
 from ..chip.offsets import (
     PLACES,
@@ -79,7 +78,7 @@ class ChipSink:
 
     def __init__(self, bus: Bus, where: str, journal: Journal | None = None) -> None:
         self._journal = journal or Journal()
-        self._port = Port(bus, Decoder(where))
+        self._port = Port(bus)
         self.where = where
 
     def interruption_warning(self) -> str | None:

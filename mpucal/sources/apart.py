@@ -91,7 +91,8 @@ class SourceApart:
             # Real-time priority, if the user may set it; the process sleeps between two polls.
             with suppress(OSError):
                 os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
-            outbox = self._tap.recorder = Outbox(session)
+            outbox = Outbox(session)
+            self._tap.record = outbox.put
             try:
                 self._driver.start()
                 while not self._is_to_stop(session):
@@ -124,7 +125,7 @@ class Outbox:
 
     def __init__(self, session: Connection) -> None:
         self._queue: SimpleQueue[Any] = SimpleQueue()
-        self.put = self.transaction = self._queue.put
+        self.put = self._queue.put
         self._thread = Thread(target=self._send, args=(session,))
         self._thread.start()
 

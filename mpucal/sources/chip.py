@@ -56,11 +56,11 @@ class OpenedChip(OpenedSource):
     def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
         """See OpenedSource."""
 
-        tap = Tap(self.bus, recorder)
+        tap = Tap(self.bus, recorder.transaction)
 
         def tell(text: str) -> None:
             # The process that reads shows nothing.
-            if tap.recorder is recorder:
+            if tap.record == recorder.transaction:
                 say(f"  {text}.")
 
         driver, event = self.driver(tap, name, tell), recorder.event

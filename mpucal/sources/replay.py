@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Literal, TypeVar
 
 from ..chip.access import Bus, Failure, Reply, Transaction
-from ..chip.records import Recorder, SessionEvent
+from ..chip.records import SessionEvent
 from ..errors import BusError, BusHeld, CaptureError, EndOfCapture, LateRead, LinkError, NoAnswer
 from ..files.mcap import Record
 from ..mavlink.texts import is_own
@@ -157,28 +157,27 @@ T = TypeVar("T")
 
 
 class Tap:
-    """Passes every access on to `bus` and records it in `recorder`, failed accesses included.
+    """Passes every access on to `bus` and to `record`, failed accesses included.
 
     A failed access has no time: it is recorded with the last known time. Both may be replaced between two accesses.
     """
 
-    def __init__(self, bus: Bus, recorder: Recorder) -> None:
-        self.bus = bus
-        self.recorder = recorder
+    def __init__(self, bus: Bus, record: Callable[[Transaction], object]) -> None:
+        self.bus, self.record = bus, record
         self._latest_ns = 0
 
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
         reply = self._tried("read", register, count, b"", lambda: self.bus.read(register, count))
         self._latest_ns = max(self._latest_ns, reply.t_ns)
-        self.recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns, host_ns=reply.host_ns))
+        self.record(Transaction("read", register, count, reply.data, reply.t_ns, host_ns=reply.host_ns))
         return reply
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
         t_ns = self._tried("write", register, len(data), data, lambda: self.bus.write(register, data))
         self._latest_ns = max(self._latest_ns, t_ns)
-        self.recorder.transaction(Transaction("write", register, len(data), data, t_ns))
+        self.record(Transaction("write", register, len(data), data, t_ns))
         return t_ns
 
     def sleep_until(self, t_ns: int) -> None:
@@ -187,7 +186,7 @@ class Tap:
         self._latest_ns = max(self._latest_ns, t_ns)
 
     def close(self) -> None:
-        """Close the bus; the recorder stays open."""
+        """Close the bus."""
         self.bus.close()
 
     def _tried(
@@ -198,5 +197,5 @@ class Tap:
             return access()
         except BusError as error:
             failure = Failure(type(error).__name__, error.what, error.remedy)
-            self.recorder.transaction(Transaction(op, register, count, data, self._latest_ns, failure))
+            self.record(Transaction(op, register, count, data, self._latest_ns, failure))
             raise

@@ -39,7 +39,7 @@ def recorded(tmp_path, numbered):
         path = tmp_path / "capture.mcap"
         with CaptureWriter(path) as writer:
             writer.start({})
-            driver = Driver(Tap(BridgeBus(line), NewRecords(writer)), Config())
+            driver = Driver(Tap(BridgeBus(line), NewRecords(writer).transaction), Config())
             driver.start()
             while clock.now() < seconds * 1e9:
                 if reset_s is not None and clock.now() > reset_s * 1e9:

@@ -30,11 +30,8 @@ class Rig:
         self.chip = Chip(MODELS[model], feeds.NumberedFeed(), rate_error_ppm, FactoryTrim((-1500, 2001, 700)))
         self.inner = SimulatedBus(self.chip, self.clock)
         self.before: dict[tuple[str, int], Callable] = {}
-        self.bus = Tap(self, self)
+        self.bus = Tap(self, self.transactions.append)
         self.sleep_until, self.close = self.inner.sleep_until, self.inner.close
-
-    def transaction(self, transaction):
-        self.transactions.append(transaction)
 
     def read(self, register, count):
         self.before.get(("read", register), _nothing)()
@@ -99,13 +96,9 @@ def started():
 def tapped():
     """Opens a simulated chip and records its transactions: (bus, transactions)."""
 
-    class Recorder(list):
-        def transaction(self, transaction):
-            self.append(transaction)
-
     def tap(words):
-        recorder = Recorder()
-        return Tap(open_simulated(words), recorder), recorder
+        transactions = []
+        return Tap(open_simulated(words), transactions.append), transactions
 
     return tap
 

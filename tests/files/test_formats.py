@@ -98,7 +98,7 @@ def test_a_capture_gives_what_the_driver_gave(save, tmp_path):
     """Read three seconds of the simulated chip from the folder of its session, its capture, and an archive."""
     with CaptureWriter(tmp_path / "capture.mcap") as writer:
         writer.start({"source": "sim"})
-        driver = Driver(Tap(open_simulated("sim", seed=1), writer))
+        driver = Driver(Tap(open_simulated("sim", seed=1), writer.transaction))
         driver.start()
         for _ in range(150):
             driver.poll()

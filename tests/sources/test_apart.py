@@ -31,7 +31,7 @@ def rest(n=400):
 
 def tapped(bus):
     accesses = []
-    return Tap(bus, SimpleNamespace(transaction=accesses.append)), accesses
+    return Tap(bus, accesses.append), accesses
 
 
 def apart(bus, hands=(), parts=None):

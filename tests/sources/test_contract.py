@@ -39,7 +39,7 @@ def script(bus):
 
 @pytest.fixture(params=["bridge", "i2c", "sim", "replay", "tap"])
 def bus(request, adapter, still_chip):
-    recorder = _List()
+    accesses = []
     if request.param == "i2c":
         return I2cBus(str(adapter().path))
     simulated, clock = still_chip()
@@ -48,14 +48,9 @@ def bus(request, adapter, still_chip):
     if request.param == "sim":
         return simulated
     if request.param == "tap":
-        return Tap(simulated, recorder)
-    script(Tap(simulated, recorder))
-    return ReplayBus(recorder)
-
-
-class _List(list):
-    def transaction(self, transaction):
-        self.append(transaction)
+        return Tap(simulated, accesses.append)
+    script(Tap(simulated, accesses.append))
+    return ReplayBus(accesses)
 
 
 def test_registers_are_kept_the_fifo_does_not_increment_and_time_never_goes_back(bus):

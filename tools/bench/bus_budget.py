@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Annotated
 
 import numpy as np
@@ -87,7 +86,7 @@ def run(
 def polled(bus: Bus, rate_hz: float, seconds: float) -> tuple[Driver, list[Transaction], float]:
     """Poll for `seconds`; return the driver, the transactions after its start, and the share of a processor."""
     kept: list[Transaction] = []
-    driver = Driver(Tap(bus, SimpleNamespace(transaction=kept.append)), Config(rate_hz=rate_hz))
+    driver = Driver(Tap(bus, kept.append), Config(rate_hz=rate_hz))
     driver.start()
     kept.clear()
     until_ns = driver.now_ns() + seconds * 1e9

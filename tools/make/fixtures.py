@@ -153,7 +153,7 @@ def make_faults(folder: Path) -> None:
         simulated = open_simulated(f"sim:seed=8,chip=mpu6500,fault={name}@{FAULT_S:g}")
         with CaptureWriter(folder / f"{name}.mcap") as writer:
             writer.start(FAULTY.meta())
-            found = made_of_it(*measured(Tap(simulated, writer)))
+            found = made_of_it(*measured(Tap(simulated, writer.transaction)))
         (folder / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from ...chip import registers as reg
 from ...chip.access import Bus, Reply
 from ...chip.config import Config
-from ...chip.decode import Decoder
 from ...chip.driver import Driver
 from ...chip.families import PARTS, Part
 from ...chip.offsets import OffsetRegisters, Words
@@ -46,7 +45,7 @@ class SimulatedFiles(Bus):
 
     def __init__(self, bus: SimulatedBus, *, apart: bool = False, buffered: bool = True) -> None:
         self._bus = bus
-        self._port = Port(bus, Decoder("the simulated kernel"))
+        self._port = Port(bus)
         part = PARTS[read_identity(self._port)]
         self._place = part.family.accel_offset_h
         kinds = [[ACCEL], [GYRO]] if apart else [[ACCEL, GYRO]]
