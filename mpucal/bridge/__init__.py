@@ -15,30 +15,16 @@ from .micropython import MicroPythonPort
 from .port import Port, SerialPort
 from .store import BlobStore
 
-__all__ = ["BlobStore", "BridgeBus", "open_bridge", "open_link", "open_source", "open_store"]
-
-
-def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ...] | None = None) -> BridgeBus:
-    """Open the chip behind the bridge on PORT[:BAUD], or on a URL of pyserial such as socket://host:port.
-
-    Parameters
-    ----------
-    pins : SDA and SCL of a board with MicroPython, on which the bridge is started; empty: the board's own pins; None:
-        the board has the bridge's firmware.
-
-    Raises
-    ------
-    UsageError : no port is named. BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
-    """
-    return BridgeBus(_open_port(text, pins), address)
+__all__ = ["BlobStore", "BridgeBus", "open_link", "open_source", "open_store"]
 
 
 def open_source(request: Request) -> OpenedChip:
-    """Open the chip behind the bridge on a port; see open_bridge.
+    """Open the chip behind the bridge on PORT[:BAUD], or on a URL of pyserial such as socket://host:port.
 
     Raises
     ------
-    UsageError : the requested rate is more than a serial line can carry.
+    UsageError : no port is named, or the requested rate is more than a serial line can carry.
+    BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
     """
     config = request.plan.config
     if config.accel_only:
@@ -46,8 +32,8 @@ def open_source(request: Request) -> OpenedChip:
             f"a bridge cannot carry {config.rate_hz:g} samples a second",
             "use --rate 1000 or less, or connect the chip to an I2C bus of this computer",
         )
-    bridge = open_bridge(request.value, request.values.get("address"), request.values.get("micropython"))
-    return OpenedChip(bridge, request.plan, words=request.words)
+    bus = BridgeBus(_open_port(request.values), request.values.get("address"))
+    return OpenedChip(bus, request.plan, words=request.words)
 
 
 @contextmanager
@@ -65,11 +51,13 @@ def open_link(values: Mapping[str, Any]) -> Iterator[Link]:
     ------
     UsageError : no port is named. BusError : no such port, or no bridge on it.
     """
-    with closing(_open_port(values["serial"], values.get("micropython"))) as port:
+    with closing(_open_port(values)) as port:
         link = Link(port)
         link.greet()
         yield link
 
 
-def _open_port(text: str, pins: tuple[int | str, ...] | None) -> Port:
-    return SerialPort(text) if pins is None else MicroPythonPort(text, pins)
+def _open_port(values: Mapping[str, Any]) -> Port:
+    """Open a port; the bridge is started on a board with MicroPython, on the named pins or its own."""
+    pins: tuple[int | str, ...] | None = values.get("micropython")
+    return SerialPort(values["serial"]) if pins is None else MicroPythonPort(values["serial"], pins)

@@ -20,7 +20,6 @@ from . import registers as reg
 from .access import Bus
 from .config import Config
 from .decode import Decoder
-from .families import Part
 from .fifo import FifoDecoder
 from .identity import describe_mismatch
 from .losses import Loss, TransferStats, remedy_of
@@ -104,11 +103,6 @@ class Driver:
         """Return the last time of the bus's clock, at the host's rate as far as that is known."""
         fifo, now_ns = self._decoder.fifo, self._port.now_ns
         return now_ns if fifo is None else fifo.provisional_ns(now_ns)
-
-    @property
-    def part(self) -> Part:
-        """Part that the started chip was identified as."""
-        return self.settings.part
 
     @property
     def repaired(self) -> int:

@@ -94,7 +94,7 @@ def _examine_chip(
     port: Port, driver: Driver, config: Config, seconds: float, olds: list[OffsetRegisters], patience: int
 ) -> Iterator[Finding]:
     sensor = driver.start()
-    part, family = driver.part, driver.part.family
+    part, family = driver.settings.part, driver.settings.part.family
     mismatch = describe_mismatch(sensor)
     data = {"chip": sensor.chip, "who_am_i": sensor.who_am_i, "accel_range_g": sensor.accel_range_g}
     what = mismatch or f"{sensor.chip}, WHO_AM_I 0x{sensor.who_am_i or 0:02x}"

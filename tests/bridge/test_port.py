@@ -12,7 +12,7 @@ import serial
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from mpucal.bridge import open_bridge
+from mpucal.bridge.bus import BridgeBus
 from mpucal.bridge.link import Link
 from mpucal.bridge.port import BAUDS, SerialPort, split_port
 from mpucal.chip.config import Config
@@ -36,7 +36,7 @@ def test_a_port_and_its_rate(text, name, bauds):
 
 def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream):
     made = rig()
-    bus = open_bridge(serve(made.line.device, made.clock).name)
+    bus = BridgeBus(SerialPort(serve(made.line.device, made.clock).name))
     driver = Driver(bus, Config(rate_hz=1000))
     driver.start()
     stream(driver, 1)
@@ -54,7 +54,7 @@ def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_p
     made = rig()
     first, name = serve(made.line.device, made.clock), tmp_path / "ttyUSB0"
     name.symlink_to(first.name)
-    driver = Driver(open_bridge(str(name)), Config(rate_hz=200))
+    driver = Driver(BridgeBus(SerialPort(str(name))), Config(rate_hz=200))
     driver.start()
     stream(driver, 1)
     second = serve(made.new_bridge(), made.clock)
@@ -140,7 +140,7 @@ def test_nothing_stays_open_where_nobody_answers(monkeypatch):
     host, there = os.openpty()
     name = os.ttyname(there)
     with pytest.raises(BusError, match="nothing answers"):
-        open_bridge(name)
+        BridgeBus(SerialPort(name))
     assert opened(name) == 1
     os.close(host)
     os.close(there)
