@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
@@ -18,6 +19,7 @@ from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
 from .reading import HELD, check_size, first_bytes, import_extra, reading
 from .tables.array_table import table_of_arrays, tables_of_arrays
+from .tables.labelled import pivot
 from .tables.load import recording_from_table
 from .tables.phone import is_pair, recording_of_tables
 
@@ -63,7 +65,7 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
     table = table_of_arrays(path.name, found)
     if table is None:
         raise RecordingError(f"{path.name} holds no columns of numbers", _REMEDY)
-    return recording_from_table(table, hints)
+    return recording_from_table(pivot(table) or table, hints)
 
 
 def _read_numpy(path: Path) -> Arrays:
@@ -115,12 +117,14 @@ def _json_arrays(name: str, value: Any) -> Arrays:
         for key, each in value.items():
             yield from _json_arrays(f"{name}.{key}".removeprefix("."), each)
         return
-    for kind in (None, float, "M8[ns]"):
+    for kind in (None, float, "M8[ns]", str):
         try:
-            array = np.asarray(value, kind)
+            with warnings.catch_warnings(action="ignore"):
+                # NumPy warns of a zone
+                array = np.asarray(value, kind)
         except (TypeError, ValueError):
             continue
-        if array.dtype.kind in "iufM":
+        if array.dtype.kind in "iufM" or kind is str:
             yield name, array
             return
 
@@ -143,4 +147,8 @@ def _read_matlab(path: Path) -> Arrays:
     return read_matlab_arrays(path.read_bytes(), path)
 
 
-_READERS = {".mat": _read_matlab, ".npz": _read_numpy, ".npy": _read_numpy, ".parquet": _read_parquet}
+_READERS = {
+    **dict.fromkeys((".mat", ".h5", ".hdf5"), _read_matlab),
+    **dict.fromkeys((".npz", ".npy"), _read_numpy),
+    ".parquet": _read_parquet,
+}

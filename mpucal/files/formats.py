@@ -117,6 +117,7 @@ FORMATS = (
     *_others(".npz", "another program's archive of NumPy", _ARRAYS, "arrays:is_of_others"),
     *_others(".npy", "an array of NumPy", _ARRAYS),
     *_others(".mat", "a file of MATLAB", _ARRAYS),
+    *_others(".h5 .hdf5", "a file of HDF5", _ARRAYS),
     *_others(".json .jsonl .ndjson", "samples in JSON", _ARRAYS, "arrays:is_json_of_samples"),
     Format(".npz", "a NumPy archive", rows=f"{_HERE}.npz:npz_rows", writer=f"{_HERE}.npz:npz_file"),
     *_others(".parquet", "a Parquet file", _ARRAYS, only=False),
@@ -170,7 +171,8 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
             )
     others = [row for row in of_suffix if not row.only_recognised and row.suffix in (FOLDER, path.suffix.lower())]
     if found is None and not others:
-        raise RecordingError(f"{path} is not a recording that mpucal knows", f"give {_suffixes()}")
+        remedy = f"export a table as .csv, or give {_suffixes()}"
+        raise RecordingError(f"{path} is not a recording that mpucal knows", remedy)
     return found or others[-1]
 
 

@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from .reading import allowed_bytes, check_size, import_extra
 
 HEAD = 128
-MATLAB, HDF5 = b"MATLAB", b"MATLAB 7.3"
+MATLAB = b"MATLAB"
+# plain, and below a head of MATLAB's
+HDF5 = b"\x89HDF", b"MATLAB 7.3"
 ORDERS = {b"IM": "<", b"MI": ">"}
 # data types of elements, and classes of arrays
 MATRIX, COMPRESSED = 14, 15
@@ -71,7 +73,7 @@ def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]
             file.visit(names.append)
             for name in names:
                 item = file[name]
-                if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and item.ndim == 2:
+                if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and item.ndim in (1, 2):
                     check_size(path, item.size * item.dtype.itemsize)
                     # MATLAB stores by columns
                     yield name.replace("/", "."), item[()].T

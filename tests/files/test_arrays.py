@@ -53,6 +53,23 @@ def at_a_frequency(walk):
     return {"at": "26/06/20", "emg": {"data": [[0] * 8] * 4000}, "imu": {"frequency": 100.0, "data": data}}
 
 
+def of_sensor_logger(walk):
+    """Return an object for each sensor and time, of text, with the axes backwards, beside one without gravity."""
+    sensors = {"AccelerometerUncalibrated": walk.acc, "Accelerometer": walk.acc * 0.001, "Gyroscope": walk.gyr}
+    return [
+        {"sensor": of, "time": str(int(t * 1e9))}
+        | {axis: str(values[k, i]) for i, axis in ((2, "z"), (1, "y"), (0, "x"))}
+        for k, t in enumerate(walk.t)
+        for of, values in sensors.items()
+    ]
+
+
+def as_hdf5(path, walk, ns):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        file["imu/t"], file["imu/acc"], file["imu/gyro"] = walk.t, walk.acc, walk.gyr
+
+
 def in_json(document):
     return lambda path, walk, ns: path.write_text(json.dumps(document(walk)))
 
@@ -112,6 +129,8 @@ WRITTEN = {
     ),
     "Edge Impulse": ("a.json", in_json(lambda w: edge_impulse(w, acc="m/s2", gyr="rad/s")), "a rate of 100 Hz"),
     "Edge Impulse without units": ("a.json", in_json(edge_impulse), "a rate of 100 Hz"),
+    "JSON of Sensor Logger": ("a.json", in_json(of_sensor_logger), "its lines of one time were joined"),
+    "HDF5": ("a.h5", as_hdf5, "times in s"),
     "JSON at a frequency": ("a.json", in_json(at_a_frequency), "a rate of 100 Hz"),
     "an object on each line, of which the last is torn": (
         "a.jsonl",

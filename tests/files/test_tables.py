@@ -57,6 +57,9 @@ COLUMNS = {
     "epoch": lambda w, ns: ns // 10**6,
     "micros": lambda w, ns: dates(w).astype(int) % 10**6,
     "minutes": lambda w, ns: minutes(w),
+    "serial": lambda w, ns: 45413.5 + w.t / 86400,
+    "overflow": lambda w, ns: (2**32 - 5_000_000 + np.rint(w.t * 1e6).astype(np.int64)) % 2**32,
+    "digits": lambda w, ns: [f"{date.item():%Y%m%d%H%M%S%f}"[:-3] for date in dates(w)],
     "a": lambda w, ns: w.acc,
     "zyx": lambda w, ns: w.acc[:, ::-1],
     "g": lambda w, ns: w.acc / G,
@@ -66,10 +69,13 @@ COLUMNS = {
     "w": lambda w, ns: w.gyr,
     "wzyx": lambda w, ns: w.gyr[:, ::-1],
     "dps": lambda w, ns: np.degrees(w.gyr),
+    "mrad": lambda w, ns: w.gyr * 1000,
     "field": lambda w, ns: 0.01 * w.acc,
     "jerk": lambda w, ns: 0.3 * w.gyr,
     "000": lambda w, ns: 0.0 * w.acc,
     "counts": lambda w, ns: counts(w),
+    "1024": lambda w, ns: np.rint(w.acc * 1024 / G).astype(int),
+    "rates": lambda w, ns: counts(w)[:, 3:],
     "unsigned": lambda w, ns: counts(w) % 65536,
     "upward": lambda w, ns: counts(w) + 32768,
 }
@@ -304,7 +310,45 @@ FORMS = {
         *("clock. a w", "{} > " + ",".join(["{}"] * 6) + "\n"),
     ),
     "times in brackets": Form("", "date a w", "[{}] {},{},{},{},{},{}\n", "walk.log", BY_GRAVITY, edit=("T", " ")),
+    "Python's logging": Form(
+        *("", "clock, a w", "2024-05-01 {} - INFO - {}, {}, {}, {}, {}, {}\n", "walk.log", BY_GRAVITY)
+    ),
+    "numbers of rows without a name": Form(f"time,{AXES}", "i t a w"),
+    "days": Form(f"Time,{AXES}", "serial a w", says="times in days"),
+    "a counter that overflows": Form(
+        f"micros,{AXES}", "overflow a w", says="times in us, whose counter overflows 1 times"
+    ),
+    "a date in digits": Form(f"Time,{AXES}", "digits a w", says="times in ns"),
+    "Movella DOT": Form(
+        "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n", "i us a dps", says="times in us"
+    ),
+    "units in brackets below the names": Form(
+        f"Time,{AXES}(s),(g),(g),(g),(deg/s),(deg/s),(deg/s)\n", "t g dps", says="accelerations in g"
+    ),
+    "a checksum": Form("", "ms a w", "$IMU,{},{},{},{},{},{},{}*5A\r\n", "walk.txt", BY_GRAVITY),
+    "1024 for 1 g": Form(
+        AXES, "1024 rates", hints=AT_100_HZ, says="±32 g (by |a|) and rates in counts", atol=5 * IN_COUNTS
+    ),
+    "g beside counts": Form(f"time,{AXES}", "t g rates", says="in g and rates in counts of ±500", atol=IN_COUNTS),
+    "lines of a receiver between": Form(
+        f"time,{AXES[:-1]},lat\n", "t a w", "{},{},{},{},{},{},{},\n", edit=("0.05,", "0.045,,,,,,,48.1\n0.05,")
+    ),
+    "ArduPilot's log as text": Form(
+        "FMT, 172, 60, IMU, QBffffff, TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ\nPARM, 1, AHRS, 2\n",
+        *("us w a", "IMU, {}, 0, {}, {}, {}, {}, {}, {}\nGPS, 1, 2\n", "flight.log"),
+    ),
+    "mavlogdump": Form(
+        *("", "clock. mg mrad"),
+        "2024-05-01 {}: SCALED_IMU {{xacc : {}, yacc : {}, zacc : {}, xgyro : {}, ygyro : {}, zgyro : {}}}\n",
+        *("walk.txt", "accelerations in mg and rates in mrad/s"),
+    ),
     # lines that name some of the numbers, and make a sample together
+    "numbers below a heading": Form(
+        "", "a w", "Accelerometer:\n{} {} {}\nGyroscope:\n{} {} {}\n", "walk.txt", "a rate", AT_100_HZ
+    ),
+    "axes without marks": Form(
+        "", "a dps", "Accel   x {}  y {}   z {}\nGyro    x {}  y {}  z {}\n", "walk.txt", "a rate", AT_100_HZ
+    ),
     "ESP-IDF": Form(
         *("I (312) cpu_start: Starting scheduler on PRO CPU.\n", "tick g tick dps"),
         "I ({}) mpu6050: acce_x:{}, acce_y:{}, acce_z:{}\n"
@@ -543,6 +587,10 @@ def test_gravity_that_is_missing_or_hidden_is_told(read, walk):
         read(f"time,{AXES}", "t a w", of=none)
     with pytest.raises(RecordingError, match=r"without gravity \(FreeAcc_X, FreeAcc_Y, FreeAcc_Z\)"):
         read("SampleTimeFine,Euler_X,Euler_Y,Euler_Z,FreeAcc_X,FreeAcc_Y,FreeAcc_Z\n", "ticks w a", of=none)
+    # a phone's estimate of gravity is no accelerometer's
+    head = ",".join(f"{of}{axis}" for of in ("UserAcceleration", "Gravity", "RotationRate") for axis in "XYZ")
+    with pytest.raises(RecordingError, match=r"without gravity \(UserAccelerationX"):
+        read(f"time,{head}\n", "t jerk g w")
     shaken = replace(walk, acc=walk.acc * np.random.default_rng(4).uniform(0.2, 3, (len(walk), 1)))
     with pytest.raises(RecordingError, match="would be gravity in g") as refused:
         read(AXES, "g dps", of=shaken)

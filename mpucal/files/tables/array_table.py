@@ -31,7 +31,7 @@ def _columns(arrays: Arrays) -> dict[str, NDArray[Any]]:
     """Return name -> (n,) for the arrays of the largest number of samples."""
     tables = {}
     for name, array in arrays.items():
-        if array.dtype.kind in "iufMm" and 0 < np.squeeze(array).ndim <= 2:
+        if array.dtype.kind in "iufMmU" and 0 < np.squeeze(array).ndim <= 2:
             table = np.squeeze(array)
             table = table[:, None] if table.ndim == 1 else table
             tables[name] = table.T if table.shape[0] <= WIDEST < table.shape[1] else table

@@ -32,6 +32,10 @@ _TIME_OF_DAY = re.compile(
 ).fullmatch
 # a date that does not begin with the year, or not as ISO 8601 has it, and a time of day
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.*)").fullmatch
+# a date and time of day in digits alone
+_COMPACT = re.compile(
+    r"(20\d\d)(0[1-9]|1[0-2])([0-3]\d)[T_ -]?([01]\d|2[0-3])([0-5]\d)([0-5]\d)[._]?(\d{0,6})(Z?)"
+).fullmatch
 _ISO = re.compile(r"\d{4}-\d\d-\d\d").match
 _MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
 
@@ -72,6 +76,8 @@ def parse_cell(text: str) -> Decimal:
     ValueError : it is none of these.
     """
     text = text.strip()
+    if compact := _COMPACT(text):
+        text = "{}-{}-{}T{}:{}:{}.{:0<6}{}".format(*compact.groups())
     try:
         number = Decimal(with_point(text))
         if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
@@ -103,7 +109,7 @@ def is_number(cell: str, dates: bool = True) -> bool:
     """Return True if a cell holds a number, or a date or time of day if `dates`."""
     try:
         parse_cell(cell)
-        return dates or Decimal(with_point(cell.strip())).is_finite()
+        return dates or (not _COMPACT(cell.strip()) and Decimal(with_point(cell.strip())).is_finite())
     except (ValueError, InvalidOperation):
         return False
 

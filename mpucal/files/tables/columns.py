@@ -13,7 +13,7 @@ from ...errors import RecordingError
 from ..hints import ROLES, Hints
 from .cells import Kind
 from .guess import guess_columns, is_clock, is_even_clock
-from .names import ACC, GYR, TEMPERATURE, TIME, WITHOUT_GRAVITY, Column, first_triple, parse_column_name
+from .names import ACC, ESTIMATED, GYR, TEMPERATURE, TIME, WITHOUT_GRAVITY, Column, first_triple, parse_column_name
 from .table import Table
 from .units import BEYOND, acceleration_unit, are_counts, mean_acceleration_unit
 
@@ -78,8 +78,8 @@ def columns_by_hint(header: Sequence[str], roles: Mapping[str, str | int]) -> li
 
 
 def _numbers(table: Table) -> dict[int, Vector]:
-    """Return place -> (n,) of the columns of numbers in whole lines."""
-    places = table.places(Kind.NUMBER)
+    """Return place -> (n,) of the columns of numbers that a sensor may have measured, in whole lines."""
+    places = [place for place in table.places(Kind.NUMBER) if not ESTIMATED.search(table.name_of(place))]
     with suppress(RecordingError):
         numbers = table.numbers([Column("", place, "") for place in places])
         whole = (np.abs(numbers) < BEYOND**2).all(axis=1)

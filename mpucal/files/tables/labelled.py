@@ -21,7 +21,7 @@ from .names import (
     parse_header,
 )
 from .table import Table
-from .text import PREAMBLE, table_of_rows
+from .text import PREAMBLE, read_table, table_of_rows
 
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
 _NAME = r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})"
@@ -29,7 +29,7 @@ _PAIR = re.compile(rf"{_NAME}\s?[:=][ \t]{{0,9}}(?:({MOMENT})|({NUMBER}))(?![\w:
 # programs' ways to write the time of a line, beside a date at its beginning: ESP-IDF's log, Teleplot, InfluxDB
 _AT = "line_time="
 _TIMES = (
-    (re.compile(rf"^(?:[\w-]{{1,12}} ){{0,3}}(?={MOMENT}\b)", re.MULTILINE), _AT),
+    (re.compile(rf"^(?:[\w-]{{1,12}} ){{0,3}}({MOMENT})\b:?", re.MULTILINE), rf"{_AT}\1 "),
     (re.compile(r"^[EWIDV] \((\d{1,12})\) ", re.MULTILINE), rf"{_AT}\1, "),
     (re.compile(r"^>([A-Za-z_]\w{0,40}):(\d{10,19}):", re.MULTILINE), rf"{_AT}\2, \1:"),
     (re.compile(r"(?<=\d)[ \t](\d{10,19})\r?$", re.MULTILINE), rf", {_AT}\1"),
@@ -41,7 +41,7 @@ _AXES = (rf"(?:{axis}[ \t]{{0,9}}[:=]?[ \t]{{0,9}})?({NUMBER}|nan)" for axis in 
 _THREE = re.compile(
     r"(?<![\w.])([A-Za-z_]\w{0,40})[ \t]{0,9}[:=]?\s{0,3}[(\[]?[ \t]{0,9}"
     + r"(?:[ \t]{0,9}[,;|][ \t]{0,9}|[ \t]{1,9})".join(_AXES)
-    + r"(?![\w.])"
+    + r"(?![\w.])(?![ \t]{0,9}[,;|]?[ \t]{0,9}[-+.\d])"
 )
 # as `rostopic echo` and `ros2 topic echo` print messages
 _BETWEEN_RECORDS = "\n---\n"
@@ -87,6 +87,13 @@ def marked_table(text: str, name: str) -> Table | None:
             found = table_of_rows(name, each.columns.split(), rows, [*range(1, len(rows) + 1)])
             return replace(found, ranges=each.ranges)
     return None
+
+
+def dataflash_text_table(text: str, name: str) -> Table | None:
+    """Return the table in an ArduPilot log as text, whose FMT line names the columns; None for other text."""
+    named = re.search(r"^FMT, ?\d+, ?\d+, ?IMU, ?\w+, ?([\w,]+)\r?$", text, re.MULTILINE)
+    lines = re.findall(r"^IMU, ?(.+)\n", text, re.MULTILINE)
+    return read_table("\n".join(lines), name, named[1].split(","), 0, ",") if named and lines else None
 
 
 def labelled_table(text: str, name: str) -> Table | None:
@@ -176,18 +183,21 @@ def pivot(table: Table) -> Table | None:
     increasing = [Column(TIME, at, TIME) for at, of in numbers.items() if is_clock(of)]
     clocks = sorted(table.clocks(table.columns) or increasing, key=lambda clock: clock.rank)
     free = [at for at in numbers if at not in {clock.place for clock in (*clocks, *increasing)}]
-    called = [at for at in free if parse_axis_name(table.name_of(at)) or table.name_of(at).strip("_").lower() == VALUE]
+    axes = {at: axis for at in free if (axis := parse_axis_name(table.name_of(at)))}
+    called = sorted(axes, key=axes.__getitem__) or [at for at in free if table.name_of(at).strip("_").lower() == VALUE]
     if not clocks or not free:
         return None
     records: dict[str, list[dict[str, str]]] = {}
     for time, word, *row in zip(*(table.cells[at] for at in (clocks[0].place, place, *(called or free))), strict=True):
         if word in names:
-            found = dict(zip(names[word], row, strict=False))
+            found = dict(zip(names[word], map(str, row), strict=False))
             # a second sample at one time is another one
             at_once = records.setdefault(time, [])
             record = next((each for each in at_once if not found.keys() & each.keys()), None)
             at_once.append(found) if record is None else record.update(found)
     header = list(dict.fromkeys(chain(*names.values())))
-    rows = [[time, *(each.get(name, "") for name in header)] for time, at_once in records.items() for each in at_once]
+    rows = [
+        [str(time), *(each.get(name, "") for name in header)] for time, at_once in records.items() for each in at_once
+    ]
     made = table_of_rows(table.name, [clocks[0].name or TIME, *header], rows, [*range(1, len(rows) + 1)])
     return replace(made, remarks=(*table.remarks, "its lines of one time were joined"))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...data import Recording, Vector
+from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
@@ -19,7 +19,7 @@ from .cells import Kind
 from .clock import FEWEST
 from .columns import find_columns
 from .guess import is_index
-from .labelled import labelled_table, marked_table, pivot
+from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
 from .names import (
     ACC,
     BY_A_WORD,
@@ -104,7 +104,7 @@ def find_any_table(text: str, name: str, wanted: Sequence[str | int] = ()) -> Ta
     """Return the table of the `wanted` columns, or of named ones, or else of numbers."""
     if wanted:
         return find_wanted_table(text, name, wanted)
-    for find in (marked_table, labelled_table, find_named_table):
+    for find in (marked_table, dataflash_text_table, labelled_table, find_named_table):
         if (found := find(text, name)) is not None:
             return found
     found = find_bare_table(text, name)
@@ -174,13 +174,13 @@ def sensor_stream(
 ) -> Stream:
     """Return the samples in one sensor's three columns, and the temperatures beside them; see Stream.
 
-    Many lines without any number are those of another sensor.
+    Lines without any number are those of another sensor if they are many, or hold cells that the others lack.
     """
     values = table.numbers(axes)
     values = -values if axes[0].sign_flipped else values
     values[~np.isfinite(values)] = np.nan
-    empty = np.isnan(values).all(axis=1)
-    others = np.count_nonzero(empty) > MOST_ODD * len(values)
+    empty = np.asarray(np.isnan(values).all(axis=1))
+    others = int(np.count_nonzero(empty)) > MOST_ODD * len(values) or _are_of_others(table, empty)
     units = {column.unit for column in axes}
     kept, timed = np.asarray(~empty | (not others)), None
     of_sensor = [clock for clock in clocks if clock.clock_of in ("", axes[0].quantity)]
@@ -205,6 +205,13 @@ def sensor_stream(
         lost=0 if others else int((~kept).sum()),
         rate_hz=table.rate_hz,
     )
+
+
+def _are_of_others(table: Table, empty: Mask) -> bool:
+    """Return True if there is a column that holds cells only in lines where this sensor has none."""
+    has = (table.has(Column("", at, "")) for at in range(len(table.cells)))
+    some = 0 < int(np.count_nonzero(empty)) < len(empty)
+    return some and any(bool(of[empty].mean() > 0.5 > of[~empty].mean()) for of in has)
 
 
 def _increases(ticks: Vector) -> bool:

@@ -59,6 +59,8 @@ COLDEST_C, WARMEST_C = -60.0, 130.0
 FLIPPED_STEMS = ("accelerometeracceleration",)
 # accelerations from which a program has taken gravity
 WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
+# the direction of gravity as a program estimates it, which an accelerometer of no errors would measure
+ESTIMATED = re.compile(r"gravity", re.IGNORECASE)
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
 BY_A_WORD = len(STEMS[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")

@@ -41,7 +41,8 @@ MONITORED = re.compile(
     r"|\][ \t]*|[ \t]*-?>[ \t]*|[ \t]+(?=[-+.\d][^\n ]*[,;\t]))",
     re.MULTILINE,
 )
-COLOUR = re.compile(r"\x1b\[[0-9;]{0,9}m")
+# colours of a terminal, and the checksums of sentences as of NMEA 0183
+_MARKS = re.compile(r"\x1b\[[0-9;]{0,9}m|\*[0-9A-F]{2}(?=\r?$)", re.MULTILINE)
 # a number and its unit in one cell
 _WITH_UNIT = re.compile(r"[-+.\d][-+.,\deE]*( ?[^-+.,\d\s][^\d]{0,9}\d?)").fullmatch
 _NUMBER_OR_MOMENT = re.compile(rf"(?<![\w.])(?:{MOMENT}|{NUMBER})(?!\w)")
@@ -81,7 +82,7 @@ def decode_text(data: bytes, name: str) -> str:
     if "\n" not in text:
         text = text.replace("\r", "\n")
     head = _QUOTED.sub(lambda quoted: " ".join(quoted[0].split("\n")), text[:HEAD])
-    text = COLOUR.sub("", head + text[HEAD:])
+    text = _MARKS.sub("", head + text[HEAD:])
     begun = text[:HEAD].rstrip("\n")
     stamped = [*MONITORED.finditer(begun)]
     if 2 * len(stamped) <= begun.count("\n"):
@@ -232,9 +233,10 @@ def read_table(text: str, name: str, header: Cells, first: int, separator: str |
     if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]):
         # the logger was switched off
         rows[-1] = []
-    if rows and any(map(find_unit, rows[0])) and not any(map(is_number, rows[0])):
-        pairs = zip_longest(header, rows[0], fillvalue="")
-        header = [f"{of} ({unit.strip()})" if unit.strip() else of for of, unit in pairs]
+    units = [cell.strip(" ()[]") for cell in rows[0]] if rows else []
+    if any(map(find_unit, units)) and not any(map(is_number, units)):
+        pairs = zip_longest(header, units, fillvalue="")
+        header = [f"{of} ({unit})" if unit else of for of, unit in pairs]
         rows, lines = rows[1:], lines[1:]
     remarks = [] if separator == "," else [f"its cells are separated by {SEPARATORS[separator]}"]
     table = table_of_rows(name, header, rows, lines, *remarks)

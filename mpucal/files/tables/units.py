@@ -22,7 +22,7 @@ FEWEST_PER_G, MOST_PER_G = 8, 14
 QUANTITIES = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4, DAYS: 86400.0},
     "acc": {"m/s^2": 1.0, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1000, COUNTS: math.nan},
-    "gyr": {"rad/s": 1.0, "deg/s": math.radians(1), "mdeg/s": math.radians(1e-3), COUNTS: math.nan},
+    "gyr": {"rad/s": 1.0, "deg/s": math.radians(1), "mdeg/s": math.radians(1e-3), "mrad/s": 1e-3, COUNTS: math.nan},
 }
 _SPELLED = {
     "s": "s sec secs second seconds",
@@ -36,6 +36,7 @@ _SPELLED = {
     "rad/s": "rad/s radpers rads-1 radps rads rad/sec radians/s rps rad",
     "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s degrees/sec deg",
     "mdeg/s": "mdeg/s mdps",
+    "mrad/s": "mrad/s",
     COUNTS: "counts count lsb raw adc",
 }
 _NAMES = {spelled: unit for unit, words in _SPELLED.items() for spelled in words.split()}
