@@ -9,7 +9,6 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
@@ -97,10 +96,10 @@ def next_steps(
     calibration: Calibration,
     paths: Sequence[Path],
     recording: Path | None = None,
-    source: Mapping[str, Any] = MappingProxyType({}),
+    source: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the list of files that were written to `paths`, and what to do next; see command_again."""
-    again = command_again(calibration, paths[0].parent if paths else None, recording, source)
+    again = command_again(calibration, paths[0].parent if paths else None, recording, source or {})
     how = f"run\n  {again}" if again else "give the same command again."
     refused = f"Next: follow the remedy above, and {how}"
     if not paths:

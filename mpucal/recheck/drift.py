@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -66,29 +65,25 @@ UNKNOWN_C = 3.0
 # A smaller change of temperature is within the thermometer's error, or that of a chip that warms unevenly.
 LEAST_C = 2.0
 # Change in one degree Celsius, by kind of chip.
-BY_TEMPERATURE: Mapping[str, Spread] = MappingProxyType(
-    {
-        "MPU-6050": Spread(0.5 * MG, 2e-4, gyro_bias=0.16 * DEG, gyro_scale=2e-4),
-        "MPU-6500": Spread(1.0 * MG, 2.6e-4, gyro_bias=0.24 * DEG, gyro_scale=4e-4),
-    }
-)
+BY_TEMPERATURE: Mapping[str, Spread] = {
+    "MPU-6050": Spread(0.5 * MG, 2e-4, gyro_bias=0.16 * DEG, gyro_scale=2e-4),
+    "MPU-6500": Spread(1.0 * MG, 2.6e-4, gyro_bias=0.24 * DEG, gyro_scale=4e-4),
+}
 # Factory tolerances, for parameters whose uncertainty the calibration does not state.
 TOLERANCE = Spread(80.0 * MG, 0.03, 0.02, 2.0 * DEG, 20.0 * DEG, 0.02, 0.01)
 # Standard deviation of G where the fit found no difference from the identity.
 PERFECT_GYRO = 0.003
 
 # Hypotheses of a change: the prior probability of each, given that something changed, and the size of the change.
-HYPOTHESES: Mapping[str, tuple[float, Spread]] = MappingProxyType(
-    {
-        "bias": (0.4, Spread(bias=20.0 * MG)),
-        "scale": (0.1, Spread(scale=0.01)),
-        "mount": (0.15, Spread(turn=2.0 * DEG)),
-        "gyroscope's bias": (0.1, Spread(gyro_bias=5.0 * DEG)),
-        "gyroscope's scale": (0.05, Spread(gyro_scale=0.02, gyro_skew=0.01)),
-        "another sensor": (0.2, Spread(100.0 * MG, 0.02, 0.01, 1.5 * DEG, 10.0 * DEG, 0.015, 0.012)),
-        "noise": (0.1, Spread(noise=1.0)),
-    }
-)
+HYPOTHESES: Mapping[str, tuple[float, Spread]] = {
+    "bias": (0.4, Spread(bias=20.0 * MG)),
+    "scale": (0.1, Spread(scale=0.01)),
+    "mount": (0.15, Spread(turn=2.0 * DEG)),
+    "gyroscope's bias": (0.1, Spread(gyro_bias=5.0 * DEG)),
+    "gyroscope's scale": (0.05, Spread(gyro_scale=0.02, gyro_skew=0.01)),
+    "another sensor": (0.2, Spread(100.0 * MG, 0.02, 0.01, 1.5 * DEG, 10.0 * DEG, 0.015, 0.012)),
+    "noise": (0.1, Spread(noise=1.0)),
+}
 TEMPERATURE, TEMPERATURE_PRIOR = "temperature", 0.5
 
 

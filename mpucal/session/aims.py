@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from types import MappingProxyType
 
 import numpy as np
 
@@ -47,13 +46,11 @@ class Aim:
     flat_s: float = FLAT_S
 
 
-AIMS: Mapping[str, Aim] = MappingProxyType(
-    {
-        "quick": Aim(Target(0.3, 0.15, 3.0), least=8, least_of_vehicle=8, longest_s=60.0, verify=2),
-        "normal": Aim(Target(0.1, 0.05, 1.0), least=10, least_of_vehicle=14, longest_s=120.0, verify=3),
-        "best": Aim(Target(0.04, 0.02, 0.4), least=14, least_of_vehicle=14, longest_s=240.0, verify=3),
-    }
-)
+AIMS: Mapping[str, Aim] = {
+    "quick": Aim(Target(0.3, 0.15, 3.0), least=8, least_of_vehicle=8, longest_s=60.0, verify=2),
+    "normal": Aim(Target(0.1, 0.05, 1.0), least=10, least_of_vehicle=14, longest_s=120.0, verify=3),
+    "best": Aim(Target(0.04, 0.02, 0.4), least=14, least_of_vehicle=14, longest_s=240.0, verify=3),
+}
 NORMAL = "normal"
 # An autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows what is left of it.
 FLAT_OF_VEHICLE_S = 5.0
