@@ -51,30 +51,12 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class SiSetting:
-    """Setting whose counts are m/s^2, rad/s and degrees Celsius, without a full scale; see Setting."""
-
-    rate_hz: float
-    mps2_per_lsb: float = 1.0
-    rad_s_per_lsb: float = 1.0
-    lsb_per_c: float = 1.0
-    zero_c: float = 0.0
-    accel_offset_g: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    gyro_offset_dps: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
 class SensorResponse:
     """Response in counts: (f, w) times `matrix` (6, 7) + `offset` (7,) + noise of standard deviation `noise` (7,)."""
 
     matrix: Vector
     offset: Vector
     noise: Vector
-
-    def values(self, specific_force: Vector, omega: Vector, normal: Vector) -> Vector:
-        """Return (n, 7) before rounding, with noise from `normal` (n, 7) of unit variance; see `counts`."""
-        exact = np.concatenate((specific_force, omega), axis=1) @ self.matrix + self.offset
-        return np.asarray(exact + normal * self.noise)
 
     def counts(self, specific_force: Vector, omega: Vector, rng: np.random.Generator) -> Counts:
         """Return the chip's samples of the mean motion over each sample.
@@ -87,7 +69,8 @@ class SensorResponse:
         -------
         (n, 7) int16 in register order: accelerometer x, y, z, temperature, gyroscope x, y, z; saturated.
         """
-        noisy = self.values(specific_force, omega, rng.standard_normal((len(omega), len(self.offset))))
+        exact = np.concatenate((specific_force, omega), axis=1) @ self.matrix + self.offset
+        noisy = exact + rng.standard_normal(exact.shape) * self.noise
         return np.minimum(np.maximum(np.rint(noisy), -FULL_SCALE), FULL_SCALE - 1).astype(np.int16)
 
 
@@ -147,7 +130,7 @@ class SensorTruth:
             seed=seed,
         )
 
-    def response(self, setting: Setting | SiSetting) -> SensorResponse:
+    def response(self, setting: Setting) -> SensorResponse:
         """Return the sensor's response under a setting.
 
         A mean over one sample passes white noise up to half the sample rate.

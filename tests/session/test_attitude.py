@@ -13,7 +13,7 @@ from mpucal.session.machine import Machine
 from mpucal.session.meter import MotionWatch
 from mpucal.simulated.hands import HANDS
 from mpucal.simulated.motion import Motion
-from mpucal.simulated.sensor import SensorTruth, SiSetting
+from mpucal.simulated.sensor import FULL_SCALE, SensorTruth, Setting
 
 # Length of a simulated session, within which the hands' mishaps happen; a poll is 50 ms long.
 SECONDS, RATE_HZ, POLL = 40.0, 100.0, 5
@@ -60,13 +60,14 @@ def learnt(down):
 
 def polls(motion, rng):
     """The samples of a sensor that is moved so, a poll after the other."""
-    response = SensorTruth.draw(1).response(SiSetting(RATE_HZ))
+    setting = Setting(RATE_HZ, 4.0, GYRO_RANGE_DPS, lsb_per_c=340.0, zero_c=36.53)
+    response, no = SensorTruth.draw(1).response(setting), np.zeros(POLL, bool)
     for first in range(0, round(SECONDS * RATE_HZ), POLL):
         edges_s = np.arange(first, first + POLL + 1) / RATE_HZ
-        values = response.values(*motion.means(edges_s), rng.standard_normal((POLL, 7)))
-        most, no = np.radians(GYRO_RANGE_DPS), np.zeros(POLL, bool)
-        gyr = np.clip(values[:, 4:], -most, most)
-        yield Samples(edges_s[1:], values[:, :3], gyr, values[:, 3], no, no, (np.abs(gyr) == most).any(axis=1))
+        counts = response.counts(*motion.means(edges_s), rng).astype(float)
+        acc, gyr = counts[:, :3] * setting.mps2_per_lsb, counts[:, 4:] * setting.rad_s_per_lsb
+        clipped = (np.abs(counts[:, 4:] + 0.5) > FULL_SCALE - 1).any(axis=1)
+        yield Samples(edges_s[1:], acc, gyr, np.full(POLL, 25.0), no, no, clipped)
 
 
 def meters(hand):
