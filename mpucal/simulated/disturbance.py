@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,73 +89,61 @@ WARMER_C, WARMING_S = 15.0, 40.0
 ACC_MPS2_A_C, GYRO_RAD_S_A_C = 0.005, math.radians(0.1)
 
 
-class Mishap:
-    """Base of mishaps, which has no effect itself."""
+# A change of a sensor: from the seconds since its begin (n,), negative before it, and from specific force [m/s^2] and
+# rate [rad/s] without it, both (n, 3), to those that it feels.
+Change = Callable[[Vector, Vector, Vector], tuple[Vector, Vector]]
 
-    def __init__(self) -> None:
-        self._begun_s = math.inf
+
+def slip(since_s: Vector, force: Vector, rate: Vector) -> tuple[Vector, Vector]:
+    """Turn the accelerometer on its mount, too slowly for the operator to notice; the gyroscope stays."""
+    turn = _share(since_s, SLIP_S) * SLIP_RAD
+    # The angle is small: a first-order rotation is exact enough.
+    return force - np.cross(turn, force), rate
+
+
+def knock(since_s: Vector, force: Vector, rate: Vector) -> tuple[Vector, Vector]:
+    """Add a blow, which shifts the accelerometer's zero."""
+    share = _share(since_s, KNOCK_S)
+    return force + share * ZERO_SHIFT_MPS2 + 4.0 * share * (1.0 - share) * KNOCK_MPS2, rate
+
+
+def zero_step(
+    since_s: Vector, force: Vector, rate: Vector, step_mps2: Vector = ZERO_STEP_MPS2
+) -> tuple[Vector, Vector]:
+    """Step the accelerometer's bias from one sample to the next, which the operator does not notice."""
+    return force + (since_s >= 0.0)[:, None] * step_mps2, rate
+
+
+def warming(since_s: Vector, force: Vector, rate: Vector) -> tuple[Vector, Vector]:
+    """Add biases by the data sheet's temperature coefficients, as in sunshine."""
+    warmer = _warmer_c(since_s)
+    return force + ACC_MPS2_A_C * warmer, rate + GYRO_RAD_S_A_C * warmer
+
+
+def _warmer_c(since_s: Vector) -> Vector:
+    return WARMER_C * _share(since_s, WARMING_S)
+
+
+def _share(since_s: Vector, seconds: float) -> Vector:
+    """Return (n, 1) the progress of a change that takes `seconds`: 0 before, 1 after."""
+    return minimum_jerk(since_s / seconds)[:, None]
+
+
+@dataclass
+class Mishap:
+    """Change of a sensor, and the time of its begin; infinity: not yet."""
+
+    change: Change
+    begun_s: float = math.inf
 
     def begin(self, t_s: float) -> None:
         """Schedule it at `t_s`, unless it began before."""
-        self._begun_s = min(self._begun_s, t_s)
+        self.begun_s = min(self.begun_s, t_s)
 
     def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
         """Return specific force (n, 3) [m/s^2] and rate (n, 3) [rad/s] at the sensor, changed by it, at times (n,)."""
-        return force, rate
+        return self.change(t_s - self.begun_s, force, rate)
 
     def warmer_c(self, t_s: Vector) -> Vector:
         """Return (n,) degrees Celsius by which the chip is warmer than at first."""
-        return np.zeros(len(t_s))
-
-    def _share(self, t_s: Vector, seconds: float) -> Vector:
-        """Return (n,) the progress of a change that takes `seconds`: 0 before, 1 after."""
-        return minimum_jerk((t_s - self._begun_s) / seconds) if math.isfinite(self._begun_s) else np.zeros(len(t_s))
-
-
-class Slip(Mishap):
-    """A slip of the accelerometer on its mount; the gyroscope stays."""
-
-    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
-        """Turn the force by some degrees, too slowly for the operator to notice."""
-        turn = self._share(t_s, SLIP_S)[:, None] * SLIP_RAD
-        # The angle is small: a first-order rotation is exact enough.
-        return force - np.cross(turn, force), rate
-
-
-class Knock(Mishap):
-    """A blow, which shifts the accelerometer's zero."""
-
-    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
-        """Add the blow and the shift of the zero."""
-        share = self._share(t_s, KNOCK_S)[:, None]
-        return force + share * ZERO_SHIFT_MPS2 + 4.0 * share * (1.0 - share) * KNOCK_MPS2, rate
-
-
-class ZeroStep(Mishap):
-    """A step of the accelerometer's bias, which the operator does not notice.
-
-    Parameters
-    ----------
-    step : (3,) m/s^2.
-    """
-
-    def __init__(self, step: Vector = ZERO_STEP_MPS2) -> None:
-        super().__init__()
-        self._step = step
-
-    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
-        """Add the step from one sample to the next."""
-        return force + (t_s >= self._begun_s)[:, None] * self._step, rate
-
-
-class Warmth(Mishap):
-    """Sunshine: the chip warms, and its biases follow."""
-
-    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
-        """Add the biases of the data sheet's temperature coefficients."""
-        warmer = self.warmer_c(t_s)[:, None]
-        return force + ACC_MPS2_A_C * warmer, rate + GYRO_RAD_S_A_C * warmer
-
-    def warmer_c(self, t_s: Vector) -> Vector:
-        """Return up to WARMER_C."""
-        return WARMER_C * self._share(t_s, WARMING_S)
+        return _warmer_c(t_s - self.begun_s)[:, 0] if self.change is warming else np.zeros(len(t_s))

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Self
 
 from ..chip.registers import FIFO_COUNT_H, FIFO_R_W
-from .disturbance import Knock, Mishap, Slip, Warmth, ZeroStep
+from .disturbance import Change, Mishap, knock, slip, warming, zero_step
 
 
 class Where(StrEnum):
@@ -47,7 +47,7 @@ class FaultKind:
     strike : called with the chip, begin [ns] and end [ns], or with the vehicle.
     share : of the packets or bytes that it affects.
     spoils : makes bytes of a byte on a serial line and a number from 1 to 255, which varies the damage.
-    mishap : of the sensor.
+    mishap : change of the sensor.
     pins : words of a sample, by number, and the count at which they stay. alters : makes another reply of a register
         and its data.
     """
@@ -65,7 +65,7 @@ class FaultKind:
     strike: Callable[..., None] | None = None
     share: float = 0.0
     spoils: Callable[[int, int], bytes] | None = None
-    mishap: type[Mishap] | None = None
+    mishap: Change | None = None
     pins: tuple[tuple[int, ...], int] | None = None
     alters: Callable[[int, bytes], bytes] | None = None
 
@@ -131,10 +131,10 @@ _ROWS = (
     ALWAYS("zero_gz", DEFECT, "gyroscope z stays at 0", pins=((6,), 0)),
     ALWAYS("stuck_gy", DEFECT, "gyroscope y stays at -15", pins=((5,), -15)),
     ALWAYS("stuck_temp", DEFECT, "the thermometer stays at 0", pins=(TEMPERATURE, 0)),
-    FaultKind("loose", HAND, "the accelerometer turns by 8 deg on its mount", mishap=Slip),
-    FaultKind("knock", HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=Knock),
-    FaultKind("zero_step", HAND, "the accelerometer's bias steps by 10 mg on x", mishap=ZeroStep),
-    FaultKind("warming", HAND, "the chip warms by 15 °C within 40 s, and its biases follow", mishap=Warmth),
+    FaultKind("loose", HAND, "the accelerometer turns by 8 deg on its mount", mishap=slip),
+    FaultKind("knock", HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=knock),
+    FaultKind("zero_step", HAND, "the accelerometer's bias steps by 10 mg on x", mishap=zero_step),
+    FaultKind("warming", HAND, "the chip warms by 15 °C within 40 s, and its biases follow", mishap=warming),
     FaultKind("arm", VEHICLE, "it is armed", strike=lambda vehicle: vehicle.arm()),
     FaultKind("reboot", VEHICLE, "it boots anew, and is silent for 2 s", strike=lambda vehicle: vehicle.reboot()),
     FaultKind("silence", VEHICLE, "it sends and hears nothing any more", strike=lambda vehicle: vehicle.fall_silent()),
@@ -224,9 +224,4 @@ class Schedule:
 
 def begin_mishaps(faults: Iterable[Fault]) -> list[Mishap]:
     """Return the mishaps of the sensor, each scheduled at its time."""
-    begun = []
-    for fault in faults:
-        if fault.kind.mishap is not None:
-            begun.append(fault.kind.mishap())
-            begun[-1].begin(fault.at_s)
-    return begun
+    return [Mishap(fault.kind.mishap, fault.at_s) for fault in faults if fault.kind.mishap is not None]

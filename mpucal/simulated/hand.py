@@ -12,7 +12,7 @@ from ..calibration.rotation import shortest_turn
 from ..data import Vector
 from ..mavlink.texts import Prompt
 from . import rotation
-from .disturbance import Mishap
+from .disturbance import Change, Mishap
 from .legs import STEP_HZ, Hold, Leg, Move, steps
 
 # Nobody reacts faster, so the motion is fixed this far ahead.
@@ -43,12 +43,12 @@ class Manner:
     Attributes
     ----------
     grip : with which it pauses in an orientation. speed : of its moves, relative to the usual.
-    mishap : of the sensor, while it turns.
+    mishap : change of the sensor while it turns.
     """
 
     grip: float = IN_THE_HAND
     speed: float = 1.0
-    mishap: type[Mishap] = Mishap
+    mishap: Change | None = None
 
 
 USUAL = Manner()
@@ -63,7 +63,7 @@ class Hand:
 
     Attributes
     ----------
-    mishap : of the sensor in this hand.
+    mishap : of the sensor in this hand; None: there is none.
     """
 
     def __init__(self, rng: np.random.Generator, manner: Manner = USUAL) -> None:
@@ -75,7 +75,7 @@ class Hand:
         self._task = "hold_still"
         self._down: Vector | None = None
         self._moved = False
-        self.mishap = manner.mishap()
+        self.mishap = None if manner.mishap is None else Mishap(manner.mishap)
 
     def first_stance(self) -> Stance:
         """Return the board as it is picked up, with a random tilt."""
@@ -88,7 +88,7 @@ class Hand:
         if received == self._last:
             return
         self._last = received
-        if prompt.kind == "rotate":
+        if prompt.kind == "rotate" and self.mishap is not None:
             self.mishap.begin(t_s + MISHAP_AFTER_S)
         obeyed = math.ceil((t_s + self._reaction_rng.uniform(*REACTION_S)) * STEP_HZ)
         if self._prompts:

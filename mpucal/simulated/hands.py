@@ -12,7 +12,7 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
-from .disturbance import Knock, Slip, Warmth
+from .disturbance import knock, slip, warming
 from .hand import IN_THE_HAND, ON_THE_TABLE, PAUSE_S, TURN_RAD, USUAL, Hand, Manner, Stance
 from .legs import Leg, Move, Tumble, steps
 
@@ -149,7 +149,7 @@ HANDS: dict[str, Callable[[np.random.Generator], Hand]] = {
     "one_axis": OneAxis,
     "hasty": partial(Guided, manner=Manner(speed=4.0)),
     # the mishap comes while it turns, instead of at the time of a fault
-    "slipping": partial(Guided, manner=Manner(mishap=Slip)),
-    "knocking": partial(Guided, manner=Manner(mishap=Knock)),
-    "warming": partial(Guided, manner=Manner(mishap=Warmth)),
+    "slipping": partial(Guided, manner=Manner(mishap=slip)),
+    "knocking": partial(Guided, manner=Manner(mishap=knock)),
+    "warming": partial(Guided, manner=Manner(mishap=warming)),
 }

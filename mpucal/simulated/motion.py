@@ -106,7 +106,7 @@ class Motion:
 
     Attributes
     ----------
-    mishaps : of both, those that have an effect.
+    mishaps : of both.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Motion:
         disturbance: HandDisturbance = ARMS[USUAL_ARM],
     ) -> None:
         self._hand = hand
-        self.mishaps = tuple(mishap for mishap in (hand.mishap, *mishaps) if type(mishap) is not Mishap)
+        self.mishaps = tuple(mishap for mishap in (hand.mishap, *mishaps) if mishap is not None)
         self._gravity, self._disturbance = gravity, disturbance
         lever = rng.normal(size=3)
         self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(*disturbance.lever_m)

@@ -13,6 +13,7 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from mpucal.bridge.bus import BridgeBus
 from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.simulated.chip import SimulatedBus, open_simulated
 from mpucal.simulated.chip.bus import FaultInjector
-from mpucal.simulated.disturbance import Mishap, ZeroStep
+from mpucal.simulated.disturbance import Mishap, zero_step
 from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, begin_mishaps, fault_kinds
 from mpucal.simulated.vehicle.transport import PacketLine, SimulatedTransport
 
@@ -117,7 +118,7 @@ class World:
         D, b_a = np.array(document["D"], float), np.array(document["b_a"], float)
         maps = []
         for mishap in _befallen(blows):
-            times = mishap._begun_s + np.array([-1.0, 10.0, 20.0, 30.0, 1000.0])
+            times = mishap.begun_s + np.array([-1.0, 10.0, 20.0, 30.0, 1000.0])
             maps.append([_affine(mishap, t) for t in times])
         found = []
         for chosen in product(*maps):
@@ -215,13 +216,11 @@ def _befallen(blows: Sequence[TimedFault]) -> list[Mishap]:
     return [*begin_mishaps(_faults(blows)), *(_step(blow) for blow in blows if blow.name == STEP)]
 
 
-def _step(blow: TimedFault) -> ZeroStep:
+def _step(blow: TimedFault) -> Mishap:
     rng = np.random.default_rng(blow.number)
     direction = rng.normal(size=3)
     size = np.exp(rng.uniform(*np.log(STEP_MG))) / MG_PER_MPS2
-    step = ZeroStep(direction / np.linalg.norm(direction) * size)
-    step.begin(blow.at_s)
-    return step
+    return Mishap(partial(zero_step, step_mps2=direction / np.linalg.norm(direction) * size), blow.at_s)
 
 
 def _affine(mishap: Mishap, t_s: float) -> tuple[np.ndarray, np.ndarray]:
