@@ -331,7 +331,7 @@ FORMS = {
     ),
     "g beside counts": Form(f"time,{AXES}", "t g rates", says="in g and rates in counts of ±500", atol=IN_COUNTS),
     "lines of a receiver between": Form(
-        f"time,{AXES[:-1]},lat\n", "t a w", "{},{},{},{},{},{},{},\n", edit=("0.05,", "0.045,,,,,,,48.1\n0.05,")
+        f"time,{AXES[:-1]},lat\n", "t a w", "{},{},{},{},{},{},{},\n", edit=("\n0.05,", "\n0.045,,,,,,,48.1\n0.05,")
     ),
     "ArduPilot's log as text": Form(
         "FMT, 172, 60, IMU, QBffffff, TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ\nPARM, 1, AHRS, 2\n",

@@ -12,10 +12,10 @@ from ...data import Vector
 from ...errors import RecordingError
 from ..hints import ROLES, Hints
 from .cells import Kind
-from .guess import guess_columns, is_clock, is_even_clock
+from .guess import guess_columns, is_even_clock, likely_columns
 from .names import ACC, ESTIMATED, GYR, TEMPERATURE, TIME, WITHOUT_GRAVITY, Column, first_triple, parse_column_name
 from .table import Table
-from .units import BEYOND, acceleration_unit, are_counts, mean_acceleration_unit
+from .units import BEYOND
 
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
 _GIVE_VALUES = "export the accelerometer's own values and the rates of the gyroscope"
@@ -39,7 +39,7 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
         if named:
             columns = [*columns, *(Column(table.header[place], place, TIME) for place in even[:1])]
             remark = "".join(f"{table.name_of(place)} is taken for the time" for place in even[:1])
-        elif found := _guess(of, hints):
+        elif found := guess_columns(of, hints):
             times = {} if clocks else dict(zip("t", even, strict=False))
             found = times | {role: place for role, place in found.items() if role != "t" or not clocks}
             order = _order(found | ({"t": clocks[0].place} if clocks else {}))
@@ -87,13 +87,6 @@ def _numbers(table: Table) -> dict[int, Vector]:
     return {}
 
 
-def _guess(of: Mapping[int, Vector], hints: Hints) -> dict[str, int]:
-    """Return role -> place among columns of numbers, by physics; see guess_columns."""
-    places = list(of)
-    found = guess_columns(np.column_stack([*of.values()]), hints) if of else {}
-    return {role: places[at] for role, at in found.items()}
-
-
 def _order(roles: Mapping[str, int]) -> str:
     """Return roles as text in the order of their columns, with `-` for others."""
     at = {place: role for role, place in roles.items()}
@@ -110,39 +103,14 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
             f"{table.name} holds no columns of an accelerometer; its columns are {names}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
         )
-    options = _likely_options(table, columns)
-    if options is None:
+    likely = likely_columns(_numbers(table), [clock.place for clock in table.clocks(columns)])
+    if likely is None:
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
         return RecordingError(what, _GIVE_VALUES)
+    roles, unit = likely
+    options = f"--columns {_order(roles)}" + (f" --units acc={unit}" if unit else "") if roles else ""
     return RecordingError(
         f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are {names}",
         f"name its columns in their order with {options or NAMED_BY_ORDER}, and - for one to leave out",
         options,
     )
-
-
-def _likely_options(table: Table, columns: Sequence[Column]) -> str | None:
-    """Return options if triples of the columns are the sensors'; empty if they are too few, None without gravity."""
-    of = _numbers(table)
-    increasing = [place for place in of if is_clock(of[place])]
-    clocks = [c.place for c in table.clocks(columns)] or [place for place in increasing if is_even_clock(of[place])]
-    sensors = [place for place in of if place not in {*clocks, *increasing}]
-    triples = [sensors[first : first + 3] for first in range(0, len(sensors) - 2, 3)]
-    values = [np.column_stack([of[place] for place in triple]) for triple in triples]
-    if not triples:
-        return ""
-    acc = next((i for i, each in enumerate(values) if are_counts(each) or mean_acceleration_unit(each)), None)
-    if acc is None:
-        return None
-    # rates are none at times, other than a magnetic field
-    others = sorted((i for i in range(len(triples)) if i != acc), key=lambda i: _steadiness(values[i]))
-    found = [place for i in (acc, *others[:1]) for place in triples[i]]
-    roles = dict(zip(ROLES[1:], found, strict=False)) | dict(zip("t", clocks, strict=False))
-    unit = "" if are_counts(values[acc]) or acceleration_unit(values[acc]) else mean_acceleration_unit(values[acc])
-    return f"--columns {_order(roles)}" + (f" --units acc={unit}" if unit else "")
-
-
-def _steadiness(values: Vector) -> float:
-    """Return the first quartile of the lengths of (n, 3) over their median."""
-    low, size = np.percentile(np.linalg.norm(values, axis=1), [25, 50]).tolist()
-    return low / size if size else 0.0

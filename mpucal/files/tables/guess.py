@@ -8,7 +8,7 @@ units. Nothing is guessed that physics does not confirm.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from ..hints import ROLES, Hints
 from .clock import FEWEST, sample_period
 from .units import (
     ANY_HZ,
-    BEYOND,
     EXPLAINED,
     FASTEST_HZ,
     FEWEST_PER_G,
@@ -26,12 +25,15 @@ from .units import (
     acceleration_unit,
     are_counts,
     gyro_unit,
+    mean_acceleration_unit,
     time_unit,
     to_signed,
     turning,
     typical_size,
 )
 
+# place -> (n,)
+Columns = Mapping[int, Vector]
 WIDEST = 16
 # relative error of |a| at rest that is still nearly 1 g: the scale factors and biases of usual sensors
 ONE_G = 0.04
@@ -43,39 +45,63 @@ EVEN = 0.99
 ALIKE = 0.1
 
 
-def guess_columns(table: Vector, hints: Hints) -> dict[str, int]:
-    """Return role -> place among the columns of (n, k) numbers; empty if nothing fits."""
-    table = table[np.isfinite(table).all(axis=1)]
-    if len(table) >= FEWEST:
-        varies = np.flatnonzero(np.ptp(table, axis=0) > 0.0)
-        if len(varies) < table.shape[1]:
-            return {role: int(varies[at]) for role, at in guess_columns(table[:, varies], hints).items()}
-    n, width = table.shape
-    if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND**2).all():
+def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
+    """Return role -> place among columns of numbers, which physics confirms; empty if nothing fits."""
+    n = len(next(iter(of.values()), ()))
+    of = {place: column for place, column in of.items() if n < FEWEST or np.ptp(column) > 0.0}
+    if n < FEWEST or not 6 <= len(of) <= WIDEST:
         return {}
-    clocks = [place for place in range(width) if is_clock(table[:, place]) and not is_index(table[:, place])]
+    clocks = [place for place, column in of.items() if is_clock(column) and not is_index(column)]
     for at in (*clocks, None):
-        t = _seconds(None if at is None else table[:, at], n, hints)
-        pairs = _pairs(table, [place for place in range(width) if place != at])
-        turned = {pair: _turned(table, pair, t, any_rate=at is None) for pair in pairs}
+        t = _seconds(None if at is None else of[at], n, hints)
+        pairs = _pairs(of, [place for place in of if place != at])
+        turned = {pair: _turned(of, pair, t, any_rate=at is None) for pair in pairs}
         # rates turn a magnetic field, too
         for sized in (True, False):
-            alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and _has_size(table, pair) is sized]
+            alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and _has_size(_stacked(of, pair[:3])) is sized]
             best = max((turned[pair] for pair in alike), default=0.0)
             found = next((pair for pair in alike if turned[pair] >= best - ALIKE), None)
             if found is not None:
                 return dict(zip(ROLES[1:], found, strict=True)) | ({} if at is None else {"t": at})
-    return _accelerometer_alone(table, clocks)
+    # a board that hardly turned: the only triple of columns as long as gravity
+    found_alone = [triple for triple in _triples(of, clocks[:1]) if _is_one_g(_stacked(of, triple))]
+    alone = dict(zip(ROLES[1:4], found_alone[0], strict=True)) if len(found_alone) == 1 else {}
+    return alone | (dict(zip("t", clocks, strict=False)) if alone else {})
 
 
-def _accelerometer_alone(table: Vector, clocks: list[int]) -> dict[str, int]:
-    """Return the only triple of columns as long as gravity, and the time; for a board that hardly turned."""
-    places = [place for place in range(table.shape[1]) if place not in clocks[:1]]
-    triples = [places[first : first + 3] for first in range(0, len(places) - 2, 3)]
-    found = [triple for triple in triples if _is_one_g(table[:, triple])]
-    if len(found) != 1:
-        return {}
-    return dict(zip(ROLES[1:4], found[0], strict=True)) | dict(zip("t", clocks, strict=False))
+def likely_columns(of: Columns, clocks: Sequence[int]) -> tuple[dict[str, int], str] | None:
+    """Return role -> place of triples of columns that are the sensors', and a unit of the accelerations to be named.
+
+    They are none if there are no triples. None if no triple may be as long as gravity.
+    """
+    increasing = [place for place in of if is_clock(of[place])]
+    clocks = clocks or [place for place in increasing if is_even_clock(of[place])]
+    triples = {triple: _stacked(of, triple) for triple in _triples(of, {*clocks, *increasing})}
+    acc = next((triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)), None)
+    if acc is None:
+        return None if triples else ({}, "")
+    # rates are none at times, other than a magnetic field
+    others = sorted((triple for triple in triples if triple != acc), key=lambda triple: _steadiness(triples[triple]))
+    found = [place for triple in (acc, *others[:1]) for place in triple]
+    roles = dict(zip(ROLES[1:], found, strict=False)) | dict(zip("t", clocks, strict=False))
+    return roles, "" if _has_size(triples[acc]) else mean_acceleration_unit(triples[acc])
+
+
+def _triples(of: Columns, without: Collection[int]) -> list[tuple[int, ...]]:
+    """Return the places of the columns in threes."""
+    places = [place for place in of if place not in without]
+    return [tuple(places[first : first + 3]) for first in range(0, len(places) - 2, 3)]
+
+
+def _stacked(of: Columns, places: Sequence[int]) -> Vector:
+    """Return columns as (n, k) numbers, counts with their sign."""
+    return to_signed(np.column_stack([of[place] for place in places]))
+
+
+def _steadiness(values: Vector) -> float:
+    """Return the first quartile of the lengths of (n, 3) over their median."""
+    low, size = np.percentile(np.linalg.norm(values, axis=1), [25, 50]).tolist()
+    return low / size if size else 0.0
 
 
 def _is_one_g(acc: Vector) -> bool:
@@ -87,9 +113,8 @@ def _is_one_g(acc: Vector) -> bool:
     return 0.0 < scatter < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
 
 
-def _has_size(table: Vector, pair: Sequence[int]) -> bool:
-    """Return True if the first three columns are as large as gravity in some unit, or counts."""
-    acc = to_signed(table[:, list(pair[:3])])
+def _has_size(acc: Vector) -> bool:
+    """Return True if (n, 3) numbers are as large as gravity in some unit, or counts."""
     return are_counts(acc) or bool(acceleration_unit(acc))
 
 
@@ -120,17 +145,17 @@ def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
     return np.asarray((clock - clock[0]) * si)
 
 
-def _pairs(table: Vector, places: list[int]) -> list[tuple[int, ...]]:
+def _pairs(of: Columns, places: list[int]) -> list[tuple[int, ...]]:
     """Return the places of two sensors' three adjacent columns each, of which the first keep a magnitude."""
     starts = range(len(places) - 2)
-    sizes = {a: typical_size(to_signed(table[:, places[a : a + 3]])) for a in starts}
+    sizes = {a: typical_size(_stacked(of, places[a : a + 3])) for a in starts}
     gravity = [a for a, (size, scatter) in sizes.items() if 0.0 < scatter <= MOST_SCATTER * size]
     return [(*places[a : a + 3], *places[w : w + 3]) for a in gravity for w in starts if abs(a - w) >= 3]
 
 
-def _turned(table: Vector, pair: Sequence[int], t: Vector, *, any_rate: bool) -> float:
+def _turned(of: Columns, pair: Sequence[int], t: Vector, *, any_rate: bool) -> float:
     """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
-    acc, gyr = (to_signed(table[:, list(places)]) for places in (pair[:3], pair[3:]))
+    acc, gyr = _stacked(of, pair[:3]), _stacked(of, pair[3:])
     factor, correlation = turning(t, acc, gyr)
     of_a_unit = any_rate or are_counts(gyr) or gyro_unit(factor)
     return correlation if factor > 0.0 and of_a_unit else 0.0
