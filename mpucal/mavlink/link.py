@@ -57,6 +57,7 @@ class Link:
     Attributes
     ----------
     received, lost : number of the vehicle's packets since the lock, and of those lost by their sequence numbers.
+    heard_ns : time of its last packet.
     stations : ids of the other ground stations whose HEARTBEAT came from the vehicle's address.
     armed : True if the vehicle's last HEARTBEAT says that it is armed, None before the first.
     """
@@ -81,8 +82,7 @@ class Link:
         self._seeking = False
         self._next_heartbeat_ns = self._now_ns
         self._sequence: int | None = None
-        self._counted_ns = 0
-        self.received = self.lost = 0
+        self.received = self.lost = self.heard_ns = 0
         self.stations: set[int] = set()
         self.armed: bool | None = None
         self._signed = self._unsigned = 0
@@ -140,7 +140,7 @@ class Link:
     def lock(self, vehicle: Vehicle) -> None:
         """Receive from `vehicle` alone from now on, and send to it."""
         self._vehicle = vehicle
-        self.received = self.lost = 0
+        self.received, self.lost, self.heard_ns, self._sequence = 0, 0, self._now_ns, None
         self._transport.restrict(vehicle.address)
         for t_ns, address, data in self._before_lock:
             if address in (vehicle.address, None):
@@ -208,7 +208,7 @@ class Link:
         self._queue.clear()
         self._before_lock.clear()
         self._listeners.clear()
-        self._vehicle, self._seeking, self._sequence, self.armed = None, False, None, None
+        self._vehicle, self._seeking, self.armed = None, False, None
         self._now_ns = self._next_heartbeat_ns = max(self._now_ns, self._transport.now_ns())
 
     def close(self) -> None:
@@ -311,7 +311,7 @@ class Link:
         self._signed += header.incompat_flags & SIGNED
         self._unsigned += not header.incompat_flags & SIGNED
         last = self._sequence
-        if last is None or self._now_ns - self._counted_ns > SILENCE_NS:
+        if last is None or self._now_ns - self.heard_ns > SILENCE_NS:
             last = header.seq - 1
         step = (header.seq - last) % SEQUENCE
         if 0 < step < SEQUENCE - LATE:
@@ -319,7 +319,7 @@ class Link:
             self.lost += step - 1
         elif step:
             self.lost = max(self.lost - 1, 0)
-        self._counted_ns = self._now_ns
+        self.heard_ns = self._now_ns
 
     def _new_receiver(self) -> Any:
         """Return a MAVLink for one address: a forged packet must not change the signature times of another address.

@@ -65,7 +65,7 @@ class VehicleSource:
         self._stream: Stream | None = None
         self._rows: list[Row] = []
         self._last_us: float | None = None
-        self._heard_ns = self._sampled_ns = 0
+        self._sampled_ns = 0
         self._pause_ns = 0
         self._rebooted = False
         self._changes_reported = 0
@@ -100,7 +100,7 @@ class VehicleSource:
         self._rows = []
         # What was rebooted between two parts is back.
         self._rebooted &= first
-        self._heard_ns = self._sampled_ns = self._link.now_ns()
+        self._sampled_ns = self._link.now_ns()
         return sensor_of(self._stream, firmware, parameters, self._rate_hz)
 
     def poll(self) -> Samples:
@@ -115,13 +115,12 @@ class VehicleSource:
             self._pause_ns = 0
             self._wait_for_return()
         begun_ns = self._link.now_ns()
-        for _ in self._link.messages(begun_ns + POLL_NS):
-            self._heard_ns = self._link.now_ns()
+        list(self._link.messages(begun_ns + POLL_NS))
         pause_ns = self._link.now_ns() - begun_ns
         if pause_ns > PAUSE_NS:
             # The samples of before are returned first.
             self._pause_ns = pause_ns
-            self._heard_ns = self._sampled_ns = self._link.now_ns()
+            self._sampled_ns = self._link.now_ns()
             return self._take_samples()
         if self._streams is not None:
             self._streams.watch()
@@ -228,16 +227,17 @@ class VehicleSource:
         if self._streams is not None:
             self._streams.request_again()
         begun_ns = self._link.now_ns()
-        for _ in self._link.messages(begun_ns + LOOK_NS):
-            self._heard_ns = self._link.now_ns()
+        list(self._link.messages(begun_ns + LOOK_NS))
         return self._sampled_ns > begun_ns
 
     def _fault(self) -> str:
         if self._rebooted:
             return "rebooted (its clock started again)"
         now_ns = self._link.now_ns()
-        heard = now_ns - self._heard_ns < SILENT_NS
-        what, since_ns = ("no IMU messages", self._sampled_ns) if heard else ("nothing", self._heard_ns)
+        what, since_ns = "no IMU messages", self._sampled_ns
+        if now_ns - self._link.heard_ns >= SILENT_NS:
+            # What was sent before a pause is not told from what was sent during it.
+            what, since_ns = "nothing", max(self._link.heard_ns, self._sampled_ns)
         return f"has sent {what} for {(now_ns - since_ns) // S} s"
 
 

@@ -221,10 +221,9 @@ class AutopilotSink:
         now = adapt_to_write(calibration, planned, level)
         writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait(), level.turn))
         imus = " and ".join(str(change.imu) for change in planned)
-        residuals = ", ".join(f"{change.residual} (IMU {change.imu})" for change in planned)
         clauses = [
-            f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams; they have no"
-            f" cross-axis terms, which leaves errors of up to {residuals}",
+            f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams",
+            *(f"IMU {each.imu}: without cross-axis terms, errors of up to {each.residual} remain" for each in planned),
             _level_clause(level, of_level),
             *self._finish(before, first, level),
             *_unchanged_clauses(possible, planned, refused_imus(calibration)),
