@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..mavlink.firmwares import ARDUPILOT, PX4
-from ..mavlink.parameters.encoding import INT32, param_text, params_text
+from ..mavlink.firmwares import PX4
+from ..mavlink.parameters.encoding import parameters_text
 from ..mavlink.parameters.plan import plan_changes, refused_imus
 from ..result.calibration import Calibration
 from .losses import date_text
@@ -31,9 +31,7 @@ def text(calibration: Calibration, notes: Sequence[str], firmware: str) -> str:
     values = {name: value for change in changes for name, value in change.slot.values(change.new).items()} | ids
     imus = ", ".join(str(change.imu) for change in changes)
     about = f"Accelerometer calibration of a {firmware} vehicle by mpucal, {date_text(calibration)}: IMU {imus}"
-    if firmware == ARDUPILOT:
-        return param_text(values, (about, *notes))
-    return params_text(values, (about, *notes), types=dict.fromkeys(ids, INT32))
+    return parameters_text(firmware, values, (about, *notes), whole=ids)
 
 
 def losses(calibration: Calibration, firmware: str) -> tuple[str, ...]:

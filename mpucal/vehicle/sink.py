@@ -17,7 +17,7 @@ from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.link import Link, S
 from ..mavlink.parameters import document
 from ..mavlink.parameters.client import read_parameters, read_stream_parameters, require_parameters
-from ..mavlink.parameters.encoding import param_text, params_text, read_parameters_file
+from ..mavlink.parameters.encoding import parameters_text, read_parameters_file
 from ..mavlink.parameters.mounting import MOST_DEG, Level, Leveller, trim_names, trim_of
 from ..mavlink.parameters.plan import (
     NOTHING,
@@ -141,9 +141,8 @@ class AutopilotSink:
         values = {name: held[name] for slot in all_slots(self._firmware) for name in slot.names if name in held}
         values |= read_parameters(self._link, trim_names(self._firmware))
         remarks = [f"Accelerometer parameters and level of {self.where} before mpucal wrote new ones"]
-        file, text = OLD_PARAM, param_text(values, remarks)
-        if self._firmware == PX4:
-            file, text = OLD_PARAMS, params_text(values, remarks, self._link.vehicle.system)
+        file = OLD_PARAMS if self._firmware == PX4 else OLD_PARAM
+        text = parameters_text(self._firmware, values, remarks, self._link.vehicle.system)
         path = file.free_in(folder)
         write_atomically(path, text.encode())
         return (path,)

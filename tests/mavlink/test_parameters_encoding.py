@@ -12,8 +12,7 @@ from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.parameters.encoding import (
     from_wire,
     name_bytes,
-    param_text,
-    params_text,
+    parameters_text,
     read_parameters_file,
     to_wire,
 )
@@ -51,10 +50,9 @@ def test_integers_travel_by_their_bytes_to_px4(kind, data):
 def test_both_files_give_back_each_float32(tmp_path_factory, values):
     folder = tmp_path_factory.mktemp("parameters")
     finite = {name: value for name, value in values.items() if math.isfinite(value)}
-    texts = {"a.param": param_text(finite, ["a remark"]), "a.params": params_text(finite, ["a remark"], system=3)}
-    for name, text in texts.items():
-        (folder / name).write_text(text)
-        assert read_parameters_file(folder / name) == finite
+    for firmware in ("ArduPilot", "PX4"):
+        (folder / firmware).write_text(parameters_text(firmware, finite, ["a remark"], system=3))
+        assert read_parameters_file(folder / firmware) == finite
 
 
 @pytest.mark.parametrize("text", ["NAME,VALUE,MORE\n", "NAME,word\n", "\xff"], ids=["columns", "word", "letters"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from ...errors import RecordingError
 from ..dialect import HEADER, Message
+from ..firmwares import PX4
 
 Number = int | float
 
@@ -111,26 +112,24 @@ def error_name(number: int) -> str:
     return ERRORS.get(number, f"error {number}")
 
 
-def param_text(values: Mapping[str, float], remarks: Iterable[str] = ()) -> str:
-    """Return a .param file; its floats have the nine digits that identify a float32."""
-    lines = [f"# {remark}" for remark in remarks]
-    return "\n".join([*lines, *(f"{name},{_digits(value)}" for name, value in values.items())]) + "\n"
-
-
-def params_text(
+def parameters_text(
+    firmware: str,
     values: Mapping[str, float],
     remarks: Iterable[str] = (),
     system: int = 1,
-    component: int = 1,
-    types: Mapping[str, int] | None = None,
+    whole: Collection[str] = (),
 ) -> str:
-    """Return a .params file; `types` holds the MAV_PARAM_TYPE of parameters that are not floats."""
-    lines = [f"# {remark}" for remark in remarks]
-    lines += ["#", "# Vehicle-Id Component-Id Name Value Type"]
-    kinds = types or {}
-    for name, value in values.items():
-        lines.append(f"{system}\t{component}\t{name}\t{_digits(value)}\t{kinds.get(name, REAL32)}")
-    return "\n".join(lines) + "\n"
+    """Return a ground station's file, .param of ArduPilot or .params of PX4; `whole` are names of whole numbers.
+
+    Floats have the nine digits that identify a float32.
+    """
+    if firmware == PX4:
+        lines = ["#", "# Vehicle-Id Component-Id Name Value Type"]
+        for name, value in values.items():
+            lines.append(f"{system}\t1\t{name}\t{_digits(value)}\t{INT32 if name in whole else REAL32}")
+    else:
+        lines = [f"{name},{_digits(value)}" for name, value in values.items()]
+    return "\n".join([*(f"# {remark}" for remark in remarks), *lines]) + "\n"
 
 
 def read_parameters_file(path: Path) -> dict[str, float]:

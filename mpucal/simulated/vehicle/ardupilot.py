@@ -14,7 +14,6 @@ from ...mavlink.parameters.encoding import INT32, REAL32, Parameter
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES, ORIENTATION, tilt_deg
 from ...mavlink.parameters.slots import AXES, all_slots
 from ...mavlink.requests import SYS_STATUS
-from ...mavlink.rest import ATTITUDE
 from ...vehicle.sink import SAVE_IDS
 from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .options import VehicleOptions
@@ -134,15 +133,9 @@ class ArduPilot(Firmware):
             message = self.highres_imu(t_us, np.zeros(3), np.zeros(3))
             message.temperature = 41.0  # the barometer's
             return message
-        if message_id in SCALED_IMUS:
-            imu = SCALED_IMUS.index(message_id)
-            if imu < self.options.imus:
-                return self.scaled_imu(imu, t_us)
-            if self.options.has_fault("phantom"):
-                return self.scaled_imu(imu, t_us, [0] * 10)
-        if message_id == ATTITUDE:
-            return self.attitude(t_us)
-        return self.sys_status() if message_id == SYS_STATUS else None
+        if message_id in SCALED_IMUS[self.options.imus :] and self.options.has_fault("phantom"):
+            return self.scaled_imu(SCALED_IMUS.index(message_id), t_us, [0] * 10)
+        return super().message(message_id, t_us)
 
     def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
         """Accept an interval in whole ms; deny a shorter one than it can send, which changes nothing."""

@@ -19,7 +19,8 @@ from ...mavlink.parameters.mounting import (
     trim_of,
     trim_values,
 )
-from ...mavlink.requests import PREARM_CHECK
+from ...mavlink.requests import PREARM_CHECK, SYS_STATUS
+from ...mavlink.rest import ATTITUDE
 from .imus import Imus
 from .options import VehicleOptions
 from .store import ParameterStore
@@ -94,9 +95,13 @@ class Firmware(ABC):
         """Process samples (n, imus, 2, 3), one a tick."""
         self.corrected = corrected[-1]
 
-    @abstractmethod
     def message(self, message_id: int, t_us: int) -> Message | None:
         """Return the message, `t_us` after the boot; None for one that the firmware does not know."""
+        if message_id in SCALED_IMUS[: self.options.imus]:
+            return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
+        if message_id == ATTITUDE:
+            return self.attitude(t_us)
+        return self.sys_status() if message_id == SYS_STATUS else None
 
     @abstractmethod
     def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:

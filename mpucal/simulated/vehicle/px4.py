@@ -101,11 +101,7 @@ class Px4(Firmware):
         """Return a message; there is no RAW_IMU."""
         if message_id == HIGHRES_IMU:
             return self.highres_imu(t_us, self.bias, self._gyro_bias)
-        if message_id in SCALED_IMUS and SCALED_IMUS.index(message_id) < self.options.imus:
-            return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
-        if message_id == ATTITUDE:
-            return self.attitude(t_us)
-        return self.sys_status() if message_id == SYS_STATUS else None
+        return super().message(message_id, t_us)
 
     def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
         """Accept any stream that it knows, at most as fast as it can send it."""
