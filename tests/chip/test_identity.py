@@ -13,7 +13,6 @@ from mpucal.chip.driver import Driver
 from mpucal.errors import ChipError
 
 FILLING = {reg.FIFO_EN: reg.FIFO_EN_FRAME}
-WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}
 
 
 @pytest.mark.parametrize(

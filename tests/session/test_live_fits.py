@@ -13,7 +13,6 @@ from tools.lab.scenarios.recordings import hand_scenario
 from tools.lab.scenarios.sensors import GRAVITY_MPS2
 
 SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
-NONE = Samples.empty()
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from mpucal.session.table import TRANSITIONS, IllegalEvent, State
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
 DOWN = (0.0, 0.6, -0.8)
 MOVED = Reason("verification_failed", "the sensor moved on its mount", "fasten it", True)
-FLIPPED = Reason("left_handed", "an axis is flipped", "change its sign", True)
 
 
 def learnt(overall=0.1, advice=True, down=DOWN):

@@ -7,8 +7,6 @@ from scipy.spatial.transform import Rotation
 from mpucal.session.aims import ALL_AROUND
 from mpucal.session.meter import TURN_WORDS, TurnGuide
 
-STRAIGHT = (1.0, 0.0, 0.0, 0.0)
-
 
 def test_the_missing_turn_leads_to_the_wanted_orientation():
     attitude = Rotation.random(random_state=3)

@@ -1,7 +1,6 @@
 import io
 import os
 import pty
-import re
 import select
 import signal
 import threading
@@ -15,7 +14,6 @@ from mpucal.terminal.letters import UNICODE
 from mpucal.terminal.screen import Painter, Screen
 
 SHOWN, GIVEN_BACK = "\x1b[?1049h", "\x1b[?1049l"
-COLOUR = re.compile(r"\x1b\[(\d+;)*(3[0-8]|9[0-7])[;m]")
 
 
 class Terminal(io.StringIO):

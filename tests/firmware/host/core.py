@@ -17,7 +17,6 @@ SANITIZERS = ["-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recove
 
 U8, U16, U32 = ctypes.c_uint8, ctypes.c_uint16, ctypes.c_uint32
 BYTES = ctypes.POINTER(U8)
-OK = 0
 
 
 class Memory(ctypes.Structure):
