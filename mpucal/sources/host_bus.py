@@ -88,6 +88,8 @@ class RegisterBus(HostBus, ABC):
 def find_chip(path: str, addresses: Sequence[int], who_am_i: Callable[[int], int]) -> int:
     """Return the first address at which a known part answers `who_am_i`, else the first at which anything answers.
 
+    Each is asked again if it is silent: one acknowledge in a hundred may be lost.
+
     Raises
     ------
     BusError : the first failure of a transfer if nothing answers. NoAnswer : nothing acknowledges.
@@ -95,14 +97,16 @@ def find_chip(path: str, addresses: Sequence[int], who_am_i: Callable[[int], int
     failures: list[BusError] = []
     others: list[int] = []
     for address in addresses:
-        try:
-            if who_am_i(address) in PARTS:
-                return address
-            others.append(address)
-        except NoAnswer:
-            continue
-        except BusError as error:
-            failures.append(error)
+        for _ in range(TRIES):
+            try:
+                if who_am_i(address) in PARTS:
+                    return address
+                others.append(address)
+            except NoAnswer:
+                continue
+            except BusError as error:
+                failures.append(error)
+            break
     if others:
         return others[0]
     raise next(iter(failures), no_answer_error(path, addresses))

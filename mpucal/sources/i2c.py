@@ -16,9 +16,9 @@ from pathlib import Path
 
 from ..chip.families import PARTS
 from ..chip.registers import WHO_AM_I
-from ..errors import BusError, NoAnswer
+from ..errors import BusError
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, TRIES, RegisterBus, converting, find_chip, lock_device
+from .host_bus import ADDRESSES, RegisterBus, converting, find_chip, lock_device
 from .i2c_errors import DEVICES, device_error, no_answer_error, other_buses, transfer_error
 from .kind import Request
 
@@ -117,16 +117,7 @@ class I2cBus(RegisterBus):
         self._smbus.close()
 
     def _who_am_i(self, address: int) -> int:
-        """Read WHO_AM_I at `address`, with retries: one acknowledge in a hundred may be lost.
-
-        It is a plain SMBus read, since I2C_RDWR does not notice that a driver of the kernel holds the address.
-        """
-        for _ in range(TRIES - 1):
-            with suppress(NoAnswer):
-                return self._read_identity(address)
-        return self._read_identity(address)
-
-    def _read_identity(self, address: int) -> int:
+        """Read WHO_AM_I by SMBus, since I2C_RDWR does not notice that a driver of the kernel holds the address."""
         with converting(lambda error: transfer_error(error, self._path, address)):
             try:
                 return int(self._smbus.read_byte_data(address, WHO_AM_I))
