@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
-from .parameters import ACCEL, HAND, IMU, LANES, LAYOUT, TABLE, estimated, lanes_used
+from .parameters import ACCEL, HAND, IMU, LANES, LAYOUT, lanes_used
 from .problem import SERIES, SERIES_OF_A_HAND, Problem
 from .theta import Theta
 
 if _kernel.layout != LAYOUT:
     raise ImportError("the kernel was built for another table of parameters: build it again")
 
-EXACT = estimated("imu")  # parameters of the exact filter
 USED = {0: 0, ACCEL: lanes_used("accel"), IMU: lanes_used("imu")}
 
 
@@ -115,14 +114,14 @@ class Trace(NamedTuple):
 def trace(problem: Problem, theta: Theta) -> Trace:
     """Run the hand's filter, and return its predictions sample by sample."""
     series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
-    return Trace(*_kernel.trace_hand(theta.packed(TABLE), problem.constants_of_a_hand(), **series))
+    return Trace(*_kernel.trace_hand(theta.packed, problem.constants_of_a_hand(), **series))
 
 
 def _exact(
     problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.int64] | None = None
 ) -> tuple[float, float, Vector, Vector]:
     series = problem.series.arrays(SERIES)
-    return _kernel.evaluate(theta.packed(EXACT), problem.constants(), USED[parameters], **series, ends=ends)
+    return _kernel.evaluate(theta.packed_exact, problem.constants(), USED[parameters], **series, ends=ends)
 
 
 def _hand(
@@ -130,7 +129,7 @@ def _hand(
 ) -> tuple[float, float, Vector, Vector]:
     series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
     constants = problem.constants_of_a_hand()
-    return _kernel.evaluate_hand(theta.packed(TABLE), constants, derivatives, **series, ends=ends)
+    return _kernel.evaluate_hand(theta.packed, constants, derivatives, **series, ends=ends)
 
 
 @cache

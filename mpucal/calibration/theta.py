@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..data import Sensor, Vector
 from ..rests.flat import Flat
-from .parameters import BY_NAME, NAMES, PLACES, TABLE, Form, Parameter
+from .parameters import BY_NAME, NAMES, PLACES, TABLE, Form, Parameter, estimated
 from .rotation import tangents
 
 UPPER = np.triu_indices(3)
+EXACT = estimated("imu")  # parameters of the exact filter
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,17 @@ class Theta:
         """Return the one with det D > 0 of (D, u) and (-D, -u), which fit equally well."""
         return self if np.linalg.det(self.D) > 0.0 else replace(self, D=-self.D, u=-self.u)
 
-    def packed(self, rows: Sequence[Parameter]) -> Vector:
-        """Return the kernel's structure of these rows: matrices whole, u with its derivatives by the tilts."""
+    @cached_property
+    def packed(self) -> Vector:
+        """The hand's filter's structure: matrices whole, u with its derivatives by the tilts."""
+        return self._packed(TABLE)
+
+    @cached_property
+    def packed_exact(self) -> Vector:
+        """The exact filter's structure, see packed."""
+        return self._packed(EXACT)
+
+    def _packed(self, rows: Sequence[Parameter]) -> Vector:
         return np.concatenate([_packed(row.form, getattr(self, row.field)) for row in rows])
 
     def values(self) -> Vector:

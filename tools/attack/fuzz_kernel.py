@@ -85,8 +85,7 @@ def odd(value: Any, rng: Rng) -> Any:
 
 def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]]]:
     """Return the functions, each with a function that makes valid arguments of n samples."""
-    from mpucal.calibration.likelihood import EXACT, USED  # noqa: PLC0415 - not before the modules are those of build/asan
-    from mpucal.calibration.parameters import TABLE  # noqa: PLC0415
+    from mpucal.calibration.likelihood import USED  # noqa: PLC0415 - not before the modules are those of build/asan
     from mpucal.calibration.theta import Theta  # noqa: PLC0415
     from mpucal.chip import _flips  # noqa: PLC0415
     from mpucal.files import _packed, _text  # noqa: PLC0415
@@ -119,7 +118,7 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
     def lines(n: int, rng: Rng) -> bytes:
         return b"".join(b"%.3f,%d, %g\n" % tuple(row) for row in some(n, rng, 3))
 
-    exact, whole = theta.packed(EXACT), theta.packed(TABLE)
+    exact, whole = theta.packed_exact, theta.packed
     return {
         _kernel.evaluate: lambda n, rng: (
             (exact, constants, int(rng.choice([0, *USED.values()])), *series(n, rng), ends(n, rng))
