@@ -31,6 +31,7 @@ DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
 FEWEST_RESTS = 3  # fewer cannot contradict each other
+BLOCK_S, MOVING_RAD_S = 0.01, 0.3
 SIGNED_PERMUTATIONS = [
     np.eye(3)[list(order)] * np.array(signs)[:, None]
     for order in permutations(range(3))
@@ -114,6 +115,18 @@ class Evidence:
     def median_mps2(self) -> float:
         """Median of |y| [m/s^2]."""
         return float(np.median(self.magnitude))
+
+    @cached_property
+    def straying(self) -> tuple[float, float]:
+        """How far |a| strays from g while the board turns, and its change of course within 10 ms [m/s^2], medians."""
+        r, a = self.recording, self.calibrated
+        if a is None or self.flat is None:
+            return 0.0, np.inf
+        n = max(round(BLOCK_S * r.rate_hz), 1)
+        turns = lengths(_means(r.gyr - self.flat.b_omega, n))[1:-1] > MOVING_RAD_S
+        size = lengths(_means(a, n)) - self.gravity
+        away, bent = np.abs(size[1:-1])[turns], np.abs(np.diff(size, n=2))[turns]
+        return (float(np.median(away)), float(np.median(bent))) if len(away) else (0.0, np.inf)
 
     @cached_property
     def gravity_moved(self) -> float:

@@ -164,7 +164,8 @@ def explain(parts: Parts, D: Vector) -> list[Explanation]:
     known: list[Explanation] = []
     while True:
         found = _weigh([each for each in HYPOTHESES if each not in {of.hypothesis for of in known}], parts, D)
-        if not (found and found[0].hypothesis.what == "gyroscope" and found[0].weight > 1.0 - 1.0 / SURE):
+        of_gyroscope = sum(each.weight for each in found if each.hypothesis.what == "gyroscope")
+        if not (of_gyroscope > 1.0 - 1.0 / SURE):
             return known + found
         known.append(found[0])
         parts = _without(parts, found[0])

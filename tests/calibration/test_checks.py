@@ -89,6 +89,15 @@ def only_gravity(acc):
     return G * acc / np.linalg.norm(acc, axis=1, keepdims=True)
 
 
+def followed(r):
+    """Return the recording with gravity as a filter of a second follows it, by the gyroscope and the accelerometer."""
+    v, acc, share = r.acc[0], r.acc.copy(), 1.0 / r.rate_hz
+    for k, (a, turn) in enumerate(zip(r.acc, (r.gyr - r.gyr[:500].mean(0)) * share, strict=True)):
+        v = v - np.cross(turn, v)
+        v = acc[k] = v + share * (a - v)
+    return replace(r, acc=acc)
+
+
 def last_at_rest(r):
     """Return a recording that ends with its rest; the turn about the vertical before it looks like another rest."""
     return Recording.from_arrays(r.t, np.roll(r.acc, -500, axis=0), np.roll(r.gyr, -500, axis=0))
@@ -106,7 +115,7 @@ def without(*spans):
 
 
 # A name: the base, how it is spoilt, the code, and words of the sentence. Those of MORE have further reasons.
-MORE = {"beyond the range", "moved", "mostly lost", "other turns"}
+MORE = {"beyond the range", "moved", "mostly lost", "other turns", "gravity that is followed"}
 REFUSED = {
     "shaken": ("bench", changed(gyr=noisy(0.5), flat=None), "never_still", "never lay still", "for ten seconds"),
     "turned at once": ("bench", lambda r: replace(r.part(500, 1500), flat=None), "never_still", "never lay still"),
@@ -138,6 +147,7 @@ REFUSED = {
     "a dead axis": ("bench", changed(put(slice(None), 1, None)), "bits_stuck", "the same on y in every"),
     "stuck for 4 s": ("hand", changed(put(slice(1900, 2300), 2, None)), "bits_stuck", "on z from 19 to 23 s, though"),
     "gravity alone": ("hand", changed(only_gravity), "not_raw", "stays within", "raw accelerometer"),
+    "gravity that is followed": ("pose12", followed, "not_raw", "no hand moves so smoothly", "raw accelerometer"),
     "no gravity": ("hand", changed(lambda acc: 0.3 * (acc - only_gravity(acc))), "not_raw", "no gravity in it"),
     "few rests at a half": ("turns", changed(gyr=lambda gyr: 0.25 * gyr), "gyro_off", "4 times as", "--gyro-range"),
     "mirrored": ("bench", changed(lambda acc: acc * [1.0, -1.0, 1.0]), "left_handed", "change the sign of its y axis"),

@@ -66,6 +66,7 @@ TABLE = (
     Row(bits.bits_stuck),
     Row(sensor.clock_off, of_gyroscope=True),
     Row(sensor.sensors_lag, "fit", of_gyroscope=True),
+    Row(estimate.smoothed, "fit"),
     Row(estimate.not_converged, "fit"),
     Row(estimate.inconsistent, "fit"),
     Row(estimate.contradiction, "fit"),
@@ -74,11 +75,12 @@ TABLE = (
 # Faults of the gyroscope, for which the rests alone may give an estimate. Without rates, or with rates of another
 # range, the other rows mean nothing.
 NO_GYROSCOPE, OTHER_RANGE = Row(unusable.no_gyroscope), Row(sensor.gyro_range, "fit")
+CONTRADICTED = Row(sensor.gyro_contradicts, "fit")
 AT_FAULT = (
     NO_GYROSCOPE,
     Row(unusable.dead_gyroscope, "flat"),
     OTHER_RANGE,
-    Row(sensor.gyro_contradicts, "fit"),
+    CONTRADICTED,
     Row(sensor.sensors_lag, "fit"),
 )
 

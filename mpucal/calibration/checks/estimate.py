@@ -6,6 +6,7 @@ import numpy as np
 from numpy.linalg import norm
 
 from ...data import STANDARD_GRAVITY_MPS2
+from ...origin import Origin
 from ...reasons import Reason, reason
 from ..evidence import Evidence
 from ..tilt import CONE_RAD
@@ -14,6 +15,9 @@ from ..uncertainty import MOST_NIS
 # Claimed uncertainty, 1 sigma, of a good and of a usable calibration: errors above 0.1 m/s^2 are then rare.
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
 SLOW_HZ = 20.0  # at a lower sample rate, a hand turns too much from sample to sample
+# How far |a| strays, in units of its change of course within 10 ms, and this change. In hands, also behind slow filters,
+# they are at most 30, or at least 0.013 m/s^2; in a fusion filter's gravity at least 76, and at most 0.005 m/s^2.
+SMOOTH, LEAST_BENT_MPS2 = 40.0, 0.008
 # Errors of readings by a change of the sensor: smaller ones are not reported, larger ones of its matrix refused.
 LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 
@@ -54,6 +58,14 @@ def not_converged(e: Evidence) -> Reason | None:
     """Find a minimiser that did not settle."""
     fit = e.estimate
     return None if fit.converged else reason("not_converged", "iterations", iterations=fit.iterations)
+
+
+def smoothed(e: Evidence) -> Reason | None:
+    """Find accelerations that were computed or smoothed: only what a hand does below 3 Hz is left of its motion."""
+    away, bent = e.straying
+    if not away > SMOOTH * bent or bent > LEAST_BENT_MPS2 or e.recording.sensor.origin is Origin.VEHICLE:
+        return None
+    return reason("not_raw", "smoothed", away=away, bent=bent)
 
 
 def inconsistent(e: Evidence) -> Reason | None:
