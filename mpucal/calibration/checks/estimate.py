@@ -15,7 +15,7 @@ from ..uncertainty import MOST_NIS
 # Claimed uncertainty, 1 sigma, of a good and of a usable calibration: errors above 0.1 m/s^2 are then rare.
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
 SLOW_HZ = 20.0  # at a lower sample rate, a hand turns too much from sample to sample
-# How far |a| strays, in units of its change of course within 10 ms, and this change. In hands, also behind slow filters,
+# How far |a| strays, in units of its change of course within 10 ms, and this change. In hands, also behind a filter,
 # they are at most 30, or at least 0.013 m/s^2; in a fusion filter's gravity at least 76, and at most 0.005 m/s^2.
 SMOOTH, LEAST_BENT_MPS2 = 40.0, 0.008
 # Errors of readings by a change of the sensor: smaller ones are not reported, larger ones of its matrix refused.
