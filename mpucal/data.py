@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from operator import attrgetter
@@ -157,6 +157,10 @@ class Samples:  # noqa: PLW1641 - arrays have no hash either
         if len(parts) == 1:
             return Samples(*_arrays(parts[0]))
         return Samples(*map(np.concatenate, zip(*map(_arrays, parts), strict=True)))
+
+    def each(self, function: Callable[[Any], Any]) -> Samples:
+        """Return the samples whose arrays are `function` of these arrays, such as a part of each."""
+        return Samples(*map(function, _arrays(self)))
 
     @classmethod
     def empty(cls) -> Samples:

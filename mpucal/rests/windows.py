@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -90,7 +90,7 @@ class Windows:
                 break
             windows.append(_window(pending, first, last, self._length_s, self._spread))
             first = last
-        self._parts = [_tail(pending, first)]
+        self._parts = [pending.each(lambda array: array[first:])]
         return windows
 
 
@@ -145,10 +145,6 @@ def _noise(rows: Vector) -> Vector:
         rows = rows[..., 1:, :] - rows[..., :-1, :]
     sizes = np.sort(np.abs(rows), axis=-2)
     return np.asarray(sizes[..., n // 2, :] * (OF_NORMAL / math.sqrt(SQUARES)))
-
-
-def _tail(samples: Samples, first: int) -> Samples:
-    return Samples(*(getattr(samples, field.name)[first:] for field in fields(Samples)))
 
 
 def noise_variance(recording: Recording) -> Vector:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -204,13 +204,14 @@ class SampleStore:
         if self._size > 1:
             pending = Samples.joined([self._rest, samples])
             used = len(pending) // self._size * self._size
-            samples, self._rest = _means(_cut(pending, 0, used), self._size), _cut(pending, used, len(pending))
+            samples = _means(pending.each(lambda array: array[:used]), self._size)
+            self._rest = pending.each(lambda array: array[used:])
         if len(samples):
             self._parts.append(samples)
 
     def forget(self, first: int) -> None:
         """Drop the added samples from number `first` on, and mark a gap before the next one."""
-        self._parts = [_cut(self.samples(), 0, first // self._size)]
+        self._parts = [self.samples().each(lambda array: array[: first // self._size])]
         self._rest, self._gap_next = Samples.empty(), True
 
     def recording(self) -> Recording:
@@ -223,10 +224,6 @@ class SampleStore:
         return self._parts[0]
 
 
-def _cut(samples: Samples, first: int, last: int) -> Samples:
-    return Samples(*(getattr(samples, f.name)[first:last] for f in fields(Samples)))
-
-
 def _means(samples: Samples, size: int) -> Samples:
     """Return the means of `size` samples each; a gap or clipping of one of them marks the mean."""
 
@@ -234,4 +231,4 @@ def _means(samples: Samples, size: int) -> Samples:
         groups = values.reshape(len(values) // size, size, *values.shape[1:])
         return groups.any(1) if values.dtype == bool else groups.mean(1)
 
-    return Samples(*(mean(getattr(samples, f.name)) for f in fields(Samples)))
+    return samples.each(mean)
