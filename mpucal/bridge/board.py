@@ -90,6 +90,12 @@ class Failed(Exception):
     """Error of a request that cannot be done; its argument is the status."""
 
 
+def check_size(count, most):
+    """Refuse a request of no bytes, or of more than `most`."""
+    if not 1 <= count <= most:
+        raise Failed(BAD_PAYLOAD)
+
+
 class Chip:
     """Chip on one of `buses`, which are machine.I2C of MicroPython."""
 
@@ -169,12 +175,10 @@ class BlobFiles:
     def stored(self):
         """Return number, generation and blob of the valid slot; 1, 0 and None without one."""
         first, second = self.slot(0), self.slot(1)
-        if first and second:
-            number = 1 if (second[0] - first[0]) & 0xFFFFFFFF < 0x80000000 else 0
-        else:
-            number = 1 if second else 0
-        found = (first, second)[number]
-        return (number, found[0], found[1]) if found else (1, 0, None)
+        # Generations wrap.
+        if second and (not first or (second[0] - first[0]) & 0xFFFFFFFF < 0x80000000):
+            return (1,) + second
+        return (0,) + first if first else (1, 0, None)
 
     def remove(self, number):
         """Remove a slot if it is there."""
@@ -298,14 +302,12 @@ class Bridge:
 
     def read(self, register, count):
         """Read registers."""
-        if not 1 <= count <= MAX_READ:
-            raise Failed(BAD_PAYLOAD)
+        check_size(count, MAX_READ)
         return self.reply(OK, self.chip.read(register, count))
 
     def burst(self, register, count):
         """Read a register that does not auto-increment, in several replies."""
-        if not 1 <= count <= MAX_BURST:
-            raise Failed(BAD_PAYLOAD)
+        check_size(count, MAX_BURST)
         made = []
         for at in range(0, count, MAX_READ):
             self.began_us = self.clock()
@@ -317,8 +319,7 @@ class Bridge:
 
     def write(self, register, data):
         """Write registers."""
-        if not 1 <= len(data) <= MAX_WRITE:
-            raise Failed(BAD_PAYLOAD)
+        check_size(len(data), MAX_WRITE)
         self.chip.write(register, data)
         return self.reply(OK)
 
@@ -387,8 +388,7 @@ class Bridge:
 
     def blob_read(self, offset, count):
         """Read a part of the stored blob."""
-        if not 1 <= count <= MAX_READ:
-            raise Failed(BAD_PAYLOAD)
+        check_size(count, MAX_READ)
         blob = self.files.stored()[2]
         if blob is None:
             raise Failed(NO_BLOB)
@@ -407,8 +407,7 @@ class Bridge:
 
     def blob_data(self, offset, data):
         """Receive a part of the blob."""
-        if not 1 <= len(data) <= MAX_WRITE:
-            raise Failed(BAD_PAYLOAD)
+        check_size(len(data), MAX_WRITE)
         begun = self.files.begun
         if begun is None:
             raise Failed(NOT_BEGUN)
