@@ -21,14 +21,14 @@ from mpucal.chip.families import PARTS
 from mpucal.errors import SourceError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.result.calibration import GOOD
-from mpucal.session.events import Prompt, PromptKind
+from mpucal.session.events import PromptKind
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.sources.replay import Tap
-from tools.lab.sessions import NOTHING, Session, SilentOperator, by_command, judge_session
+from tools.lab.sessions import NOTHING, Session, SilentOperator, by_command, judge_session, recorded
 
 FAULTS = tuple(fault_kinds(*OF_CHIP))
 HALF = -(-len(FAULTS) // 2)
@@ -37,7 +37,7 @@ RECORDED_S, RATE_HZ, POLL_S = 45, 50.0, 0.2
 CODES, FARTHEST_Z = (0, 3, 4, 5), 6.0
 
 
-def recorded(words):
+def with_faults(words):
     """Record a chip for so long, as far as it gives samples, and calibrate."""
     plan = Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True)
     bus, accesses, said = open_simulated(words), [], ""
@@ -60,7 +60,7 @@ def test_no_pair_of_faults_makes_a_wrong_calibration_good(number, seed):
     """Each fault strikes a recorded chip, beside another one; what is calibrated afterwards is true, or refused."""
     rng = np.random.default_rng([seed, number])
     faults = [Fault(name, round(float(rng.uniform(0.0, RECORDED_S)), 2)) for name in FAULTS[number::HALF]]
-    done = recorded(f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}")
+    done = with_faults(f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}")
     ended = judge_session("", seed, done, "" if done.code in CODES else f"exit code {done.code}")
     assert not ended.wrong, (faults, seed, ended)
     assert ended.verdict != GOOD or max(map(abs, ended.z)) <= FARTHEST_Z, (faults, seed, ended)
@@ -78,15 +78,9 @@ def parts():
 @pytest.mark.parametrize(("words", "name", "source"), [*parts()])
 def test_a_part_has_its_name_its_temperature_and_a_source(words, name, source):
     bus = open_simulated(f"sim:chip={words},seed=4,temperature_c=27")
-    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
-    driver = Driver(bus, Config())
-    found = driver.start()
-    end_ns = driver.now_ns() + 5e8
-    while driver.now_ns() < end_ns:
-        driver.poll()
-    assert (found.chip, bool(source)) == (name, True)
-    assert driver.recording().temperature_c.mean() == pytest.approx(27, abs=0.3)
-    driver.stop()
+    recording = recorded(bus, Config(), (PromptKind.LAY_FLAT, 1.0))
+    assert (recording.sensor.chip, bool(source)) == (name, True)
+    assert recording.temperature_c.mean() == pytest.approx(27, abs=0.3)
 
 
 @pytest.mark.slow
@@ -104,13 +98,8 @@ FLAT_S, TURNED_S = 12.0, 75.0
 def turned(chip):
     """A recording of the chip in a hand that turns it as it likes, and the D that it has."""
     bus = open_simulated(f"sim:seed=3,hand=random,chip={chip},temperature_c=27")
-    driver = Driver(bus, Config(rate_hz=50, poll_s=0.25))
-    driver.start()
-    for kind, until_s in ((PromptKind.LAY_FLAT, FLAT_S), (PromptKind.ROTATE, TURNED_S)):
-        bus.hear(Prompt(kind, ""))
-        while driver.now_ns() < until_s * 1e9:
-            driver.poll()
-    return driver.recording(), np.array(bus.truth_document()["D"])
+    steps = (PromptKind.LAY_FLAT, FLAT_S), (PromptKind.ROTATE, TURNED_S)
+    return recorded(bus, Config(rate_hz=50, poll_s=0.25), *steps), np.array(bus.truth_document()["D"])
 
 
 @pytest.mark.parametrize(("chip", "name"), [("icm20690", "ICM-20690"), ("mpu6050,fault=no_fifo", "MPU-6050")])

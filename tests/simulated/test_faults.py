@@ -1,16 +1,16 @@
 """Table of faults: the options accept it, and faults of the hand affect chip and vehicle."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from mpucal.chip.driver import Driver
+from mpucal.chip.config import Config
 from mpucal.errors import UsageError
+from mpucal.session.events import PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.options import ChipOptions
 from mpucal.simulated.faults import FAULTS, OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, fault_kinds
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
+from tools.lab.sessions import recorded
 
 WORLDS = {ChipOptions: (*OF_CHIP, Where.DEFECT, Where.HAND), VehicleOptions: (*OF_VEHICLE, Where.HAND)}
 
@@ -45,12 +45,7 @@ def test_a_schedule_gives_each_once_in_order_and_the_recurring_again():
 def measured(word):
     """Return the specific force of a board that lies flat, 10 s after the start."""
     bus = open_simulated(f"sim:seed=6,hand=still{word}")
-    driver = Driver(bus)
-    driver.start()
-    bus.hear(SimpleNamespace(kind="lay_flat", down=None))
-    while driver.now_ns() < 13e9:
-        driver.poll()
-    recording = driver.recording()
+    recording = recorded(bus, Config(), (PromptKind.LAY_FLAT, 13.0))
     return recording.acc[recording.t > 11.0].mean(0)
 
 

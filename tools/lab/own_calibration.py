@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from mpucal.mavlink.parameters.mounting import tilt_deg
 from mpucal.mavlink.requests import send_command
 from mpucal.mavlink.rest import Horizon
 from mpucal.session.aims import SIDES
+
+if TYPE_CHECKING:
+    from .live_vehicle import Body
 
 PATIENCE_NS, LISTEN_NS = 600 * S, S // 5
 # level, left, right, nose down, nose up, back
@@ -28,17 +31,7 @@ SETTLED_S, AVERAGED = 20.0, 20
 ATTITUDE_US = 100_000
 
 
-class Turned(Protocol):
-    """The vehicle's body in a hand: its time [s], for how long it has been still, and what is up in its axes (3,)."""
-
-    t_s: float
-    still_s: float
-    up: Vector
-
-    def hear(self, kind: str, down: tuple[float, float, float] | None) -> None: ...  # noqa: D102
-
-
-def calibrate(link: Link, body: Turned) -> tuple[bool, float, Vector]:
+def calibrate(link: Link, body: Body) -> tuple[bool, float, Vector]:
     """Have the vehicle calibrate itself on six sides; return if it succeeded, the time [s] it took, and its level.
 
     The level (2,) [deg] is roll and pitch of the vehicle as it was put down for the first side.
@@ -69,7 +62,7 @@ def calibrate(link: Link, body: Turned) -> tuple[bool, float, Vector]:
     return False, body.t_s - begun_s, level
 
 
-def set_level(link: Link, body: Turned) -> Vector:
+def set_level(link: Link, body: Body) -> Vector:
     """Have the vehicle take its level as it is put down; return roll and pitch (2,) [deg] of its body there.
 
     Raises
@@ -82,7 +75,7 @@ def set_level(link: Link, body: Turned) -> Vector:
     return tilt_deg(body.up)
 
 
-def attitude_error_deg(link: Link, body: Turned, level_deg: Vector) -> float:
+def attitude_error_deg(link: Link, body: Body, level_deg: Vector) -> float:
     """Reboot the vehicle; return how far roll and pitch [deg] are from the truth, less `level_deg`, at worst."""
     _put_down(link, body)
     Horizon(link).reboot()
@@ -98,7 +91,7 @@ def attitude_error_deg(link: Link, body: Turned, level_deg: Vector) -> float:
     return float(np.abs(found - (tilt_deg(body.up) - level_deg)).max())
 
 
-def _put_down(link: Link, body: Turned) -> None:
+def _put_down(link: Link, body: Body) -> None:
     body.hear("lay_flat", None)
     begun_s = body.t_s
     while body.t_s - begun_s < PUT_DOWN_S or body.still_s < HELD_S:

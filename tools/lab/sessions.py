@@ -17,6 +17,7 @@ import numpy as np
 
 from mpucal.__main__ import run
 from mpucal.calibration import calibrate
+from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording
 from mpucal.errors import Abandoned
@@ -24,7 +25,7 @@ from mpucal.result.calibration import GOOD, Calibration
 from mpucal.session.events import Key, Meter, Output, Prompt, PromptKind
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
-from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip import SimulatedBus, open_simulated
 
 from .judge import judged, judgement
 from .table import Row
@@ -101,6 +102,17 @@ def session(words: str, plan: Plan, seed: int, ear: Any) -> Session:
         return Session(code=error.exit_code, said=str(error))
     found = runner.calibrate(recording, partial(calibrate, model=plan.model, gravity=plan.gravity))
     return Session(found, bus.truth_document() or {}, recording)
+
+
+def recorded(bus: SimulatedBus, config: Config, *steps: tuple[PromptKind, float]) -> Recording:
+    """Return what a driver records while the hand follows prompts, each until a time [s]."""
+    driver = Driver(bus, config)
+    driver.start()
+    for kind, until_s in steps:
+        bus.hear(Prompt(kind, ""))
+        while driver.now_ns() < until_s * 1e9:
+            driver.poll()
+    return driver.recording()
 
 
 def by_command(*words: str) -> tuple[Session, dict[str, Any]]:

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.chip.driver import Driver
-from mpucal.session.events import Prompt, PromptKind
+from mpucal.chip.config import Config
+from mpucal.session.events import PromptKind
 from mpucal.simulated.chip import open_simulated
+from tools.lab.sessions import recorded
 
 
 def test_transfers_take_their_time_at_400_khz():
@@ -22,12 +23,7 @@ def test_transfers_take_their_time_at_400_khz():
 @pytest.mark.parametrize("chip", ["mpu6050", "mpu6500", "clone98"])
 def test_the_driver_reads_the_truth_of_a_board_at_rest(chip):
     bus = open_simulated(f"sim:chip={chip},seed=3,rate_error_ppm=4000", gravity=9.82)
-    truth, driver = bus.truth_document(), Driver(bus)
-    driver.start()
-    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
-    while driver.now_ns() < 15e9:
-        driver.poll()
-    recording = driver.recording()
+    truth, recording = bus.truth_document(), recorded(bus, Config(), (PromptKind.LAY_FLAT, 15.0))
     assert not recording.gap.any()
     assert recording.rate_hz == pytest.approx(200 * 1.004, rel=2e-4)
     assert recording.temperature_c.mean() == pytest.approx(truth["temperature_c"], abs=0.05)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Protocol
+from typing import Any
 
 from mpucal.bridge.port import BAUDS, Chunk
 from mpucal.bridge.port_errors import port_gone
@@ -21,23 +21,12 @@ LATE = "late"
 Damage = Callable[[bytes], bytes]
 
 
-class LineEnd(Protocol):
-    """Device at the other end."""
-
-    def receive(self, data: bytes) -> None:
-        """Take bytes from the host."""
-        ...
-
-    def work(self) -> bytes:
-        """Handle what came, and return the bytes to the host."""
-        ...
-
-
 class EmulatedLine:
     """Port whose other end is `device`; both have the same `clock`.
 
     Parameters
     ----------
+    device : takes bytes from the host by `receive`, and by `work` handles them and returns bytes to the host.
     latency_ns : delay of the bytes to the host by an adapter. burst_ns : interval at which they are delivered, as by
         USB; 0: as they come. step_ns : interval of the device's `work`.
 
@@ -49,7 +38,7 @@ class EmulatedLine:
 
     def __init__(
         self,
-        device: LineEnd,
+        device: Any,
         clock: SimulatedClock,
         latency_ns: int = 1_000_000,
         burst_ns: int = 0,
