@@ -39,6 +39,7 @@ def test_a_vehicle_without_faults_has_none_and_shows_what_a_write_would_change()
         ("imus=1,fault=arm@1", "armed", Mark.BAD, "keep clear of its propellers"),
         ("imus=1,fault=loss", "link", Mark.NOTE, "nearer or faster"),
         ("imus=1,fault=second_station@6", "other stations", Mark.NOTE, "system 255 is here"),
+        ("imus=1,highres=no,fault=second_station@6", "IMU 1", Mark.NOTE, "end other ground stations"),
         ("imus=1,fault=reboot@7", "streams", Mark.BAD, "nothing came"),
         ("imus=1,hand=restless", "IMU 1, at rest", Mark.UNKNOWN, "the vehicle moved"),
         ("imus=1,INS_ACCEL_FILTER=1,highres=no,rotation=100", "IMU 1, rounding", Mark.NOTE, "raise INS_ACCEL_FILTER"),
