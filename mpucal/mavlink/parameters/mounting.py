@@ -95,6 +95,11 @@ def tilt_deg(force: Vector) -> Vector:
     return np.degrees([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))])
 
 
+def stream_axes(firmware: str, trim_deg: Vector) -> Vector:
+    """Return the rotation (3, 3) from the autopilot's axes to those of its streams: a PX4 turns them by its trim."""
+    return euler_matrix(trim_deg.tolist()) if firmware == PX4 else np.eye(3)
+
+
 def attitude_deg(firmware: str, trim_deg: Vector, mean: Vector) -> Vector:
     """Return roll and pitch (2,) [deg] that an unbiased estimator has at rest, where a stream's mean is `mean`."""
     return tilt_deg(mean) if firmware == PX4 else tilt_deg(mean) - trim_deg[:2]
@@ -116,9 +121,7 @@ class Level:
     @property
     def turn(self) -> Vector:
         """Rotation (3, 3) of the streams by the change."""
-        if self.firmware != PX4:
-            return np.eye(3)
-        return euler_matrix(self.wanted_deg.tolist()) @ euler_matrix(self.held_deg.tolist()).T
+        return stream_axes(self.firmware, self.wanted_deg) @ stream_axes(self.firmware, self.held_deg).T
 
     def values(self) -> dict[str, float]:
         """Return the new trim as parameters by name."""
@@ -149,7 +152,7 @@ class Leveller:
         """
         if np.abs(self.held_deg[:2]).max() < LEAST_DEG:
             return self._level(self.held_deg[:2])
-        u = self._turned.T @ [0.0, 0.0, -1.0]
+        u = euler_matrix(self.held_deg.tolist()).T @ [0.0, 0.0, -1.0]
         c = self._recorrect(np.zeros(3))
         Au = self._recorrect(u) - c
         t = np.roots([Au @ Au, 2 * Au @ c, c @ c - STANDARD_GRAVITY_MPS2**2]).max()
@@ -163,17 +166,12 @@ class Leveller:
     def standing_deg(self, level: Level, mean: Vector) -> Vector:
         """Return roll and pitch (2,) [deg] under `level` of a vehicle whose first stream's mean was `mean`."""
         force = self._recorrect(self._axes.T @ mean)
-        turned = euler_matrix(level.wanted_deg.tolist()) if self.firmware == PX4 else np.eye(3)
-        return attitude_deg(self.firmware, level.wanted_deg, turned @ force)
-
-    @property
-    def _turned(self) -> Vector:
-        return euler_matrix(self.held_deg.tolist())
+        axes = stream_axes(self.firmware, level.wanted_deg)
+        return attitude_deg(self.firmware, level.wanted_deg, axes @ force)
 
     @property
     def _axes(self) -> Vector:
-        """Rotation (3, 3) from the autopilot's axes to those of the streams."""
-        return self._turned if self.firmware == PX4 else np.eye(3)
+        return stream_axes(self.firmware, self.held_deg)
 
     def _recorrect(self, force: Vector) -> Vector:
         """Return what `force`, in the autopilot's axes and under the old correction, is under the new one."""
