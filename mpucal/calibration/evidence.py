@@ -118,7 +118,7 @@ class Evidence:
 
     @cached_property
     def straying(self) -> tuple[float, float]:
-        """How far |a| strays from g while the board turns, and its change of course within 10 ms [m/s^2], medians."""
+        """Medians, while the board turns, of the distance of |a| from g and of its bend within 10 ms [m/s^2]."""
         r, a = self.recording, self.calibrated
         if a is None or self.flat is None:
             return 0.0, np.inf
