@@ -46,10 +46,6 @@ class Words(NamedTuple):
     counts: Counts
     lsb: float
 
-    def part(self, first: int, last: int) -> Words:
-        """Return the words of the samples first..last-1."""
-        return self._replace(counts=self.counts[first:last])
-
 
 class Decoded(NamedTuple):
     """Recording of true words.
@@ -64,7 +60,7 @@ class Decoded(NamedTuple):
 
     def part(self, first: int, last: int) -> Decoded:
         """Return the samples first..last-1."""
-        acc, gyr = (None if each is None else each.part(first, last) for each in self.words)
+        acc, gyr = (each and each._replace(counts=each.counts[first:last]) for each in self.words)
         return Decoded(self.recording.part(first, last), (acc, gyr), self.corrected)
 
 

@@ -55,8 +55,7 @@ TABLE = (
     Row(partial(recording.clipped, "gyro_clipped", "gyr_clipped"), of_gyroscope=True),
     Row(partial(recording.clipped, "accel_clipped", "acc_clipped")),
     Row(recording.data_lost, of_gyroscope=True),  # gaps do not spoil rests
-    Row(sensor.wrong_range, "trustworthy fit"),
-    Row(sensor.accelerometer_factor, "trustworthy fit"),
+    Row(sensor.scale_factors, "trustworthy fit"),
     Row(sensor.axes, "trustworthy fit", of_gyroscope=True),
     Row(sensor.gyro_off, "trustworthy fit", of_gyroscope=True),
     Row(recording.temperature_moved),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -36,28 +37,17 @@ def is_trustworthy(e: Evidence) -> bool:
     return contradiction is None or not contradiction.refuse
 
 
-def wrong_range(e: Evidence) -> Reason | None:
-    """Find three scale factors near the same power of two."""
-    scale = _scale_factors(e.estimate.D)
-    power = np.round(np.log2(scale)).astype(int)
-    if power[0] == 0 or not (power == power[0]).all() or not (np.abs(scale / 2.0 ** power[0] - 1.0) < ALIKE).all():
-        return None
-    return reason("wrong_range", "power_of_two", factor=2.0 ** power[0])
-
-
-def accelerometer_factor(e: Evidence) -> Reason | None:
-    """Find three scale factors that are wrong by one factor, which is no range's and larger than a sensor's error."""
-    scale = _scale_factors(e.estimate.D)
+def scale_factors(e: Evidence) -> Reason | None:
+    """Find three scale factors that are wrong by one factor: another range's, or more than a sensor's error."""
+    scale = np.diag(sensor_axes(e.estimate.D))  # along the accelerometer's own axes, which may be swapped or turned
     factor = float(scale.mean())
-    if wrong_range(e) is not None or abs(factor - 1.0) < SCALE_OFF or not (np.abs(scale / factor - 1.0) < ALIKE).all():
+    power = 2.0 ** round(math.log2(factor))
+    if power != 1.0 and (np.abs(scale / power - 1.0) < ALIKE).all():
+        return reason("wrong_range", "power_of_two", factor=power)
+    if abs(factor - 1.0) < SCALE_OFF or not (np.abs(scale / factor - 1.0) < ALIKE).all():
         return None
     far = not 1.0 / MOST_SCALE < factor < MOST_SCALE
     return reason("units_suspect", "scale_factors" if far else "alike", factor=factor)
-
-
-def _scale_factors(D: Vector) -> Vector:
-    """Return (3,) along the accelerometer's own axes, which may be swapped or turned."""
-    return np.diag(sensor_axes(D))
 
 
 def axes(e: Evidence) -> Reason | None:
