@@ -37,9 +37,10 @@ def held_back():
         (in_bursts(10), 2e-3),
         (in_bursts(32) + 2e-4 * (np.arange(N) % 32), 3e-3),
         (np.floor(TRUE * 100) / 100, 1e-3),
+        (np.floor(TRUE), 5e-2),
         (held_back(), 5e-4),
     ],
-    ids=["1 ms", "5 ms", "bursts of 10", "bursts of 32", "rounded to 10 ms", "a busy computer"],
+    ids=["1 ms", "5 ms", "bursts of 10", "bursts of 32", "rounded to 10 ms", "rounded to 1 s", "a busy computer"],
 )
 def test_what_arrives_late_was_measured_evenly(stamps, within):
     found = fit_clock(stamps)

@@ -74,6 +74,7 @@ COLUMNS = {
     "jerk": lambda w, ns: 0.3 * w.gyr,
     "000": lambda w, ns: 0.0 * w.acc,
     "counts": lambda w, ns: counts(w),
+    "20_bits": lambda w, ns: np.rint(np.column_stack([w.acc, w.gyr]) * COUNTS * 16).astype(int),
     "1024": lambda w, ns: np.rint(w.acc * 1024 / G).astype(int),
     "rates": lambda w, ns: counts(w)[:, 3:],
     "unsigned": lambda w, ns: counts(w) % 65536,
@@ -329,6 +330,7 @@ FORMS = {
     "1024 for 1 g": Form(
         AXES, "1024 rates", hints=AT_100_HZ, says="±32 g (by |a|) and rates in counts", atol=5 * IN_COUNTS
     ),
+    "counts of 20 bits": Form(f"time,{AXES}", "t 20_bits", says="accelerations in counts", atol=IN_COUNTS),
     "g beside counts": Form(f"time,{AXES}", "t g rates", says="in g and rates in counts of ±500", atol=IN_COUNTS),
     "lines of a receiver between": Form(
         f"time,{AXES[:-1]},lat\n", "t a w", "{},{},{},{},{},{},{},\n", edit=("\n0.05,", "\n0.045,,,,,,,48.1\n0.05,")

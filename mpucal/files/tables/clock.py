@@ -24,6 +24,8 @@ from ...clocks.sample_clock import NS, SampleClock, make_increasing
 from ...data import GAP_INTERVALS, Mask, Vector
 
 FEWEST = 100
+# s of a recording, of which 64 bits hold the ns
+LONGEST_S = 1e9
 # periods: steps that vary by less are a clock's own
 EVEN = 0.1
 # samples over which a period is measured, so that bursts do not matter, and the least number of such stretches
@@ -121,12 +123,16 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
     period, steps = sample_period(stamps, number), np.diff(stamps)
     own = Clock(make_increasing(stamps, EVEN * period), are_gaps(stamps), 1.0 / period if period else 0.0)
     off = steps - period * np.diff(number)
-    if n < FEWEST or not period > 0.0 or (np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period):
+    if n < FEWEST or not period > 0.0 or stamps[-1] - stamps[0] > LONGEST_S:
         return own
-    gap, late = _gaps(stamps, number, period)
-    lag = min(LAG, n // STRETCHES)
+    if np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period:
+        return own
+    # several changes of rounded stamps, which have many samples each
+    several = STRETCHES * n // (np.count_nonzero(steps) + 1)
+    gap, late = _gaps(stamps, number, period, several)
+    lag = min(max(LAG, several), n // STRETCHES)
     # of rounded stamps, few steps are none
-    seldom = min(SELDOM, float(np.mean(steps > 0.0)) / 2)
+    seldom = min(SELDOM, float(np.mean(steps > 0.0)) / 8)
     if _square(late[lag:] - late[:-lag], OUTLIERS) > FOLLOWS_A_LINE * lag * _square(off, seldom):
         return own
     clock, segment = SampleClock(1.0 / period), np.cumsum(gap)
@@ -145,10 +151,15 @@ def _square(values: Vector, left_out: float) -> float:
     return float(squares[: len(squares) - max(round(left_out * len(squares)), 1)].mean())
 
 
-def _gaps(stamps: Vector, number: Numbers, period: float) -> tuple[Mask, Vector]:
-    """Return (n,) where samples are missing, by jumps of the lower envelope, and the delay (n,) of each stamp."""
+def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> tuple[Mask, Vector]:
+    """Return (n,) where samples are missing, by jumps of the lower envelope, and the delay (n,) of each stamp.
+
+    Parameters
+    ----------
+    least_width : samples of a stretch of the envelope, at least.
+    """
     n = len(stamps)
-    width = max(round(STRETCH_S / period), STRETCH)
+    width = max(round(STRETCH_S / period), STRETCH, least_width)
     edges = np.arange(0, n - width // 2, width)
     late = stamps - period * number
     # after four rounds the envelope's slope has settled

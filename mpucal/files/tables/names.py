@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -61,6 +62,8 @@ FLIPPED_STEMS = ("accelerometeracceleration",)
 WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
 # the direction of gravity as a program estimates it, which an accelerometer of no errors would measure
 ESTIMATED = re.compile(r"gravity", re.IGNORECASE)
+# names that are remembered
+MOST_NAMES = 1024
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
 BY_A_WORD = len(STEMS[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
@@ -99,6 +102,8 @@ class Column:
     sign_flipped: bool = False
 
 
+# a log names them on each line
+@lru_cache(MOST_NAMES)
 def parse_column_name(name: str, place: int) -> Column | None:
     """Return the column of that name at `place`; None if it holds nothing that is read."""
     text, axis, unit = name.strip().lstrip("#%").strip(), -1, ""
@@ -195,6 +200,7 @@ def parse_header(header: list[str]) -> list[Column]:
     return [column for place, name in enumerate(header) if (column := parse_column_name(name, place)) is not None]
 
 
+@lru_cache(MOST_NAMES)
 def axes_of(name: str) -> list[str]:
     """Return names for the columns x, y, z of a matrix or file that is called after a sensor; else an empty list."""
     last = name.rpartition(".")[2]

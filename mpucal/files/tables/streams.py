@@ -49,8 +49,9 @@ class Reading:
 
     @classmethod
     def of(cls, values: Vector, scale: float, said: str, *, counts: bool = False) -> Reading:
-        """Return values times `scale`; counts are clipped at the ends of 16 bits."""
+        """Return values times `scale`; counts of 16 bits are clipped at their ends."""
         ends = (values >= ACCEL_COUNTS - 1) | (values <= -ACCEL_COUNTS)
+        counts = counts and bool(np.abs(values).max() <= ACCEL_COUNTS)
         return cls(values * scale, said, np.asarray(ends.any(axis=1) & counts))
 
 
@@ -293,12 +294,11 @@ class _Rates:
 
 
 def _gyro_range_dps(factor: float | None) -> float | None:
-    """Return the range of counts by how fast gravity turns: a usual one, or else what was found; None if unknown."""
+    """Return the range of counts by how fast gravity turns: a usual one, times a power of two; None if unknown."""
     if not factor:
         return None
-    dps = math.degrees(abs(factor)) * GYRO_COUNTS
-    nearest = min(GYRO_RANGES_DPS, key=lambda each: abs(math.log2(dps / each)))
-    return nearest if abs(math.log2(dps / nearest)) < ANOTHER_RANGE else round(dps)
+    usual = GYRO_RANGES_DPS[0]
+    return float(usual * 2.0 ** round(math.log2(math.degrees(abs(factor)) * GYRO_COUNTS / usual)))
 
 
 def is_wrong_full_scale(ratio: float) -> bool:

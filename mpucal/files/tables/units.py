@@ -16,8 +16,8 @@ from ...errors import RecordingError
 
 NS = 1_000_000_000
 COUNTS, DAYS = "counts", "days"
-# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 16
-FEWEST_PER_G, MOST_PER_G = 8, 14
+# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 20 at ±0.5 g or 24 at ±8 g; and the largest count
+FEWEST_PER_G, MOST_PER_G, MOST_COUNTS = 8, 20, 2.0**23
 # quantity -> unit -> SI
 QUANTITIES = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4, DAYS: 86400.0},
@@ -143,8 +143,8 @@ def to_signed(values: Vector) -> Vector:
 
 
 def are_counts(values: Vector) -> bool:
-    """Return True if all values are whole 16-bit numbers."""
-    return bool((values == np.rint(values)).all() and np.abs(values).max() <= ACCEL_COUNTS)
+    """Return True if all values are whole numbers of 24 bits at most."""
+    return bool((values == np.rint(values)).all() and np.abs(values).max() <= MOST_COUNTS)
 
 
 def seem_counts(values: Vector) -> bool:
