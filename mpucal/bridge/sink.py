@@ -12,7 +12,7 @@ from ..errors import BusError, WriteBackError
 from ..result.blob import Blob, BlobError
 from ..result.calibration import Calibration
 from ..result.comparison import is_better, worst_magnitude_error
-from ..sinks.kind import Applied, Device
+from ..sinks.kind import Applied, Device, Sink
 from ..sinks.old_state import check_accepted, nothing_written
 from ..sinks.table import BRIDGE_BLOB
 from .store import BlobStore, StoredBlob
@@ -30,7 +30,7 @@ def open_bridge(device: Device) -> Iterator[BridgeSink]:
         yield BridgeSink(store)
 
 
-class BridgeSink:
+class BridgeSink(Sink):
     """Config blob in the memory of the bridge behind `store`."""
 
     def __init__(self, store: BlobStore) -> None:
@@ -47,7 +47,7 @@ class BridgeSink:
         return (path,)
 
     def reason_to_keep(self, calibration: Calibration) -> str | None:
-        """See ComparableSink; an empty or damaged memory is never as good, but other data may be needed."""
+        """See Sink; an empty or damaged memory is never as good, but other data may be needed."""
         if self._store.occupied:
             return (
                 f"the memory of {self.where} holds other data, perhaps another sketch's or file system's, which a write"

@@ -35,7 +35,7 @@ from ..result.journal import Journal
 from ..session.lay_flat import put_down
 from ..session.ports import polled
 from ..sinks.chip import check_shift, mg
-from ..sinks.kind import Applied, Device
+from ..sinks.kind import Applied, Device, Sink
 from ..sinks.old_state import check_accepted, load_state, not_a_state, nothing_written, restore_on_failure, save_state
 from ..sinks.table import IIO_STATE, KERNEL
 from .source import OpenedIio
@@ -62,7 +62,7 @@ def open_kernel(device: Device) -> Iterator[KernelSink]:
         yield sink
 
 
-class KernelSink:
+class KernelSink(Sink):
     """Accelerometer of an open source of the Linux kernel; `journal` notes a write."""
 
     def __init__(self, source: OpenedIio, journal: Journal | None = None) -> None:
@@ -87,7 +87,7 @@ class KernelSink:
         return save_state(IIO_STATE, folder, FORMAT, self.where, self._read_state())
 
     def put_back(self, path: Path) -> str:
-        """Restore the state from the file of an earlier `keep`; see Restorable."""
+        """Restore the state from the file of an earlier `keep`; see Sink."""
         document = load_state(IIO_STATE, path, FORMAT, WORDS, RULE)
         if not (_are_words(document[WORDS]) and isinstance(document[RULE], str | None)):
             raise not_a_state(IIO_STATE, path, f"{WORDS} or {RULE} has another type")

@@ -36,7 +36,7 @@ from ..result.comparison import is_better
 from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.chip import OpenedChip
-from .kind import Applied, Device
+from .kind import Applied, Device, Sink
 from .old_state import check_accepted, load_state, not_a_state, nothing_written, restore_on_failure, save_state
 from .table import CHIP, CHIP_OFFSETS
 
@@ -73,7 +73,7 @@ def open_chip(device: Device) -> Iterator[ChipSink]:
         yield sink
 
 
-class ChipSink:
+class ChipSink(Sink):
     """Offset registers of the chip on `bus`, which messages call `where`; `journal` notes a write."""
 
     def __init__(self, bus: Bus, where: str, journal: Journal | None = None) -> None:
@@ -104,7 +104,7 @@ class ChipSink:
         return save_state(CHIP_OFFSETS, folder, FORMAT, self.where, {REGISTERS: _hex(self._blocks())})
 
     def put_back(self, path: Path) -> str:
-        """Restore the registers from the file of an earlier `keep`; see Restorable."""
+        """Restore the registers from the file of an earlier `keep`; see Sink."""
         wanted = saved_blocks(path)
         with nothing_written():
             read_identity(self._port)
@@ -116,7 +116,7 @@ class ChipSink:
         return f"the offset registers of {self.where} have the content of {path.name} again; {VOLATILE}"
 
     def reason_to_keep(self, calibration: Calibration) -> str | None:
-        """See ComparableSink; a bias below a step and its uncertainty cannot be improved."""
+        """See Sink; a bias below a step and its uncertainty cannot be improved."""
         bias, std = (
             float(np.linalg.norm(np.nan_to_num(b))) for b in (calibration.b_a_to_subtract, calibration.b_a_std)
         )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
+from ..errors import WriteBackError
 from ..result.session_files import DOCUMENT, SessionFile
 
 if TYPE_CHECKING:
@@ -116,7 +118,7 @@ class Applied:
         return "; ".join(self.clauses)
 
 
-class Sink(Protocol):
+class Sink(ABC):
     """A place that keeps a calibration: a chip's offset registers, a bridge's EEPROM, an autopilot's parameters.
 
     Attributes
@@ -124,18 +126,18 @@ class Sink(Protocol):
     where : the device, for messages.
     """
 
-    @property
-    def where(self) -> str: ...  # noqa: D102 - see above
+    where: str
 
-    def keep(self, folder: Path) -> tuple[Path, ...]:
-        """Save the state of the device to files in `folder` before anything is changed; no file if it is empty.
+    def keep(self, _folder: Path) -> tuple[Path, ...]:
+        """Save the state of the device to files in a folder before anything is changed; no file if it is empty.
 
         Raises
         ------
         SourceError : it cannot be read. OutputError : it cannot be saved.
         """
-        ...
+        return ()
 
+    @abstractmethod
     def write(self, calibration: Calibration) -> Applied:
         """Write, read back, compare, and verify the effect if the device can show it.
 
@@ -143,32 +145,23 @@ class Sink(Protocol):
         ------
         WriteBackError : refused (nothing was written), or failed (the old state is restored); `what` says which.
         """
-        ...
-
-
-@runtime_checkable
-class Restorable(Sink, Protocol):
-    """Sink that can restore a saved state."""
 
     def put_back(self, kept: Path) -> str:
         """Restore the state that `keep` saved to `kept`; return a clause on it for the user.
 
+        Every sink with another Effect than NONE can do so.
+
         Raises
         ------
-        RecordingError : `kept` is not a state of this sink. WriteBackError : see Sink.
+        RecordingError : `kept` is not a state of this sink. WriteBackError : see `write`.
         """
-        ...
+        raise WriteBackError(f"nothing was written: {kept} is not a calibration", "give a calibration.json")
 
-
-@runtime_checkable
-class ComparableSink(Sink, Protocol):
-    """Sink that can predict whether a calibration is better than the one that it holds."""
-
-    def reason_to_keep(self, calibration: Calibration) -> str | None:
+    def reason_to_keep(self, _calibration: Calibration) -> str | None:
         """Return why the held calibration is predicted to be as good, as a clause; None if the new one is better.
 
         Raises
         ------
         SourceError : it cannot be read.
         """
-        ...
+        return None

@@ -17,7 +17,7 @@ from ..result.keys import FORMAT
 from ..result.session_files import DOCUMENT
 from ..session.results import result_files, save
 from ..strict_json import MOST_BYTES, parse_json
-from .kind import Applied, ComparableSink, Device, Effect, Restorable, Say, Sink, SinkKind
+from .kind import Applied, Device, Effect, Say, Sink, SinkKind
 from .old_state import interrupting
 
 # asks the user whether to go on; raises WriteBackError if not
@@ -59,7 +59,7 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
         error = (
             cause if isinstance(cause, OutputError) else OutputError(NO_MEMORY, "end other programs, and start again")
         )
-        if not isinstance(sink, Restorable) or not kept:
+        if kind.effect is Effect.NONE or not kept:
             raise OutputError(f"{applied.what}, but {error.what}", error.remedy) from cause
         # without a record, a bias that the device removes would be removed from its samples again
         raise WriteBackError(f"{error.what}; {sink.put_back(kept[0])}", error.remedy) from cause
@@ -112,7 +112,7 @@ def write_objection(calibration: Calibration, sink: Sink) -> str | None:
     SourceError : the sink cannot be read.
     """
     verification = calibration.quality.get("verification")
-    reasons = [sink.reason_to_keep(calibration)] if isinstance(sink, ComparableSink) else []
+    reasons = [sink.reason_to_keep(calibration)]
     # a blob has no quality
     if calibration.quality and not (verification and verification.get("agrees") is True):
         reasons.insert(0, "the calibration was not verified in new orientations")
@@ -124,11 +124,10 @@ def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> 
 
     Raises
     ------
-    WriteBackError : the sink accepts only a calibration, or see Restorable.put_back.
+    WriteBackError : the sink accepts only a calibration, or see Sink.put_back.
     """
-    if not isinstance(sink, Restorable):
-        raise WriteBackError(f"nothing was written: {kept} is not a calibration", "give a calibration.json")
-    keep(kind, sink, folder, say)
+    if kind.effect is not Effect.NONE:
+        keep(kind, sink, folder, say)
     with _report_interruption(sink):
         return sink.put_back(kept)
 

@@ -35,7 +35,7 @@ from ..mavlink.rest import Horizon, RestMeans, RestMonitor
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.lay_flat import STAND, put_down
-from ..sinks.kind import Applied, Confirm, Device, Say, nobody
+from ..sinks.kind import Applied, Confirm, Device, Say, Sink, nobody
 from ..sinks.old_state import interrupting, nothing_written
 from ..sinks.table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 from .source import OpenedVehicle
@@ -78,7 +78,7 @@ def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
         yield sink
 
 
-class AutopilotSink:
+class AutopilotSink(Sink):
     """Accelerometer parameters of the vehicle on a locked link.
 
     Parameters
@@ -98,12 +98,7 @@ class AutopilotSink:
         self._stands_level: bool | None = None
         self._link = link
         self._journal = journal or Journal()
-        self._firmware = link.vehicle.family
-
-    @property
-    def where(self) -> str:
-        """Return the name of the vehicle, for messages."""
-        return str(self._link.vehicle)
+        self._firmware, self.where = link.vehicle.family, str(link.vehicle)
 
     def recover(self) -> str | None:
         """Restore the parameters of an interrupted write; return a clause for the user, or None if there was none.
@@ -148,7 +143,7 @@ class AutopilotSink:
         return (path,)
 
     def put_back(self, kept: Path) -> str:
-        """Restore the parameters from the file of an earlier `keep`; see Restorable."""
+        """Restore the parameters from the file of an earlier `keep`; see Sink."""
         wanted = read_parameters_file(kept)
         writer = Writer(self._link, wanted, self._journal)
         if not writer.slots:
@@ -161,7 +156,7 @@ class AutopilotSink:
         return f"{self.where} has the parameters of {kept.name} again, read back; {NOT_REBOOTED}"
 
     def reason_to_keep(self, calibration: Calibration) -> str | None:
-        """See ComparableSink; residual cross-axis errors count, and one IMU with better parameters is enough."""
+        """See Sink; residual cross-axis errors count, and one IMU with better parameters is enough."""
         planned = plan_changes(calibration, self._firmware)
         if any(change.improves for change in planned):
             return None

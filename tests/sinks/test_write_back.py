@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from mpucal.cli.person import ask_in_doubt
 from mpucal.errors import BusError, KeepsNothing, OutputError, WriteBackError
 from mpucal.result.calibration import Calibration
-from mpucal.sinks.kind import Applied, Device, SinkKind
+from mpucal.sinks.kind import Applied, Device, Effect, Sink, SinkKind
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import put_back, session_recorder, write_objection, write_to, write_to_all
 
@@ -26,7 +26,7 @@ def measured(**quality):
     return Calibration(np.eye(3), BIAS, quality={"verdict": "good", "reasons": [], **quality})
 
 
-class Registers:
+class Registers(Sink):
     """A place that subtracts what was written, where each step may fail: keep, write, read back, put back."""
 
     where = "the chip of the test"
@@ -60,7 +60,14 @@ class Registers:
         return "it holds again what it held"
 
 
-KIND = SinkKind("made", behind=lambda source: True, where="the made-up sink", holds="all", opener="made_up_sink:opened")
+KIND = SinkKind(
+    "made",
+    behind=lambda source: True,
+    where="the made-up sink",
+    holds="all",
+    opener="made_up_sink:opened",
+    effect=Effect.LESS_BIAS,
+)
 
 
 def write_all(monkeypatch, sink, calibration, folder, record, asked=(), said=print, in_doubt=None):
@@ -118,14 +125,13 @@ def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, 
 
 
 def test_a_place_that_cannot_be_restored_says_what_it_keeps_and_takes_calibrations_alone(tmp_path):
-    sink = Registers(set())
-    sink.put_back = None
+    sink, kind = Registers(set()), replace(KIND, effect=Effect.NONE)
+    sink.put_back = partial(Sink.put_back, sink)
     with pytest.raises(WriteBackError, match="old is not a calibration"):
-        put_back(KIND, sink, tmp_path / "old", tmp_path, print)
+        put_back(kind, sink, tmp_path / "old", tmp_path, print)
     assert sink.steps == 0
-    sink.keep = lambda folder: ()
     with pytest.raises(OutputError, match="it is written, but cannot write"):
-        write_to(KIND, sink, measured(), tmp_path, unsaved, print)
+        write_to(kind, sink, measured(), tmp_path, unsaved, print)
 
 
 def test_what_cannot_be_written_is_told_or_a_failure(tmp_path, monkeypatch):
