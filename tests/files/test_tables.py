@@ -134,7 +134,7 @@ ANDROSENSOR = (
     ";LINEAR ACCELERATION Y (m/s²);LINEAR ACCELERATION Z (m/s²);GYROSCOPE X (rad/s);GYROSCOPE Y (rad/s)"
     ";GYROSCOPE Z (rad/s);Time since start in ms \n"
 )
-A_LOG = "ESP-ROM:esp32c3-api1-20210207\r\nself_test accel=(17020,-1262) baseline_gyro=(645,315,-309)\r\n"
+A_LOG = 300 * "ESP-ROM:esp32c3-api1-20210207\r\n" + "self_test accel=(17020,-1262) baseline_gyro=(645,315,-309)\r\n"
 MT_MANAGER = "// General information:\n//  MT Manager version: 2022.0.0\n// Coordinate system: ENU\n"
 ECHO = (
     "header:\n  stamp:\n    sec: {}\n    nanosec: {}\n  frame_id: imu\norientation:\n  x: 0.0\n  w: 1.0\n"

@@ -128,7 +128,7 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
     if np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period:
         return own
     # several changes of rounded stamps, which have many samples each
-    several = STRETCHES * n // (np.count_nonzero(steps) + 1)
+    several = STRETCHES * n // (int(np.count_nonzero(steps)) + 1)
     gap, late = _gaps(stamps, number, period, several)
     lag = min(max(LAG, several), n // STRETCHES)
     # of rounded stamps, few steps are none

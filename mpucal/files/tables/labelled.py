@@ -21,7 +21,7 @@ from .names import (
     parse_header,
 )
 from .table import Table
-from .text import PREAMBLE, read_table, table_of_rows
+from .text import read_table, table_of_rows
 
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
 _NAME = r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})"
@@ -43,6 +43,8 @@ _THREE = re.compile(
     + r"(?:[ \t]{0,9}[,;|][ \t]{0,9}|[ \t]{1,9})".join(_AXES)
     + r"(?![\w.])(?![ \t]{0,9}[,;|]?[ \t]{0,9}[-+.\d])"
 )
+# lines of which one names numbers: the log of a board that starts comes before
+BEGUN = 2000
 # as `rostopic echo` and `ros2 topic echo` print messages
 _BETWEEN_RECORDS = "\n---\n"
 # different words in a column that names the sensor of each line
@@ -101,7 +103,7 @@ def labelled_table(text: str, name: str) -> Table | None:
 
     A sample is a line, or the lines from one that names the first axis to the next such line.
     """
-    begun = [list(_numbers(line)) for line in _label("\n".join(text.split("\n", PREAMBLE)[:PREAMBLE]))]
+    begun = [list(_numbers(line)) for line in _label("\n".join(text.split("\n", BEGUN)[:BEGUN]))]
     together = list(dict.fromkeys(name for names in begun for name in names))
     header = next((names for names in begun if _names_both(names)), together)
     if not _names_both(header):
