@@ -15,7 +15,7 @@ from .calibration import GOOD, Calibration
 from .correction import same_trim
 from .error_model import AXES
 
-# Of pairs of calibrations of an unchanged sensor, 1 in 100 are called different, over all kinds of recordings of
+# Of pairs of calibrations of an unchanged linear sensor, 1 in 100 are called different, over all kinds of recordings of
 # `python -m tools.lab families`. Of calm hands alone fewer are: what they state is of hands in general.
 CONFIDENCE = 0.99
 # Factor by which the uncertainties of a calibration with reservations may be too small. Halves of a real recording with

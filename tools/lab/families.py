@@ -54,8 +54,10 @@ def of_seed(item: tuple[str, int], *, model: str = "auto") -> Row:
     D, unit = truth.D, truth.gravity
     if GRAVITY_NAMED in [reason["code"] for reason in reasons] and result.verdict != GOOD:
         D, unit = D * (unit / gravity), gravity
+    # a calibration may be of the part before its mount slipped, or of that after it
+    truths = [(D, truth.b_a), *((each.D, each.b_a) for each in simulated.slipped)]
     more = {"model": result.fit["model"], "why": [str(reason["message"]) for reason in reasons]}
-    return row(judged(result, (D, truth.b_a), gravity=unit, family=name, seed=seed, **more))
+    return row(judged(result, *truths, gravity=unit, family=name, seed=seed, **more))
 
 
 def row(worth: Row) -> Row:

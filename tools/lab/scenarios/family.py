@@ -72,12 +72,14 @@ class Simulated:
     ----------
     truth : in the body frame in which K is symmetric, as an estimator finds it; of a sensor that changed, the mean.
     specific_force : (n, 3) m/s^2, R(x_t) g without the hand's acceleration. attitude : (n, 3, 3), R(x_t).
+    slipped : the truth before and after the mount slipped, in that frame.
     """
 
     recording: Recording
     truth: SensorTruth
     specific_force: Vector
     attitude: Vector
+    slipped: tuple[SensorTruth, ...] = ()
 
 
 def drawn(family: Family, seed: int) -> Simulated:
@@ -110,16 +112,15 @@ def simulate(family: Family, rng: Rng, truth: SensorTruth | None = None) -> Simu
     moved = course.t[middle], course.moving[middle], force[middle]
     temperature_c = np.full(len(acc), family.temperature_c)
     readings = Readings(*moved, acc, gyr, temperature_c, truth, family.chip.ranges)
-    recording, rows, truth = _delivered(family, readings, of_damage)
-    truth, Q = truth.symmetric()
+    recording, rows, readings = _delivered(family, readings, of_damage)
+    truth, Q = readings.truth.symmetric()
     R = board_from_world(q[middle])
-    return Simulated(recording, truth, truth.gravity * (R[..., 2] @ Q.T)[rows], (Q @ R)[rows])
+    slipped = tuple(each.symmetric()[0] for each in readings.slipped)
+    return Simulated(recording, truth, truth.gravity * (R[..., 2] @ Q.T)[rows], (Q @ R)[rows], slipped)
 
 
-def _delivered(
-    family: Family, readings: Readings, rngs: Sequence[Rng]
-) -> tuple[Recording, NDArray[np.intp], SensorTruth]:
-    """Return the recording of readings that faults befall, which of them it holds, and the truth of their sensor."""
+def _delivered(family: Family, readings: Readings, rngs: Sequence[Rng]) -> tuple[Recording, NDArray[np.intp], Readings]:
+    """Return the recording of readings that faults befall, which of them it holds, and these readings."""
     of_faults, of_digits, of_timing = rngs
     for fault in family.faults:
         readings = fault(readings, of_faults)
@@ -144,7 +145,7 @@ def _delivered(
         sensor=_sensor(family),
         name=family.name,
     )
-    return recording, rows, readings.truth
+    return recording, rows, readings
 
 
 def _sensor(family: Family) -> Sensor:

@@ -30,6 +30,7 @@ class Readings:
 
     t : (m,) s, true. moving : (m,) 0 to 1. force : (m, 3) m/s^2, the specific force. acc, gyr : (m, 3) m/s^2, rad/s.
     temperature_c : (m,). truth : the sensor. ranges : its full scales [m/s^2, rad/s].
+    slipped : the sensor before and after its mount slipped.
     """
 
     t: Vector
@@ -40,6 +41,7 @@ class Readings:
     temperature_c: Vector
     truth: SensorTruth
     ranges: tuple[float, float]
+    slipped: tuple[SensorTruth, ...] = ()
 
     def zero_moved(self, by: Vector) -> Readings:
         """Move the accelerometer's zero by (m, 3) m/s^2, and the true b_a by its mean after the flat segment."""
@@ -175,7 +177,8 @@ def slip(readings: Readings, rng: Rng, deg: float = 3.0) -> Readings:
     turn = np.cross(np.eye(3), np.radians(deg) * direction(rng))
     D, share = readings.truth.D, after[readings.t >= FLAT_S].mean()
     acc = readings.acc + after[:, None] * (readings.force @ (D @ turn).T)
-    return replace(readings, acc=acc, truth=replace(readings.truth, D=D + share * D @ turn))
+    before, mean, end = (replace(readings.truth, D=D + of_turn * D @ turn) for of_turn in (0.0, share, 1.0))
+    return replace(readings, acc=acc, truth=mean, slipped=(before, end))
 
 
 def teleport(readings: Readings, rng: Rng, seconds: float = 8.0) -> Readings:
