@@ -70,12 +70,12 @@ def is_plausible(values: ArrayLike) -> Mask:
     return np.asarray(np.abs(values) <= LARGEST)
 
 
-def check_seconds(times: ArrayLike, name: str) -> Vector:
-    """Return increasing times (n,) s; dates become the time since the first one.
+def to_seconds(times: ArrayLike, name: str) -> Vector:
+    """Return times (n,) s; dates become the time since the first one.
 
     Raises
     ------
-    ArraysError : they are not times, or do not increase.
+    ArraysError : they are not times.
     """
     given = check_numbers(times, "t", name, as_given=True)
     if given.dtype.kind == "M" and given.size:
@@ -83,11 +83,28 @@ def check_seconds(times: ArrayLike, name: str) -> Vector:
     t: Vector = given / np.timedelta64(1, "s") if given.dtype.kind == "m" else check_numbers(given, "t", name)
     if t.ndim != 1 or len(t) < 2:
         raise ArraysError(f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds per sample")
+    if not np.isfinite(t).all():
+        raise ArraysError(f"{name}: t is not a finite number everywhere", "give times in seconds")
+    return t
+
+
+def check_increasing(t: Vector, name: str) -> Vector:
+    """Return times (n,) s, which increase.
+
+    Raises
+    ------
+    ArraysError : they do not.
+    """
     with np.errstate(over="ignore"):
-        _check_time(t, name)
-        least, most = np.diff(t).min(), t[-1] - t[0]
-    if least < SHORTEST_S or not most < LONGEST_S:
-        raise ArraysError(f"{name}: t has steps of {least:g} s within {most:g} s", "give times in seconds")
+        steps, most = np.diff(t), t[-1] - t[0]
+    if (steps <= 0).any():
+        i = int((steps <= 0).argmax()) + 1
+        raise ArraysError(
+            f"{name}: time does not increase at sample {i} ({t[i - 1]:.6f} s, then {t[i]:.6f} s)",
+            "sort the samples by time and drop repeated ones",
+        )
+    if steps.min() < SHORTEST_S or not most < LONGEST_S:
+        raise ArraysError(f"{name}: t has steps of {steps.min():g} s within {most:g} s", "give times in seconds")
     return t
 
 
@@ -214,15 +231,3 @@ def _real(array: NDArray[Any]) -> Vector:
     # too large a number becomes infinite, and a signalling NaN a quiet one
     with np.errstate(over="ignore", invalid="ignore"):
         return array.astype(np.float64, copy=False)
-
-
-def _check_time(t: Vector, name: str) -> None:
-    if not np.isfinite(t).all():
-        raise ArraysError(f"{name}: t is not a finite number everywhere", "give times in seconds")
-    back = np.diff(t) <= 0
-    if back.any():
-        i = int(back.argmax()) + 1
-        raise ArraysError(
-            f"{name}: time does not increase at sample {i} ({t[i - 1]:.6f} s, then {t[i]:.6f} s)",
-            "sort the samples by time and drop repeated ones",
-        )

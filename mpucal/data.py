@@ -15,9 +15,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import frames
-from .arguments import LARGEST, check_column, check_flat, check_mask, check_rows, check_seconds, is_plausible
+from .arguments import (
+    LARGEST,
+    check_column,
+    check_flat,
+    check_increasing,
+    check_mask,
+    check_rows,
+    is_plausible,
+    to_seconds,
+)
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
+from .clocks.sample_clock import GAP_INTERVALS as GAP_INTERVALS  # noqa: PLC0414
+from .clocks.stamps import FEWEST, Clock, fit_clock
 from .errors import WrongType, escape_line
 from .origin import Origin
 
@@ -35,8 +46,6 @@ GYRO_COUNTS = 32750.0
 ACCEL_RANGES_G, GYRO_RANGES_DPS = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000)
 # names are exported to scripts and source code: these characters cannot end a string or comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
-# a time between two samples that is longer than this number of intervals is a gap
-GAP_INTERVALS = 2.5
 BYTE = 0xFF
 MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")
 
@@ -222,7 +231,8 @@ class Recording(Samples):
 
         Parameters
         ----------
-        t : (n,) s, strictly increasing, or datetime64, of which the first is 0 s.
+        t : (n,) s, increasing, or datetime64, of which the first is 0 s. Stamps of arrival, late or one for a burst of
+            samples, are replaced by the sensor's own clock, as in files; `taken` says so.
         acc : (n, 3) m/s^2. gyr : (n, 3) rad/s.
         flat : (first, last + 1) samples that lie flat, if known.
         temperature_c : (n,); its mean becomes the sensor's temperature if that is not set.
@@ -237,26 +247,27 @@ class Recording(Samples):
             raise WrongType(
                 f"{name}: sensor is {sensor!r}", "give a Sensor, such as that of another recording, or leave it out"
             )
-        t = check_seconds(t, name)
+        t = to_seconds(t, name)
         n = len(t)
         acc, gyr = check_rows(acc, "acc", n, name), check_rows(gyr, "gyr", n, name)
         warm = np.full(n, np.nan) if temperature_c is None else check_column(temperature_c, "temperature_c", n, name)
-        sensor = sensor or Sensor()
+        sensor, missing = sensor or Sensor(), check_mask(gap, "gap", n, name)
+        clock = clock_of(t, sensor)
         known = warm[is_plausible(warm)]
         if sensor.temperature_c is None and len(known):
             sensor = replace(sensor, temperature_c=float(known.mean()))
         return cls(
-            t,
+            check_increasing(clock.t, name),
             acc,
             gyr,
             warm,
-            check_mask(gap, "gap", n, name),
+            missing | clock.gap,
             check_mask(acc_clipped, "acc_clipped", n, name),
             check_mask(gyr_clipped, "gyr_clipped", n, name),
             flat=None if flat is None else check_flat(flat, n, name),
             sensor=sensor,
             name=name,
-            taken=taken,
+            taken=" ".join(filter(None, (taken, clock.describe(name)))) or None,
         )
 
     @classmethod
@@ -324,6 +335,14 @@ class Recording(Samples):
             arrays["gap"][first] = True
         flat = self.flat if self.flat is not None and self.flat[1] <= first else None
         return replace(self, flat=flat, **arrays)
+
+
+def clock_of(stamps: Vector, sensor: Sensor) -> Clock:
+    """Return the clock behind stamps (n,) s of samples; those of an autopilot, or of few samples, are their times."""
+    is_own = sensor.origin is Origin.VEHICLE or len(stamps) < FEWEST
+    with np.errstate(over="ignore"):
+        is_own = is_own or bool((np.diff(stamps) < 0).any())
+        return Clock(stamps, np.zeros(len(stamps), bool), 0.0) if is_own else fit_clock(stamps)
 
 
 def _same(one: Any, other: Any) -> bool:

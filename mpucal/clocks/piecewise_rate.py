@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..data import Vector
+from ..arguments import Vector
 
 # A break must explain this many times the residual variance. Chance alone, over all places, stays below 30.
 LEAST_BREAK_RATIO = 100.0

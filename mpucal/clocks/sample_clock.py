@@ -22,10 +22,12 @@ from operator import mul
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data import GAP_INTERVALS, Vector
+from ..arguments import Vector
 from .piecewise_rate import fit_lines, merge_equal_slopes
 
 NS = 1e-9
+# a time between two samples that is longer than this number of intervals is a gap
+GAP_INTERVALS = 2.5
 Whole = NDArray[np.int64]
 
 # PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %.

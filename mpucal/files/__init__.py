@@ -59,7 +59,8 @@ def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
         # read before: its last samples may show the units of its first, and all stamps the clock
         units = shown_units(found.read_rows(path, hints=hints).runs, rows.sensor)
         clock = arrival_clock(found.read_rows(path, hints=hints).runs, rows.sensor)
-        taken = " ".join(filter(None, (rows.taken, describe(rows.name, units, clock.remark if clock else "")))) or None
+        said = rows.taken, describe(rows.name, units), clock.describe(rows.name) if clock else ""
+        taken = " ".join(filter(None, said)) or None
         runs = with_times(rows.runs, clock) if clock else rows.runs
         rows = replace(rows, runs=(to_si(samples, units) for samples in runs), taken=taken)
     return rows if hints.span is None else replace(rows, runs=cut_span(rows.runs, hints.span, rows.name))

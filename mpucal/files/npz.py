@@ -65,11 +65,12 @@ def npz_rows(path: Path) -> Rows:
         arrays = {} if _by_rows(archive) else _arrays(archive, path, LARGE)
         size = _size(archive, LARGE)
     sensor, flat = _sensor(small, path), _flat(small, path)
-    runs = _runs(path)
+    runs, taken = _runs(path), None
     if arrays:
         warm = next((arrays.pop(key) for key in TEMPERATURES if key in arrays), None)
         arrays.pop("temperature", None)
-        runs = Rows.of(make_recording(**arrays, temperature_c=warm, name=path.name)).runs
+        whole = make_recording(**arrays, temperature_c=warm, sensor=sensor, name=path.name)
+        runs, taken = Rows.of(whole).runs, whole.taken
     utc_ns = np.asarray(small.get(UTC, np.nan))
     return Rows(
         check_runs(runs, path.name),
@@ -77,6 +78,7 @@ def npz_rows(path: Path) -> Rows:
         flat,
         name=path.name,
         done=str(small.get(DONE, "")),
+        taken=taken,
         utc_ns=plausible_utc_ns(int(utc_ns)) if utc_ns.shape == () and utc_ns.dtype.kind in "iu" else None,
         plain=True,
         size=size,

@@ -10,11 +10,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..arguments import is_plausible
-from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector
+from ..clocks.stamps import FEWEST, Clock, are_gaps
+from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector, clock_of
 from ..errors import RecordingError
-from ..origin import Origin
 from .reading import check_size
-from .tables.clock import FEWEST, Clock, are_gaps, fit_clock
 from .tables.units import QUANTITIES, acceleration_unit, gyro_unit, rate_factor
 
 # 16 Ki samples take 1 MB, which fits a cache; for larger products BLAS starts threads, which takes longer
@@ -73,11 +72,9 @@ class Rows:
         check_size(Path(self.name), self.size)
         samples, remarks = Samples.joined(list(self.runs)), [self.taken]
         if self.plain and len(samples):
-            clock = _clock(samples, self.sensor)
-            samples = replace(samples, t=clock.t, gap=samples.gap | clock.gap)
             found = shown_units([samples], self.sensor)
             samples = to_si(samples, found)
-            remarks += [describe(self.name, found, clock.remark)]
+            remarks += [describe(self.name, found)]
         taken = " ".join(filter(None, remarks)) or None
         whole = make_recording(**vars(samples), flat=self.flat, sensor=self.sensor, name=self.name, taken=taken)
         return replace(whole, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns)
@@ -92,26 +89,18 @@ def make_recording(*, acc: Any, gyr: Any, **others: Any) -> Recording:
     return replace(recording, acc=np.asarray(acc, float), gyr=np.asarray(gyr, float))
 
 
-def describe(name: str, units: Mapping[str, str], clock: str = "") -> str:
-    """Return a sentence on units that are not SI, and on the clock; empty if there is nothing to say."""
-    others = [f"{key} was read in {unit}, which its values suggest" for key, unit in units.items() if unit]
-    said = "; ".join(filter(None, (clock, *others)))
+def describe(name: str, units: Mapping[str, str]) -> str:
+    """Return a sentence on units that are not SI; empty if all are."""
+    said = "; ".join(f"{key} was read in {unit}, which its values suggest" for key, unit in units.items() if unit)
     return f"{name}: {said}." if said else ""
-
-
-def _clock(samples: Samples, sensor: Sensor) -> Clock:
-    """Return the clock of the samples; an autopilot's times are its own."""
-    if sensor.origin is Origin.VEHICLE or len(samples) < FEWEST:
-        return Clock(samples.t, np.zeros(len(samples), bool), 0.0)
-    return fit_clock(samples.t)
 
 
 def arrival_clock(runs: Iterator[Samples], sensor: Sensor) -> Clock | None:
     """Return the clock behind the stamps of all runs, if those of the first are of arrival; otherwise None."""
     first = next(runs, None)
-    if first is None or not _clock(first, sensor).jitter_s:
+    if first is None or not clock_of(first.t, sensor).jitter_s:
         return None
-    return fit_clock(np.concatenate([first.t, *(samples.t for samples in runs)]))
+    return clock_of(np.concatenate([first.t, *(samples.t for samples in runs)]), sensor)
 
 
 def with_times(runs: Iterable[Samples], clock: Clock) -> Iterator[Samples]:
@@ -128,7 +117,7 @@ def shown_units(runs: Iterable[Samples], sensor: Sensor) -> dict[str, str]:
     for samples in runs:
         kept = drop_incomplete(samples)
         if len(kept) >= FEWEST:
-            t = _clock(kept, sensor).t
+            t = clock_of(kept.t, sensor).t
             seen["acc"] = seen["acc"] or acceleration_unit(kept.acc)
             seen["gyr"] = seen["gyr"] or gyro_unit(rate_factor(t, kept.acc, kept.gyr))
         if all(seen.values()):

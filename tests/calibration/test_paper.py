@@ -47,7 +47,7 @@ def test_cost_is_equation_8_whatever_the_blocks(monkeypatch):
 def test_true_parameters_leave_no_innovation_whatever_the_time_steps(jitter):
     rng = np.random.default_rng(0)
     D, b_a = np.eye(3) + 0.2 * rng.normal(size=(3, 3)), np.array([0.3, -0.2, 0.5])
-    t = 0.01 * np.arange(300) + jitter * rng.uniform(-0.5, 0.5, 300)
+    t = np.cumsum(0.01 + jitter * rng.uniform(-0.5, 0.5, 300))
     omega, s_0 = np.array([0.7, -1.1, 0.4]), np.array([0.0, 0.0, G])
     s = np.array([rotation(-(time - t[0]) * omega) @ s_0 for time in t])
     recording = Recording.from_arrays(t, s @ D.T + b_a, np.tile(omega + 0.1, (300, 1)))

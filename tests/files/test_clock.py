@@ -1,88 +1,10 @@
-"""Stamps of arrival give the sensor's own clock, lost is only what is missing, and true times stay as they are."""
+"""A file whose stamps are those of arrival has the sensor's own clock, whole and in runs."""
 
 import numpy as np
 import pytest
 
 import mpucal
 from mpucal.files import open_rows
-from mpucal.files.tables.clock import fit_clock
-
-HZ, N = 199.7, 8000
-TRUE = np.arange(N) / HZ
-
-
-def late(seed, s):
-    """Stamps that are late by so much on average."""
-    return np.maximum.accumulate(TRUE + np.random.default_rng(seed).exponential(s, N))
-
-
-def in_bursts(size):
-    """Samples that arrive with the last of so many."""
-    return TRUE[np.minimum((np.arange(N) // size + 1) * size - 1, N - 1)]
-
-
-def held_back():
-    """A computer that is busy for 0.3 s now and then."""
-    stamps = late(1, 1e-3)
-    for first in range(500, N - 500, 1000):
-        stamps[first : first + 60] = np.maximum(stamps[first : first + 60], stamps[first + 60])
-    return np.maximum.accumulate(stamps)
-
-
-@pytest.mark.parametrize(
-    ("stamps", "within"),
-    [
-        (late(1, 1e-3), 1e-4),
-        (late(2, 5e-3), 5e-4),
-        (in_bursts(10), 2e-3),
-        (in_bursts(32) + 2e-4 * (np.arange(N) % 32), 3e-3),
-        (np.floor(TRUE * 100) / 100, 1e-3),
-        (np.floor(TRUE), 5e-2),
-        (held_back(), 5e-4),
-    ],
-    ids=["1 ms", "5 ms", "bursts of 10", "bursts of 32", "rounded to 10 ms", "rounded to 1 s", "a busy computer"],
-)
-def test_what_arrives_late_was_measured_evenly(stamps, within):
-    found = fit_clock(stamps)
-    assert found.rate_hz == pytest.approx(HZ, rel=2e-4)
-    assert not found.gap.any()
-    off = found.t - TRUE
-    assert np.abs(off - np.median(off)).max() < within
-    assert "without gaps" in found.remark
-
-
-def test_lost_is_what_is_missing():
-    lost = np.zeros(N, bool)
-    for first in (700, 2000, 2080, 5000):
-        lost[first : first + 5] = True
-    # and a logger that stopped for a while
-    true = TRUE + np.where(np.arange(N) >= 6500, 7.3, 0.0)
-    stamps = np.maximum.accumulate(true + np.random.default_rng(3).exponential(3e-3, N))[~lost]
-    found = fit_clock(stamps)
-    begins = [int(np.count_nonzero(~lost[:at])) for at in (705, 2005, 2085, 5005, 6500)]
-    assert np.flatnonzero(found.gap).tolist() == begins
-    off = found.t - true[~lost]
-    assert np.abs(off - np.median(off)).max() < 1.5e-3
-    assert "with 5 gaps" in found.remark
-
-
-@pytest.mark.parametrize(
-    "times",
-    [
-        TRUE,
-        np.round(TRUE, 3),
-        TRUE[np.random.default_rng(4).random(N) > 0.1],
-        np.cumsum((1 + np.random.default_rng(5).exponential(0.3, N)) / HZ),
-        TRUE[:50],
-    ],
-    ids=["even", "rounded to 1 ms", "some left out", "whenever a program came to it", "few"],
-)
-def test_true_times_stay(times):
-    found = fit_clock(times)
-    assert (found.jitter_s, found.remark) == (0.0, "")
-    np.testing.assert_array_equal(found.t, times)
-    # a step over two missing samples or more is a gap
-    np.testing.assert_array_equal(found.gap[1:], np.diff(times) > 2.5 * np.median(np.diff(times)))
 
 
 @pytest.mark.parametrize("ending", [".csv", ".npz"])

@@ -12,9 +12,9 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from ...clocks.stamps import FEWEST, sample_period
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..hints import ROLES, Hints
-from .clock import FEWEST, sample_period
 from .units import (
     ANY_HZ,
     EXPLAINED,

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ...clocks.stamps import FEWEST
 from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
 from ..reading import HELD, MOST_ODD, check_size, first_bytes, reading
 from .cells import Kind
-from .clock import FEWEST
 from .columns import find_columns
 from .guess import is_index
 from .labelled import dataflash_text_table, labelled_table, marked_table, pivot

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clocks.stamps import are_new
 from ...data import ACCEL_COUNTS, GYRO_COUNTS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Sensor, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from ..rows import make_recording
 from . import times, units
-from .clock import are_new
 from .times import Stream
 from .units import COUNTS, QUANTITIES, resolve_unit
 

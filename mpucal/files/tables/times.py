@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
+from ...clocks.stamps import FEWEST, Clock, Numbers, are_gaps, fit_clock, sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import units
-from .clock import FEWEST, Clock, Numbers, are_gaps, fit_clock, sample_period
 from .units import DAYS, NS, QUANTITIES, resolve_unit
 
 # s between two files, or parts of one, without a common clock: longer than the gaps that a bus leaves

@@ -4,7 +4,7 @@ A sensor measures evenly. Over USB, radio or a busy computer its samples arrive 
 within a run without a missing sample one line, with the sample period as its slope, lies below all stamps; after
 missing samples, or a logger's pause, the line lies higher. A jump of that lower envelope is therefore a gap, while a
 stamp that is merely late is not. With the gaps known, the clock is fitted as a chip's is by polls of its FIFO
-(clocks/sample_clock.py).
+(sample_clock.py).
 
 Stamps that are even, or that follow no such line as of a program that measured when it could, are the samples' times;
 a longer step between them is a gap, as it is to the estimate and to a driver that polls.
@@ -20,8 +20,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ...clocks.sample_clock import NS, SampleClock, make_increasing
-from ...data import GAP_INTERVALS, Mask, Vector
+from ..arguments import Mask, Vector
+from .sample_clock import GAP_INTERVALS, NS, SampleClock, make_increasing
 
 FEWEST = 100
 # s of a recording, of which 64 bits hold the ns
@@ -73,6 +73,10 @@ class Clock:
             f"its times are arrival stamps, {1e3 * self.jitter_s:.2g} ms (rms) off, and were replaced by an even clock"
             f" of {self.rate_hz:.4g} Hz {gaps}"
         )
+
+    def describe(self, name: str) -> str:
+        """Return the remark as a sentence on the recording `name`; empty if there is none."""
+        return f"{name}: {self.remark}." if self.remark else ""
 
 
 def are_new(at_once: Mask | None, values: Vector) -> Mask:
@@ -159,18 +163,26 @@ def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> t
     least_width : samples of a stretch of the envelope, at least.
     """
     n = len(stamps)
-    width = max(round(STRETCH_S / period), STRETCH, least_width)
+    width = min(max(round(STRETCH_S / period), STRETCH, least_width), n // 2)
     edges = np.arange(0, n - width // 2, width)
     late = stamps - period * number
-    # after four rounds the envelope's slope has settled
+    # after four rounds the envelope's slope has settled, here and below
     for _ in range(4):
         late -= float(np.median(np.diff(np.minimum.reduceat(late, edges)))) / width * number
+    lost = LOST * period
+    if np.median(np.diff(stamps)) < EVEN * period:
+        # the last sample of a burst waits for up to a period; where that wraps, the envelope jumps without a loss
+        lost += period
+        for _ in range(4):
+            moved = np.diff(np.minimum.reduceat(late, edges))
+            usual = moved[np.abs(moved) <= lost]
+            late -= float(usual.sum()) / max(len(usual), 1) / width * number
     least = np.minimum.reduceat(late, edges)
     chance = float(np.median(np.abs(np.diff(least))))
     # after a mere delay the next samples are soon in time again
     least = sliding_window_view(np.append(least, np.full(CATCHES_UP - 1, np.inf)), CATCHES_UP).min(1)
     moved = np.diff(least)
-    limit = max(LOST * period, BY_CHANCE * chance, ROUNDED * _resolution(stamps))
+    limit = max(lost, BY_CHANCE * chance, ROUNDED * _resolution(stamps))
     gap = np.zeros(n, bool)
     for at in np.flatnonzero(moved > limit):
         # in the stretch with the gap, the envelope is that of the part before it
