@@ -198,7 +198,7 @@ USABLE = {
         changed(gyr=lambda gyr: gyr / [1.0, 1.2, 1.0]),
         "gyro_off",
         "% on y ",
-        "check its range and the sample rate",
+        "check the sample rate",
     ),
     "clipped turns": (
         "pose12",
