@@ -23,7 +23,7 @@ from .rotation import cross, shortest_turn
 # These describe how a person turns the board to an orientation, and holds it there.
 MOVE_S, REST_S = 1.6, 2.0
 FAST_RAD_S = math.radians(130.0) / MOVE_S
-TREMOR_MPS2 = 0.07
+SWAY_MPS2 = 0.02
 
 NEAR_RAD = math.radians(25.0)  # a direction nearer than this is the present one
 
@@ -88,9 +88,9 @@ def _moves(known: InterimEstimate, s: Vector, directions: Vector, seconds: list[
         r_extra = np.full(move + rest, POSE_MPS2**2 * rest)
         r_extra[:move] = moving_noise * speed2 / (speed2 + MOVING_RAD_S**2)
         jerk = np.zeros(move + rest)
-        jerk[move:] = jerk_density(TREMOR_MPS2, problem.lam)
+        jerk[move:] = jerk_density(SWAY_MPS2, problem.lam)
         reset = np.full(move + rest, -1.0)
-        reset[0], reset[move] = 0.0, TREMOR_MPS2
+        reset[0], reset[move] = 0.0, SWAY_MPS2
         series = Series(
             y=path @ theta.D.T + theta.b_a,
             omega=omega @ rates.T + theta.b_omega,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +12,7 @@ from ..kernel import _kernel
 from ..rests.flat import UNAVERAGED, Flat, flat_statistics, rounding_variance
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder, statistics
-from ..rests.tremor import fit_lambda, level_rests, tremor_variance
+from ..rests.tremor import SWAY_PER_S, without_tremor
 from ..rests.windows import WINDOW_S, noise_ratio, noise_variance
 from .masks import mask
 from .problem import Problem, Series
@@ -24,8 +23,6 @@ HUBER = 2.0
 MOVING_RAD_S = 0.3  # rate at which a hand's acceleration reaches half of its maximum
 SHAKEN_MPS2 = 0.3  # standard deviation of |y| in a window that does the same, at any rate: walking shakes the board
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
-# Lambda: 4.5 Hz for a tremor where the rests do not show it, 1.1 Hz for a pivot.
-TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest
 FLOOR_CORRELATION_S = 0.05  # of jerks
 FLOOR_MPS2 = 0.12  # white acceleration by jerks, in addition to the pivot's own
@@ -107,17 +104,19 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     # At rest, rates are noise alone, and noise in a regressor biases the lever arm towards zero.
     rate, alpha = (np.where(rest[:, None], 0.0, values) for values in smoothed_rates(recording, flat))
     speed2 = np.sum(rate * rate, axis=1)
-    acc = level_rests(recording, flat, runs)
-    lam = fit_lambda(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
+    noise_factor = np.array([loud[a:b].mean() for a, b in after])
+    hand = without_tremor(recording, flat, after + flat.last, noise_factor)
+    raw = statistics(recording.acc[flat.last :], after)[1]
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
-    for (a, b), variance in zip(after.tolist(), statistics(acc[flat.last :], after)[1], strict=True):
-        tremor = math.sqrt(tremor_variance(variance, float(loud[a:b].mean()) * flat.Sigma_a))
-        reset[a], jerk[a:b] = tremor, jerk_density(tremor, lam)
-        pose[a:b] = (POSE_MPS2**2 + rounding_variance(recording.sensor, variance, UNAVERAGED)) * (b - a)
+    of_rests = zip(after.tolist(), np.sqrt(hand.sway).tolist(), hand.jitter.tolist(), raw, strict=True)
+    for (a, b), sway, jitter, variance in of_rests:
+        reset[a], jerk[a:b] = sway, jerk_density(sway, SWAY_PER_S)
+        pose[a:b] = (POSE_MPS2**2 + jitter + rounding_variance(recording.sensor, variance, UNAVERAGED)) * (b - a)
         if b < len(series):
             reset[b] = 0.0
-    series = replace(series, rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)
-    problem = Problem(series, flat, gravity, huber=HUBER, tail=1.0, lam=lam)
+    recording = replace(recording, acc=hand.acc)
+    series = replace(series, y=hand.acc[flat.last :], rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)
+    problem = Problem(series, flat, gravity, huber=HUBER, tail=1.0, lam=SWAY_PER_S)
     # With many rests, all between them is motion: the ends of a move are slow, but in the hand, too.
     if len(after) >= MANY_RESTS:
         motion = np.where(rest, 0.0, 1.0)

@@ -27,8 +27,8 @@ class Series:
     rate, alpha : (n, 3) rad/s, rad/s^2 at the sample, for lever arm and delay [neither].
     r_extra : (n,) (m/s^2)^2 added to the noise of every axis [0].
     jerk : (n,) (m/s^3)^2/Hz, spectral density of the hand's jerk over the step that leads to the sample [0].
-    reset : (n,) m/s^2, not below zero where the hand comes to rest or leaves it: its travel begins anew from rest, with
-        this standard deviation of its acceleration [nowhere].
+    reset : (n,) m/s^2, not below zero where the hand comes to rest or leaves it: its travel begins anew as in a long
+        rest, with this standard deviation of its acceleration [nowhere].
     """
 
     y: Vector

@@ -13,11 +13,11 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..rests.intervals import RestFinder, statistics
-from ..rests.tremor import fit_lambda, mean_variance, tremor_variance
+from ..rests.tremor import SWAY_PER_S, mean_variance, without_tremor
 from .fit import Fit
 from .hypothesis_tests import KNOWN
 from .parameters import B_A_NAMES, D_NAMES, Form
-from .preprocessing import POSE_MPS2, TREMOR_PER_S
+from .preprocessing import POSE_MPS2
 from .theta import UPPER, from_elements
 
 # PS-MPU-6000A r3.4, section 6.2: +-3 % of scale factor, +-2 % across axes, both taken as uniform
@@ -77,12 +77,11 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
 def _rests(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
     """Return the mean accelerations (k, 3) of the rests, and the variance (k,) of each."""
     runs = RestFinder(recording, flat).typical()
-    y, spread = statistics(recording.acc, runs)
-    lam = fit_lambda(recording.acc, recording, flat, runs, TREMOR_PER_S)
+    hand = without_tremor(recording, flat, runs, np.ones(len(runs)))
     seconds = (runs[:, 1] - runs[:, 0]) / recording.rate_hz
-    tremor = np.array([tremor_variance(of_one, flat.Sigma_a) for of_one in spread])
     noise = flat.Sigma_a.mean() / (runs[:, 1] - runs[:, 0])
-    return y, POSE_MPS2**2 + noise + tremor * mean_variance(lam * seconds)
+    of_hand = hand.jitter + hand.sway * mean_variance(SWAY_PER_S * seconds)
+    return statistics(hand.acc, runs)[0], POSE_MPS2**2 + noise + of_hand
 
 
 def _residuals(x: Vector, y: Vector, gravity: float, variance: Vector) -> tuple[Vector, Vector, Vector]:

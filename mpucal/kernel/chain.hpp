@@ -69,11 +69,14 @@ struct Chain {
     noise(h, lam, of_step.decay * of_step.decay, of_step.sum);
   }
 
-  // The covariance of (0, a, b, c) where p = 0, and v and a have these standard deviations
-  static void rest(double lam, double sd_v, double sd_a, Lane (&P)[4]) {
-    const Lane a{0.0, sd_a, -2.0 * lam * sd_a, lam * lam * sd_a};
-    const Lane v{0.0, 0.0, -3.0 * lam * lam * sd_v, 2.0 * lam * lam * lam * sd_v};
-    for (int k = 0; k < 4; ++k) P[k] = at(a, k) * a + at(v, k) * v;
+  // The covariance of (0, a, b, c) after a long rest, where a has this standard deviation: Q of an endless step
+  static void rest(double lam, double sd_a, Lane (&P)[4]) {
+    const double aa = sd_a * sd_a, l2 = lam * lam;
+    const double ab = -5.0 / 3.0 * lam * aa, ac = 2.0 / 3.0 * l2 * aa, bc = -4.0 * l2 * lam * aa;
+    P[0] = all(0.0);
+    P[1] = Lane{0.0, aa, ab, ac};
+    P[2] = Lane{0.0, ab, 20.0 / 3.0 * l2 * aa, bc};
+    P[3] = Lane{0.0, ac, bc, 8.0 / 3.0 * l2 * l2 * aa};
   }
 
  private:

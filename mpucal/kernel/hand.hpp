@@ -21,7 +21,7 @@ struct HandSeries : Series {
   const double* alpha;    // rad/s^2 at the sample
   const double* r_extra;  // (m/s^2)^2 added to R on each axis [0]
   const double* jerk;     // (m/s^3)^2/Hz, the chain's noise [0]
-  const double* reset;    // m/s^2: reset to p = v = a = 0 with this standard deviation of a; below zero: no reset [none]
+  const double* reset;    // m/s^2: the travel of a long rest with this standard deviation of a; below zero: no reset [none]
 };
 
 struct HandConstants : Constants {

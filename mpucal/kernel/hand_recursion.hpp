@@ -8,7 +8,6 @@
 namespace mpucal {
 namespace {  // each instruction set has its own copy
 
-constexpr double kSpeedOfReset = 0.04;     // s: ratio of a tremor's speed to its acceleration
 constexpr int kState = 4, kS = 0, kA = 1;  // places of s and a in (s, a, b, c)
 
 // State before and effect of four measurements, one to a lane or [step]
@@ -204,7 +203,7 @@ class HandRecursion {
     N[5] = nmadd(s[1], X[2][0], s[0] * X[2][1]);
   }
 
-  // p = v = a = 0, uncorrelated with all
+  // p = v = a = 0 and uncorrelated with s, each as far from it as in a long rest
   void reset(double sigma) {
     const Lane s_alone{1.0, 0.0, 0.0, 0.0};
     for (int a = 0; a < 3; ++a) {
@@ -214,7 +213,7 @@ class HandRecursion {
         for (int k = 1; k < kState; ++k) block[k] = all(0.0);
       }
       const Lane s = P_[a][a][kS];
-      Chain::rest(c_.lam, kSpeedOfReset * sigma, sigma, P_[a][a]);
+      Chain::rest(c_.lam, sigma, P_[a][a]);
       P_[a][a][kS] = s;
     }
   }

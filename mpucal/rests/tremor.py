@@ -1,23 +1,65 @@
-"""Tremor of a hand at rest: its variance, and its spectrum by one parameter lambda.
+"""Tremor and sway of a hand at rest: a low pass removes the tremor of a rest, and the law of the sway is equation (13).
 
-A hand that holds still trembles at 4 to 12 Hz and sways below 1 Hz. Its acceleration is that of a position that three
-poles at lambda keep bounded (docs/method.md, equation 13). Each rest has a size of its own; lambda belongs to the
-recording, and gives the share of the acceleration's variance that a mean over a rest keeps.
+A hand that holds still trembles at 8 to 12 Hz and sways below 1 Hz. The mean of a rest's readings keeps what the tremor
+did at its two ends. The low pass weighs the ends less and removes it; what is left is the acceleration of a position
+that three poles at SWAY_PER_S keep bounded (docs/method.md), with a size of its own in each rest.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..data import Recording, Vector
 from .flat import Flat
-from .intervals import Intervals
+from .intervals import Intervals, statistics
 
-BLOCK_S = 0.4
-FEWEST_RESTS = 3
-QUICKEST_PER_S, SLOWEST_PER_S = 44.0, 3.0  # a tremor of 10 Hz alone; a sway of 0.7 Hz
-LAMBDAS = np.geomspace(QUICKEST_PER_S, SLOWEST_PER_S, 28)
+LOW_PASS_S = 0.2  # length of a Hann window, whose response is zero at 10 Hz and nearly 1 below 1 Hz
+SHORTEST = 3  # windows
+SWAY_PER_S, TREMOR_PER_S = 5.0, 20.0  # lambda of what the low pass leaves, and of a whole tremor
 TREMBLES = 0.04  # a tremor's variance below this share of the sensor's noise counts as zero
+
+
+class RestingHand(NamedTuple):
+    """A hand's acceleration in k rests.
+
+    acc : (n, 3) m/s^2, the readings, without the tremor of the rests that are long enough.
+    sway : (k,) (m/s^2)^2, variance of the hand's acceleration in these; 0 of a still board.
+    jitter : (k,) (m/s^2)^2, variance that the tremor of each of the other rests leaves in its mean.
+    """
+
+    acc: Vector
+    sway: Vector
+    jitter: Vector
+
+
+def without_tremor(recording: Recording, flat: Flat, runs: Intervals, noise_factor: Vector) -> RestingHand:
+    """Remove the tremor of rests by a low pass.
+
+    Parameters
+    ----------
+    runs : (k, 2) rests. noise_factor : (k,) noise of the accelerometer in each, as a factor of Sigma_a.
+    """
+    acc, noise = recording.acc.copy(), noise_factor[:, None] * flat.Sigma_a
+    n = round(LOW_PASS_S * recording.rate_hz) | 1
+    window = np.hanning(n + 2)[1:-1]
+    window /= window.sum()
+    tremor = np.array([tremor_variance(*of) for of in zip(statistics(acc, runs)[1], noise, strict=True)])
+    samples = np.asarray(runs[:, 1] - runs[:, 0], np.float64)
+    # What goes on from the flat segment is not in a hand, and the low pass would leave nothing of a short rest.
+    trembles, is_long = (runs[:, 0] > flat.last) & (tremor > 0.0), samples >= SHORTEST * n
+    for k in np.flatnonzero(trembles & is_long):
+        first, last = runs[k]
+        begin, end = max(first - n // 2, 0), min(last + n // 2, len(acc))  # a rest lacks its ends
+        low = [np.convolve(axis, window, "valid") for axis in recording.acc[begin:end].T]
+        acc[begin + n // 2 : end - n // 2] = np.stack(low, axis=1)
+        noise[k] *= window @ window
+    variance = statistics(level_rests(acc, recording, flat, runs), runs)[1]
+    sway = np.array([tremor_variance(*of) for of in zip(variance, noise, strict=True)])
+    is_raw = trembles & ~is_long
+    jitter = sway * mean_variance(TREMOR_PER_S * samples / recording.rate_hz)
+    return RestingHand(acc, np.where(is_raw, 0.0, sway), np.where(is_raw, jitter, 0.0))
 
 
 def tremor_variance(variance: Vector, noise: Vector) -> float:
@@ -34,12 +76,12 @@ def mean_variance(x: Vector) -> Vector:
     return np.asarray(2.0 / (3.0 * x * x) * (1.0 - (1.0 + x - x * x) * np.exp(-x)))
 
 
-def level_rests(recording: Recording, flat: Flat, runs: Intervals) -> Vector:
-    """Return the acceleration (n, 3) [m/s^2], in each run rotated by the gyroscope into the axes of the run's middle.
+def level_rests(acc: Vector, recording: Recording, flat: Flat, runs: Intervals) -> Vector:
+    """Return `acc` (n, 3) [m/s^2], in each run rotated by the gyroscope into the axes of the run's middle.
 
     Otherwise a slow turn of the hand, which moves gravity through the axes, would pass for an acceleration of the hand.
     """
-    acc = recording.acc.copy()
+    acc = acc.copy()
     steps = np.diff(recording.t, prepend=recording.t[0])[:, None] * (recording.gyr - flat.b_omega)
     path = np.cumsum(steps, axis=0)
     # All runs are rotated at once, since there are many.
@@ -50,28 +92,3 @@ def level_rests(recording: Recording, flat: Flat, runs: Intervals) -> Vector:
     once = np.cross(phi, acc[at])
     acc[at] += once + 0.5 * np.cross(phi, once)
     return acc
-
-
-def fit_lambda(acc: Vector, recording: Recording, flat: Flat, runs: Intervals, otherwise: float) -> float:
-    """Return lambda [1/s] by the share of the acceleration's variance that means over blocks keep in a hand's rests.
-
-    acc : (n, 3) as `level_rests` returns it. otherwise : returned where too few rests tremble.
-    """
-    n = max(round(BLOCK_S * recording.rate_hz), 2)
-    kept, seconds = [], []
-    for first, last in runs.tolist():
-        blocks = (last - first) // n
-        if last <= flat.last or blocks < 2:
-            continue
-        rest = acc[first : first + blocks * n]
-        variance = tremor_variance(rest.var(0), flat.Sigma_a)
-        if not variance:
-            continue
-        noise = flat.Sigma_a / n * (blocks - 1) / blocks
-        kept.append(float(np.mean(rest.reshape(blocks, n, 3).mean(1).var(0) - noise)) / variance)
-        seconds.append(blocks * n / recording.rate_hz)
-    if len(kept) < FEWEST_RESTS:
-        return otherwise
-    expected = mean_variance(LAMBDAS * n / recording.rate_hz) - mean_variance(np.outer(seconds, LAMBDAS)).mean(0)
-    enough = np.flatnonzero(expected >= np.mean(kept))
-    return float(LAMBDAS[enough[0] if len(enough) else -1])

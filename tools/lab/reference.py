@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_continuous_lyapunov
 
 from mpucal.calibration.likelihood import Evaluation
 from mpucal.calibration.parameters import HAND, NAMES, PLACES, TABLE, Form
@@ -25,7 +25,7 @@ from mpucal.data import Vector
 
 STEP = 1e-30
 Complex = NDArray[np.complex128]
-LONGEST_STEP_S, SPEED_OF_RESET_S = 0.2, 0.04
+LONGEST_STEP_S = 0.2
 
 
 def with_steps(theta: Theta, p: int) -> SimpleNamespace:
@@ -143,8 +143,7 @@ class Pass:
 
     def _travel(self, i: int) -> None:
         """Move (p, v, a) along the chain; Phi and Q from one matrix exponential (Van Loan 1978)."""
-        lam, h = self.problem.lam, min(self.problem.series.dt[i], LONGEST_STEP_S)
-        A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(lam**3), -3.0 * lam**2, -3.0 * lam]])
+        A, h = self._chain(), min(self.problem.series.dt[i], LONGEST_STEP_S)
         both = expm(h * np.block([[-A, np.diag([0.0, 0.0, 1.0])], [np.zeros((3, 3)), A.T]]))
         Phi: Vector = np.eye(4)
         Q: Vector = np.zeros((4, 4))
@@ -155,8 +154,14 @@ class Pass:
 
     def _reset(self, sigma: float) -> None:
         self.x[:, 3:], self.P[3:, :], self.P[:, 3:] = 0.0, 0.0, 0.0
-        self.P[6:9, 6:9] = (SPEED_OF_RESET_S * sigma) ** 2 * np.eye(3)
-        self.P[9:, 9:] = sigma**2 * np.eye(3)
+        A, lam = self._chain(), self.problem.lam
+        stationary = solve_continuous_lyapunov(A, -np.diag([0.0, 0.0, 16.0 * lam / 3.0 * sigma**2]))
+        self.P[3:, 3:] = np.kron(stationary, np.eye(3))
+
+    def _chain(self) -> Vector:
+        """Return the matrix (3, 3) of d/dt (p, v, a)."""
+        lam = self.problem.lam
+        return np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(lam**3), -3.0 * lam**2, -3.0 * lam]])
 
     def _measure(self, y: Vector, R: Vector, rate: Vector, alpha: Vector, tau: Complex, huber: float) -> None:
         """Compute innovation, cost, derivatives and update; R (3,) is the diagonal of the noise."""
