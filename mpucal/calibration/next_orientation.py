@@ -23,7 +23,7 @@ from .rotation import cross, shortest_turn
 # These describe how a person turns the board to an orientation, and holds it there.
 MOVE_S, REST_S = 1.6, 2.0
 FAST_RAD_S = math.radians(130.0) / MOVE_S
-SWAY_MPS2 = 0.02
+SWAY_MPS2 = 0.02  # what a low pass leaves of a seated hand's acceleration
 
 NEAR_RAD = math.radians(25.0)  # a direction nearer than this is the present one
 

@@ -36,8 +36,8 @@ class Preprocessed:
 
     Attributes
     ----------
-    recording, flat : with the gyroscope's drift removed.
-    problem : the series with the tremor of the rests, and no noise of moving yet.
+    recording, flat : with the gyroscope's drift and the tremor of the rests removed.
+    problem : the series with the sway of the rests, and no noise of moving yet.
     runs : (k, 2) rests in samples of the recording. rests : number of those that end after the flat segment.
     motion : (n,) 0 at rest to 1. pose : (n,) (m/s^2)^2, r_extra of the rests.
     """
@@ -72,7 +72,7 @@ class Preprocessed:
         lam = lam or self.problem.lam
         jerk = jerk_density(sigma, lam) * self.motion
         if self.problem.series.jerk is not None:
-            jerk = jerk + lam / self.problem.lam * self.problem.series.jerk  # which keeps the size of the tremor
+            jerk = jerk + lam / self.problem.lam * self.problem.series.jerk  # which keeps the size of the sway
         white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
         return replace(self._with(jerk=jerk, r_extra=self.pose + white), lam=lam)
 

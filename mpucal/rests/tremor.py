@@ -16,7 +16,7 @@ from .flat import Flat
 from .intervals import Intervals, statistics
 
 LOW_PASS_S = 0.2  # length of a Hann window, whose response is zero at 10 Hz and nearly 1 below 1 Hz
-SHORTEST = 3  # windows
+SHORTEST = 3  # windows that a rest lasts at least to be low-passed
 SWAY_PER_S, TREMOR_PER_S = 5.0, 20.0  # lambda of what the low pass leaves, and of a whole tremor
 TREMBLES = 0.04  # a tremor's variance below this share of the sensor's noise counts as zero
 
