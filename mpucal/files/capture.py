@@ -17,7 +17,6 @@ from weakref import finalize
 
 import numpy as np
 
-from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
@@ -92,11 +91,9 @@ class _SessionRecords:
         self.recovered: str | None = None
         self.utc_ns: int | None = None
 
-    def accesses(self) -> Generator[Transaction | Accesses]:
-        """Yield the accesses, by the block where they are stored so."""
-        for record in self._records():
-            if not isinstance(record, RawPacket):
-                yield record
+    def accesses(self) -> Iterator[Accesses]:
+        """Yield the accesses by the block, as they are stored."""
+        return (record for record in self._records() if isinstance(record, Accesses))
 
     def __iter__(self) -> Iterator[RawPacket]:
         """Yield the packets that count, of which a vehicle's log is made in two passes."""
@@ -104,7 +101,7 @@ class _SessionRecords:
             if isinstance(record, RawPacket) and self._counts:
                 yield record
 
-    def _records(self) -> Generator[Transaction | Accesses | RawPacket]:
+    def _records(self) -> Generator[Accesses | RawPacket]:
         self._counts = True
         for reader in map(CaptureReader, self._paths):
             for record in reader.blocks():

@@ -46,6 +46,8 @@ from .messages import (
 from .reading import LONGEST_CHUNK
 
 Record = Transaction | RawPacket | SessionEvent
+# as a file holds records
+Block = Accesses | RawPacket | SessionEvent
 
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
 # the name of the metadata in a file of calibrated samples, which is not a capture
@@ -278,7 +280,7 @@ class CaptureReader:
     def __iter__(self) -> Iterator[Record]:
         return one_by_one(self.blocks())
 
-    def blocks(self) -> Generator[Accesses | Record]:
+    def blocks(self) -> Generator[Block]:
         """Yield the records, register accesses by the block as in the file."""
         try:
             with check_regular(self._path).open("rb") as file:
@@ -288,7 +290,7 @@ class CaptureReader:
                 f"cannot read {self._path} ({error.strerror})", "check the path and its permissions"
             ) from error
 
-    def _blocks(self, file: IO[bytes]) -> Iterator[Accesses | Record]:
+    def _blocks(self, file: IO[bytes]) -> Iterator[Block]:
         size = os.fstat(file.fileno()).st_size
         self._check(file.read(len(MCAP0_MAGIC)))
         file.seek(0)
@@ -324,11 +326,11 @@ class CaptureReader:
             raise CaptureError(f"{self._path} lacks the metadata of a capture", _REMEDY)
         self.recovered = None if finished else self._recovery_sentence(size - whole)
 
-    def _block(self, channel: Channel | None, message: Message) -> Accesses | Record | None:
+    def _block(self, channel: Channel | None, message: Message) -> Block | None:
         if channel is None:
             return None
         try:
-            return decode_message(channel.topic, channel.message_encoding, message.log_time, message.data)
+            return decode_message(channel.topic, message.log_time, message.data)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise CaptureError(
                 f"{self._path} holds an invalid message on {channel.topic} ({error})", _REMEDY
@@ -340,7 +342,7 @@ class CaptureReader:
         if magic != MCAP0_MAGIC:
             raise CaptureError(f"{self._path} is not an MCAP file", _REMEDY)
 
-    def _count_block(self, block: Accesses | Record) -> None:
+    def _count_block(self, block: Block) -> None:
         if isinstance(block, Accesses):
             first_ns, self._last_ns, count = int(block.t_ns[0]), int(block.t_ns[-1]), len(block)
         else:
@@ -355,7 +357,7 @@ class CaptureReader:
         return f"{self.name} was never closed: its {held}, what may have followed is lost."
 
 
-def one_by_one(blocks: Iterable[Accesses | Record]) -> Iterator[Any]:
+def one_by_one(blocks: Iterable[Block]) -> Iterator[Any]:
     """Yield the records of blocks, each register access by itself."""
     for block in blocks:
         yield from block if isinstance(block, Accesses) else (block,)
@@ -397,8 +399,9 @@ def _meta(item: Metadata, path: Path) -> dict[str, Any]:
         version = int(meta.pop(VERSION_KEY))
     except (ValueError, KeyError, TypeError) as error:
         raise CaptureError(f"the metadata of {path} are damaged ({error})", "record it again") from error
-    if version > VERSION:
+    if version != VERSION:
         raise CaptureError(
-            f"{path} is a capture of version {version}, but this mpucal reads versions up to {VERSION}", "update mpucal"
+            f"{path} is a capture of version {version}, but this mpucal reads version {VERSION}",
+            "read it with the mpucal that recorded it",
         )
     return meta

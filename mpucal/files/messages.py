@@ -16,7 +16,7 @@ A message of accesses has columns with one entry per access, in Protocol Buffers
     failures     of failed accesses: index (from 0) and error
     files        names, such as iio:device0/in_accel_scale
 
-Events are JSON. In captures of version 1 each access was a JSON message.
+Events are JSON.
 """
 
 from __future__ import annotations
@@ -26,9 +26,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from mcap.well_known import MessageEncoding
 
-from ..chip.access import Failure, Transaction
+from ..chip.access import Failure
 from ..chip.accesses import Accesses
 from ..chip.records import SessionEvent
 from ..mavlink.dialect import is_packet
@@ -152,9 +151,7 @@ def encode_event(name: str, data: Mapping[str, Any]) -> bytes:
     return json.dumps({"name": name, "data": dict(data)}, separators=(",", ":")).encode()
 
 
-def decode_message(
-    topic: str, encoding: str, t_ns: int, message: bytes
-) -> Accesses | Transaction | RawPacket | SessionEvent | None:
+def decode_message(topic: str, t_ns: int, message: bytes) -> Accesses | RawPacket | SessionEvent | None:
     """Decode a message; None for the topic of a newer mpucal.
 
     Raises
@@ -162,7 +159,7 @@ def decode_message(
     ValueError, KeyError, TypeError, AttributeError : it is not a message of that topic.
     """
     if topic == BUS:
-        return decode_accesses(message) if encoding == MessageEncoding.Protobuf else _transaction(t_ns, message)
+        return decode_accesses(message)
     if topic == PACKETS:
         if not is_packet(message):
             raise ValueError(f"{len(message)} bytes are no packet")
@@ -171,17 +168,3 @@ def decode_message(
         content = parse_own_json(message)
         return SessionEvent(content["name"], t_ns, content["data"])
     return None
-
-
-def _transaction(t_ns: int, message: bytes) -> Transaction:
-    content = parse_own_json(message)
-    error = content.get("error")
-    return Transaction(
-        content["op"],
-        content["register"],
-        content["count"],
-        bytes.fromhex(content["data"]),
-        t_ns,
-        None if error is None else Failure(**error),
-        content.get("host_ns"),
-    )
