@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from ..chip.records import OPENED, SessionEvent
 from ..data import Recording
 from ..errors import RecordingError
-from ..mavlink.dialect import Parser, dialect
 from ..mavlink.log import read_log
-from ..mavlink.texts import NoteReader, is_own
 from ..mavlink.tlog import RawPacket, TlogFile, encode_tlog
 from ..result.session_files import CAPTURE
-from .mcap import Capture, CaptureReader, Record
+from .mcap import Capture, CaptureReader
 from .reading import check_size
 
 TLOG = ".tlog"
@@ -34,23 +31,14 @@ def load_tlog(path: Path) -> Recording:
 
 
 def read_tlog(path: Path) -> Capture:
-    """Return a .tlog as a capture, with the events and the head of a session that an earlier mpucal recorded so.
+    """Return the packets of a .tlog as a capture without a head.
 
     Raises
     ------
     CaptureError : it cannot be read, or holds no packet.
     """
-    file, parser, notes = TlogFile(path), Parser(dialect().MAVLink(None)), NoteReader()
-    records: list[Record] = []
-    for record in file:
-        records.append(record)
-        for packet in parser.datagram(record.data) if is_own(record.data) else ():
-            note = notes.add(packet.message)
-            if note is not None:
-                records.append(SessionEvent(note.name, record.t_ns, note.data))
-    head = next((dict(each.data) for each in records if isinstance(each, SessionEvent) and each.name == OPENED), {})
-    meta = {**head, "driver": f"mavlink {head.pop('source', None)}"} if head else {}
-    return Capture(meta, tuple(records), file.recovered, file.name)
+    file = TlogFile(path)
+    return Capture({}, tuple(file), file.recovered, file.name)
 
 
 def tlog_of(place: Path) -> bytes:

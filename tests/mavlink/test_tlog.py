@@ -1,10 +1,8 @@
 """The .tlog format: written, read, damaged, read by others, and made into recordings and sessions."""
 
 import gc
-import json
 import struct
 import tracemalloc
-from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -13,8 +11,7 @@ from hypothesis import strategies as st
 
 import mpucal
 from mpucal.__main__ import run
-from mpucal.chip.config import RateOnlyConfig
-from mpucal.chip.records import END, OPENED, SessionEvent
+from mpucal.chip.records import END, SessionEvent
 from mpucal.data import Samples
 from mpucal.errors import CaptureError, EndOfCapture, RecordingError
 from mpucal.files.mcap import CaptureWriter
@@ -23,9 +20,7 @@ from mpucal.files.tlog import read_tlog
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM
 from mpucal.mavlink.log import read_log
-from mpucal.mavlink.texts import CHUNK, PREFIX, Note, NoteReader
 from mpucal.mavlink.tlog import RawPacket, TlogFile, encode_tlog
-from mpucal.session.plan import Plan
 from mpucal.sources.replay import PacketReplay
 
 START_NS = 1_700_000_000_000_000_000
@@ -176,49 +171,26 @@ def test_a_log_is_not_held_as_messages(station, made):
     assert peak < 400 * 1500
 
 
-def noted(*notes):
-    """Return the packets of events (name, data) as STATUSTEXT chunks, as an earlier mpucal wrote them."""
-    sender = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
-    packets = []
-    for number, (name, data) in enumerate(notes, 1):
-        text = PREFIX + json.dumps({"name": name, "data": data}, separators=(",", ":")).encode()
-        chunks = [text[at : at + CHUNK] for at in range(0, len(text) + 1, CHUNK)]
-        messages = [dialect().MAVLink_statustext_message(7, chunk, number, k) for k, chunk in enumerate(chunks)]
-        packets += [bytes(message.pack(sender)) for message in messages]
-    return packets
-
-
-LEAVES = st.none() | st.booleans() | st.integers(-9, 9) | st.text(max_size=60)
-DATA = st.dictionaries(st.text(max_size=9), LEAVES | st.lists(LEAVES, max_size=4), max_size=4)
-
-
-@given(name=st.text(max_size=80), data=DATA, lost=st.none() | st.integers(0, 20))
-def test_a_note_comes_back_whole_or_not_at_all(decoded, name, data, lost):
-    packets = noted((name, data))
-    whole = lost is None or lost >= len(packets)
-    reader = NoteReader()
-    found = [reader.add(decoded(packet)) for k, packet in enumerate(packets) if k != lost]
-    assert [note for note in found if note] == ([Note(name, data)] if whole else [])
-
-
-def test_a_session_of_an_earlier_version_is_read_with_its_events(station, tmp_path):
-    plan = asdict(Plan(RateOnlyConfig(rate_hz=50.0), target="quick"))
-    heartbeat = station(7).heartbeat()
-    head = noted((OPENED, {"mpucal": "1.0", "source": 4, "plan": plan, "system": 7, "prepare": True}))
-    packets = [*head, heartbeat, *noted(("key", {"key": "enough"})), heartbeat, *noted((END, {}))]
-    path = tmp_path / "capture.tlog"
-    path.write_bytes(encode_tlog(RawPacket(k * 10**9, data) for k, data in enumerate(packets, 1)))
+def test_the_log_of_another_station_is_a_capture_of_its_packets(written):
+    path, records = written
     capture = read_tlog(path)
-    assert Plan.of_capture(capture.meta, "capture") == Plan(RateOnlyConfig(rate_hz=50.0), target="quick")
-    assert (capture.meta["system"], capture.meta["prepare"]) == (7, True)
-    replay = PacketReplay(capture.records, "capture")
-    key = next(record for record in capture.records if record.data == {"key": "enough"})
+    assert (capture.meta, list(capture.records), capture.recovered) == ({}, records, None)
+
+
+def test_a_replay_gives_the_packets_of_a_vehicle_and_the_keys_between_them(station):
+    own = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
+    ours = bytes(dialect().MAVLink_statustext_message(6, b"mpucal: rotate").pack(own))
+    heartbeat = station(7).heartbeat()
+    key = SessionEvent("key", 3 * 10**9, {"key": "enough"})
+    records = [*(RawPacket(k * 10**9, data) for k, data in ((1, ours), (2, heartbeat))), key]
+    records += [RawPacket(4 * 10**9, heartbeat), SessionEvent(END, 5 * 10**9)]
+    replay = PacketReplay(records, "capture")
     assert replay.receive(10**12).data == heartbeat
     assert replay.pending_events("key") == []
     assert replay.receive(key.t_ns + 1) is None
-    assert replay.pending_events("key") == [SessionEvent("key", key.t_ns, {"key": "enough"})]
+    assert replay.pending_events("key") == [key]
     assert replay.receive(10**12).data == heartbeat
-    assert replay.receive(capture.records[-1].t_ns) is None
+    assert replay.receive(records[-1].t_ns) is None
     assert [event.name for event in replay.pending_events(END)] == [END]
     with pytest.raises(EndOfCapture):
         replay.receive(10**12)
