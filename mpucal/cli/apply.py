@@ -17,7 +17,7 @@ from ..disk.atomic import check_not_input
 from ..errors import UsageError
 from ..files import open_rows, open_writer
 from ..files.csv import CsvText
-from ..files.formats import formats_in_memory, writable_formats
+from ..files.formats import writable_formats
 from ..files.rows import Rows
 from ..result.correction import make_correction
 from ..result.session_files import captures_in
@@ -28,9 +28,10 @@ from .recording_options import hint_options, make_hints, say_interpretation
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
 
 
-HELP = f"""Apply a calibration (.json or .bin) to any recording that `mpucal calibrate` reads, however long.
+HELP = """Apply a calibration (.json or .bin) to any recording that `mpucal calibrate` reads.
 
-The result is in m/s² and rad/s, in the calibration's body frame. Only {formats_in_memory()} is loaded as a whole.
+The result is in m/s² and rad/s, in the calibration's body frame. A table in mpucal's own format and a chip's capture
+may be longer than the memory; other recordings are loaded whole.
 """
 
 
@@ -41,7 +42,7 @@ The result is in m/s² and rad/s, in the calibration's body frame. Only {formats
 @json_option("Print a summary as JSON; needs -o.")
 @hint_options()
 def command(calibration: Path, file: Path, target: Path | None, as_json: bool, **hints: Any) -> None:
-    """Apply the calibration to a run of samples at a time; constant memory."""
+    """Apply the calibration to a run of samples at a time."""
     if as_json and target is None:
         raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
     if target is not None:

@@ -44,9 +44,9 @@ def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
 def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     """Return the samples of any recording that `load` reads, a run at a time.
 
-    Tables and archives are read while the runs are consumed, and before that until their units are known. A capture is
-    decoded before, since the times of its first samples depend on its last. A vehicle's log is decoded whole. A missing
-    number is NaN.
+    A table in mpucal's own format is read while the runs are consumed, and before that until its units are known. A
+    capture is decoded before, since the times of its first samples depend on its last. Any other file is loaded
+    whole. A missing number is NaN.
 
     Raises
     ------

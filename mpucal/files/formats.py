@@ -207,11 +207,6 @@ def readable_formats() -> str:
     return _list_formats(row for row in FORMATS if row.is_read)
 
 
-def formats_in_memory() -> str:
-    """Return the formats that are loaded whole into memory, as text."""
-    return _list_formats(row for row in FORMATS if row.is_read and (row.hinted or not row.rows))
-
-
 def writable_formats() -> str:
     """Return the formats that can be written, as text."""
     return _list_formats(row for row in FORMATS if row.writer)

@@ -3,9 +3,6 @@
 Optional are `flat`, (first, last + 1) samples that lie flat, or `flat_samples`, the number of them at the start;
 `temperature_c` or `temperature`, (n,); `gap`, `acc_clipped`, `gyr_clipped`, (n,); `sensor`, a JSON object; `done`, the
 processing of calibrated samples. Other keys are ignored.
-
-An archive holds one array after the other: for runs of samples they are read side by side, and first written to
-separate files.
 """
 
 from __future__ import annotations
@@ -15,32 +12,28 @@ import lzma
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, fields
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
-from shutil import copyfileobj
-from tempfile import TemporaryFile
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
-from numpy.lib import format as npy
-from numpy.typing import NDArray
 
+from ..arguments import is_plausible
 from ..data import Samples, Sensor
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ..strict_json import parse_json
 from .reading import check_size, reading
-from .rows import ROWS, Rows, Write, check_runs, make_recording
+from .rows import Rows, Write, check_runs, describe, make_recording, shown_units, to_si
 from .tables.times import plausible_utc_ns
 
 NEEDED = ("t", "acc", "gyr")
 TEMPERATURES = ("temperature_c", "temperature")
 MASKS = ("gap", "acc_clipped", "gyr_clipped")
-LARGE = (*NEEDED, *TEMPERATURES, *MASKS)
-DONE = "done"
-UTC = "utc_ns"
+DONE, UTC = "done", "utc_ns"
+READ = (*NEEDED, *TEMPERATURES, *MASKS, "flat", "flat_samples", "sensor", DONE, UTC)
 # errors of zipfile, its decompressors and numpy: damaged, encrypted, of an unknown method, longer than memory
 DAMAGED = (
     *(ValueError, TypeError, AttributeError, ArithmeticError, LookupError, EOFError, RuntimeError, MemoryError),
@@ -50,7 +43,7 @@ _REMEDY = "give an .npz with t [s] (n,), acc [m/s^2] (n, 3) and gyr [rad/s] (n, 
 
 
 def npz_rows(path: Path) -> Rows:
-    """Return the samples of an archive, a run at a time if it is stored by rows.
+    """Return the samples of an archive, which is loaded whole.
 
     Raises
     ------
@@ -61,38 +54,21 @@ def npz_rows(path: Path) -> Rows:
         if missing:
             has = ", ".join(archive.files) or "nothing"
             raise RecordingError(f"{path} has no {', '.join(missing)}; it has {has}", _REMEDY)
-        small = _arrays(archive, path, ("flat", "flat_samples", "sensor", DONE, UTC))
-        arrays = {} if _by_rows(archive) else _arrays(archive, path, LARGE)
-        size = _size(archive, LARGE)
-    sensor, flat = _sensor(small, path), _flat(small, path)
-    runs, taken = _runs(path), None
-    if arrays:
-        warm = next((arrays.pop(key) for key in TEMPERATURES if key in arrays), None)
-        arrays.pop("temperature", None)
-        whole = make_recording(**arrays, temperature_c=warm, sensor=sensor, name=path.name)
-        runs, taken = Rows.of(whole).runs, whole.taken
-    utc_ns = np.asarray(small.get(UTC, np.nan))
-    return Rows(
-        check_runs(runs, path.name),
-        sensor,
-        flat,
-        name=path.name,
-        done=str(small.get(DONE, "")),
-        taken=taken,
+        check_size(path, sum(each.file_size for each in archive.zip.infolist() if each.filename[:-4] in READ))
+        arrays = {key: archive[key] for key in READ if key in archive.files}
+    columns = {key: arrays[key] for key in (*NEEDED, *MASKS) if key in arrays}
+    columns |= {key: _with_nan(columns[key]) for key in ("acc", "gyr")}
+    warm = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
+    sensor, flat = _sensor(arrays, path), _flat(arrays, path)
+    whole = make_recording(**columns, temperature_c=warm, flat=flat, sensor=sensor, name=path.name)
+    units, utc_ns = shown_units([whole], sensor), np.asarray(arrays.get(UTC, np.nan))
+    rows = Rows.of(to_si(whole, units), str(arrays.get(DONE, "")))
+    return replace(
+        rows,
+        runs=check_runs(rows.runs, path.name),
+        taken=" ".join(filter(None, (whole.taken, describe(path.name, units)))) or None,
         utc_ns=plausible_utc_ns(int(utc_ns)) if utc_ns.shape == () and utc_ns.dtype.kind in "iu" else None,
-        plain=True,
-        size=size,
     )
-
-
-def _arrays(archive: Any, path: Path, keys: Sequence[str]) -> dict[str, Any]:
-    """Return those arrays of `keys` that an archive holds, if they fit the memory."""
-    check_size(path, _size(archive, keys))
-    return {key: archive[key] for key in keys if key in archive.files}
-
-
-def _size(archive: Any, keys: Sequence[str]) -> int:
-    return sum(each.file_size for each in archive.zip.infolist() if each.filename.removesuffix(".npy") in keys)
 
 
 @contextmanager
@@ -136,81 +112,24 @@ def _sensor(arrays: Mapping[str, Any], path: Path) -> Sensor:
         ) from error
 
 
-class _Column:
-    """Array of an archive, read from its beginning to its end."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        version = npy.read_magic(file)
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        self.shape, self.fortran, self.dtype = read(file)
-        self._file, self._width = file, int(np.prod(self.shape[1:]))
-
-    def take(self, count: int, dtype: type) -> NDArray[Any]:
-        """Return the next `count` rows."""
-        data = self._file.read(count * self._width * self.dtype.itemsize)
-        # too large a number becomes infinite, and a signalling NaN a quiet one; both are refused later
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.frombuffer(data, self.dtype).reshape(count, *self.shape[1:]).astype(dtype)
-
-
-def _columns(archive: Any, stack: ExitStack) -> dict[str, _Column]:
-    there = [key for key in LARGE if key in archive.files]
-    return {key: _Column(stack.enter_context(archive.zip.open(f"{key}.npy"))) for key in there}
-
-
-def _by_rows(archive: Any) -> bool:
-    """Return True if all arrays are stored by rows in the right shapes, as nearly always."""
-    with ExitStack() as stack:
-        columns = _columns(archive, stack)
-    n = (*columns["t"].shape, 0)[0]
-    return n >= 2 and all(
-        column.shape == ((n, 3) if key in ("acc", "gyr") else (n,))
-        and column.dtype.kind in ("fiub" if key in MASKS else "fiu")
-        and not column.fortran
-        for key, column in columns.items()
-    )
-
-
-def _runs(path: Path) -> Iterator[Samples]:
-    with _open_archive(path) as archive, ExitStack() as stack:
-        columns = _columns(archive, stack)
-        warm = next((columns[key] for key in TEMPERATURES if key in columns), None)
-        for first in range(0, columns["t"].shape[0], ROWS):
-            n = min(ROWS, columns["t"].shape[0] - first)
-            run = {key: columns[key].take(n, float) for key in NEEDED}
-            run |= {key: columns[key].take(n, bool) if key in columns else np.zeros(n, bool) for key in MASKS}
-            yield Samples(**run, temperature_c=np.full(n, np.nan) if warm is None else warm.take(n, float))
+def _with_nan(values: Any) -> Any:
+    """Return numbers with NaN in place of those that no sensor gives; anything else as it is."""
+    if values.dtype.kind not in "fiu":
+        return values
+    # too large a number becomes infinite, and a signalling NaN a quiet one
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = values.astype(float)
+    found[~is_plausible(found)] = np.nan
+    return found
 
 
 @contextmanager
 def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
-    """Open an uncompressed archive with all metadata; see open_writer."""
-    with atomic_file(path) as file, ExitStack() as stack:
-        columns = {field.name: stack.enter_context(TemporaryFile(dir=path.parent)) for field in fields(Samples)}
-        count = 0
-
-        def write(samples: Samples) -> None:
-            nonlocal count
-            for name, column in columns.items():
-                column.write(np.ascontiguousarray(getattr(samples, name)).data)
-            count += len(samples)
-
-        yield write
-        small: dict[str, Any] = {"sensor": json.dumps(asdict(rows.sensor)), DONE: done}
-        small |= {} if rows.utc_ns is None else {UTC: np.int64(rows.utc_ns)}
-        with zipfile.ZipFile(file, "w") as archive:
-            for name, column in columns.items():
-                _join(archive, name, column, count)
-            for name, value in (small if rows.flat is None else small | {"flat": rows.flat}).items():
-                with archive.open(f"{name}.npy", "w") as member:
-                    npy.write_array(member, np.asarray(value), allow_pickle=False)
-
-
-def _join(archive: zipfile.ZipFile, name: str, column: IO[bytes], count: int) -> None:
-    """Copy the values in the file `column` into the archive."""
-    like: NDArray[Any] = getattr(Samples.empty(), name)
-    described = npy.header_data_from_array_1_0(like) | {"shape": (count, *like.shape[1:])}
-    column.seek(0)
-    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-        npy.write_array_header_1_0(member, described)
-        copyfileobj(column, member)
+    """Open an uncompressed archive with all metadata, written whole at the end; see open_writer."""
+    with atomic_file(path) as file:
+        runs: list[Samples] = []
+        yield runs.append
+        known: dict[str, Any] = {"flat": rows.flat, UTC: rows.utc_ns}
+        small = {key: value for key, value in known.items() if value is not None}
+        sensor = json.dumps(asdict(rows.sensor))
+        np.savez(file, **vars(Samples.joined(runs)), **small, sensor=sensor, done=done)

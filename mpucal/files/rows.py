@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,7 +12,6 @@ from ..arguments import is_plausible
 from ..clocks.stamps import FEWEST, Clock, are_gaps
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector, clock_of
 from ..errors import RecordingError
-from .reading import check_size
 from .tables.units import QUANTITIES, acceleration_unit, gyro_unit, rate_factor
 
 # 16 Ki samples take 1 MB, which fits a cache; for larger products BLAS starts threads, which takes longer
@@ -34,7 +32,7 @@ class Rows:
     others : number of further IMUs in the file.
     done : the processing of samples that are calibrated already; empty if they are not.
     noise : (2, 3) standard deviations of a sample's acc [m/s^2] and gyr [rad/s]; NaN: unknown.
-    plain : units are known only by convention. size : bytes of memory of the whole, if it is known before.
+    plain : units are known only by convention.
     """
 
     runs: Iterator[Samples]
@@ -49,7 +47,6 @@ class Rows:
     utc_ns: int | None = None
     taken: str | None = None
     plain: bool = False
-    size: int = 0
 
     @classmethod
     def of(cls, recording: Recording, done: str = "") -> Rows:
@@ -69,7 +66,6 @@ class Rows:
 
     def recording(self) -> Recording:
         """Return the whole recording, checked; a plain one has even times and SI units."""
-        check_size(Path(self.name), self.size)
         samples, remarks = Samples.joined(list(self.runs)), [self.taken]
         if self.plain and len(samples):
             found = shown_units([samples], self.sensor)
@@ -125,7 +121,7 @@ def shown_units(runs: Iterable[Samples], sensor: Sensor) -> dict[str, str]:
     return {key: unit for key, unit in seen.items() if unit != SI[key]}
 
 
-def to_si(samples: Samples, units: Mapping[str, str]) -> Samples:
+def to_si(samples: S, units: Mapping[str, str]) -> S:
     """Return samples in SI units that were in `units`."""
     return replace(samples, **{key: getattr(samples, key) * QUANTITIES[key][of] for key, of in units.items() if of})
 

@@ -213,7 +213,9 @@ def test_a_bad_time_is_named_from_run_to_run_and_leaves_no_file(kind, at, value,
         np.savez(source, t=t, acc=made.acc, gyr=made.gyr)
     else:
         source.write_bytes(HEADER.encode() + lines(np.column_stack([t, made.acc, made.gyr])))
-    with pytest.raises(RecordingError, match=f"{said} {at}"):
+    # an archive is checked whole, and does not name the sample that lacks a time
+    named = "t is not a finite number" if kind == ".npz" and np.isnan(value) else f"{said} {at}"
+    with pytest.raises(RecordingError, match=named):
         through(source, tmp_path / "out.csv")
     assert not (tmp_path / "out.csv").exists()
 
@@ -273,11 +275,11 @@ def test_a_failure_leaves_the_old_file_and_no_other(ending, archive, tmp_path):
     assert list(tmp_path.iterdir()) == [target]
 
 
-@pytest.mark.parametrize(("source", "target"), [(".npz", ".csv"), (".csv", ".npz")])
-def test_memory_is_that_of_a_run_however_many_there_are(source, target, tmp_path):
+@pytest.mark.parametrize("target", [".csv", ".mcap"])
+def test_memory_is_that_of_a_run_however_many_there_are(target, tmp_path):
     def peak(runs):
         whole = recording(runs * ROWS)
-        path = tmp_path / f"{runs}{source}"
+        path = tmp_path / f"{runs}.csv"
         with open_writer(path, Rows(iter(())), "") as write:
             for first in range(0, len(whole), ROWS):
                 write(whole.part(first, first + ROWS))
