@@ -1,24 +1,21 @@
-"""Feed of the page: sends the session's state to the page's process without ever waiting for it."""
+"""Feed of the page: the session's state for the page's server, which runs beside the session in threads."""
 
 from __future__ import annotations
 
-import json
 import secrets
-import subprocess
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import Any
 
 from ..errors import OutputError
-from ..session.beside import end_beside, start_beside
 from ..session.boards import BOARD
 from ..session.events import Key, Output
 from ..terminal.view import View
 from ..terminal.voice import Voice
 from .address import Address
+from .server import Server
 from .state import changes, state
 
 # Least time between two updates of the page.
@@ -29,9 +26,9 @@ LINGER_S = 5.0
 
 
 class Feed:
-    """Process of a page, and a thread that sends it the latest view of the session.
+    """Server of a page, and a thread that gives it the latest view of the session.
 
-    Outputs only change the view. If the process or its clients are slow, they skip the views between.
+    Outputs only change the view. If the thread or the clients are slow, they skip the views between.
 
     Parameters
     ----------
@@ -39,7 +36,7 @@ class Feed:
 
     Attributes
     ----------
-    url : address of the page, with its token. visited : True once a client has followed the session.
+    url : address of the page, with its token.
 
     Raises
     ------
@@ -47,33 +44,29 @@ class Feed:
     """
 
     def __init__(self, where: Address, about: Mapping[str, Any], keys: bool = False) -> None:
-        self._process = start_beside("mpucal.page.process", text=True)
-        pipes = self._process.stdin, self._process.stdout
-        self._stdin, self._answers = cast("tuple[IO[str], IO[str]]", pipes)
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        # The token is no argument of the process, because every user of the computer could read it there.
-        self._send({"host": where.host, "port": where.port, "name": where.name, "token": token, "keys": keys})
-        word, _, rest = self._answers.readline().strip().partition(" ")
-        if word != "port":
-            self.close()
+        self._pressed: deque[Key] = deque()
+        try:
+            self._server = Server((where.host, where.port), where.name, token, keys, self._press)
+        except OSError as error:
             raise OutputError(
-                f"no page can be served at {where.host}:{where.port} ({rest or 'its process ended'})",
+                f"no page can be served at {where.host}:{where.port} ({error.strerror or error})",
                 "choose another address with --page=HOST:PORT, or leave --page out",
                 without="--page",
-            )
-        self.url = f"http://{where.name}:{rest}/{token}/"
-        self.visited = False
+            ) from error
+        self.url = f"http://{self._server.filter.host}/{token}/"
         self._view, self._voice = View(board=str(about.get("board", BOARD))), Voice()
         self._fixed: dict[str, Any] = {**about, "keys": keys}
-        self._offered: deque[dict[str, str]] = deque()
-        self._pressed: deque[Key] = deque()
         self._changed, self._closed = threading.Event(), threading.Event()
         self._changed.set()
-        self._threads = [
-            threading.Thread(target=job, name="page", daemon=True) for job in (self._send_changes, self._listen)
-        ]
-        for thread in self._threads:
+        self._updates = threading.Thread(target=self._update, name="page", daemon=True)
+        for thread in (self._updates, threading.Thread(target=self._server.serve_forever, daemon=True)):
             thread.start()
+
+    @property
+    def visited(self) -> bool:
+        """True once a client has followed the session."""
+        return self._server.visited
 
     def hear(self, output: Output) -> None:
         """Change the view, and what is said about it."""
@@ -93,7 +86,7 @@ class Feed:
 
     def offer(self, paths: Sequence[Path]) -> None:
         """Offer files for download."""
-        self._offered.append({path.name: str(path.resolve()) for path in paths})
+        self._server.results.update((path.name, path.resolve()) for path in paths)
         self.show(results=[{"name": path.name, "bytes": path.stat().st_size} for path in paths])
 
     def pressed(self) -> Sequence[Key]:
@@ -101,47 +94,24 @@ class Feed:
         return [self._pressed.popleft() for _ in range(len(self._pressed))]
 
     def end(self) -> None:
-        """Send the last changes, give the clients time to fetch the results, and end the process."""
+        """Show the last changes, give the clients time to fetch the results, and stop serving."""
         self.show(ended=True)
         self._closed.set()
-        self._changed.set()
-        self._threads[0].join(LINGER_S)
-        with suppress(OSError):
-            self._stdin.close()
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(2.0 * LINGER_S)
-        self.close()
+        self._updates.join()
+        self._server.end(LINGER_S)
 
-    def close(self) -> None:
-        """End the process at once."""
-        end_beside(self._process)
+    def _press(self, key: str) -> None:
+        self._pressed.append(Key(key))
 
-    def _send(self, message: Mapping[str, Any]) -> None:
-        with suppress(OSError, ValueError):
-            self._stdin.write(json.dumps(message, allow_nan=False) + "\n")
-            self._stdin.flush()
-
-    def _send_changes(self) -> None:
+    def _update(self) -> None:
         old: dict[str, Any] = {}
         while True:
             self._changed.wait()
             self._changed.clear()
             last = self._closed.is_set()
             new = {**state(self._view, self._voice.said), **self._fixed}
-            while self._offered:
-                self._send({"results": self._offered.popleft()})
-            if changed := changes(new, old):
-                self._send({"show": changed})
+            self._server.latest.update(changes(new, old))
             old = new
             if last:
-                self._send({"end": LINGER_S})
                 return
             self._closed.wait(LEAST_INTERVAL_S)
-
-    def _listen(self) -> None:
-        for line in self._answers:
-            word, _, rest = line.strip().partition(" ")
-            if word == "clients":
-                self.visited = True
-            elif word == "key":
-                self._pressed.append(Key(rest))

@@ -36,6 +36,8 @@ PATIENCE_S = 10.0
 WAITING_BYTES = 32768
 # Interval of the heartbeats, during the session and after its end.
 BEAT_S, LAST_BEAT_S = 2.0, 0.2
+# Interval at which the end is looked for.
+ASK_EVERY_S = 0.05
 HEADERS = {
     "Cache-Control": "no-store",
     "Connection": "close",
@@ -60,12 +62,12 @@ class Server(ThreadingHTTPServer):
     Parameters
     ----------
     where : host and port to listen on; port 0: any free one. name, token, keys : see RequestFilter.
-    pressed : called with each key. counted : called with the number of clients that follow, when it changes.
+    pressed : called with each key.
 
     Attributes
     ----------
-    latest : values of the page. results : path of each by name. ending : True once the session has ended.
-    clients : number of those that follow the session.
+    latest : values of the page. results : path of each by name.
+    clients : number of those that follow the session. visited : True once there was one.
 
     Raises
     ------
@@ -82,15 +84,14 @@ class Server(ThreadingHTTPServer):
         token: str,
         keys: bool = False,
         pressed: Callable[[str], None] = lambda key: None,
-        counted: Callable[[int], None] = lambda clients: None,
     ) -> None:
         self.address_family = socket.AF_INET6 if ":" in where[0] else socket.AF_INET
         super().__init__(where, Handler)
         self.filter = RequestFilter(f"{name}:{self.server_port}", token, keys)
         self.latest = LatestValues()
         self.results: dict[str, Path] = {}
-        self.ending = False
-        self.pressed, self._counted = pressed, counted
+        self.pressed = pressed
+        self.ending = self.ended = self.visited = False
         self._free = threading.Semaphore(CONNECTIONS)
         self.clients, self._counting = 0, threading.Lock()
 
@@ -100,8 +101,21 @@ class Server(ThreadingHTTPServer):
             if self.clients + more > CLIENTS:
                 return False
             self.clients += more
-            self._counted(self.clients)
+            self.visited |= more > 0
             return True
+
+    def end(self, linger_s: float) -> None:
+        """Stop serving when no client follows any more, or after `linger_s`."""
+        self.ending, until_s = True, time.monotonic() + linger_s
+        while self.clients and time.monotonic() < until_s:
+            time.sleep(ASK_EVERY_S)
+        self.ended = True
+        self.shutdown()
+        self.server_close()
+
+    def serve_forever(self, poll_interval: float = ASK_EVERY_S) -> None:
+        """Serve until `shutdown`, which waits for one `poll_interval` at most."""
+        super().serve_forever(poll_interval)
 
     def verify_request(self, request: Any, client_address: Any) -> bool:
         """Return True if there is a thread left for the request."""
@@ -227,7 +241,7 @@ class Handler(BaseHTTPRequestHandler):
                 self.connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(PATIENCE_S * 1e3))
             self._begin(HTTPStatus.OK, {"Content-Type": "text/event-stream"})
             version = 0
-            while True:
+            while not self.server.ended:
                 version, changed = self.server.latest.since(version, LAST_BEAT_S if self.server.ending else BEAT_S)
                 self.wfile.write(f"data: {json.dumps(changed)}\n\n".encode())
         finally:

@@ -6,26 +6,24 @@ import os
 import subprocess
 import sys
 from contextlib import suppress
-from typing import Any
 
 # NumPy's libraries read these as they are loaded. Matrices are small here: a second thread would wait for the first,
 # and take its core from the loop that reads the sensor.
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-def start_beside(module: str, text: bool = False) -> subprocess.Popen[Any]:
+def start_beside(module: str) -> subprocess.Popen[bytes]:
     """Start the process; it ends with this program, however that ends, because its stdin is closed then.
 
     Parameters
     ----------
-    module : its name, for `python -m`. text : the pipes carry text instead of bytes.
+    module : its name, for `python -m`.
     """
     return subprocess.Popen(
         [sys.executable, "-P", "-m", module],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        text=text,
         # The process imports from the same places as this program.
         env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)},
         # Ctrl-C reaches the session alone, which ends this process.
@@ -33,7 +31,7 @@ def start_beside(module: str, text: bool = False) -> subprocess.Popen[Any]:
     )
 
 
-def end_beside(process: subprocess.Popen[Any]) -> None:
+def end_beside(process: subprocess.Popen[bytes]) -> None:
     """Kill the process, and close its pipes."""
     process.kill()
     process.wait()

@@ -1,7 +1,6 @@
 """The page in a real browser, beside a session on the simulated chip."""
 
 import json
-import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -73,17 +72,30 @@ def test_a_lost_connection_is_shown_and_reopened(tab, serve):
     assert tab.is_hidden("#lost")
 
 
+# A session that begins when two browsers follow it.
+SESSION_FOR_TWO = """
+import time
+from mpucal.__main__ import main
+from mpucal.page import console
+invite = console._invite
+def invite_two(feed, *how):
+    invite(feed, *how)
+    while feed._server.clients < 2:
+        time.sleep(0.02)
+console._invite = invite_two
+main()
+"""
+
+
 @pytest.fixture
 def session(tmp_path):
-    """A session with a page, which goes on as fast as it can once it is woken: its process, the address, its folder."""
+    """A session with a page, as fast as it can be once two browsers follow it: its process, the address, its folder."""
     words = ["session", "--bus", "sim:pace=fast", "--seed", "3", "--rate", "50", "--target", "quick"]
     words += ["--page", "--yes", "--json-events", "-o", "board"]
     with subprocess.Popen(
-        [sys.executable, "-m", "mpucal", *words], cwd=tmp_path, stdout=-1, stderr=-1, text=True
+        [sys.executable, "-c", SESSION_FOR_TWO, *words], cwd=tmp_path, stdout=-1, stderr=-1, text=True
     ) as process:
         address = json.loads(process.stderr.readline())["address"]
-        # The page is served by another process, which goes on.
-        process.send_signal(signal.SIGSTOP)
         yield process, address, tmp_path / "board"
         process.kill()
 
@@ -94,7 +106,6 @@ def test_two_browsers_follow_a_session_to_its_results(chromium, tab, session):
     tab.evaluate(WATCH)
     other = chromium.new_page(color_scheme="dark")
     other.goto(address)
-    process.send_signal(signal.SIGCONT)
     events = [json.loads(line) for line in process.stderr]
     for page in (tab, other):
         page.wait_for_selector("text=The calibration is good.")

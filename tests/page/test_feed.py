@@ -1,16 +1,17 @@
-"""The feed of a page: its messages reach the process, and both end together."""
+"""The feed of a page: its messages reach the clients, and the page ends with the session."""
 
 import json
-import os
-import signal
+import socket
 import subprocess
 import sys
 import time
 import urllib.request
 from contextlib import closing
+from urllib.parse import urlsplit
 
 import pytest
 
+from mpucal.page import feed as feed_module
 from mpucal.page.address import Address
 from mpucal.page.feed import Feed
 from mpucal.session.events import Key, Prompt, PromptKind
@@ -22,7 +23,7 @@ PROMPT = Prompt(PromptKind.ROTATE, "Turn the board: on its right edge (+X).", (1
 def feed():
     feed = Feed(Address(), {"title": "a chip", "board": "plain"}, keys=True)
     yield feed
-    feed.close()
+    feed.end()
 
 
 def followed(url, until):
@@ -61,18 +62,28 @@ def test_keys_and_results_go_through(feed, tmp_path):
     assert feed.pressed() == []
 
 
-def test_a_stopped_or_killed_process_does_not_block_the_session(feed):
-    pid = feed._process.pid
-    os.kill(pid, signal.SIGSTOP)
-    for number in range(20000):
-        feed.hear(Prompt(PromptKind.ROTATE, "x" * 100 + str(number)))
-    os.kill(pid, signal.SIGKILL)
-    feed.hear(PROMPT)
-    feed.end()
-    assert feed._process.poll() is not None
+def test_a_client_that_reads_nothing_does_not_block_the_session(feed):
+    where = urlsplit(feed.url)
+    with closing(socket.create_connection((where.hostname, where.port))) as stalled:
+        stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+        stalled.sendall(f"GET {where.path}events HTTP/1.1\r\nHost: {where.netloc}\r\n\r\n".encode())
+        for number in range(20000):
+            feed.hear(Prompt(PromptKind.ROTATE, "x" * 100 + str(number)))
+        assert followed(feed.url, lambda shown: shown["prompt"]["text"].endswith("19999"))["headline"] == "Turn it"
 
 
-def test_the_process_ends_with_a_killed_session():
+def test_a_client_that_stays_is_told_of_the_end_and_then_left(feed, monkeypatch):
+    monkeypatch.setattr(feed_module, "LINGER_S", 0.5)
+    with closing(urllib.request.urlopen(f"{feed.url}events", timeout=60.0)) as events:
+        events.readline()
+        feed.end()
+        assert feed.visited
+        assert b'"ended": true' in events.read()
+    with pytest.raises(OSError):
+        urllib.request.urlopen(feed.url, timeout=60.0)
+
+
+def test_the_page_ends_with_a_killed_session():
     program = (
         "import sys; from mpucal.page.feed import Feed; from mpucal.page.address import Address\n"
         "print(Feed(Address(), {}).url, flush=True); sys.stdin.read()"
