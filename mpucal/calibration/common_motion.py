@@ -6,7 +6,8 @@ acceleration alike:
 
     y = D (s + L r - tau ds/dt) + b_a + e                                         (19)
 
-with s of the first accelerometer, and lever arm r and delay tau from it to the other one.
+with s of the first accelerometer, and lever arm r and delay tau from it to the other one. The rates of both gyroscopes,
+compared in the same way, tell how the axes of the other one are turned against the first one's, and how surely.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from ..data import Vector
 from ..rests.flat import QUIETEST_ACC_MPS2, UNVARIED
 from .evidence import Evidence
 from .fit import Fit
-from .parameters import ACCELEROMETER, MODELS
+from .parameters import ACCELEROMETER, MODELS, PLACES
 from .preprocessing import smoothed_rates
 from .rotation import cross
 from .uncertainty import UncertaintyClaim
@@ -74,25 +75,30 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     inverse = np.linalg.inv(by.D)
     felt = (there.acc - by.b_a) @ inverse.T
     rate, alpha = smoothed_rates(there, replace(first.flat, last=0, b_omega=by.b_omega))
-    columns = np.hstack([felt, np.gradient(felt, there.t, axis=0), rate, alpha, there.gyr - by.b_omega])
+    columns = np.hstack([felt, np.gradient(felt, there.t, axis=0), rate, alpha, there.gyr])
     t = here.t[near]
     s, change, rate, alpha, rates = np.hsplit(np.stack([np.interp(t, there.t, c) for c in columns.T], axis=1), 5)
     L = cross(alpha) + cross(rate) @ cross(rate)
     more = own.D @ np.concatenate([L, -change[:, :, None]], axis=2)
-    step, n = here.sensor.steps[0], max(round(WINDOW_S * here.rate_hz), 4)
-    theta, covariance = _solve([_axis(axis, t, here.acc[near], s, more, step, n) for axis in range(3)])
-    # D is in the axes of its own gyroscope, whatever their scale factors.
-    own_rates = here.gyr[near] - own.b_omega
-    Q = polar(np.linalg.solve(rates.T @ rates + np.eye(3), rates.T @ own_rates + np.eye(3)))[0]
+    n = max(round(WINDOW_S * here.rate_hz), 4)
+    theta, covariance = _solve([_axis(axis, t, here.acc[near], s, more, here.sensor.steps[0], n) for axis in range(3)])
     D = theta[:9].reshape(3, 3)
     # The errors of the first one's D and b_a are errors of s.
     by_first = block_diag(np.kron(D @ inverse, np.eye(3)), D @ inverse)
     covariance += by_first @ by.covariance[ACCELEROMETER, ACCELEROMETER] @ by_first.T
-    in_own_axes = block_diag(np.kron(np.eye(3), Q.T), np.eye(3))
+    # D is in the axes of its own gyroscope, whatever their scale factors: Q turns the first one's into them.
+    later = np.concatenate([np.zeros((len(t), 3, 3)), -alpha[:, :, None]], axis=2)
+    M, of_M = _solve([_axis(axis, t, here.gyr[near], rates, later, here.sensor.steps[1], n) for axis in range(3)])
+    Q = polar(M[:9].reshape(3, 3))[0]
+    D = D @ Q.T
+    in_own_axes = block_diag(np.kron(np.eye(3), Q), np.eye(3))
+    by_M = (0.5 * cross(np.eye(3)) @ Q).reshape(3, 9)  # of the small turn that an error of M is for Q
+    by_Q = -(D @ cross(np.eye(3))).reshape(3, 9).T @ by_M
     whole = own.covariance.copy()
     whole[ACCELEROMETER], whole[:, ACCELEROMETER] = 0.0, 0.0
     whole[ACCELEROMETER, ACCELEROMETER] = in_own_axes @ covariance @ in_own_axes.T
-    return replace(own, D=D @ Q, b_a=theta[9:12], covariance=whole)
+    whole[PLACES["D"], PLACES["D"]] += by_Q @ of_M[:9, :9] @ by_Q.T
+    return replace(own, D=D, b_a=theta[9:12], covariance=whole)
 
 
 class _Measurements(NamedTuple):

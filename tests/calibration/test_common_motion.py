@@ -11,6 +11,9 @@ from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
 D = np.array([[1.01, 0.002, -0.003], [0.001, 0.985, 0.002], [-0.002, 0.003, 1.02]])
 B_A = np.array([0.31, -0.22, 0.17])
 G = 9.82
+# of the second gyroscope against the first one, and its bias's drift [rad/s^2]
+TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+DRIFT = 2e-5
 STEP_MPS2 = STANDARD_GRAVITY_MPS2 / 1000.0
 SENSOR = Sensor(chip="second", steps=(STEP_MPS2, 1e-3))
 
@@ -22,6 +25,12 @@ def second(run, seed=0):
     noise = np.random.default_rng(seed).normal(0.0, 0.1 * STEP_MPS2, felt.shape)
     acc = STEP_MPS2 * np.rint((felt @ D.T + B_A + noise) / STEP_MPS2)
     return replace(first, acc=acc, sensor=SENSOR, name="second")
+
+
+def turned(other, lag_s):
+    """Return the recording of a second sensor whose gyroscope is turned against the first one's, late and coarse."""
+    late = np.stack([np.interp(other.t - lag_s, other.t, rates) for rates in other.gyr.T], axis=1)
+    return replace(other, gyr=1e-3 * np.rint((late @ TURN.T + DRIFT * other.t[:, None]) / 1e-3))
 
 
 def together(run, other):
@@ -45,6 +54,15 @@ def test_it_is_as_well_known_as_the_first_one(runs):
         assert other.magnitude_std < 1.02 * first.magnitude_std
     z = [z_scores(other) for _, other in pairs]
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 0.004])
+def test_its_frame_is_claimed_as_well_as_the_rates_of_both_tell_it(runs, lag_s):
+    apart = []
+    for run in runs:
+        other = together(run, turned(second(run), lag_s))[1]
+        apart.append((other.D @ TURN - D) / np.sqrt((other.D_std**2) @ np.square(TURN)))
+    assert 0.3 < np.sqrt(np.mean(np.square(apart))) < 1.5
 
 
 def test_one_that_slipped_or_was_recorded_at_another_time_keeps_its_own_estimate(runs):
