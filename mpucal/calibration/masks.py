@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import ACCEL_RANGES_G, GAP_INTERVALS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..kernel import _kernel
 from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.intervals import true_runs
@@ -35,11 +36,6 @@ BY_CHANCE, TURNING = 1e-6, 0.3
 RESET_RAD, OF_NEIGHBOURS, NEIGHBOURS, BACK = np.deg2rad(5.0), 0.2, 4, 0.02
 AROUND = np.array([step for step in range(-NEIGHBOURS, NEIGHBOURS + 1) if step])
 
-# A spike exceeds so much [m/s^2, rad/s], and so many times the departures of its neighbours from theirs; its
-# neighbours differ by less than this share of it.
-LEAST_SPIKE, SPIKES, RETURNS = np.repeat((0.3, 0.15), 3), 8.0, 0.25
-BESIDE = np.arange(-4, 5)
-
 
 def _without_spikes(recording: Recording) -> Vector:
     """Return the rates, each spike of a single word that is back with the next sample replaced by its neighbours' mean.
@@ -48,26 +44,11 @@ def _without_spikes(recording: Recording) -> Vector:
     (chip/bit_flips.py). A spike of the acceleration stays: it may be a knock, which the fit weighs itself.
     """
     gyr = recording.gyr
-    # Few depart from their neighbours, and by much more than the sample two before: `bent` is twice the departure.
-    bent = np.abs(np.diff(gyr, n=2, axis=0))
-    at = np.unique(np.nonzero(bent > 2.0 * LEAST_SPIKE[-1])[0])
-    at = 1 + at[(at < 2) | (bent[at] > SPIKES * bent[np.maximum(at - 2, 0)]).any(axis=1)]
+    at, axis = _kernel.spikes(np.ascontiguousarray(recording.acc), np.ascontiguousarray(gyr)).astype(np.intp).T
     if not len(at):
         return gyr
-    near = at[:, None] + BESIDE
-    inside = (near > 0) & (near < len(gyr) - 1)
-    near = near.clip(0, len(gyr) - 1)
-    words = np.concatenate((recording.acc[near], gyr[near]), axis=2)
-    before, here, after = words[:, :-2], words[:, 1:-1], words[:, 2:]
-    mean = 0.5 * (before + after)
-    off = np.where(inside[:, 1:-1, None], np.abs(here - mean), 0.0)
-    # The departures of the samples beside it hold half of the spike: those beyond them do not.
-    usual, of_it = off[:, [0, 1, 5, 6]].max(axis=1), off[:, 3]
-    jumps = of_it > np.maximum(LEAST_SPIKE, SPIKES * usual)
-    alone = jumps & (np.abs(after - before)[:, 3] < RETURNS * of_it) & (jumps.sum(axis=1, keepdims=True) == 1)
-    of, axis = np.nonzero(alone[:, 3:])
     mended = gyr.copy()
-    mended[at[of], axis] = mean[of, 3, 3 + axis]
+    mended[at, axis] = 0.5 * (gyr[at - 1, axis] + gyr[at + 1, axis])
     return mended
 
 

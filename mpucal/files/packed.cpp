@@ -1,4 +1,4 @@
-// Packed integers of Protocol Buffers to arrays: see protobuf.py, which has the other direction.
+// Packed integers of Protocol Buffers to arrays, and back: see protobuf.py.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -7,13 +7,17 @@
 #include <cstdint>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <vector>
+
+#include "../aligned.hpp"
 
 namespace nb = nanobind;
 
 namespace {
 
 using Whole = nb::ndarray<nb::numpy, std::uint64_t, nb::ndim<1>>;
+using GivenWhole = nb::ndarray<const std::uint64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Frames = nb::ndarray<nb::numpy, std::int16_t, nb::ndim<2>>;
 
 // a frame has 3 or 7
@@ -53,6 +57,18 @@ Whole unpacked(const nb::bytes& data) {
   return Whole(held->data(), {held->size()}, owned(held));
 }
 
+nb::bytes packed(GivenWhole values) {
+  const std::uint64_t* const given = mpucal::aligned(values);
+  std::string data;
+  data.reserve(2 * values.shape(0));
+  for (std::size_t i = 0; i < values.shape(0); ++i) {
+    std::uint64_t value = given[i];
+    for (; value > 127; value >>= 7) data.push_back(static_cast<char>(value | 128u));
+    data.push_back(static_cast<char>(value));
+  }
+  return nb::bytes(data.data(), data.size());
+}
+
 Frames frames(const nb::bytes& data, std::size_t words) {
   if (words == 0 || words > MOST_WORDS) throw std::invalid_argument("a frame of no words, or of too many");
   auto values = std::make_unique<std::vector<std::int16_t>>();
@@ -74,7 +90,8 @@ Frames frames(const nb::bytes& data, std::size_t words) {
 }  // namespace
 
 NB_MODULE(_packed, m) {
-  m.doc() = "Packed integers of Protocol Buffers to arrays.";
+  m.doc() = "Packed integers of Protocol Buffers to arrays, and back.";
+  m.def("packed", &packed, nb::arg("values"), "Varints of (n,) numbers, one after the other.");
   m.def("unpacked", &unpacked, nb::arg("data"), "(n,) varints one after the other; ValueError where one is cut.");
   m.def("frames", &frames, nb::arg("data"), nb::arg("words"),
         "(n, words) int16 of zigzag varints, each less the same word of the frame before, modulo 2^16; ValueError where"

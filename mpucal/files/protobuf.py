@@ -2,7 +2,7 @@
 
 A field is a key, `number << 3 | wire type`, and a varint (type 0) or a length and so many bytes (type 2). A varint has
 seven bits per byte, the lowest first; the eighth bit is set in all bytes but the last. Signed integers (sint) are
-zigzag: 0, -1, 1, -2. `packed.cpp` unpacks them.
+zigzag: 0, -1, 1, -2. `packed.cpp` packs and unpacks them.
 
 Source: https://protobuf.dev/programming-guides/encoding, and descriptor.proto for the schema.
 """
@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._packed import frames, unpacked
+from ._packed import frames, packed, unpacked
 
 Columns = NDArray[np.uint64]
 
@@ -56,15 +56,7 @@ def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
 
 def pack_varints(values: ArrayLike) -> bytes:
     """Encode (n,) whole numbers >= 0 as consecutive varints."""
-    value = np.asarray(values, np.uint64)[:, None]
-    widest = max(-(-int(value.max(initial=0)).bit_length() // 7), 1)
-    left = value >> (np.uint64(7) * np.arange(widest + 1, dtype=np.uint64))
-    # a byte is written while digits of the number are left, with bit 8 set if another byte follows
-    more = left[:, 1:] > 0
-    digits = (left[:, :-1] & np.uint64(127)).astype(np.uint8) | more * np.uint8(128)
-    shown = np.ones_like(more)
-    shown[:, 1:] = more[:, :-1]
-    return digits[shown].tobytes()
+    return packed(np.ascontiguousarray(values, np.uint64))
 
 
 def zigzag(values: ArrayLike) -> Columns:

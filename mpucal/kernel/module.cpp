@@ -293,6 +293,17 @@ NB_MODULE(_kernel, m) {
       "Return means and variances (3, n - size + 1) of x (n, 3) over all windows of `size` samples.");
 
   m.def(
+      "noise_variance",
+      [](const Array& x, std::size_t half) {
+        const std::size_t n = x.size() / 3;
+        std::vector<double> variance(3 * n);
+        noise_variance(pointer(x, 3 * n, "x"), n, half, variance.data());
+        return give(std::move(variance), {n, 3});
+      },
+      nb::arg("x"), nb::arg("half"),
+      "Return variances (n, 3) of the noise of x (n, 3), by fourth differences over up to `half` samples on both sides.");
+
+  m.def(
       "mean_rates",
       [](const Array& rate, const Array& bias, const Array& dt) {
         const std::size_t n = dt.size(), samples = rate.size() / 3;
@@ -304,6 +315,17 @@ NB_MODULE(_kernel, m) {
       },
       nb::arg("rate"), nb::arg("bias"), nb::arg("dt"),
       "Return rotation vectors divided by their times (n, 3) of the steps to the last n rates; the bias stays in.");
+
+  m.def(
+      "spikes",
+      [](const Array& acc, const Array& rate) {
+        const std::size_t n = rate.size() / 3;
+        std::vector<double> found = spikes(pointer(acc, 3 * n, "acc"), pointer(rate, 3 * n, "rate"), n);
+        const std::size_t count = found.size() / 2;
+        return give(std::move(found), {count, 2});
+      },
+      nb::arg("acc"), nb::arg("rate"),
+      "Return sample and axis (k, 2) of the spikes of rates (n, 3) beside accelerations (n, 3).");
 
   m.def(
       "stuck_odds",

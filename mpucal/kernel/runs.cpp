@@ -2,6 +2,7 @@
 #include "runs.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <vector>
 
@@ -13,6 +14,14 @@ namespace {
 // Of the second difference of rates: 1/24 for samples of a smooth rate, 1/16 for its means over the sample's time. The
 // low-pass filter of a chip is in between.
 constexpr double kChord = 0.05;
+
+// A fourth difference has the coefficients 1, -4, 6, -4, 1, whose squares have this sum.
+constexpr std::size_t kOrder = 4;
+constexpr double kSquares = 70.0;
+
+// A spike exceeds so much, and so many times the departures of its neighbours from theirs; its neighbours differ by less
+// than this share of it.
+constexpr double kLeastSpike[2] = {0.3, 0.15}, kSpikes = 8.0, kReturns = 0.25;  // m/s^2, rad/s
 
 // M = F M, column by column
 template <std::size_t columns>
@@ -59,11 +68,19 @@ void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_
   if (n == 0) return;
   std::vector<double> sums(columns * (n + 1));
   for (std::size_t i = 0; i < columns * n; ++i) sums[i + columns] = sums[i] + x[i];
-  for (std::size_t i = 0; i < n; ++i) {
+  const auto over = [&](std::size_t i) {
     const std::size_t low = i > half ? i - half : 0, high = half < n - i ? i + half + 1 : n;
-    for (std::size_t j = 0; j < columns; ++j)
-      mean[columns * i + j] = (sums[columns * high + j] - sums[columns * low + j]) / static_cast<double>(high - low);
-  }
+    for (std::size_t j = columns * i; j < columns * (i + 1); ++j)
+      mean[j] = (sums[j + columns * (high - i)] - sums[j - columns * (i - low)]) / static_cast<double>(high - low);
+  };
+  const std::size_t begin = std::min(half, n), end = std::max(begin, n - begin);
+  for (std::size_t i = 0; i < begin; ++i) over(i);
+  // Between the ends all means are over as many samples, which a compiler turns into vectors.
+  const double* const sum = sums.data();
+  const auto count = static_cast<double>(2 * half + 1);
+  for (std::size_t j = columns * begin; j < columns * end; ++j)
+    mean[j] = (sum[j + columns * (half + 1)] - sum[j - columns * half]) / count;
+  for (std::size_t i = end; i < n; ++i) over(i);
 }
 
 void moving_statistics(const double* x, std::size_t n, std::size_t size, double* mean, double* variance) {
@@ -83,6 +100,14 @@ void moving_statistics(const double* x, std::size_t n, std::size_t size, double*
   }
 }
 
+void noise_variance(const double* x, std::size_t n, std::size_t half, double* variance) {
+  std::vector<double> d(x, x + 3 * n), squares(3 * n);
+  for (std::size_t order = 1; order <= kOrder; ++order)
+    for (std::size_t i = 0; i + 3 * order < 3 * n; ++i) d[i] = d[i + 3] - d[i];
+  for (std::size_t i = 0; i + 3 * kOrder < 3 * n; ++i) squares[i + 3 * (kOrder / 2)] = d[i] * d[i] / kSquares;
+  moving_mean(squares.data(), n, 3, half, variance);
+}
+
 void mean_rates(const double* rate, std::size_t samples, const double bias[3], const double* dt, std::size_t n,
                 double* mean) {
   for (std::size_t i = samples - n; i < samples; ++i, ++dt) {
@@ -96,6 +121,40 @@ void mean_rates(const double* rate, std::size_t samples, const double bias[3], c
       *mean++ = 0.5 * (here[j] + there[j]) - kChord * bend + coning;
     }
   }
+}
+
+std::vector<double> spikes(const double* acc, const double* rate, std::size_t n) {
+  const auto bent = [&](std::size_t i, int j) {  // twice the departure of the sample after i from its neighbours
+    const double* const x = rate + 3 * i + j;
+    return std::fabs((x[6] - x[3]) - (x[3] - x[0]));
+  };
+  std::vector<double> found;
+  for (std::size_t i = 0; i + 2 < n; ++i) {
+    bool is_bent = false, is_sudden = i < 2;
+    for (int j = 0; j < 3; ++j) is_bent |= bent(i, j) > 2.0 * kLeastSpike[1];
+    if (!is_bent) continue;
+    for (int j = 0; j < 3 && !is_sudden; ++j) is_sudden = bent(i, j) > kSpikes * bent(i - 2, j);
+    if (!is_sudden) continue;
+    int jumps = 0, spike = -1;
+    for (int word = 0; word < 6; ++word) {
+      const double* const x = (word < 3 ? acc : rate) + word % 3;
+      const auto off = [&](std::size_t at) {
+        return std::fabs(x[3 * at] - 0.5 * (x[3 * at - 3] + x[3 * at + 3]));
+      };
+      const double size = off(i + 1);
+      bool jumped = size > kLeastSpike[word / 3];
+      // The departures of the samples beside it hold half of the spike: those beyond them do not.
+      for (const int beside : {-2, -1, 3, 4}) {
+        const auto at = static_cast<std::ptrdiff_t>(i) + beside;
+        if (at > 0 && at + 1 < static_cast<std::ptrdiff_t>(n))
+          jumped = jumped && size > kSpikes * off(static_cast<std::size_t>(at));
+      }
+      jumps += jumped;
+      if (jumped && word >= 3 && std::fabs(x[3 * i + 6] - x[3 * i]) < kReturns * size) spike = word - 3;
+    }
+    if (jumps == 1 && spike >= 0) found.insert(found.end(), {static_cast<double>(i + 1), static_cast<double>(spike)});
+  }
+  return found;
 }
 
 }  // namespace mpucal

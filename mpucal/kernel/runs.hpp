@@ -1,7 +1,9 @@
-// Functions of runs of samples without a filter: products of rotations, means and variances, moving ones, mean rates.
+// Functions of runs of samples without a filter: products of rotations, means and variances, moving ones, mean rates,
+// noise, spikes.
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace mpucal {
 
@@ -21,8 +23,15 @@ void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_
 // Means and variances (3, n - size + 1) of x (n, 3) over all windows of so many samples.
 void moving_statistics(const double* x, std::size_t n, std::size_t size, double* mean, double* variance);
 
+// Fourth differences of x (n, 3), squared, as variances (n, 3) of white noise: moving means as those above.
+void noise_variance(const double* x, std::size_t n, std::size_t half, double* variance);
+
 // The rotation vectors (n, 3) of the steps that lead to the last n of `samples` rates [rad/s], each over its time dt.
 void mean_rates(const double* rate, std::size_t samples, const double bias[3], const double* dt, std::size_t n,
                 double* mean);
+
+// The spikes of rates (n, 3) [rad/s] beside accelerations (n, 3) [m/s^2]: sample and axis, one after the other. A spike
+// is back with the next sample, alone among the six words, and far beyond its neighbours' departures from theirs.
+std::vector<double> spikes(const double* acc, const double* rate, std::size_t n);
 
 }  // namespace mpucal

@@ -152,11 +152,8 @@ def noise_variance(recording: Recording) -> Vector:
 
     A motor that starts makes it louder than it was at rest.
     """
-    acc, n = recording.acc, len(recording)
-    squares = np.zeros((n, 3))
-    if n > ORDER:
-        squares[ORDER // 2 : -ORDER // 2] = np.square(np.diff(acc, ORDER, axis=0)) / SQUARES
-    return _kernel.moving_mean(squares, max(round(WINDOW_S * recording.rate_hz) // 2, 2))
+    half = max(round(WINDOW_S * recording.rate_hz) // 2, 2)
+    return _kernel.noise_variance(np.ascontiguousarray(recording.acc), half)
 
 
 def noise_ratio(recording: Recording, Sigma_a: Vector) -> Vector:

@@ -54,6 +54,24 @@ def test_moving_statistics_are_of_whole_windows(x, size):
             _kernel.moving_statistics(x, wrong)
 
 
+def test_the_noise_is_that_of_fourth_differences(x):
+    squares = np.zeros_like(x)
+    squares[2:-2] = np.diff(x, 4, axis=0) ** 2 / 70.0
+    wanted = [squares[max(i - 9, 0) : i + 10].mean(0) for i in range(len(x))]
+    np.testing.assert_allclose(_kernel.noise_variance(x, 9), wanted, atol=1e-13)
+    np.testing.assert_array_equal(_kernel.noise_variance(x[:4], 9), np.zeros((4, 3)))
+
+
+def test_a_spike_is_of_one_word_and_back_with_the_next_sample(x):
+    acc, rate = 0.01 * x, np.sin(0.05 * np.arange(len(x)))[:, None] + 0.001 * x
+    rate[[1, 50, 198], [0, 2, 1]] += (3.0, -0.6, 0.9)
+    rate[100:, 0] += 2.0  # a step stays
+    rate[120] += 1.5  # a blow moves every word
+    rate[150, 1] += 2.0
+    acc[150, 0] += 2.0
+    np.testing.assert_array_equal(_kernel.spikes(acc, rate), [[1, 0], [50, 2], [198, 1]])
+
+
 def test_odds_of_stuck_bits():
     rng, errors, sound = np.random.default_rng(3), 0.1, 0.98
     counts, gap = rng.normal(0.0, (3.0, 300.0, 15000.0), (400, 3)).astype(np.int32), np.arange(400) % 97 == 50

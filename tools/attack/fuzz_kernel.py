@@ -131,6 +131,8 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
         _kernel.moving_mean: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
         _kernel.moving_statistics: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
         _kernel.mean_rates: lambda n, rng: (some(n + 1, rng, 3), np.zeros(3), some(n, rng)),
+        _kernel.noise_variance: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
+        _kernel.spikes: lambda n, rng: (some(n, rng, 3), some(n, rng, 3)),
         _kernel.stuck_odds: lambda n, rng: (
             rng.integers(-(1 << 15), 1 << 15, (n, 3)).astype(np.int32),
             rng.random(n) < 0.1,
@@ -140,6 +142,7 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
         ),
         _text.lines: lambda n, rng: (some(n, rng, int(rng.integers(0, 5))),),
         _text.numbers: lambda n, rng: (lines(n, rng), 3, [0, 2]),
+        _packed.packed: lambda n, rng: (rng.integers(0, 1 << 63, n, np.uint64, endpoint=True),),
         _packed.unpacked: lambda n, rng: (bytes(rng.integers(0, 140, n, np.uint8)),),
         _packed.frames: lambda n, rng: (bytes(rng.integers(0, 128, 7 * n, np.uint8)), 7),
         _flips.until_jumps: lambda n, rng: (
