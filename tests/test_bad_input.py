@@ -81,7 +81,6 @@ calibrate walk.npz --gravity much                   | 'much' is not a local grav
 session --bus sim --address 0x68                    | --bus sim does not take --address
 session --bus sim --rate 3                          | use 3.90625 Hz
 record --bus sim --dlpf 7                           | --dlpf
-record --serial socket://localhost:1 --rate 4000    | a bridge cannot carry 4000 samples a second
 record --bus sim --seconds 0                        | --seconds
 record --mavlink sim --rate 5000                    | 5000
 stream --bus sim --seconds nan                      | 'nan' is not a finite number

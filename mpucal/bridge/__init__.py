@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from typing import Any
 
-from ..errors import UsageError
 from ..sources.chip import OpenedChip
 from ..sources.kind import Request
 from .bus import BridgeBus
@@ -23,15 +22,9 @@ def open_source(request: Request) -> OpenedChip:
 
     Raises
     ------
-    UsageError : no port is named, or the requested rate is more than a serial line can carry.
+    UsageError : no port is named.
     BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
     """
-    config = request.plan.config
-    if config.accel_only:
-        raise UsageError(
-            f"a bridge cannot carry {config.rate_hz:g} samples a second",
-            "use --rate 1000 or less, or connect the chip to an I2C bus of this computer",
-        )
     bus = BridgeBus(_open_port(request.values), request.values.get("address"))
     return OpenedChip(bus, request.plan, words=request.words)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..clocks.sample_clock import Whole
 from .access import Failure, Transaction
-from .registers import ACCEL_WORDS, FIFO_R_W, FRAME_WORDS
+from .registers import FIFO_R_W, FRAME_BYTES, FRAME_WORDS
 
 # Register addresses are one byte: larger numbers stand for files.
 FIRST_FILE_NUMBER = 256
@@ -122,8 +122,7 @@ class Accesses:
         write = np.array([each.op == "write" for each in transactions], bool)
         fifo = np.array([each.register == FIFO_R_W for each in transactions], bool)
         framed = fifo & ~write & (moved > 0)
-        words = next((words for words in (FRAME_WORDS, ACCEL_WORDS) if not (moved[framed] % (2 * words)).any()), 0)
-        framed &= words > 0
+        framed &= not (moved[framed] % FRAME_BYTES).any()
         files = tuple(dict.fromkeys(each.register for each in transactions if isinstance(each.register, str)))
         numbers = {name: FIRST_FILE_NUMBER + i for i, name in enumerate(files)}
         shown = [each.host_ns for each in transactions]
@@ -137,7 +136,7 @@ class Accesses:
             np.array([each.t_ns for each in transactions], np.int64),
             np.array([ns or 0 for ns in shown], np.int64),
             np.frombuffer(_joined(transactions, ~framed), np.uint8),
-            np.frombuffer(_joined(transactions, framed), ">i2").astype(np.int16).reshape(-1, max(words, 1)),
+            np.frombuffer(_joined(transactions, framed), ">i2").astype(np.int16).reshape(-1, FRAME_WORDS),
             {i: each.error for i, each in enumerate(transactions) if each.error is not None},
             files,
         )

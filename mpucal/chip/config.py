@@ -15,7 +15,6 @@ MAX_FRAMES_A_POLL = 24
 MIN_POLL_S = 0.001
 SLOW_POLL_S = 0.040
 FAST_POLL_S, FAST_HZ = 0.020, 400
-ACCEL_ONLY_POLL_S = 0.005
 # Samples read one by one take half of the bus's time at this rate and 400 kHz, and all of it at 100 kHz.
 MOST_POLLED_HZ = 250
 
@@ -27,7 +26,7 @@ class Config:
     Attributes
     ----------
     accel_range_g : 2, 4, 8 or 16. gyro_range_dps : 250, 500, 1000 or 2000 deg/s.
-    rate_hz : nominal sample rate; at ACCEL_ONLY_HZ the accelerometer alone measures, without its filter.
+    rate_hz : nominal sample rate.
     dlpf : code of the low-pass filter, 0 (widest) to 6.
     poll_s : time between two polls of the FIFO; None: `period_s` chooses by the rate.
 
@@ -46,8 +45,7 @@ class Config:
         _check("accelerometer range", self.accel_range_g, "g", reg.ACCEL_RANGES_G)
         _check("gyroscope range", self.gyro_range_dps, "deg/s", reg.GYRO_RANGES_DPS)
         _check("low-pass filter", self.dlpf, "", reg.DLPF_CODES)
-        if not self.accel_only:
-            reg.sample_rate_divider(self.rate_hz, self.dlpf)
+        reg.sample_rate_divider(self.rate_hz, self.dlpf)
         longest_s = MAX_FRAMES_A_POLL / self.rate_hz
         if not MIN_POLL_S <= self.period_s <= longest_s:
             raise UsageError(
@@ -60,12 +58,7 @@ class Config:
         """Time between two polls of the FIFO: the longest that a FIFO of 512 bytes and a host 10 ms late allow."""
         if self.poll_s is not None:
             return self.poll_s
-        return ACCEL_ONLY_POLL_S if self.accel_only else FAST_POLL_S if self.rate_hz > FAST_HZ else SLOW_POLL_S
-
-    @property
-    def accel_only(self) -> bool:
-        """True if the accelerometer alone measures."""
-        return self.rate_hz == reg.ACCEL_ONLY_HZ
+        return FAST_POLL_S if self.rate_hz > FAST_HZ else SLOW_POLL_S
 
     def settings(self, part: Part) -> Settings:
         """Return the settings for one part; one with less sensitivity gets the smallest range that is large enough.
@@ -75,29 +68,21 @@ class Config:
         ChipError : the part does not have this rate.
         """
         self._check_part(part)
-        direct = self.accel_only or not part.fifo_bytes
         range_g = min(self.accel_range_g * part.accel_sensitivity, reg.ACCEL_RANGES_G[-1])
         return Settings(
             part=part,
-            smplrt_div=0 if direct else reg.sample_rate_divider(self.rate_hz, self.dlpf),
+            smplrt_div=reg.sample_rate_divider(self.rate_hz, self.dlpf) if part.fifo_bytes else 0,
             dlpf_cfg=self.dlpf,
             fs_sel=reg.GYRO_RANGES_DPS.index(self.gyro_range_dps),
             afs_sel=next(i for i, nominal_g in enumerate(reg.ACCEL_RANGES_G) if nominal_g >= range_g),
-            accel_only=self.accel_only,
         )
 
     def _check_part(self, part: Part) -> None:
         if not part.fifo_bytes and self.rate_hz > MOST_POLLED_HZ:
             what = f"this {part.chip} has no FIFO, and its samples are read one by one"
             raise ChipError(what, f"use --rate {MOST_POLLED_HZ} or less")
-        filtered_apart = part.family.has_accel_config2
-        if self.accel_only and not filtered_apart:
-            raise ChipError(
-                f"the accelerometer of the {part.chip} measures {reg.MAX_RATE_HZ:g} times a second at most",
-                f"use --rate {reg.MAX_RATE_HZ:g} or less; only the MPU-6500's family is faster",
-            )
         # RM-MPU-9250A, register 25: SMPLRT_DIV divides the rate only if the filter is at 1 to 6.
-        if filtered_apart and not self.accel_only and reg.base_rate_hz(self.dlpf) > reg.MAX_RATE_HZ:
+        if part.family.has_accel_config2 and reg.base_rate_hz(self.dlpf) > reg.MAX_RATE_HZ:
             what = f"the {part.chip} takes 8000 samples a second with its filter at {self.dlpf}"
             raise ChipError(what, "set the filter to 1 to 6")
 

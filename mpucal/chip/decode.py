@@ -148,7 +148,7 @@ class Decoder:
 
     def _feed_polls(self, accesses: Accesses, first: int, last: int) -> int:
         """Decode the leading ordinary polls of the accesses first..last-1; return the number of their accesses."""
-        if self.fifo is None or accesses.frames.shape[1] != self.fifo.settings.frame_words:
+        if self.fifo is None or accesses.frames.shape[1] != reg.FRAME_WORDS:
             return 0
         looks, reads, checks = (np.arange(first + i, last, ACCESSES_A_POLL) for i in range(ACCESSES_A_POLL))
         frames = accesses.frames[accesses.begin[reads[0]] : accesses.end[reads[-1]]]

@@ -204,13 +204,13 @@ class Driver:
         count, begun_ns = self._fifo_count(), self._port.now_ns
         self._plan_next_poll()
         settings = self.settings
-        if count >= settings.part.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
+        if count >= settings.part.fifo_bytes - SPARE_FRAMES * reg.FRAME_BYTES:
             self.faults[Loss.OVERFLOW] += 1
             return Need.RESTART
-        frames = count // settings.frame_bytes
+        frames = count // reg.FRAME_BYTES
         try:
             if frames:
-                self._port.read_destructive(reg.FIFO_R_W, frames * settings.frame_bytes)
+                self._port.read_destructive(reg.FIFO_R_W, frames * reg.FRAME_BYTES)
             self._port.read_destructive(reg.INT_ENABLE, STATUS_BYTES)
         except BusError:
             # The bytes or the flag are gone from the chip: a second read would begin within a frame.
@@ -279,7 +279,7 @@ class Driver:
 
     def _fifo_count(self) -> int:
         count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")
-        if count % self.settings.frame_bytes:
+        if count % reg.FRAME_BYTES:
             # The chip is writing a frame, or the FIFO has slipped.
             self._port.sleep(FRAME_WRITTEN_NS)
             count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")

@@ -26,14 +26,13 @@ class Family:
     source : document of its differences from the others.
     fifo_bytes : size of the FIFO after a reset.
     widest_fifo_bytes : size with both FIFO_SIZE bits of ACCEL_CONFIG2 set; None: these bits have no effect.
-    fifo_en_frame : value of FIFO_EN for a whole frame. fifo_en_with_temperature : True if its accelerometer bit adds
-        the temperature.
+    fifo_en_frame : value of FIFO_EN for a whole frame. has_i2c_if : True if I2C is switched off in a register of its
+        own, and the accelerometer's bit of FIFO_EN adds the temperature.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
     accel_offset_h : addresses of the high bytes of the accelerometer offsets x, y, z; the low byte follows.
     accel_offset_lsb_per_g : nominal scale of such a 16-bit word; bit 0 is reserved.
     gyro_range_shift : position of FS_SEL in GYRO_CONFIG.
-    has_accel_config2 : True if the accelerometer's filter has its own register, ACCEL_CONFIG2, which also lets the
-        accelerometer measure alone at ACCEL_ONLY_HZ.
+    has_accel_config2 : True if the accelerometer's filter has its own register, ACCEL_CONFIG2.
     packed_self_test : True if the factory's self-test codes are 5 bits each in SELF_TEST_ACCEL and the three registers
         after it; otherwise 8 bits each, from SELF_TEST_GYRO and from SELF_TEST_ACCEL on.
     asleep : True if it sleeps after power-on and reset.
@@ -65,7 +64,7 @@ class Family:
     accel_offset_lsb_per_g: float = 2048.0
     widest_fifo_bytes: int | None = None
     fifo_en_frame: int = reg.FIFO_EN_FRAME
-    fifo_en_with_temperature: bool = False
+    has_i2c_if: bool = False
     gyro_range_shift: int = reg.FULL_SCALE_SHIFT
     fifo_reset_needs_stop: bool = False
     accel_lag_ms: tuple[int, ...] = ()
@@ -200,7 +199,7 @@ ICM20602 = replace(
     fifo_bytes=1008,
     widest_fifo_bytes=None,
     fifo_en_frame=reg.FIFO_EN_ZG | reg.FIFO_EN_ACCEL,
-    fifo_en_with_temperature=True,
+    has_i2c_if=True,
 )
 
 MPU6886 = replace(

@@ -1,8 +1,7 @@
 """FIFO decoder: checks the frames' alignment, marks clipped samples, and gives each sample its time.
 
 A frame is 14 bytes, big-endian int16: accelerometer x, y, z, temperature, gyroscope x, y, z (RM-MPU-6000A r4.2,
-registers 59 to 72 and 116). A frame of the accelerometer alone has six bytes. It has no temperature from which
-misalignment would show; there a part of a frame shows it, since the FIFO slips by bytes.
+registers 59 to 72 and 116).
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ LEAST_STEP = 0.1
 
 @dataclass(frozen=True)
 class Run:
-    """Consecutive frames (n, 7 or 3) from number `first` of `segment` on; `gap`: samples are missing before them."""
+    """Consecutive frames (n, 7) from number `first` of `segment` on; `gap`: samples are missing before them."""
 
     segment: int
     first: int
@@ -72,8 +71,8 @@ class FifoDecoder:
         self._pending = bytearray()
         self._last_t_s: float | None = None
         self._stuck_frames = max(STUCK_FRAMES, math.ceil(STUCK_S * settings.nominal_rate_hz))
-        self._waiting = np.zeros((0, settings.frame_words), np.int16)
-        self._flips = BitFlipFilter(settings.frame_words)
+        self._waiting = np.zeros((0, reg.FRAME_WORDS), np.int16)
+        self._flips = BitFlipFilter(reg.FRAME_WORDS)
 
     @property
     def repaired(self) -> int:
@@ -90,7 +89,7 @@ class FifoDecoder:
 
     def set_count(self, t_ns: int, count_bytes: int) -> None:
         """Begin a poll: the FIFO held `count_bytes` at `t_ns`."""
-        frames, self._odd_bytes = divmod(count_bytes, self.settings.frame_bytes)
+        frames, self._odd_bytes = divmod(count_bytes, reg.FRAME_BYTES)
         self._pending.clear()
         self._look = (t_ns, self._read + frames)
 
@@ -111,11 +110,11 @@ class FifoDecoder:
             return Loss.RESET
         if overflow:
             return Loss.OVERFLOW
-        if self._odd_bytes or len(data) % self.settings.frame_bytes:
+        if self._odd_bytes or len(data) % reg.FRAME_BYTES:
             return Loss.MISALIGNED
         if look is not None and isinstance(self._clock, PolledClock) and self._clock.is_late(look[0]):
             return Loss.LATE
-        frames = np.frombuffer(data, ">i2").reshape(-1, self.settings.frame_words).astype(np.int16)
+        frames = np.frombuffer(data, ">i2").reshape(-1, reg.FRAME_WORDS).astype(np.int16)
         kept = self._flips.repair(frames[max(DROPPED_FRAMES - self._read, 0) :], self._waiting)
         if self._temperature_jumps(kept).any():
             return Loss.MISALIGNED
@@ -156,7 +155,7 @@ class FifoDecoder:
 
     def _accept(self, kept: Counts, equal: int) -> None:
         """Keep all frames except those at the end, of which `equal` are, that the next poll decides on."""
-        if len(kept) and not self.settings.accel_only:
+        if len(kept):
             self._temperature = int(kept[-1, TEMPERATURE])
         accepted = len(kept) - (equal if equal > 1 else min(int(self._flips.is_open), len(kept)))
         self._waiting = kept[accepted:].copy()
@@ -166,8 +165,7 @@ class FifoDecoder:
         self._runs.append(Run(self._clock.segment, first, kept[:accepted], first == DROPPED_FRAMES and self._begun))
         self._begun = True
         self.accepted += accepted
-        if not self.settings.accel_only:
-            self._temperature_sum += int(kept[:accepted, TEMPERATURE].sum(dtype=np.int64))
+        self._temperature_sum += int(kept[:accepted, TEMPERATURE].sum(dtype=np.int64))
 
     def reset(self) -> None:
         """Discard what was in the FIFO, which was emptied: a frame begins at the next byte."""
@@ -241,8 +239,8 @@ class FifoDecoder:
 
     def _temperature_jumps(self, frames: Counts) -> Mask:
         """Return (n,) True where the temperature jumps, as in a frame that is not aligned."""
-        if not len(frames) or self.settings.accel_only:
-            return np.zeros(len(frames), bool)
+        if not len(frames):
+            return np.zeros(0, bool)
         temperature = frames[:, TEMPERATURE].astype(np.int64)
         before = temperature[0] if self._temperature is None else self._temperature
         return np.asarray(np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP)
@@ -258,7 +256,7 @@ class FifoDecoder:
         if not runs:
             return Samples.empty()
         frames = np.concatenate([run.frames for run in runs])
-        settings, alone, n = self.settings, self.settings.accel_only, len(frames)
+        settings, n = self.settings, len(frames)
         gap = np.zeros(n, bool)
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
         segment = np.concatenate([np.full(len(run.frames), run.segment) for run in runs])
@@ -267,11 +265,11 @@ class FifoDecoder:
         return Samples(
             t=make_increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz),
             acc=accel * settings.mps2_per_lsb,
-            gyr=np.full((n, 3), np.nan) if alone else gyro * reg.rad_s_per_lsb(settings.fs_sel),
-            temperature_c=np.full(n, np.nan) if alone else self._celsius(frames[:, TEMPERATURE]),
+            gyr=gyro * reg.rad_s_per_lsb(settings.fs_sel),
+            temperature_c=self._celsius(frames[:, TEMPERATURE]),
             gap=gap,
             acc_clipped=_clipped(accel),
-            gyr_clipped=np.zeros(n, bool) if alone else _clipped(gyro),
+            gyr_clipped=_clipped(gyro),
         )
 
     def _celsius(self, counts: Any) -> Any:
@@ -279,10 +277,8 @@ class FifoDecoder:
         return counts / family.lsb_per_c + family.zero_c
 
     @property
-    def _mean_c(self) -> float | None:
-        """Mean temperature of all frames; without one in the frames, the last value of its register."""
-        if self.settings.accel_only:
-            return None if self._temperature is None else float(self._celsius(self._temperature))
+    def _mean_c(self) -> float:
+        """Mean temperature of all frames."""
         return float(self._celsius(self._temperature_sum / self.accepted))
 
 

@@ -47,7 +47,6 @@ FULL_SCALE: Final = 0x18
 FULL_SCALE_CODES: Final = 0x03
 
 # ACCEL_CONFIG2 (6500 only)
-ACCEL_FCHOICE_B: Final = 0x08
 FIFO_SIZE: Final = 0xC0  # 512 bytes, doubled this many times, in chips whose FIFO grows
 FIFO_SIZE_SHIFT: Final = 6
 
@@ -76,9 +75,6 @@ PWR_MGMT_1_DEVICE_RESET: Final = 0x80
 PWR_MGMT_1_SLEEP: Final = 0x40
 CLKSEL_PLL: Final = 0x01
 
-# PWR_MGMT_2
-STANDBY_GYRO: Final = 0x07
-
 # One FIFO frame, in register order: accelerometer x, y, z, temperature, gyroscope x, y, z, big-endian int16.
 ACCEL_WORDS: Final = 3
 FRAME_WORDS: Final = 7
@@ -95,8 +91,6 @@ GYRO_OFFSET_LSB_PER_DPS: Final = 32.75
 
 DLPF_CODES: Final = (0, 1, 2, 3, 4, 5, 6)
 MAX_RATE_HZ: Final = 1000.0
-# ACCEL_FCHOICE_B bypasses the accelerometer's filter, and a gyroscope in standby does not set the rate.
-ACCEL_ONLY_HZ: Final = 4000.0
 
 
 def mps2_per_lsb(afs_sel: int) -> float:
@@ -132,8 +126,7 @@ def sample_rate_divider(rate_hz: float, dlpf_cfg: int) -> int:
     if not math.isclose(nearest, rate_hz, rel_tol=1e-6):
         raise UsageError(
             f"the chip has no sample rate of {rate_hz:g} Hz with its low-pass filter at {dlpf_cfg}",
-            f"use {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz, or"
-            f" {ACCEL_ONLY_HZ:g} Hz for the accelerometer of an MPU-6500 alone",
+            f"use {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz",
             f"--rate {nearest:g}",
         )
     return int(divider)

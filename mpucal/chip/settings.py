@@ -23,7 +23,6 @@ class Settings:
     ----------
     part : the chip. smplrt_div, dlpf_cfg : sample rate and low-pass filter, as registers hold them.
     fs_sel, afs_sel : full scale of gyroscope and accelerometer, 0..3.
-    accel_only : the accelerometer measures at ACCEL_ONLY_HZ without its filter; the gyroscope is in standby.
     """
 
     part: Part
@@ -31,7 +30,6 @@ class Settings:
     dlpf_cfg: int
     fs_sel: int
     afs_sel: int
-    accel_only: bool = False
 
     @property
     def polled(self) -> bool:
@@ -41,24 +39,7 @@ class Settings:
     @property
     def nominal_rate_hz(self) -> float:
         """Sample rate of a chip whose clock is exact; real ones are up to 1 % off."""
-        return reg.ACCEL_ONLY_HZ if self.accel_only else reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
-
-    @property
-    def fifo_en(self) -> int:
-        """Value of FIFO_EN."""
-        return reg.FIFO_EN_ACCEL if self.accel_only else self.part.family.fifo_en_frame
-
-    @property
-    def frame_words(self) -> int:
-        """Number of words in a frame."""
-        if not self.accel_only:
-            return reg.FRAME_WORDS
-        return reg.ACCEL_WORDS + self.part.family.fifo_en_with_temperature
-
-    @property
-    def frame_bytes(self) -> int:
-        """Number of bytes in a frame."""
-        return 2 * self.frame_words
+        return reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
 
     @property
     def mps2_per_lsb(self) -> float:
@@ -72,7 +53,7 @@ class Settings:
             chip=self.part.chip,
             who_am_i=self.part.who_am_i,
             accel_range_g=reg.ACCEL_RANGES_G[self.afs_sel] / self.part.accel_sensitivity,
-            gyro_range_dps=None if self.accel_only else float(reg.GYRO_RANGES_DPS[self.fs_sel]),
+            gyro_range_dps=float(reg.GYRO_RANGES_DPS[self.fs_sel]),
             rate_hz=self.nominal_rate_hz,
             accel_lag_s=self.part.family.accel_lag_s(self.dlpf_cfg),
         )
@@ -80,7 +61,7 @@ class Settings:
     def registers(self) -> dict[int, int]:
         """Return the value of each register, in the order of writing."""
         values = {
-            reg.PWR_MGMT_2: reg.STANDBY_GYRO if self.accel_only else 0,
+            reg.PWR_MGMT_2: 0,
             # It also shows a reset of the chip, which clears it.
             reg.INT_ENABLE: reg.INT_FIFO_OFLOW,
             reg.SMPLRT_DIV: self.smplrt_div,
@@ -90,7 +71,7 @@ class Settings:
         }
         if self.part.family.has_accel_config2:
             size = reg.FIFO_SIZE if self.part.wide_fifo_bytes else 0
-            values[reg.ACCEL_CONFIG2] = size | (reg.ACCEL_FCHOICE_B if self.accel_only else self.dlpf_cfg)
+            values[reg.ACCEL_CONFIG2] = size | self.dlpf_cfg
         return values
 
     @classmethod
@@ -114,5 +95,4 @@ class Settings:
             dlpf_cfg=held[reg.CONFIG] & reg.CONFIG_DLPF_CFG,
             fs_sel=held[reg.GYRO_CONFIG] >> part.family.gyro_range_shift & reg.FULL_SCALE_CODES,
             afs_sel=held[reg.ACCEL_CONFIG] >> reg.FULL_SCALE_SHIFT & reg.FULL_SCALE_CODES,
-            accel_only=held.get(reg.PWR_MGMT_2, 0) & reg.STANDBY_GYRO == reg.STANDBY_GYRO,
         )

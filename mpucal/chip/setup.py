@@ -207,9 +207,10 @@ def restart_fifo(port: Port, settings: Settings) -> None:
     port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
     port.read(reg.INT_STATUS, 1)
     port.read(reg.TEMP_OUT_H, 2)
-    port.write(reg.FIFO_EN, settings.fifo_en)
+    fifo_en = settings.part.family.fifo_en_frame
+    port.write(reg.FIFO_EN, fifo_en)
     held = port.read(reg.FIFO_EN, 1) + port.read(reg.USER_CTRL, 1)
-    if held != bytes([settings.fifo_en, reg.USER_CTRL_FIFO_EN]):
+    if held != bytes([fifo_en, reg.USER_CTRL_FIFO_EN]):
         raise ChipError(
             f"the chip's FIFO does not start (FIFO_EN and USER_CTRL read {held.hex(' ')})",
             "check its wiring and supply, and that no other program uses it",

@@ -16,7 +16,7 @@ from ..session.lay_flat import PUT_DOWN, STAND, put_down
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
-from .options import Finite, check_gyroscope, check_source, source_options
+from .options import Finite, check_source, source_options
 from .person import say
 
 EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus sim:chip=clone98,who_am_i=0x68`"
@@ -80,7 +80,6 @@ def _examine(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> It
     except SourceError as error:
         yield Finding.failed("bus", error)
         return
-    check_gyroscope(source.plan.config)
     # A vehicle gets this prompt over its link, once the link is locked.
     of_vehicle = source.origin is Origin.VEHICLE
     put_down(() if of_vehicle else source.listeners, say, STAND if of_vehicle else PUT_DOWN)

@@ -27,7 +27,7 @@ from ..session.ports import Source, polled
 from ..session.results import save
 from ..sources.opening import open_source
 from .arguments import PATH, json_option, output_option
-from .options import ABOVE_ZERO, check_gyroscope, check_input, check_source, given_options, source_options
+from .options import ABOVE_ZERO, check_input, check_source, given_options, source_options
 from .person import duration, say
 from .recording_options import given_hints, hint_options, say_interpretation
 
@@ -84,7 +84,6 @@ def _measure_file(file: Path, options: dict[str, Any]) -> Noise:
 def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noise, SourceError | None]:
     """Measure until the time is over, the source ends or fails, or Ctrl-C is pressed; return the failure as well."""
     source = open_source(options, given_options(), until_end=True)
-    check_gyroscope(source.plan.config)
     meter: NoiseMeter | None = None
     failure: SourceError | None = None
     with source.measuring(Path(os.devnull), say, now().isoformat()) as measuring, _progress() as show_progress:

@@ -13,7 +13,6 @@ from click.core import ParameterSource
 
 from ..arguments import LEAST_GRAVITY_MPS2, LEAST_ON_EARTH_MPS2, MOST_GRAVITY_MPS2, MOST_ON_EARTH_MPS2
 from ..calibration import MODELS
-from ..chip.config import Config
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 from ..session.aims import AIMS, NORMAL
@@ -156,16 +155,6 @@ aim_options = together(
         "their defaults.",
     ),
 )
-
-
-def check_gyroscope(config: Config) -> None:
-    """Raise UsageError if the settings leave the gyroscope out."""
-    if config.accel_only:
-        raise UsageError(
-            f"at {config.rate_hz:g} Hz a chip measures with its accelerometer alone, and this needs the gyroscope",
-            f"take --rate 1000 or less; `mpucal record` and `mpucal stream` accept --rate {config.rate_hz:g}",
-            "--rate 1000",
-        )
 
 
 def given_options() -> dict[str, str]:

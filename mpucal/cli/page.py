@@ -15,7 +15,7 @@ from ..sources.opened_source import OpenedSource
 from ..sources.table import source_title
 from ..terminal.console import Console, console
 from .arguments import together
-from .options import Parsed, check_gyroscope
+from .options import Parsed
 
 if TYPE_CHECKING:
     from ..page.console import ResultCallback
@@ -61,12 +61,7 @@ def show_session(
     Parameters
     ----------
     options : of the source. board, name : of the board, if given. yes : ask no questions. page_keys : see Feed.
-
-    Raises
-    ------
-    UsageError : the settings leave the gyroscope out.
     """
-    check_gyroscope(source.plan.config)
     title, board = ", ".join(filter(None, (name, source_title(options)))), choose_board(board, source)
     terminal = console(yes, json_events, beep, title, board)
     if page is None:

@@ -112,9 +112,6 @@ def _facts(recording: Recording) -> dict[str, Any]:
     """Return the properties of a recording, in JSON's own types."""
     flat = recording.flat or find_flat(recording)
     temperature = recording.temperature_c[np.isfinite(recording.temperature_c)]
-    if not len(temperature) and recording.sensor.temperature_c is not None:
-        # Recordings of the accelerometer alone have the temperature of their start only.
-        temperature = np.array([recording.sensor.temperature_c])
     return {
         "chip": _sensor_name(recording.sensor),
         "accel_range_g": recording.sensor.accel_range_g,

@@ -33,7 +33,7 @@ from ..terminal.console import JsonLines
 from ..terminal.keys import Keys
 from .arguments import CALIBRATION_PATH, json_option, output_option
 from .loading import at_gravity_of, load_calibration
-from .options import ABOVE_ZERO, check_gyroscope, check_source, source_options
+from .options import ABOVE_ZERO, check_source, source_options
 from .page import choose_board, page_options
 from .person import say
 
@@ -72,8 +72,6 @@ def command(
     if file is not None:
         check_free(file)
     source = open_source(at_gravity_of(applied, options), until_end=True)
-    if page is not None:
-        check_gyroscope(source.plan.config)
     text = CsvText(lambda text: sys.stdout.write(text.decode()))
     on_page = nullcontext() if page is None else live_page(page, source_title(options), choose_board(board, source))
     events = JsonLines(sys.stderr, Keys()) if json_events else None

@@ -17,7 +17,7 @@ from .live_scheduler import FitScheduler, InlineWorker, Worker
 from .live_verification import add_verification
 from .machine import Machine
 from .plan import Plan
-from .ports import Note, Operator, Source, polled
+from .ports import Note, Operator, Source
 from .results import save
 from .table import State
 
@@ -96,8 +96,6 @@ class Runner:
         SourceError : the source failed, or sent no samples for seconds.
         """
         self._recording = True
-        if self._plan.config.accel_only:
-            return self._record_accel_alone(seconds)
         self._connect()
         begun_ns = self._source.now_ns()
         long_ns = math.inf if seconds is None else seconds * 1e9
@@ -137,19 +135,6 @@ class Runner:
         self._dialogue.take_keys()
         self._dialogue.feed(Written(tuple(made)))
         return written
-
-    def _record_accel_alone(self, seconds: float | None) -> int:
-        """Record as `record` does, without prompts: there is no session of the accelerometer alone."""
-        with suppress(EndOfCapture):
-            self.sensor = self._source.start()
-            for samples in polled(self._source, seconds):
-                self.samples += len(samples)
-                self._source.forget()
-                if self._operator.pressed():
-                    break
-            self._end_recording()
-            self._source.stop()
-        return self.samples
 
     def _end_recording(self) -> None:
         """Write a key into the capture, so that a replay calibrates, or aborts where there is too little."""

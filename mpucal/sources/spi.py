@@ -76,7 +76,7 @@ class SpiBus(RegisterBus):
         reply = super().read(register, count)
         part = PARTS.get(reply.data[0]) if register == reg.WHO_AM_I else None
         if part is not None:
-            self._has_i2c_if = part.family.fifo_en_with_temperature
+            self._has_i2c_if = part.family.has_i2c_if
             self._data_hz = int(min(part.family.spi_data_hz, self._most_hz))
         return reply._replace(data=_change_user_ctrl(register, reply.data, lambda value: value & ~I2C_IF_DIS))
 

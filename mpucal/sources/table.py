@@ -90,7 +90,7 @@ SIGNING_KEY = Option(
 
 RATE = Option(
     "rate",
-    "Samples a second, up to 1000; 4000: only the accelerometer of an MPU-6500, to record or stream.",
+    "Samples a second, up to 1000.",
     "HZ",
     number,
     default=200.0,

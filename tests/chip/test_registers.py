@@ -19,7 +19,6 @@ settings = st.builds(
     dlpf_cfg=st.integers(0, 6),
     fs_sel=st.integers(0, 3),
     afs_sel=st.integers(0, 3),
-    accel_only=st.booleans(),
 )
 
 

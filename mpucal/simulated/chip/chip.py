@@ -215,15 +215,9 @@ class Chip:
         divider, dlpf = self._registers[reg.SMPLRT_DIV], self._registers[reg.CONFIG] & reg.CONFIG_DLPF_CFG
         if not self._model.family.has_accel_config2:
             return reg.sample_rate_hz(divider, dlpf)
-        if self._in_standby() and self._registers[reg.ACCEL_CONFIG2] & reg.ACCEL_FCHOICE_B:
-            return reg.ACCEL_ONLY_HZ
         # RM-MPU-9250A, register 25: the divider has no effect on the filter's 8 kHz.
         base_hz = reg.base_rate_hz(dlpf)
         return base_hz if base_hz > reg.MAX_RATE_HZ else reg.sample_rate_hz(divider, dlpf)
-
-    def _in_standby(self) -> bool:
-        """Return True if the gyroscope is in standby."""
-        return self._registers[reg.PWR_MGMT_2] & reg.STANDBY_GYRO == reg.STANDBY_GYRO
 
     def _advance(self, t_ns: int) -> None:
         """Take the samples that are due; measure them if the FIFO gets full."""
@@ -276,8 +270,6 @@ class Chip:
 
     def _measure(self, edges_s: Vector) -> Counts:
         counts = self._feed.samples(edges_s, self._current_setting())
-        if self._in_standby():
-            counts[:, GYRO] = 0
         for word, bits in self._cleared:
             counts[:, word] &= ~bits
         for words, count in self._held:
@@ -296,12 +288,11 @@ class Chip:
 
 # Bits of FIFO_EN for a sample's seven words, in register order
 WORD_BITS = (*[reg.FIFO_EN_ACCEL] * 3, reg.FIFO_EN_TEMP, reg.FIFO_EN_XG, reg.FIFO_EN_YG, reg.FIFO_EN_ZG)
-GYRO = slice(4, 7)
 
 
 def _columns(sources: int, family: Family) -> list[int]:
     """Return the numbers of a sample's words that FIFO_EN selects."""
-    if family.fifo_en_with_temperature:
+    if family.has_i2c_if:
         sources |= reg.FIFO_EN_TEMP
         sources |= reg.FIFO_EN_XG | reg.FIFO_EN_YG if sources & reg.FIFO_EN_ZG else 0
     return [word for word, bit in enumerate(WORD_BITS) if sources & bit]
