@@ -1,15 +1,15 @@
 """Arrays of a MATLAB file of level 5, as written by `save(NAME, '-v7')` or `'-v6'` (MAT-File Format, MathWorks).
 
-SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers, structures of them, and
-timetables, as MATLAB Mobile saves a phone's sensors: an object's contents stand apart from its name, in a file of their
-own at the end (as seen in such files; MathWorks does not describe it). Files of `'-v7.3'` are HDF5, which h5py reads.
+SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers and structures of them. The
+contents of objects, such as timetables, stand in a form that MathWorks does not describe: they are refused. Files of
+`'-v7.3'` are HDF5, which h5py reads.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from math import prod
@@ -29,7 +29,7 @@ ORDERS = {b"IM": "<", b"MI": ">"}
 # data types of elements, and classes of arrays
 MATRIX, COMPRESSED = 14, 15
 DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-CELLS, STRUCTURE, TEXT, NUMBERS, OBJECT = 1, 2, 4, range(6, 16), 17
+STRUCTURE, NUMBERS, OBJECT = 2, range(6, 16), 17
 DEEPEST, MOST_DIMENSIONS = 8, 8
 
 
@@ -47,22 +47,19 @@ def read_matlab_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArra
     order = ORDERS.get(bytes(data[HEAD - 2 : HEAD]))
     if order is None:
         raise ValueError("it does not begin as a file of MATLAB 5 or later")
-    objects, contents, found = {}, None, False
+    kinds, found = set(), False
     for matrix in _matrices(data[HEAD:], order):
         name, value = _matrix(matrix, order)
         if isinstance(value, _Object):
-            objects[name] = value
+            kinds.add(value.kind)
         elif name:
             found = True
             yield from _arrays(name, value)
-        elif isinstance(value, np.ndarray) and value.dtype == np.uint8:
-            contents = value.tobytes(order="F")
-    tables = [name for name, value in objects.items() if value.kind == "timetable"]
-    if tables and contents:
-        yield from _timetables(tables, contents)
-    elif objects and not found:
-        kinds = ", ".join(sorted({value.kind for value in objects.values()}))
-        raise ValueError(f"it holds objects of MATLAB ({kinds}): save their columns as arrays of numbers")
+    if kinds and not found:
+        raise ValueError(
+            f"it holds objects of MATLAB ({', '.join(sorted(kinds))}): save their columns as arrays of numbers, or in"
+            " MATLAB writetimetable(Acceleration, 'Accelerometer.csv') and the like for each table"
+        )
 
 
 def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -107,24 +104,20 @@ def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
 
 @dataclass(frozen=True)
 class _Object:
-    """An object of MATLAB: the name of its class, and its value."""
+    """An object of MATLAB, by the name of its class."""
 
     kind: str
-    value: Any
 
 
 def _matrix(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
-    """Return the name and the value of a matrix: an array, a text, a list of cells, a dict of fields, or an object."""
+    """Return the name and the value of a matrix: an array, a dict of fields, or an object; None of any other."""
     parts = list(_elements(data, order))
     if len(parts) < 3 or depth > DEEPEST or len(parts[0][1]) < 4:
         return "", None
 
-    def values(first: int) -> list[Any]:
-        return [_matrix(element, order, depth + 1)[1] if kind == MATRIX else None for kind, element in parts[first:]]
-
     of = struct.unpack_from(f"{order}I", parts[0][1])[0] & 0xFF
     if of == OBJECT:
-        return _text(parts[1][1]), _Object(_text(parts[3][1]), values(4)[0]) if len(parts) > 4 else None
+        return _text(parts[1][1]), _Object(_text(parts[3][1])) if len(parts) > 3 else None
     name, shape = _text(parts[2][1]), _numbers(*parts[1], order).tolist()
     if not 0 < len(shape) <= MOST_DIMENSIONS or min(shape) < 0:
         raise ValueError("an array has no shape")
@@ -137,10 +130,9 @@ def _matrix(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
         length = max(int(_numbers(*parts[3], order)[0]), 1)
         names = bytes(parts[4][1])
         fields = [_text(names[at : at + length].partition(b"\0")[0]) for at in range(0, len(names), length)]
-        return name, dict(zip(fields, values(5), strict=False))
-    if of == TEXT and len(parts) > 3:
-        return name, _text(parts[3][1])
-    return name, values(3) if of == CELLS else None
+        values = [_matrix(part, order, depth + 1)[1] if kind == MATRIX else None for kind, part in parts[5:]]
+        return name, dict(zip(fields, values, strict=False))
+    return name, None
 
 
 def _arrays(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -149,23 +141,6 @@ def _arrays(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
     elif isinstance(value, dict):
         for field, each in value.items():
             yield from _arrays(f"{name}.{field}", each)
-
-
-def _timetables(names: Sequence[str], contents: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the columns of the timetables `names`, whose contents follow in the same order, each after its times."""
-    order = ORDERS.get(contents[2:4], "<")
-    wrapped = [_matrix(element, order)[1] for kind, element in _elements(memoryview(contents)[8:], order)]
-    cells: list[Any] = next(
-        (value["MCOS"].value for value in wrapped if isinstance(value, dict) and "MCOS" in value), []
-    )
-    whole = [i for i, cell in enumerate(cells) if isinstance(cell, dict) and {"data", "varNames"} <= cell.keys()]
-    for name, at in zip(names, whole, strict=False):
-        times = next((cell for cell in reversed(cells[:at]) if isinstance(cell, np.ndarray) and cell.size > 1), None)
-        if times is not None:
-            # a datetime is ms since 1970
-            yield f"{name}.Timestamp (ms)", times
-        for column, values in zip(cells[at]["varNames"], cells[at]["data"], strict=False):
-            yield from _arrays(f"{name}.{column}", values)
 
 
 def _text(data: bytes | memoryview) -> str:

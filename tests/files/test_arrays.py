@@ -3,7 +3,6 @@
 import json
 import struct
 import sys
-import zlib
 from contextlib import suppress
 
 import numpy as np
@@ -287,33 +286,6 @@ def thing(name, kind, value):
 
 
 HEAD_OF_5 = b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM"
-
-
-def as_timetables(path, **sensors):
-    """Write tables {X, Y, Z} with their times in ms as MATLAB Mobile saves a phone's sensors."""
-    contents = [numbers([])]
-    for t_ms, values in sensors.values():
-        names = [matrix(4, (1, 1), b"", element(16, axis)) for axis in (b"X", b"Y", b"Z")]
-        columns = [numbers(column) for column in values.T]
-        contents += [numbers(t_ms), fields(data=cells(*columns), varNames=cells(*names))]
-    inner = b"\0\1IM\0\0\0\0" + fields(MCOS=thing(b"", b"FileWrapper__", cells(*contents)))
-    named = [thing(name.encode(), b"timetable", numbers([1.0, 2.0])) for name in sensors]
-    last = matrix(9, (1, len(inner)), b"", element(2, inner))
-    path.write_bytes(HEAD_OF_5 + b"".join(element(15, zlib.compress(each)) for each in (*named, last)))
-
-
-def test_timetables_of_matlab_mobile_are_read(walk, tmp_path):
-    t_ms, later = walk.t * 1000 + 1.6e12, slice(7, None)
-    as_timetables(
-        tmp_path / "sensorlog.mat",
-        Acceleration=(t_ms, walk.acc),
-        Orientation=(t_ms, walk.acc * 10),
-        AngularVelocity=(t_ms[later], walk.gyr[later]),
-    )
-    read = mpucal.load(tmp_path / "sensorlog.mat")
-    assert "from Acceleration and AngularVelocity" in read.taken
-    np.testing.assert_allclose(si(read), si(walk)[later], atol=1e-6)
-    assert read.utc_ns is not None
 
 
 def test_objects_of_matlab_are_named(tmp_path):
