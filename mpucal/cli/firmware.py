@@ -21,28 +21,17 @@ HEX = "mpucal_bridge.hex"
 LICENCE = "LICENSE"
 # Boards with an ATmega328P at 16 MHz, for which there is an image, and the baud rate of their boot loader.
 BAUDS = {"uno": 115_200, "nano": 115_200, "nano-old": 57_600}
-# Other boards, for which arduino-cli builds the sketch and finds the tool, by its name for them (FQBN).
-NAMES = {
-    "mega": "arduino:avr:mega",
-    "leonardo": "arduino:avr:leonardo",
-    "nano-every": "arduino:megaavr:nona4809",
-    "uno-wifi": "arduino:megaavr:uno2018",
-    "esp32": "esp32:esp32:esp32",
-    "esp8266": "esp8266:esp8266:nodemcuv2",
-    # The default layout has no file system, which stores the calibration.
-    "pico": "rp2040:rp2040:rpipico:flash=2097152_65536",
-}
 
 
 @click.command("firmware", epilog=EXAMPLE)
 @output_option("folder", "DIR", "Write the Arduino library to this folder.")
 @click.option("--flash", "port", metavar="PORT", help="Write the bridge onto the board on this serial port.")
-@click.option("--board", type=click.Choice([*BAUDS, *NAMES]), default="uno", show_default=True, help="Board on PORT.")
+@click.option("--board", type=click.Choice(list(BAUDS)), default="uno", show_default=True, help="Board on PORT.")
 def command(folder: Path | None, port: str | None, board: str) -> None:
     """Write the serial bridge's firmware: as a library for the Arduino IDE, or onto a board.
 
-    An Uno or Nano is flashed by avrdude with an image that comes with mpucal; for other boards arduino-cli builds the
-    sketch, and flashes it with the tool of their core.
+    An Uno or Nano is flashed by avrdude with an image that comes with mpucal. For other boards, the Arduino IDE or
+    arduino-cli builds the library's sketch.
     """
     if (folder is None) == (port is None):
         raise UsageError("`mpucal firmware` takes one of -o DIR and --flash PORT", "give one of them")
@@ -82,27 +71,16 @@ def _write(folder: Path) -> None:
 
 
 def _flash(port: str, board: str) -> None:
-    words = _by_avrdude(port, BAUDS[board]) if board in BAUDS else _by_arduino(port, NAMES[board])
+    source = _library()
+    image = next((path for path in (source / HEX, source / "build" / HEX) if path.is_file()), None)
+    if image is None:
+        raise SourceError("this installation of mpucal has no image of the bridge", "build it: `make firmware`")
+    words = ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(BAUDS[board]), "-P", port, "-D"]
+    words += ["-U", f"flash:w:{image}:i"]
     if shutil.which(words[0]) is None:
-        core = "" if board in BAUDS else f" and the core {':'.join(NAMES[board].split(':')[:2])}"
-        raise SourceError(f"{words[0]} is not installed", f"install it{core}, then: {shlex.join(words)}")
+        raise SourceError(f"{words[0]} is not installed", f"install it, then: {shlex.join(words)}")
     if subprocess.run(words, check=False).returncode:
         raise WriteBackError(
             f"{words[0]} could not write to the board on {port}",
             "check that nothing else uses the port, and --board: an old Nano needs nano-old",
         )
-
-
-def _by_avrdude(port: str, baud: int) -> list[str]:
-    source = _library()
-    image = next((path for path in (source / HEX, source / "build" / HEX) if path.is_file()), None)
-    if image is None:
-        raise SourceError("this installation of mpucal has no image of the bridge", "build it: `make firmware`")
-    upload = f"flash:w:{image}:i"
-    return ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(baud), "-P", port, "-D", "-U", upload]
-
-
-def _by_arduino(port: str, name: str) -> list[str]:
-    source = _library()
-    sketch = str(source / "examples" / "mpucal_bridge")
-    return ["arduino-cli", "compile", "--upload", "-b", name, "-p", port, "--library", str(source), sketch]

@@ -63,14 +63,3 @@ def test_a_board_that_was_not_written_is_said(installed, programs, capsys):
     program(programs, 1)
     assert run(["firmware", "--flash", "/dev/ttyX"]) == 6
     assert "could not write to the board on /dev/ttyX" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("board", ["mega", "pico"])
-def test_other_boards_are_left_to_arduino_cli(installed, programs, capsys, board):
-    assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 3
-    command = capsys.readouterr().err.partition("then: ")[2].strip().rstrip(".")
-    name, core = firmware.NAMES[board], installed / "examples" / "mpucal_bridge"
-    assert command == f"arduino-cli compile --upload -b {name} -p /dev/ttyX --library {installed} {core}"
-    program(programs, 0, "arduino-cli")
-    assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 0
-    assert f"arduino-cli {(programs / 'said').read_text().strip()}" == command
