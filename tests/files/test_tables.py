@@ -60,6 +60,8 @@ COLUMNS = {
     "serial": lambda w, ns: 45413.5 + w.t / 86400,
     "overflow": lambda w, ns: (2**32 - 5_000_000 + np.rint(w.t * 1e6).astype(np.int64)) % 2**32,
     "digits": lambda w, ns: [f"{date.item():%Y%m%d%H%M%S%f}"[:-3] for date in dates(w)],
+    "hhmmss": lambda w, ns: [f"{date.item():%H%M%S.%f}" for date in dates(w) + 45_000_000],
+    "hhmmssmmm": lambda w, ns: [f"{date.item():%H%M%S%f}"[:-3] for date in dates(w) + 45_000_000],
     "a": lambda w, ns: w.acc,
     "zyx": lambda w, ns: w.acc[:, ::-1],
     "g": lambda w, ns: w.acc / G,
@@ -77,6 +79,7 @@ COLUMNS = {
     "20_bits": lambda w, ns: np.rint(np.column_stack([w.acc, w.gyr]) * COUNTS * 16).astype(int),
     "1024": lambda w, ns: np.rint(w.acc * 1024 / G).astype(int),
     "rates": lambda w, ns: counts(w)[:, 3:],
+    "bno055": lambda w, ns: np.rint(np.column_stack([w.acc * 100, np.degrees(w.gyr) * 16])).astype(int),
     "unsigned": lambda w, ns: counts(w) % 65536,
     "upward": lambda w, ns: counts(w) + 32768,
 }
@@ -201,6 +204,10 @@ FORMS = {
         *(A_LOG, "counts", "RAW 0x68: accel=({}, {}, {}) temp_raw=4000 gyro=({}, {}, {})\r\nadvanced fifo_end\r\n"),
         *("board.log", "counts of ±4 g (by |a|)", AT_100_HZ, IN_COUNTS),
     ),
+    "times of day in digits": Form(f"time,{AXES}", "hhmmss a w"),
+    "times of day in whole digits": Form(f"time,{AXES}", "hhmmssmmm a w"),
+    "times of day in digits under our own names": Form(f"t,{AXES}", "hhmmss a w", says="times in s"),
+    "a BNO055": Form(f"time,{AXES}", "ms bno055", says="cm/s^2 and rates in deg/s/16", atol=6e-3),
     "MT Manager": Form(
         f"{MT_MANAGER}PacketCounter\tSampleTimeFine\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tRoll\n",
         *("i ticks a w 1.0", "\t", "MT Manager.txt"),
@@ -581,6 +588,15 @@ def test_a_rate_is_found_by_how_gravity_turns_and_must_fit(read, walk):
             read(AXES, "a w", rate=25, units=units)
     opposite = read(f"time,{AXES}", "t a w", of=replace(walk, gyr=-walk.gyr))
     assert "gravity turns the other way" in opposite.taken
+
+
+def test_numbers_of_samples_are_no_seconds_under_our_own_names_either(read, walk):
+    found = read(f"t,{AXES}", "i a w")
+    assert found.rate_hz == pytest.approx(100.0, rel=0.2)
+    assert "this sample rate is that at which its rates turn gravity" in found.taken
+    still = replace(walk, acc=np.tile([0.0, 0.0, G], (len(walk), 1)), gyr=0.01 * walk.gyr)
+    # nothing shows another rate than that of the times
+    assert read(f"t,{AXES}", "i a w", of=still).rate_hz == pytest.approx(1.0)
 
 
 def test_gravity_that_is_missing_or_hidden_is_told(read, walk):

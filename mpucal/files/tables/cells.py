@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clocks.sample_clock import GAP_INTERVALS
 from ...data import Vector
 from ..reading import MOST_ODD
 from .units import NS
@@ -36,6 +37,8 @@ _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.
 _COMPACT = re.compile(
     r"(20\d\d)(0[1-9]|1[0-2])([0-3]\d)[T_ -]?([01]\d|2[0-3])([0-5]\d)([0-5]\d)[._]?(\d{0,6})(Z?)"
 ).fullmatch
+# the same without the date, as the first cell of a column has it; the numbers then show if it is one
+OF_DAY = re.compile(r"\s*([01]\d|2[0-3])([0-5]\d){2}(\.\d+|\d{3})?\s*").fullmatch
 _ISO = re.compile(r"\d{4}-\d\d-\d\d").match
 _MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
 
@@ -103,6 +106,24 @@ def _days(first: str, mark: str, middle: str, last: str) -> int:
         day, month = middle, first
     months = _MONTHS.find(month.lower()) // 3 + 1 if month.isalpha() else int(month)
     return datetime(int(year), months, int(day)).toordinal() - 1
+
+
+def since_midnight(times: NDArray[Any]) -> Vector | None:
+    """Return seconds of numbers (n,) that are times of day in digits (hhmmss.sss, hhmmssmmm); None of any others.
+
+    They are if no part exceeds a day's, and the clock goes on evenly where a minute begins.
+    """
+    numbers = np.asarray(times, float)
+    for scale in (1.0, 1000.0) if np.isfinite(numbers).all() else ():
+        minutes, seconds = np.divmod(numbers / scale, 100.0)
+        hours, minutes = np.divmod(minutes, 100.0)
+        if (seconds < 60).all() and (minutes < 60).all() and (hours < 24).all() and (hours >= 0).all():
+            found = (60.0 * hours + minutes) * 60.0 + seconds
+            steps, begins = np.diff(found), np.diff(minutes) != 0.0
+            usual = float(np.median(steps)) if len(steps) else 0.0
+            if begins.any() and ((steps[begins] > 0.0) & (steps[begins] <= GAP_INTERVALS * usual)).all():
+                return np.asarray(found)
+    return None
 
 
 def is_number(cell: str, dates: bool = True) -> bool:

@@ -16,7 +16,7 @@ from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
 from ..reading import HELD, MOST_ODD, check_size, first_bytes, reading
-from .cells import Kind
+from .cells import OF_DAY, Kind
 from .columns import find_columns
 from .guess import is_index
 from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
@@ -25,6 +25,7 @@ from .names import (
     BY_A_WORD,
     GYR,
     TEMPERATURE,
+    TIME,
     Column,
     axes_of,
     axis_triples,
@@ -38,7 +39,7 @@ from .streams import index_with_gravity, join_streams
 from .table import Table
 from .text import HEAD, PREAMBLE, decode_text, find_bare_table, find_named_table, find_wanted_table, stated_rate_hz
 from .times import Stream
-from .units import QUANTITIES, acceleration_unit, seem_counts
+from .units import OF_BNO055, QUANTITIES, acceleration_unit, likely_rate_hz, seem_counts
 
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"t": "0.1ms", "acc": "m/s^2", "gyr": "rad/s"}}
@@ -59,7 +60,7 @@ def is_own_table(path: Path) -> bool:
     first = next(iter(first_bytes(path).decode("utf-8-sig", "replace").splitlines()), "")
     named = {name.strip(' "').lower() for name in first.split(",")}
     table = _begun(path) if set(COLUMNS) <= named else None
-    return table is not None and _may_be_si(table)
+    return table is not None and _may_be_si(table) and not _may_be_no_seconds(table, path)
 
 
 def _begun(path: Path) -> Table | None:
@@ -76,6 +77,27 @@ def _may_be_si(table: Table) -> bool:
     return len(values) < FEWEST or (not seem_counts(values) and acceleration_unit(values) in ("", "m/s^2"))
 
 
+def _may_be_no_seconds(table: Table, path: Path) -> bool:
+    """Return True if the column t may hold times of day in digits, or counts the samples, as the whole file shows."""
+    place = [name.strip().lower() for name in table.header].index("t")
+    if len(table) and OF_DAY(str(table.cells[place][0])):
+        return True
+    # what was read of the file may end within a number
+    t = table.numbers([Column("t", place, TIME)])[:-1, 0]
+    if len(t) < FEWEST or not is_index(t):
+        return False
+    whole = find_any_table(_read_text(path), path.name)
+    acc, gyr = (whole.numbers(first_triple(whole.columns, of)) if whole else np.zeros((0, 3)) for of in (ACC, GYR))
+    complete = np.isfinite(np.hstack([acc, gyr])).all(axis=1)
+    return bool(complete.any()) and likely_rate_hz(acc[complete], gyr[complete], "") is not None
+
+
+def _read_text(path: Path) -> str:
+    with reading(path):
+        check_size(path, HELD * path.stat().st_size)
+        return decode_text(path.read_bytes(), path.name)
+
+
 def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """Return the recording in a table of text.
 
@@ -83,9 +105,7 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     ------
     RecordingError : it cannot be read, or does not say all that is needed; the message names what is missing.
     """
-    with reading(path):
-        check_size(path, HELD * path.stat().st_size)
-        text = decode_text(path.read_bytes(), path.name)
+    text = _read_text(path)
     if not text.strip():
         raise RecordingError(f"{path} is empty", "record it again")
     table = find_any_table(text, path.name, [*hints.columns.values()])
@@ -204,6 +224,8 @@ def sensor_stream(
         temperature_c=plausible_celsius(table.numbers(warm[:1])[kept, 0]) if warm else None,
         lost=0 if others else int((~kept).sum()),
         rate_hz=table.rate_hz,
+        # xacc and xgyro of MAVLink are in mg and mrad/s
+        whole_unit="" if axes[0].name.strip().lower().startswith("x") else OF_BNO055[axes[0].quantity],
     )
 
 

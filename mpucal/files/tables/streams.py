@@ -17,7 +17,7 @@ from ..hints import Hints
 from ..rows import make_recording
 from . import times, units
 from .times import Stream
-from .units import COUNTS, QUANTITIES, resolve_unit
+from .units import COUNTS, OF_BNO055, QUANTITIES, resolve_unit
 
 # octaves: half way to the next range, which leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
@@ -108,6 +108,10 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         w = Reading.of(rates, math.nan, left_out)
     else:
         rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
+        if rate_of.are_whole_mrad and _are_whole_mg(acc, values) and not hints.units.keys() & OF_BNO055.keys():
+            hints = replace(hints, units={**hints.units, **OF_BNO055})
+            rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
+            remarks = [*remarks, "these may be the counts of a BNO055, or else --units acc=mg,gyr=mrad/s"]
         a = _accelerations(values, acc.unit, hints, name, beside_counts=rate_of.show_counts)
         w = rate_of.read(beside_counts=a.said.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
@@ -157,6 +161,12 @@ def _among(complete: Mask, values: NDArray[Any], missing: float) -> NDArray[Any]
     found = np.full((len(complete), *values.shape[1:]), missing, values.dtype)
     found[complete] = values
     return found
+
+
+def _are_whole_mg(acc: Stream, values: Vector) -> bool:
+    """Return True if accelerations (n, 3) are whole numbers that seem to be in mg, as a BNO055's do."""
+    named = bool(acc.unit) or not acc.whole_unit
+    return not named and units.are_counts(values) and units.acceleration_unit(values) == "mg"
 
 
 def _rate_hz(acc: Stream, gyr: Stream, hints: Hints) -> float | None:
@@ -242,6 +252,11 @@ class _Rates:
     def show_counts(self) -> bool:
         """Return True if they are whole numbers that turn gravity as rates in no unit do."""
         return self._whole and bool(self._factor and not self._seen)
+
+    @property
+    def are_whole_mrad(self) -> bool:
+        """Return True if they are whole numbers that turn gravity as rates in mrad/s do."""
+        return self._whole and self._seen == "mrad/s"
 
     def read(self, *, beside_counts: bool) -> Reading:
         """Return them in SI units; `beside_counts` if the accelerations are counts."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
-from .cells import DAY_NS, Cells, Kind, kind_of, parse_cell, since_first, with_point
+from .cells import DAY_NS, Cells, Kind, kind_of, parse_cell, since_first, since_midnight, with_point
 from .names import NANOSECONDS, TIME, Column, parse_header
 from .units import NS, QUANTITIES
 
@@ -130,6 +130,8 @@ class Table:
         if self.kinds[column.place] is Kind.MOMENT:
             below = [c for c in self.columns if c.quantity == TIME and c.unit in BELOW_A_SECOND and c != column]
             parts, unit = [] if any(found % NS) else below, "ns"
+        elif unit in ("", "s") and (of_day := since_midnight(found)) is not None:
+            found, unit = of_day, "s"
         if parts:
             ticks = round(QUANTITIES[TIME][parts[0].unit or "ns"] * NS)
             more = self._exact(parts[0], kept) * ticks

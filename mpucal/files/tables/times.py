@@ -38,6 +38,7 @@ class Stream:
     places : (n,) of the samples in the order of measurement, with holes where lines without a sample are between.
     temperature_c : (n,), if the file has it. lost : number of lines that hold no sample and no time.
     rate_hz : the sample rate, if the file states it.
+    whole_unit : of whole numbers that seem to be in mg or mrad/s, but may be a BNO055's; empty if they are not.
     """
 
     ticks: Vector | None
@@ -50,6 +51,7 @@ class Stream:
     temperature_c: Vector | None = None
     lost: int = 0
     rate_hz: float | None = None
+    whole_unit: str = ""
 
     @cached_property
     def number(self) -> Numbers:

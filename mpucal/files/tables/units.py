@@ -21,9 +21,24 @@ FEWEST_PER_G, MOST_PER_G, MOST_COUNTS = 8, 20, 2.0**23
 # quantity -> unit -> SI
 QUANTITIES = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4, DAYS: 86400.0},
-    "acc": {"m/s^2": 1.0, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1000, COUNTS: math.nan},
-    "gyr": {"rad/s": 1.0, "deg/s": math.radians(1), "mdeg/s": math.radians(1e-3), "mrad/s": 1e-3, COUNTS: math.nan},
+    "acc": {
+        "m/s^2": 1.0,
+        "g": STANDARD_GRAVITY_MPS2,
+        "mg": STANDARD_GRAVITY_MPS2 / 1000,
+        "cm/s^2": 0.01,
+        COUNTS: math.nan,
+    },
+    "gyr": {
+        "rad/s": 1.0,
+        "deg/s": math.radians(1),
+        "mdeg/s": math.radians(1e-3),
+        "mrad/s": 1e-3,
+        "deg/s/16": math.radians(1 / 16),
+        COUNTS: math.nan,
+    },
 }
+# the counts of a BNO055 (BST-BNO055-DS000, UNIT_SEL 0), which samples hardly tell from mg and mrad/s
+OF_BNO055 = {"acc": "cm/s^2", "gyr": "deg/s/16"}
 _SPELLED = {
     "s": "s sec secs second seconds",
     "ms": "ms msec millis millisec millisecond milliseconds",
@@ -33,10 +48,12 @@ _SPELLED = {
     "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/(s2) m/s**2 meters/second2 m/sec2",
     "g": "g gs g's g-force gforce gee g0",
     "mg": "mg milli-g millig",
+    "cm/s^2": "cm/s2 gal",
     "rad/s": "rad/s radpers rads-1 radps rads rad/sec radians/s rps rad",
     "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s degrees/sec deg",
     "mdeg/s": "mdeg/s mdps",
     "mrad/s": "mrad/s",
+    "deg/s/16": "deg/s/16",
     COUNTS: "counts count lsb raw adc",
 }
 _NAMES = {spelled: unit for unit, words in _SPELLED.items() for spelled in words.split()}
@@ -99,7 +116,7 @@ def acceleration_unit(acc: Vector) -> str:
     size, scatter = typical_size(acc)
     if scatter > SCATTER * size:
         return ""
-    units = QUANTITIES["acc"].items()
+    units = ((unit, si) for unit, si in QUANTITIES["acc"].items() if unit != OF_BNO055["acc"])
     return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
 
 
@@ -193,7 +210,8 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
     """Return the sample rate at which (n, 3) rates in `unit`, or in the only likely one, turn gravity; else None."""
     fastest = float(np.percentile(np.abs(gyr), 99))
     known = QUANTITIES["gyr"].items()
-    units = [si for name, si in known if name == unit or (not unit and fastest * si < FASTEST_RAD_S)]
+    shown = (si for name, si in known if name != OF_BNO055["gyr"] and fastest * si < FASTEST_RAD_S)
+    units = [QUANTITIES["gyr"][unit]] if unit else [*shown]
     likely = []
     for si in units:
         # the second time with the right smoothing
@@ -207,7 +225,7 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
 
 def gyro_unit(factor: float | None) -> str:
     """Return the unit of rates with this rate_factor; empty if there is none."""
-    units = {unit: si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS}
+    units = {unit: si for unit, si in QUANTITIES["gyr"].items() if unit not in (COUNTS, OF_BNO055["gyr"])}
     return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
 
 
