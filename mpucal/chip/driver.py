@@ -18,7 +18,7 @@ from ..data import Recording, Samples, Sensor
 from ..errors import BusError, BusHeld, ChipError, EndOfCapture
 from . import registers as reg
 from .access import Bus
-from .config import Config
+from .config import MOST_FILLED, Config
 from .decode import Decoder
 from .fifo import FifoDecoder
 from .identity import describe_mismatch
@@ -93,6 +93,7 @@ class Driver:
         self._port = Port(bus, self._decoder.feed, stats)
         self._config = config or Config()
         self._polls = 0
+        self._period_s = self._config.period_s
         self._next_poll_ns = 0
         self._need = Need.NOTHING
         self._fruitless_ns = 0
@@ -124,6 +125,9 @@ class Driver:
         probe(self._port)
         settings = self.settings = self._config.settings(self._decoder.part)
         configure(self._port, settings)
+        if not settings.polled:
+            filled_s = MOST_FILLED * settings.part.fifo_bytes / settings.frame_bytes / self._config.rate_hz
+            self._period_s = min(self._period_s, filled_s)
         self._restart()
         no_fifo = NO_FIFO if settings.polled else None
         for sentence in filter(None, (describe_mismatch(settings.sensor), self._correction_remark(), no_fifo)):
@@ -222,7 +226,7 @@ class Driver:
     def _read_samples(self) -> Need:
         """Read samples one by one for a poll's period; return what the chip needs next."""
         step_ns = round(1e9 / self._config.rate_hz)
-        for _ in range(max(1, round(self._config.period_s * self._config.rate_hz))):
+        for _ in range(max(1, round(self._period_s * self._config.rate_hz))):
             self._port.sleep_until(self._next_poll_ns)
             try:
                 self._port.read(reg.INT_ENABLE, SAMPLE_BYTES)
@@ -286,8 +290,7 @@ class Driver:
         return count
 
     def _plan_next_poll(self) -> None:
-        period_s = self._config.period_s
-        in_s = period_s + poll_phase(self._polls) * min(period_s, 1 / self._config.rate_hz)
+        in_s = self._period_s + poll_phase(self._polls) * min(self._period_s, 1 / self._config.rate_hz)
         self._polls += 1
         self._next_poll_ns = self._port.now_ns + round(in_s * 1e9)
 

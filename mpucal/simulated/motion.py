@@ -26,7 +26,7 @@ from .hand import REACTION_S, Hand, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 
 # Shorter than any reaction: a prompt never changes motion that has been computed.
-AHEAD_S = REACTION_S[0] / 2
+AHEAD_S = 0.9 * REACTION_S[0]
 
 SINES = 12
 

@@ -72,7 +72,7 @@ def _truth(options: ChipOptions, gravity: float) -> SensorTruth:
 
 
 # A simulation at full speed has no operator who waits for samples, and no host that is late.
-SELDOM_S = 0.12
+SELDOM_S = 0.25
 
 
 def polled_seldom(plan: Plan, real_time: bool) -> Plan:
