@@ -72,6 +72,7 @@ COLUMNS = {
     "wzyx": lambda w, ns: w.gyr[:, ::-1],
     "dps": lambda w, ns: np.degrees(w.gyr),
     "mrad": lambda w, ns: w.gyr * 1000,
+    "dph": lambda w, ns: np.degrees(w.gyr) * 3600,
     "field": lambda w, ns: 0.01 * w.acc,
     "jerk": lambda w, ns: 0.3 * w.gyr,
     "000": lambda w, ns: 0.0 * w.acc,
@@ -208,6 +209,11 @@ FORMS = {
     "times of day in whole digits": Form(f"time,{AXES}", "hhmmssmmm a w"),
     "times of day in digits under our own names": Form(f"t,{AXES}", "hhmmss a w", says="times in s"),
     "a BNO055": Form(f"time,{AXES}", "ms bno055", says="cm/s^2 and rates in deg/s/16", atol=6e-3),
+    "counts beside what was made of them": Form(
+        "sample,time_s,ax_raw,ay_raw,az_raw,gx_raw,gy_raw,gz_raw,ax_m_s2,ay_m_s2,az_m_s2,gx_deg_h,gy_deg_h,gz_deg_h\n",
+        *("i t counts a dph", ","),
+        says="accelerations in m/s^2 and rates in deg/h",
+    ),
     "MT Manager": Form(
         f"{MT_MANAGER}PacketCounter\tSampleTimeFine\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tRoll\n",
         *("i ticks a w 1.0", "\t", "MT Manager.txt"),
@@ -597,6 +603,11 @@ def test_numbers_of_samples_are_no_seconds_under_our_own_names_either(read, walk
     still = replace(walk, acc=np.tile([0.0, 0.0, G], (len(walk), 1)), gyr=0.01 * walk.gyr)
     # nothing shows another rate than that of the times
     assert read(f"t,{AXES}", "i a w", of=still).rate_hz == pytest.approx(1.0)
+
+
+def test_three_parts_of_an_attitude_are_no_accelerometer(read, walk):
+    with pytest.raises(RecordingError, match="so gravity is not in it"):
+        read("time,acc_x,acc_y,acc_z,q_w,q_x,q_y,q_z\n", "t jerk g 0.1")
 
 
 def test_gravity_that_is_missing_or_hidden_is_told(read, walk):

@@ -11,6 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
 
 import numpy as np
 
@@ -60,8 +61,9 @@ COLDEST_C, WARMEST_C = -60.0, 130.0
 FLIPPED_STEMS = ("accelerometeracceleration",)
 # accelerations from which a program has taken gravity
 WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
-# the direction of gravity as a program estimates it, which an accelerometer of no errors would measure
-ESTIMATED = re.compile(r"gravity", re.IGNORECASE)
+# the direction of gravity as a program estimates it, which an accelerometer of no errors would measure, and attitudes,
+# of which three parts may be as long
+ESTIMATED = re.compile(r"gravity|quat|^q[_.]?[wxyz0-3]$", re.IGNORECASE)
 # names that are remembered
 MOST_NAMES = 1024
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
@@ -74,7 +76,7 @@ _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 _UNIT_TAIL = re.compile(
     r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|dps|mdps|mps2|m_s2|m/s2|ms2|rad_s|rads|rad|deg_s|degs|deg"
-    r"|deg_per_s|rad_per_s)"
+    r"|deg_per_s|rad_per_s|deg_h|deg_hr)"
 )
 
 
@@ -216,11 +218,18 @@ def axes_of(name: str) -> list[str]:
 
 
 def axis_triples(columns: Sequence[Column], quantity: str) -> list[tuple[Column, ...]]:
-    """Return the x, y, z columns of a quantity, for each stem that has all three, by rank."""
-    of = [column for column in columns if column.quantity == quantity]
-    ranks = sorted({column.rank for column in of})
-    found = [sorted((c for c in of if c.rank == rank), key=lambda c: c.axis) for rank in ranks]
-    return [tuple(axes) for axes in found if [c.axis for c in axes] == [0, 1, 2]]
+    """Return the x, y, z columns of a quantity, for each stem that has all three, by rank; those with units first."""
+    of = sorted(
+        (column for column in columns if column.quantity == quantity), key=lambda c: (c.rank, not c.unit, c.unit)
+    )
+    found: list[list[Column]] = []
+    for _, group in groupby(of, lambda column: column.rank):
+        # a logger may write counts beside what it made of them
+        same = [*group]
+        of_units = [[*of_unit] for _, of_unit in groupby(same, lambda column: column.unit)]
+        found += of_units if len(same) > len("xyz") else [same]
+    ordered = (sorted(axes, key=lambda c: c.axis) for axes in found)
+    return [tuple(axes) for axes in ordered if [c.axis for c in axes] == [0, 1, 2]]
 
 
 def first_triple(columns: Sequence[Column], quantity: str) -> tuple[Column, ...]:

@@ -33,6 +33,7 @@ QUANTITIES = {
         "deg/s": math.radians(1),
         "mdeg/s": math.radians(1e-3),
         "mrad/s": 1e-3,
+        "deg/h": math.radians(1 / 3600),
         "deg/s/16": math.radians(1 / 16),
         COUNTS: math.nan,
     },
@@ -53,6 +54,7 @@ _SPELLED = {
     "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s degrees/sec deg",
     "mdeg/s": "mdeg/s mdps",
     "mrad/s": "mrad/s",
+    "deg/h": "deg/h deg/hr degh deghr",
     "deg/s/16": "deg/s/16",
     COUNTS: "counts count lsb raw adc",
 }
