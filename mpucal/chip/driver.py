@@ -126,7 +126,7 @@ class Driver:
         settings = self.settings = self._config.settings(self._decoder.part)
         configure(self._port, settings)
         if not settings.polled:
-            filled_s = MOST_FILLED * settings.part.fifo_bytes / settings.frame_bytes / self._config.rate_hz
+            filled_s = MOST_FILLED * settings.part.fifo_bytes / reg.FRAME_BYTES / self._config.rate_hz
             self._period_s = min(self._period_s, filled_s)
         self._restart()
         no_fifo = NO_FIFO if settings.polled else None
