@@ -29,6 +29,7 @@ from .parameters import ACCEL, IMU
 from .parts import ends_of, parts_of
 from .problem import Problem, Series
 from .rotation import lengths
+from .sampling import with_sampling_errors
 from .static import fit_static
 from .theta import Prior, Theta
 from .tilt import fit_tilt
@@ -204,7 +205,8 @@ class InPlaceFits:
 
 
 def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
-    return Problem(mask(Series.after(recording, flat), recording, flat), flat, gravity)
+    series = with_sampling_errors(mask(Series.after(recording, flat), recording, flat), recording, flat)
+    return Problem(series, flat, gravity)
 
 
 def _with_errors(problem: Problem, errors: Errors) -> Problem:

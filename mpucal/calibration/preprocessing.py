@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..kernel import _kernel
-from ..rests.flat import UNAVERAGED, Flat, flat_statistics, rounding_variance
+from ..rests.flat import UNAVERAGED, Flat, flat_statistics, left_by_rounding
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.tremor import SWAY_PER_S, without_tremor
@@ -106,12 +106,12 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     speed2 = np.sum(rate * rate, axis=1)
     noise_factor = np.array([loud[a:b].mean() for a, b in after])
     hand = without_tremor(recording, flat, after + flat.last, noise_factor)
-    raw = statistics(recording.acc[flat.last :], after)[1]
+    rounded = left_by_rounding(*statistics(recording.acc[flat.last :], after), recording.sensor.steps[0], UNAVERAGED)
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
-    of_rests = zip(after.tolist(), np.sqrt(hand.sway).tolist(), hand.jitter.tolist(), raw, strict=True)
-    for (a, b), sway, jitter, variance in of_rests:
+    of_rests = zip(after.tolist(), np.sqrt(hand.sway).tolist(), hand.jitter.tolist(), rounded, strict=True)
+    for (a, b), sway, jitter, rounding in of_rests:
         reset[a], jerk[a:b] = sway, jerk_density(sway, SWAY_PER_S)
-        pose[a:b] = (POSE_MPS2**2 + jitter + rounding_variance(recording.sensor, variance, UNAVERAGED)) * (b - a)
+        pose[a:b] = (POSE_MPS2**2 + jitter + rounding.max()) * (b - a)
         if b < len(series):
             reset[b] = 0.0
     recording = replace(recording, acc=hand.acc)

@@ -128,7 +128,7 @@ class Prior:
         """
         known = {row.name: (np.array(row.mean), np.array(row.sd)) for row in TABLE if row.sd}
         known["tau"] = (np.array(sensor.accel_lag_s), np.array(BY_NAME["tau"].sd))
-        return cls.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)), **known, **more)
+        return cls.of(b_omega=(flat.b_omega, flat.b_omega_std), **known, **more)
 
     def cost(self, theta: Theta) -> float:
         """Return the sum of precision (x - mean)^2 / 2 at theta, which adds to V."""

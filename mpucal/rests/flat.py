@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data import Recording, Sensor, Vector
+from ..data import Recording, Vector
 from ..kernel import _kernel
 from .limits import QUIET
 from .stillness import Detector, still_windows
@@ -39,7 +39,8 @@ class Flat:
     first, last : samples first..last-1 are the segment.
     y : (3,) m/s^2, mean of the accelerometer. b_omega : (3,) rad/s, mean of the gyroscope.
     Sigma_a : (3,) (m/s^2)^2 and Sigma_omega : (3,) (rad/s)^2, the diagonals of the covariances.
-    rounded : (m/s^2)^2, variance of y by coarse steps of the stream, which no number of samples reduces.
+    rounded : (m/s^2)^2, and rounded_rates : (3,) (rad/s)^2, variances of y and b_omega by coarse steps of the stream,
+        which no number of samples reduces.
     """
 
     first: int
@@ -49,6 +50,7 @@ class Flat:
     Sigma_a: Vector
     Sigma_omega: Vector
     rounded: float = 0.0
+    rounded_rates: Vector | float = 0.0
 
     @property
     def n(self) -> int:
@@ -59,6 +61,11 @@ class Flat:
     def worth(self) -> float:
         """Number of samples of independent noise that give y the same variance."""
         return min(self.n, float(self.Sigma_a.min()) / self.rounded) if self.rounded else self.n
+
+    @property
+    def b_omega_std(self) -> Vector:
+        """Standard deviations (3,) of b_omega [rad/s]."""
+        return np.asarray(np.sqrt(self.Sigma_omega / self.n + self.rounded_rates))
 
 
 def find_flat(recording: Recording) -> tuple[int, int] | None:
@@ -113,17 +120,24 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
     recording = with_rates(recording)
     least_acc, least_gyr = recording.sensor.least_noise
     y, spread_a, Sigma_a = _statistics(recording.acc, flat, max(least_acc, QUIETEST_ACC_MPS2))
-    b_omega, _, Sigma_omega = _statistics(recording.gyr, flat, max(least_gyr, QUIETEST_GYRO_RAD_S))
-    return Flat(first, last, y, b_omega, Sigma_a, Sigma_omega, rounding_variance(recording.sensor, spread_a))
+    b_omega, spread_omega, Sigma_omega = _statistics(recording.gyr, flat, max(least_gyr, QUIETEST_GYRO_RAD_S))
+    acc_step, gyr_step = recording.sensor.steps
+    rounded = float(left_by_rounding(y, spread_a, acc_step).max())
+    rounded_rates = left_by_rounding(b_omega, spread_omega, gyr_step)
+    return Flat(first, last, y, b_omega, Sigma_a, Sigma_omega, rounded, rounded_rates)
 
 
-def rounding_variance(sensor: Sensor, variance: Vector, least: float = 0.0) -> float:
-    """Return the variance [(m/s^2)^2] that coarse steps leave in any mean at rest of readings with `variance` (3,).
+def left_by_rounding(mean: Vector, variance: Vector, step: float, least: float = 0.0) -> Vector:
+    """Return the variance (..., 3) that coarse steps leave in means at rest of readings with `variance` (..., 3).
 
     least : share of the variance of rounding that is left where the readings vary.
     """
-    step = sensor.steps[0]
-    return UNIFORM * step**2 * (1.0 if (variance < UNVARIED * step**2).any() else least)
+    return np.asarray(np.where(variance < UNVARIED * step**2, rounding(mean, step), least * UNIFORM * step**2))
+
+
+def rounding(readings: Vector, step: float) -> Vector:
+    """Return the variance of the rounding of readings: those that truncate to zero come from either side of it."""
+    return np.where(np.abs(readings) < step, 4.0, 1.0) * (UNIFORM * step**2)
 
 
 def _statistics(values: Vector, flat: tuple[int, int], quietest: float) -> tuple[Vector, Vector, Vector]:

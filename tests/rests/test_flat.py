@@ -102,7 +102,7 @@ def test_coarse_steps_hide_noise_but_the_variance_keeps_it():
 def test_a_mean_of_readings_on_one_step_is_no_finer_than_the_step(noise):
     rng, step = np.random.default_rng(2), 0.01
     off, claimed = [], []
-    for true in rng.uniform(0.0, step, (60, 3)):
+    for true in rng.uniform(10.0 * step, 11.0 * step, (60, 3)):
         acc = step * np.rint((true + rng.normal(0.0, noise * step, (500, 3))) / step)
         recording = Recording.from_arrays(np.arange(500) / 100.0, acc, np.zeros((500, 3)))
         of = flat_statistics(replace(recording, sensor=replace(recording.sensor, steps=(step, 0.0))), (0, 500))
@@ -111,6 +111,20 @@ def test_a_mean_of_readings_on_one_step_is_no_finer_than_the_step(noise):
     z = np.sqrt(np.mean(np.square(np.array(off) / claimed)))
     # An axis that leaves its step sometimes has a smaller error than claimed.
     assert 0.4 < z < 1.3
+
+
+@pytest.mark.parametrize("most", [1.0, 20.0])
+def test_a_bias_of_rates_that_stay_on_one_step_is_no_finer_than_the_step(most):
+    rng, step = np.random.default_rng(4), 1e-3
+    off, claimed = [], []
+    for true in rng.uniform(-most * step, most * step, (60, 3)):
+        whole = np.trunc(true / step)  # as a vehicle's stream truncates: values between -1 and 1 are zero
+        gyr = np.tile(step * (whole + 0.5 * np.sign(whole)), (500, 1))
+        recording = Recording.from_arrays(np.arange(500) / 100.0, np.tile(UP, (500, 1)), gyr)
+        of = flat_statistics(replace(recording, sensor=replace(recording.sensor, steps=(0.0, step))), (0, 500))
+        off.append(of.b_omega - true)
+        claimed.append(of.b_omega_std)
+    assert 0.8 < np.sqrt(np.mean(np.square(np.array(off) / claimed))) < 1.2
 
 
 def test_data_without_noise_still_have_a_variance():
