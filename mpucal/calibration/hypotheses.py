@@ -106,11 +106,12 @@ class Explanation(NamedTuple):
     hypothesis : which one. evidence : log of its evidence as a multiple of that of nothing.
     delta : (k, 3) by group, m/s^2, 1, rad or rad/s, at the likeliest q and time.
     start, end : (k,) s after the flat segment, of the groups; of sides, the first and last time that each was down.
-    away : (p,) rms distance of the estimate from the parameters, if it is true; of a change, from their mean over time.
+    aways : (m, p) rms distances of the estimate from the parameters, if it is true; of a change, by group.
     shift : (1 + k, p) parameters less the estimate, before the first group and in each, at the likeliest q and time.
     freed : (p,) share of itself by which the variance of the estimate grows, if x is estimated too.
     weight : probability among all hypotheses and nothing.
-    is_sure : True for a change of the accelerometer against which all else is unlikely; `away` is the largest shift.
+    is_sure : True for a change of the accelerometer against which all else is unlikely.
+    is_possible : True if something surely happened, and the likeliest explanation does not exclude this one.
     """
 
     hypothesis: Hypothesis
@@ -118,11 +119,12 @@ class Explanation(NamedTuple):
     delta: Vector
     start: Vector
     end: Vector
-    away: Vector
+    aways: Vector
     shift: Vector
     freed: Vector
     weight: float = 0.0
     is_sure: bool = False
+    is_possible: bool = False
 
     @property
     def log_share(self) -> float:
@@ -133,6 +135,11 @@ class Explanation(NamedTuple):
     def size(self) -> float:
         """Range of the quantity over the recording."""
         return float(np.linalg.norm(np.ptp(self.delta, axis=0)))
+
+    @property
+    def away(self) -> Vector:
+        """Distances (p,) of the estimate from the parameters: rms over time, of a sure change the largest."""
+        return np.asarray(self.aways.max(axis=0) if self.is_sure else np.sqrt(np.mean(self.aways**2, axis=0)))
 
     @property
     def span(self) -> tuple[float, float]:
@@ -183,9 +190,11 @@ def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Ex
     total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # with nothing, whose share is 1
     found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
     found.sort(key=lambda each: -each.weight)
+    if total > np.log(SURE):
+        found = [each._replace(is_possible=SURE * each.weight > found[0].weight) for each in found]
     changes = [each for each in found if each.hypothesis.kind == "change"]
     if sum(each.weight for each in changes) > 1.0 - 1.0 / SURE:
-        of_sure = changes[0]._replace(weight=1.0, away=np.abs(changes[0].shift).max(axis=0), is_sure=True)
+        of_sure = changes[0]._replace(weight=1.0, is_sure=True)
         found = [of_sure if each is changes[0] else each for each in found]
     return found
 
@@ -284,14 +293,15 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
     p = np.exp(log_p - most)
     evidence = most[:, 0, 0] + np.log(p.mean(axis=(1, 2)))
     p /= p.sum(axis=(1, 2), keepdims=True)
-    astray = -likelihood.follow
-    if alike[0].is_change:
-        mean = np.sum(likelihood.U * shapes.mean(axis=1)[:, :, None, None], axis=2)  # of delta over the groups
-        astray += mean.swapaxes(2, 3) @ B.swapaxes(1, 2)[:, None]
     weighed = p[..., None] * x
     squares = weighed.swapaxes(2, 3) @ x
     squares[..., range(x.shape[3]), range(x.shape[3])] += np.sum(p[..., None] * variance, axis=2)
-    away = np.sum(astray * (squares @ astray), axis=(1, 2))
+    astray = -likelihood.follow[:, :, None]  # (h, m, k, d, p) by group, where the sensor is another one in each
+    if alike[0].is_change:
+        h, m, r, _, d = likelihood.U.shape
+        delta_by_x = (shapes @ likelihood.U.reshape(h, m, r, -1)).reshape(h, m, -1, 3, d)
+        astray = astray + delta_by_x.swapaxes(3, 4) @ B.swapaxes(1, 2)[:, None, None]
+    away = np.sqrt(np.sum(astray * (squares[:, :, None] @ astray), axis=(1, 3)))
     found = []
     for k, (hypothesis, of) in enumerate(zip(alike, log_p, strict=True)):
         m, best = np.unravel_index(of.argmax(), of.shape)
@@ -300,7 +310,7 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
         shift = np.vstack([np.zeros(3), delta]) @ B[k].T - likeliest @ follow
         freed = variance[k, m, best] @ follow**2 / np.diag(parts.covariance)
         times = groups.start, groups.end
-        found.append(Explanation(hypothesis, float(evidence[k]), delta, *times, np.sqrt(away[k]), shift, freed))
+        found.append(Explanation(hypothesis, float(evidence[k]), delta, *times, away[k], shift, freed))
     return found
 
 

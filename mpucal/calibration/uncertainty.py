@@ -112,10 +112,16 @@ class UncertaintyClaim:
         return max(of, default=0.0)
 
     def widen(self) -> Vector:
-        """Return the covariance (p, p) as it is claimed."""
+        """Return the covariance (p, p) as it is claimed.
+
+        It holds the mean of the explanations by their weights, and of what surely happened each that may be its cause:
+        the true cause need not be in the table, and may be like any of them.
+        """
         wide = (self.floored / self.model) ** 2 * self.covariance
-        away = [each.weight * each.away**2 for each in self.explanations]
-        return np.asarray(wide + np.diag(np.sum(away, axis=0)))
+        squares = np.array([each.away for each in self.explanations]) ** 2
+        mean = np.array([each.weight for each in self.explanations]) @ squares
+        held = squares[[each.is_possible for each in self.explanations]].max(axis=0, initial=0.0)
+        return np.asarray(wide + np.diag(np.maximum(mean, held)))
 
 
 def claim_uncertainty(

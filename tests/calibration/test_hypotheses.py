@@ -10,6 +10,7 @@ from mpucal.calibration import calibrate, estimate
 from mpucal.calibration.hypotheses import (
     HYPOTHESES,
     LARGEST,
+    SURE,
     VARIANCES,
     Hypothesis,
     _explain,
@@ -20,7 +21,7 @@ from mpucal.calibration.hypotheses import (
 from mpucal.calibration.parameters import PLACES
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.quality import judge
-from mpucal.calibration.uncertainty import propagate
+from mpucal.calibration.uncertainty import UncertaintyClaim, propagate
 from tools.lab.judge import judged, sph_rms
 
 G = 9.82
@@ -129,10 +130,10 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
             both = np.hstack([design, of_x])
             covariance = np.linalg.inv(both.T @ both + np.diag(np.r_[np.ones(p), np.full(of_x.shape[1], 1.0 / q)]))
             mean = covariance @ both.T @ y
-            # a changed sensor is what it was in the mean of the time
-            to_mean = np.kron(of.mean(0), B) if shape in ("step", "walk") else np.zeros((p, of_x.shape[1]))
-            to = np.hstack([np.eye(p), to_mean])
-            variance = np.diag(to @ covariance @ to.T)
+            # a changed sensor is another one in each group
+            of_groups = of if shape in ("step", "walk") else np.zeros((1, of.shape[1]))
+            to = np.array([np.hstack([np.eye(p), np.kron(of_group, B)]) for of_group in of_groups])
+            variance = np.diagonal(to @ covariance @ to.swapaxes(1, 2), axis1=1, axis2=2)
             squares.append(variance - np.diag(parts.covariance) + (to @ mean - minimum) ** 2)
             freed.append(np.diag(covariance)[:p] / np.diag(parts.covariance) - 1.0)
             marginal = np.eye(k * m) + design @ design.T + q * of_x @ of_x.T
@@ -142,7 +143,10 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
     assert told.evidence == pytest.approx(np.logaddexp.reduce(logs) - none - np.log(len(logs)), rel=1e-6, abs=1e-9)
     np.testing.assert_allclose(told.freed, freed[int(np.argmax(logs))], rtol=1e-6, atol=1e-12)
     weights = np.exp(np.array(logs) - max(logs))
-    np.testing.assert_allclose(told.away**2, weights @ squares / weights.sum(), rtol=1e-6)
+    expected = np.tensordot(weights, squares, 1) / weights.sum()
+    np.testing.assert_allclose(told.aways**2, expected, rtol=1e-6)
+    np.testing.assert_allclose(told.away**2, expected.mean(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(told._replace(is_sure=True).away ** 2, expected.max(axis=0), rtol=1e-6)
 
 
 def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
@@ -152,6 +156,20 @@ def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
     priors = np.array([each.hypothesis.prior for each in found])
     odds = np.exp([each.evidence for each in found]) * priors / sum(each.prior for each in HYPOTHESES)
     np.testing.assert_allclose([each.weight for each in found], odds / (1.0 + odds.sum()))
+
+
+def test_each_cause_of_what_surely_happened_is_held():
+    _, _, parts = linear_parts()
+    for scale, surely in ((0.1, False), (2.0, True)):
+        found = explain(replace(parts, gradient=scale * parts.gradient, left=scale * parts.left), np.eye(3))
+        squares = np.array([each.away**2 for each in found])
+        weights = np.array([each.weight for each in found])
+        assert (1.0 - weights.sum() < 1.0 / SURE) == surely
+        mean, held = weights @ squares, squares[SURE * weights > weights.max()]
+        expected = np.maximum(mean, held.max(axis=0)) if surely else mean
+        claim = UncertaintyClaim(parts.covariance, 1.0, 1.0, found)
+        np.testing.assert_allclose(np.diag(claim.widen() - parts.covariance), expected, rtol=1e-9)
+        assert not surely or (len(held) > 1 and (expected > mean).any())
 
 
 def test_what_surely_happened_is_taken_out_of_the_scores():
