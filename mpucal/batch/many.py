@@ -6,15 +6,13 @@ import atexit
 import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..data import STANDARD_GRAVITY_MPS2
-from ..disk.output_folder import OutputFolder
 from ..errors import SourceError, UsageError
 from ..files.reading import VARIABLE, allowed_bytes
 from .journal import RowJournal
@@ -54,39 +52,6 @@ class Progress:
         """Return the remaining time [s] at the pace so far; None if nothing is done yet."""
         made = self.done - self.kept
         return (self.of - self.done) * self.seconds / made if made else None
-
-
-def calibrate_many(
-    paths: Sequence[str | Path],
-    client: Any = None,
-    *,
-    model: str = "auto",
-    gravity: float = STANDARD_GRAVITY_MPS2,
-    folder: str | Path | None = None,
-) -> Any:
-    """Calibrate many recordings; return a pyarrow.Table with a row for each, in their order.
-
-    Parameters
-    ----------
-    paths : files, folders of sessions, or URLs of fsspec, which the workers read.
-    client : a distributed.Client; None: one worker for each processor of this machine.
-    model, gravity : see mpucal.calibrate.
-    folder : for the finished rows, so that the next call continues there.
-
-    Raises
-    ------
-    SourceError : the scheduler was lost. OutputError : `folder` cannot be written, or another batch writes to it.
-    UsageError : dask.distributed or pyarrow is not installed.
-    """
-    from .table import make_table  # noqa: PLC0415
-
-    names, settings = [str(path) for path in paths], Settings(model, gravity)
-    with TemporaryDirectory() as temporary, local_client() if client is None else nullcontext(client) as workers:
-        place = Path(folder or temporary)
-        with OutputFolder(place), closing(RowJournal(place / JOURNAL, settings.key)) as journal:
-            for _ in run_batch(names, workers, journal, settings):
-                pass
-            return make_table(journal.rows(names))
 
 
 def run_batch(paths: Sequence[str], client: Any, journal: RowJournal, settings: Settings) -> Iterator[Progress]:
@@ -146,7 +111,7 @@ def _worker_failure(path: str, result: Any) -> dict[str, Any]:
 
 
 @contextmanager
-def local_client(workers: int | None = None, dashboard: bool = False) -> Iterator[Any]:
+def local_client(workers: int | None = None) -> Iterator[Any]:
     """Start workers on this machine, processes of one thread each.
 
     Raises
@@ -165,7 +130,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
                 processes=True,
                 env={VARIABLE: str(allowed_bytes() >> 20)},
                 local_directory=scratch,
-                dashboard_address=":8787" if dashboard else ":0",
+                dashboard_address=":0",
                 # its messages would only be about a worker that could not be started
                 silence_logs="CRITICAL",
             )

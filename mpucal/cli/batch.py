@@ -35,7 +35,6 @@ REPORTS, HINTS = "reports", "hints.txt"
 @output_option("folder", "DIR", "Folder for the results.", required=True)
 @click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes on this machine; default: one a core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://HOST:PORT.")
-@click.option("--dashboard", is_flag=True, help="Print the address of dask's dashboard.")
 @click.option("--reports", is_flag=True, help="Write a report of each recording, linked from the page.")
 @click.option(
     "--hints",
@@ -51,7 +50,6 @@ def command(
     folder: Path,
     workers: int | None,
     scheduler: str | None,
-    dashboard: bool,
     reports: bool,
     by_pattern: Path | None,
     gravity: float,
@@ -79,9 +77,7 @@ def command(
         OutputFolder(folder / REPORTS) if reports else nullcontext(),
         closing(RowJournal(folder / JOURNAL, settings.key)) as journal,
     ):
-        with remote_client(scheduler) if scheduler else local_client(workers, dashboard) as client:
-            if dashboard:
-                say(f"the dashboard is at {client.dashboard_link}")
+        with remote_client(scheduler) if scheduler else local_client(workers) as client:
             _follow(run_batch(paths, client, journal, settings))
         _write_results(folder, paths, journal)
         _say_options(folder, journal.rows(paths), settings, by_pattern)

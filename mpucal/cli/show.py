@@ -66,13 +66,7 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
         with resolve_name(kind.store)(options) as store:
             number, blob = store.take()
             where = f"blob number {number} of the bridge on {store.name}"
-            held = Blob.decode(blob)
-            if held.gyro_counts is None:
-                say(
-                    f"{where} has an old format that does not state the unit of K: 131 counts to 1 deg/s at ±250 deg/s"
-                    " are assumed; rates from firmware of that time are 0.055 % too small"
-                )
-            _show_calibration(where, Calibration.from_blob(held), as_json)
+            _show_calibration(where, Calibration.from_blob(Blob.decode(blob)), as_json)
         return
     facts = open_source(options).contents()
     click.echo(json.dumps(facts, indent=2) if as_json else _device_page(facts))

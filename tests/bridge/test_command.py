@@ -1,7 +1,6 @@
 """The command line on a board with an emulated bridge: record, store, show."""
 
 import json
-import struct
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -70,17 +69,9 @@ def test_into_the_memory_and_back(board, mpucal, tmp_path):
     assert (kept["D"], kept["b_a"]) == (made.D.tolist(), made.b_a.tolist())
     shown = mpucal("show", "--serial", board.name)
     assert "blob number 1 of the bridge on" in shown.out
-    assert "the unit of K" not in shown.err
     anew = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "-o", "kept")
     assert "bridge-blob-1.bin" in anew.err
     assert (tmp_path / "kept" / "bridge-blob-1.bin").read_bytes() == made.blob().encode()
-
-
-def test_a_blob_of_before_says_that_its_unit_is_known(board, mpucal):
-    board.memory.slots[0] = struct.pack("<II", 1, 0xFFFFFFFE) + BLOB.read_bytes()
-    shown = mpucal("show", "--serial", board.name)
-    assert shown.code == 0, shown.err
-    assert "does not state the unit of K: 131 counts to 1 deg/s" in shown.err
 
 
 def test_the_doctor_tells_bridge_and_chip():
