@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, wraps
 from itertools import permutations, product
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,8 @@ SIGNED_PERMUTATIONS = [
     for order in permutations(range(3))
     for signs in product((1.0, -1.0), repeat=3)
 ]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -227,6 +230,20 @@ class Evidence:
         dt = r.t[first:last] - r.t[first - 1 : last - 1]
         steps = dt[:, None] * (r.gyr[first:last] - flat.b_omega)
         return _Turn(before, steps, after, bool(r.gyr_clipped[first:last].any()))
+
+
+def once(function: Callable[[Evidence], T]) -> Callable[[Evidence], T]:
+    """Keep the value of a function of an Evidence with it, as cached_property does that of a method."""
+
+    @wraps(function)
+    def kept(e: Evidence) -> T:
+        known = vars(e)
+        if function.__qualname__ not in known:
+            known[function.__qualname__] = function(e)
+        value: T = known[function.__qualname__]
+        return value
+
+    return kept
 
 
 class _Turn(NamedTuple):

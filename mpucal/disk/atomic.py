@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
@@ -86,7 +85,7 @@ def atomic_file(path: Path) -> Iterator[IO[bytes]]:
     ------
     OutputError : the folder or file cannot be written, or `path` is a link, device or pipe.
     """
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    temporary = path.with_name(f".{path.name}.{os.urandom(4).hex()}")
     rights = mode_of_existing(path)
     made = False
     try:

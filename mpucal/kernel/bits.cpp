@@ -13,7 +13,12 @@ void stuck_odds(const std::int32_t* counts, const bool* gap, std::size_t n, cons
   const auto of_share = [&](bool changes, double share) {
     return std::log(changes ? errors / share : (1.0 - errors) / (1.0 - share));
   };
-  const double by_chance[2] = {of_share(false, 0.5), of_share(true, 0.5)};
+  struct Odds {
+    double share, of[2];  // log odds of a bit that stays, and of one that changes
+  };
+  const auto odds_of = [&](double share) { return Odds{share, {of_share(false, share), of_share(true, share)}}; };
+  // most steps have one of these shares
+  const Odds usual[3] = {odds_of(0.5), odds_of(errors), odds_of(sound)};
   std::fill_n(odds, kBits * pieces * 3, 0.0);
   for (std::size_t k = 0; k < pieces; ++k) {
     const std::size_t last = k + 1 < pieces ? static_cast<std::size_t>(edges[k + 1]) : n - 1;
@@ -30,7 +35,9 @@ void stuck_odds(const std::int32_t* counts, const bool* gap, std::size_t n, cons
           // A value anywhere in the bit's period, of two halves, crosses its end; longer steps leave the bit to chance.
           if (step >> bit < 2)
             share = std::clamp(std::ldexp(2.0, bit) / static_cast<double>(step) - 1.0, errors, sound);
-          odds[(bit * pieces + k) * 3 + j] += share == 0.5 ? by_chance[changes] : of_share(changes, share);
+          const auto* const known =
+              std::find_if(usual, usual + 3, [&](const Odds& each) { return each.share == share; });
+          odds[(bit * pieces + k) * 3 + j] += known < usual + 3 ? known->of[changes] : of_share(changes, share);
         };
         for (int bit = 0; bit < kBits - 1 && changed >> bit > 1; ++bit) add(bit);
         if (leaps) add(kBits - 1);

@@ -11,7 +11,7 @@ import re
 import reprlib
 from collections.abc import Callable, Mapping
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 _IS: Mapping[str, Callable[[Any], bool]] = {
@@ -40,7 +40,7 @@ def check_document(document: Any) -> None:
 
 @cache
 def _schema() -> Any:
-    return json.loads(files(__package__).joinpath("calibration.schema.json").read_bytes())
+    return json.loads(Path(__file__).with_name("calibration.schema.json").read_bytes())
 
 
 def _check(value: Any, schema: Mapping[str, Any], where: str) -> None:

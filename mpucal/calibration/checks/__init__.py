@@ -14,7 +14,7 @@ from functools import partial
 from typing import Literal, NamedTuple
 
 from ...reasons import Reason
-from ..evidence import Evidence
+from ..evidence import Evidence, once
 from . import bits, estimate, recording, sensor, unusable
 from .sensor import is_trustworthy
 
@@ -89,6 +89,7 @@ def find_gyroscope_fault(e: Evidence) -> Reason | None:
     return next(_found(e, AT_FAULT), None)
 
 
+@once
 def find_reasons(e: Evidence) -> list[Reason]:
     """Return all reasons against an estimate, those that refuse it first."""
     of_rests = e.model == "static"

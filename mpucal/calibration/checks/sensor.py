@@ -11,7 +11,7 @@ from ...data import Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
-from ..evidence import MOST_MISS_RAD, SIGNED_PERMUTATIONS, Evidence
+from ..evidence import MOST_MISS_RAD, SIGNED_PERMUTATIONS, Evidence, once
 from ..parameters import BY_NAME
 from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent
 
@@ -29,6 +29,7 @@ TRUSTING = ("accel", "paper", "tilt")
 LAG_S, LEAST_STDS = 0.02, 5.0
 
 
+@once
 def is_trustworthy(e: Evidence) -> bool:
     """Return True if D and K are known well enough to conclude from them what is wrong with the sensor."""
     if e.fit is None or e.uncertainty is None or not e.fit.converged or e.uncertainty.rms_mps2 > USABLE_RMS_MPS2:

@@ -9,7 +9,7 @@ from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 from ...rests.intervals import true_runs
-from ..evidence import LEAST_TURN_RAD, Evidence
+from ..evidence import LEAST_TURN_RAD, Evidence, once
 from ..rotation import lengths
 
 FEWEST_SAMPLES = 50
@@ -124,6 +124,7 @@ def _rested_late(e: Evidence) -> bool:
     return turned_before and _seconds_before(e) >= LONGEST_TO_LAY_DOWN_S
 
 
+@once
 def dead_accelerometer(e: Evidence) -> Reason | None:
     """Find an axis of the accelerometer that is constant, throughout or for seconds while the others show a turn."""
     axes = _constant_axes(e, e.recording.acc, e.rest.Sigma_a, QUIETEST_ACC_MPS2)
@@ -140,6 +141,7 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
     return None
 
 
+@once
 def dead_gyroscope(e: Evidence) -> Reason | None:
     """Find an axis of the gyroscope that is constant throughout."""
     axes = _constant_axes(e, e.recording.gyr, e.rest.Sigma_omega, QUIETEST_GYRO_RAD_S)
