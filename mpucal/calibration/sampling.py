@@ -43,7 +43,7 @@ def _rounding_factor(values: Vector, step: float, variance: Vector, fewest: floa
     samples are worth one, and as white noise have m times its variance.
     """
     together = np.stack([_together(axis, fewest) for axis in np.floor(values / step + 1e-6).T], axis=1)
-    return np.maximum(1.0, np.mean(together * rounding(values, step) / variance, axis=1))
+    return np.asarray(np.maximum(1.0, np.mean(together * rounding(values, step) / variance, axis=1)))
 
 
 def _together(steps: Vector, fewest: float) -> NDArray[np.intp]:
