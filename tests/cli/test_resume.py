@@ -43,7 +43,7 @@ def test_a_resumed_session_has_the_bits_of_an_unbroken_one(mpucal, stopped_at, w
     killed_s = came_to_s(stopped_at(tmp_path, ("flat", 50), signal.SIGKILL, *WORDS, *words).err)
     assert killed_s > 3.0
     assert killed_s - last_s(folder / "capture.mcap") < 1.0
-    stopped = stopped_at(tmp_path, ("rotate", 133), signal.SIGINT, *WORDS, "--resume", "board")
+    stopped = stopped_at(tmp_path, ("rotate", 80), signal.SIGINT, *WORDS, "--resume", "board")
     assert stopped.code == 4
     stopped_s = came_to_s(stopped.err)
     assert stopped_s > 20.0
