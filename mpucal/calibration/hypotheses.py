@@ -296,12 +296,17 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
     weighed = p[..., None] * x
     squares = weighed.swapaxes(2, 3) @ x
     squares[..., range(x.shape[3]), range(x.shape[3])] += np.sum(p[..., None] * variance, axis=2)
-    astray = -likelihood.follow[:, :, None]  # (h, m, k, d, p) by group, where the sensor is another one in each
+    # The estimate strays by x times a basis (h, m, a, d, p): by -follow, and where the sensor is another one in each
+    # group by what the shapes weigh there. Its mean products need no array of every shape in every group.
+    basis, weights = -likelihood.follow[:, :, None], np.ones((len(shapes), 1, 1))
     if alike[0].is_change:
-        h, m, r, _, d = likelihood.U.shape
-        delta_by_x = (shapes @ likelihood.U.reshape(h, m, r, -1)).reshape(h, m, -1, 3, d)
-        astray = astray + delta_by_x.swapaxes(3, 4) @ B.swapaxes(1, 2)[:, None, None]
-    away = np.sqrt(np.sum(astray * (squares[:, :, None] @ astray), axis=(1, 3)))
+        of_x = likelihood.U.swapaxes(3, 4) @ B.swapaxes(1, 2)[:, None, None]
+        basis = np.concatenate([basis, of_x], axis=2)
+        weights = np.concatenate([np.ones((*shapes.shape[:2], 1)), shapes], axis=2)
+    products = np.einsum("hmadp,hmbdp->hmabp", basis, squares[:, :, None] @ basis)
+    pairs = (weights[:, :, :, None] * weights[:, :, None]).swapaxes(0, 1)
+    away2 = pairs.reshape(len(pairs), -1) @ products.reshape(len(alike), -1, products.shape[-1])
+    away = np.sqrt(np.maximum(away2, 0.0))
     found = []
     for k, (hypothesis, of) in enumerate(zip(alike, log_p, strict=True)):
         m, best = np.unravel_index(of.argmax(), of.shape)
