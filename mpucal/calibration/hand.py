@@ -33,14 +33,14 @@ from .hand_noise import (
 from .hypothesis_tests import WALD_99, undetermined, wald
 from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
-from .likelihood import value
+from .likelihood import evaluate, value
 from .parameters import HAND
 from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, preprocess
 from .problem import Problem
 from .slip import find_slip
 from .theta import Prior, Theta
-from .transitions import leverages, miss_variances, q_scale, transitions_of
+from .transitions import each_variance, leverages, miss_variances, q_scale, transitions_of
 
 MOST_ITERATIONS = 20  # of a rough search
 PASSES = 3
@@ -49,10 +49,11 @@ PASSES = 3
 def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """Estimate D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves.
 
-    If the search does not settle and there are gaps, it begins once more, from a perfect sensor.
+    A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
+    perfect sensor.
     """
     fit = _fit_from(initialise, recording, flat, gravity)
-    if fit.converged or not recording.gap.any():
+    if fit.converged:
         return fit
     again = _fit_from(perfect, recording, flat, gravity)
     return again if again.converged else fit
@@ -76,7 +77,7 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
         trusted = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
-    parts = parts_of(problem, minimum, prior)
+    parts = parts_of(*_with_each_variance(problem, minimum, noise, fine), prior)
     minimum = _with_honest_information(minimum, noise, search.prepared, fine)
     known = undetermined(minimum.covariance()) if minimum.free.all() else ()
     fit = replace(minimum, iterations=iterations).as_fit(known, parts)
@@ -117,6 +118,24 @@ def _with_transition_noise(problem: Problem, prepared: Preprocessed, theta: Thet
     if not transitions:
         return problem
     return _scaled(problem, q_scale(transitions, miss_variances(transitions), len(problem.series)))
+
+
+def _with_each_variance(
+    problem: Problem, minimum: Minimum, noise: Noise, prepared: Preprocessed
+) -> tuple[Problem, Minimum]:
+    """Return the problem in which each transition has a variance of its own, and the minimum as seen in it.
+
+    The estimate stays: with so few transitions it would follow some and leave out others.
+    """
+    transitions, ends = transitions_of(prepared, minimum.theta), ends_of(problem)
+    if not transitions or ends is None:
+        return problem, minimum
+    variance = each_variance(transitions)
+    if np.allclose(variance, [each.variance for each in transitions]):
+        return problem, minimum
+    problem = _scaled(noise.problem(prepared), q_scale(transitions, variance, len(problem.series)))
+    seen = minimum.theta, evaluate(problem, minimum.theta, len(minimum.free), ends)
+    return problem, replace(minimum, seen=seen, last=np.zeros_like(minimum.last))
 
 
 def _scaled(problem: Problem, factor: Vector) -> Problem:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..data import Vector
 from .hypotheses import SURE
 from .rotation import lengths
-from .transitions import DEGREES_OF_FREEDOM, Transition, likely_variances
+from .transitions import DEGREES_OF_FREEDOM, Transition, likely_scale
 
 FEWEST_BESIDE = 3  # transitions before a slip and after it: with fewer, two of a lost gyroscope would look like one
 ITERATIONS = 8
@@ -76,11 +76,10 @@ def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[Vector, V
     known = np.array([each.variance for each in transitions])
     left, nu = misses, DEGREES_OF_FREEDOM
     for _ in range(ITERATIONS):
-        variance = likely_variances(left, known)
-        weighted = (A / variance[..., None, None]).reshape(len(A), -1, A.shape[3]).swapaxes(1, 2)
+        c, weight = likely_scale(left, known)
+        weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, A.shape[3]).swapaxes(1, 2)
         N = weighted @ A.reshape(len(A), -1, A.shape[3])
         x = -(np.linalg.pinv(N, rcond=LEAST_SEEN, hermitian=True) @ (weighted @ misses.ravel())[..., None])
         left = misses + (A @ x[:, None])[..., 0]
-    c = np.min(variance / known, axis=-1, keepdims=True)
     z = 0.5 * np.sum(left**2, axis=-1) / known
     return -np.sum(np.log(c) + 0.5 * (nu + 2.0) * np.log1p(2.0 * z / (c * nu)), axis=-1), x[..., 0]

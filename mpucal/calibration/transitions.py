@@ -67,30 +67,47 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
 
 
 def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0) -> Vector:
-    """Return the variances (k,) [rad^2 an axis] with which noise explains all misses; see likely_variances."""
-    miss, known = (np.array([getattr(of, name) for of in transitions]) for name in ("miss", "variance"))
-    return likely_variances(miss, known, leverage)
+    """Return the variances (k,) [rad^2 an axis] with which noise explains all misses, at least the known ones.
 
-
-def likely_variances(miss: Vector, known: Vector, leverage: Vector | float = 0.0) -> Vector:
-    """Return the variances (..., k) [rad^2 an axis] of misses (..., k, 3) that noise explains, at least `known` (k,).
-
-    With z = |miss|^2 / (2 variance), all transitions have a common scale c, the mean of z by Student's t; a lost one
-    has a scale of its own.
+    All transitions have a common scale, and a lost one has a scale of its own.
 
     leverage : (k,), the share that the estimate took of the two degrees of freedom of each miss. The most likely scale,
         for the estimate itself, has none; an honest one counts what is left.
+    """
+    known, c, weight = _scales(transitions, leverage)
+    return np.asarray(c / np.where(weight < WORTHLESS, weight, 1.0) * known)
+
+
+def each_variance(transitions: list[Transition]) -> Vector:
+    """Return the variance (k,) [rad^2 an axis] of each miss, if the gyroscope's error beyond its noise varies.
+
+    It is as often large as Student's t says: a transition in which the sensor met the table misses by several times
+    what the others do, and no change of the sensor is needed to explain it.
+    """
+    known, c, weight = _scales(transitions, 0.0)
+    return np.asarray((1.0 + (c - 1.0) / weight) * known)
+
+
+def _scales(transitions: list[Transition], leverage: Vector | float) -> tuple[Vector, Vector, Vector]:
+    """Return the known variances (k,) of the misses, their common scale (1,) and their weights (k,)."""
+    miss, known = (np.array([getattr(of, name) for of in transitions]) for name in ("miss", "variance"))
+    return known, *likely_scale(miss, known, leverage)
+
+
+def likely_scale(miss: Vector, known: Vector, leverage: Vector | float = 0.0) -> tuple[Vector, Vector]:
+    """Return the common scale (..., 1), at least 1, by which misses (..., k, 3) exceed their variances `known` (k,).
+
+    It is the mean of z = |miss|^2 / (2 variance) by Student's t. The second value (..., k) are the weights of misses.
     """
     z = 0.5 * np.sum(miss * miss, axis=-1) / known
     left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(known)))), LEAST_LEFT)
     nu, c = DEGREES_OF_FREEDOM, np.ones((*z.shape[:-1], 1))
     for _ in range(50):
-        w, before = (nu + 2.0) / (nu + 2.0 * z / c), c
-        c = np.maximum(1.0, 2.0 * np.sum(w * z, axis=-1, keepdims=True) / left)
+        weight, before = (nu + 2.0) / (nu + 2.0 * z / c), c
+        c = np.maximum(1.0, 2.0 * np.sum(weight * z, axis=-1, keepdims=True) / left)
         if (c == before).all():
             break
-    weight = (nu + 2.0) / (nu + 2.0 * z / c)
-    return np.asarray(c / np.where(weight < WORTHLESS, weight, 1.0) * known)
+    return c, (nu + 2.0) / (nu + 2.0 * z / c)
 
 
 def q_scale(transitions: list[Transition], variance: Vector, n: int) -> Vector:

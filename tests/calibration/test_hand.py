@@ -146,13 +146,17 @@ def test_one_lost_move_does_little(in_hand, pick, how):
     assert [reason["code"] for reason in calibration.quality["reasons"]] == ["data_lost"]
 
 
-def test_a_move_that_the_gyroscope_did_not_see_hardly_counts(in_hand):
+@pytest.mark.parametrize("move", [3, 6, 9])
+def test_a_move_that_the_gyroscope_did_not_see_hardly_counts(in_hand, move):
+    """The first guess of the search is 57 deg wrong by the one in the middle."""
     recording = in_hand.recording
     runs, gyr, rng = rests(recording), recording.gyr.copy(), np.random.default_rng(0)
-    unseen = slice(runs[6][1], runs[7][0])
+    unseen = slice(runs[move][1], runs[move + 1][0])
     gyr[unseen] = gyr[:900].mean(0) + 0.002 * rng.standard_normal((unseen.stop - unseen.start, 3))
     calibration = calibrate(replace(recording, gyr=gyr), "auto", G)
-    assert sph_rms(in_hand.truth, calibration.D, calibration.b_a) < 3.0 * calibration.quality["error_std"]["rms"]
+    error = sph_rms(in_hand.truth, calibration.D, calibration.b_a)
+    assert calibration.verdict == "good"
+    assert error < min(0.05, 3.0 * calibration.quality["error_std"]["rms"])
 
 
 def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):

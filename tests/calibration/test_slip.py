@@ -19,7 +19,7 @@ def slipped(recording, at_s):
     return replace(recording, acc=np.where(after[:, None], recording.acc @ R.T, recording.acc))
 
 
-@pytest.mark.parametrize(("seed", "at_s"), [(1, 27.0), (2, 30.0), (3, 33.0)])
+@pytest.mark.parametrize(("seed", "at_s"), [(2, 30.0), (3, 33.0), (4, 28.0)])
 def test_a_mount_that_slips_between_rests_is_told_with_its_time(hand, seed, at_s):
     calibration = calibrate(slipped(hand(seed, "pose12").recording, at_s), "auto", G)
     (reason,) = calibration.quality["reasons"]
