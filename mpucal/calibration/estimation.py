@@ -77,11 +77,13 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     """Return the estimate of a part, from rest to rest, that is good by itself; None where there is none, or no need.
 
     The part after what changed the sensor is of what it is now. The part before is used only where all of the recording
-    tells less than a good calibration. The part before a sensor was at the end of its range needs no reservation. But a
-    bias that moved may move on: there the uncertainty of the whole holds what it was and what it is.
+    tells less than a good calibration. The part before a sensor was at the end of its range needs no reservation, and
+    need not be better than usable where the whole is refused. But a bias that moved may move on: there the uncertainty
+    of the whole holds what it was and what it is.
     """
-    recording, flat = whole.recording, whole.flat
-    changed = next((reason for reason in find_reasons(whole) if reason.span is not None), None)
+    recording, flat, of_whole = whole.recording, whole.flat, find_reasons(whole)
+    changed = next((reason for reason in of_whole if reason.span is not None), None)
+    refused = any(reason.refuse for reason in of_whole)
     clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
     if flat is None or (changed is None and not len(clipped)):
         return None
@@ -96,7 +98,9 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
             continue
         seconds = t[end - 1] if when == "before" else t[begin]
         part, chosen = _with_gyroscope(replace(whole.part(begin, end), model="auto"))
-        if part.fit is None or find_reasons(part):
+        reasons = find_reasons(part)
+        is_unclipped = len(clipped) and end <= clipped[0]
+        if part.fit is None or any(each.refuse or not (refused and is_unclipped) for each in reasons):
             continue
         if changed is not None:
             what = changed.what + OF_A_PART.format(when=when, seconds=seconds)

@@ -143,12 +143,13 @@ class Explanation(NamedTuple):
 
     @property
     def span(self) -> tuple[float, float]:
-        """Times [s after the flat segment] between which it changed most, or of the group that is farthest off."""
+        """Times [s after the flat segment] of its largest steps from group to group, or of the group farthest off."""
         if not self.hypothesis.is_change:
             at = int(np.linalg.norm(self.delta, axis=1).argmax())
             return float(self.start[at]), float(self.end[at])
-        at = int(np.linalg.norm(np.diff(self.delta, axis=0), axis=1).argmax())
-        return self.middles[at], self.middles[at + 1]
+        steps = np.linalg.norm(np.diff(self.delta, axis=0), axis=1)
+        large = np.flatnonzero(steps > 0.5 * steps.max())  # of a steady drift all are
+        return float(self.middles[large[0]]), float(self.middles[large[-1] + 1])
 
     @property
     def middles(self) -> Vector:
