@@ -15,9 +15,10 @@ STAYS_S = 0.1  # a reading that stays on its step for so long has too little noi
 
 
 def with_sampling_errors(series: Series, recording: Recording, flat: Flat) -> Series:
-    """Return the series with more noise where samples are rounded, or too far apart for the board's turn.
+    """Return the series of a stream with more noise where samples are rounded, or too far apart for the board's turn.
 
-    A mean rate by the trapezoidal rule lacks a twelfth of the rates' second difference.
+    A mean rate by the trapezoidal rule lacks a twelfth of the rates' second difference. A chip is read often enough: in
+    a hand's smooth turn the differences cancel.
     """
     acc, gyr, before = recording.acc[flat.last :], recording.gyr[flat.last :], recording.gyr[flat.last - 1 :]
     fewest = max(STAYS_S * recording.rate_hz, 2.0)
@@ -25,8 +26,9 @@ def with_sampling_errors(series: Series, recording: Recording, flat: Flat) -> Se
     if acc_step:
         r_scale = _rounding_factor(acc, acc_step, flat.Sigma_a, fewest)
         series = replace(series, r_scale=r_scale if series.r_scale is None else np.maximum(series.r_scale, r_scale))
-    if gyr_step:
-        series = replace(series, q_scale=_rounding_factor(gyr, gyr_step, flat.Sigma_omega, fewest))
+    if not gyr_step:
+        return series
+    series = replace(series, q_scale=_rounding_factor(gyr, gyr_step, flat.Sigma_omega, fewest))
     bends = np.pad(np.sum(np.diff(before, n=2, axis=0) ** 2, axis=1), 1)
     lacking = np.maximum(bends[:-1], bends[1:]) / 144.0
     visible = (lacking > flat.Sigma_omega.sum()) & ~recording.gap[flat.last :]
