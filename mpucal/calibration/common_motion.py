@@ -86,10 +86,10 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     # The errors of the first one's D and b_a are errors of s.
     by_first = block_diag(np.kron(D @ inverse, np.eye(3)), D @ inverse)
     covariance += by_first @ by.covariance[ACCELEROMETER, ACCELEROMETER] @ by_first.T
-    # D is in the axes of its own gyroscope, whatever their scale factors: Q turns the first one's into them.
+    # D is in the axes in which its own gyroscope's K is symmetric: Q turns those of the first one into them.
     later = np.concatenate([np.zeros((len(t), 3, 3)), -alpha[:, :, None]], axis=2)
     M, of_M = _solve([_axis(axis, t, here.gyr[near], rates, later, here.sensor.steps[1], n) for axis in range(3)])
-    Q = polar(M[:9].reshape(3, 3))[0]
+    Q = polar(own.K @ M[:9].reshape(3, 3) @ np.linalg.inv(by.K))[0]
     D = D @ Q.T
     in_own_axes = block_diag(np.kron(np.eye(3), Q), np.eye(3))
     by_M = (0.5 * cross(np.eye(3)) @ Q).reshape(3, 9)  # of the small turn that an error of M is for Q
