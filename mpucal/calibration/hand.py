@@ -40,7 +40,7 @@ from .preprocessing import Preprocessed, preprocess
 from .problem import Problem
 from .slip import find_slip
 from .theta import Prior, Theta
-from .transitions import each_variance, leverages, miss_variances, q_scale, transitions_of
+from .transitions import Transition, each_variance, leverages, miss_variances, q_scale, transitions_of
 
 MOST_ITERATIONS = 20  # of a rough search
 PASSES = 3
@@ -77,11 +77,12 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
         trusted = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
-    parts = parts_of(*_with_each_variance(problem, minimum, noise, fine), prior)
+    transitions = transitions_of(fine, minimum.theta)
+    parts = parts_of(*_with_each_variance(problem, minimum, transitions), prior)
     minimum = _with_honest_information(minimum, noise, search.prepared, fine)
     known = undetermined(minimum.covariance()) if minimum.free.all() else ()
     fit = replace(minimum, iterations=iterations).as_fit(known, parts)
-    return replace(fit, slip=find_slip(transitions_of(fine, minimum.theta), fine.problem.series.dt))
+    return replace(fit, slip=find_slip(transitions, fine.problem.series.dt))
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
@@ -120,20 +121,18 @@ def _with_transition_noise(problem: Problem, prepared: Preprocessed, theta: Thet
     return _scaled(problem, q_scale(transitions, miss_variances(transitions), len(problem.series)))
 
 
-def _with_each_variance(
-    problem: Problem, minimum: Minimum, noise: Noise, prepared: Preprocessed
-) -> tuple[Problem, Minimum]:
+def _with_each_variance(problem: Problem, minimum: Minimum, transitions: list[Transition]) -> tuple[Problem, Minimum]:
     """Return the problem in which each transition has a variance of its own, and the minimum as seen in it.
 
     The estimate stays: with so few transitions it would follow some and leave out others.
     """
-    transitions, ends = transitions_of(prepared, minimum.theta), ends_of(problem)
+    ends = ends_of(problem)
     if not transitions or ends is None:
         return problem, minimum
     variance = each_variance(transitions)
     if np.allclose(variance, [each.variance for each in transitions]):
         return problem, minimum
-    problem = _scaled(noise.problem(prepared), q_scale(transitions, variance, len(problem.series)))
+    problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
     seen = minimum.theta, evaluate(problem, minimum.theta, len(minimum.free), ends)
     return problem, replace(minimum, seen=seen, last=np.zeros_like(minimum.last))
 

@@ -136,7 +136,10 @@ def left_by_rounding(mean: Vector, variance: Vector, step: float, least: float =
 
 
 def rounding(readings: Vector, step: float) -> Vector:
-    """Return the variance of the rounding of readings: those that truncate to zero come from either side of it."""
+    """Return the variance of the rounding of readings, in the square of their unit and shape.
+
+    Those that truncate to zero come from either side of it.
+    """
     return np.where(np.abs(readings) < step, 4.0, 1.0) * (UNIFORM * step**2)
 
 
