@@ -8,7 +8,7 @@ correlation time; with few, the second derivative of a position that stays bound
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,7 +40,7 @@ from .preprocessing import Preprocessed, preprocess
 from .problem import Problem
 from .slip import find_slip
 from .theta import Prior, Theta
-from .transitions import Transition, each_variance, leverages, miss_variances, q_scale, transitions_of
+from .transitions import Transition, each_variance, leverages, miss_variances, over_spans, q_scale, transitions_of
 
 MOST_ITERATIONS = 20  # of a rough search
 PASSES = 3
@@ -78,11 +78,14 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
     transitions = transitions_of(fine, minimum.theta)
-    parts = parts_of(*_with_each_variance(problem, minimum, transitions), prior)
+    slip = find_slip(transitions, fine.problem.series.dt)
+    # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
+    weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
+    parts = parts_of(*weighed, prior)
     minimum = _with_honest_information(minimum, noise, search.prepared, fine)
     known = undetermined(minimum.covariance()) if minimum.free.all() else ()
     fit = replace(minimum, iterations=iterations).as_fit(known, parts)
-    return replace(fit, slip=find_slip(transitions, fine.problem.series.dt))
+    return replace(fit, slip=slip)
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
@@ -121,7 +124,9 @@ def _with_transition_noise(problem: Problem, prepared: Preprocessed, theta: Thet
     return _scaled(problem, q_scale(transitions, miss_variances(transitions), len(problem.series)))
 
 
-def _with_each_variance(problem: Problem, minimum: Minimum, transitions: list[Transition]) -> tuple[Problem, Minimum]:
+def _with_each_variance(
+    problem: Problem, minimum: Minimum, transitions: Sequence[Transition]
+) -> tuple[Problem, Minimum]:
     """Return the problem in which each transition has a variance of its own, and the minimum as seen in it.
 
     The estimate stays: with so few transitions it would follow some and leave out others.
@@ -129,10 +134,14 @@ def _with_each_variance(problem: Problem, minimum: Minimum, transitions: list[Tr
     ends = ends_of(problem)
     if not transitions or ends is None:
         return problem, minimum
-    variance = each_variance(transitions)
+    variance, share = each_variance(transitions)
     if np.allclose(variance, [each.variance for each in transitions]):
         return problem, minimum
-    problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
+    n, extra = len(problem.series), problem.series.r_extra
+    problem = _scaled(problem, q_scale(transitions, variance, n))
+    if extra is not None:
+        more = 1.0 + over_spans(transitions, (1.0 / share - 1.0).tolist(), n)
+        problem = replace(problem, series=replace(problem.series, r_extra=extra * more))
     seen = minimum.theta, evaluate(problem, minimum.theta, len(minimum.free), ends)
     return problem, replace(minimum, seen=seen, last=np.zeros_like(minimum.last))
 

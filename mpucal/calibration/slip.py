@@ -28,10 +28,12 @@ class Slip(NamedTuple):
     """Slip of the mount.
 
     span : (2,) s after the flat segment, between which it happened. delta : (3,) rad, rotation of the accelerometer.
+    transitions : those in which it was found, with the misses that it leaves.
     """
 
     span: tuple[float, float]
     delta: Vector
+    transitions: Sequence[Transition]
 
 
 def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
@@ -45,12 +47,13 @@ def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
     always = _likelihood(transitions, _directions(transitions, np.array([k]))[..., :3])[0][0]
     cost = math.log(SURE) + 1.5 * math.log(2 * k) + math.log(k)  # of three numbers more, and of so many times
     places = np.arange(FEWEST_BESIDE, k - FEWEST_BESIDE)
-    likelihood, x = _likelihood(transitions, _directions(transitions, places))
+    likelihood, x, left = _likelihood(transitions, _directions(transitions, places))
     best = int(likelihood.argmax())
     if not likelihood[best] > always + cost:
         return None
     t, span = np.cumsum(dt), transitions[places[best]].span
-    return Slip((float(t[max(span.start - 1, 0)]), float(t[span.stop - 1])), x[best, 3:] - x[best, :3])
+    without = [each._replace(miss=miss) for each, miss in zip(transitions, left[best], strict=True)]
+    return Slip((float(t[max(span.start - 1, 0)]), float(t[span.stop - 1])), x[best, 3:] - x[best, :3], without)
 
 
 def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> Vector:
@@ -67,10 +70,10 @@ def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> 
     return np.concatenate([P * ~after_end - PF * ~after_start, P * after_end - PF * after_start], axis=3)
 
 
-def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[Vector, Vector]:
-    """Return the log likelihoods (m,) of misses + A x by Student's t, at the likeliest x, and these x (m, r).
+def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return the log likelihoods (m,) of misses + A x by Student's t, at the likeliest x, these x (m, r), and the sums.
 
-    A : (m, k, 3, r).
+    A : (m, k, 3, r). The sums (m, k, 3) are the misses that x leaves.
     """
     misses = np.array([each.miss for each in transitions])
     known = np.array([each.variance for each in transitions])
@@ -82,4 +85,4 @@ def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[Vector, V
         x = -(np.linalg.pinv(N, rcond=LEAST_SEEN, hermitian=True) @ (weighted @ misses.ravel())[..., None])
         left = misses + (A @ x[:, None])[..., 0]
     z = 0.5 * np.sum(left**2, axis=-1) / known
-    return -np.sum(np.log(c) + 0.5 * (nu + 2.0) * np.log1p(2.0 * z / (c * nu)), axis=-1), x[..., 0]
+    return -np.sum(np.log(c) + 0.5 * (nu + 2.0) * np.log1p(2.0 * z / (c * nu)), axis=-1), x[..., 0], left

@@ -6,6 +6,7 @@ both sides of a transition show by how much.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -66,7 +67,7 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     return [Transition(*of) for of in zip(*columns, strict=True)]
 
 
-def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0) -> Vector:
+def miss_variances(transitions: Sequence[Transition], leverage: Vector | float = 0.0) -> Vector:
     """Return the variances (k,) [rad^2 an axis] with which noise explains all misses, at least the known ones.
 
     All transitions have a common scale, and a lost one has a scale of its own.
@@ -78,17 +79,20 @@ def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0
     return np.asarray(c / np.where(weight < WORTHLESS, weight, 1.0) * known)
 
 
-def each_variance(transitions: list[Transition]) -> Vector:
+def each_variance(transitions: Sequence[Transition]) -> tuple[Vector, Vector]:
     """Return the variance (k,) [rad^2 an axis] of each miss, if the gyroscope's error beyond its noise varies.
 
     It is as often large as Student's t says: a transition in which the sensor met the table misses by several times
     what the others do, and no change of the sensor is needed to explain it.
+
+    The second value (k,) is by how much less the acceleration counts there, which would say else how the board turned;
+    in a lost transition it alone does.
     """
     known, c, weight = _scales(transitions, 0.0)
-    return np.asarray((1.0 + (c - 1.0) / weight) * known)
+    return (1.0 + (c - 1.0) / weight) * known, np.where(weight < WORTHLESS, 1.0, np.minimum(weight, 1.0))
 
 
-def _scales(transitions: list[Transition], leverage: Vector | float) -> tuple[Vector, Vector, Vector]:
+def _scales(transitions: Sequence[Transition], leverage: Vector | float) -> tuple[Vector, Vector, Vector]:
     """Return the known variances (k,) of the misses, their common scale (1,) and their weights (k,)."""
     miss, known = (np.array([getattr(of, name) for of in transitions]) for name in ("miss", "variance"))
     return known, *likely_scale(miss, known, leverage)
@@ -110,16 +114,22 @@ def likely_scale(miss: Vector, known: Vector, leverage: Vector | float = 0.0) ->
     return c, (nu + 2.0) / (nu + 2.0 * z / c)
 
 
-def q_scale(transitions: list[Transition], variance: Vector, n: int) -> Vector:
+def q_scale(transitions: Sequence[Transition], variance: Vector, n: int) -> Vector:
     """Return the factor (n,) of Sigma_omega over a series that gives the misses these variances (k,)."""
-    factor = np.ones(n)
-    for transition, wanted in zip(transitions, variance.tolist(), strict=True):
-        factor[transition.span] += (wanted - transition.variance) / transition.of_gyro
-    return factor
+    more = [(wanted - of.variance) / of.of_gyro for of, wanted in zip(transitions, variance.tolist(), strict=True)]
+    return 1.0 + over_spans(transitions, more, n)
+
+
+def over_spans(transitions: Sequence[Transition], values: Sequence[float], n: int) -> Vector:
+    """Return (n,) the values of k transitions over a series, and 0 between them."""
+    over = np.zeros(n)
+    for transition, value in zip(transitions, values, strict=True):
+        over[transition.span] = value
+    return over
 
 
 def leverages(
-    transitions: list[Transition], prepared: Preprocessed, theta: Theta, covariance: Vector, variance: Vector
+    transitions: Sequence[Transition], prepared: Preprocessed, theta: Theta, covariance: Vector, variance: Vector
 ) -> Vector:
     """Return tr(J C J') / variance (k,) of each miss, 0 to 2.
 
@@ -130,7 +140,7 @@ def leverages(
     return np.asarray(np.clip(taken / variance, 0.0, 2.0))
 
 
-def _jacobians(transitions: list[Transition], series: Series, theta: Theta) -> Vector:
+def _jacobians(transitions: Sequence[Transition], series: Series, theta: Theta) -> Vector:
     """Return derivatives (k, 3, p) of the misses u x v in the order of NAMES, with u and v near each other."""
     # phi is the error of the turn in the axes of its end; that of a step is -dt dK (omega - b_omega), as the rests
     # determine b_omega.

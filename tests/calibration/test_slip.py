@@ -12,10 +12,12 @@ from mpucal.calibration.rotation import turned
 G = 9.82
 
 
-def slipped(recording, at_s):
-    """Rotate the accelerometer by 3 deg against the gyroscope from `at_s` [s] on."""
-    axis = np.array([[0.6, -0.6, 0.53]])
-    R, after = turned(np.radians(3.0) * axis / np.linalg.norm(axis)), recording.t >= recording.t[0] + at_s
+AXIS = np.array([[0.6, -0.6, 0.53]]) / np.linalg.norm([0.6, -0.6, 0.53])
+
+
+def slipped(recording, at_s, degrees=3.0):
+    """Rotate the accelerometer against the gyroscope from `at_s` [s] on."""
+    R, after = turned(np.radians(degrees) * AXIS), recording.t >= recording.t[0] + at_s
     return replace(recording, acc=np.where(after[:, None], recording.acc @ R.T, recording.acc))
 
 
@@ -26,6 +28,16 @@ def test_a_mount_that_slips_between_rests_is_told_with_its_time(hand, seed, at_s
     assert (calibration.verdict, reason["code"]) == ("refused", "inconsistent")
     begin, end = map(float, re.findall(r"(\d+) s", reason["message"]))
     assert begin - 1.0 <= at_s <= end + 1.0
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_slip_too_small_to_matter_is_within_the_uncertainty_of_a_good_calibration(hand, seed):
+    simulated = hand(seed, "pose12")
+    calibration = calibrate(slipped(simulated.recording, 30.0, degrees=0.1), "auto", G)
+    assert calibration.verdict == "good"
+    before = simulated.truth.D
+    away = [abs(calibration.D - D) / calibration.D_std for D in (before, turned(np.radians(0.1) * AXIS) @ before)]
+    assert np.max(away) < 4.5
 
 
 @pytest.mark.parametrize("motion", ["continuous", "pose12", "pose7"])

@@ -9,6 +9,7 @@ from ...data import STANDARD_GRAVITY_MPS2
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ..evidence import Evidence
+from ..slip import Slip
 from ..tilt import CONE_RAD
 from ..uncertainty import MOST_NIS
 
@@ -25,7 +26,7 @@ LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 def few_orientations(e: Evidence) -> Reason | None:
     """Find directions that the data leave open, where the model holds; after a slip, more orientations do not help."""
     rms = _model_rms(e)
-    if e.estimate.slip is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
+    if _slip(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
         return None
     if e.uncertainty is None or rms is None:
         return reason("few_orientations", "nothing_known")
@@ -89,7 +90,7 @@ def contradiction(e: Evidence) -> Reason | None:
     if claim is None or e.uncertainty is None or inconsistent(e) is not None:
         return None
     rms, change, disturbed = e.uncertainty.rms_mps2, claim.change, _is_disturbed(e)
-    if (slip := e.estimate.slip) is not None:
+    if (slip := _slip(e)) is not None:
         begin, end = _since_the_start(e, slip.span)
         return reason("inconsistent", "change", bool(e.gravity * norm(slip.delta) > CHANGED_MPS2), begin=begin, end=end)
     if change is not None and not disturbed and claim.error("change") > LEAST_CHANGE_MPS2:
@@ -106,6 +107,12 @@ def contradiction(e: Evidence) -> Reason | None:
         return reason("inconsistent", "sides", _is_useless(e), rms=rms)
     begin, end = _since_the_start(e, worst.span)
     return reason("inconsistent", "part", _is_useless(e), begin=begin, end=end, rms=rms)
+
+
+def _slip(e: Evidence) -> Slip | None:
+    """Return the slip of the mount, if a calibration would not be good with it."""
+    slip = e.estimate.slip
+    return slip if slip is not None and e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
 
 
 def _is_useless(e: Evidence) -> bool:
