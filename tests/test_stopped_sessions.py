@@ -35,7 +35,7 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
     for at_s, stopped_s in stops_s.items():
         world.at(at_s, lambda stopped_s=stopped_s: pass_by(world, stopped_s))
     days = iter(range(1, 1_000_000))
-    words = ["--mavlink", "sim:seed=3,imus=1", "--rate", "50", "--target", "quick", "--no-write"]
+    words = ["--mavlink", "sim:imus=1", "--seed", "3", "--rate", "50", "--target", "quick", "--no-write"]
     with world.opened(), quick(), patch("time.time_ns", lambda: time_ns() + (-1) ** next(days) * DAY_NS):
         code = run(["session", *words, "-o", str(tmp_path / "board"), "--yes"])
     said = capsys.readouterr().err

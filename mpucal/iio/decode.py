@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..chip.access import Transaction
+from ..clocks.sample_clock import NS
 from ..data import Recording, Samples, Sensor
 from ..errors import ChipError, RecordingError
 from .attributes import (
@@ -39,7 +40,6 @@ class _DeviceState:
 
     texts: dict[str, str]
     layout: FrameLayout | None = None
-    offset_ns: int | None = None
 
 
 class IioDecoder:
@@ -183,9 +183,11 @@ class IioDecoder:
             return
         columns = held.layout.columns(data)
         times = columns[TIMESTAMP]
-        if held.offset_ns is None:
+        if run.offset_ns is None:
             off = t_ns - int(times[-1])
-            held.offset_ns = off if abs(off) > OTHER_CLOCK_NS else 0
+            # After a reboot the kernel's clock begins again; that of a resumed session goes on.
+            again = bool(self._samples) and times[0] * NS <= self._samples[-1].t[-1]
+            run.offset_ns = off if again or abs(off) > OTHER_CLOCK_NS else 0
         parts = []
         for kind in (ACCEL, GYRO):
             of, scales = self.scale(kind)
@@ -194,7 +196,7 @@ class IioDecoder:
                 parts += [counts, scales.clipped(counts)[:, None]]
         if TEMP in columns:
             self._set_temperature(device, float(columns[TEMP][-1]))
-        run.add(device, times + held.offset_ns, np.concatenate(parts, axis=1))
+        run.add(device, times + run.offset_ns, np.concatenate(parts, axis=1))
         self._deliver(run)
 
     def _add_count(self, channel: str, text: str, t_ns: int) -> None:

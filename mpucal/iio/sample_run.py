@@ -81,7 +81,8 @@ class SampleRun:
     accel, gyro : their scales. gyro_to_accel : (3, 3) rotation to the accelerometer's frame; None: it is the same.
     widths : number of columns of each stream, by its name: of a device, 3 counts and a mark of each of its sensors; of
         a polled channel, its count and its mark. rate_hz : of the buffers, if known.
-    gap_next : True if samples are missing before the next one.
+    gap_next : True if samples are missing before the next one. offset_ns : from the buffers' clock to that of the
+        accesses; None before the first frame.
     """
 
     accel: SensorScale
@@ -90,6 +91,7 @@ class SampleRun:
     widths: Mapping[str, int]
     rate_hz: float | None
     gap_next: bool
+    offset_ns: int | None = None
 
     def __post_init__(self) -> None:
         self._aligned = StreamAligner(list(self.widths.values()))

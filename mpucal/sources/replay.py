@@ -130,7 +130,7 @@ def as_asked(asked: Transaction, recorded: Transaction, which: str) -> Transacti
     if _words(asked) != _words(recorded):
         raise CaptureError(
             f"the program makes {_words(asked)}, but {which} is {_words(recorded)}",
-            "replay it with the mpucal and options that recorded it, or calibrate it without replaying",
+            "replay it with the command, mpucal and options that recorded it, or give the file without --replay",
         )
     return recorded
 

@@ -202,6 +202,7 @@ SOURCES = [
         word="sim",
         forms="sim[:key=value,...] for the simulated vehicle",
         opener="mpucal.simulated.vehicle:open_source",
+        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE, SEED),
         title="simulated vehicle",
     ),
     SourceKind(

@@ -92,10 +92,10 @@ def cut_off(write_capture, tmp_path):
     return call
 
 
-def resume_vehicle(mpucal, begins):
+def resume_cut(mpucal, begins):
     """Resume the session in the folder `cut`; return its recording, that of the cut part, and its calibration.
 
-    The simulated vehicle stands where it was switched on, and its clock begins again.
+    The simulated sensor stands where it was switched on, and its clock begins again.
     """
     resumed = mpucal(*WORDS, "--no-write", "--resume", "cut")
     assert resumed.code == 0, resumed.err
@@ -110,7 +110,15 @@ def resume_vehicle(mpucal, begins):
 
 def test_a_vehicle_is_resumed_after_a_reboot_while_rotating(mpucal, flown, cut_off):
     cut_off(flown.folder, 25.0)
-    resume_vehicle(mpucal, "rotate")
+    resume_cut(mpucal, "rotate")
+
+
+def test_a_kernel_device_is_resumed_after_a_reboot(mpucal, cut_off, tmp_path):
+    words = ("--iio", "sim:seed=3", "--rate", "50", "--target", "quick", "--no-write")
+    assert mpucal(*WORDS, *words, "-o", "whole").code == 0
+    cut_off(tmp_path / "whole", 20.0)
+    recording, _, _ = resume_cut(mpucal, "rotate")
+    assert np.all(np.diff(recording.t) > 0)
 
 
 @pytest.mark.slow
@@ -118,7 +126,7 @@ def test_a_vehicle_of_two_imus_is_resumed_after_a_reboot_while_flat(mpucal, cut_
     words = ("--mavlink", "sim:firmware=px4,imus=2,seed=3", "--rate", "50", "--target", "quick", "--no-write")
     assert mpucal(*WORDS, *words, "--prepare=yes", "-o", "whole").code == 0
     cut_off(tmp_path / "whole", 6.0)
-    recording, first, found = resume_vehicle(mpucal, "lay_flat")
+    recording, first, found = resume_cut(mpucal, "lay_flat")
     again = mpucal(*WORDS, "--replay", "cut", "-o", "again")
     assert again.code == 0, again.err
     assert Calibration.load("again/calibration.json").quality["verification"] == found.quality["verification"]

@@ -25,6 +25,8 @@ def open_source(request: Request) -> OpenedIio:
         bus.truth_document,
         words=request.words,
         real_time=bus.real_time,
+        # The buffers are filled while they are read.
+        apart=bus.real_time,
         devices=Devices(DEVICE, DEVICE),
         trigger=request.values.get("trigger"),
     )

@@ -17,7 +17,8 @@ def open_source(request: Request) -> OpenedVehicle:
     A command that opens it again passes the same dict `kept`: the vehicle then has the parameters that it had before.
     """
     options = link_options(request)
-    vehicle = SimulatedVehicle(VehicleOptions.parse(request.value), request.plan.gravity, options["key"])
+    wanted = VehicleOptions.parse(request.value, request.values.get("seed"))
+    vehicle = SimulatedVehicle(wanted, request.plan.gravity, options["key"])
     vehicle.switch_on(request.values.get("kept", {}).setdefault(request.value, vehicle.firmware.store))
     transport = SimulatedTransport(vehicle)
     return OpenedVehicle(
