@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import permutations
-from statistics import NormalDist
 
 import numpy as np
 
@@ -15,9 +14,10 @@ from .calibration import GOOD, Calibration
 from .correction import same_trim
 from .error_model import AXES
 
-# Of pairs of calibrations of an unchanged linear sensor, 1 in 100 are called different, over all kinds of recordings of
-# `python -m tools.lab families`. Of calm hands alone fewer are: what they state is of hands in general.
+# Of pairs of calibrations of an unchanged linear sensor, 1 in 100 are called different.
 CONFIDENCE = 0.99
+# Degrees of freedom of the deviations of a sensor in a hand: its turns from rest to rest, which are few, tell them.
+FREEDOM_OF_A_HAND = 12.0
 # Factor by which the uncertainties of a calibration with reservations may be too small. Halves of a real recording with
 # this verdict, of an unchanged sensor, were 1.1 times as far apart as two good ones may be, and there are worse ones.
 RESERVED = 2.0
@@ -55,17 +55,19 @@ class Comparison:
     numbers : the accelerometer's twelve. gyroscope : its bias, which changes from day to day.
     remarks : sentences on other differences.
     margin : factor by which the uncertainties may be too small: 1 for two good calibrations.
+    freedom : degrees of freedom of the uncertainties.
     """
 
     numbers: tuple[Difference, ...]
     gyroscope: tuple[Difference, ...]
     remarks: tuple[str, ...]
     margin: float = 1.0
+    freedom: float = math.inf
 
     @property
     def limit(self) -> float:
         """Return the limit of |z| of one number."""
-        return limit_of(max(len(self._known), 1))
+        return limit_of(max(len(self._known), 1), self.freedom)
 
     @property
     def same(self) -> bool | None:
@@ -106,12 +108,18 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     std = np.hypot(a.b_omega_std, b.b_omega_std)
     gyroscope = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
     margin = RESERVED if _has_reservations(a) or _has_reservations(b) else 1.0
-    return Comparison(tuple(numbers), tuple(gyroscope), tuple(_remarks(a, b)), margin)
+    freedom = FREEDOM_OF_A_HAND if "hand" in (a.fit.get("model"), b.fit.get("model")) else math.inf
+    return Comparison(tuple(numbers), tuple(gyroscope), tuple(_remarks(a, b)), margin, freedom)
 
 
-def limit_of(count: int) -> float:
-    """Return the limit of |z| of each of so many numbers, by Šidák's correction, so that CONFIDENCE holds for all."""
-    return NormalDist().inv_cdf((1 + CONFIDENCE ** (1 / count)) / 2)
+def limit_of(count: int, freedom: float = math.inf) -> float:
+    """Return the limit of |z| of each of so many numbers, by Šidák's correction, so that CONFIDENCE holds for all.
+
+    freedom : degrees of freedom of the standard deviations, for Student's t.
+    """
+    from scipy.special import stdtrit  # noqa: PLC0415 - slow to import
+
+    return float(stdtrit(freedom, (1 + CONFIDENCE ** (1 / count)) / 2))
 
 
 def in_body_frame(c: Calibration) -> Calibration:

@@ -47,6 +47,19 @@ def test_one_sensor_is_called_the_same_as_often_as_promised():
     assert same == pytest.approx(CONFIDENCE, abs=3 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / DRAWS))
 
 
+@pytest.mark.parametrize(("model", "least", "most"), [("hand", 0.0, 0.01), ("accel", 0.01, 0.05)])
+def test_deviations_that_few_turns_tell_count_as_such(model, least, most):
+    """The deviations of a hand's calibration are estimates themselves, by a dozen numbers."""
+    rng = np.random.default_rng(9)
+
+    def by_hand():
+        told = np.sqrt(rng.chisquare(12) / 12)
+        return replace(drawn(rng), D_std=told * D_STD, b_a_std=told * B_STD, fit={**TRUTH.fit, "model": model})
+
+    share = np.mean([compare(by_hand(), by_hand()).same is False for _ in range(DRAWS)])
+    assert least <= share < most
+
+
 def test_what_changed_is_named():
     moved = replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 0.098, 0.0]))
     found = compare(TRUTH, moved)
@@ -110,8 +123,8 @@ def test_halves_of_a_real_recording_agree_and_two_real_sensors_differ():
     found = compare(first, second)
     assert not found.changed
     assert found.same or not first.verdict == second.verdict == "good"
-    # not because they know nothing: 10 mg on an axis would be seen
-    moved = replace(second, b_a=second.b_a + np.array([0.0, 0.0, 0.0981]))
+    # not because they know nothing: 15 mg on an axis would be seen
+    moved = replace(second, b_a=second.b_a + np.array([0.0, 0.0, 0.147]))
     assert compare(first, moved).same is False
     assert compare(second, of_other).same is False
 

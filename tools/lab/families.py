@@ -21,7 +21,7 @@ import numpy as np
 import mpucal
 from mpucal.errors import MpucalError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
-from mpucal.result.comparison import limit_of
+from mpucal.result.comparison import FREEDOM_OF_A_HAND, limit_of
 
 from .judge import judged, judgement, rms
 from .runner import Trial
@@ -98,7 +98,8 @@ def told_apart(runs: Sequence[Row]) -> float:
     """
     z = [np.array(run.z) for run in runs if run.verdict == GOOD]
     farthest = [float(np.abs(one - other).max()) for one, other in combinations(z, 2)]
-    return float(np.mean(np.array(farthest) > math.sqrt(2.0) * limit_of(len(z[0])))) if farthest else math.nan
+    limit = math.sqrt(2.0) * limit_of(len(z[0]), FREEDOM_OF_A_HAND) if z else math.nan
+    return float(np.mean(np.array(farthest) > limit)) if farthest else math.nan
 
 
 COLUMNS: dict[str, Column] = {
