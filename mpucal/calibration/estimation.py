@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
-from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..errors import WrongValue
 from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
@@ -137,19 +137,22 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     before = replace(before, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
-    choice, explanations, freed = _fit(recording, flat, gravity, model)
+    choice, explanations, walks = _fit(recording, flat, gravity, model)
+    # the share of the variance that the removed changes added
+    freed = sum((walk.freed[ACCELEROMETER] for walk in walks), np.zeros(len(D_NAMES + B_A_NAMES)))
     claim = claim_uncertainty(choice.fit, gravity, explanations, freed)
-    evidence = replace(before, fit=inflate(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
+    fit = inflate(choice.fit, claim).right_handed()
+    evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=walks)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 
 
-def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation], Vector]:
-    """Return the fit without changes of the gyroscope's bias during the turning, and what explains the rest.
-
-    The third value (12,) is the share of the variance that the removed changes added, see claim_uncertainty.
-    """
-    (choice, found), freed = _fit_once(recording, flat, gravity, model), np.zeros(len(D_NAMES + B_A_NAMES))
+def _fit(
+    recording: Recording, flat: Flat, gravity: float, model: str
+) -> tuple[ModelChoice, list[Explanation], tuple[Explanation, ...]]:
+    """Return the fit without changes of the gyroscope's bias during the turning, what explains the rest, and these."""
+    choice, found = _fit_once(recording, flat, gravity, model)
+    walks: tuple[Explanation, ...] = ()
     for _ in range(MOST_CHANGES):
         change = gyroscope_change(found)
         if change is None or not choice.fit.converged:
@@ -159,8 +162,8 @@ def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[
         # A change whose removal explains nothing is none.
         if not choice.fit.V - np.log(SURE) > without.fit.V:
             break
-        choice, found, freed = without, left, freed + change.freed[ACCELEROMETER]
-    return choice, found, freed
+        choice, found, walks = without, left, (*walks, change)
+    return choice, found, walks
 
 
 def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation]]:

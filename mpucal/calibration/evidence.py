@@ -17,6 +17,7 @@ from ..rests.flat import Flat, find_flat, flat_statistics
 from ..rests.intervals import RestFinder, statistics
 from ..rests.windows import WINDOW_S
 from .fit import Fit
+from .hypotheses import Explanation
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere, lengths, turned
 from .tilt import tilted_directions
@@ -52,6 +53,7 @@ class Evidence:
     first : sample of the whole recording with which this one begins.
     decoded : the recording's words, before anything was masked, and how they were corrected.
     against_rests : why it cannot use the rests alone, where nothing else was recorded.
+    walks : changes of the gyroscope's bias, which are removed from the rates for the fit.
     """
 
     recording: Recording
@@ -66,12 +68,13 @@ class Evidence:
     first: int = 0
     decoded: Decoded | None = None
     against_rests: tuple[Reason, ...] = ()
+    walks: tuple[Explanation, ...] = ()
 
     def part(self, first: int, last: int) -> Evidence:
         """Return the evidence of the samples first..last-1, before their estimation."""
         decoded = None if self.decoded is None else self.decoded.part(first, last)
-        recording = self.recording.part(first, last)
-        return replace(self, recording=recording, first=first, decoded=decoded, flat=None, fit=None, claim=None)
+        part = replace(self, recording=self.recording.part(first, last), first=first, decoded=decoded)
+        return replace(part, flat=None, fit=None, claim=None, walks=())
 
     @property
     def is_of_now(self) -> bool:

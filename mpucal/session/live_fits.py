@@ -10,6 +10,7 @@ import numpy as np
 from ..calibration import estimate
 from ..calibration.checks import find_reasons
 from ..calibration.evidence import Evidence
+from ..calibration.hypotheses import remove_change
 from ..calibration.interim import InterimEstimate, interim_estimate
 from ..calibration.masks import with_masks
 from ..calibration.next_orientation import next_orientation
@@ -105,6 +106,8 @@ class Fits:
             return Checked((), False, reason("verification_failed", "nothing"))
         recording, first = with_masks(self._store.recording()), evidence.first
         after = recording.part(first, len(recording))
+        for walk in evidence.walks:
+            after = remove_change(after, evidence.flat, walk)
         rests = new_orientations(after, evidence.flat, evidence.fit, self._plan.gravity, self._since - first)
         unseen = select_unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
         contradiction = next((against for against in find_reasons(evidence) if against.code == CONTRADICTION), None)

@@ -5,10 +5,15 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from mpucal.data import Samples, Sensor
+from mpucal.data import Recording, Samples, Sensor
+from mpucal.mavlink.texts import ReceivedPrompt
+from mpucal.session.aims import ALL_AROUND
 from mpucal.session.events import Checked, FitKind, Learnt, Tried
 from mpucal.session.live_fits import Fits, SampleStore, Task
 from mpucal.session.plan import Plan
+from mpucal.simulated.disturbance import ARMS
+from mpucal.simulated.hands import HANDS
+from mpucal.simulated.motion import Motion
 from tools.lab.scenarios.recordings import hand_scenario
 from tools.lab.scenarios.sensors import GRAVITY_MPS2
 
@@ -25,6 +30,24 @@ def part(recording, first_s, last_s=None):
     """The samples of that time."""
     chosen = slice(round(first_s * 200), None if last_s is None else round(last_s * 200))
     return Samples(*(getattr(recording, field.name)[chosen] for field in fields(Samples)))
+
+
+@pytest.fixture(scope="module")
+def swaying():
+    """A sensor whose gyroscope has a growing bias, in the hand of an arm that sways: 22 poses in 100 s."""
+    rng = np.random.default_rng(1)
+    downs = rng.permutation(ALL_AROUND)[:22].tolist()
+    motion = Motion(HANDS["guided"](rng), rng, GRAVITY_MPS2, disturbance=ARMS["standing"])
+    motion.hear(ReceivedPrompt("lay_flat", None), 0.0)
+    parts = [motion.means(np.arange(2401) / 200)]
+    for pose, down in enumerate(downs):
+        motion.hear(ReceivedPrompt("rotate", tuple(down)), 12.0 + 4.0 * pose)
+        parts.append(motion.means(12.0 + 4.0 * pose + np.arange(801) / 200))
+    acc, gyr = (np.concatenate(values) for values in zip(*parts, strict=True))
+    t = np.arange(1, len(acc) + 1) / 200
+    drift = np.radians(0.1 / 60.0) * np.maximum(t - 10.0, 0.0)[:, None]
+    noisy = acc + rng.normal(0.0, 0.02, acc.shape), gyr + drift + rng.normal(0.0, 1e-3, gyr.shape)
+    return Recording.from_arrays(t, *noisy, sensor=SENSOR)
 
 
 def after(samples, seconds):
@@ -55,6 +78,16 @@ def test_a_try_and_its_check_agree_on_good_data(fits, poses):
     assert isinstance(checked, Checked)
     assert checked.agrees, checked
     assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.verifications)
+
+
+@pytest.mark.parametrize(("slipped_deg", "agrees"), [(0.0, True), (1.5, False)])
+def test_a_growing_bias_of_the_gyroscope_is_told_from_a_mount_that_slips(fits, swaying, slipped_deg, agrees):
+    """The mean rates of the rests hide the bias, as the arm sways; the fit knows it."""
+    fits.do(Task(part(swaying, 0, 84), FitKind.TRY))
+    later = part(swaying, 84)
+    slipped = later.acc - np.cross(np.radians(slipped_deg) * np.array([0.6, 0.0, 0.8]), later.acc)
+    checked = fits.do(Task(replace(later, acc=slipped), FitKind.CHECK, of=3))
+    assert checked.agrees == agrees, checked
 
 
 def test_orientations_that_the_fit_has_seen_verify_nothing(fits, poses):
