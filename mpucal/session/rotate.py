@@ -14,7 +14,7 @@ from . import events
 from .aims import SIDES, VERIFY_PLACED, Aim
 from .coverage import Coverage
 from .plan import Plan
-from .step import ENOUGH, HOLD_S, PATIENCE_S, PLACED_S, WAIT_S, Pause, PoseStep
+from .step import ENOUGH, HOLD_S, PATIENCE_S, WAIT_S, Pause, PoseStep
 
 PASS_WINDOW_S = 0.1
 # Least length of a pause. A fit uses shorter rests, too.
@@ -46,8 +46,8 @@ class Rotate(PoseStep):
     """
 
     def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
-        asks = not (plan.tilt_only or plan.until_end)
-        super().__init__(flat, plan, placed_s=PLACED_S if asks and aim.sides else None)
+        super().__init__(flat, plan)
+        self._takes_sides = aim.sides > 0 and not (plan.tilt_only or plan.until_end)
         self._aim, self._coverage = aim, coverage
         self._passes = Windows(PASS_WINDOW_S, spread=False)
         acc = np.array(flat.acc)
@@ -152,9 +152,9 @@ class Rotate(PoseStep):
             outputs.append(events.Seen(pause.t_s, len(self._coverage.paused), events.down_of(pause.acc), paused=True))
         if self._plan.until_end or self._requested or advised:
             return outputs
-        if pause.seconds >= pause.hold_s - WAIT_S - 1e-6:
-            first = len(self._coverage.paused) <= 2  # the flat rest, and this one
-            self._coverage.placed = pause.hold_s > HOLD_S and (self._coverage.placed or first)
+        if pause.seconds >= HOLD_S - WAIT_S - 1e-6:
+            first = len(self._coverage.paused) == 1  # the flat rest
+            self._coverage.placed = self._takes_sides and not pause.touched and (self._coverage.placed or first)
             self._advised_run = pause.run
             outputs.append(self._request(events.FitKind.ADVISE, pause.t_s))
         return outputs

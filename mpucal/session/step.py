@@ -65,9 +65,8 @@ class Step:
 HAND_WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
-# A vehicle that is put down is left there for longer: no tremor moves its readings over the steps of its streams. The
-# newest windows show that nobody touches it.
-PLACED_S, NEWEST = 3.0, 2
+# So many of the newest windows show that nobody touches the board.
+NEWEST = 2
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0
 # Rests, turnings and questions end after this time without progress; a check and a verification after the second one.
@@ -89,7 +88,7 @@ class Pause:
 
     Attributes
     ----------
-    acc : (3,) mean acceleration [m/s^2]. hold_s : time for which it is to be held, longer where nobody touches it.
+    acc : (3,) mean acceleration [m/s^2]. touched : False where nobody touches the board.
     countdown : to the end of the hold; None once that is past.
     """
 
@@ -97,7 +96,7 @@ class Pause:
     seconds: float
     acc: Vector
     run: int
-    hold_s: float = HOLD_S
+    touched: bool
     countdown: events.Countdown | None = None
 
     def is_near(self, wanted: events.Direction | None, near_rad: float) -> bool:
@@ -128,12 +127,12 @@ class PoseStep(Step):
 
     Parameters
     ----------
-    flat : the flat rest. plan : settings of the session. hold_s, placed_s : see PauseDetector.
+    flat : the flat rest. plan : settings of the session. hold_s : time for which each orientation is to be held.
     """
 
-    def __init__(self, flat: events.Rested, plan: Plan, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
+    def __init__(self, flat: events.Rested, plan: Plan, hold_s: float = HOLD_S) -> None:
         self._plan = plan
-        self._pauses = PauseDetector(flat, hold_s, placed_s)
+        self._pauses = PauseDetector(flat, hold_s)
         self._directions = directions(events.down_of(np.array(flat.acc)), plan.tilt_only)
         self._begun_s: float | None = None
         self._prompted_s = 0.0
@@ -170,11 +169,10 @@ class PauseDetector:
     Parameters
     ----------
     flat : the flat rest, which gives the gyroscope's bias. hold_s : time for which each orientation is to be held.
-    placed_s : the same where nobody touches the board; None: `hold_s`.
     """
 
-    def __init__(self, flat: events.Rested, hold_s: float = HOLD_S, placed_s: float | None = None) -> None:
-        self._hold_s, self._placed_s = hold_s, placed_s or hold_s
+    def __init__(self, flat: events.Rested, hold_s: float = HOLD_S) -> None:
+        self._hold_s = hold_s
         silent = np.zeros(3)
         self._hands = Detector(UNTOUCHED, (silent, silent), bias=np.array(flat.gyr))
         self._touched: deque[bool] = deque(maxlen=NEWEST)
@@ -200,9 +198,10 @@ class PauseDetector:
                 self._last_run = sight.run if isinstance(sight, Still) else -1
             if not isinstance(sight, Still) or sight.run <= self._last_run:
                 continue
-            hold_s, remaining = self._hold_s if any(self._touched) else self._placed_s, None
-            if sight.seconds < hold_s + HAND_WINDOW_S - 1e-6:
-                remaining = events.Countdown(window.end_s, max(hold_s - sight.seconds, 0.0), hold_s, paused=False)
+            remaining = None
+            if sight.seconds < self._hold_s + HAND_WINDOW_S - 1e-6:
+                left_s = max(self._hold_s - sight.seconds, 0.0)
+                remaining = events.Countdown(window.end_s, left_s, self._hold_s, paused=False)
             acc = np.asarray(sight.acc)
-            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, hold_s, remaining))
+            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, any(self._touched), remaining))
         return pauses

@@ -1,5 +1,4 @@
 import pickle
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -155,12 +154,13 @@ def placed(make_board, tremor, target="normal"):
     session.said = session.machine.handle(events.Connected(Sensor(message="RAW_IMU")))
     assert "still for 5 s" in session.of(events.Prompt)[-1].text
     session.feed(board.still(5.6))
-    session.overall = 1.0
+    # The advice comes at the end of the hold.
+    session.answer = lambda wish: learnt(1.0, advice=False) if wish is events.FitKind.KNOW else None
     held = []
     while session.state is State.ROTATE and len(held) < 6:
         held.append(session.of(events.Prompt)[-1].text.split(": ")[1].split(" (")[0])
         session.feed(board.turn_to(-np.array(session.of(events.Prompt)[-1].down)))
-        session.feed(board.shaken(3.6, tremor) if tremor else board.still(3.6))
+        session.feed(board.shaken(1.5, tremor) if tremor else board.still(1.5)).give(learnt(1.0))
     return session, held
 
 
@@ -169,9 +169,6 @@ def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board):
     assert held == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
     assert session.state is State.VERIFY
     assert "Verification 1 of 1" in session.of(events.Prompt)[-1].text
-    # Each side is left alone for three seconds before the next is asked for.
-    asked_s = [output.t_s for output in session.said if type(output).__name__ == "Held"]
-    assert all(after - before == pytest.approx(1.6 + 3.6, abs=0.3) for before, after in pairwise(asked_s))
 
 
 def test_a_vehicle_in_a_hand_is_turned_to_more_orientations(make_board):
