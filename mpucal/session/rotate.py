@@ -102,11 +102,12 @@ class Rotate(PoseStep):
             self._prompted_s = knowledge.t_s
             side = self._next_side()
             # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
-            # even if the estimate takes up for down, as for a sensor whose axes are mirrored.
+            # even if the estimate takes up for down, as for a sensor whose axes are mirrored; and one that was seen
+            # does not count towards those that must have been.
             down = np.array(knowledge.down)
             if side is not None:
                 down = side
-            elif self._plan.tilt_only or knowledge.down == self.prompt.down:
+            elif self._plan.tilt_only or knowledge.down == self.prompt.down or self._is_idle(down):
                 down = self._farthest(self._coverage.paused)
             self.prompt = self._prompt_for(down)
             outputs.append(self.prompt)
@@ -210,6 +211,10 @@ class Rotate(PoseStep):
 
     def _is_certain(self) -> bool:
         return self._knowledge is not None and self._knowledge.overall >= 1.0
+
+    def _is_idle(self, down: Vector) -> bool:
+        """Return True for an orientation that was seen, where the target is reached."""
+        return self._is_certain() and self._coverage.paused.near(-down)
 
     def _is_enough(self) -> bool:
         if self._coverage.placed:

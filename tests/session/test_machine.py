@@ -178,6 +178,14 @@ def test_a_vehicle_in_a_hand_is_turned_to_more_orientations(make_board):
     assert session.of(events.Progress)[-1].of == 14
 
 
+def test_once_the_target_is_reached_each_orientation_asked_for_is_a_new_one(rotating, board):
+    rotating.overall = 1.0
+    for _ in range(6):
+        show(rotating, board, [-np.array(rotating.of(events.Prompt)[-1].down)])
+    asked = np.array([prompt.down for prompt in rotating.of(events.Prompt) if prompt.down])
+    assert (asked @ asked.T)[np.triu_indices(len(asked), 1)].max() < np.cos(np.radians(20.0))
+
+
 def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, varied):
     rotating.overall = 1.0
     show(rotating, board, varied[:8])
