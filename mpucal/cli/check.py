@@ -34,10 +34,11 @@ from ..terminal.console import Console
 from .arguments import PATH, calibration_argument, json_option, output_option, yes_option
 from .destination import write_back
 from .loading import at_gravity_of, force_option, load_calibration, load_trusted
-from .options import check_input, check_source, given_options, source_options
+from .options import given_options
 from .page import BOARD_KIND, page_options, show_session
 from .recording_options import given_hints, hint_options, say_interpretation
 from .running import open_runner
+from .source_options import check_input, check_source, source_options
 
 EXAMPLE = (
     "Example: `mpucal check board7/calibration.json walk.npz`, or `mpucal check board7/calibration.json --bus sim`"

@@ -27,9 +27,10 @@ from ..session.ports import Source, polled
 from ..session.results import save
 from ..sources.opening import open_source
 from .arguments import PATH, json_option, output_option
-from .options import ABOVE_ZERO, check_input, check_source, given_options, source_options
+from .options import ABOVE_ZERO, given_options
 from .person import duration, say
 from .recording_options import given_hints, hint_options, say_interpretation
+from .source_options import check_input, check_source, source_options
 
 EXAMPLE = "Example: `mpucal noise walk.npz -o noise`, or `mpucal noise --bus sim --hours 0.02`"
 DOCUMENT, PAGE = "noise.json", "noise.html"

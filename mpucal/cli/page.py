@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..page.address import LOOPBACK, Address, parse_address
+from ..page.state import Result
+from ..report.units import accelerometer, estimated_error
+from ..result.calibration import Calibration
 from ..session.boards import BOARD, BOARDS, usual_board
 from ..sources.opened_source import OpenedSource
 from ..sources.table import source_title
 from ..terminal.console import Console, console
 from .arguments import together
 from .options import Parsed
+from .summary import describe_fit
 
 if TYPE_CHECKING:
     from ..page.console import ResultCallback
@@ -73,3 +77,14 @@ def show_session(
     attended = not (yes or json_events) and sys.stdin.isatty() and sys.stderr.isatty()
     about = {"title": title, "board": board}
     return terminal, on_page(terminal, page, about, page_keys, paced, json_events, attended)
+
+
+def page_result(calibration: Calibration) -> Result:
+    """Return the summary for the page, which lays it out itself."""
+    return Result(
+        calibration.verdict,
+        estimated_error(calibration),
+        calibration.quality.get("reasons", ()),
+        [(f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration)],
+        "\n".join(describe_fit(calibration)).strip(),
+    )

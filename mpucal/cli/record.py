@@ -15,8 +15,9 @@ from ..sources.opening import open_source
 from ..terminal.console import console
 from ..terminal.hangup import logging_after_hangup
 from .arguments import output_option
-from .options import ABOVE_ZERO, check_source, fit_options, given_options, source_options
+from .options import ABOVE_ZERO, fit_options, given_options
 from .running import open_runner
+from .source_options import check_source, source_options
 
 MCAP = ".mcap"
 EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60`"

@@ -17,6 +17,7 @@ from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import warn_unset
 from ..result.session_files import DOCUMENT, LOG
+from ..session.aims import AIMS, NORMAL
 from ..session.results import SessionFolder, check_unfinished, result_files
 from ..sinks.choose import announce_sinks, choose_sinks, interrupted_writes
 from ..sinks.kind import SinkKind
@@ -29,21 +30,36 @@ from ..terminal.console import Console
 from ..terminal.hangup import logging_after_hangup
 from .arguments import PATH, json_option, output_option, yes_option
 from .destination import session_sink_options, write_back
-from .options import aim_options, check_gravity, check_source, fit_options, given_options, source_options
-from .page import BOARD_KIND, page_options, show_session
+from .options import check_gravity, fit_options, given_options
+from .page import BOARD_KIND, page_options, page_result, show_session
 from .person import say
 from .running import open_runner
-from .summary import next_steps, page_result, summary
+from .source_options import check_source, source_options
+from .summary import next_steps, summary
 
 # Words of remedies that are replaced where the session can be resumed.
 AGAIN = "start again"
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
+TARGET = AIMS[NORMAL].target
 
 
 @click.command("session", epilog=EXAMPLE)
 @source_options("session")
 @fit_options
-@aim_options
+@click.option(
+    "--target",
+    type=click.Choice(tuple(AIMS)),
+    default=NORMAL,
+    show_default=True,
+    help=f"Required accuracy (1 sigma): {NORMAL} is {TARGET.bias_mg:g} mg of bias, {TARGET.gain_pct:g} % of scale"
+    f" factor error, {TARGET.misalignment_deg:g} deg of misalignment.",
+)
+@click.option(
+    "--tilt-only",
+    is_flag=True,
+    help="For boards that cannot be turned upside down: use tilts only; parameters that tilts do not show keep "
+    "their defaults.",
+)
 @session_sink_options
 @output_option("folder", "DIR", "Folder for the results.")
 @click.option("--resume", metavar="DIR", type=PATH, help="Continue the interrupted session in DIR.")

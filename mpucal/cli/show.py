@@ -24,9 +24,10 @@ from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from .arguments import PATH, json_option
 from .loading import load_calibration
-from .options import check_input, check_source, given_options, source_options
+from .options import given_options
 from .person import say
 from .recording_options import NAMES, hint_options, make_hints, say_interpretation
+from .source_options import check_input, check_source, source_options
 from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"

@@ -33,9 +33,10 @@ from ..terminal.console import JsonLines
 from ..terminal.keys import Keys
 from .arguments import CALIBRATION_PATH, json_option, output_option
 from .loading import at_gravity_of, load_calibration
-from .options import ABOVE_ZERO, check_source, source_options
+from .options import ABOVE_ZERO
 from .page import choose_board, page_options
 from .person import say
+from .source_options import check_source, source_options
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
 

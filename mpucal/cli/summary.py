@@ -16,7 +16,6 @@ from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import free_name
 from ..mavlink.parameters.document import AUTOPILOT, NEW
 from ..origin import Origin
-from ..page.state import Result
 from ..report.elements import as_float
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
@@ -61,7 +60,7 @@ def summary(calibration: Calibration) -> str:
         lines += ["", textwrap.fill(error, WIDTH)]
     for other in others:
         lines += ["", *_verdict(f"The calibration of {_imu(other)}", other.get("quality", {}))]
-    return "\n".join([*lines, *_fit(calibration)])
+    return "\n".join([*lines, *describe_fit(calibration)])
 
 
 def _verdict(what: str, quality: Mapping[str, Any]) -> list[str]:
@@ -79,17 +78,6 @@ def _verdict(what: str, quality: Mapping[str, Any]) -> list[str]:
 
 def _imu(document: Mapping[str, Any]) -> str:
     return f"IMU {document.get('autopilot', {}).get('imu', 1)}"
-
-
-def page_result(calibration: Calibration) -> Result:
-    """Return the summary for the page, which lays it out itself."""
-    return Result(
-        calibration.verdict,
-        estimated_error(calibration),
-        calibration.quality.get("reasons", ()),
-        [(f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration)],
-        "\n".join(_fit(calibration)).strip(),
-    )
 
 
 def next_steps(
@@ -194,7 +182,8 @@ def slope(calibration: Calibration) -> str:
     )
 
 
-def _fit(calibration: Calibration) -> list[str]:
+def describe_fit(calibration: Calibration) -> list[str]:
+    """Return the model, what it was fitted to, and gravity, after an empty line; nothing if there was no fit."""
     fit = calibration.fit
     if "samples" not in fit:
         return []

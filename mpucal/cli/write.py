@@ -14,8 +14,8 @@ from ..sinks.write_back import file_recorder, is_calibration, put_back, write_ob
 from .arguments import calibration_argument, json_option, output_option, yes_option
 from .destination import make_device
 from .loading import at_gravity_of, force_option, load_trusted
-from .options import check_source, source_options
 from .person import ask, say, say_done
+from .source_options import check_source, source_options
 
 EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`"
 
