@@ -101,7 +101,7 @@ _FOLDER = "folder:load_folder_of_recordings", "folder:is_folder_of_recordings"
 _BAG, _BAG_ROWS = "ros:load_bag", "ros:bag_rows"
 _ARRAYS = "arrays:load_arrays"
 FORMATS = (
-    *_others(".mcap", "a bag of ROS 2", _BAG, "ros:is_mcap_of_ros", _BAG_ROWS, only=False),
+    *_others(".mcap", "a bag of ROS 2", _BAG, "mcap:is_mcap_of_ros", _BAG_ROWS, only=False),
     Format(".mcap", "a capture", f"{_HERE}.capture:load_capture", f"{_HERE}.capture:capture_rows", session=CAPTURE),
     Format(".tlog", "a MAVLink log", f"{_HERE}.tlog:load_tlog", session=CAPTURE_OF_VEHICLE),
     Format(

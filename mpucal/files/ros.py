@@ -21,7 +21,7 @@ from ..data import Recording
 from ..errors import CaptureError, MpucalError, RecordingError
 from .hints import NO_HINTS, Hints
 from .imu import NOT_MEASURED
-from .mcap import CALIBRATED, FORMAT
+from .mcap import CALIBRATED, IMU, ROS1, profile
 from .reading import first_bytes, import_extra
 from .rows import Rows
 from .tables.cells import since_first
@@ -29,21 +29,8 @@ from .tables.streams import join_streams
 from .tables.times import Stream
 from .tables.units import COUNTS, NS, acceleration_unit
 
-IMU, IMU_OF_ROS1, ROS1 = "sensor_msgs/msg/Imu", "sensor_msgs/Imu", b"ros1"
-_HEADER = struct.Struct("<8xBQI")
+IMU_OF_ROS1 = "sensor_msgs/Imu"
 REMEDY = "give a bag with sensor_msgs/Imu"
-
-
-def is_mcap_of_ros(path: Path) -> bool:
-    """Return True if an MCAP file begins as one of ROS, and not as a capture."""
-    begun = first_bytes(path)
-    if len(begun) < _HEADER.size or FORMAT.encode() in begun[: _HEADER.size + 100]:
-        return False
-    return _profile(begun) in (b"ros2", ROS1) or IMU.encode() in begun
-
-
-def _profile(begun: bytes) -> bytes:
-    return begun[_HEADER.size :][: _HEADER.unpack_from(begun)[2]] if len(begun) >= _HEADER.size else b""
 
 
 def is_folder_of_ros(path: Path) -> bool:
@@ -78,7 +65,7 @@ def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     highlevel, typesys = (import_extra(f"rosbags.{name}", "ros", path) for name in ("highlevel", "typesys"))
     try:
-        if path.suffix.lower() == ".mcap" and _profile(first_bytes(path)) == ROS1:
+        if path.suffix.lower() == ".mcap" and profile(first_bytes(path)) == ROS1:
             topics, found = _read_ros1(path, typesys.get_typestore(typesys.Stores.ROS1_NOETIC), hints)
             return _recording(path, topics, found, hints)
         with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:

@@ -23,7 +23,8 @@ from ..session.ports import Note, Operator, ReplayedOperator, Source
 from .recorded_parts import RecordedParts
 
 if TYPE_CHECKING:
-    from ..files.mcap import Capture, CaptureWriter
+    from ..files.capture_writer import CaptureWriter
+    from ..files.mcap import Capture
 
 # Key of a capture's head: the source, to resume the session.
 SOURCE = "source"
@@ -146,7 +147,7 @@ class OpenedSource(ABC):
         ------
         CaptureError : a replay ended before its capture did.
         """
-        from ..files.mcap import CaptureWriter  # noqa: PLC0415 - --help records nothing
+        from ..files.capture_writer import CaptureWriter  # noqa: PLC0415 - --help records nothing
 
         with closing(self.line), CaptureWriter(capture) as writer:
             head = {"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()}

@@ -11,7 +11,8 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.doctor.finding import Mark
 from mpucal.doctor.measure import examine_stream
-from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.capture_writer import CaptureWriter
+from mpucal.files.mcap import read_capture
 from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.models import MODELS, FactoryTrim

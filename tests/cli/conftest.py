@@ -15,7 +15,7 @@ import pytest
 
 from mpucal.__main__ import run
 from mpucal.chip.records import SessionEvent
-from mpucal.files.mcap import CaptureWriter
+from mpucal.files.capture_writer import CaptureWriter
 from mpucal.files.messages import BUS, PACKETS
 from mpucal.mavlink import MAVLINK_VERSION
 from mpucal.mavlink.tlog import RawPacket

@@ -10,7 +10,7 @@ from mpucal.chip.access import Transaction
 from mpucal.disk.atomic import check_free
 from mpucal.disk.growing_file import GrowingFile
 from mpucal.errors import OutputError
-from mpucal.files.mcap import CaptureWriter
+from mpucal.files.capture_writer import CaptureWriter
 
 
 def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch):

@@ -12,9 +12,9 @@ from mpucal.chip.driver import Driver
 from mpucal.data import Recording, Samples
 from mpucal.errors import OutputError, RecordingError
 from mpucal.files import formats, open_rows, open_writer
+from mpucal.files.capture_writer import CaptureWriter
 from mpucal.files.csv import csv_rows
 from mpucal.files.formats import FORMATS, Format, readable_formats, writable_formats
-from mpucal.files.mcap import CaptureWriter
 from mpucal.files.rows import Rows
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.replay import Tap

@@ -30,9 +30,10 @@ from mpucal.chip.records import FORGET, SessionEvent
 from mpucal.data import Samples
 from mpucal.errors import CaptureError, OutputError, RecordingError
 from mpucal.files import capture as capture_module
-from mpucal.files import mcap, open_rows, protobuf
+from mpucal.files import capture_writer, mcap, open_rows, protobuf
 from mpucal.files.capture import Spool, capture_rows, load_capture
-from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.capture_writer import CaptureWriter
+from mpucal.files.mcap import read_capture
 from mpucal.files.messages import encode_accesses
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -69,7 +70,7 @@ def polls(count, period_ns=20_000_000, fifo=4):
 def killed_at_the_end(monkeypatch):
     """A capture's chunks as they are while it is written."""
     with monkeypatch.context() as as_killed:
-        as_killed.setattr(mcap, "CLOSED_CHUNK_NS", mcap.CHUNK_NS)
+        as_killed.setattr(capture_writer, "CLOSED_CHUNK_NS", capture_writer.CHUNK_NS)
         yield
 
 
@@ -107,7 +108,7 @@ def test_other_programs_read_it(path, monkeypatch):
     failed = Transaction("read", 0x38, 3, b"", 2_000_000_001, Failure("NoAnswer", "no answer of 0x68", "wire it"))
     heard = [replace(each, host_ns=each.t_ns + 7_000_000_000 - i) for i, each in enumerate(polls(200, fifo=14))]
     records = [*heard[:101], failed, *heard[101:], SessionEvent("key", 5_000_000_000, {"key": "enough"})]
-    monkeypatch.setattr(mcap, "CHUNK_NS", 5_000_000_000)
+    monkeypatch.setattr(capture_writer, "CHUNK_NS", 5_000_000_000)
     write(path, records)
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
@@ -133,7 +134,7 @@ def test_other_programs_read_it(path, monkeypatch):
 
 KILLED = """
 import sys
-from mpucal.files.mcap import CaptureWriter
+from mpucal.files.capture_writer import CaptureWriter
 from mpucal.chip.access import Transaction
 writers = []
 for count in map(int, sys.argv[1:]):
@@ -237,7 +238,7 @@ def test_what_is_no_capture_is_refused(path, content, says):
 @pytest.mark.parametrize("version", [1, 3])
 def test_a_capture_of_another_version_is_refused(path, version, monkeypatch):
     with monkeypatch.context() as other:
-        other.setattr(mcap, "VERSION", version)
+        other.setattr(capture_writer, "VERSION", version)
         write(path, polls(3))
     with pytest.raises(CaptureError, match=f"version {version}"):
         read_capture(path)
@@ -283,7 +284,7 @@ def test_many_accesses_at_once_are_decoded_as_one_by_one(capture, path, monkeypa
 
 @pytest.mark.parametrize("number", [5, 6], ids=["times", "times heard"])
 def test_a_message_whose_columns_do_not_fit_is_refused(path, number, monkeypatch):
-    monkeypatch.setattr(mcap, "encode_accesses", lambda accesses: message + protobuf.field(number, b"\2"))
+    monkeypatch.setattr(capture_writer, "encode_accesses", lambda accesses: message + protobuf.field(number, b"\2"))
     message = encode_accesses(Accesses.from_transactions(polls(3)))
     write(path, polls(3))
     with pytest.raises(CaptureError, match="an invalid message"):

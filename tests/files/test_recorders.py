@@ -8,7 +8,7 @@ from mpucal.chip.config import RateOnlyConfig
 from mpucal.data import Recording
 from mpucal.errors import CaptureError
 from mpucal.files import load, recorders
-from mpucal.files.mcap import CaptureWriter
+from mpucal.files.capture_writer import CaptureWriter
 from mpucal.sources.opening import open_source
 
 META = {"driver": "pigeon 2", "plan": {"config": {"rate_hz": 50.0}}}

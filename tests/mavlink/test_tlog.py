@@ -14,7 +14,7 @@ from mpucal.__main__ import run
 from mpucal.chip.records import END, SessionEvent
 from mpucal.data import Samples
 from mpucal.errors import CaptureError, EndOfCapture, RecordingError
-from mpucal.files.mcap import CaptureWriter
+from mpucal.files.capture_writer import CaptureWriter
 from mpucal.files.messages import PACKETS
 from mpucal.files.tlog import read_tlog
 from mpucal.mavlink.dialect import dialect

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from mpucal.files.mcap import CaptureWriter
+from mpucal.files.capture_writer import CaptureWriter
 from mpucal.files.messages import PACKETS
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.transports import open_transport

@@ -25,7 +25,8 @@ from mpucal.chip.records import SessionEvent
 from mpucal.cli.running import open_runner
 from mpucal.data import Recording
 from mpucal.errors import EndOfCapture, SourceError
-from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.capture_writer import CaptureWriter
+from mpucal.files.mcap import read_capture
 from mpucal.session.events import Key, Output, Progress
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_simulated
