@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
 from .reading import HELD, check_size, first_bytes, import_extra, reading
 from .tables.array_table import table_of_arrays, tables_of_arrays
+from .tables.cells import is_number
+from .tables.guess import is_clock
 from .tables.labelled import pivot
 from .tables.load import recording_from_table
 from .tables.phone import is_pair, recording_of_tables
@@ -102,12 +104,14 @@ def _read_json(path: Path) -> Arrays:
 
 def _json_arrays(name: str, value: Any) -> Arrays:
     """Yield name and array of the numbers in a value of JSON; of a list of objects, a column for each key."""
-    if isinstance(value, list) and any(isinstance(row, dict) for row in value):
-        rows = [row if isinstance(row, dict) else {} for row in value]
-        value = {key: [row.get(key) for row in rows] for key in dict.fromkeys(chain(*rows))}
-    if isinstance(value, dict) and value and all(key.isdecimal() for key in value):
-        # a column of pandas, by its index
+    if isinstance(value, dict) and value and all(map(is_number, value)):
+        # a table of pandas, or a column, by its index
+        if not all(map(str.isdecimal, value)) or is_clock(np.array([*value], float) - np.arange(len(value))):
+            yield from _json_arrays("index_time", [*value])
         value = list(value.values())
+    if isinstance(value, list) and any(isinstance(row, dict) for row in value):
+        rows = [each for row in value for each in _samples(row if isinstance(row, dict) else {})]
+        value = {key: [row.get(key) for row in rows] for key in dict.fromkeys(chain(*rows))}
     if isinstance(value, dict):
         if {"sensors", "values"} <= value.keys():
             # Edge Impulse's data acquisition format
@@ -127,6 +131,13 @@ def _json_arrays(name: str, value: Any) -> Arrays:
         if array.dtype.kind in "iufM" or kind is str:
             yield name, array
             return
+
+
+def _samples(row: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the samples of an object that holds lists of objects, as a packet does, or else the object alone."""
+    lists = {key: each for key, each in row.items() if isinstance(each, list) and each and isinstance(each[0], dict)}
+    several = zip_longest(*lists.values())
+    return [{**row, **dict(zip(lists, sample, strict=True))} for sample in several] if lists else [row]
 
 
 def _read_parquet(path: Path) -> Arrays:

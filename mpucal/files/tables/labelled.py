@@ -175,8 +175,10 @@ def pivot(table: Table) -> Table | None:
     Lines of one time are a sample.
     """
     for place in table.places(Kind.WORD):
-        words = [word for word in dict.fromkeys(table.cells[place]) if word and not WITHOUT_GRAVITY.match(word)]
-        names = {word: [word] if parse_header([word]) else axes_of(word) for word in words[:MOST_WORDS]}
+        words = [word for word in dict.fromkeys(table.cells[place]) if word][:MOST_WORDS]
+        # linear_acceleration.x is ROS's, which contains gravity
+        names = {word: [word] for word in words if parse_header([word])}
+        names |= {word: axes_of(word) for word in words if word not in names and not WITHOUT_GRAVITY.match(word)}
         if _names_both(list(chain(*names.values()))):
             break
     else:

@@ -73,10 +73,11 @@ _AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 _CLOCK = re.compile(r"(?<![a-z])(?:time|timestamp|stamp|millis|micros|date)(?![a-z])")
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
+_TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)").fullmatch
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 _UNIT_TAIL = re.compile(
-    r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|dps|mdps|mps2|m_s2|m/s2|ms2|rad_s|rads|rad|deg_s|degs|deg"
-    r"|deg_per_s|rad_per_s|deg_h|deg_hr)"
+    r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|ug|dps|mdps|udps|mps2|m_s2|m/s2|ms2|cm_s2|mm_s2|ft_s2|rad_s"
+    r"|rads|rad|deg_s|degs|deg|deg_per_s|rad_per_s|deg_h|deg_hr|rpm)"
 )
 
 
@@ -166,6 +167,8 @@ def _split_axis(word: str, axis: int) -> list[tuple[str, int]]:
             found.append((stem[:-1], "xyz".index(stem[-1])))
     if word[:1] in ("x", "y", "z"):
         found.append((word[1:], "xyz".index(word[0])))
+    if turn := _TURN(word):
+        found.append(("rotationrate", ("roll", "pitch", "yaw").index(turn[1])))
     return found
 
 

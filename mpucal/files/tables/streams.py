@@ -24,6 +24,9 @@ ANOTHER_RANGE = 0.5
 OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
+# |a| of whole numbers below which cm/s^2 are nearer than mg; e-fold within which |a| is 1 g in mm/s^2, not 8192 counts,
+# and within which rates turn gravity as hundredths of deg/s, not as 131 counts for 1 deg/s
+CM_BELOW, NEAR = math.sqrt(1000.0 * 100.0 * STANDARD_GRAVITY_MPS2), 0.08
 # quartile distance of |a| over its median, beyond which the median is that of a motion
 SHAKING = 0.25
 
@@ -108,10 +111,11 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         w = Reading.of(rates, math.nan, left_out)
     else:
         rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
-        if rate_of.are_whole_mrad and _are_whole_mg(acc, values) and not hints.units.keys() & OF_BNO055.keys():
-            hints = replace(hints, units={**hints.units, **OF_BNO055})
+        named = hints.units.keys() & OF_BNO055.keys() or not _are_whole_mg(acc, values)
+        if not named and (whole := rate_of.whole_units()):
+            hints = replace(hints, units={**hints.units, **whole[0]})
             rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
-            remarks = [*remarks, "these may be the counts of a BNO055, or else --units acc=mg,gyr=mrad/s"]
+            remarks = [*remarks, whole[1]]
         a = _accelerations(values, acc.unit, hints, name, beside_counts=rate_of.show_counts)
         w = rate_of.read(beside_counts=a.said.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
@@ -193,9 +197,13 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
             f"{name}: the accelerations turn about {', '.join(f'{at:.4g}' for at in centre)} in place of zero",
             "subtract from each axis what its converter gives at 0 g, such as half of its range",
         )
-    size, seen = units.typical_size(values)[0], units.acceleration_unit(values)
+    size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
     unclear = not seen or hints.accel_range_g or (beside_counts and seen == "mg")
-    if said == COUNTS or (not said and unclear and units.are_counts(values)):
+    whole = not said and units.are_counts(values)
+    of_mm = abs(math.log(size * QUANTITIES["acc"]["mm/s^2"] / STANDARD_GRAVITY_MPS2)) if size else math.inf
+    if whole and of_mm < NEAR and not beside_counts and not hints.accel_range_g:
+        return Reading.of(values, QUANTITIES["acc"]["mm/s^2"], "in mm/s^2 (by |a|, if 1 g is not 10000)")
+    if said == COUNTS or (whole and unclear):
         return _scaled_counts(values, hints, name, size)
     near = "" if seen or said else units.mean_acceleration_unit(values)
     if near:
@@ -213,7 +221,8 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
     likely = likely or not (values == np.rint(values)).all()
     seen = hints.units.get("acc", (seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
-    return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}")
+    cm = " (|a| fits --units acc=cm/s^2 better)" if whole and unit == "mg" and size < CM_BELOW else ""
+    return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}{cm}")
 
 
 def _scaled_counts(values: Vector, hints: Hints, name: str, size: float) -> Reading:
@@ -245,7 +254,7 @@ class _Rates:
         self._t, self._acc, self._values, self._hints, self._name = t, acc, values, hints, name
         self._said = hints.units.get("gyr", stream.unit)
         self._factor = units.rate_factor(t, acc, values)
-        self._seen = hints.units.get("gyr", units.gyro_unit(self._factor))
+        self._seen = hints.units.get("gyr", units.gyro_unit(self._factor, self._said))
         self._whole = not self._said and units.are_counts(stream.values[stream.complete])
 
     @property
@@ -253,10 +262,21 @@ class _Rates:
         """Return True if they are whole numbers that turn gravity as rates in no unit do."""
         return self._whole and bool(self._factor and not self._seen)
 
-    @property
-    def are_whole_mrad(self) -> bool:
-        """Return True if they are whole numbers that turn gravity as rates in mrad/s do."""
-        return self._whole and self._seen == "mrad/s"
+    def whole_units(self) -> tuple[dict[str, str], str] | None:
+        """Return the units of both sensors, beside accelerations that seem to be in whole mg, and a remark on them.
+
+        None if these rates are no whole numbers, or in no such unit.
+        """
+        if not self._whole or not self._factor:
+            return None
+        if self._seen == "mrad/s":
+            return OF_BNO055, "these may be the counts of a BNO055, or else --units acc=mg,gyr=mrad/s"
+        hundredths = "deg/s/100"
+        if abs(math.log(abs(self._factor) / QUANTITIES["gyr"][hundredths])) > NEAR:
+            return None
+        likely, other = ("cm/s^2", "mg")[:: 1 if units.typical_size(self._acc)[0] < CM_BELOW else -1]
+        of_both = {"acc": likely, "gyr": hundredths}
+        return of_both, f"|a| suggests these units, or else --units acc={other},gyr={hundredths}"
 
     def read(self, *, beside_counts: bool) -> Reading:
         """Return them in SI units; `beside_counts` if the accelerations are counts."""

@@ -24,6 +24,8 @@ from .units import find_unit
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 # lines that may precede the header: a sketch's greeting, `sep=;`, the settings that Betaflight's Explorer writes
 PREAMBLE = 200
+# lines below the header that hold no numbers
+MORE_HEADS = 3
 # characters within which the names of columns begin
 HEAD = 4096
 # a header may begin with such a mark; any other line that does is a comment
@@ -43,6 +45,8 @@ MONITORED = re.compile(
 )
 # colours of a terminal, and the checksums of sentences as of NMEA 0183
 _MARKS = re.compile(r"\x1b\[[0-9;]{0,9}m|\*[0-9A-F]{2}(?=\r?$)", re.MULTILINE)
+# of Fortran's double precision
+_EXPONENT = re.compile(r"(?<=\d)D(?=[-+]\d\d)")
 # a number and its unit in one cell
 _WITH_UNIT = re.compile(r"[-+.\d][-+.,\deE]*( ?[^-+.,\d\s][^\d]{0,9}\d?)").fullmatch
 _NUMBER_OR_MOMENT = re.compile(rf"(?<![\w.])(?:{MOMENT}|{NUMBER})(?!\w)")
@@ -82,7 +86,7 @@ def decode_text(data: bytes, name: str) -> str:
     if "\n" not in text:
         text = text.replace("\r", "\n")
     head = _QUOTED.sub(lambda quoted: " ".join(quoted[0].split("\n")), text[:HEAD])
-    text = _MARKS.sub("", head + text[HEAD:])
+    text = _EXPONENT.sub("E", _MARKS.sub("", head + text[HEAD:]))
     begun = text[:HEAD].rstrip("\n")
     stamped = [*MONITORED.finditer(begun)]
     if 2 * len(stamped) <= begun.count("\n"):
@@ -134,7 +138,7 @@ def _are_numbers(cells: Cells, following: Cells) -> bool:
     """
     alike = [is_number(one) and is_number(other) for one, other in zip(cells, following, strict=False)]
     words = (two for *two, number in zip(cells, following, alike, strict=False) if not number)
-    marked = all(one == other or axes_of(one) for one, other in words)
+    marked = all(one == other or axes_of(one) or parse_header([one]) for one, other in words)
     return sum(alike) >= len("xyz") * (1 if marked else 2) and len(following) == len(cells)
 
 
@@ -233,10 +237,11 @@ def read_table(text: str, name: str, header: Cells, first: int, separator: str |
     if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]):
         # the logger was switched off
         rows[-1] = []
-    units = [cell.strip(" ()[]") for cell in rows[0]] if rows else []
-    if any(map(find_unit, units)) and not any(map(is_number, units)):
-        pairs = zip_longest(header, units, fillvalue="")
-        header = [f"{of} ({unit})" if unit else of for of, unit in pairs]
+    while header and rows and not any(map(is_number, rows[0])) and lines[0] <= first + MORE_HEADS:
+        # units, the name of pandas' index, or what a program says of each column
+        more = [cell.strip(" ()[]") for cell in rows[0]]
+        has_units, pairs = any(map(find_unit, more)), zip_longest(header, more, fillvalue="")
+        header = [f"{of} ({cell})" if of and cell and has_units else of or cell for of, cell in pairs]
         rows, lines = rows[1:], lines[1:]
     remarks = [] if separator == "," else [f"its cells are separated by {SEPARATORS[separator]}"]
     table = table_of_rows(name, header, rows, lines, *remarks)

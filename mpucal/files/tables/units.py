@@ -26,6 +26,9 @@ QUANTITIES = {
         "g": STANDARD_GRAVITY_MPS2,
         "mg": STANDARD_GRAVITY_MPS2 / 1000,
         "cm/s^2": 0.01,
+        "mm/s^2": 0.001,
+        "ft/s^2": 0.3048,
+        "ug": STANDARD_GRAVITY_MPS2 / 1e6,
         COUNTS: math.nan,
     },
     "gyr": {
@@ -34,10 +37,15 @@ QUANTITIES = {
         "mdeg/s": math.radians(1e-3),
         "mrad/s": 1e-3,
         "deg/h": math.radians(1 / 3600),
+        "rpm": math.radians(6),
+        "udeg/s": math.radians(1e-6),
         "deg/s/16": math.radians(1 / 16),
+        "deg/s/100": math.radians(1 / 100),
         COUNTS: math.nan,
     },
 }
+# the units that samples show without a name; the others are too near to these, to counts, or to a magnetic field in uT
+SHOWN = {"acc": ("m/s^2", "g", "mg"), "gyr": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h")}
 # the counts of a BNO055 (BST-BNO055-DS000, UNIT_SEL 0), which samples hardly tell from mg and mrad/s
 OF_BNO055 = {"acc": "cm/s^2", "gyr": "deg/s/16"}
 _SPELLED = {
@@ -49,13 +57,19 @@ _SPELLED = {
     "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/(s2) m/s**2 meters/second2 m/sec2",
     "g": "g gs g's g-force gforce gee g0",
     "mg": "mg milli-g millig",
-    "cm/s^2": "cm/s2 gal",
+    "cm/s^2": "cm/s2 cms2 gal",
+    "mm/s^2": "mm/s2 mms2",
+    "ft/s^2": "ft/s2 fts2 ft/s/s feet/s2",
+    "ug": "ug micro-g microg",
     "rad/s": "rad/s radpers rads-1 radps rads rad/sec radians/s rps rad",
     "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s degrees/sec deg",
     "mdeg/s": "mdeg/s mdps",
     "mrad/s": "mrad/s",
     "deg/h": "deg/h deg/hr degh deghr",
+    "rpm": "rpm rev/min",
+    "udeg/s": "udeg/s udps",
     "deg/s/16": "deg/s/16",
+    "deg/s/100": "deg/s/100",
     COUNTS: "counts count lsb raw adc",
 }
 _NAMES = {spelled: unit for unit, words in _SPELLED.items() for spelled in words.split()}
@@ -108,8 +122,8 @@ def time_unit(step: float, said: str = "") -> str:
     return next((unit for unit, s in units if 1 / FASTEST_HZ <= step * s <= 1 / SLOWEST_HZ), "")
 
 
-def acceleration_unit(acc: Vector) -> str:
-    """Return the unit in which the median of (n, 3) accelerations is gravity; empty if there is none.
+def acceleration_unit(acc: Vector, said: str = "") -> str:
+    """Return the unit in which the median of (n, 3) accelerations is gravity, first that `said`; empty if none is.
 
     Without gravity, |a| of a hand scatters by more than half of its median.
     """
@@ -118,8 +132,9 @@ def acceleration_unit(acc: Vector) -> str:
     size, scatter = typical_size(acc)
     if scatter > SCATTER * size:
         return ""
-    units = ((unit, si) for unit, si in QUANTITIES["acc"].items() if unit != OF_BNO055["acc"])
-    return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
+    units = (*filter(None, [said]), *SHOWN["acc"])
+    of_g = {unit: size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2 for unit in units}
+    return next((unit for unit, ratio in of_g.items() if LEAST_OF_G <= ratio <= MOST_OF_G), "")
 
 
 def mean_acceleration_unit(values: Vector) -> str:
@@ -211,8 +226,7 @@ def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
 def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
     """Return the sample rate at which (n, 3) rates in `unit`, or in the only likely one, turn gravity; else None."""
     fastest = float(np.percentile(np.abs(gyr), 99))
-    known = QUANTITIES["gyr"].items()
-    shown = (si for name, si in known if name != OF_BNO055["gyr"] and fastest * si < FASTEST_RAD_S)
+    shown = (si for name in SHOWN["gyr"] if fastest * (si := QUANTITIES["gyr"][name]) < FASTEST_RAD_S)
     units = [QUANTITIES["gyr"][unit]] if unit else [*shown]
     likely = []
     for si in units:
@@ -225,9 +239,9 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
     return likely[0] if len(likely) == 1 else None
 
 
-def gyro_unit(factor: float | None) -> str:
-    """Return the unit of rates with this rate_factor; empty if there is none."""
-    units = {unit: si for unit, si in QUANTITIES["gyr"].items() if unit not in (COUNTS, OF_BNO055["gyr"])}
+def gyro_unit(factor: float | None, said: str = "") -> str:
+    """Return the unit of rates with this rate_factor, first that `said`; empty if there is none."""
+    units = {unit: QUANTITIES["gyr"][unit] for unit in (*filter(None, [said]), *SHOWN["gyr"])}
     return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
 
 

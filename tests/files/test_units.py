@@ -1,0 +1,128 @@
+"""Units and layouts of tables that few programs write: each gives the samples back."""
+
+import json
+import math
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mpucal
+
+G = 9.80665
+NAMES = [f"{of}_{axis}" for of in ("acc", "gyr") for axis in "xyz"]
+TWO_PERCENT = 0.02
+
+
+@pytest.fixture
+def ms(walk):
+    return np.rint(1e3 * (walk.t - walk.t[0]))
+
+
+def same(found, walk, rtol=1e-6, gyr_atol=1e-6):
+    np.testing.assert_allclose(found.acc, walk.acc, rtol=rtol, atol=1e-2)
+    np.testing.assert_allclose(found.gyr, walk.gyr, rtol=rtol, atol=gyr_atol)
+
+
+@pytest.mark.parametrize(
+    ("acc", "mps2", "gyr", "rad_s"),
+    [
+        ("ug", G / 1e6, "udps", math.radians(1e-6)),
+        ("ft_s2", 0.3048, "rpm", math.tau / 60),
+        ("cm_s2", 0.01, "dps", math.radians(1)),
+        ("mm_s2", 0.001, "rad_s", 1.0),
+    ],
+)
+def test_named_units(acc, mps2, gyr, rad_s, walk, ms, tmp_path):
+    names = [f"a{axis}_{acc}" for axis in "xyz"] + [f"g{axis}_{gyr}" for axis in "xyz"]
+    made = pd.DataFrame(np.column_stack([walk.acc / mps2, walk.gyr / rad_s]), columns=names)
+    made.insert(0, "ms", ms)
+    made.to_csv(tmp_path / "a.csv", index=False)
+    same(mpucal.load(tmp_path / "a.csv"), walk)
+
+
+@pytest.mark.parametrize(
+    ("mps2", "rad_s", "says"),
+    [
+        (0.001, 0.001, r"accelerations in mm/s\^2 .* and rates in mrad/s"),
+        (0.01, math.radians(0.01), r"accelerations in (mg|cm/s\^2) and rates in deg/s/100.* or else --units acc="),
+    ],
+)
+def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, tmp_path):
+    """Tell them from counts, and name the units that |a| cannot tell from these."""
+    made = pd.DataFrame(np.rint(np.column_stack([walk.acc / mps2, walk.gyr / rad_s])).astype(int), columns=NAMES)
+    made.insert(0, "ms", ms)
+    made.to_csv(tmp_path / "a.csv", index=False)
+    found = mpucal.load(tmp_path / "a.csv")
+    assert re.search(says, found.taken), found.taken
+    same(found, walk, TWO_PERCENT, rad_s)
+
+
+def test_counts_stay_counts(walk, ms, tmp_path):
+    counts = np.column_stack([walk.acc * 8192 / G, np.rad2deg(walk.gyr) * 65.536])
+    made = pd.DataFrame(np.rint(counts).astype(int), columns=NAMES)
+    made.insert(0, "ms", ms)
+    made.to_csv(tmp_path / "a.csv", index=False)
+    found = mpucal.load(tmp_path / "a.csv")
+    assert "counts of ±4 g" in found.taken
+    same(found, walk, 1e-3, 1e-3)
+
+
+@pytest.mark.parametrize("orient", ["columns", "index"])
+def test_pandas_json_with_times_as_its_index(orient, walk, tmp_path):
+    made = pd.DataFrame(np.column_stack([walk.acc, walk.gyr]), columns=NAMES, index=walk.t - walk.t[0])
+    made.to_json(tmp_path / "a.json", orient=orient, double_precision=15)
+    found = mpucal.load(tmp_path / "a.json")
+    same(found, walk)
+    np.testing.assert_allclose(np.diff(found.t), np.diff(walk.t), atol=1e-9)
+
+
+def test_packets_of_samples_in_json(walk, tmp_path):
+    """Read one time and lists of samples for each packet, as of Movesense."""
+    size = 8
+    packets = [
+        {
+            "Timestamp": round(1e3 * float(walk.t[i])),
+            "ArrayAcc": [dict(zip("xyz", row, strict=True)) for row in walk.acc[i : i + size].tolist()],
+            "ArrayGyro": [dict(zip("xyz", row, strict=True)) for row in walk.gyr[i : i + size].tolist()],
+        }
+        for i in range(0, len(walk) - size + 1, size)
+    ]
+    (tmp_path / "a.json").write_text(json.dumps([{"data": {"imu": packet}} for packet in packets]))
+    found = mpucal.load(tmp_path / "a.json", units="t=ms,gyr=rad/s")
+    n = size * len(packets)
+    np.testing.assert_allclose(found.acc, walk.acc[:n])
+
+
+def test_two_lines_of_names_and_that_of_the_index(walk, tmp_path):
+    names = pd.MultiIndex.from_product([["accel", "gyro"], list("xyz")])
+    made = pd.DataFrame(np.column_stack([walk.acc, walk.gyr]), columns=names, index=pd.Index(walk.t, name="time"))
+    made.to_csv(tmp_path / "a.csv")
+    same(mpucal.load(tmp_path / "a.csv"), walk)
+
+
+def test_lines_below_the_names_that_hold_no_numbers(walk, ms, tmp_path):
+    """Read what Shimmer's program says of each column, and then its unit."""
+    heads = [["Timestamp", *NAMES], ["CAL"] * 7, ["ms", *["m/(s^2)"] * 3, *["deg/s"] * 3]]
+    rows = np.column_stack([ms, walk.acc, np.rad2deg(walk.gyr)]).tolist()
+    (tmp_path / "a.csv").write_text("\n".join(",".join(map(str, row)) for row in [*heads, *rows]) + "\n")
+    same(mpucal.load(tmp_path / "a.csv"), walk)
+
+
+def test_lines_of_a_value_called_by_its_path(walk, tmp_path):
+    """Read Foxglove's export, in which linear_acceleration is ROS's and contains gravity."""
+    paths = [f"/imu.{of}.{axis}" for of in ("linear_acceleration", "angular_velocity") for axis in "xyz"]
+    samples = zip(walk.t.tolist(), np.column_stack([walk.acc, walk.gyr]).tolist(), strict=True)
+    lines = [f"{t},{1e9 + t},{path},{of}" for t, row in samples for path, of in zip(paths, row, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["elapsed,receive_time,topic,value", *lines]) + "\n")
+    same(mpucal.load(tmp_path / "a.csv"), walk)
+
+
+def test_rates_called_after_turns_and_exponents_of_fortran(walk, tmp_path):
+    """Read rates in the order yaw, pitch, roll; a velocity along x is none."""
+    rows = np.column_stack([walk.t, walk.acc, walk.gyr[:, ::-1], walk.gyr[:, :1]])
+    text = "\n".join(" ".join(f"{value:.12E}" for value in row) for row in rows).replace("E", "D")
+    names = "time acc_x acc_y acc_z yaw_rate pitch_rate roll_rate x_vel"
+    (tmp_path / "a.txt").write_text(f"{names}\n{text}\n")
+    same(mpucal.load(tmp_path / "a.txt"), walk)
