@@ -47,6 +47,7 @@ def test_named_units(acc, mps2, gyr, rad_s, walk, ms, tmp_path):
     [
         (0.001, 0.001, r"accelerations in mm/s\^2 .* and rates in mrad/s"),
         (0.01, math.radians(0.01), r"accelerations in (mg|cm/s\^2) and rates in deg/s/100.* or else --units acc="),
+        (G / 1000, math.radians(0.1), r"accelerations in (mg|cm/s\^2) and rates in deg/s/10.* or else --units acc="),
     ],
 )
 def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, tmp_path):

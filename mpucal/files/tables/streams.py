@@ -25,7 +25,7 @@ OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # |a| of whole numbers below which cm/s^2 are nearer than mg; e-fold within which |a| is 1 g in mm/s^2, not 8192 counts,
-# and within which rates turn gravity as hundredths of deg/s, not as 131 counts for 1 deg/s
+# and within which rates turn gravity as tenths or hundredths of deg/s, not as 8 or 131 counts for 1 deg/s
 CM_BELOW, NEAR = math.sqrt(1000.0 * 100.0 * STANDARD_GRAVITY_MPS2), 0.08
 # quartile distance of |a| over its median, beyond which the median is that of a motion
 SHAKING = 0.25
@@ -271,12 +271,12 @@ class _Rates:
             return None
         if self._seen == "mrad/s":
             return OF_BNO055, "these may be the counts of a BNO055, or else --units acc=mg,gyr=mrad/s"
-        hundredths = "deg/s/100"
-        if abs(math.log(abs(self._factor) / QUANTITIES["gyr"][hundredths])) > NEAR:
+        decimal = {of: abs(math.log(abs(self._factor) / QUANTITIES["gyr"][of])) for of in ("deg/s/10", "deg/s/100")}
+        of = min(decimal, key=decimal.__getitem__)
+        if decimal[of] > NEAR:
             return None
         likely, other = ("cm/s^2", "mg")[:: 1 if units.typical_size(self._acc)[0] < CM_BELOW else -1]
-        of_both = {"acc": likely, "gyr": hundredths}
-        return of_both, f"|a| suggests these units, or else --units acc={other},gyr={hundredths}"
+        return {"acc": likely, "gyr": of}, f"|a| suggests these units, or else --units acc={other},gyr={of}"
 
     def read(self, *, beside_counts: bool) -> Reading:
         """Return them in SI units; `beside_counts` if the accelerations are counts."""

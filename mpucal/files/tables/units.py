@@ -40,6 +40,7 @@ QUANTITIES = {
         "rpm": math.radians(6),
         "udeg/s": math.radians(1e-6),
         "deg/s/16": math.radians(1 / 16),
+        "deg/s/10": math.radians(1 / 10),
         "deg/s/100": math.radians(1 / 100),
         COUNTS: math.nan,
     },
@@ -69,6 +70,7 @@ _SPELLED = {
     "rpm": "rpm rev/min",
     "udeg/s": "udeg/s udps",
     "deg/s/16": "deg/s/16",
+    "deg/s/10": "deg/s/10",
     "deg/s/100": "deg/s/100",
     COUNTS: "counts count lsb raw adc",
 }
