@@ -108,8 +108,13 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     std = np.hypot(a.b_omega_std, b.b_omega_std)
     gyroscope = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
     margin = RESERVED if _has_reservations(a) or _has_reservations(b) else 1.0
-    freedom = FREEDOM_OF_A_HAND if "hand" in (a.fit.get("model"), b.fit.get("model")) else math.inf
+    freedom = degrees_of_freedom(a.fit.get("model"), b.fit.get("model"))
     return Comparison(tuple(numbers), tuple(gyroscope), tuple(_remarks(a, b)), margin, freedom)
+
+
+def degrees_of_freedom(*models: str | None) -> float:
+    """Return the degrees of freedom of the uncertainties of calibrations by these models."""
+    return FREEDOM_OF_A_HAND if "hand" in models else math.inf
 
 
 def limit_of(count: int, freedom: float = math.inf) -> float:

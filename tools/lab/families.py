@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -21,7 +22,7 @@ import numpy as np
 import mpucal
 from mpucal.errors import MpucalError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
-from mpucal.result.comparison import FREEDOM_OF_A_HAND, limit_of
+from mpucal.result.comparison import degrees_of_freedom, limit_of
 
 from .judge import judged, judgement, rms
 from .runner import Trial
@@ -96,10 +97,18 @@ def told_apart(runs: Sequence[Row]) -> float:
 
     The difference of two has the errors of both; they are compared as if both claimed as much.
     """
-    z = [np.array(run.z) for run in runs if run.verdict == GOOD]
-    farthest = [float(np.abs(one - other).max()) for one, other in combinations(z, 2)]
-    limit = math.sqrt(2.0) * limit_of(len(z[0]), FREEDOM_OF_A_HAND) if z else math.nan
-    return float(np.mean(np.array(farthest) > limit)) if farthest else math.nan
+    good = [run for run in runs if run.verdict == GOOD]
+    apart = [
+        np.abs(np.subtract(one.z, other.z)).max() > math.sqrt(2.0) * _limit(one.model, other.model)
+        for one, other in combinations(good, 2)
+    ]
+    return float(np.mean(apart)) if apart else math.nan
+
+
+@cache
+def _limit(*models: str) -> float:
+    """Return the limit of |z| of one of twelve numbers, of calibrations by these models."""
+    return limit_of(12, degrees_of_freedom(*models))
 
 
 COLUMNS: dict[str, Column] = {
