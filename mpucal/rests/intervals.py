@@ -122,7 +122,9 @@ def gravity_turns(recording: Recording, runs: Intervals) -> Vector:
     size2 = np.sum(one**2, axis=1)
     # An accelerometer that reads only zeros shows no gravity, and so no rest.
     angle2 = np.divide(away2, size2, out=np.full(len(size2), np.inf), where=size2 > 0.0)
-    return np.asarray(np.sqrt(np.maximum(angle2, 0.0)) / (recording.t[last - n] - recording.t[first]))
+    seconds = recording.t[last - n] - recording.t[first]  # 0 in a run of one sample: it may turn at any rate
+    angle = np.sqrt(np.maximum(angle2, 0.0))
+    return np.asarray(np.divide(angle, seconds, out=np.full(len(runs), np.inf), where=seconds > 0.0))
 
 
 def statistics(values: Vector, runs: Intervals) -> tuple[Vector, Vector]:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.gyro_drift import remove_drift
-from mpucal.rests.intervals import RestFinder
+from mpucal.rests.intervals import RestFinder, gravity_turns
 from mpucal.rests.limits import ANY_HAND
 
 
@@ -60,6 +60,11 @@ def test_a_recording_shorter_than_a_window_or_of_zeros_has_no_rests(n, g):
     recording = Recording.from_arrays(0.01 * np.arange(n), np.full((n, 3), g), gyr)
     with np.errstate(all="raise"):
         assert len(RestFinder(recording, flat_statistics(recording, (0, n // 2))).typical()) == 0
+
+
+def test_a_run_of_one_sample_may_turn_at_any_rate(in_hand):
+    turns = gravity_turns(in_hand.recording, np.array([[10, 11], [10, 400]]))
+    assert turns[0] == np.inf and np.isfinite(turns[1])
 
 
 @pytest.mark.parametrize(
