@@ -150,7 +150,7 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
 def _fit(
     recording: Recording, flat: Flat, gravity: float, model: str
 ) -> tuple[ModelChoice, list[Explanation], tuple[Explanation, ...]]:
-    """Return the fit without changes of the gyroscope's bias during the turning, what explains the rest, and these."""
+    """Return the fit without changes of the gyroscope's bias during the turning, what explains the rest, and them."""
     choice, found = _fit_once(recording, flat, gravity, model)
     walks: tuple[Explanation, ...] = ()
     for _ in range(MOST_CHANGES):

@@ -28,7 +28,7 @@ class Slip(NamedTuple):
     """Slip of the mount.
 
     span : (2,) s after the flat segment, between which it happened. delta : (3,) rad, rotation of the accelerometer.
-    transitions : those in which it was found, with the misses that it leaves.
+    transitions : all of them, with the misses that remain after the slip.
     """
 
     span: tuple[float, float]
@@ -71,9 +71,10 @@ def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> 
 
 
 def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the log likelihoods (m,) of misses + A x by Student's t, at the likeliest x, these x (m, r), and the sums.
+    """Return the log likelihoods (m,) of misses + A x by Student's t, at the likeliest x, these x (m, r), and the
+    misses that remain (m, k, 3).
 
-    A : (m, k, 3, r). The sums (m, k, 3) are the misses that x leaves.
+    A : (m, k, 3, r).
     """
     misses = np.array([each.miss for each in transitions])
     known = np.array([each.variance for each in transitions])

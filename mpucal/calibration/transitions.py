@@ -85,8 +85,8 @@ def each_variance(transitions: Sequence[Transition]) -> tuple[Vector, Vector]:
     It is as often large as Student's t says: a transition in which the sensor met the table misses by several times
     what the others do, and no change of the sensor is needed to explain it.
 
-    The second value (k,) is by how much less the acceleration counts there, which would say else how the board turned;
-    in a lost transition it alone does.
+    The second value (k,) is the factor by which the acceleration's weight is reduced in each transition; otherwise the
+    acceleration would decide how the board turned. In a lost transition it is 1: only the acceleration shows the turn.
     """
     known, c, weight = _scales(transitions, 0.0)
     return (1.0 + (c - 1.0) / weight) * known, np.where(weight < WORTHLESS, 1.0, np.minimum(weight, 1.0))

@@ -20,13 +20,14 @@ from .npz import DAMAGED, NEEDED
 from .reading import HELD, check_size, first_bytes, import_extra, reading
 from .tables.array_table import table_of_arrays, tables_of_arrays
 from .tables.cells import is_number
-from .tables.guess import is_clock
 from .tables.labelled import pivot
 from .tables.load import recording_from_table
 from .tables.phone import is_pair, recording_of_tables
 
 _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is what with --columns t=NAME,ax=NAME,..."
 Arrays = Iterator[tuple[str, NDArray[Any]]]
+# name of an index of times, and the least whole number in it that is a time (s since 1970), not the number of a row
+INDEX, EPOCH_S = "index_time", 1e9
 # numbers at the beginning of a document of JSON beyond which it holds samples, not settings
 FEWEST_NUMBERS = 200
 _IS_OWN = b'"D":', b'"b_a":'
@@ -99,15 +100,21 @@ def _read_json(path: Path) -> Arrays:
         # an object on each line, of which the last may be torn
         lines = [line for line in text.split("\n") if line.strip()]
         document = [json.loads(line) for line in lines[: len(lines) if text.endswith("\n") else -1]]
-    return _json_arrays("", document)
+    arrays = [*_json_arrays("", document)]
+    indices = [array for name, array in arrays if name == INDEX]
+    if any(not np.array_equal(index, indices[0]) for index in indices):
+        raise RecordingError(
+            f"{path}: its columns have different indices", "export one table, in which all columns have one index"
+        )
+    return iter(arrays)
 
 
 def _json_arrays(name: str, value: Any) -> Arrays:
     """Yield name and array of the numbers in a value of JSON; of a list of objects, a column for each key."""
     if isinstance(value, dict) and value and all(map(is_number, value)):
-        # a table of pandas, or a column, by its index
-        if not all(map(str.isdecimal, value)) or is_clock(np.array([*value], float) - np.arange(len(value))):
-            yield from _json_arrays("index_time", [*value])
+        # a table of pandas, or a column, by its index: small whole numbers count the rows
+        if not all(map(str.isdecimal, value)) or float(next(iter(value))) >= EPOCH_S:
+            yield from _json_arrays(INDEX, [*value])
         value = list(value.values())
     if isinstance(value, list) and any(isinstance(row, dict) for row in value):
         rows = [each for row in value for each in _samples(row if isinstance(row, dict) else {})]

@@ -25,9 +25,7 @@ from ..chip.records import SessionEvent
 from ..errors import CaptureError
 from ..mavlink.tlog import RawPacket
 from ..strict_json import parse_own_json
-from .messages import (
-    decode_message,
-)
+from .messages import decode_message
 from .reading import LONGEST_CHUNK, first_bytes
 
 Record = Transaction | RawPacket | SessionEvent

@@ -16,7 +16,7 @@ from .error_model import AXES
 
 # Of pairs of calibrations of an unchanged linear sensor, 1 in 100 are called different.
 CONFIDENCE = 0.99
-# Degrees of freedom of the deviations of a sensor in a hand: its turns from rest to rest, which are few, tell them.
+# Degrees of freedom of the standard uncertainties of the model `hand`, which come from a few turns between rests.
 FREEDOM_OF_A_HAND = 12.0
 # Factor by which the uncertainties of a calibration with reservations may be too small. Halves of a real recording with
 # this verdict, of an unchanged sensor, were 1.1 times as far apart as two good ones may be, and there are worse ones.

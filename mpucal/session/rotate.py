@@ -102,12 +102,12 @@ class Rotate(PoseStep):
             self._prompted_s = knowledge.t_s
             side = self._next_side()
             # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
-            # even if the estimate takes up for down, as for a sensor whose axes are mirrored; and one that was seen
-            # does not count towards those that must have been.
+            # even if the estimate takes up for down, as for a sensor whose axes are mirrored. Once the target is
+            # reached, only a new orientation counts towards the least number.
             down = np.array(knowledge.down)
             if side is not None:
                 down = side
-            elif self._plan.tilt_only or knowledge.down == self.prompt.down or self._is_idle(down):
+            elif self._plan.tilt_only or knowledge.down == self.prompt.down or self._adds_nothing(down):
                 down = self._farthest(self._coverage.paused)
             self.prompt = self._prompt_for(down)
             outputs.append(self.prompt)
@@ -154,7 +154,7 @@ class Rotate(PoseStep):
         if self._plan.until_end or self._requested or advised:
             return outputs
         if pause.seconds >= HOLD_S - WAIT_S - 1e-6:
-            first = len(self._coverage.paused) == 1  # the flat rest
+            first = self._advised_run < 0
             self._coverage.placed = self._takes_sides and not pause.touched and (self._coverage.placed or first)
             self._advised_run = pause.run
             outputs.append(self._request(events.FitKind.ADVISE, pause.t_s))
@@ -212,7 +212,7 @@ class Rotate(PoseStep):
     def _is_certain(self) -> bool:
         return self._knowledge is not None and self._knowledge.overall >= 1.0
 
-    def _is_idle(self, down: Vector) -> bool:
+    def _adds_nothing(self, down: Vector) -> bool:
         """Return True for an orientation that was seen, where the target is reached."""
         return self._is_certain() and self._coverage.paused.near(-down)
 

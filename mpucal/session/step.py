@@ -65,7 +65,7 @@ class Step:
 HAND_WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
-# So many of the newest windows show that nobody touches the board.
+# Number of the newest windows that tell whether somebody touches the board.
 NEWEST = 2
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0

@@ -130,7 +130,8 @@ def as_asked(asked: Transaction, recorded: Transaction, which: str) -> Transacti
     if _words(asked) != _words(recorded):
         raise CaptureError(
             f"the program makes {_words(asked)}, but {which} is {_words(recorded)}",
-            "replay it with the command, mpucal and options that recorded it, or give the file without --replay",
+            "replay it with the command, mpucal and options that recorded it, or give it without --replay to"
+            " `calibrate`, `check` or `noise`",
         )
     return recorded
 

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import mpucal
+from mpucal.errors import RecordingError
 
 G = 9.80665
 NAMES = [f"{of}_{axis}" for of in ("acc", "gyr") for axis in "xyz"]
@@ -77,6 +78,34 @@ def test_pandas_json_with_times_as_its_index(orient, walk, tmp_path):
     found = mpucal.load(tmp_path / "a.json")
     same(found, walk)
     np.testing.assert_allclose(np.diff(found.t), np.diff(walk.t), atol=1e-9)
+
+
+def test_numbers_of_rows_are_no_times(walk, tmp_path):
+    """Read pandas' own index, of which rows were dropped."""
+    made = pd.DataFrame(np.column_stack([walk.acc, walk.gyr]), columns=NAMES)
+    made[::2].to_json(tmp_path / "a.json", double_precision=15)
+    half = mpucal.load(tmp_path / "a.json", rate=50.0)
+    np.testing.assert_allclose(half.acc, walk.acc[::2], atol=1e-9)
+    np.testing.assert_allclose(half.gyr, walk.gyr[::2], atol=1e-9)
+
+
+def test_columns_of_different_times_are_refused(walk, tmp_path):
+    columns = {
+        name: {str(at): x for at, x in zip((walk.t + 0.5 * (name[0] == "g")).tolist(), column.tolist(), strict=True)}
+        for name, column in zip(NAMES, np.column_stack([walk.acc, walk.gyr]).T, strict=True)
+    }
+    (tmp_path / "a.json").write_text(json.dumps(columns))
+    with pytest.raises(RecordingError, match="different indices"):
+        mpucal.load(tmp_path / "a.json")
+
+
+def test_samples_whose_cells_hold_their_units_are_no_heads(walk, tmp_path):
+    rows = [
+        ",".join([f"{t:.6f} s", *(f"{x:.9g} m/s^2" for x in acc), *(f"{x:.9g} rad/s" for x in gyr)])
+        for t, acc, gyr in zip(walk.t - walk.t[0], walk.acc, walk.gyr, strict=True)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join([f"t,{','.join(NAMES)}", *rows, ""]))
+    assert len(mpucal.load(tmp_path / "a.csv")) == len(walk)
 
 
 def test_packets_of_samples_in_json(walk, tmp_path):

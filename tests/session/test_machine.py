@@ -146,8 +146,11 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
     assert rotating.feed(board.still(3.0)).prompts().count(events.PromptKind.ROTATE) == 2
 
 
-def placed(make_board, tremor, target="normal"):
-    """A vehicle is put on its sides as it is asked for, by somebody who lets go of it (no tremor) or does not."""
+def placed(make_board, tremor, target="normal", late=False):
+    """A vehicle is put on its sides as it is asked for, by somebody who lets go of it (no tremor) or does not.
+
+    late : the answer of what is known comes in the middle of the first hold.
+    """
     board, session = make_board(), Session()
     board.up = np.array([0.0, 0.0, -1.0])
     session.machine = Machine(Plan(target=target))
@@ -155,17 +158,21 @@ def placed(make_board, tremor, target="normal"):
     assert "still for 5 s" in session.of(events.Prompt)[-1].text
     session.feed(board.still(5.6))
     # The advice comes at the end of the hold.
-    session.answer = lambda wish: learnt(1.0, advice=False) if wish is events.FitKind.KNOW else None
+    session.answer = lambda wish: learnt(1.0, advice=False) if wish is events.FitKind.KNOW and not late else None
     held = []
     while session.state is State.ROTATE and len(held) < 6:
         held.append(session.of(events.Prompt)[-1].text.split(": ")[1].split(" (")[0])
         session.feed(board.turn_to(-np.array(session.of(events.Prompt)[-1].down)))
+        if late:
+            session.feed(board.still(1.0)).give(learnt(1.0, advice=False))
         session.feed(board.shaken(1.5, tremor) if tremor else board.still(1.5)).give(learnt(1.0))
+        late = False
     return session, held
 
 
-def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board):
-    session, held = placed(make_board, 0.0, "best")
+@pytest.mark.parametrize("late", [False, True])
+def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board, late):
+    session, held = placed(make_board, 0.0, "best", late)
     assert held == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
     assert session.state is State.VERIFY
     assert "Verification 1 of 1" in session.of(events.Prompt)[-1].text

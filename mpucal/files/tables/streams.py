@@ -24,9 +24,10 @@ ANOTHER_RANGE = 0.5
 OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
-# |a| of whole numbers below which cm/s^2 are nearer than mg; e-fold within which |a| is 1 g in mm/s^2, not 8192 counts,
-# and within which rates turn gravity as tenths or hundredths of deg/s, not as 8 or 131 counts for 1 deg/s
-CM_BELOW, NEAR = math.sqrt(1000.0 * 100.0 * STANDARD_GRAVITY_MPS2), 0.08
+# |a| of whole numbers below which cm/s^2 is nearer than mg
+CM_BELOW = math.sqrt(1000.0 * 100.0 * STANDARD_GRAVITY_MPS2)
+# Largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther), or to tenths or hundredths of deg/s.
+NEAR = 0.08
 # quartile distance of |a| over its median, beyond which the median is that of a motion
 SHAKING = 0.25
 
@@ -111,8 +112,8 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         w = Reading.of(rates, math.nan, left_out)
     else:
         rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
-        named = hints.units.keys() & OF_BNO055.keys() or not _are_whole_mg(acc, values)
-        if not named and (whole := rate_of.whole_units()):
+        may_be_whole = _are_whole_mg(acc, values) and not hints.units.keys() & OF_BNO055.keys()
+        if may_be_whole and (whole := rate_of.whole_units()):
             hints = replace(hints, units={**hints.units, **whole[0]})
             rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
             remarks = [*remarks, whole[1]]
@@ -200,9 +201,11 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
     size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
     unclear = not seen or hints.accel_range_g or (beside_counts and seen == "mg")
     whole = not said and units.are_counts(values)
-    of_mm = abs(math.log(size * QUANTITIES["acc"]["mm/s^2"] / STANDARD_GRAVITY_MPS2)) if size else math.inf
-    if whole and of_mm < NEAR and not beside_counts and not hints.accel_range_g:
-        return Reading.of(values, QUANTITIES["acc"]["mm/s^2"], "in mm/s^2 (by |a|, if 1 g is not 10000)")
+    away_from_mm = abs(math.log(size * QUANTITIES["acc"]["mm/s^2"] / STANDARD_GRAVITY_MPS2)) if size else math.inf
+    if whole and away_from_mm < NEAR and not beside_counts and not hints.accel_range_g:
+        return Reading.of(
+            values, QUANTITIES["acc"]["mm/s^2"], "in mm/s^2 (by |a|; if these are counts, give --units acc=counts)"
+        )
     if said == COUNTS or (whole and unclear):
         return _scaled_counts(values, hints, name, size)
     near = "" if seen or said else units.mean_acceleration_unit(values)
@@ -214,7 +217,7 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
         )
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
         raise RecordingError(
-            f"{name}: the median |a| is only {size:.3g}, so gravity is not in it",
+            f"{name}: the median |a| is only {f'{size:.3g} {said}'.strip()}, so gravity is not in it",
             "give the accelerometer's own values, not the linear acceleration computed from them",
         )
     likely = LEAST_LIKELY <= size * QUANTITIES["acc"].get(seen, 0.0) / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY

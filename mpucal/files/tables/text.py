@@ -237,7 +237,7 @@ def read_table(text: str, name: str, header: Cells, first: int, separator: str |
     if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]):
         # the logger was switched off
         rows[-1] = []
-    while header and rows and not any(map(is_number, rows[0])) and lines[0] <= first + MORE_HEADS:
+    while header and rows and not any(map(_holds_number, rows[0])) and lines[0] <= first + MORE_HEADS:
         # units, the name of pandas' index, or what a program says of each column
         more = [cell.strip(" ()[]") for cell in rows[0]]
         has_units, pairs = any(map(find_unit, more)), zip_longest(header, more, fillvalue="")
@@ -246,6 +246,11 @@ def read_table(text: str, name: str, header: Cells, first: int, separator: str |
     remarks = [] if separator == "," else [f"its cells are separated by {SEPARATORS[separator]}"]
     table = table_of_rows(name, header, rows, lines, *remarks)
     return _with_units_of_cells(table) if table.header and rows else table
+
+
+def _holds_number(cell: str) -> bool:
+    """Return True for a number, also with a unit behind it."""
+    return is_number(cell) or _WITH_UNIT(cell.strip()) is not None
 
 
 def _with_units_of_cells(table: Table) -> Table:

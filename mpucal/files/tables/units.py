@@ -70,8 +70,8 @@ _SPELLED = {
     "rpm": "rpm rev/min",
     "udeg/s": "udeg/s udps",
     "deg/s/16": "deg/s/16",
-    "deg/s/10": "deg/s/10",
-    "deg/s/100": "deg/s/100",
+    "deg/s/10": "deg/s/10 0.1deg/s 1/10deg/s",
+    "deg/s/100": "deg/s/100 0.01deg/s 1/100deg/s",
     COUNTS: "counts count lsb raw adc",
 }
 _NAMES = {spelled: unit for unit, words in _SPELLED.items() for spelled in words.split()}
@@ -125,9 +125,9 @@ def time_unit(step: float, said: str = "") -> str:
 
 
 def acceleration_unit(acc: Vector, said: str = "") -> str:
-    """Return the unit in which the median of (n, 3) accelerations is gravity, first that `said`; empty if none is.
+    """Return the unit in which the median of (n, 3) accelerations is gravity; empty if none is.
 
-    Without gravity, |a| of a hand scatters by more than half of its median.
+    The unit `said` by the file is tried first. Without gravity, |a| of a hand scatters by more than half of its median.
     """
     if not (np.abs(acc) < BEYOND).all():
         return ""
@@ -242,7 +242,7 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
 
 
 def gyro_unit(factor: float | None, said: str = "") -> str:
-    """Return the unit of rates with this rate_factor, first that `said`; empty if there is none."""
+    """Return the unit of rates with this rate_factor, first the one `said` by the file; empty if there is none."""
     units = {unit: QUANTITIES["gyr"][unit] for unit in (*filter(None, [said]), *SHOWN["gyr"])}
     return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
 
