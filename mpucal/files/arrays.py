@@ -23,11 +23,12 @@ from .tables.cells import is_number
 from .tables.labelled import pivot
 from .tables.load import recording_from_table
 from .tables.phone import is_pair, recording_of_tables
+from .tables.times import UTC_NS
+from .tables.units import NS
 
 _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is what with --columns t=NAME,ax=NAME,..."
 Arrays = Iterator[tuple[str, NDArray[Any]]]
-# name of an index of times, and the least whole number in it that is a time (s since 1970), not the number of a row
-INDEX, EPOCH_S = "index_time", 1e9
+INDEX = "index_time"
 # numbers at the beginning of a document of JSON beyond which it holds samples, not settings
 FEWEST_NUMBERS = 200
 _IS_OWN = b'"D":', b'"b_a":'
@@ -113,7 +114,7 @@ def _json_arrays(name: str, value: Any) -> Arrays:
     """Yield name and array of the numbers in a value of JSON; of a list of objects, a column for each key."""
     if isinstance(value, dict) and value and all(map(is_number, value)):
         # a table of pandas, or a column, by its index: small whole numbers count the rows
-        if not all(map(str.isdecimal, value)) or float(next(iter(value))) >= EPOCH_S:
+        if not all(map(str.isdecimal, value)) or float(next(iter(value))) >= UTC_NS[0] / NS:
             yield from _json_arrays(INDEX, [*value])
         value = list(value.values())
     if isinstance(value, list) and any(isinstance(row, dict) for row in value):

@@ -24,8 +24,6 @@ ANOTHER_RANGE = 0.5
 OF_COUNTS = "in counts of"
 # |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
-# |a| of whole numbers below which cm/s^2 is nearer than mg
-CM_BELOW = math.sqrt(1000.0 * 100.0 * STANDARD_GRAVITY_MPS2)
 # Largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther), or to tenths or hundredths of deg/s.
 NEAR = 0.08
 # quartile distance of |a| over its median, beyond which the median is that of a motion
@@ -201,8 +199,7 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
     size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
     unclear = not seen or hints.accel_range_g or (beside_counts and seen == "mg")
     whole = not said and units.are_counts(values)
-    away_from_mm = abs(math.log(size * QUANTITIES["acc"]["mm/s^2"] / STANDARD_GRAVITY_MPS2)) if size else math.inf
-    if whole and away_from_mm < NEAR and not beside_counts and not hints.accel_range_g:
+    if whole and _away(size, "mm/s^2") < NEAR and not beside_counts and not hints.accel_range_g:
         return Reading.of(
             values, QUANTITIES["acc"]["mm/s^2"], "in mm/s^2 (by |a|; if these are counts, give --units acc=counts)"
         )
@@ -224,8 +221,18 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
     likely = likely or not (values == np.rint(values)).all()
     seen = hints.units.get("acc", (seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
-    cm = " (|a| fits --units acc=cm/s^2 better)" if whole and unit == "mg" and size < CM_BELOW else ""
+    cm = " (|a| fits --units acc=cm/s^2 better)" if whole and unit == "mg" and _mg_or_cm(size)[0] != unit else ""
     return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}{cm}")
+
+
+def _away(size: float, unit: str) -> float:
+    """Return |log| of the ratio of an acceleration to 1 g in a unit."""
+    return abs(math.log(size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2)) if size else math.inf
+
+
+def _mg_or_cm(size: float) -> list[str]:
+    """Return mg and cm/s^2, first the one in which an acceleration is nearer to 1 g."""
+    return sorted(("mg", "cm/s^2"), key=lambda unit: _away(size, unit))
 
 
 def _scaled_counts(values: Vector, hints: Hints, name: str, size: float) -> Reading:
@@ -278,7 +285,7 @@ class _Rates:
         of = min(decimal, key=decimal.__getitem__)
         if decimal[of] > NEAR:
             return None
-        likely, other = ("cm/s^2", "mg")[:: 1 if units.typical_size(self._acc)[0] < CM_BELOW else -1]
+        likely, other = _mg_or_cm(units.typical_size(self._acc)[0])
         return {"acc": likely, "gyr": of}, f"|a| suggests these units, or else --units acc={other},gyr={of}"
 
     def read(self, *, beside_counts: bool) -> Reading:
