@@ -8,6 +8,7 @@ import numpy as np
 
 from ..data import Mask, Recording, Vector
 from ..rests.flat import Flat
+from ..rests.intervals import Intervals
 
 # A rate that follows a hand's motion, with few enough samples for a search.
 SEARCH_HZ = 50.0
@@ -53,6 +54,15 @@ def means(x: Vector, recording: Recording, flat: Flat, rate_hz: float) -> Vector
     start = flat.last % size
     m = (len(x) - start) // size
     return np.asarray(np.einsum("ij...->i...", x[start : start + m * size].reshape(m, size, *x.shape[1:])) / size)
+
+
+def blocks(runs: Intervals, recording: Recording, flat: Flat, rate_hz: float) -> Intervals:
+    """Return the blocks (k, 2), first and last + 1, that lie within runs (k, 2) of samples."""
+    size = _size(recording, rate_hz)
+    if size < 2:
+        return runs
+    first, last = (runs - flat.last % size).T
+    return np.stack([np.maximum(-(-first // size), 0), last // size], axis=1)
 
 
 def _size(recording: Recording, rate_hz: float) -> int:

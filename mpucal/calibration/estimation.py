@@ -17,9 +17,10 @@ from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_faul
 from .checks.estimate import GOOD_RMS_MPS2
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
+from .fit import Fit
 from .hypotheses import SURE, Explanation, explain, gyroscope_change, remove_change
 from .masks import find_reset, with_masks
-from .model_selection import METHODS, ModelChoice, choose_model
+from .model_selection import METHODS, ModelChoice, fit_model
 from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
@@ -140,8 +141,9 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     choice, explanations, walks = _fit(recording, flat, gravity, model)
     # the share of the variance that the removed changes added
     freed = sum((walk.freed[ACCELEROMETER] for walk in walks), np.zeros(len(D_NAMES + B_A_NAMES)))
-    claim = claim_uncertainty(choice.fit, gravity, explanations, freed)
-    fit = inflate(choice.fit, claim).right_handed()
+    fit = choice.fit
+    claim = claim_uncertainty(fit, gravity, explanations, freed)
+    fit = inflate(fit, claim).right_handed()
     evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=walks)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
@@ -151,25 +153,21 @@ def _fit(
     recording: Recording, flat: Flat, gravity: float, model: str
 ) -> tuple[ModelChoice, list[Explanation], tuple[Explanation, ...]]:
     """Return the fit without changes of the gyroscope's bias during the turning, what explains the rest, and them."""
-    choice, found = _fit_once(recording, flat, gravity, model)
+    choice = fit_model(model, recording, flat, gravity)
+    found = _explain(choice.plain)
     walks: tuple[Explanation, ...] = ()
     for _ in range(MOST_CHANGES):
         change = gyroscope_change(found)
-        if change is None or not choice.fit.converged:
+        if change is None or not choice.plain.converged:
             break
         recording = remove_change(recording, flat, change)
-        without, left = _fit_once(recording, flat, gravity, model)
+        without = fit_model(model, recording, flat, gravity, choice)
         # A change whose removal explains nothing is none.
-        if not choice.fit.V - np.log(SURE) > without.fit.V:
+        if not choice.plain.V - np.log(SURE) > without.plain.V:
             break
-        choice, found, walks = without, left, (*walks, change)
+        choice, found, walks = without, _explain(without.plain), (*walks, change)
     return choice, found, walks
 
 
-def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[ModelChoice, list[Explanation]]:
-    if model == "auto":
-        choice = choose_model(recording, flat, gravity)
-    else:
-        choice = ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for")
-    fit = choice.fit
-    return choice, [] if fit.parts is None else explain(fit.parts, fit.D)
+def _explain(fit: Fit) -> list[Explanation]:
+    return [] if fit.parts is None else explain(fit.parts, fit.D)

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
+from ..rests.intervals import Intervals
 from ..rests.windows import noise_ratio
-from .downsampling import SEARCH_HZ, downsampled, means
+from .downsampling import SEARCH_HZ, blocks, downsampled, means
 from .fit import Fit
 from .hand_noise import (
     CALM_MPS2,
@@ -36,7 +38,7 @@ from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import evaluate, value
 from .parameters import HAND
 from .parts import ends_of, parts_of
-from .preprocessing import Preprocessed, preprocess
+from .preprocessing import Preprocessed, find_rests, prepare
 from .problem import Problem
 from .slip import find_slip
 from .theta import Prior, Theta
@@ -47,32 +49,97 @@ PASSES = 3
 
 
 def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """Estimate D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves.
+    """Estimate D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves."""
+    return search_hand(recording, flat, gravity).honest()
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Recording, prepared sample by sample (`fine`) and as means over blocks (`rough`)."""
+
+    recording: Recording
+    flat: Flat
+    gravity: float
+
+    @cached_property
+    def fine(self) -> Preprocessed:
+        recording, runs = self._rests
+        return prepare(recording, (self.flat.first, self.flat.last), runs, self.gravity, self._noise_factor)
+
+    @cached_property
+    def rough(self) -> Preprocessed:
+        recording, runs = self._rests
+        noise_factor = means(self._noise_factor, recording, self.flat, SEARCH_HZ)
+        thin, at = downsampled(recording, self.flat, SEARCH_HZ)
+        return prepare(thin, at, blocks(runs, recording, self.flat, SEARCH_HZ), self.gravity, noise_factor)
+
+    @cached_property
+    def _rests(self) -> tuple[Recording, Intervals]:
+        return find_rests(self.recording, self.flat)
+
+    @cached_property
+    def _noise_factor(self) -> Vector:
+        return noise_ratio(self.recording, self.flat.Sigma_a)
+
+
+@dataclass(frozen=True)
+class HandFit:
+    """Fit of a hand's model, without and with its honest covariance, which takes a quarter of the time.
+
+    Attributes
+    ----------
+    fit : with the covariance by the model alone. minimum : where the search ended. noise : of the hand as it moves.
+    trembles : True where the tremor has a lever arm of its own. data : the recording.
+    """
+
+    fit: Fit
+    minimum: Minimum
+    noise: Noise
+    trembles: bool
+    data: _Data
+
+    def honest(self) -> Fit:
+        """Return the fit with its honest covariance."""
+        rough, fine = (remove_tremor(x) if self.trembles else x for x in (self.data.rough, self.data.fine))
+        minimum = _with_honest_information(self.minimum, self.noise, rough, fine)
+        covariance = minimum.covariance()
+        known = undetermined(covariance) if minimum.free.all() else ()
+        return replace(self.fit, covariance=covariance[np.ix_(minimum.free, minimum.free)], at_prior=known)
+
+
+def search_hand(recording: Recording, flat: Flat, gravity: float, near: HandFit | None = None) -> HandFit:
+    """Fit a hand's model.
 
     A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
     perfect sensor.
+
+    Parameters
+    ----------
+    near : fit of a recording that hardly differs, where there is one: the search begins there.
     """
-    fit = _fit_from(initialise, recording, flat, gravity)
-    if fit.converged:
-        return fit
-    again = _fit_from(perfect, recording, flat, gravity)
-    return again if again.converged else fit
+    data = _Data(recording, flat, gravity)
+    if near is not None:
+        found = _fit(data, near.minimum.theta, near.noise, near.trembles, near.fit.iterations)
+        if found.fit.converged:
+            return found
+    search = _Search(data.rough)
+    found = _fit(data, *search.run(initialise), search.trembles, search.iterations)
+    if found.fit.converged:
+        return found
+    search = _Search(data.rough)
+    again = _fit(data, *search.run(perfect), search.trembles, search.iterations)
+    return again if again.fit.converged else found
 
 
-def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, flat: Flat, gravity: float) -> Fit:
-    noise_factor = noise_ratio(recording, flat.Sigma_a)
-    fine = preprocess(recording, (flat.first, flat.last), gravity, noise_factor)
-    rough = means(noise_factor, recording, flat, SEARCH_HZ)
-    search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
-    theta, noise = search.run(begin(search.prepared.problem, fine.flat.b_omega))
-    if search.trembles:
-        fine = remove_tremor(fine)
+def _fit(data: _Data, theta: Theta, noise: Noise, trembles: bool, iterations: int) -> HandFit:
+    """Fit sample by sample from where a search ended, after so many iterations."""
+    fine = remove_tremor(data.fine) if trembles else data.fine
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
         noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _with_transition_noise(noise.problem(fine), fine, theta)
     prior = fine.prior()
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
-    iterations = search.iterations + minimum.iterations
+    iterations += minimum.iterations
     if wald(minimum) < WALD_99 and not undetermined(minimum.covariance()):
         trusted = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
@@ -81,11 +148,8 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
     slip = find_slip(transitions, fine.problem.series.dt)
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
-    parts = parts_of(*weighed, prior)
-    minimum = _with_honest_information(minimum, noise, search.prepared, fine)
-    known = undetermined(minimum.covariance()) if minimum.free.all() else ()
-    fit = replace(minimum, iterations=iterations).as_fit(known, parts)
-    return replace(fit, slip=slip)
+    fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
+    return HandFit(replace(fit, slip=slip), minimum, noise, trembles, data)
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
@@ -110,7 +174,7 @@ def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed
         if at.theta is not before.theta:
             transitions = transitions_of(rough, at.theta)
     problem, transitions = noise.problem(fine), transitions_of(fine, at.theta)
-    if transitions:  # rests are found again here, and their number may differ by one
+    if transitions:  # one that begins as the flat segment ends may be there alone
         variance = miss_variances(transitions, float(leverage.mean()))
         problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
     return replace(minimum, H=information(problem, minimum.theta, prior))
@@ -152,7 +216,10 @@ def _scaled(problem: Problem, factor: Vector) -> Problem:
 
 
 class _Search:
-    """Search for theta and the hand's noise in turn, by rough fits."""
+    """Search for theta and the hand's noise in turn, by rough fits.
+
+    trembles : True where the tremor has a lever arm of its own, and is removed from what is `prepared`.
+    """
 
     def __init__(self, prepared: Preprocessed) -> None:
         self.prepared = prepared
@@ -160,9 +227,10 @@ class _Search:
         self.iterations = 0
         self.trembles = False
 
-    def run(self, theta: Theta) -> tuple[Theta, Noise]:
+    def run(self, begin: Callable[[Problem, Vector], Theta]) -> tuple[Theta, Noise]:
         """Search with Huber's loss, which converges from afar, then with the redescending one and the best sigma."""
         prepared = self.prepared
+        theta = begin(prepared.problem, prepared.flat.b_omega)
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
         sigma, sigmas = HAND_MPS2[0], HAND_MPS2 if prepared.rests_often else WHITE_MPS2
         for _ in range(2):

@@ -18,7 +18,7 @@ from ..data import Recording
 from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
-from .hand import fit_hand
+from .hand import HandFit, fit_hand, search_hand
 from .hypothesis_tests import WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
@@ -58,11 +58,21 @@ PROMISING = WALD_99 / 3.0  # least decrement for a search with K: twice the decr
 
 
 class ModelChoice(NamedTuple):
-    """Chosen model: its name, its fit, and why it was chosen."""
+    """Chosen model: what was fitted, the model's name, and why it was chosen."""
 
-    fit: Fit
+    found: Fit | HandFit
     model: str
     why: str
+
+    @property
+    def plain(self) -> Fit:
+        """The fit, with the covariance by the model alone."""
+        return self.found.fit if isinstance(self.found, HandFit) else self.found
+
+    @property
+    def fit(self) -> Fit:
+        """The fit, with its honest covariance."""
+        return self.found.honest() if isinstance(self.found, HandFit) else self.found
 
 
 def fit_in_place(parameters: int, recording: Recording, flat: Flat, gravity: float) -> Fit:
@@ -80,7 +90,22 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 }
 
 
-def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
+def fit_model(
+    model: str, recording: Recording, flat: Flat, gravity: float, near: ModelChoice | None = None
+) -> ModelChoice:
+    """Fit the model of a name, or for "auto" the simplest one that explains the data.
+
+    near : of a recording that hardly differs, where there is one.
+    """
+    of_a_hand = near.found if near is not None and isinstance(near.found, HandFit) else None
+    if model == "auto":
+        return choose_model(recording, flat, gravity, of_a_hand)
+    if model == "hand":
+        return ModelChoice(search_hand(recording, flat, gravity, of_a_hand), model, "asked for")
+    return ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for")
+
+
+def choose_model(recording: Recording, flat: Flat, gravity: float, near: HandFit | None = None) -> ModelChoice:
     """Choose the simplest model that explains the data.
 
     White noise and a trusted gyroscope come first, then its matrix K; then the same with small errors of both sensors.
@@ -88,11 +113,11 @@ def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoic
     lever arm, were measured in a hand.
     """
     in_place = InPlaceFits(recording, flat, gravity)
-    chosen = in_place.choose()
+    chosen = in_place.choose(None if near is None else near.minimum.theta)
     if isinstance(chosen, ModelChoice):
         return chosen
-    hand = fit_hand(recording, flat, gravity)
-    kept = "K" if "K_xx" in hand.names else "no K (it is not significantly different from the identity)"
+    hand = search_hand(recording, flat, gravity, near)
+    kept = "K" if "K_xx" in hand.fit.names else "no K (it is not significantly different from the identity)"
     return ModelChoice(hand, "hand", f"{chosen}: a hand's model, with {kept}")
 
 
@@ -104,11 +129,16 @@ class InPlaceFits:
         self._prior = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
-    def choose(self) -> ModelChoice | str:
-        """Return the simplest model that explains the data, or why none does."""
+    def choose(self, near: Theta | None = None) -> ModelChoice | str:
+        """Return the simplest model that explains the data, or why none does.
+
+        near : an estimate that is good enough to tell that none does.
+        """
+        if near is not None and not self._errors_may_explain(near):
+            return "white noise does not explain the data"
         least = np.inf
         for erring, parameters in product((False, True), (ACCEL, IMU)):
-            if erring and parameters == ACCEL and not self._errors_may_explain():
+            if erring and parameters == ACCEL and not self._errors_may_explain(self._rough(IMU).theta):
                 break
             minimum, errors = self._explain(parameters, erring)
             least = min(least, minimum.nis)
@@ -128,9 +158,9 @@ class InPlaceFits:
         why = f"{noise} and {gyroscope} the data (innovations {minimum.nis:.1f}, expected 3)"
         return ModelChoice(self._as_fit(minimum, errors), "accel" if perfect else "imu", why)
 
-    def _errors_may_explain(self) -> bool:
-        """Return True if errors of the largest size could explain the data."""
-        squares = evaluate(_with_errors(self._thin, ERRORS[-1]), self._rough(IMU).theta, 0).squares
+    def _errors_may_explain(self, theta: Theta) -> bool:
+        """Return True if errors of the largest size could explain the data at theta."""
+        squares = evaluate(_with_errors(self._thin, ERRORS[-1]), theta, 0).squares
         return squares < ERRING_NIS * (self._thin.flat.last + len(self._thin.series))
 
     def fit(self, parameters: int) -> Fit:

@@ -51,9 +51,9 @@ class Parts:
 
     def grouped(self, groups: NDArray[np.intp]) -> tuple[Vector, Vector]:
         """Return gradients (m, p) and Fisher matrices (m, p, p) of groups; `groups` (k,) is the group of each part."""
-        member = (groups == np.unique(groups)[:, None]).astype(np.float64)
-        fisher = member @ self.fisher.reshape(len(self), -1)
-        return member @ self.gradient, fisher.reshape(-1, *self.fisher.shape[1:])
+        order = np.argsort(groups, kind="stable")
+        first = np.unique(groups[order], return_index=True)[1]
+        return np.add.reduceat(self.gradient[order], first), np.add.reduceat(self.fisher[order], first)
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
         """Return (k,) the group of each part, in `groups` stretches of time."""

@@ -84,15 +84,26 @@ class Preprocessed:
         return replace(self.problem, series=replace(self.problem.series, **series))
 
 
-def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise: Vector | None = None) -> Preprocessed:
-    """Prepare a recording whose flat segment is at[0]..at[1]-1.
+def preprocess(recording: Recording, at: tuple[int, int], gravity: float) -> Preprocessed:
+    """Prepare a recording whose flat segment is at[0]..at[1]-1."""
+    recording, runs = find_rests(recording, flat_statistics(recording, at))
+    return prepare(recording, at, runs, gravity)
+
+
+def find_rests(recording: Recording, flat: Flat) -> tuple[Recording, Intervals]:
+    """Return the recording without the gyroscope's drift, and its rests."""
+    rests = RestFinder(recording, flat)
+    runs = rests.typical()
+    return remove_drift(recording, flat, rests.bias_runs(runs)), runs
+
+
+def prepare(
+    recording: Recording, at: tuple[int, int], runs: Intervals, gravity: float, noise: Vector | None = None
+) -> Preprocessed:
+    """Prepare a recording without drift, whose flat segment is at[0]..at[1]-1 and whose rests are `runs` (k, 2).
 
     noise : (n,) factors of Sigma_a, known from before the downsampling of a recording.
     """
-    flat = flat_statistics(recording, at)
-    rests = RestFinder(recording, flat)
-    runs = rests.typical()
-    recording = remove_drift(recording, flat, rests.bias_runs(runs))
     flat = flat_statistics(recording, at)
     loud = (noise_ratio(recording, flat.Sigma_a) if noise is None else noise)[flat.last :]
     series = mask(Series.after(recording, flat), recording, flat)

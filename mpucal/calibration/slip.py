@@ -44,12 +44,11 @@ def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
     k = len(transitions)
     if k < 2 * FEWEST_BESIDE + 1:
         return None
-    always = _likelihood(transitions, _directions(transitions, np.array([k]))[..., :3])[0][0]
-    cost = math.log(SURE) + 1.5 * math.log(2 * k) + math.log(k)  # of three numbers more, and of so many times
     places = np.arange(FEWEST_BESIDE, k - FEWEST_BESIDE)
-    likelihood, x, left = _likelihood(transitions, _directions(transitions, places))
-    best = int(likelihood.argmax())
-    if not likelihood[best] > always + cost:
+    likelihood, x, left = _likelihood(transitions, np.append(places, k))
+    cost = math.log(SURE) + 1.5 * math.log(2 * k) + math.log(k)  # of three numbers more, and of so many times
+    best = int(likelihood[:-1].argmax())
+    if not likelihood[best] > likelihood[-1] + cost:
         return None
     t, span = np.cumsum(dt), transitions[places[best]].span
     without = [each._replace(miss=miss) for each, miss in zip(transitions, left[best], strict=True)]
@@ -59,7 +58,7 @@ def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
 def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> Vector:
     """Return derivatives (m, k, 3, 6) of the misses by the rotation before a slip, and after it.
 
-    places : (m,) numbers of the transitions in which it may be.
+    places : (m,) numbers of the transitions in which it may be; that after the last stands for no slip.
     """
     v = np.array([each.coming for each in transitions])
     v /= lengths(v)[:, None]
@@ -70,19 +69,18 @@ def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> 
     return np.concatenate([P * ~after_end - PF * ~after_start, P * after_end - PF * after_start], axis=3)
 
 
-def _likelihood(transitions: Sequence[Transition], A: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the log likelihoods (m,) of misses + A x by Student's t, at the likeliest x, these x (m, r), and the
+def _likelihood(transitions: Sequence[Transition], places: NDArray[np.intp]) -> tuple[Vector, Vector, Vector]:
+    """Return the log likelihoods (m,) of a slip at each place, by Student's t, its likeliest rotations (m, 6), and the
     misses that remain (m, k, 3).
-
-    A : (m, k, 3, r).
     """
+    A = _directions(transitions, places)
     misses = np.array([each.miss for each in transitions])
     known = np.array([each.variance for each in transitions])
     left, nu = misses, DEGREES_OF_FREEDOM
     for _ in range(ITERATIONS):
         c, weight = likely_scale(left, known)
-        weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, A.shape[3]).swapaxes(1, 2)
-        N = weighted @ A.reshape(len(A), -1, A.shape[3])
+        weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, 6).swapaxes(1, 2)
+        N = weighted @ A.reshape(len(A), -1, 6)
         x = -(np.linalg.pinv(N, rcond=LEAST_SEEN, hermitian=True) @ (weighted @ misses.ravel())[..., None])
         left = misses + (A @ x[:, None])[..., 0]
     z = 0.5 * np.sum(left**2, axis=-1) / known

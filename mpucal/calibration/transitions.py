@@ -107,9 +107,13 @@ def likely_scale(miss: Vector, known: Vector, leverage: Vector | float = 0.0) ->
     left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(known)))), LEAST_LEFT)
     nu, c = DEGREES_OF_FREEDOM, np.ones((*z.shape[:-1], 1))
     for _ in range(50):
-        weight, before = (nu + 2.0) / (nu + 2.0 * z / c), c
-        c = np.maximum(1.0, 2.0 * np.sum(weight * z, axis=-1, keepdims=True) / left)
-        if (c == before).all():
+        # Newton's method: this falls with c and is convex, so that steps from below do not pass the root.
+        share = z / (nu * c + 2.0 * z)
+        above = share.sum(axis=-1, keepdims=True) - 0.5 * left / (nu + 2.0)
+        slope = (share * nu / (nu * c + 2.0 * z)).sum(axis=-1, keepdims=True)
+        step = np.divide(above, slope, out=np.zeros_like(c), where=above > 0.0)
+        c = c + step
+        if (step < 1e-6 * c).all():
             break
     return c, (nu + 2.0) / (nu + 2.0 * z / c)
 

@@ -75,13 +75,12 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     session on a table, except that the gyroscope's bias may have any size and that a bump ends a run.
     """
     n = samples_of_window(recording)
-    windows = cut(with_rates(recording), n)
+    spreads, windows = cut(with_rates(recording), n)
     if len(windows) < 2:
         return None
-    spreads = np.array([(window.acc_sd, window.gyr_sd) for window in windows])
-    acc_noise, gyr_noise = np.quantile(spreads, 0.05, axis=0)
+    detector = Detector(QUIET, tuple(np.quantile([spreads.acc_sd, spreads.gyr_sd], 0.05, axis=1)), math.inf)
     runs: list[tuple[int, int, int]] = []
-    for run, first, last in still_windows(Detector(QUIET, (acc_noise, gyr_noise), math.inf), windows):
+    for run, first, last in still_windows(detector, spreads, windows):
         goes_on = runs and runs[-1][0] == run and runs[-1][2] == first
         runs.append((run, runs.pop()[1] if goes_on else first, last))
     lengths = [last - first for _, first, last in runs]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -108,6 +108,7 @@ class Detector:
         unknown: Vector = np.full(3, np.inf)
         self._acc_noise, self._gyr_noise = noise if noise is not None else (unknown, unknown)
         self._bias, self._turns = (np.zeros(3), bias) if isinstance(bias, float) else (bias, limits.gyro_mean)
+        self._most = self._of_sensor()
         self._spreads: deque[tuple[float, float]] = deque(maxlen=NEWEST_WINDOWS)
         # These are sums over the windows of this run.
         self._count = 0
@@ -129,9 +130,8 @@ class Detector:
             np.abs(windows.gyr - self._bias) / self._turns,
         )
 
-    @property
-    def _most(self) -> tuple[Vector, Vector]:
-        """Limits (3,) of the standard deviations for this sensor."""
+    def _of_sensor(self) -> tuple[Vector, Vector]:
+        """Return the limits (3,) of the standard deviations for this sensor."""
         return (
             np.maximum(self._limits.acc_sd, np.minimum(TIMES_NOISE * self._acc_noise, NOISIEST_ACC_MPS2)),
             np.maximum(self._limits.gyro_sd, np.minimum(TIMES_NOISE * self._gyr_noise, NOISIEST_GYRO_RAD_S)),
@@ -153,6 +153,8 @@ class Detector:
             self._gyr_noise = np.minimum(self._gyr_noise, window.gyr_sd)
         if self._learns:
             self._learn(window)
+        if self._quietest or self._learns:
+            self._most = self._of_sensor()
         shaken = self._shaken(window)
         if shaken:
             return self._bumped(window, shaken)
@@ -254,11 +256,16 @@ def _shook(acc_sd: Vector, ratio: Vector) -> str:
     return f"shaking by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"
 
 
-def still_windows(detector: Detector, windows: Iterable[Window]) -> Iterator[tuple[int, int, int]]:
-    """Yield the number of its run, and the first and last + 1 of its samples, for each still window."""
-    last = 0
-    for window in windows:
+def still_windows(detector: Detector, spreads: Spreads, windows: Sequence[Window]) -> Iterator[tuple[int, int, int]]:
+    """Yield the number of its run, and the first and last + 1 of its samples, for each still window.
+
+    spreads : the same windows. The limits are known beforehand: between runs, those beyond them need no detector.
+    """
+    last, moving = 0, detector.shares(spreads).level > 1.0
+    for window, moves in zip(windows, moving.tolist(), strict=True):
         first, last = last, last + window.count
+        if moves and not detector.seconds:
+            continue
         state = detector.add(window)
         if isinstance(state, Still):
             yield state.run, first, last

@@ -45,7 +45,7 @@ def without_tremor(recording: Recording, flat: Flat, runs: Intervals, noise_fact
     n = round(LOW_PASS_S * recording.rate_hz) | 1
     window = np.hanning(n + 2)[1:-1]
     window /= window.sum()
-    tremor = np.array([tremor_variance(*of) for of in zip(statistics(acc, runs)[1], noise, strict=True)])
+    tremor = tremor_variance(statistics(acc, runs)[1], noise)
     samples = np.asarray(runs[:, 1] - runs[:, 0], np.float64)
     # What goes on from the flat segment is not in a hand, and the low pass would leave nothing of a short rest.
     trembles, is_long = (runs[:, 0] > flat.last) & (tremor > 0.0), samples >= SHORTEST * n
@@ -55,17 +55,19 @@ def without_tremor(recording: Recording, flat: Flat, runs: Intervals, noise_fact
         low = [np.convolve(axis, window, "valid") for axis in recording.acc[begin:end].T]
         acc[begin + n // 2 : end - n // 2] = np.stack(low, axis=1)
         noise[k] *= window @ window
-    variance = statistics(level_rests(acc, recording, flat, runs), runs)[1]
-    sway = np.array([tremor_variance(*of) for of in zip(variance, noise, strict=True)])
+    sway = tremor_variance(statistics(level_rests(acc, recording, flat, runs), runs)[1], noise)
     is_raw = trembles & ~is_long
     jitter = sway * mean_variance(TREMOR_PER_S * samples / recording.rate_hz)
     return RestingHand(acc, np.where(is_raw, 0.0, sway), np.where(is_raw, jitter, 0.0))
 
 
-def tremor_variance(variance: Vector, noise: Vector) -> float:
-    """Return the tremor's variance [(m/s^2)^2] in a rest of `variance` (3,), beyond noise (3,); 0 of a still board."""
-    tremor = float(np.mean(variance - 1.05 * noise))
-    return tremor if tremor > TREMBLES * float(noise.mean()) else 0.0
+def tremor_variance(variance: Vector, noise: Vector) -> Vector:
+    """Return the tremor's variance (k,) [(m/s^2)^2] in k rests, beyond noise (k, 3); 0 of a still board.
+
+    variance : (k, 3) (m/s^2)^2, of the readings.
+    """
+    tremor = np.mean(variance - 1.05 * noise, axis=-1)
+    return np.where(tremor > TREMBLES * noise.mean(axis=-1), tremor, 0.0)
 
 
 def mean_variance(x: Vector) -> Vector:

@@ -94,13 +94,14 @@ class Windows:
         return windows
 
 
-def cut(recording: Recording, n: int) -> list[Window]:
-    """Cut a whole recording into windows of n samples, without an incomplete last one."""
+def cut(recording: Recording, n: int) -> tuple[Spreads, list[Window]]:
+    """Cut a whole recording into windows of n samples, without an incomplete last one: all as one, and each."""
     length_s, m = n / recording.rate_hz, len(recording) // n
     acc_rows, gyr_rows = (values[: m * n].reshape(m, n, 3) for values in (recording.acc, recording.gyr))
     gyr, acc_sd, gyr_sd, noise, acc = _of_rows(acc_rows, gyr_rows)
     spans = (_span(recording, k * n, (k + 1) * n, length_s) for k in range(m))
-    return [Window(gyr[k], acc_sd[k], gyr_sd[k], noise[k], acc[k], *span) for k, span in enumerate(spans)]
+    rows = zip(gyr, acc_sd, gyr_sd, noise, acc, spans, strict=True)
+    return Spreads(gyr, acc_sd, gyr_sd, noise), [Window(*of, *span) for *of, span in rows]
 
 
 def of_rows(acc: Vector, gyr: Vector, start_s: float = 0.0, end_s: float = 1.0, whole: bool = True) -> Window:
