@@ -122,20 +122,25 @@ def search_hand(recording: Recording, flat: Flat, gravity: float, near: HandFit 
         found = _fit(data, near.minimum.theta, near.noise, near.trembles, near.fit.iterations)
         if found.fit.converged:
             return found
-    search = _Search(data.rough)
-    found = _fit(data, *search.run(initialise), search.trembles, search.iterations)
+    found = _fit_from(initialise, data)
     if found.fit.converged:
         return found
-    search = _Search(data.rough)
-    again = _fit(data, *search.run(perfect), search.trembles, search.iterations)
+    again = _fit_from(perfect, data)
     return again if again.fit.converged else found
+
+
+def _fit_from(begin: Callable[[Problem, Vector], Theta], data: _Data) -> HandFit:
+    """Fit means over blocks first, then sample by sample."""
+    search = _Search(data.rough)
+    theta, noise = search.run(begin)
+    if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
+        noise = Noise("white", most_likely_sigma(data.fine.white, CALM_MPS2, theta, noise.sigma))
+    return _fit(data, theta, noise, search.trembles, search.iterations)
 
 
 def _fit(data: _Data, theta: Theta, noise: Noise, trembles: bool, iterations: int) -> HandFit:
     """Fit sample by sample from where a search ended, after so many iterations."""
     fine = remove_tremor(data.fine) if trembles else data.fine
-    if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
-        noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _with_transition_noise(noise.problem(fine), fine, theta)
     prior = fine.prior()
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))

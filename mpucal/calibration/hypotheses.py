@@ -162,21 +162,27 @@ class Explanation(NamedTuple):
         return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
 
 
-def explain(parts: Parts, D: Vector) -> list[Explanation]:
-    """Return what surely happened to the gyroscope, and what the other hypotheses say besides, the likeliest first.
+def weigh(parts: Parts, D: Vector) -> list[Explanation]:
+    """Return what each hypothesis says, weighed against the others and nothing, the likeliest first.
 
     Nothing where the fit failed.
     """
-    if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
-        return []
+    is_known = np.isfinite(parts.H).all() and np.isfinite(D).all()
+    return _weigh(HYPOTHESES, parts, D) if is_known else []
+
+
+def explain(parts: Parts, D: Vector, found: list[Explanation] | None = None) -> list[Explanation]:
+    """Return what surely happened to the gyroscope, and what the other hypotheses say besides, the likeliest first.
+
+    found : what `weigh` returned, if that was asked before.
+    """
+    found = weigh(parts, D) if found is None else found
     known: list[Explanation] = []
-    while True:
-        found = _weigh([each for each in HYPOTHESES if each not in {of.hypothesis for of in known}], parts, D)
-        of_gyroscope = sum(each.weight for each in found if each.hypothesis.what == "gyroscope")
-        if not (of_gyroscope > 1.0 - 1.0 / SURE):
-            return known + found
+    while sum(each.weight for each in found if each.hypothesis.what == "gyroscope") > 1.0 - 1.0 / SURE:
         known.append(found[0])
         parts = _without(parts, found[0])
+        found = _weigh([each for each in HYPOTHESES if each not in {of.hypothesis for of in known}], parts, D)
+    return known + found
 
 
 def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Explanation]:

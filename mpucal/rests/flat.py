@@ -82,6 +82,8 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     runs: list[tuple[int, int, int]] = []
     for run, first, last in still_windows(detector, spreads, windows):
         goes_on = runs and runs[-1][0] == run and runs[-1][2] == first
+        if len(runs) == 1 and not goes_on and runs[0][2] - runs[0][1] >= ENOUGH_FLAT_S * recording.rate_hz:
+            break  # the first one is long enough, whatever follows
         runs.append((run, runs.pop()[1] if goes_on else first, last))
     lengths = [last - first for _, first, last in runs]
     if max(lengths, default=0) < SHORTEST_FLAT_S * recording.rate_hz:
