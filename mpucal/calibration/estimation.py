@@ -18,7 +18,7 @@ from .checks.estimate import GOOD_RMS_MPS2
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .fit import Fit
-from .hypotheses import SURE, Explanation, explain, gyroscope_change, remove_change, weigh
+from .hypotheses import SURE, Explanation, explain, gyroscope_change, rank, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, fit_model
 from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
@@ -154,7 +154,7 @@ def _fit(
 ) -> tuple[ModelChoice, list[Explanation], tuple[Explanation, ...]]:
     """Return the fit without changes of the gyroscope's bias during the turning, what explains the rest, and them."""
     choice = fit_model(model, recording, flat, gravity)
-    found = _weigh(choice.plain)
+    found = _rank(choice.plain)
     walks: tuple[Explanation, ...] = ()
     for _ in range(MOST_CHANGES):
         change = gyroscope_change(found)
@@ -165,10 +165,10 @@ def _fit(
         # A change whose removal explains nothing is none.
         if not choice.plain.V - np.log(SURE) > without.plain.V:
             break
-        choice, found, walks = without, _weigh(without.plain), (*walks, change)
+        choice, found, walks = without, _rank(without.plain), (*walks, change)
     fit = choice.plain
     return choice, [] if fit.parts is None else explain(fit.parts, fit.D, found), walks
 
 
-def _weigh(fit: Fit) -> list[Explanation]:
-    return [] if fit.parts is None else weigh(fit.parts, fit.D)
+def _rank(fit: Fit) -> list[Explanation]:
+    return [] if fit.parts is None else rank(fit.parts, fit.D)

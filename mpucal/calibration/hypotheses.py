@@ -162,7 +162,7 @@ class Explanation(NamedTuple):
         return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
 
 
-def weigh(parts: Parts, D: Vector) -> list[Explanation]:
+def rank(parts: Parts, D: Vector) -> list[Explanation]:
     """Return what each hypothesis says, weighed against the others and nothing, the likeliest first.
 
     Nothing where the fit failed.
@@ -174,9 +174,9 @@ def weigh(parts: Parts, D: Vector) -> list[Explanation]:
 def explain(parts: Parts, D: Vector, found: list[Explanation] | None = None) -> list[Explanation]:
     """Return what surely happened to the gyroscope, and what the other hypotheses say besides, the likeliest first.
 
-    found : what `weigh` returned, if that was asked before.
+    found : what `rank` returned, if that was asked before.
     """
-    found = weigh(parts, D) if found is None else found
+    found = rank(parts, D) if found is None else found
     known: list[Explanation] = []
     while sum(each.weight for each in found if each.hypothesis.what == "gyroscope") > 1.0 - 1.0 / SURE:
         known.append(found[0])
