@@ -195,7 +195,8 @@ class InPlaceFits:
             return None
         if minimise(problem, near.theta, IMU, self._prior, until=PROMISING, most=1).iterations == 0:
             return None
-        imu = self._minimum(IMU, near, errors)
+        rough = minimise(_with_errors(self._thin, errors), near.theta, IMU, self._prior, until=ROUGHLY)
+        imu = self._minimum(IMU, rough if rough.converged else near, errors)
         return imu if imu.converged and wald(imu) > WALD_99 else None
 
     def _as_fit(self, minimum: Minimum, errors: Errors) -> Fit:

@@ -44,9 +44,13 @@ def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
     k = len(transitions)
     if k < 2 * FEWEST_BESIDE + 1:
         return None
-    places = np.arange(FEWEST_BESIDE, k - FEWEST_BESIDE)
-    likelihood, x, left = _likelihood(transitions, np.append(places, k))
     cost = math.log(SURE) + 1.5 * math.log(2 * k) + math.log(k)  # of three numbers more, and of so many times
+    misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
+    # No likelihood is above 0, that of no misses at all.
+    if not -_log_likelihood(misses, known) > cost:
+        return None
+    places = np.arange(FEWEST_BESIDE, k - FEWEST_BESIDE)
+    likelihood, x, left = _likeliest(misses, known, _directions(transitions, np.append(places, k)))
     best = int(likelihood[:-1].argmax())
     if not likelihood[best] > likelihood[-1] + cost:
         return None
@@ -69,19 +73,22 @@ def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> 
     return np.concatenate([P * ~after_end - PF * ~after_start, P * after_end - PF * after_start], axis=3)
 
 
-def _likelihood(transitions: Sequence[Transition], places: NDArray[np.intp]) -> tuple[Vector, Vector, Vector]:
-    """Return the log likelihoods (m,) of a slip at each place, by Student's t, its likeliest rotations (m, 6), and the
-    misses that remain (m, k, 3).
+def _likeliest(misses: Vector, known: Vector, A: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return the largest log likelihoods (m,) of misses + A x, with A (m, k, 3, 6), these x (m, 6), and what is left
+    of the misses (m, k, 3).
     """
-    A = _directions(transitions, places)
-    misses = np.array([each.miss for each in transitions])
-    known = np.array([each.variance for each in transitions])
-    left, nu = misses, DEGREES_OF_FREEDOM
+    left = misses
     for _ in range(ITERATIONS):
-        c, weight = likely_scale(left, known)
+        weight = likely_scale(left, known)[1]
         weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, 6).swapaxes(1, 2)
         N = weighted @ A.reshape(len(A), -1, 6)
         x = -(np.linalg.pinv(N, rcond=LEAST_SEEN, hermitian=True) @ (weighted @ misses.ravel())[..., None])
         left = misses + (A @ x[:, None])[..., 0]
-    z = 0.5 * np.sum(left**2, axis=-1) / known
-    return -np.sum(np.log(c) + 0.5 * (nu + 2.0) * np.log1p(2.0 * z / (c * nu)), axis=-1), x[..., 0], left
+    return _log_likelihood(left, known), x[..., 0], left
+
+
+def _log_likelihood(misses: Vector, known: Vector) -> Vector:
+    """Return the log likelihood (...) of misses (..., k, 3) of `known` variances (k,), by Student's t of one scale."""
+    c, nu = likely_scale(misses, known)[0], DEGREES_OF_FREEDOM
+    z = 0.5 * np.sum(misses**2, axis=-1) / known
+    return np.asarray(-np.sum(np.log(c) + 0.5 * (nu + 2.0) * np.log1p(2.0 * z / (c * nu)), axis=-1))
