@@ -16,7 +16,8 @@ from .interim import InterimEstimate
 from .levenberg_marquardt import inverse
 from .likelihood import evaluate, trace
 from .parameters import ACCELEROMETER, HAND, PLACES
-from .preprocessing import CORRELATION_S, MOVING_RAD_S, POSE_MPS2, jerk_density
+from .poses import POSE_MPS2
+from .preprocessing import CORRELATION_S, MOVING_RAD_S, jerk_density
 from .problem import Problem, Series
 from .rotation import cross, shortest_turn
 

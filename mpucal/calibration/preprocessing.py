@@ -15,6 +15,7 @@ from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.tremor import SWAY_PER_S, without_tremor
 from ..rests.windows import WINDOW_S, noise_ratio, noise_variance
 from .masks import mask
+from .poses import POSE_MPS2, Poses
 from .problem import Problem, Series
 from .rotation import lengths
 from .theta import Prior
@@ -26,7 +27,6 @@ SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest
 FLOOR_CORRELATION_S = 0.05  # of jerks
 FLOOR_MPS2 = 0.12  # white acceleration by jerks, in addition to the pivot's own
-POSE_MPS2 = 0.0003  # standard deviation of a rest's mean, since no mounting is perfectly stiff
 MANY_RESTS = 6
 
 
@@ -75,6 +75,12 @@ class Preprocessed:
             jerk = jerk + lam / self.problem.lam * self.problem.series.jerk  # which keeps the size of the sway
         white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
         return replace(self._with(jerk=jerk, r_extra=self.pose + white), lam=lam)
+
+    @cached_property
+    def poses(self) -> Poses:
+        """Poses that the board holds after the flat segment, or from it on."""
+        runs = self.runs[self.runs[:, 1] > self.flat.last + 1]
+        return Poses.of(self.recording, self.flat, self.problem, runs)
 
     @cached_property
     def _dt(self) -> float:

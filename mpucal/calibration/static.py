@@ -17,7 +17,7 @@ from ..rests.tremor import SWAY_PER_S, mean_variance, without_tremor
 from .fit import Fit
 from .hypothesis_tests import KNOWN
 from .parameters import B_A_NAMES, D_NAMES, Form
-from .preprocessing import POSE_MPS2
+from .poses import POSE_MPS2
 from .theta import UPPER, from_elements
 
 # PS-MPU-6000A r3.4, section 6.2: +-3 % of scale factor, +-2 % across axes, both taken as uniform

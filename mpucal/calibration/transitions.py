@@ -13,14 +13,12 @@ import numpy as np
 
 from ..data import Vector
 from ..kernel import _kernel
-from ..rests.intervals import Intervals, statistics
 from .parameters import NAMES, PLACES
-from .preprocessing import POSE_MPS2, Preprocessed
+from .preprocessing import Preprocessed
 from .problem import Series
 from .rotation import cross, cross_rows, lengths, turned
 from .theta import UPPER, Theta
 
-SPEED_OF_TREMOR_S = 0.04  # ratio of a tremor's speed to its acceleration
 FEWEST_TRANSITIONS = 3
 DEGREES_OF_FREEDOM = 4.0
 # A transition of less weight gets a scale of its own; the others differ by chance.
@@ -48,12 +46,12 @@ class Transition(NamedTuple):
 
 def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     """Return the transitions under theta; none where they are too few to be compared."""
-    series, flat = prepared.problem.series, prepared.flat
-    turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
-    runs = prepared.runs[prepared.runs[:, 1] > flat.last + 1]
+    series, flat, poses = prepared.problem.series, prepared.flat, prepared.poses
+    runs, direction = poses.runs, poses.variance
     if len(runs) <= FEWEST_TRANSITIONS:
         return []
-    coming, leaving, direction = _rests(prepared, runs, turns, theta)
+    turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
+    coming, leaving = poses.forces(theta)
     spans = [slice(*span) for span in zip(runs[:-1, 1] - flat.last, runs[1:, 0] + 1 - flat.last, strict=True)]
     F, leaving, coming = np.array([turned(turns[span]) for span in spans]), leaving[:-1], coming[1:]
     # The miss is the sine of the angle between two directions, along their axis.
@@ -166,23 +164,3 @@ def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
     ds[:, :, PLACES["D"]] = -np.einsum("ai,kj->kaij", inverse, s).reshape(-1, 3, 9)
     ds[:, :, PLACES["b_a"]] = -inverse
     return ds
-
-
-def _rests(prepared: Preprocessed, runs: Intervals, turns: Vector, theta: Theta) -> tuple[Vector, Vector, Vector]:
-    """Return the poses of k rests between transitions; `turns` (n, 3) [rad] are the steps of the series.
-
-    These are the mean specific force (k, 3) [m/s^2] of each in the body's axes at its first sample, and at its last
-    one, and the variance (k,) [rad^2 an axis] of its direction.
-    """
-    recording, flat = prepared.recording, prepared.flat
-    inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D, and must not stop there
-    mean, spread = statistics(recording.acc, runs)
-    s, n = (mean - theta.b_a) @ inverse.T, runs[:, 1] - runs[:, 0]
-    # A board in a hand turns a little as it rests: each sample is rotated into the axes of either end.
-    path = np.zeros((len(recording) + 1, 3))
-    np.cumsum(turns, axis=0, out=path[flat.last + 1 :])
-    across = statistics(cross_rows(path[1:], (recording.acc - theta.b_a) @ inverse.T), runs)[0]
-    coming, leaving = (s + cross_rows(path[at], s) - across for at in (runs[:, 0] + 1, runs[:, 1]))
-    tremor = np.maximum(np.mean(spread - flat.Sigma_a, axis=1), 0.0)
-    of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S * recording.rate_hz / n) ** 2
-    return coming, leaving, (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / prepared.problem.gravity**2
