@@ -61,6 +61,37 @@ def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, tmp_path):
     same(found, walk, TWO_PERCENT, rad_s)
 
 
+@pytest.mark.parametrize(
+    ("per_g", "says"),
+    [
+        (1000, "accelerations in mg and"),
+        (980.665, "accelerations in cm/s^2 (by |a|; if these are in mg, give --units acc=mg)"),
+        (1024, "accelerations in counts of ±32 g (by |a|; if these are in mg, give --units acc=mg)"),
+    ],
+)
+def test_whole_numbers_near_1000_for_1_g(per_g, says, walk, ms, tmp_path):
+    """Read them in the nearest unit, and name the other."""
+    of_g = walk.acc / np.median(np.linalg.norm(walk.acc, axis=1))
+    made = pd.DataFrame(np.rint(per_g * of_g).astype(int), columns=NAMES[:3])
+    made.insert(0, "ms", ms)
+    made.to_csv(tmp_path / "a.csv", index=False)
+    found = mpucal.load(tmp_path / "a.csv")
+    assert says in found.taken
+    np.testing.assert_allclose(found.acc, G * of_g, atol=0.01)
+    np.testing.assert_allclose(mpucal.load(tmp_path / "a.csv", units="acc=mg").acc, G / 1000 * made[NAMES[:3]])
+
+
+@pytest.mark.parametrize("per_g", [980, 1000, 1024])
+def test_whole_mg_beside_mdeg(per_g, walk, ms, tmp_path):
+    """Take these for the units of a driver, and a gain of 2 % for the sensor's."""
+    of_g = walk.acc / np.median(np.linalg.norm(walk.acc, axis=1))
+    whole = np.rint(np.column_stack([per_g * of_g, 1e3 * np.rad2deg(walk.gyr)])).astype(int)
+    made = pd.DataFrame(whole, columns=NAMES)
+    made.insert(0, "ms", ms)
+    made.to_csv(tmp_path / "a.csv", index=False)
+    assert "accelerations in mg and rates in mdeg/s" in mpucal.load(tmp_path / "a.csv").taken
+
+
 def test_counts_stay_counts(walk, ms, tmp_path):
     counts = np.column_stack([walk.acc * 8192 / G, np.rad2deg(walk.gyr) * 65.536])
     made = pd.DataFrame(np.rint(counts).astype(int), columns=NAMES)

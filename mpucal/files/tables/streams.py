@@ -26,6 +26,8 @@ OF_COUNTS = "in counts of"
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # Largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther), or to tenths or hundredths of deg/s.
 NEAR = 0.08
+# counts for 1 g that |a| hardly tells from mg, and how units are known by it
+COUNTS_NEAR_MG, BY_SIZE, OR_MG = 1024, " (by |a|)", " (by |a|; if these are in mg, give --units acc=mg)"
 # quartile distance of |a| over its median, beyond which the median is that of a motion
 SHAKING = 0.25
 
@@ -115,7 +117,7 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
             hints = replace(hints, units={**hints.units, **whole[0]})
             rate_of = _Rates(t[complete], values, rates, gyr, hints, name)
             remarks = [*remarks, whole[1]]
-        a = _accelerations(values, acc.unit, hints, name, beside_counts=rate_of.show_counts)
+        a = _accelerations(values, acc.unit, hints, name, beside=rate_of.shown)
         w = rate_of.read(beside_counts=a.said.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
     repeated, lost = int((~new[0]).sum()), max(acc.lost, gyr.lost)
@@ -183,12 +185,12 @@ def _rate_hz(acc: Stream, gyr: Stream, hints: Hints) -> float | None:
     return units.likely_rate_hz(acc.values[complete], values, unit)
 
 
-def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside_counts: bool = False) -> Reading:
+def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside: str = "") -> Reading:
     """Return (n, 3) accelerations, in the unit `said` by the file, in SI units.
 
     Parameters
     ----------
-    beside_counts : the rates are counts, so that whole numbers of some 1000 for 1 g are not mg.
+    beside : the unit of the rates that their turning shows, COUNTS if it is none; empty if it shows nothing.
     """
     said = hints.units.get("acc", said)
     if (centre := units.offset(values)) is not None:
@@ -197,14 +199,15 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
             "subtract from each axis what its converter gives at 0 g, such as half of its range",
         )
     size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
-    unclear = not seen or hints.accel_range_g or (beside_counts and seen == "mg")
     whole = not said and units.are_counts(values)
-    if whole and _away(size, "mm/s^2") < NEAR and not beside_counts and not hints.accel_range_g:
+    likely_whole = _whole_unit(size, beside) if whole and seen == "mg" else ""
+    unclear = not seen or hints.accel_range_g or likely_whole == COUNTS
+    if whole and _away(size, "mm/s^2") < NEAR and beside != COUNTS and not hints.accel_range_g:
         return Reading.of(
             values, QUANTITIES["acc"]["mm/s^2"], "in mm/s^2 (by |a|; if these are counts, give --units acc=counts)"
         )
     if said == COUNTS or (whole and unclear):
-        return _scaled_counts(values, hints, name, size)
+        return _scaled_counts(values, hints, name, size, OR_MG if likely_whole and not beside else BY_SIZE)
     near = "" if seen or said else units.mean_acceleration_unit(values)
     if near:
         raise RecordingError(
@@ -219,10 +222,9 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
         )
     likely = LEAST_LIKELY <= size * QUANTITIES["acc"].get(seen, 0.0) / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
     likely = likely or not (values == np.rint(values)).all()
-    seen = hints.units.get("acc", (seen if said or likely else "") or said)
+    seen = hints.units.get("acc", (likely_whole or seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
-    cm = " (|a| fits --units acc=cm/s^2 better)" if whole and unit == "mg" and _mg_or_cm(size)[0] != unit else ""
-    return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}{cm}")
+    return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}{OR_MG if likely_whole not in ('', 'mg') else ''}")
 
 
 def _away(size: float, unit: str) -> float:
@@ -235,8 +237,16 @@ def _mg_or_cm(size: float) -> list[str]:
     return sorted(("mg", "cm/s^2"), key=lambda unit: _away(size, unit))
 
 
-def _scaled_counts(values: Vector, hints: Hints, name: str, size: float) -> Reading:
-    """Return (n, 3) counts, whose median magnitude is `size`, in SI units."""
+def _whole_unit(size: float, beside: str) -> str:
+    """Return the unit of whole numbers of some 1000 for 1 g: the nearest of those that occur beside such rates."""
+    if beside in (COUNTS, "mdeg/s"):
+        return COUNTS if beside == COUNTS else "mg"
+    nearest = _mg_or_cm(size)[0]
+    return COUNTS if not beside and abs(math.log(size / COUNTS_NEAR_MG)) < _away(size, nearest) else nearest
+
+
+def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str) -> Reading:
+    """Return (n, 3) counts, whose median magnitude is `size`, in SI units; `by` says how their range is known."""
     if units.typical_size(values)[1] > SHAKING * size:
         size = units.typical_size(units.averaged(values))[0]
     per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
@@ -248,7 +258,7 @@ def _scaled_counts(values: Vector, hints: Hints, name: str, size: float) -> Read
             "give the --accel-range that the sensor had, or --units acc=counts if it was this one",
             f"--accel-range {ACCEL_COUNTS / per_g:g}" if hints.accel_range_g else "",
         )
-    by = "" if hints.accel_range_g else " (by |a|)"
+    by = "" if hints.accel_range_g else by
     return Reading.of(values, scale, f"{OF_COUNTS} ±{range_g:g} g{by}", counts=True)
 
 
@@ -268,9 +278,9 @@ class _Rates:
         self._whole = not self._said and units.are_counts(stream.values[stream.complete])
 
     @property
-    def show_counts(self) -> bool:
-        """Return True if they are whole numbers that turn gravity as rates in no unit do."""
-        return self._whole and bool(self._factor and not self._seen)
+    def shown(self) -> str:
+        """Return their unit as they turn gravity, COUNTS if they are whole and turn it as in none; or empty."""
+        return self._seen or (COUNTS if self._whole and self._factor else "")
 
     def whole_units(self) -> tuple[dict[str, str], str] | None:
         """Return the units of both sensors, beside accelerations that seem to be in whole mg, and a remark on them.
@@ -290,7 +300,8 @@ class _Rates:
 
     def read(self, *, beside_counts: bool) -> Reading:
         """Return them in SI units; `beside_counts` if the accelerations are counts."""
-        of_counts = self.show_counts or (self._whole and (beside_counts or self._hints.gyro_range_dps is not None))
+        counted = self.shown == COUNTS or beside_counts or self._hints.gyro_range_dps is not None
+        of_counts = self._whole and counted
         if self._said == COUNTS or of_counts:
             return self._counts()
         said, seen, factor = self._said, self._seen, self._factor
