@@ -107,8 +107,8 @@ def first_bytes(path: Path, count: int = SNIFFED) -> bytes:
 
 
 def is_text(data: bytes) -> bool:
-    """Return True if bytes seem to be text; a logger that is switched off leaves zeros."""
-    return len(data) > 0 and data.count(b"\0") <= MOST_ODD * len(data)
+    """Return True if bytes seem to be text, and no workbook of Excel; a logger that is switched off leaves zeros."""
+    return len(data) > 0 and not data.startswith(b"PK\3\4") and data.count(b"\0") <= MOST_ODD * len(data)
 
 
 def import_extra(name: str, extra: str, path: Path) -> Any:

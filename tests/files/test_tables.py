@@ -1,5 +1,6 @@
 """Tables of text as programs and people write them: each form is a row of data, and gives the walk's samples back."""
 
+import zipfile
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -328,6 +329,7 @@ FORMS = {
         *("", "clock, a w", "2024-05-01 {} - INFO - {}, {}, {}, {}, {}, {}\n", "walk.log", BY_GRAVITY)
     ),
     "numbers of rows without a name": Form(f"time,{AXES}", "i t a w"),
+    "specific forces": Form("t,fx,fy,fz,wx,wy,wz\n", "t a w", says="rates in rad/s."),
     "days": Form(f"Time,{AXES}", "serial a w", says="times in days"),
     "a counter that overflows": Form(
         f"micros,{AXES}", "overflow a w", says="times in us, whose counter overflows 1 times"
@@ -561,6 +563,48 @@ def test_counts_of_an_analog_accelerometer_have_an_offset(read, walk):
         read("ms,ax,ay,az\n", "ms a", of=whole)
 
 
+def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, tmp_path):
+    """Fit a sphere to neither: any few points lie on one."""
+    noise = np.random.default_rng(1).uniform(-0.1, 0.1, size=(len(walk), 3))
+    faces = np.repeat(G * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]]), 100, axis=0)
+    for name, acc in (("rest", noise + np.array([0, 0, G])), ("faces", faces + noise[: len(faces)])):
+        made = np.column_stack([np.arange(len(acc)) / 100 + 0.005, acc])
+        np.savetxt(tmp_path / f"{name}.csv", made, delimiter=",", header="t,ax,ay,az", comments="")
+        np.testing.assert_allclose(mpucal.load(tmp_path / f"{name}.csv").acc, acc)
+
+
+@pytest.mark.parametrize("above", range(0, 130, 13))
+def test_a_line_that_the_beginning_cuts_does_not_show_the_separator(above, walk, tmp_path):
+    """Read lines of a serial monitor, wherever in one of them the part ends that shows how they are separated."""
+    rows = np.column_stack([walk.t, walk.acc, walk.gyr])
+    lines = "".join(f"12:34:56.789 -> {','.join(map(repr, row))}\n" for row in rows.tolist())
+    (tmp_path / "walk.txt").write_text(f"{'#' * above}\n12:34:56.789 -> time,{AXES}{lines}")
+    assert "times in s" in mpucal.load(tmp_path / "walk.txt").taken
+
+
+def test_numbers_of_packets_are_no_times(walk, tmp_path):
+    made = np.column_stack([2 * np.arange(len(walk)), walk.acc, walk.gyr])
+    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header=f"Packet number,{AXES.strip()}", comments="")
+    found = mpucal.load(tmp_path / "walk.csv", units="gyr=rad/s")
+    assert "this sample rate is that at which its rates turn gravity" in found.taken
+
+
+def test_an_order_is_suggested_in_which_accelerations_keep_their_length(walk, tmp_path):
+    rates = np.random.default_rng(2).normal(size=(len(walk), 3)) ** 3
+    made = np.rint(np.column_stack([300 * rates, 4096 / G * walk.acc]))
+    np.savetxt(tmp_path / "walk.txt", made, delimiter=",", fmt="%d")
+    with pytest.raises(RecordingError) as raised:
+        mpucal.load(tmp_path / "walk.txt")
+    assert raised.value.options == "--columns gx,gy,gz,ax,ay,az"
+
+
+def test_a_workbook_is_to_be_exported(tmp_path):
+    with zipfile.ZipFile(tmp_path / "walk.xlsx", "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr("xl/worksheets/sheet1.xml", np.random.default_rng(3).bytes(1 << 16))
+    with pytest.raises(RecordingError, match=r"not a recording that mpucal knows: export a table as \.csv"):
+        mpucal.load(tmp_path / "walk.xlsx")
+
+
 def test_counts_beside_an_index_have_no_rate(read, walk):
     """Take no index for milliseconds: any range of counts would fit these."""
     found = read("", "i 10.0 counts")
@@ -590,7 +634,7 @@ def test_a_rate_is_found_by_how_gravity_turns_and_must_fit(read, walk):
     assert found.rate_hz == pytest.approx(100.0, rel=0.2)
     assert "this sample rate is that at which its rates turn gravity" in found.taken
     for units in ("", "acc=m/s^2"):
-        with pytest.raises(RecordingError, match=r"gravity turns 0\.\d+ times as fast .* for the times --rate \d"):
+        with pytest.raises(RecordingError, match=r"gravity turns [\d.]+ times as fast .* for the times --rate \d"):
             read(AXES, "a w", rate=25, units=units)
     opposite = read(f"time,{AXES}", "t a w", of=replace(walk, gyr=-walk.gyr))
     assert "gravity turns the other way" in opposite.taken

@@ -13,7 +13,18 @@ from ...errors import RecordingError
 from ..hints import ROLES, Hints
 from .cells import Kind
 from .guess import guess_columns, is_even_clock, likely_columns
-from .names import ACC, ESTIMATED, GYR, TEMPERATURE, TIME, WITHOUT_GRAVITY, Column, first_triple, parse_column_name
+from .names import (
+    ACC,
+    COUNTER,
+    ESTIMATED,
+    GYR,
+    TEMPERATURE,
+    TIME,
+    WITHOUT_GRAVITY,
+    Column,
+    first_triple,
+    parse_column_name,
+)
 from .table import Table
 from .units import BEYOND
 
@@ -35,7 +46,7 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if not (named and (clocks or hints.rate_hz)):
         of = _numbers(table)
-        even = [place for place in of if is_even_clock(of[place])]
+        even = [at for at in of if is_even_clock(of[at]) and not COUNTER.search(table.name_of(at))]
         if named:
             columns = [*columns, *(Column(table.header[place], place, TIME) for place in even[:1])]
             remark = "".join(f"{table.name_of(place)} is taken for the time" for place in even[:1])

@@ -77,9 +77,10 @@ def likely_columns(of: Columns, clocks: Sequence[int]) -> tuple[dict[str, int], 
     increasing = [place for place in of if is_clock(of[place])]
     clocks = clocks or [place for place in increasing if is_even_clock(of[place])]
     triples = {triple: _stacked(of, triple) for triple in _triples(of, {*clocks, *increasing})}
-    acc = next((triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)), None)
-    if acc is None:
+    sized = [triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)]
+    if not sized:
         return None if triples else ({}, "")
+    acc = next((triple for triple in sized if _keeps_size(triples[triple])), sized[0])
     # rates are none at times, other than a magnetic field
     others = sorted((triple for triple in triples if triple != acc), key=lambda triple: _steadiness(triples[triple]))
     found = [place for triple in (acc, *others[:1]) for place in triple]
@@ -118,6 +119,12 @@ def _has_size(acc: Vector) -> bool:
     return are_counts(acc) or bool(acceleration_unit(acc))
 
 
+def _keeps_size(values: Vector) -> bool:
+    """Return True if (n, 3) numbers vary, and keep their length as gravity does."""
+    size, scatter = typical_size(values)
+    return 0.0 < scatter <= MOST_SCATTER * size
+
+
 def is_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase, and do not only repeat."""
     steps = np.diff(column[np.isfinite(column)])
@@ -148,8 +155,7 @@ def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
 def _pairs(of: Columns, places: list[int]) -> list[tuple[int, ...]]:
     """Return the places of two sensors' three adjacent columns each, of which the first keep a magnitude."""
     starts = range(len(places) - 2)
-    sizes = {a: typical_size(_stacked(of, places[a : a + 3])) for a in starts}
-    gravity = [a for a, (size, scatter) in sizes.items() if 0.0 < scatter <= MOST_SCATTER * size]
+    gravity = [a for a in starts if _keeps_size(_stacked(of, places[a : a + 3]))]
     return [(*places[a : a + 3], *places[w : w + 3]) for a in gravity for w in starts if abs(a - w) >= 3]
 
 

@@ -46,11 +46,12 @@ STEMS = {
     ACC: _stems(
         "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
         " acce accelero acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
+        " specificforce f fb fib"
     ),
     GYR: _stems(
         "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
         " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate gyroadc:deg/s rotationrate"
-        " motionrotationrate rotation"
+        " motionrotationrate rotation wb wib"
     ),
 }
 UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}
@@ -64,6 +65,8 @@ WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", 
 # the direction of gravity as a program estimates it, which an accelerometer of no errors would measure, and attitudes,
 # of which three parts may be as long
 ESTIMATED = re.compile(r"gravity|quat|^q[_.]?[wxyz0-3]$", re.IGNORECASE)
+# numbers of samples, which are no times
+COUNTER = re.compile(r"packet|number|index|sequence|frame|sample|counter", re.IGNORECASE)
 # names that are remembered
 MOST_NAMES = 1024
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms

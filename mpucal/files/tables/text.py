@@ -87,7 +87,8 @@ def decode_text(data: bytes, name: str) -> str:
         text = text.replace("\r", "\n")
     head = _QUOTED.sub(lambda quoted: " ".join(quoted[0].split("\n")), text[:HEAD])
     text = _EXPONENT.sub("E", _MARKS.sub("", head + text[HEAD:]))
-    begun = text[:HEAD].rstrip("\n")
+    # what was read of the file may end within a line
+    begun = text[:HEAD].rpartition("\n")[0] or text
     stamped = [*MONITORED.finditer(begun)]
     if 2 * len(stamped) <= begun.count("\n"):
         return text
