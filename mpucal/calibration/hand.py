@@ -8,7 +8,7 @@ correlation time; with few, the second derivative of a position that stays bound
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -107,7 +107,9 @@ class HandFit:
         return replace(self.fit, covariance=covariance[np.ix_(minimum.free, minimum.free)], at_prior=known)
 
 
-def search_hand(recording: Recording, flat: Flat, gravity: float, near: HandFit | None = None) -> HandFit:
+def search_hand(
+    recording: Recording, flat: Flat, gravity: float, first: Theta | None = None, near: HandFit | None = None
+) -> HandFit:
     """Fit a hand's model.
 
     A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
@@ -115,21 +117,22 @@ def search_hand(recording: Recording, flat: Flat, gravity: float, near: HandFit 
 
     Parameters
     ----------
-    near : fit of a recording that hardly differs, where there is one: the search begins there.
+    first : linear estimate, if it is known. near : fit of a recording that hardly differs, where there is one; the
+        search begins there.
     """
     data = _Data(recording, flat, gravity)
     if near is not None:
         found = _fit(data, near.minimum.theta, near.noise, near.trembles, near.fit.iterations)
         if found.fit.converged:
             return found
-    found = _fit_from(initialise, data)
+    found = _fit_from(first or initialise(data.rough.problem, data.fine.flat.b_omega), data)
     if found.fit.converged:
         return found
-    again = _fit_from(perfect, data)
+    again = _fit_from(perfect(data.rough.problem, data.fine.flat.b_omega), data)
     return again if again.fit.converged else found
 
 
-def _fit_from(begin: Callable[[Problem, Vector], Theta], data: _Data) -> HandFit:
+def _fit_from(begin: Theta, data: _Data) -> HandFit:
     """Fit means over blocks first, then sample by sample."""
     search = _Search(data.rough)
     theta, noise = search.run(begin)
@@ -232,10 +235,9 @@ class _Search:
         self.iterations = 0
         self.trembles = False
 
-    def run(self, begin: Callable[[Problem, Vector], Theta]) -> tuple[Theta, Noise]:
+    def run(self, theta: Theta) -> tuple[Theta, Noise]:
         """Search with Huber's loss, which converges from afar, then with the redescending one and the best sigma."""
         prepared = self.prepared
-        theta = begin(prepared.problem, prepared.flat.b_omega)
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
         sigma, sigmas = HAND_MPS2[0], HAND_MPS2 if prepared.rests_often else WHITE_MPS2
         for _ in range(2):

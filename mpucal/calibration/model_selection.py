@@ -101,7 +101,8 @@ def fit_model(
     if model == "auto":
         return choose_model(recording, flat, gravity, of_a_hand)
     if model == "hand":
-        return ModelChoice(search_hand(recording, flat, gravity, of_a_hand), model, "asked for")
+        first = None if of_a_hand else InPlaceFits(recording, flat, gravity).first
+        return ModelChoice(search_hand(recording, flat, gravity, first, of_a_hand), model, "asked for")
     return ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for")
 
 
@@ -116,7 +117,7 @@ def choose_model(recording: Recording, flat: Flat, gravity: float, near: HandFit
     chosen = in_place.choose(None if near is None else near.minimum.theta)
     if isinstance(chosen, ModelChoice):
         return chosen
-    hand = search_hand(recording, flat, gravity, near)
+    hand = search_hand(recording, flat, gravity, None if near else in_place.first, near)
     kept = "K" if "K_xx" in hand.fit.names else "no K (it is not significantly different from the identity)"
     return ModelChoice(hand, "hand", f"{chosen}: a hand's model, with {kept}")
 
@@ -207,7 +208,8 @@ class InPlaceFits:
     def _rough(self, parameters: int) -> Minimum:
         """Search on means over blocks, once for each number of parameters."""
         if parameters not in self._roughly:
-            self._roughly[parameters] = minimise(self._thin, self._first, parameters, self._prior, until=ROUGHLY)
+            begin = self.first if parameters == ACCEL else self._rough(ACCEL).theta
+            self._roughly[parameters] = minimise(self._thin, begin, parameters, self._prior, until=ROUGHLY)
         return self._roughly[parameters]
 
     @cached_property
@@ -217,7 +219,8 @@ class InPlaceFits:
         return WHITE_NIS + MOST_STD * float(np.sqrt(variance))
 
     @cached_property
-    def _first(self) -> Theta:
+    def first(self) -> Theta:
+        """Linear estimate, from which searches begin."""
         return initialise(self._thin, self._flat.b_omega)
 
     @cached_property
