@@ -137,6 +137,14 @@ def test_two_tables_are_joined_by_time(walk, walk_ns, tmp_path):
         mpucal.load(tmp_path)
 
 
+def test_a_letter_in_a_files_name_is_no_sensor(walk, assert_same, tmp_path):
+    for name, values in (("accm", walk.acc), ("gyrm", walk.gyr)):
+        made = np.column_stack([walk.t, values])
+        header = "time,X_value,Y_value,Z_value"
+        np.savetxt(tmp_path / f"house_f_158_{name}.csv", made, "%.17g", ",", header=header, comments="")
+    assert_same(mpucal.load(tmp_path / "house_f_158_accm.csv"), walk)
+
+
 def test_one_table_of_two_is_read_with_the_other_if_that_is_there(walk, walk_ns, assert_same, tmp_path):
     phyphox(tmp_path, walk, walk_ns)
     for given in ("Accelerometer.csv", "Gyroscope.csv"):

@@ -329,7 +329,6 @@ FORMS = {
         *("", "clock, a w", "2024-05-01 {} - INFO - {}, {}, {}, {}, {}, {}\n", "walk.log", BY_GRAVITY)
     ),
     "numbers of rows without a name": Form(f"time,{AXES}", "i t a w"),
-    "specific forces": Form("t,fx,fy,fz,wx,wy,wz\n", "t a w", says="rates in rad/s."),
     "days": Form(f"Time,{AXES}", "serial a w", says="times in days"),
     "a counter that overflows": Form(
         f"micros,{AXES}", "overflow a w", says="times in us, whose counter overflows 1 times"
@@ -571,6 +570,30 @@ def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, tmp_path):
         made = np.column_stack([np.arange(len(acc)) / 100 + 0.005, acc])
         np.savetxt(tmp_path / f"{name}.csv", made, delimiter=",", header="t,ax,ay,az", comments="")
         np.testing.assert_allclose(mpucal.load(tmp_path / f"{name}.csv").acc, acc)
+
+
+def test_shocks_near_some_sphere_have_no_offset(tmp_path):
+    """Refuse what scatters too much, without a zero that none has."""
+    directions = np.random.default_rng(4).normal(size=(1000, 3))
+    acc = 35.0 * directions / np.linalg.norm(directions, axis=1)[:, None] + np.array([26, 7, 32])
+    np.savetxt(tmp_path / "a.csv", np.column_stack([np.arange(1000) / 100, acc]), delimiter=",", header="t,ax,ay,az")
+    with pytest.raises(RecordingError) as raised:
+        mpucal.load(tmp_path / "a.csv")
+    assert "in place of zero" not in str(raised.value)
+
+
+@pytest.mark.parametrize("order", [[0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5], [0, 1, 2, 3, 4, 5] * 2])
+def test_two_sensors_under_one_name(order, walk, assert_same, tmp_path):
+    """Read the first of both, as of pandas' columns of two levels."""
+    one, other = (np.column_stack([of * walk.acc, walk.gyr]) for of in (1.0, -1.0))
+    names = [AXES.strip().split(",")[at] for at in order]
+    first = [names.index(name) == at for at, name in enumerate(names)]
+    columns = [(one if is_first else other)[:, at] for is_first, at in zip(first, order, strict=True)]
+    sides = ["left" if is_first else "right" for is_first in first]
+    header = f"sensor,{','.join(sides)}\naxis,{','.join(names)}"
+    made = np.column_stack([walk.t, *columns])
+    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header=header, comments="", fmt="%.17g")
+    assert_same(mpucal.load(tmp_path / "walk.csv"), walk)
 
 
 @pytest.mark.parametrize("above", range(0, 130, 13))

@@ -46,12 +46,12 @@ STEMS = {
     ACC: _stems(
         "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
         " acce accelero acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
-        " specificforce f fb fib"
+        " specificforce"
     ),
     GYR: _stems(
         "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
         " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate gyroadc:deg/s rotationrate"
-        " motionrotationrate rotation wb wib"
+        " motionrotationrate rotation"
     ),
 }
 UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}
@@ -228,14 +228,14 @@ def axis_triples(columns: Sequence[Column], quantity: str) -> list[tuple[Column,
     of = sorted(
         (column for column in columns if column.quantity == quantity), key=lambda c: (c.rank, not c.unit, c.unit)
     )
-    found: list[list[Column]] = []
+    found: list[tuple[Column, ...]] = []
     for _, group in groupby(of, lambda column: column.rank):
-        # a logger may write counts beside what it made of them
+        # a logger may write counts beside what it made of them, and several sensors under one name
         same = [*group]
         of_units = [[*of_unit] for _, of_unit in groupby(same, lambda column: column.unit)]
-        found += of_units if len(same) > len("xyz") else [same]
-    ordered = (sorted(axes, key=lambda c: c.axis) for axes in found)
-    return [tuple(axes) for axes in ordered if [c.axis for c in axes] == [0, 1, 2]]
+        for each in of_units if len(same) > len("xyz") else [same]:
+            found += zip(*([column for column in each if column.axis == axis] for axis in range(3)), strict=False)
+    return found
 
 
 def first_triple(columns: Sequence[Column], quantity: str) -> tuple[Column, ...]:

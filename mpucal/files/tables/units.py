@@ -161,15 +161,16 @@ def typical_size(values: Vector) -> tuple[float, float]:
 
 
 def offset(values: Vector) -> Vector | None:
-    """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is outside; None otherwise.
+    """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is far outside; None otherwise.
 
-    Each axis has to cover more than the radius, so that the sphere is determined.
+    Each axis has to cover more than the radius, so that the sphere is determined; the shocks of a walk fit some sphere
+    near zero.
     """
     x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), (values**2).sum(axis=1), rcond=None)
     radius, scatter = typical_size(values - x[:3])
     known = 0.0 < scatter < SCATTER * radius < SCATTER * float(np.ptp(values, axis=0).min())
     known = known and BETTER_CENTRED * scatter < typical_size(values)[1]
-    return x[:3] if known and radius < float(np.linalg.norm(x[:3])) else None
+    return x[:3] if known and 2.0 * radius < float(np.linalg.norm(x[:3])) else None
 
 
 def to_signed(values: Vector) -> Vector:
