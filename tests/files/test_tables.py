@@ -596,6 +596,13 @@ def test_two_sensors_under_one_name(order, walk, assert_same, tmp_path):
     assert_same(mpucal.load(tmp_path / "walk.csv"), walk)
 
 
+def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, tmp_path):
+    made = np.column_stack([walk.t, walk.gyr, 0.6 / G * walk.acc])
+    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header="time,pA,pB,pC,MagX,MagY,MagZ", comments="")
+    with pytest.raises(RecordingError):
+        mpucal.load(tmp_path / "walk.csv")
+
+
 @pytest.mark.parametrize("above", range(0, 130, 13))
 def test_a_line_that_the_beginning_cuts_does_not_show_the_separator(above, walk, tmp_path):
     """Read lines of a serial monitor, wherever in one of them the part ends that shows how they are separated."""

@@ -50,7 +50,7 @@ STEMS = {
     ),
     GYR: _stems(
         "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
-        " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate gyroadc:deg/s rotationrate"
+        " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate angrate gyroadc:deg/s rotationrate"
         " motionrotationrate rotation"
     ),
 }
@@ -62,9 +62,9 @@ COLDEST_C, WARMEST_C = -60.0, 130.0
 FLIPPED_STEMS = ("accelerometeracceleration",)
 # accelerations from which a program has taken gravity
 WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
-# the direction of gravity as a program estimates it, which an accelerometer of no errors would measure, and attitudes,
-# of which three parts may be as long
-ESTIMATED = re.compile(r"gravity|quat|^q[_.]?[wxyz0-3]$", re.IGNORECASE)
+# what rates turn as they turn gravity: its direction as a program estimates it, and a magnetic field; and attitudes, of
+# which three parts may be as long
+ESTIMATED = re.compile(r"gravity|^mag|magnet|quat|^q[_.]?[wxyz0-3]$", re.IGNORECASE)
 # numbers of samples, which are no times
 COUNTER = re.compile(r"packet|number|index|sequence|frame|sample|counter", re.IGNORECASE)
 # names that are remembered
