@@ -1,5 +1,6 @@
 """Tables of text as programs and people write them: each form is a row of data, and gives the walk's samples back."""
 
+import contextlib
 import zipfile
 from dataclasses import dataclass, replace
 
@@ -601,6 +602,28 @@ def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, tmp_path):
     np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header="time,pA,pB,pC,MagX,MagY,MagZ", comments="")
     with pytest.raises(RecordingError):
         mpucal.load(tmp_path / "walk.csv")
+
+
+def test_of_two_sensors_under_one_name_both_parts_are_of_one(walk, assert_same, tmp_path):
+    """Read the gyroscope of the accelerometer that shows gravity, and mix no axes where a name is there twice."""
+    names = AXES.strip().split(",")
+    header = f"sensor,{','.join(['left'] * 6 + ['right'] * 6)}\naxis,{','.join(names * 2)}"
+    other = np.column_stack([0.01 * walk.acc, -walk.gyr])
+    made = np.column_stack([walk.t, other, walk.acc, walk.gyr])
+    np.savetxt(tmp_path / "two.csv", made, delimiter=",", header=header, comments="", fmt="%.17g")
+    assert_same(mpucal.load(tmp_path / "two.csv"), walk)
+    made = np.column_stack([walk.t, -walk.acc[:, 0], walk.acc, walk.gyr])
+    header = f"sensor,{','.join(['left'] + ['right'] * 6)}\naxis,{','.join([names[0], *names])}"
+    np.savetxt(tmp_path / "mixed.csv", made, delimiter=",", header=header, comments="", fmt="%.17g")
+    with contextlib.suppress(RecordingError):
+        np.testing.assert_allclose(mpucal.load(tmp_path / "mixed.csv").acc, walk.acc)
+
+
+@pytest.mark.parametrize("name", ["framestamp", "sample_at"])
+def test_times_whose_name_counts_are_times_if_they_have_parts_of_a_second(name, walk, assert_same, tmp_path):
+    made = np.column_stack([walk.t, walk.acc, walk.gyr])
+    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header=f"{name},{AXES.strip()}", comments="", fmt="%.17g")
+    assert_same(mpucal.load(tmp_path / "walk.csv"), walk)
 
 
 @pytest.mark.parametrize("above", range(0, 130, 13))

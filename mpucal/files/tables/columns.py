@@ -46,7 +46,8 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if not (named and (clocks or hints.rate_hz)):
         of = _numbers(table)
-        even = [at for at in of if is_even_clock(of[at]) and not COUNTER.search(table.name_of(at))]
+        counts = [at for at in of if COUNTER.search(table.name_of(at)) and not np.any(of[at] % 1.0)]
+        even = [at for at in of if is_even_clock(of[at]) and at not in counts]
         if named:
             columns = [*columns, *(Column(table.header[place], place, TIME) for place in even[:1])]
             remark = "".join(f"{table.name_of(place)} is taken for the time" for place in even[:1])

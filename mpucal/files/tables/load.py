@@ -161,12 +161,15 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     if ranges:
         hints = replace(hints, accel_range_g=ranges[0], gyro_range_dps=ranges[1])
     columns, guess_remark = find_columns(table, hints)
-    accelerometers, gyr = axis_triples(columns, ACC), first_triple(columns, GYR)
+    accelerometers, gyroscopes = axis_triples(columns, ACC), axis_triples(columns, GYR)
     warm = [column for column in columns if column.quantity == TEMPERATURE]
     # a rate beside columns without a time says that the times are wrong
     at = () if hints.columns and hints.rate_hz and "t" not in hints.columns else table.clocks(columns)
     streams = [sensor_stream(table, at, of, warm) for of in accelerometers]
     chosen = index_with_gravity(streams)
+    # several sensors under one name have a gyroscope each
+    each = len({column.name for of in accelerometers for column in of}) == len("xyz")
+    gyr = gyroscopes[chosen] if each and chosen < len(gyroscopes) else first_triple(columns, GYR)
     acc, a, w = accelerometers[chosen], streams[chosen], sensor_stream(table, at, gyr) if gyr else None
     a, ios_remark = _undo_ios_sign(a, acc[0].name.strip().lower())
     several = len(accelerometers) > 1

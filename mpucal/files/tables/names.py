@@ -65,8 +65,8 @@ WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", 
 # what rates turn as they turn gravity: its direction as a program estimates it, and a magnetic field; and attitudes, of
 # which three parts may be as long
 ESTIMATED = re.compile(r"gravity|^mag|magnet|quat|^q[_.]?[wxyz0-3]$", re.IGNORECASE)
-# numbers of samples, which are no times
-COUNTER = re.compile(r"packet|number|index|sequence|frame|sample|counter", re.IGNORECASE)
+# numbers of samples, which are no times where they are whole
+COUNTER = re.compile(r"^(?!.*(?:stamp|time)).*(?:packet|number|index|sequence|frame|sample|counter)", re.IGNORECASE)
 # names that are remembered
 MOST_NAMES = 1024
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
@@ -234,7 +234,9 @@ def axis_triples(columns: Sequence[Column], quantity: str) -> list[tuple[Column,
         same = [*group]
         of_units = [[*of_unit] for _, of_unit in groupby(same, lambda column: column.unit)]
         for each in of_units if len(same) > len("xyz") else [same]:
-            found += zip(*([column for column in each if column.axis == axis] for axis in range(3)), strict=False)
+            axes = [[column for column in each if column.axis == axis] for axis in range(3)]
+            if len(axes[0]) == len(axes[1]) == len(axes[2]):
+                found += zip(*axes, strict=True)
     return found
 
 

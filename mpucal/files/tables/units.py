@@ -170,7 +170,7 @@ def offset(values: Vector) -> Vector | None:
     radius, scatter = typical_size(values - x[:3])
     known = 0.0 < scatter < SCATTER * radius < SCATTER * float(np.ptp(values, axis=0).min())
     known = known and BETTER_CENTRED * scatter < typical_size(values)[1]
-    return x[:3] if known and 2.0 * radius < float(np.linalg.norm(x[:3])) else None
+    return x[:3] if known and 1.5 * radius < float(np.linalg.norm(x[:3])) else None
 
 
 def to_signed(values: Vector) -> Vector:
