@@ -141,7 +141,7 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     choice, explanations, walks = _fit(recording, flat, gravity, model)
     # the share of the variance that the removed changes added
     freed = sum((walk.freed[ACCELEROMETER] for walk in walks), np.zeros(len(D_NAMES + B_A_NAMES)))
-    fit = choice.fit
+    fit = choice.honest()
     claim = claim_uncertainty(fit, gravity, explanations, freed)
     fit = inflate(fit, claim).right_handed()
     evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=walks)
@@ -161,7 +161,7 @@ def _fit(
         if change is None or not choice.plain.converged:
             break
         recording = remove_change(recording, flat, change)
-        without = fit_model(model, recording, flat, gravity, choice)
+        without = fit_model(model, recording, flat, gravity)
         # A change whose removal explains nothing is none.
         if not choice.plain.V - np.log(SURE) > without.plain.V:
             break

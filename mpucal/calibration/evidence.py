@@ -33,7 +33,8 @@ CLEARLY = 3.0  # ratio of misses above which another unit or range is the right 
 DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
-FEWEST_RESTS, MOST_TURNS = 3, 50  # fewer rests cannot contradict each other, and more turns tell no more
+FEWEST_RESTS = 3  # fewer cannot contradict each other
+MOST_TURNS = 50  # more of them hardly change a median
 BLOCK_S, MOVING_RAD_S = 0.01, 0.3
 SIGNED_PERMUTATIONS = [
     np.eye(3)[list(order)] * np.array(signs)[:, None]

@@ -84,7 +84,7 @@ class _Data:
 
 @dataclass(frozen=True)
 class HandFit:
-    """Fit of a hand's model, without and with its honest covariance, which takes a quarter of the time.
+    """Fit of a hand's model, whose honest covariance, a quarter of the work, is computed when it is asked for.
 
     Attributes
     ----------
@@ -107,25 +107,14 @@ class HandFit:
         return replace(self.fit, covariance=covariance[np.ix_(minimum.free, minimum.free)], at_prior=known)
 
 
-def search_hand(
-    recording: Recording, flat: Flat, gravity: float, first: Theta | None = None, near: HandFit | None = None
-) -> HandFit:
+def search_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
     """Fit a hand's model.
 
     A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
     perfect sensor.
-
-    Parameters
-    ----------
-    first : linear estimate, if it is known. near : fit of a recording that hardly differs, where there is one; the
-        search begins there.
     """
     data = _Data(recording, flat, gravity)
-    if near is not None:
-        found = _fit(data, near.minimum.theta, near.noise, near.trembles, near.fit.iterations)
-        if found.fit.converged:
-            return found
-    found = _fit_from(first or initialise(data.rough.problem, data.fine.flat.b_omega), data)
+    found = _fit_from(initialise(data.rough.problem, data.fine.flat.b_omega), data)
     if found.fit.converged:
         return found
     again = _fit_from(perfect(data.rough.problem, data.fine.flat.b_omega), data)
@@ -138,16 +127,11 @@ def _fit_from(begin: Theta, data: _Data) -> HandFit:
     theta, noise = search.run(begin)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
         noise = Noise("white", most_likely_sigma(data.fine.white, CALM_MPS2, theta, noise.sigma))
-    return _fit(data, theta, noise, search.trembles, search.iterations)
-
-
-def _fit(data: _Data, theta: Theta, noise: Noise, trembles: bool, iterations: int) -> HandFit:
-    """Fit sample by sample from where a search ended, after so many iterations."""
-    fine = remove_tremor(data.fine) if trembles else data.fine
+    fine = remove_tremor(data.fine) if search.trembles else data.fine
     problem = _with_transition_noise(noise.problem(fine), fine, theta)
     prior = fine.prior()
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
-    iterations += minimum.iterations
+    iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99 and not undetermined(minimum.covariance()):
         trusted = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
@@ -157,7 +141,7 @@ def _fit(data: _Data, theta: Theta, noise: Noise, trembles: bool, iterations: in
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
-    return HandFit(replace(fit, slip=slip), minimum, noise, trembles, data)
+    return HandFit(replace(fit, slip=slip), minimum, noise, search.trembles, data)
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:

@@ -69,9 +69,8 @@ class ModelChoice(NamedTuple):
         """The fit, with the covariance by the model alone."""
         return self.found.fit if isinstance(self.found, HandFit) else self.found
 
-    @property
-    def fit(self) -> Fit:
-        """The fit, with its honest covariance."""
+    def honest(self) -> Fit:
+        """Return the fit with its honest covariance."""
         return self.found.honest() if isinstance(self.found, HandFit) else self.found
 
 
@@ -90,23 +89,15 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 }
 
 
-def fit_model(
-    model: str, recording: Recording, flat: Flat, gravity: float, near: ModelChoice | None = None
-) -> ModelChoice:
-    """Fit the model of a name, or for "auto" the simplest one that explains the data.
-
-    near : of a recording that hardly differs, where there is one.
-    """
-    of_a_hand = near.found if near is not None and isinstance(near.found, HandFit) else None
+def fit_model(model: str, recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
+    """Fit the model of a name, or for "auto" the simplest one that explains the data."""
     if model == "auto":
-        return choose_model(recording, flat, gravity, of_a_hand)
-    if model == "hand":
-        first = None if of_a_hand else InPlaceFits(recording, flat, gravity).first
-        return ModelChoice(search_hand(recording, flat, gravity, first, of_a_hand), model, "asked for")
-    return ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for")
+        return choose_model(recording, flat, gravity)
+    by = search_hand if model == "hand" else METHODS[model]
+    return ModelChoice(by(recording, flat, gravity), model, "asked for")
 
 
-def choose_model(recording: Recording, flat: Flat, gravity: float, near: HandFit | None = None) -> ModelChoice:
+def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
     """Choose the simplest model that explains the data.
 
     White noise and a trusted gyroscope come first, then its matrix K; then the same with small errors of both sensors.
@@ -114,10 +105,10 @@ def choose_model(recording: Recording, flat: Flat, gravity: float, near: HandFit
     lever arm, were measured in a hand.
     """
     in_place = InPlaceFits(recording, flat, gravity)
-    chosen = in_place.choose(None if near is None else near.minimum.theta)
+    chosen = in_place.choose()
     if isinstance(chosen, ModelChoice):
         return chosen
-    hand = search_hand(recording, flat, gravity, None if near else in_place.first, near)
+    hand = search_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.fit.names else "no K (it is not significantly different from the identity)"
     return ModelChoice(hand, "hand", f"{chosen}: a hand's model, with {kept}")
 
@@ -130,16 +121,11 @@ class InPlaceFits:
         self._prior = Prior.of_sensor(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
-    def choose(self, near: Theta | None = None) -> ModelChoice | str:
-        """Return the simplest model that explains the data, or why none does.
-
-        near : an estimate that is good enough to tell that none does.
-        """
-        if near is not None and not self._errors_may_explain(near):
-            return "white noise does not explain the data"
+    def choose(self) -> ModelChoice | str:
+        """Return the simplest model that explains the data, or why none does."""
         least = np.inf
         for erring, parameters in product((False, True), (ACCEL, IMU)):
-            if erring and parameters == ACCEL and not self._errors_may_explain(self._rough(IMU).theta):
+            if erring and parameters == ACCEL and not self._errors_may_explain():
                 break
             minimum, errors = self._explain(parameters, erring)
             least = min(least, minimum.nis)
@@ -159,9 +145,9 @@ class InPlaceFits:
         why = f"{noise} and {gyroscope} the data (innovations {minimum.nis:.1f}, expected 3)"
         return ModelChoice(self._as_fit(minimum, errors), "accel" if perfect else "imu", why)
 
-    def _errors_may_explain(self, theta: Theta) -> bool:
-        """Return True if errors of the largest size could explain the data at theta."""
-        squares = evaluate(_with_errors(self._thin, ERRORS[-1]), theta, 0).squares
+    def _errors_may_explain(self) -> bool:
+        """Return True if errors of the largest size could explain the data."""
+        squares = evaluate(_with_errors(self._thin, ERRORS[-1]), self._rough(IMU).theta, 0).squares
         return squares < ERRING_NIS * (self._thin.flat.last + len(self._thin.series))
 
     def fit(self, parameters: int) -> Fit:
@@ -208,7 +194,7 @@ class InPlaceFits:
     def _rough(self, parameters: int) -> Minimum:
         """Search on means over blocks, once for each number of parameters."""
         if parameters not in self._roughly:
-            begin = self.first if parameters == ACCEL else self._rough(ACCEL).theta
+            begin = self._first if parameters == ACCEL else self._rough(ACCEL).theta
             self._roughly[parameters] = minimise(self._thin, begin, parameters, self._prior, until=ROUGHLY)
         return self._roughly[parameters]
 
@@ -219,8 +205,7 @@ class InPlaceFits:
         return WHITE_NIS + MOST_STD * float(np.sqrt(variance))
 
     @cached_property
-    def first(self) -> Theta:
-        """Linear estimate, from which searches begin."""
+    def _first(self) -> Theta:
         return initialise(self._thin, self._flat.b_omega)
 
     @cached_property

@@ -21,7 +21,7 @@ SPEED_OF_TREMOR_S = 0.04  # ratio of a tremor's speed to its acceleration
 class Poses:
     """Poses of k rests, with sums over their samples that serve for any theta.
 
-    Z = (-integral of omega, -time) since a rest's first sample: K (1, -b_omega) Z is the angle turned since then.
+    Z = (-integral of omega, -time) since a rest's first sample: K (I, -b_omega) Z is the angle turned since then.
 
     Attributes
     ----------

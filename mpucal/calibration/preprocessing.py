@@ -78,7 +78,7 @@ class Preprocessed:
 
     @cached_property
     def poses(self) -> Poses:
-        """Poses that the board holds after the flat segment, or from it on."""
+        """Poses of the rests that end after the flat segment."""
         runs = self.runs[self.runs[:, 1] > self.flat.last + 1]
         return Poses.of(self.recording, self.flat, self.problem, runs)
 

@@ -103,7 +103,7 @@ def test_with_a_perfect_gyroscope_imu_agrees_with_accel_and_auto_keeps_it_perfec
         chosen = by(choose_model, run.recording)
         assert chosen.model == "accel"
         assert "perfect gyroscope" in chosen.why
-        np.testing.assert_array_equal(chosen.fit.K, np.eye(3))
+        np.testing.assert_array_equal(chosen.honest().K, np.eye(3))
 
 
 def wrong_gyro(seed):
@@ -122,8 +122,8 @@ def test_auto_finds_a_gyroscope_that_is_off_with_right_standard_deviations(ideal
         chosen = by(choose_model, made.recording)
         assert chosen.model == "imu", seed
         assert "not perfect" in chosen.why
-        error = np.append(theta_a(chosen.fit) - theta_a(made.truth), (chosen.fit.K - K)[np.triu_indices(3)])
-        z.append(error / chosen.fit.std(*THETA_A, *K_NAMES))
+        error = np.append(theta_a(chosen.honest()) - theta_a(made.truth), (chosen.honest().K - K)[np.triu_indices(3)])
+        z.append(error / chosen.honest().std(*THETA_A, *K_NAMES))
     assert np.abs(z).max() < 4.0
     assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.3
 

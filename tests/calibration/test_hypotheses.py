@@ -22,6 +22,7 @@ from mpucal.calibration.parameters import PLACES
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.quality import judge
 from mpucal.calibration.uncertainty import UncertaintyClaim, propagate
+from tools.lab.families import of_seed
 from tools.lab.judge import judged, sph_rms
 
 G = 9.82
@@ -71,6 +72,11 @@ def test_a_gyroscopes_bias_that_steps_or_drifts_is_followed(hand, how):
     assert judged(found, (made.truth.D, made.truth.b_a)).farthest < 3.0
     times = {"drifts": 1.5, "steps": 2.5}[how]
     assert found.quality["error_std"]["rms"] < times * still.quality["error_std"]["rms"]
+
+
+@pytest.mark.parametrize("seed", [7, 28])
+def test_a_step_of_the_gyroscopes_bias_between_rests_leaves_the_claim_true(seed):
+    assert not of_seed(("gyro step poses", seed)).false
 
 
 def test_a_nonlinear_sensor_is_claimed_by_its_sides(hand):

@@ -54,7 +54,7 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
     ):
         found = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
         flat = flat_statistics(recording, recording.flat)
-        estimate = choose_model if model == "auto" else METHODS[model]
+        estimate = (lambda *of: choose_model(*of).honest()) if model == "auto" else METHODS[model]
         estimation_s = median_s(lambda e=estimate, r=recording, f=flat: e(r, f, GRAVITY_MPS2), runs)
         whole_s = median_s(lambda r=recording, m=model: mpucal.calibrate(r, model=m, gravity=GRAVITY_MPS2), runs)
         length_s = float(recording.t[-1] - recording.t[0])

@@ -224,7 +224,7 @@ def axes_of(name: str) -> list[str]:
 
 
 def axis_triples(columns: Sequence[Column], quantity: str) -> list[tuple[Column, ...]]:
-    """Return the x, y, z columns of a quantity, for each stem that has all three, by rank; those with units first."""
+    """Return the x, y, z columns of each sensor of a quantity, by the rank of its name; those with units first."""
     of = sorted(
         (column for column in columns if column.quantity == quantity), key=lambda c: (c.rank, not c.unit, c.unit)
     )
