@@ -120,7 +120,7 @@ def test_the_filters_of_a_6500_are_found_and_told():
 
     def fitted(recording, **told):
         recording = replace(recording, sensor=replace(recording.sensor, **told))
-        return fit_hand(recording, flat_statistics(recording, find_flat(recording)), 9.80665)
+        return fit_hand(recording, flat_statistics(recording, find_flat(recording)), 9.80665).honest()
 
     (of_6050, _), (of_6500, _) = turned("mpu6050"), turned("mpu6500")
     assert fitted(of_6500).delay_s - fitted(of_6050).delay_s == pytest.approx(-1e-3, abs=2e-4)

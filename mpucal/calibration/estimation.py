@@ -17,7 +17,6 @@ from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_faul
 from .checks.estimate import GOOD_RMS_MPS2
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
-from .fit import Fit
 from .hypotheses import SURE, Explanation, explain, gyroscope_change, rank, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, fit_model
@@ -154,21 +153,18 @@ def _fit(
 ) -> tuple[ModelChoice, list[Explanation], tuple[Explanation, ...]]:
     """Return the fit without changes of the gyroscope's bias during the turning, what explains the rest, and them."""
     choice = fit_model(model, recording, flat, gravity)
-    found = _rank(choice.plain)
+    fit = choice.plain
+    found = rank(fit.parts, fit.D)
     walks: tuple[Explanation, ...] = ()
     for _ in range(MOST_CHANGES):
         change = gyroscope_change(found)
-        if change is None or not choice.plain.converged:
+        if change is None or not fit.converged:
             break
         recording = remove_change(recording, flat, change)
         without = fit_model(model, recording, flat, gravity)
         # A change whose removal explains nothing is none.
-        if not choice.plain.V - np.log(SURE) > without.plain.V:
+        if not fit.V - np.log(SURE) > without.plain.V:
             break
-        choice, found, walks = without, _rank(without.plain), (*walks, change)
-    fit = choice.plain
-    return choice, [] if fit.parts is None else explain(fit.parts, fit.D, found), walks
-
-
-def _rank(fit: Fit) -> list[Explanation]:
-    return [] if fit.parts is None else rank(fit.parts, fit.D)
+        choice, fit, walks = without, without.plain, (*walks, change)
+        found = rank(fit.parts, fit.D)
+    return choice, explain(fit.parts, fit.D, found), walks

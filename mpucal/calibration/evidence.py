@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, wraps
@@ -34,7 +33,6 @@ DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
 FEWEST_RESTS = 3  # fewer cannot contradict each other
-MOST_TURNS = 50  # more of them hardly change a median
 BLOCK_S, MOVING_RAD_S = 0.01, 0.3
 SIGNED_PERMUTATIONS = [
     np.eye(3)[list(order)] * np.array(signs)[:, None]
@@ -269,7 +267,6 @@ def _measured(turns: list[_Turn]) -> list[_Turn]:
 
 def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
     """Return which of matrices (3, 3) makes the rates miss least, the first if in doubt, and the median angle [rad]."""
-    turns = turns[:: math.ceil(len(turns) / MOST_TURNS)]
     misses = [_miss(turns, M) for M in by]
     least = int(np.argmin(misses))
     least = least if misses[0] > CLEARLY * misses[least] else 0

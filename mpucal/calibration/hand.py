@@ -10,13 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
-from ..rests.intervals import Intervals
 from ..rests.windows import noise_ratio
 from .downsampling import SEARCH_HZ, blocks, downsampled, means
 from .fit import Fit
@@ -48,40 +46,6 @@ MOST_ITERATIONS = 20  # of a rough search
 PASSES = 3
 
 
-def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """Estimate D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves."""
-    return search_hand(recording, flat, gravity).honest()
-
-
-@dataclass(frozen=True)
-class _Data:
-    """Recording, prepared sample by sample (`fine`) and as means over blocks (`rough`)."""
-
-    recording: Recording
-    flat: Flat
-    gravity: float
-
-    @cached_property
-    def fine(self) -> Preprocessed:
-        recording, runs = self._rests
-        return prepare(recording, (self.flat.first, self.flat.last), runs, self.gravity, self._noise_factor)
-
-    @cached_property
-    def rough(self) -> Preprocessed:
-        recording, runs = self._rests
-        noise_factor = means(self._noise_factor, recording, self.flat, SEARCH_HZ)
-        thin, at = downsampled(recording, self.flat, SEARCH_HZ)
-        return prepare(thin, at, blocks(runs, recording, self.flat, SEARCH_HZ), self.gravity, noise_factor)
-
-    @cached_property
-    def _rests(self) -> tuple[Recording, Intervals]:
-        return find_rests(self.recording, self.flat)
-
-    @cached_property
-    def _noise_factor(self) -> Vector:
-        return noise_ratio(self.recording, self.flat.Sigma_a)
-
-
 @dataclass(frozen=True)
 class HandFit:
     """Fit of a hand's model, whose honest covariance, a quarter of the work, is computed when it is asked for.
@@ -89,45 +53,50 @@ class HandFit:
     Attributes
     ----------
     fit : with the covariance by the model alone. minimum : where the search ended. noise : of the hand as it moves.
-    trembles : True where the tremor has a lever arm of its own. data : the recording.
+    rough, fine : the recording as means over blocks, and sample by sample.
     """
 
     fit: Fit
     minimum: Minimum
     noise: Noise
-    trembles: bool
-    data: _Data
+    rough: Preprocessed
+    fine: Preprocessed
 
     def honest(self) -> Fit:
         """Return the fit with its honest covariance."""
-        rough, fine = (remove_tremor(x) if self.trembles else x for x in (self.data.rough, self.data.fine))
-        minimum = _with_honest_information(self.minimum, self.noise, rough, fine)
+        minimum = _with_honest_information(self.minimum, self.noise, self.rough, self.fine)
         covariance = minimum.covariance()
         known = undetermined(covariance) if minimum.free.all() else ()
         return replace(self.fit, covariance=covariance[np.ix_(minimum.free, minimum.free)], at_prior=known)
 
 
-def search_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
-    """Fit a hand's model.
+def fit_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
+    """Estimate D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves.
 
     A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
     perfect sensor.
     """
-    data = _Data(recording, flat, gravity)
-    found = _fit_from(initialise(data.rough.problem, data.fine.flat.b_omega), data)
+    recording, runs = find_rests(recording, flat)
+    noise_factor = noise_ratio(recording, flat.Sigma_a)
+    fine = prepare(recording, (flat.first, flat.last), runs, gravity, noise_factor)
+    thin, at = downsampled(recording, flat, SEARCH_HZ)
+    of_means = means(noise_factor, recording, flat, SEARCH_HZ)
+    rough = prepare(thin, at, blocks(runs, recording, flat, SEARCH_HZ), gravity, of_means)
+    found = _fit_from(initialise(rough.problem, fine.flat.b_omega), rough, fine)
     if found.fit.converged:
         return found
-    again = _fit_from(perfect(data.rough.problem, data.fine.flat.b_omega), data)
+    again = _fit_from(perfect(rough.problem, fine.flat.b_omega), rough, fine)
     return again if again.fit.converged else found
 
 
-def _fit_from(begin: Theta, data: _Data) -> HandFit:
+def _fit_from(begin: Theta, rough: Preprocessed, fine: Preprocessed) -> HandFit:
     """Fit means over blocks first, then sample by sample."""
-    search = _Search(data.rough)
+    search = _Search(rough)
     theta, noise = search.run(begin)
+    if search.trembles:
+        fine = remove_tremor(fine)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
-        noise = Noise("white", most_likely_sigma(data.fine.white, CALM_MPS2, theta, noise.sigma))
-    fine = remove_tremor(data.fine) if search.trembles else data.fine
+        noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _with_transition_noise(noise.problem(fine), fine, theta)
     prior = fine.prior()
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
@@ -141,7 +110,7 @@ def _fit_from(begin: Theta, data: _Data) -> HandFit:
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
-    return HandFit(replace(fit, slip=slip), minimum, noise, search.trembles, data)
+    return HandFit(replace(fit, slip=slip), minimum, noise, search.prepared, fine)
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:

@@ -162,23 +162,23 @@ class Explanation(NamedTuple):
         return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
 
 
-def rank(parts: Parts, D: Vector) -> list[Explanation]:
+def rank(parts: Parts | None, D: Vector) -> list[Explanation]:
     """Return what each hypothesis says, weighed against the others and nothing, the likeliest first.
 
-    Nothing where the fit failed.
+    Nothing where the fit failed, or has no parts.
     """
-    is_known = np.isfinite(parts.H).all() and np.isfinite(D).all()
-    return _weigh(HYPOTHESES, parts, D) if is_known else []
+    if parts is None or not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
+        return []
+    return _weigh(HYPOTHESES, parts, D)
 
 
-def explain(parts: Parts, D: Vector, found: list[Explanation] | None = None) -> list[Explanation]:
+def explain(parts: Parts | None, D: Vector, found: list[Explanation]) -> list[Explanation]:
     """Return what surely happened to the gyroscope, and what the other hypotheses say besides, the likeliest first.
 
-    found : what `rank` returned, if that was asked before.
+    found : what `rank` returned.
     """
-    found = rank(parts, D) if found is None else found
     known: list[Explanation] = []
-    while sum(each.weight for each in found if each.hypothesis.what == "gyroscope") > 1.0 - 1.0 / SURE:
+    while parts and sum(each.weight for each in found if each.hypothesis.what == "gyroscope") > 1.0 - 1.0 / SURE:
         known.append(found[0])
         parts = _without(parts, found[0])
         found = _weigh([each for each in HYPOTHESES if each not in {of.hypothesis for of in known}], parts, D)

@@ -18,7 +18,7 @@ from ..data import Recording
 from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
-from .hand import HandFit, fit_hand, search_hand
+from .hand import HandFit, fit_hand
 from .hypothesis_tests import WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
@@ -79,7 +79,7 @@ def fit_in_place(parameters: int, recording: Recording, flat: Flat, gravity: flo
     return InPlaceFits(recording, flat, gravity).fit(parameters)
 
 
-METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
+METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit | HandFit]] = {
     "hand": fit_hand,
     "imu": partial(fit_in_place, IMU),
     "accel": partial(fit_in_place, ACCEL),
@@ -93,8 +93,7 @@ def fit_model(model: str, recording: Recording, flat: Flat, gravity: float) -> M
     """Fit the model of a name, or for "auto" the simplest one that explains the data."""
     if model == "auto":
         return choose_model(recording, flat, gravity)
-    by = search_hand if model == "hand" else METHODS[model]
-    return ModelChoice(by(recording, flat, gravity), model, "asked for")
+    return ModelChoice(METHODS[model](recording, flat, gravity), model, "asked for")
 
 
 def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
@@ -108,7 +107,7 @@ def choose_model(recording: Recording, flat: Flat, gravity: float) -> ModelChoic
     chosen = in_place.choose()
     if isinstance(chosen, ModelChoice):
         return chosen
-    hand = search_hand(recording, flat, gravity)
+    hand = fit_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.fit.names else "no K (it is not significantly different from the identity)"
     return ModelChoice(hand, "hand", f"{chosen}: a hand's model, with {kept}")
 

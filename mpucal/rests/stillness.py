@@ -108,7 +108,6 @@ class Detector:
         unknown: Vector = np.full(3, np.inf)
         self._acc_noise, self._gyr_noise = noise if noise is not None else (unknown, unknown)
         self._bias, self._turns = (np.zeros(3), bias) if isinstance(bias, float) else (bias, limits.gyro_mean)
-        self._most = self._of_sensor()
         self._spreads: deque[tuple[float, float]] = deque(maxlen=NEWEST_WINDOWS)
         # These are sums over the windows of this run.
         self._count = 0
@@ -130,8 +129,9 @@ class Detector:
             np.abs(windows.gyr - self._bias) / self._turns,
         )
 
-    def _of_sensor(self) -> tuple[Vector, Vector]:
-        """Return the limits (3,) of the standard deviations for this sensor."""
+    @property
+    def _most(self) -> tuple[Vector, Vector]:
+        """Limits (3,) of the standard deviations for this sensor."""
         return (
             np.maximum(self._limits.acc_sd, np.minimum(TIMES_NOISE * self._acc_noise, NOISIEST_ACC_MPS2)),
             np.maximum(self._limits.gyro_sd, np.minimum(TIMES_NOISE * self._gyr_noise, NOISIEST_GYRO_RAD_S)),
@@ -153,8 +153,6 @@ class Detector:
             self._gyr_noise = np.minimum(self._gyr_noise, window.gyr_sd)
         if self._learns:
             self._learn(window)
-        if self._quietest or self._learns:
-            self._most = self._of_sensor()
         shaken = self._shaken(window)
         if shaken:
             return self._bumped(window, shaken)

@@ -23,7 +23,7 @@ G = 9.82
 
 
 def fitted(recording):
-    return fit_hand(recording, flat_statistics(recording, recording.flat), G)
+    return fit_hand(recording, flat_statistics(recording, recording.flat), G).honest()
 
 
 def z_scores(fit, truth):

@@ -17,6 +17,7 @@ from mpucal.calibration.hypotheses import (
     _Groups,
     _without,
     explain,
+    rank,
 )
 from mpucal.calibration.parameters import PLACES
 from mpucal.calibration.parts import Parts
@@ -156,7 +157,7 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
 
 
 def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
-    found = explain(linear_parts()[-1], np.eye(3))
+    found = rank(linear_parts()[-1], np.eye(3))
     # All parts are of one side: hypotheses on sides are not compared.
     assert {each.hypothesis for each in found} == {each for each in HYPOTHESES if not each.by_side}
     priors = np.array([each.hypothesis.prior for each in found])
@@ -167,7 +168,7 @@ def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
 def test_each_cause_of_what_surely_happened_is_held():
     _, _, parts = linear_parts()
     for scale, surely in ((0.1, False), (2.0, True)):
-        found = explain(replace(parts, gradient=scale * parts.gradient, left=scale * parts.left), np.eye(3))
+        found = rank(replace(parts, gradient=scale * parts.gradient, left=scale * parts.left), np.eye(3))
         squares = np.array([each.away**2 for each in found])
         weights = np.array([each.weight for each in found])
         assert (1.0 - weights.sum() < 1.0 / SURE) == surely
@@ -203,7 +204,7 @@ def test_of_two_things_that_happened_the_lesser_is_not_hidden_by_the_greater():
     gradient = np.einsum("kpq,q->kp", H_k, np.linalg.solve(H, score.sum(0))) - score
     t = np.arange(k, dtype=float)
     parts = Parts(gradient, H_k, H, gradient.sum(0), t, t + 1.0, np.zeros(k, np.intp))
-    first, second = explain(parts, np.eye(3))[:2]
+    first, second = explain(parts, np.eye(3), rank(parts, np.eye(3)))[:2]
     assert (first.hypothesis.what, second.hypothesis.what) == ("gyroscope", "accelerometer")
     assert min(first.weight, second.weight) > 0.99
     assert second.is_sure

@@ -14,7 +14,7 @@ import numpy as np
 import mpucal
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.likelihood import evaluate, value
-from mpucal.calibration.model_selection import METHODS, choose_model
+from mpucal.calibration.model_selection import fit_model
 from mpucal.calibration.parameters import ACCEL, HAND, IMU
 from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.theta import Theta
@@ -54,8 +54,7 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
     ):
         found = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
         flat = flat_statistics(recording, recording.flat)
-        estimate = (lambda *of: choose_model(*of).honest()) if model == "auto" else METHODS[model]
-        estimation_s = median_s(lambda e=estimate, r=recording, f=flat: e(r, f, GRAVITY_MPS2), runs)
+        estimation_s = median_s(lambda m=model, r=recording, f=flat: fit_model(m, r, f, GRAVITY_MPS2).honest(), runs)
         whole_s = median_s(lambda r=recording, m=model: mpucal.calibrate(r, model=m, gravity=GRAVITY_MPS2), runs)
         length_s = float(recording.t[-1] - recording.t[0])
         rows.append(
@@ -124,7 +123,7 @@ def growth(runs: int) -> list[dict[str, Any]]:
     for n in GROWTH:
         recording = turned(60.0, n / 60.0)
         flat = flat_statistics(recording, recording.flat)
-        s = median_s(lambda r=recording, f=flat: METHODS["accel"](r, f, GRAVITY_MPS2), runs)
+        s = median_s(lambda r=recording, f=flat: fit_model("accel", r, f, GRAVITY_MPS2), runs)
         whole = peak_bytes(lambda r=recording: mpucal.calibrate(r, model="accel", gravity=GRAVITY_MPS2))
         rows.append(
             {

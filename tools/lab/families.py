@@ -99,16 +99,16 @@ def told_apart(runs: Sequence[Row]) -> float:
     """
     good = [run for run in runs if run.verdict == GOOD]
     apart = [
-        np.abs(np.subtract(one.z, other.z)).max() > math.sqrt(2.0) * _limit(one.model, other.model)
+        np.abs(np.subtract(one.z, other.z)).max() > math.sqrt(2.0) * _limit(len(one.z), one.model, other.model)
         for one, other in combinations(good, 2)
     ]
     return float(np.mean(apart)) if apart else math.nan
 
 
 @cache
-def _limit(*models: str) -> float:
-    """Return the limit of |z| of one of twelve numbers, of calibrations by these models."""
-    return limit_of(12, degrees_of_freedom(*models))
+def _limit(count: int, *models: str) -> float:
+    """Return the limit of |z| of each of so many numbers, of calibrations by these models."""
+    return limit_of(count, degrees_of_freedom(*models))
 
 
 COLUMNS: dict[str, Column] = {

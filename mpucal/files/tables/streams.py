@@ -26,8 +26,8 @@ OF_COUNTS = "in counts of"
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # Largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther), or to tenths or hundredths of deg/s.
 NEAR = 0.08
-# counts for 1 g that |a| hardly tells from mg, and how units are known by it
-COUNTS_NEAR_MG, BY_SIZE, OR_MG = 1024, " (by |a|)", " (by |a|; if these are in mg, give --units acc=mg)"
+# remarks on a unit that |a| alone shows
+BY_SIZE, OR_MG = " (by |a|)", " (by |a|; if these are in mg, give --units acc=mg)"
 # quartile distance of |a| over its median, beyond which the median is that of a motion
 SHAKING = 0.25
 
@@ -242,14 +242,19 @@ def _whole_unit(size: float, beside: str) -> str:
     if beside in (COUNTS, "mdeg/s"):
         return COUNTS if beside == COUNTS else "mg"
     nearest = _mg_or_cm(size)[0]
-    return COUNTS if not beside and abs(math.log(size / COUNTS_NEAR_MG)) < _away(size, nearest) else nearest
+    return COUNTS if not beside and abs(math.log(size / _counts_per_g(size))) < _away(size, nearest) else nearest
+
+
+def _counts_per_g(size: float) -> int:
+    """Return the counts for 1 g, of those that sensors have, that are nearest to an acceleration."""
+    return 1 << min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
 
 
 def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str) -> Reading:
     """Return (n, 3) counts, whose median magnitude is `size`, in SI units; `by` says how their range is known."""
     if units.typical_size(values)[1] > SHAKING * size:
         size = units.typical_size(units.averaged(values))[0]
-    per_g = 2 ** min(max(round(math.log2(max(size, 1.0))), units.FEWEST_PER_G), units.MOST_PER_G)
+    per_g = _counts_per_g(size)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
     scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
     if is_wrong_full_scale(size * scale / STANDARD_GRAVITY_MPS2) and "acc" not in hints.units:

@@ -90,9 +90,6 @@ LEAST_OF_G, MOST_OF_G = 0.45, 2.0
 LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 # quartile distance of |a| over its median, beyond which it is not gravity
 SCATTER = 0.45
-# how much less |a| scatters about another centre than about zero, if the sensor's zero is there: noise and few
-# orientations fit some sphere, too
-BETTER_CENTRED = 3.0
 # a rate to try on samples without times, and the rates of most loggers
 ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
 # samples over which shaking averages out: a few of its periods at the rates of most loggers
@@ -161,16 +158,14 @@ def typical_size(values: Vector) -> tuple[float, float]:
 
 
 def offset(values: Vector) -> Vector | None:
-    """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is far outside; None otherwise.
+    """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is outside; None otherwise.
 
-    Each axis has to cover more than the radius, so that the sphere is determined; the shocks of a walk fit some sphere
-    near zero.
+    Each axis has to cover more than the radius, so that the sphere is determined, and not by noise or shocks.
     """
     x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), (values**2).sum(axis=1), rcond=None)
     radius, scatter = typical_size(values - x[:3])
-    known = 0.0 < scatter < SCATTER * radius < SCATTER * float(np.ptp(values, axis=0).min())
-    known = known and BETTER_CENTRED * scatter < typical_size(values)[1]
-    return x[:3] if known and 1.5 * radius < float(np.linalg.norm(x[:3])) else None
+    known = scatter < SCATTER * radius < SCATTER * float(np.ptp(averaged(values), axis=0).min())
+    return x[:3] if known and radius < float(np.linalg.norm(x[:3])) else None
 
 
 def to_signed(values: Vector) -> Vector:
