@@ -573,6 +573,17 @@ def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, tmp_path):
         np.testing.assert_allclose(mpucal.load(tmp_path / f"{name}.csv").acc, acc)
 
 
+@pytest.mark.parametrize("centre", [[1.65, 1.65, 1.65], [0.0, 1.2, 0.6]])
+def test_a_zero_elsewhere_is_said_wherever_it_is(centre, walk, tmp_path):
+    """Say it of volts, and of a zero that is only 1.3 g away."""
+    acc = walk.acc / G + np.array(centre) / (0.3 if centre[0] else 1.0)
+    made = np.column_stack([walk.t, acc, walk.gyr])
+    header = "time,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z"
+    np.savetxt(tmp_path / "zero.csv", made, delimiter=",", header=header, comments="")
+    with pytest.raises(RecordingError, match="in place of zero"):
+        mpucal.load(tmp_path / "zero.csv")
+
+
 def test_shocks_near_some_sphere_have_no_offset(tmp_path):
     """Refuse what scatters too much, without a zero that none has."""
     directions = np.random.default_rng(4).normal(size=(1000, 3))

@@ -160,11 +160,13 @@ def typical_size(values: Vector) -> tuple[float, float]:
 def offset(values: Vector) -> Vector | None:
     """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is outside; None otherwise.
 
-    Each axis has to cover more than the radius, so that the sphere is determined, and not by noise or shocks.
+    Each axis has to cover more than the radius, so that the sphere is determined, and not by noise or shocks alone;
+    and the lengths have to scatter less about the centre than about zero.
     """
     x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), (values**2).sum(axis=1), rcond=None)
     radius, scatter = typical_size(values - x[:3])
-    known = scatter < SCATTER * radius < SCATTER * float(np.ptp(averaged(values), axis=0).min())
+    cover, without_shocks = (float(np.ptp(of, axis=0).min()) for of in (values, averaged(values)))
+    known = scatter < typical_size(values)[1] and scatter < SCATTER * radius < min(SCATTER * cover, without_shocks)
     return x[:3] if known and radius < float(np.linalg.norm(x[:3])) else None
 
 
