@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..chip.families import PARTS, Part
+from ..chip.families import part_named
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
@@ -165,7 +165,7 @@ def noise_of(recording: Recording, created: str = "") -> Noise:
 
 def data_sheet(sensor: Sensor) -> dict[str, float]:
     """Return the typical white noise of the chip by its data sheet, two-sided; empty if the chip is not known."""
-    part: Part | None = next((part for part in PARTS.values() if part.chip == sensor.chip), None)
+    part = part_named(sensor.chip)
     if part is None:
         return {}
     # a data sheet's densities are one-sided

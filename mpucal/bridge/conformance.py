@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from .frame import Deframer, Frame
+from .link import MS
 from .messages import MAGIC, REPLY_BIT, Frames, Hello, Read, Status
 from .port import Port
 
-MS = 1_000_000
 TALKS = Path(__file__).with_name("talks.json")
 # A reply's payload begins with status and t_us; HELLO_REPLY continues with magic, major, minor and address.
 BODY_AT, MAJOR_AT, ADDRESS_AT = 5, 9, 11

@@ -12,6 +12,7 @@ from ..errors import BusError, WriteBackError
 from ..result.blob import Blob, BlobError
 from ..result.calibration import Calibration
 from ..result.comparison import is_better, worst_magnitude_error
+from ..result.correction import THIS_CHIP, other_who_am_i
 from ..sinks.kind import Applied, Device, Sink
 from ..sinks.old_state import check_accepted, nothing_written
 from ..sinks.table import BRIDGE_BLOB
@@ -88,13 +89,8 @@ class BridgeSink(Sink):
         )
 
     def _check_chip(self, calibration: Calibration) -> None:
-        answer, calibrated = self._store.who_am_i(), calibration.sensor.who_am_i
-        if None not in (answer, calibrated) and answer != calibrated:
-            raise WriteBackError(
-                f"nothing was written: WHO_AM_I of the chip of {self.where} is 0x{answer:02x}, but that of the"
-                f" calibrated one is 0x{calibrated:02x}",
-                "give the calibration of this chip",
-            )
+        if how := other_who_am_i(calibration.sensor.who_am_i, self._store.who_am_i()):
+            raise WriteBackError(f"nothing was written to {self.where}: {how}", THIS_CHIP)
 
     def _read_after(self, error: BusError, old: StoredBlob | None, new: bytes) -> StoredBlob:
         """Return the content of the memory after `error` if it is the new blob.

@@ -231,10 +231,16 @@ def part_of(who_am_i: int) -> Part:
         ) from None
 
 
+def part_named(chip: str | None) -> Part | None:
+    """Return the part of that name, in which case and hyphens do not count; None if there is none."""
+    name = (chip or "").replace("-", "").lower()
+    return next((part for part in PARTS.values() if part.chip.replace("-", "").lower() == name), None)
+
+
 def family_of(chip: str | None) -> Family | None:
     """Return the family of the chip of that name; None if its data sheet is unknown."""
-    families = (part.family for part in PARTS.values() if part.chip == chip)
-    return next((family for family in families if family.data_sheet), None)
+    part = part_named(chip)
+    return part.family if part is not None and part.family.data_sheet else None
 
 
 def known_parts() -> str:

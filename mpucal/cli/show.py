@@ -11,7 +11,7 @@ from typing import Any
 import click
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
+from ..data import Recording, Sensor
 from ..errors import UsageError
 from ..files import load
 from ..files.formats import readable_formats, recognise
@@ -19,6 +19,7 @@ from ..files.hints import Hints
 from ..rests.flat import find_flat
 from ..result.blob import Blob
 from ..result.calibration import Calibration
+from ..result.error_model import mg_text
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
@@ -95,7 +96,7 @@ def _where_applied(calibration: Calibration) -> list[str]:
     """Return lines about hardware offsets, write-backs and the temperature model, if present."""
     lines = []
     if np.any(calibration.applied_in_hardware):
-        mg = ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.1f}" for value in calibration.applied_in_hardware)
+        mg = mg_text(calibration.applied_in_hardware, 1)
         lines.append(f"The chip's offset registers subtract ({mg}) mg of b_a, until a power cycle or reset.")
     lines += [f"Written at {entry.get('at')}: {entry.get('what')}." for entry in calibration.extra.get("written", ())]
     if calibration.follows_temperature:

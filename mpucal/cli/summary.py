@@ -7,18 +7,17 @@ import re
 import shlex
 import textwrap
 from collections.abc import Mapping, Sequence
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
-from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.output_folder import free_name
 from ..mavlink.parameters.document import AUTOPILOT, NEW
 from ..origin import Origin
 from ..report.elements import as_float
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
+from ..result.error_model import mg_text
 from ..result.keys import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
 from ..sources.table import matching_kinds
@@ -135,7 +134,8 @@ def command_again(
     if recording is not None and said:
         words = amended(words, said[1], "")
     elif recording is not None:
-        words = [str(_free_file(recording)) if Path(word) == recording else word for word in words]
+        free = str(free_name(recording.with_suffix(""), recording.suffix))
+        words = [free if Path(word) == recording else word for word in words]
     elif calibration.sensor.origin is Origin.CHIP:
         codes = {reason["code"] for reason in reasons}
         for option, key, ranges in (row for code, row in RANGES.items() if code in codes):
@@ -155,12 +155,6 @@ def _session_words(source: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _free_file(path: Path) -> Path:
-    """Return `path` with the first free number before its suffix."""
-    names = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
-    return next(name for name in names if not name.exists())
-
-
 def formula(calibration: Calibration) -> str:
     """Return the formula of the calibrated acceleration with its numbers."""
     rows = [
@@ -174,11 +168,10 @@ def slope(calibration: Calibration) -> str:
     """Return b_a(T) as a sentence."""
     if not calibration.follows_temperature:
         return "b_a is assumed to be the same at every temperature."
-    steps = ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.3f}" for value in calibration.b_a_slope)
     low, high = calibration.temperature_range_c
     return (
-        f"b_a changes by ({steps}) mg/°C, relative to {calibration.sensor.temperature_c:.1f} °C, between"
-        f" {low:.1f} and {high:.1f} °C."
+        f"b_a changes by ({mg_text(calibration.b_a_slope, 3)}) mg/°C, relative to"
+        f" {calibration.sensor.temperature_c:.1f} °C, between {low:.1f} and {high:.1f} °C."
     )
 
 

@@ -81,13 +81,13 @@ class OutputFolder:
         self.close()
 
 
-def free_name(path: Path) -> Path:
-    """Return `path`, or `path` with the first free number behind it."""
-    return next(name for name in _numbered(str(path)) if not os.path.lexists(name))
+def free_name(path: Path, suffix: str = "") -> Path:
+    """Return `path` with `suffix`, with the first free number between them if that exists."""
+    return next(name for name in _numbered(str(path), suffix) if not os.path.lexists(name))
 
 
-def _numbered(name: str) -> map[Path]:
-    return map(Path, (name if number == 1 else f"{name}-{number}" for number in count(1)))
+def _numbered(name: str, suffix: str = "") -> map[Path]:
+    return map(Path, (f"{name}{'' if number == 1 else f'-{number}'}{suffix}" for number in count(1)))
 
 
 def _create(name: str) -> Path:

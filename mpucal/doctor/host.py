@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from ..sources.host_bus import ADDRESSES
 from ..sources.i2c import found_chips
 from ..sources.i2c_errors import transfer_error
 from ..sources.usb_i2c import adapters
@@ -22,7 +23,6 @@ FAST_HZ = 400_000
 FIRST, LAST = 0x08, 0x77
 # These addresses are EEPROMs', which a quick write could upset; a read could upset devices at the others.
 READ_ONLY = (*range(0x30, 0x38), *range(0x50, 0x60))
-OURS = (0x68, 0x69)
 # One slow device holds the bus for a while; a wire that stays low times out at every address, a second each.
 HELD_IN_A_ROW = 3
 
@@ -103,7 +103,7 @@ def _adapter(number: str) -> Iterator[Finding]:
 
 
 def _kernel_drivers(number: str) -> Iterator[Finding]:
-    for address in OURS:
+    for address in ADDRESSES:
         link = SYS / "bus" / "i2c" / "devices" / f"{number}-{address:04x}" / "driver"
         try:
             driver = link.readlink().name
@@ -138,7 +138,7 @@ def _addresses(path: str) -> Iterator[Finding]:
     if not can_i2c:
         yield Finding("adapter", Mark.NOTE, "SMBus only: 32 bytes per transfer", "keep to 200 Hz or less")
     words = [f"0x{address:02x}{_guess(address, answer)}" for address, answer in found.items()]
-    ours = any(address in OURS for address in found)
+    ours = any(address in ADDRESSES for address in found)
     elsewhere = [] if ours else [other for other, _ in found_chips(Path(path).parent) if other != path]
     remedy = f"it is on another bus: give --bus {elsewhere[0]}" if elsewhere else "check VCC, GND, SDA, SCL and AD0"
     data = {"addresses": sorted(found), "smbus_only": not can_i2c, "elsewhere": elsewhere}

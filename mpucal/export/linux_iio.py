@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..chip.families import MPU6050, PARTS
+from ..chip.families import MPU6050, PARTS, part_named
 from ..chip.offsets import Words, shift_words
 from ..chip.registers import ACCEL_RANGES_G
 from ..data import STANDARD_GRAVITY_MPS2, Vector
@@ -47,8 +47,8 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
 def offset_words(calibration: Calibration) -> tuple[Words | None, str]:
     """Return the words for the offset registers, or None and the reason; absolute, so that writing twice is safe."""
     sensor = calibration.sensor
-    families = {part.family for part in PARTS.values() if part.chip == sensor.chip}
-    if families != {MPU6050}:
+    part = part_named(sensor.chip)
+    if part is None or part.family is not MPU6050:
         return None, "calibbias is not used, as the driver writes to wrong registers of all chips except the MPU-6050"
     if sensor.accel_offsets is None:
         return None, "calibbias is not used, as the calibration lacks the factory trim"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..chip.families import MPU6050, PARTS, Part
+from ..chip.families import MPU6050, part_named
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS, mps2_per_lsb, rad_s_per_lsb
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
@@ -83,7 +83,7 @@ def full_scale(kind: str, scale: float, bits: int) -> float:
 def bits_of(kind: str, texts: Texts, elements: Mapping[str, ScanElement]) -> int | None:
     """Return the bits of a count; None if neither the buffer nor the part's name tells them."""
     first = elements.get(f"{kind}_x")
-    return first.bits if first is not None else USUAL_BITS if part_of(texts) is not None else None
+    return first.bits if first is not None else USUAL_BITS if part_named(texts.get("name")) is not None else None
 
 
 def read_scale(kind: str, device: str, texts: Texts, elements: Mapping[str, ScanElement]) -> SensorScale:
@@ -107,7 +107,8 @@ def read_scale(kind: str, device: str, texts: Texts, elements: Mapping[str, Scan
             f"the scale of the {KINDS[kind]} of {device} is {scales}, which is not plausible",
             f"correct {kind}_scale in /sys/bus/iio/devices/{device}",
         )
-    scale = printed if part_of(texts) is None else np.array([_mpu_scale(kind, value) for value in printed.tolist()])
+    is_mpu = part_named(texts.get("name")) is not None
+    scale = np.array([_mpu_scale(kind, value) for value in printed.tolist()]) if is_mpu else printed
     return SensorScale(kind, scale, printed, offset, bits)
 
 
@@ -136,15 +137,9 @@ def parse_number(name: str, text: str) -> float:
     raise ChipError(f"{name} is {text!r}, which is not a number", "report it with the kernel's version")
 
 
-def part_of(texts: Texts) -> Part | None:
-    """Return the known part with the device's name."""
-    name = texts.get("name", "").lower()
-    return next((part for part in PARTS.values() if part.chip.replace("-", "").lower() == name), None)
-
-
 def chip_name(texts: Texts) -> str:
     """Return the chip's name."""
-    part = part_of(texts)
+    part = part_named(texts.get("name"))
     name = "".join(c if c.isalnum() else "-" for c in texts.get("name", "")).strip("-").upper()
     return part.chip if part is not None else name[:60] or "IIO"
 
@@ -173,7 +168,7 @@ def read_calibbias(texts: Texts) -> tuple[int, int, int] | None:
     For the other families the driver reads y and z at wrong addresses.
     """
     words = [texts.get(f"{ACCEL}_{axis}_calibbias", "") for axis in AXES]
-    part = part_of(texts)
+    part = part_named(texts.get("name"))
     if part is None or part.family is not MPU6050 or not all(word.lstrip("-").isdecimal() for word in words):
         return None
     x, y, z = map(int, words)

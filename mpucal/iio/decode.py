@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..chip.access import Transaction
+from ..chip.families import part_named
 from ..clocks.sample_clock import NS
 from ..data import Recording, Samples, Sensor
 from ..errors import ChipError, RecordingError
@@ -20,7 +21,6 @@ from .attributes import (
     chip_name,
     mount_matrix,
     parse_number,
-    part_of,
     read_calibbias,
     read_number,
     read_scale,
@@ -143,7 +143,7 @@ class IioDecoder:
         """Describe the sensor by its present attributes."""
         device, accel = self.scale(ACCEL)
         texts = self.texts(device)
-        part = part_of(texts)
+        part = part_named(texts.get("name"))
         return Sensor(
             chip=chip_name(texts),
             who_am_i=None if part is None else part.who_am_i,

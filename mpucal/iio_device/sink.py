@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from ..chip.config import Config
-from ..chip.offsets import Words, word_difference
+from ..chip.offsets import Words
 from ..chip.port import Port
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import Vector
 from ..disk.atomic import write_atomically
 from ..errors import ChipError, OutputError
 from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
@@ -31,10 +31,11 @@ from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, DeviceSetup
 from ..rests.stillness import is_untouched
 from ..result.calibration import Calibration
+from ..result.error_model import mg_text
 from ..result.journal import Journal
 from ..session.lay_flat import put_down
 from ..session.ports import polled
-from ..sinks.chip import check_shift, mg
+from ..sinks.chip import check_shift, subtraction
 from ..sinks.kind import Applied, Device, Sink
 from ..sinks.old_state import check_accepted, load_state, not_a_state, nothing_written, restore_on_failure, save_state
 from ..sinks.table import IIO_STATE, KERNEL
@@ -107,7 +108,8 @@ class KernelSink(Sink):
         with self._restoring():
             applied = np.zeros(3) if words is None else self._write_words(calibration, words)
             rule = self._write_matrix(texts["name"], matrix)
-        bias = f"calibbias now subtracts ({mg(applied)}) mg, read back and verified in the samples" if words else why
+        subtracts = f"calibbias now subtracts ({mg_text(applied)}) mg, read back and verified in the samples"
+        bias = subtracts if words else why
         return Applied(replace(calibration, applied_in_hardware=applied), (f"{self.where}: {bias}", rule))
 
     def _write_matrix(self, name: str, matrix: str) -> str:
@@ -133,9 +135,9 @@ class KernelSink(Sink):
         self._set_words(words)
         after = self._rest()
         remedy = "keep the board still and try again; if it was still, use only files: the driver uses wrong registers"
-        check_shift(after - before, -_subtraction(words, old), remedy)
+        check_shift(after - before, -subtraction(words, old, LSB_PER_G), remedy)
         reference: Any = calibration.sensor.accel_offsets
-        return _subtraction(words, reference)
+        return subtraction(words, reference, LSB_PER_G)
 
     def _set_words(self, words: Words) -> None:
         for name, word in zip(CALIBBIAS, words, strict=True):
@@ -195,11 +197,6 @@ class KernelSink(Sink):
         with nothing_written():
             held = self._read_state()
         return restore_on_failure(self._journal, held, lambda: self._restore(held), self.where)
-
-
-def _subtraction(words: Words, reference: Words) -> Vector:
-    """Return (3,) m/s^2 that `words` subtract from the samples more than `reference`."""
-    return -np.array(word_difference(words, reference)) / LSB_PER_G * STANDARD_GRAVITY_MPS2
 
 
 def _are_words(held: Any) -> bool:

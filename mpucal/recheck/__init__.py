@@ -59,7 +59,7 @@ def check(calibration: Calibration, recording: Recording, days: float | None = N
     UsageError : the calibration was refused, or is of samples of another kind (a chip's own, an autopilot's stream).
     """
     then, now = calibration.sensor, recording.sensor
-    if message := other_who_am_i(then, now):
+    if message := other_who_am_i(then.who_am_i, now.who_am_i):
         return CheckResult(ANOTHER_SENSOR, "another sensor", message, ANEW)
     if same_trim(then, now) is False and not np.any(calibration.applied_in_hardware):
         message = (

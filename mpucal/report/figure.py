@@ -63,6 +63,10 @@ def legend(*entries: tuple[str, str]) -> str:
     return "".join(marks)
 
 
+# names and colours of the axes, as a legend
+XYZ = (("x", X), ("y", Y), ("z", Z))
+
+
 class Axes:
     """Axes over the ranges `x` and `y` (least, greatest); values beyond `y` are drawn at its edge."""
 

@@ -11,10 +11,9 @@ from .. import __version__
 from ..data import STANDARD_GRAVITY_MPS2
 from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise, axes_of
 from .elements import document, figure, paragraph, section, table
-from .figure import INK, Axes, X, Y, Z
+from .figure import INK, XYZ, Axes
 
 SENSORS = (ACCELEROMETER, GYROSCOPE)
-_XYZ = (("x", X), ("y", Y), ("z", Z))
 _UG, _DPS = 1e6 / STANDARD_GRAVITY_MPS2, math.degrees(1.0)
 # sensor -> coefficient -> (factor, unit) of the text
 UNITS = {
@@ -93,10 +92,10 @@ def _allan(noise: Noise, sensor: str) -> str:
     labels = "log10 τ [s]", f"log10 of {sensor} [{unit}]"
     axes = Axes((float(tau[0]), float(tau[-1])), (low, high), *labels)
     marks = []
-    for deviation, (_, colour) in zip(deviations.T, _XYZ, strict=True):
+    for deviation, (_, colour) in zip(deviations.T, XYZ, strict=True):
         marks += [axes.line(tau, deviation, colour, 1.6)]
         marks += [axes.line(tau, deviation + sign * share, colour, 0.5) for sign in (-1.0, 1.0)]
-    named = [*_XYZ]
+    named = [*XYZ]
     if sensor in noise.data_sheet:
         marks.append(axes.line(tau, np.log10(factor * noise.data_sheet[sensor]) - 0.5 * tau, INK, 0.8))
         named.append(("data sheet", INK))
@@ -107,8 +106,8 @@ def _course(noise: Noise) -> str:
     spread = np.maximum(noise.course[:, :6].std(0), 1e-300)
     scaled = (noise.course[:, :6] - noise.course[:, :6].mean(0)) / spread - 8.0 * np.arange(6)
     axes = Axes((0.0, float(noise.course_s[-1])), (-45.0, 5.0), "time [s]", "six axes")
-    lines = [axes.line(noise.course_s, of, colour) for of, colour in zip(scaled.T, (X, Y, Z) * 2, strict=True)]
-    return axes.svg("course", "Slow course of the six axes", lines, *_XYZ)
+    lines = [axes.line(noise.course_s, of, colour) for of, (_, colour) in zip(scaled.T, XYZ * 2, strict=True)]
+    return axes.svg("course", "Slow course of the six axes", lines, *XYZ)
 
 
 def _cell(value: float, low: float, high: float) -> str:

@@ -9,13 +9,12 @@ import numpy as np
 from ..data import Vector
 from ..result.error_model import MG_PER_MPS2
 from .elements import figure
-from .figure import AFTER, BEFORE, INK, LINE, Axes, X, Y, Z, dots
+from .figure import AFTER, BEFORE, INK, LINE, XYZ, Axes, dots
 from .spheres import coverage, sphere
 from .track import Track
 
 BINS = 500
 _TIME = "time [s]"
-_XYZ = (("x", X), ("y", Y), ("z", Z))
 RESIDUALS = "|a| of each rest minus gravity. After calibration all should lie at zero, apart from hand tremor."
 MAGNITUDE = "|a| over time. At rest it should equal gravity in every orientation; while the board moves it does not."
 SPHERE = (
@@ -100,8 +99,8 @@ def innovations(track: Track) -> str:
     most = 1.1 * float(np.quantile(np.abs(e), 0.995)) + 1e-6
     axes = _over_time(track, (-most, most), "innovation [m/s²]")
     bands = [axes.band(track.t[first], track.t[last - 1]) for first, last in track.runs]
-    lines = [axes.line(*envelope(track.t[-len(e) :], e[:, i]), colour) for i, (_, colour) in enumerate(_XYZ)]
-    return axes.svg("innovations", "Innovations of the three axes over time", bands + lines, *_XYZ, ("at rest", LINE))
+    lines = [axes.line(*envelope(track.t[-len(e) :], e[:, i]), colour) for i, (_, colour) in enumerate(XYZ)]
+    return axes.svg("innovations", "Innovations of the three axes over time", bands + lines, *XYZ, ("at rest", LINE))
 
 
 def rates(track: Track) -> str:
@@ -111,9 +110,9 @@ def rates(track: Track) -> str:
     gyr, limit = np.degrees(track.recording.gyr), track.calibration.sensor.gyro_range_dps
     most = 1.1 * max(float(np.abs(gyr).max()), limit or 0.0) + 1e-6
     axes = _over_time(track, (-most, most), "rate [deg/s]")
-    lines = [axes.line(*envelope(track.t, gyr[:, i]), colour) for i, (_, colour) in enumerate(_XYZ)]
+    lines = [axes.line(*envelope(track.t, gyr[:, i]), colour) for i, (_, colour) in enumerate(XYZ)]
     lines += [] if limit is None else [axes.level(limit), axes.level(-limit)]
-    return axes.svg("rates", "Rates of turn over time", lines, *_XYZ, ("range", INK))
+    return axes.svg("rates", "Rates of turn over time", lines, *XYZ, ("range", INK))
 
 
 def temperature(track: Track) -> str:

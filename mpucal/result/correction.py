@@ -13,6 +13,7 @@ from .calibration import Calibration
 
 # relative and absolute: a parameter is a float32 and passes through text
 TOLERANCE = 1e-5
+THIS_CHIP = "give the calibration of this chip"
 
 
 @dataclass(frozen=True)
@@ -45,18 +46,18 @@ def make_correction(calibration: Calibration, sensor: Sensor, autopilot: Autopil
     if not np.isfinite(calibration.K).all():
         raise UsageError("the calibration lacks K", "give one that has it")
     of = calibration.sensor
-    if how := other_who_am_i(of, sensor):
-        raise UsageError(f"the calibration is of another chip: {how}", "give the calibration of this chip")
+    if how := other_who_am_i(of.who_am_i, sensor.who_am_i):
+        raise UsageError(f"the calibration is of another chip: {how}", THIS_CHIP)
     _check_origin(of, sensor)
     _check_parameters(calibration, autopilot)
     return _with_registers(calibration, sensor)
 
 
-def other_who_am_i(then: Sensor, now: Sensor) -> str:
-    """Return how WHO_AM_I shows that `now` is another sensor than the calibrated one; empty if it does not."""
-    if None in (then.who_am_i, now.who_am_i) or then.who_am_i == now.who_am_i:
+def other_who_am_i(calibrated: int | None, present: int | None) -> str:
+    """Return a clause on the present chip's WHO_AM_I if it is not the calibrated one's; empty if it is, or unknown."""
+    if None in (calibrated, present) or calibrated == present:
         return ""
-    return f"its WHO_AM_I is 0x{now.who_am_i:02x}, and that of the calibrated one was 0x{then.who_am_i:02x}"
+    return f"WHO_AM_I of this chip is 0x{present:02x}, but 0x{calibrated:02x} of the calibrated one"
 
 
 def same_trim(then: Sensor, now: Sensor) -> bool | None:

@@ -57,6 +57,11 @@ def bias_mg(b: Vector) -> Vector:
     return np.asarray(MG_PER_MPS2 * b)
 
 
+def mg_text(b: Vector, decimals: int = 0) -> str:
+    """Return a bias (3,) m/s^2 as text in mg, without the unit."""
+    return ", ".join(f"{value:+.{decimals}f}" for value in bias_mg(b))
+
+
 def error_before(D: Vector, b: Vector, gravity: float) -> float:
     """Return the rms error [m/s^2] over all orientations at rest of an uncalibrated sensor with D (3, 3) and b (3,).
 

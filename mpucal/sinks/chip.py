@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..chip.access import Bus
-from ..chip.families import PARTS
+from ..chip.families import PARTS, part_named
 from ..chip.offsets import (
     PLACES,
     OffsetRegisters,
@@ -33,6 +33,8 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
 from ..result.calibration import Calibration
 from ..result.comparison import is_better
+from ..result.correction import THIS_CHIP, other_who_am_i
+from ..result.error_model import mg_text
 from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.chip import OpenedChip
@@ -143,8 +145,8 @@ class ChipSink(Sink):
         return Applied(
             replace(calibration, applied_in_hardware=applied),
             (
-                f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract ({mg(applied)}) mg,"
-                " read back and verified in the samples",
+                f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract"
+                f" ({mg_text(applied)}) mg, read back and verified in the samples",
                 VOLATILE,
             ),
         )
@@ -168,14 +170,10 @@ class ChipSink(Sink):
         """
         who_am_i = read_identity(self._port)
         calibrated = calibration.sensor
-        if calibrated.who_am_i not in (None, who_am_i):
-            raise ChipError(
-                f"WHO_AM_I of this chip is 0x{who_am_i:02x}, but 0x{calibrated.who_am_i:02x} of the calibrated one",
-                "give the calibration of this chip",
-            )
-        named = {part.chip: part.family.accel_offset_h for part in PARTS.values()}
-        by_name = named.get((calibrated.chip or "").removesuffix("C"))
-        return by_name or (PARTS[who_am_i].family.accel_offset_h if who_am_i in PARTS else PLACES[0])
+        if how := other_who_am_i(calibrated.who_am_i, who_am_i):
+            raise ChipError(how, THIS_CHIP)
+        part = part_named((calibrated.chip or "").removesuffix("C")) or PARTS.get(who_am_i)
+        return PLACES[0] if part is None else part.family.accel_offset_h
 
     def _reference(self, calibration: Calibration, response: OffsetResponse) -> Words:
         """Return the content of the registers during the calibration, which they have now or after a reset.
@@ -192,8 +190,7 @@ class ChipSink(Sink):
         held = OffsetRegisters.read(self._port, response.place).words
         if known is not None and known != held:
             raise ChipError(
-                f"the factory trim of this chip is {held}, but {known} in the one that was calibrated",
-                "give the calibration of this chip",
+                f"the factory trim of this chip is {held}, but {known} in the one that was calibrated", THIS_CHIP
             )
         return held
 
@@ -205,14 +202,14 @@ class ChipSink(Sink):
         counts = calibration.b_a / STANDARD_GRAVITY_MPS2 * response.lsb_per_g
         new = old.with_words(shift_words(reference, -counts))
         before = measurement.rest()
-        _check_gravity(calibration, before, _subtraction(old.words, reference, response))
+        _check_gravity(calibration, before, subtraction(old.words, reference, response.lsb_per_g))
         if not new.write(self._port):
             raise ChipError("the offset registers do not read back as written", "check the wires, and try again")
         after = measurement.rest()
-        expected = -_subtraction(new.words, old.words, response)
+        expected = -subtraction(new.words, old.words, response.lsb_per_g)
         shift = (after - before) * STANDARD_GRAVITY_MPS2
         check_shift(shift, expected, "put the board on a firm surface, and try again")
-        applied = _subtraction(new.words, reference, response)
+        applied = subtraction(new.words, reference, response.lsb_per_g)
         _check_gravity(calibration, after, applied)
         return applied
 
@@ -228,9 +225,9 @@ def _check_gravity(calibration: Calibration, mean_g: Vector, applied_mps2: Vecto
         )
 
 
-def _subtraction(words: Words, reference: Words, response: OffsetResponse) -> Vector:
+def subtraction(words: Words, reference: Words, lsb_per_g: float) -> Vector:
     """Return (3,) m/s^2 that `words` subtract from the samples more than `reference`; larger words add."""
-    return -np.array(word_difference(words, reference)) / response.lsb_per_g * STANDARD_GRAVITY_MPS2
+    return -np.array(word_difference(words, reference)) / lsb_per_g * STANDARD_GRAVITY_MPS2
 
 
 def _hex(blocks: Sequence[OffsetRegisters]) -> dict[str, str]:
@@ -260,9 +257,6 @@ def check_shift(shift: Vector, expected: Vector, remedy: str) -> None:
     """Raise ChipError if samples at rest changed by (3,) m/s^2, other than `expected` of what was written."""
     limit = SHIFT_G * STANDARD_GRAVITY_MPS2 + SHIFT_SHARE * np.abs(expected)
     if (np.abs(shift - expected) > limit).any():
-        raise ChipError(f"the samples changed by ({mg(shift)}) mg, but ({mg(expected)}) mg were written", remedy)
-
-
-def mg(values: Vector) -> str:
-    """Return (3,) m/s^2 as text in mg."""
-    return ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.0f}" for value in values)
+        raise ChipError(
+            f"the samples changed by ({mg_text(shift)}) mg, but ({mg_text(expected)}) mg were written", remedy
+        )

@@ -64,7 +64,11 @@ def calibration():
     [
         ({"quality": {"verdict": "refused"}}, {}, "nothing was written: the calibration was refused"),
         ({"D": np.full((3, 3), np.nan)}, {}, "nothing was written: the calibration lacks D or b_a"),
-        ({}, {"chip": 0x70}, "nothing was written: WHO_AM_I of .* is 0x70, but that of the calibrated one is 0x68"),
+        (
+            {},
+            {"chip": 0x70},
+            "nothing was written to .*: WHO_AM_I of this chip is 0x70, but 0x68 of the calibrated one",
+        ),
         ({}, {"fails": ["who_am_i"]}, "nothing was written: the bridge was reset: check its cable"),
     ],
     ids=["refused", "not finite", "another chip", "lost"],

@@ -82,6 +82,7 @@ AGAIN = {
 def test_the_command_for_another_measurement_is_never_the_same_one(tmp_path, monkeypatch, typed, codes, again):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "seven").mkdir()
+    (tmp_path / "walk.csv").touch()
     quality = {"verdict": "refused", "reasons": [{"code": code, "message": "it was"} for code in codes]}
     sensor = Sensor("MPU-6050", 0x68, accel_range_g=16.0, gyro_range_dps=500.0)
     with click.Context(click.Command("mpucal")) as context:

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Any
 
+from ...clocks.vehicle_clock import S_US, US
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
@@ -54,8 +55,6 @@ class StreamTimes:
 FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
 
 COMPONENT = 1
-S_US = 1_000_000
-US = 1_000
 HEARTBEAT = 0
 SLOWER_WHILE_BUSY = 4
 # MAV_TYPE
