@@ -10,12 +10,13 @@ MpucalError
 │   ├── CaptureError         a capture that is damaged, or lacks what was requested
 │   ├── BusError             a transfer failed
 │   │   ├── NoAnswer         no device acknowledged the address or sent a heartbeat
-│   │   ├── KeepsNothing     the bridge's firmware has no memory for a calibration
+│   │   ├── NoStorage        the bridge's firmware has no memory for a calibration
 │   │   ├── BusHeld          a wire is held low, so that every transfer times out
 │   │   ├── LateRead         this computer was busy during a read, whose time is not known
 │   │   └── LinkError        the link to a vehicle or board broke, or cannot be used
 │   └── ChipError            the chip answers, but not as in its register map
-│       ├── OddOffsets       the offset registers are not at a known place
+│       ├── BoardMoved       the board moved while it had to lie still
+│       ├── UnknownOffsets   the offset registers are not at a known place
 │       └── ChipReset        the chip lost its settings during the measurement
 ├── OutputError           3  a result cannot be written to the requested place
 ├── Abandoned             4  the session ended before there was anything to calibrate
@@ -111,7 +112,7 @@ class LinkError(BusError):
     """The link to a vehicle or board broke, or cannot be used."""
 
 
-class KeepsNothing(BusError):  # noqa: N818 - reads as the sentence it is
+class NoStorage(BusError):  # noqa: N818 - reads as the sentence it is
     """The bridge's firmware has no memory for a calibration."""
 
 
@@ -131,7 +132,7 @@ class BoardMoved(ChipError):  # noqa: N818 - reads as the sentence it is
     """The board moved while it had to lie still."""
 
 
-class OddOffsets(ChipError):  # noqa: N818 - reads as the sentence it is
+class UnknownOffsets(ChipError):  # noqa: N818 - reads as the sentence it is
     """The accelerometer's offset registers are not at a known place."""
 
 

@@ -25,7 +25,7 @@ SHARED = PROJECT.parent / "shared"
 RECORDINGS = SHARED / "recordings"
 RECORDING = RECORDINGS / "mpu6050_session.npz"
 # a session looks five times as often, for the person's sake
-SELDOM_S = 0.2
+LONG_POLL_S = 0.2
 YARDSTICK = SHARED / "check" / "gravity_transport.py"
 
 pytestmark = pytest.mark.skipif(
@@ -70,7 +70,7 @@ def make_capture(file, capture, gravity, poll_s):
 def capture(tmp_path_factory):
     """The recording as a register capture."""
     path = tmp_path_factory.mktemp("real") / "capture.mcap"
-    config = make_capture(RECORDING, path, 9.80665, SELDOM_S)
+    config = make_capture(RECORDING, path, 9.80665, LONG_POLL_S)
     assert (config.accel_range_g, config.gyro_range_dps, config.rate_hz) == (2, 250, 100)
     assert len(load(path)) == 10242
     return path
@@ -129,7 +129,7 @@ def test_what_no_pose_shows_is_not_claimed(session):
 def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
     """Use recordings that lie flat for less than ten seconds; those of the MPU-9150s begin with spikes to 74 m/s^2."""
     recording = RECORDINGS / f"{name}.npz"
-    make_capture(recording, tmp_path / "capture.mcap", 9.81, SELDOM_S)
+    make_capture(recording, tmp_path / "capture.mcap", 9.81, LONG_POLL_S)
     found = outcome(tmp_path / "board", "session", "--replay", tmp_path / "capture.mcap")
     assert found.code == 0 and found.found.verdict in ("good", "usable")
     assert transported_deg(found.file, "--trim", 0.5, "--gravity", 9.81, recording=recording) <= most_deg

@@ -27,11 +27,11 @@ LEAST_CLUSTERS = 5.0
 # octaves that may be left out, since a sensor's low-pass filter removes white noise at the shortest times
 MOST_LEFT_OUT = 7
 # a more probable fit is accepted
-FITS = 1e-3
+LEAST_PROBABILITY = 1e-3
 # iterations of the weights; share of the diagonal that stays in them
-ROUNDS, LEAST_SHARE = 6, 1e-4
-# the ends of an interval are searched from NEAR to FAR times the square or its deviation, at PLACES values
-NEAR, FAR, PLACES = 1e-3, 1e2, 40
+ITERATIONS, LEAST_SHARE = 6, 1e-4
+# the ends of an interval are searched at this number of values between these multiples of the square or its deviation
+SEARCH_FROM, SEARCH_TO, SEARCH_POINTS = 1e-3, 1e2, 40
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def fit_coefficients(
         fit = _Fit(sizes[first:], variances[first:], samples, terms=3 if first else 4)
         if best is None or fit.probability > best.probability:
             best = fit
-        if fit.probability > FITS:
+        if fit.probability > LEAST_PROBABILITY:
             break
     if best is None:
         return None
@@ -94,7 +94,7 @@ class _Fit:
         self._products = _products(sizes, samples)[:terms, :terms]
         self._scale = variances[0] / np.abs(self._A).max(0)
         C = self._independent
-        for _ in range(ROUNDS):
+        for _ in range(ITERATIONS):
             root = np.linalg.cholesky(C + LEAST_SHARE * self._independent)
             W, w = np.linalg.solve(root, self._A * self._scale), np.linalg.solve(root, variances)
             self.squares = self._scale * nnls(W, w)[0]
@@ -120,7 +120,7 @@ class _Fit:
 
         square, far = float(self.squares[i]), float(norm.isf(0.5 * (1.0 - confidence)))
         largest = max(square, float(self._std(i, 0.0)[0]))
-        truth = np.concatenate([[0.0], np.geomspace(NEAR, FAR, PLACES) * largest])
+        truth = np.concatenate([[0.0], np.geomspace(SEARCH_FROM, SEARCH_TO, SEARCH_POINTS) * largest])
         std = self._std(i, truth)
         low, high = (np.interp(square, np.maximum.accumulate(truth + sign * far * std), truth) for sign in (1, -1))
         return float(low), float(high)

@@ -17,16 +17,16 @@ from ..rests.limits import OF_NORMAL
 BLOCKS = 2048
 FIRST_S = 0.5
 # blocks averaged on each side of a step, and robust standard deviations that it exceeds
-BESIDE, STEP_STD = 8, 10.0
+STEP_BLOCKS, STEP_STD = 8, 10.0
 LEAST_BLOCKS = 64
 # more than drift or noise: a change of direction of gravity, and a rate
 TURNED_RAD, TURNED_RAD_S = math.radians(2.0), math.radians(3.0)
 
 SEGMENT = 4096
 # a line's least height above its neighbours, beyond the limit of chance, and the probability of that limit
-LEAST_SHARE, SURPRISE = 0.3, 1e-4
+LEAST_EXCESS, CHANCE = 0.3, 1e-4
 # bins: half widths of the neighbourhoods and of a line
-NEIGHBOURS, LINE = (8, 32), 2
+NEIGHBOUR_BINS, LINE_BINS = (8, 32), 2
 
 
 class Trace:
@@ -69,14 +69,14 @@ def find_steps(means: Vector) -> list[tuple[int, int, float]]:
     if len(means) < LEAST_BLOCKS:
         return []
     total = np.concatenate([np.zeros((1, means.shape[1])), np.cumsum(means - means[0], axis=0)])
-    of = (total[BESIDE:] - total[:-BESIDE]) / BESIDE
-    jumps = of[BESIDE:] - of[:-BESIDE]
+    of = (total[STEP_BLOCKS:] - total[:-STEP_BLOCKS]) / STEP_BLOCKS
+    jumps = of[STEP_BLOCKS:] - of[:-STEP_BLOCKS]
     spread = OF_NORMAL * np.median(np.abs(jumps - np.median(jumps, axis=0)), axis=0)
     found = []
     for column, (jump, std) in enumerate(zip(jumps.T, spread, strict=True)):
         at = int(np.abs(jump).argmax())
         if std > 0.0 and abs(jump[at]) > STEP_STD * std:
-            found.append((at + BESIDE, column, float(jump[at])))
+            found.append((at + STEP_BLOCKS, column, float(jump[at])))
     return found
 
 
@@ -125,17 +125,17 @@ class Spectrum:
         density = 2.0 * self._power / (self._segments * rate_hz * np.sum(self._window**2))
         freedom = 2 * self._segments
         # relative to the median, as the floor is a median of the neighbours
-        most = float(chi2.isf(SURPRISE / len(density), freedom) / chi2.median(freedom))
+        most = float(chi2.isf(CHANCE / len(density), freedom) / chi2.median(freedom))
         found: list[Tone] = []
         for axis, of in enumerate(density.T):
             # the narrow neighbourhood follows a steep density, such as drift at low frequencies
-            floor = np.maximum(*(median_filter(of, 2 * many + 1, mode="reflect") for many in NEIGHBOURS)) + 1e-300
+            floor = np.maximum(*(median_filter(of, 2 * many + 1, mode="reflect") for many in NEIGHBOUR_BINS)) + 1e-300
             above = of / floor
             # the lowest bins are drift, and the highest lack neighbours
-            above[: 2 * LINE] = above[-2 * LINE :] = 0.0
+            above[: 2 * LINE_BINS] = above[-2 * LINE_BINS :] = 0.0
             at = int(above.argmax())
-            if above[at] > (1.0 + LEAST_SHARE) * most:
-                around = slice(max(at - LINE, 0), at + LINE + 1)
+            if above[at] > (1.0 + LEAST_EXCESS) * most:
+                around = slice(max(at - LINE_BINS, 0), at + LINE_BINS + 1)
                 power = float(np.sum(of[around] - floor[around])) * rate_hz / SEGMENT
                 found.append(Tone(axis, at * rate_hz / SEGMENT, float(np.sqrt(max(power, 0.0)))))
         return found

@@ -17,7 +17,7 @@ from ..result.error_model import bias_mg, misalignment, scale_factor_error
 from .row import AXES
 
 # robust standard deviations from the fleet's median, beyond which a value is an outlier
-FAR = 5.0
+OUTLIER_STD = 5.0
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Parameter:
         median, spread = self.middle
         if spread > 0.0:
             away = np.abs(self.value - median) / spread
-            for i in np.flatnonzero(np.nan_to_num(away) > FAR):
+            for i in np.flatnonzero(np.nan_to_num(away) > OUTLIER_STD):
                 yield int(i), float(away[i])
 
 

@@ -13,11 +13,11 @@ import pyarrow.parquet as pq
 from ..data import Vector
 from ..report.elements import document, escape, figure, paragraph, section, table
 from ..report.figure import BEFORE, Axes, X, Y, Z
-from .fleet import FAR, Parameter, parameters, repeatability, repeated_sensors
+from .fleet import OUTLIER_STD, Parameter, parameters, repeatability, repeated_sensors
 
 PAGE = "fleet.html"
 # rows of a table on the page; results.csv has all
-MOST = 200
+MOST_ROWS = 200
 VERDICTS = ("good", "usable", "refused")
 Columns = Mapping[str, Sequence[Any]]
 
@@ -115,11 +115,13 @@ def _outliers(columns: Columns, found: Iterable[Parameter]) -> str:
         for i, away in each.outliers()
     ]
     rows = [row for _, row in sorted(far, key=lambda item: -item[0])]
-    caption = f"More than {FAR:g} spreads from the median"
-    if len(rows) > MOST:
-        caption += f"; the farthest {MOST} of {len(rows)}"
+    caption = f"More than {OUTLIER_STD:g} spreads from the median"
+    if len(rows) > MOST_ROWS:
+        caption += f"; the farthest {MOST_ROWS} of {len(rows)}"
     head = ("recording", "parameter", "value", "spreads away")
-    return section("Outliers", table("outliers", caption, head, rows[:MOST], links=_links(columns))) if rows else ""
+    return section(
+        "Outliers", table("outliers", caption, head, rows[:MOST_ROWS], links=_links(columns)) if rows else ""
+    )
 
 
 def _groups(title: str, what: str, names: Sequence[str | None], columns: Columns, found: Sequence[Parameter]) -> str:
@@ -129,7 +131,7 @@ def _groups(title: str, what: str, names: Sequence[str | None], columns: Columns
         return ""
     key, verdict = np.array([name or "" for name in names]), np.array([each or "" for each in columns["verdict"]])
     rows = []
-    for group in groups[:MOST]:
+    for group in groups[:MOST_ROWS]:
         inside = key == group
         good = f"{100 * np.mean(verdict[inside] == 'good'):.0f} %"
         medians = (_median(each.value[inside]) for each in found)
@@ -171,8 +173,9 @@ def _repeats(columns: Columns) -> str:
 
 def _errors(columns: Columns) -> str:
     rows = [(path, error) for path, error in zip(columns["path"], columns["error"], strict=True) if error]
-    caption = f"The first {MOST} of {len(rows)}" if len(rows) > MOST else ""
-    return section("Not read", table("errors", caption, ("recording", "why"), rows[:MOST], words=0)) if rows else ""
+    caption = f"The first {MOST_ROWS} of {len(rows)}" if len(rows) > MOST_ROWS else ""
+    head = ("recording", "why")
+    return section("Not read", table("errors", caption, head, rows[:MOST_ROWS], words=0) if rows else "")
 
 
 def _reports(columns: Columns) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple, TypeVar
 
 from ..chip.registers import WHO_AM_I
-from ..errors import BusError, KeepsNothing
+from ..errors import BusError, NoStorage
 from ..result.blob import Blob, BlobError
 from .link import Link
 from .messages import (
@@ -117,7 +117,7 @@ class BlobStore:
 
     def _check_feature(self) -> None:
         if not self._link.bridge.features & Feature.BLOB:
-            raise KeepsNothing(
+            raise NoStorage(
                 f"the bridge on {self.name} cannot store a calibration",
                 "keep calibration.bin where its firmware reads it",
             )

@@ -10,8 +10,8 @@ from . import registers as reg
 from .families import Part
 from .settings import Settings
 
-# Chips are known to corrupt some of more than 24 to 32 queued frames, and the usual periods let 20 gather. A simulation
-# at full speed fills this share of its FIFO, most of which hold 1024 bytes.
+# Some chips corrupt frames if more than 24 to 32 are queued; with the usual periods, 20 are. A simulation at full speed
+# polls less often: it may fill this share of its FIFO, or queue this number of frames of a FIFO of 1024 bytes.
 MOST_FILLED, MAX_FRAMES_A_POLL = 0.75, 54
 MIN_POLL_S = 0.001
 SLOW_POLL_S = 0.040

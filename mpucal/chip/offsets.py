@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 
 from ..data import Vector
-from ..errors import BoardMoved, BusError, ChipError, OddOffsets
+from ..errors import BoardMoved, BusError, ChipError, UnknownOffsets
 from .families import FAMILIES
 from .port import Port
 from .quick_measure import TemporaryMeasurement
@@ -165,7 +165,7 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
 
     Raises
     ------
-    BusError : a transfer failed. OddOffsets : no place responds, or one responds with an unknown scale.
+    BusError : a transfer failed. UnknownOffsets : no place responds, or one responds with an unknown scale.
     ChipError : the board moves, or the old words could not be restored.
     """
     for place in sorted(PLACES, key=lambda place: place != likely):
@@ -186,7 +186,7 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
         shift = during - (before + after) / 2
         if (np.abs(shift) > LEAST_SHIFT_G).any():
             return _identify_scale(place, shift / np.array(word_difference(probe.words, old.words)))
-    raise OddOffsets(
+    raise UnknownOffsets(
         "the accelerometer does not respond to its offset registers, neither at "
         + " nor at ".join(f"0x{place[0]:02x}" for place in PLACES),
         "use the calibration's files: this chip cannot hold a correction",
@@ -198,7 +198,7 @@ def _identify_scale(place: Place, g_per_lsb: Vector) -> OffsetResponse:
         if (np.abs(g_per_lsb * scale - 1) < TOLERANCE).all():
             return OffsetResponse(place, scale, g_per_lsb)
     per_256 = ", ".join(f"{256_000 * value:+.0f}" for value in g_per_lsb)
-    raise OddOffsets(
+    raise UnknownOffsets(
         f"256 counts in the offset registers at 0x{place[0]:02x} have an effect of {per_256} mg; known chips have 125"
         " or 62.5",
         "use the calibration's files: a correction in these registers would be wrong",

@@ -35,7 +35,7 @@ from .source_options import check_input, check_source, source_options
 EXAMPLE = "Example: `mpucal noise walk.npz -o noise`, or `mpucal noise --bus sim --hours 0.02`"
 DOCUMENT, PAGE = "noise.json", "noise.html"
 # Wanted relative standard uncertainty of the bias instability.
-WANTED = 0.1
+WANTED_STD = 0.1
 # Interval of the progress [s], on a terminal or not.
 PROGRESS_S = {True: 2.0, False: 60.0}
 # Runs of a second in which a person puts the board down.
@@ -135,8 +135,8 @@ def _progress() -> Iterator[Any]:
             return
         shown_s = monotonic()
         of = "" if seconds is None else f" of {duration(seconds)}"
-        needed_s = meter.needed_s(WANTED)
-        more = "" if needed_s is None else f"; bias instability to {100 * WANTED:.0f} %: {duration(needed_s)} more"
+        needed_s = meter.needed_s(WANTED_STD)
+        more = "" if needed_s is None else f"; bias instability to {100 * WANTED_STD:.0f} %: {duration(needed_s)} more"
         text = f"{duration(meter.seconds)}{of}{more}"
         click.echo(f"\r{text}   " if on_a_terminal else text, err=True, nl=not on_a_terminal)
 

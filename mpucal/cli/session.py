@@ -38,7 +38,7 @@ from .source_options import check_source, source_options
 from .summary import next_steps, summary
 
 # Words of remedies that are replaced where the session can be resumed.
-AGAIN = "start again"
+START_AGAIN = "start again"
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
 TARGET = AIMS[NORMAL].target
 
@@ -182,7 +182,7 @@ def _how_to_continue(source: OpenedSource, folder: Path, error: BaseException) -
         return f", and the results in {folder}"
     if not source.words:
         return ""
-    if not isinstance(error, MpucalError) or AGAIN not in error.remedy:
+    if not isinstance(error, MpucalError) or START_AGAIN not in error.remedy:
         return f"; continue with --resume {folder}"
-    error.remedy = error.remedy.replace(AGAIN, f"continue with `mpucal session --resume {folder}`")
+    error.remedy = error.remedy.replace(START_AGAIN, f"continue with `mpucal session --resume {folder}`")
     return ""

@@ -23,7 +23,7 @@ from ..result.session_files import BLOB, DOCUMENT, REPORT
 from ..sources.table import matching_kinds
 from . import amended, typed_words, with_option
 
-OUTPUT, NOT_AGAIN = "-o", frozenset({"--replay", "--resume"})
+OUTPUT, NO_MEASUREMENT = "-o", frozenset({"--replay", "--resume"})
 # A chip's range by the code of the reason that a larger one prevents.
 RANGES = {
     "gyro_clipped": ("--gyro-range", "gyro_range_dps", GYRO_RANGES_DPS),
@@ -31,7 +31,7 @@ RANGES = {
 }
 
 # Option in a remedy, with its value, which is no placeholder in capitals.
-SAID = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
+REMEDY_OPTION = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
 
 # For a terminal of 80 columns.
 WIDTH, LABEL, COLUMN = 79, 23, 17
@@ -128,9 +128,9 @@ def command_again(
     can, on the same source if that is known by the options `source` (see Request.words).
     """
     typed = typed_words()
-    words = _session_words(source) if NOT_AGAIN.intersection(typed) else list(typed)
+    words = _session_words(source) if NO_MEASUREMENT.intersection(typed) else list(typed)
     reasons = calibration.quality.get("reasons", ())
-    said = SAID.search(" ".join(reason.get("remedy", "") for reason in reasons))
+    said = REMEDY_OPTION.search(" ".join(reason.get("remedy", "") for reason in reasons))
     if recording is not None and said:
         words = amended(words, said[1], "")
     elif recording is not None:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ..disk.output_folder import OutputFolder
-from ..sinks.choose import check_behind
+from ..sinks.choose import check_has_sink
 from ..sinks.table import SINKS
 from ..sinks.write_back import file_recorder, is_calibration, put_back, write_objection, write_to
 from .arguments import calibration_argument, json_option, output_option, yes_option
@@ -37,7 +37,7 @@ def command(
     write saved it. Exit code 6: refused or failed, nothing was changed.
     """
     kind = SINKS[to]
-    check_behind(kind, check_source(click.get_current_context()), f"{kind.name} was named")
+    check_has_sink(kind, check_source(click.get_current_context()), f"{kind.name} was named")
     written = load_trusted(calibration, force) if is_calibration(calibration) else None
     with (
         OutputFolder(folder or calibration.parent) as into,

@@ -27,22 +27,22 @@ FEWEST = 100
 # s of a recording, of which 64 bits hold the ns
 LONGEST_S = 1e9
 # periods: steps that vary by less are a clock's own
-EVEN = 0.1
+MOST_UNEVEN = 0.1
 # samples over which a period is measured, so that bursts do not matter, and the least number of such stretches
-LAG, STRETCHES = 250, 4
-# variance of a step over LAG samples, over LAG times that of one step: 1 if each step varies by itself, and far less if
-# late stamps follow a line or come in bursts
-FOLLOWS_A_LINE = 0.2
-# shares of steps that are left out as pauses and delays, over LAG samples and over one
-OUTLIERS, SELDOM = 0.1, 0.02
+LAG_SAMPLES, LEAST_STRETCHES = 250, 4
+# variance of a step over LAG_SAMPLES samples, relative to that many times the variance of one step: 1 if each step
+# varies by itself; below this, late stamps follow a line or come in bursts
+MOST_LINE_VARIANCE = 0.2
+# shares of steps that are left out as pauses and delays, over LAG_SAMPLES samples and over one
+LAG_OUTLIERS, STEP_OUTLIERS = 0.1, 0.02
 # s, and the least number of samples, of a stretch, which holds a stamp that was hardly late
-STRETCH_S, STRETCH = 0.25, 48
+STRETCH_S, STRETCH_SAMPLES = 0.25, 48
 # stretches within which delayed samples have arrived
-CATCHES_UP = 8
+CATCH_UP_STRETCHES = 8
 # the share of stamps, the earliest ones, to which the clock is fitted
-IN_TIME = 0.75
-# periods, and multiples of the envelope's usual move or of the stamps' resolution: a jump by more than all is a gap
-LOST, BY_CHANCE, ROUNDED = 0.6, 6.0, 1.5
+EARLIEST = 0.75
+# a jump of the envelope is a gap beyond these multiples of the period, of its usual move and of the stamps' resolution
+GAP_PERIODS, GAP_MOVES, GAP_RESOLUTIONS = 0.6, 6.0, 1.5
 
 Numbers = NDArray[np.int64]
 
@@ -110,7 +110,7 @@ def sample_period(stamps: Vector, number: Numbers | None = None) -> float:
     new = np.flatnonzero(np.diff(stamps, prepend=np.nan) != 0.0)
     if len(new) < 2:
         return 0.0
-    lag = max(min(LAG * len(new) // len(stamps), (len(new) - 1) // STRETCHES), 1)
+    lag = max(min(LAG_SAMPLES * len(new) // len(stamps), (len(new) - 1) // LEAST_STRETCHES), 1)
     at, count = stamps[new], new if number is None else number[new]
     return float(np.median((at[lag:] - at[:-lag]) / (count[lag:] - count[:-lag])))
 
@@ -125,31 +125,32 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
     n = len(stamps)
     number = np.arange(n) if number is None else number
     period, steps = sample_period(stamps, number), np.diff(stamps)
-    own = Clock(make_increasing(stamps, EVEN * period), are_gaps(stamps), 1.0 / period if period else 0.0)
+    own = Clock(make_increasing(stamps, MOST_UNEVEN * period), are_gaps(stamps), 1.0 / period if period else 0.0)
     off = steps - period * np.diff(number)
     if n < FEWEST or not period > 0.0 or stamps[-1] - stamps[0] > LONGEST_S:
         return own
-    if np.percentile(np.abs(off), 95) <= EVEN * period and off.min() > -period:
+    if np.percentile(np.abs(off), 95) <= MOST_UNEVEN * period and off.min() > -period:
         return own
     # several changes of rounded stamps, which have many samples each
-    several = STRETCHES * n // (int(np.count_nonzero(steps)) + 1)
+    several = LEAST_STRETCHES * n // (int(np.count_nonzero(steps)) + 1)
     gap, late = _gaps(stamps, number, period, several)
-    lag = min(max(LAG, several), n // STRETCHES)
+    lag = min(max(LAG_SAMPLES, several), n // LEAST_STRETCHES)
     # of rounded stamps, few steps are none
-    seldom = min(SELDOM, float(np.mean(steps > 0.0)) / 8)
-    if _square(late[lag:] - late[:-lag], OUTLIERS) > FOLLOWS_A_LINE * lag * _square(off, seldom):
+    seldom = min(STEP_OUTLIERS, float(np.mean(steps > 0.0)) / 8)
+    over_lag, of_step = _trimmed_square(late[lag:] - late[:-lag], LAG_OUTLIERS), _trimmed_square(off, seldom)
+    if over_lag > MOST_LINE_VARIANCE * lag * of_step:
         return own
     clock, segment = SampleClock(1.0 / period), np.cumsum(gap)
     index = number - number[np.maximum.accumulate(np.where(gap, np.arange(n), 0))]
     for first, last in pairwise((0, *np.flatnonzero(gap).tolist(), n)):
-        in_time = first + np.flatnonzero(late[first:last] <= np.quantile(late[first:last], IN_TIME))
+        in_time = first + np.flatnonzero(late[first:last] <= np.quantile(late[first:last], EARLIEST))
         clock.begin_segment()
         clock.add(np.rint(stamps[in_time] / NS).astype(np.int64), index[in_time] + 1)
     t, rate_hz = clock.times_s(segment.astype(np.int64), index), clock.rate_hz
-    return Clock(make_increasing(t, EVEN / rate_hz), gap | are_gaps(number), rate_hz, float(np.std(stamps - t)))
+    return Clock(make_increasing(t, MOST_UNEVEN / rate_hz), gap | are_gaps(number), rate_hz, float(np.std(stamps - t)))
 
 
-def _square(values: Vector, left_out: float) -> float:
+def _trimmed_square(values: Vector, left_out: float) -> float:
     """Return the mean square of values without a share of the largest."""
     squares = np.sort(values * values)
     return float(squares[: len(squares) - max(round(left_out * len(squares)), 1)].mean())
@@ -163,14 +164,14 @@ def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> t
     least_width : samples of a stretch of the envelope, at least.
     """
     n = len(stamps)
-    width = min(max(round(STRETCH_S / period), STRETCH, least_width), n // 2)
+    width = min(max(round(STRETCH_S / period), STRETCH_SAMPLES, least_width), n // 2)
     edges = np.arange(0, n - width // 2, width)
     late = stamps - period * number
     # after four rounds the envelope's slope has settled, here and below
     for _ in range(4):
         late -= float(np.median(np.diff(np.minimum.reduceat(late, edges)))) / width * number
-    lost = LOST * period
-    if np.median(np.diff(stamps)) < EVEN * period:
+    lost = GAP_PERIODS * period
+    if np.median(np.diff(stamps)) < MOST_UNEVEN * period:
         # the last sample of a burst waits for up to a period; where that wraps, the envelope jumps without a loss
         lost += period
         for _ in range(4):
@@ -180,9 +181,9 @@ def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> t
     least = np.minimum.reduceat(late, edges)
     chance = float(np.median(np.abs(np.diff(least))))
     # after a mere delay the next samples are soon in time again
-    least = sliding_window_view(np.append(least, np.full(CATCHES_UP - 1, np.inf)), CATCHES_UP).min(1)
+    least = sliding_window_view(np.append(least, np.full(CATCH_UP_STRETCHES - 1, np.inf)), CATCH_UP_STRETCHES).min(1)
     moved = np.diff(least)
-    limit = max(lost, BY_CHANCE * chance, ROUNDED * _resolution(stamps))
+    limit = max(lost, GAP_MOVES * chance, GAP_RESOLUTIONS * _resolution(stamps))
     gap = np.zeros(n, bool)
     for at in np.flatnonzero(moved > limit):
         # in the stretch with the gap, the envelope is that of the part before it
@@ -199,4 +200,4 @@ def _resolution(stamps: Vector) -> float:
     steps = np.diff(stamps)
     least = float(steps[steps > 0.0].min())
     parts = steps / least
-    return least if np.abs(parts - np.rint(parts)).max() < EVEN else 0.0
+    return least if np.abs(parts - np.rint(parts)).max() < MOST_UNEVEN else 0.0

@@ -25,7 +25,7 @@ from ..chip.quick_measure import PATIENCE, temporary_measurement
 from ..chip.self_test import run_self_test
 from ..chip.setup import read_identity
 from ..data import Sensor
-from ..errors import BoardMoved, ChipError, ChipReset, OddOffsets, SourceError
+from ..errors import BoardMoved, ChipError, ChipReset, SourceError, UnknownOffsets
 from ..session.ports import polled
 from ..sources.chip import OpenedChip
 from .bus_speed import examine_speed
@@ -34,12 +34,12 @@ from .finding import Finding, Mark
 from .measure import examine_stream
 
 # Shares of failed transfers: above the first a session is in danger, above the second nothing works.
-MANY, MOST = 0.05, 0.5
+MANY_FAILED, MOST_FAILED = 0.05, 0.5
 # Share of the factory's response to the self test below which an axis is dead.
-UNMOVED = 0.05
+LEAST_RESPONSE = 0.05
 MOVED = "the board moved"
 # Attempts to measure at rest, after a board that was not put down in the first wait.
-IMPATIENCE = 3
+SHORT_PATIENCE = 3
 
 
 def examine(
@@ -53,7 +53,7 @@ def examine(
     """
     stats = TransferStats()
     port = Port(bus, stats=stats)
-    patience = IMPATIENCE
+    patience = SHORT_PATIENCE
     try:
         # Nothing is written to a chip that is not known.
         read_identity(port)
@@ -85,8 +85,8 @@ def examine(
 def _transfers(stats: TransferStats, always: bool = False) -> Iterator[Finding]:
     """Report the failed transfers; unless `always`, not for a bus on which nothing failed, or nothing worked."""
     data = {"transfers": stats.transfers, "retries": stats.retries, "errors": dict(stats.errors)}
-    if always or (stats.errors and stats.error_share < MOST):
-        mark = Mark.BAD if stats.error_share > MANY else Mark.NOTE
+    if always or (stats.errors and stats.error_share < MOST_FAILED):
+        mark = Mark.BAD if stats.error_share > MANY_FAILED else Mark.NOTE
         yield Finding.check("transfers", not stats.errors, str(stats), remedy_of(stats.errors), data, mark)
 
 
@@ -152,7 +152,7 @@ def _self_test(port: Port, part: Part) -> tuple[Finding, list[str]]:
     if test.passed:
         return Finding("self test", Mark.OK, what, "", data), []
     moves = ((f"{name} {axis}", move) for name, each in shares.items() for axis, move in zip("xyz", each, strict=True))
-    if dead := ", ".join(axis for axis, move in moves if abs(move) < UNMOVED):
+    if dead := ", ".join(axis for axis, move in moves if abs(move) < LEAST_RESPONSE):
         what = f"{dead} did not move by the self test's force ({what})"
         return Finding(DEAD_AXIS, Mark.BAD, what, REPLACE, data), [DEAD_AXIS]
     remedy = "keep the board still and repeat; if it fails again, the chip is damaged or not genuine"
@@ -167,7 +167,7 @@ def _offsets_and_bits(port: Port, part: Part, patience: int) -> Iterator[tuple[F
             try:
                 response = measure_offset_response(port, measurement, family.accel_offset_h)
                 yield _offsets(response, family)
-            except OddOffsets as error:
+            except UnknownOffsets as error:
                 # A stuck bit makes the response of an axis odd, too.
                 lsb_per_g = family.accel_offset_lsb_per_g
                 odd, response = error, OffsetResponse(family.accel_offset_h, lsb_per_g, np.full(3, 1.0 / lsb_per_g))

@@ -14,20 +14,20 @@ from .dead_axes import dead_axes, live_axes
 from .finding import Finding, Mark
 
 # Multiples of the data sheet's typical noise density.
-NOISY, BROKEN = 1.5, 3.0
+NOISY_RATIO, BROKEN_RATIO = 1.5, 3.0
 # Relative change of the sample clock's rate that warming of the chip does not explain.
-CHANGED = 0.002
+LEAST_RATE_CHANGE = 0.002
 # Five times the tolerance of a quartz crystal.
-OFF_PPM = 500.0
+MOST_RATE_ERROR_PPM = 500.0
 # Scale factor within 3 %, and zero-g level within 80 mg.
-FAR_FROM_G = 0.11
+MOST_ERROR_G = 0.11
 # The samples may be shorter than asked for by the first and the last poll.
-ENDS_S = 0.1
+MOST_MISSING_S = 0.1
 USUAL_C = (-10.0, 70.0)
 
 # Both bands lie above slow drift and below a low-pass filter of 44 Hz; a hand trembles in the lower one only.
 LOW_HZ, HIGH_HZ = (1.0, 12.0), (20.0, 40.0)
-TREMBLES = 2.0
+LEAST_TREMOR_RATIO = 2.0
 
 
 def examine_stream(
@@ -70,9 +70,9 @@ def examine_clock(topic: str, ppm: float, std: float) -> Finding:
     what = f"{ppm:+.0f} ppm against this computer's (1 sigma {std * 1e6:.0f})"
     data = {"ppm": ppm, "std_ppm": std * 1e6}
     remedy = "nothing has to be done: times are corrected for that"
-    if std * 1e6 > OFF_PPM:
+    if std * 1e6 > MOST_RATE_ERROR_PPM:
         remedy = "observe for longer (--seconds 30): its rate is not known yet"
-    return Finding.check(topic, max(abs(ppm), std * 1e6) <= OFF_PPM, what, remedy, data)
+    return Finding.check(topic, max(abs(ppm), std * 1e6) <= MOST_RATE_ERROR_PPM, what, remedy, data)
 
 
 def _rate(recording: Recording, nominal_hz: float) -> Finding:
@@ -94,12 +94,12 @@ def _rate(recording: Recording, nominal_hz: float) -> Finding:
 def _find_rate_change(recording: Recording) -> tuple[float, float, float] | None:
     """Return the time [s] of a change of the sample clock and the rates [Hz] before and after; None if it is steady."""
     period = np.where(recording.gap[1:], np.nan, np.diff(recording.t))
-    if not np.nanmedian(np.abs(np.diff(period))) < CHANGED * np.nanmedian(period):
+    if not np.nanmedian(np.abs(np.diff(period))) < LEAST_RATE_CHANGE * np.nanmedian(period):
         # Each sample has a time of its own: the kernel's driver stamps it, or the channels are polled.
         return None
     first, last = float(period[0]), float(period[-1])
     # The comparison is False for NaN, which counts as no change.
-    if not abs(last / first - 1) > CHANGED:
+    if not abs(last / first - 1) > LEAST_RATE_CHANGE:
         return None
     at = int(np.argmax(np.abs(period / first - 1) > abs(last / first - 1) / 2))
     return float(recording.t[at] - recording.t[0]), 1.0 / first, 1.0 / last
@@ -111,7 +111,7 @@ def _losses(recording: Recording, asked_s: float, remedy: str) -> Finding:
     samples = f"{len(recording)} samples in {seconds:.1f} s"
     if gaps:
         return Finding("losses", Mark.BAD, f"{gaps} gap{'' if gaps == 1 else 's'} in {samples}", remedy, data)
-    complete = seconds > asked_s - ENDS_S
+    complete = seconds > asked_s - MOST_MISSING_S
     late = "" if complete else f", though {asked_s:g} s were asked for"
     return Finding.check("losses", complete, f"none of {samples}{late}", Loss.LATE.remedy, data)
 
@@ -121,14 +121,15 @@ def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str
     what = f"{', '.join(f'{value:.3g}' for value in measured)} {unit} (data sheet: {typical:g})"
     data = {key: measured.tolist(), f"typical_{key}": typical}
     remedy = "keep vibration away from the board and check its supply; if that does not help, the chip is noisy"
-    return Finding.check(topic, share <= NOISY, what, remedy, data, Mark.NOTE if share <= BROKEN else Mark.BAD)
+    mark = Mark.NOTE if share <= BROKEN_RATIO else Mark.BAD
+    return Finding.check(topic, share <= NOISY_RATIO, what, remedy, data, mark)
 
 
 def examine_gravity(topic: str, mean: Vector, more: str = "") -> Finding:
     """Examine the mean (3,) [m/s^2] of an accelerometer at rest; `more` is said after it."""
     g = float(np.linalg.norm(mean)) / STANDARD_GRAVITY_MPS2
     remedy = "outside the data sheet's scale factor and bias; a calibration corrects it if it is constant"
-    return Finding.check(topic, abs(g - 1) <= FAR_FROM_G, f"|a| is {g:.3f} g{more}", remedy, {"g": g})
+    return Finding.check(topic, abs(g - 1) <= MOST_ERROR_G, f"|a| is {g:.3f} g{more}", remedy, {"g": g})
 
 
 def _zero_rate(dps: list[float], limit_dps: float) -> Finding:
@@ -166,4 +167,4 @@ def periodogram(values: Vector, rate_hz: float) -> tuple[Vector, Vector]:
 
 def is_trembling(values: Vector, rate_hz: float) -> bool:
     """Return True if the board was moved: the noise alone is as dense in the lower band as in the higher."""
-    return bool((noise_density(values, rate_hz, LOW_HZ) > TREMBLES * noise_density(values, rate_hz)).any())
+    return bool((noise_density(values, rate_hz, LOW_HZ) > LEAST_TREMOR_RATIO * noise_density(values, rate_hz)).any())

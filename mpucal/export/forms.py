@@ -10,7 +10,7 @@ from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..result.calibration import Calibration
 from . import arduino, c_code, esphome, i2cdevlib, linux_iio, micropython, python, ros, vehicles, vio
 from .losses import (
-    Loss,
+    LossNotes,
     check_usable,
     float_rounding,
     hardware_offsets,
@@ -39,7 +39,7 @@ class Form:
     read_by: str
     applied: str
     text: Callable[[Calibration, tuple[str, ...]], str]
-    losses: tuple[Loss, ...] = ()
+    losses: tuple[LossNotes, ...] = ()
     only_usable: bool = True
 
     def export(self, calibration: Calibration) -> tuple[str, tuple[str, ...]]:

@@ -14,7 +14,7 @@ from ..errors import RefusedError
 from ..result.calibration import Calibration
 
 # calibration -> sentences on the parts of it that a form cannot hold
-Loss = Callable[[Calibration], tuple[str, ...]]
+LossNotes = Callable[[Calibration], tuple[str, ...]]
 
 # characters that might end a comment or a string in one of the forms' languages
 UNSAFE = re.compile(r"[^A-Za-z0-9_ .,:+()-]")

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from io import StringIO
 
 LOOPBACK, LAN = "127.0.0.1", "lan"
-_EVERYWHERE = ("0.0.0.0", "::")
+_ALL_INTERFACES = ("0.0.0.0", "::")
 # An address for documentation (RFC 5737): a datagram socket chooses its interface for it, and sends nothing.
-_SOMEWHERE = ("192.0.2.1", 9)
+_ROUTED_ADDRESS = ("192.0.2.1", 9)
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def parse_address(text: str) -> Address:
     host = host.removeprefix("[").removesuffix("]")
     if not colon or not host or not port.isascii() or not port.isdigit() or int(port) > 0xFFFF:
         raise ValueError(f"{text!r} is not an address for a page: give lan, or HOST:PORT as in 192.168.1.20:8000.")
-    name = lan_host() if host in _EVERYWHERE else host
+    name = lan_host() if host in _ALL_INTERFACES else host
     return Address(host, int(port), f"[{name}]" if ":" in name else name)
 
 
@@ -44,7 +44,7 @@ def lan_host() -> str:
     """Return this computer's address in its network; the loopback address if it is in none."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(_SOMEWHERE)
+            probe.connect(_ROUTED_ADDRESS)
         except OSError:
             return LOOPBACK
         return str(probe.getsockname()[0])

@@ -11,7 +11,7 @@ from ..session.boards import KINDS
 from ..session.events import Knowledge
 from ..terminal.console import count, groups
 from ..terminal.view import View
-from ..terminal.voice import Said, in_words
+from ..terminal.voice import Announcement, in_words
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Result:
     summary: str = ""
 
 
-def state(view: View, said: Said | None = None) -> dict[str, Any]:
+def state(view: View, said: Announcement | None = None) -> dict[str, Any]:
     """Return the view's values and what was `said` last by name, not yet as JSON; see `changes`."""
     return {
         **vars(view),

@@ -29,16 +29,16 @@ __all__ = ["CheckResult", "check"]
 # The flat rest and three more.
 LEAST_ORIENTATIONS = 4
 # A calibration is called still good only if the bias is known to this standard uncertainty.
-ENOUGH_MG = 2.5
+MOST_BIAS_STD_MG = 2.5
 # Hypotheses whose log odds differ by less (20 to 1) are both named.
-NEAR = 3.0
+NEAR_LOG_ODDS = 3.0
 # Below this p-value under any hypothesis the rests contradict each other: the board was not at rest.
-CONTRADICTION = 1e-6
+LEAST_P_VALUE = 1e-6
 # Above this p-value the change of temperature explains the observations.
-SURPRISE = 0.01
+EXPLAINED_P_VALUE = 0.01
 VERDICTS = {"mount": REMOUNTED, "another sensor": ANOTHER_SENSOR}
-AGAIN = "lay the board flat for 10 s, then hold it for 2 s in three orientations 20 deg or more apart"
-ANEW = "calibrate it anew, with `mpucal session`"
+REPEAT = "lay the board flat for 10 s, then hold it for 2 s in three orientations 20 deg or more apart"
+CALIBRATE_AGAIN = "calibrate it anew, with `mpucal session`"
 
 
 def check(calibration: Calibration, recording: Recording, days: float | None = None) -> CheckResult:
@@ -60,17 +60,18 @@ def check(calibration: Calibration, recording: Recording, days: float | None = N
     """
     then, now = calibration.sensor, recording.sensor
     if message := other_who_am_i(then.who_am_i, now.who_am_i):
-        return CheckResult(ANOTHER_SENSOR, "another sensor", message, ANEW)
+        return CheckResult(ANOTHER_SENSOR, "another sensor", message, CALIBRATE_AGAIN)
     if same_trim(then, now) is False and not np.any(calibration.applied_in_hardware):
         message = (
             f"its offset registers hold {now.accel_offsets}, and the calibrated one's held {then.accel_offsets}:"
             " the factory sets them for each chip"
         )
-        return CheckResult(ANOTHER_SENSOR, "another sensor", message, f"{ANEW}, or give calibration-on-chip.json")
+        remedy = f"{CALIBRATE_AGAIN}, or give calibration-on-chip.json"
+        return CheckResult(ANOTHER_SENSOR, "another sensor", message, remedy)
     ready = make_correction(calibration, now, recording.autopilot).calibration
     observed = observe(recording, ready)
     if observed is None:
-        return CheckResult(CANNOT_BE_TOLD, NOTHING, "the board never rested", AGAIN)
+        return CheckResult(CANNOT_BE_TOLD, NOTHING, "the board never rested", REPEAT)
     return _assess(ready, recording, observed, days_since(calibration, recording.utc_ns) if days is None else days)
 
 
@@ -80,14 +81,14 @@ def _assess(calibration: Calibration, recording: Recording, observed: Observatio
     hypotheses = drift.hypotheses(calibration, change_c)
     nothing = drift.own_uncertainty(calibration) + drift.ageing(calibration, days, change_c)
     anything = nothing + sum(added for _, added in hypotheses.values())
-    if p_value(observed, anything) < CONTRADICTION:
+    if p_value(observed, anything) < LEAST_P_VALUE:
         observed = _relinearise(observed, recording, calibration, anything)
     comparison = compare_hypotheses(observed, nothing, hypotheses)
     likeliest = comparison.likeliest
     explains = None
     if likeliest != NOTHING:
         if drift.TEMPERATURE in hypotheses:
-            explains = p_value(observed, nothing + hypotheses[drift.TEMPERATURE][1]) > SURPRISE
+            explains = p_value(observed, nothing + hypotheses[drift.TEMPERATURE][1]) > EXPLAINED_P_VALUE
         P = nothing + hypotheses[likeliest][1]
         theta, covariance = estimate(_relinearise(observed, recording, calibration, P), P)
     else:
@@ -107,9 +108,9 @@ def _assess(calibration: Calibration, recording: Recording, observed: Observatio
         theta=theta,
         covariance=covariance,
     )
-    if p_value(observed, anything) < CONTRADICTION:
+    if p_value(observed, anything) < LEAST_P_VALUE:
         message = "the rests contradict each other: no change of the sensor explains them"
-        return replace(result, verdict=CANNOT_BE_TOLD, message=message, remedy=f"away from vibration, {AGAIN}")
+        return replace(result, verdict=CANNOT_BE_TOLD, message=message, remedy=f"away from vibration, {REPEAT}")
     if likeliest != NOTHING:
         return _describe_change(result)
     return _describe_unchanged(
@@ -131,8 +132,8 @@ def _describe_unchanged(result: CheckResult, bias: Change) -> CheckResult:
     """
     axis = int(np.argmax(bias.std))
     if result.orientations < LEAST_ORIENTATIONS:
-        message, remedy = f"{result.orientations} orientations were seen, and {LEAST_ORIENTATIONS} are needed", AGAIN
-    elif bias.std[axis] > ENOUGH_MG:
+        message, remedy = f"{result.orientations} orientations were seen, and {LEAST_ORIENTATIONS} are needed", REPEAT
+    elif bias.std[axis] > MOST_BIAS_STD_MG:
         message = f"the bias of {'xyz'[axis]} is known to {bias.std[axis]:.1f} mg only (1 sigma)"
         remedy = f"hold the board in further orientations, also with side +{'XYZ'[axis]} or −{'XYZ'[axis]} down"
     else:
@@ -154,19 +155,19 @@ def _describe_change(result: CheckResult) -> CheckResult:
             message = f"bias {changes['bias'].text()} mg{also}{by_T}"
             remedy = "take the updated calibration (-o DIR), or measure b_a(T) with `mpucal merge`"
         case "another sensor":
-            message, remedy = f"more has changed than does in one sensor{also}", ANEW
+            message, remedy = f"more has changed than does in one sensor{also}", CALIBRATE_AGAIN
         case "mount":
             message = f"the accelerometer has turned against the gyroscope by {changes['mount'].text()} deg{also}"
-            remedy = ANEW
+            remedy = CALIBRATE_AGAIN
         case "noise":
             accelerometer, gyroscope = np.exp(np.zeros(2) if result.theta is None else result.theta[NOISE])
             times = f"{accelerometer:.2g} times on the accelerometer, {gyroscope:.2g} times on the gyroscope"
             message = f"the noise at rest is not the calibration's: {times}{also}"
-            remedy = f"check supply, wiring and filter bandwidth; if the table shook, {AGAIN}"
+            remedy = f"check supply, wiring and filter bandwidth; if the table shook, {REPEAT}"
         case what:
             change = changes[what]
             message = f"{what} {change.text()} {change.unit}{also}{by_T}"
-            remedy = "take the updated calibration (-o DIR)" if result.only_biases else ANEW
+            remedy = "take the updated calibration (-o DIR)" if result.only_biases else CALIBRATE_AGAIN
     return replace(result, message=message, remedy=remedy)
 
 
@@ -175,7 +176,8 @@ def _close_hypotheses(comparison: Comparison) -> tuple[str, ...]:
     best, log_odds = comparison.likeliest, comparison.log_odds
     if best == NOTHING:
         return ()
-    return tuple(name for name, odds in log_odds.items() if name != best and odds > max(log_odds[best] - NEAR, 0.0))
+    least = max(log_odds[best] - NEAR_LOG_ODDS, 0.0)
+    return tuple(name for name, odds in log_odds.items() if name != best and odds > least)
 
 
 def days_since(calibration: Calibration, utc_ns: int | None = None) -> float:

@@ -38,15 +38,15 @@ CALIBRATED, PARAMETERS = DELTA.stop, NOISE.stop
 UPPER = np.triu_indices(3)
 # Standard deviation of a turn, relative to its angle, by the gyroscope's nonlinearity (PS-MPU-6000A r3.4, section 6.1:
 # 0.2 % of full scale).
-NONLINEAR = 0.001
+TURN_NONLINEARITY = 0.001
 # The variance of a rest is that of this number of block means: a tremor averages out within them, a sway does not.
-BLOCKS = 4
+BLOCKS_A_REST = 4
 # A rest has few blocks: the mean variance of the other rests counts as this many degrees of freedom more.
-POOLED = 6.0
+POOLED_FREEDOM = 6.0
 # Noise averages out in means over this time [s]; means of a board that is shaken vary more, by this factor.
-SHAKEN_S, SHAKEN = 0.1, 4.0
+SHAKEN_S, MOST_SHAKEN_RATIO = 0.1, 4.0
 # Samples of a filtered stream are worth at least this share of independent ones.
-INDEPENDENT = 0.2
+LEAST_INDEPENDENT = 0.2
 # Orientations nearer to one another count as one.
 APART_RAD = math.radians(20.0)
 
@@ -126,7 +126,7 @@ def observe(recording: Recording, calibration: Calibration) -> Observations | No
     rate = first.mean(0) - calibration.b_omega
     parts.append(_of_theta(DELTA, rate, flat.Sigma_omega / len(first) + BIAS_RAD_S**2, rests))
     noise = _noise_ratios(recording, flat, calibration)
-    parts.append(_of_theta(NOISE, noise, np.full(2, 1.0 / (6.0 * INDEPENDENT * flat.n)), rests))
+    parts.append(_of_theta(NOISE, noise, np.full(2, 1.0 / (6.0 * LEAST_INDEPENDENT * flat.n)), rests))
     J_rests = np.vstack([part.J_rests for part in parts])
     J = np.vstack([part.J_theta for part in parts])
     J[:, : BETA.stop] += J_rests @ np.vstack([accelerometer_jacobian(a) for a in rests.a])
@@ -153,12 +153,12 @@ class _Rests:
         self.norm = np.linalg.norm(self.a, axis=1)
         self.unit = self.a / self.norm[:, None]
         shortest = max(round(BLOCK_S * recording.rate_hz), 1)
-        sizes = np.maximum((runs[:, 1] - runs[:, 0]) // BLOCKS, shortest).tolist()
+        sizes = np.maximum((runs[:, 1] - runs[:, 0]) // BLOCKS_A_REST, shortest).tolist()
         own = [acc[: len(acc) // n * n].reshape(-1, n, 3).mean(1) for acc, n in zip(readings, sizes, strict=True)]
         counts = np.array([len(block) for block in own])
         variances = np.array([block.var(0, ddof=1).mean() for block in own])
         others = variances[1:].mean() if len(runs) > 1 else variances[0]
-        pooled = ((counts - 1) * 3 * variances + POOLED * others) / ((counts - 1) * 3 + POOLED)
+        pooled = ((counts - 1) * 3 * variances + POOLED_FREEDOM * others) / ((counts - 1) * 3 + POOLED_FREEDOM)
         self.covariance = np.zeros((3 * len(runs), 3 * len(runs)))
         for k, variance in enumerate(pooled / counts):
             self.covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = variance * A @ A.T
@@ -203,7 +203,7 @@ def _direction(rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _
     J_theta = np.zeros((2, PARAMETERS))
     J_theta[:, G] = -across @ _gyroscope_jacobian(steps, rests.unit[k - 1], here)
     noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
-    noise += FLOOR_RAD**2 + (NONLINEAR * float(np.linalg.norm(steps, axis=1).sum())) ** 2
+    noise += FLOOR_RAD**2 + (TURN_NONLINEARITY * float(np.linalg.norm(steps, axis=1).sum())) ** 2
     return _Residuals(across @ np.cross(there, here), J_rests, J_theta, np.full(2, noise))
 
 
@@ -232,7 +232,7 @@ def _is_shaken(values: Vector, rate_hz: float) -> bool:
     """Return True if means over 0.1 s of values (n, 3) vary by more than noise does."""
     n = max(round(SHAKEN_S * rate_hz), 1)
     blocks = values[: len(values) // n * n].reshape(-1, n, 3).mean(1)
-    return bool((n * blocks.var(0) > SHAKEN * values.var(0)).any())
+    return bool((n * blocks.var(0) > MOST_SHAKEN_RATIO * values.var(0)).any())
 
 
 def accelerometer_jacobian(a: Vector) -> Vector:

@@ -51,12 +51,12 @@ def update_biases(calibration: Calibration, result: CheckResult, recording: Reco
         b_omega_std=np.sqrt(np.diag(covariance)[DELTA]),
         created=created,
         sensor=replace(ready.sensor, temperature_c=T),
-        extra={**ready.extra, HISTORY: [*ready.extra.get(HISTORY, ()), _said(calibration, result)]},
+        extra={**ready.extra, HISTORY: [*ready.extra.get(HISTORY, ()), _earlier_biases(calibration, result)]},
     )
     return replace(new, correlation=correlation_of(NAMES, covariance, standard_deviations(vars(new))))
 
 
-def _said(calibration: Calibration, result: CheckResult) -> dict[str, Any]:
+def _earlier_biases(calibration: Calibration, result: CheckResult) -> dict[str, Any]:
     return {
         "created": calibration.created,
         "temperature_c": calibration.sensor.temperature_c,

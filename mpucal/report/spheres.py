@@ -9,13 +9,13 @@ from .figure import AFTER, BEFORE, FAINT, INK, LINE, WIDTH, dots, legend, line, 
 from .track import Track
 
 # viewpoint of the sphere, that of the page's ball; enlargements of deviations, and their largest share of the radius
-_FROM = (0.302, -0.830, -0.469)
-_TIMES, _SHOWN = (20, 10, 5, 2, 1), 0.5
+_VIEWPOINT = (0.302, -0.830, -0.469)
+_ENLARGEMENTS, _MOST_DEVIATION = (20, 10, 5, 2, 1), 0.5
 _FEWEST_RESTS, _MOST_LINES = 3, 60
-_POINTS, _SPECKS = 300, 500
+_MOST_POINTS, _MOVING_DOTS = 300, 500
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 121)
-_ROUND = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
-_HEIGHT, _LOW = 340.0, 230.0
+_UNIT_CIRCLE = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
+_HEIGHT, _COVERAGE_HEIGHT = 340.0, 230.0
 
 
 class _Disc:
@@ -37,14 +37,14 @@ def sphere(track: Track) -> str:
     """
     both = [-_points(track, acc) / track.gravity for acc in (track.recording.acc, track.calibrated)]
     farthest = max(float(np.abs(np.linalg.norm(points, axis=1) - 1.0).max()) for points in both)
-    times = next((k for k in _TIMES if k * farthest <= _SHOWN), 1)
-    disc = _Disc(WIDTH / 2.0, _HEIGHT / 2.0 + 4.0, 145.0 / (1.0 + min(times * farthest, _SHOWN)))
+    times = next((k for k in _ENLARGEMENTS if k * farthest <= _MOST_DEVIATION), 1)
+    disc = _Disc(WIDTH / 2.0, _HEIGHT / 2.0 + 4.0, 145.0 / (1.0 + min(times * farthest, _MOST_DEVIATION)))
     view = _view()
     marks = []
     for k in range(3):
-        circle = np.roll(np.column_stack([_ROUND, 0.0 * _CIRCLE]), k, axis=1) @ view.T
+        circle = np.roll(np.column_stack([_UNIT_CIRCLE, 0.0 * _CIRCLE]), k, axis=1) @ view.T
         marks.append(line(*disc.place(np.where(circle[:, 2:] >= 0.0, circle, np.nan)), LINE))
-    marks.append(line(*disc.place(_ROUND), INK))
+    marks.append(line(*disc.place(_UNIT_CIRCLE), INK))
     for axis, letter in zip(np.vstack([np.eye(3), -np.eye(3)]), ("+X", "+Y", "+Z", "−X", "−Y", "−Z"), strict=True):
         seen = view @ axis
         if seen[2] >= 0.0:
@@ -69,12 +69,12 @@ def sphere(track: Track) -> str:
 
 def coverage(track: Track) -> str:
     """Draw the directions that pointed down in the board's axes, on both halves of the sphere, in equal areas."""
-    moving = -_units(track.calibrated[:: max(len(track.calibrated) // _SPECKS, 1)])
+    moving = -_units(track.calibrated[:: max(len(track.calibrated) // _MOVING_DOTS, 1)])
     rests = -_units(track.at_rest(track.calibrated))
     marks = []
     for centre, sign, name in ((0.25, -1.0, "+Z up"), (0.75, 1.0, "−Z up")):
-        disc = _Disc(centre * WIDTH, _LOW / 2.0 + 8.0, 84.0)
-        marks += [line(*disc.place(radius * _ROUND), colour) for radius, colour in ((1.0, INK), (0.5**0.5, LINE))]
+        disc = _Disc(centre * WIDTH, _COVERAGE_HEIGHT / 2.0 + 8.0, 84.0)
+        marks += [line(*disc.place(radius * _UNIT_CIRCLE), colour) for radius, colour in ((1.0, INK), (0.5**0.5, LINE))]
         marks.append(text(centre * WIDTH, 12.0, name))
         for at_x, at_y, letter in ((1.13, -0.04, "+X"), (-1.13, -0.04, "−X"), (0.0, 1.05, "+Y"), (0.0, -1.14, "−Y")):
             (x,), (y,) = disc.place(np.array([[at_x, at_y]]))
@@ -82,18 +82,18 @@ def coverage(track: Track) -> str:
         for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
             marks.append(dots(*disc.place(_project(units[sign * units[:, 2] >= 0.0])), radius, colour))
     label = "Direction that pointed down, in the board's axes: large dots held still, small dots moving"
-    return svg("coverage", label, _LOW, *marks)
+    return svg("coverage", label, _COVERAGE_HEIGHT, *marks)
 
 
 def _points(track: Track, acc: Vector) -> Vector:
     """Return (k, 3) m/s^2: the means of rests, or single samples if there are hardly any rests."""
     rests = track.at_rest(acc)
-    return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // _POINTS, 1)]
+    return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // _MOST_POINTS, 1)]
 
 
 def _view() -> Vector:
     """Return (3, 3): the directions right, up and towards the viewer, as rows."""
-    eye = np.array(_FROM) / np.linalg.norm(_FROM)
+    eye = np.array(_VIEWPOINT) / np.linalg.norm(_VIEWPOINT)
     right = np.cross((0.0, 0.0, 1.0), eye)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(eye, right), eye])

@@ -24,7 +24,7 @@ from .correlation import UNCORRELATED
 # a chip's thermometer is accurate to a degree, and over a smaller span the drift of a day looks like a slope
 LEAST_SPAN_C = 5.0
 # standard deviations: the least of a slope, and the most of the points' distances from the line
-SLOPED, FITS = 3.0, 4.0
+LEAST_SLOPE_STD, MOST_LINE_STD = 3.0, 4.0
 DIGEST = "recording_digest"
 
 
@@ -163,12 +163,12 @@ def _objection(T: Vector, steepness: float, worst_line: float, worst_constant: f
     """Return the reason against a line; None if there is none."""
     if np.ptp(T) < LEAST_SPAN_C:
         return f"their temperatures span {np.ptp(T):.1f} °C, but {LEAST_SPAN_C:g} are needed."
-    if worst_line > FITS and count > 2:
+    if worst_line > MOST_LINE_STD and count > 2:
         return (
             f"no line fits them, the worst is {worst_line:.1f} standard deviations off; b_a is their mean, with the"
             f" worst {worst_constant:.1f} off."
         )
-    if steepness < SLOPED:
+    if steepness < LEAST_SLOPE_STD:
         return f"the slope is not significant ({steepness:.1f} standard deviations at most); b_a is their mean."
     return None
 

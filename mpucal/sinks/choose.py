@@ -33,15 +33,15 @@ def choose_sinks(asked: Sequence[str], no_write: bool, source: SourceKind) -> tu
         raise UsageError("--to and --no-write exclude each other", "leave one of them out", without="--no-write")
     for name in asked:
         if name != FILE:
-            check_behind(SINKS[name], source, f"--to {name} was given", f"--to {name}")
+            check_has_sink(SINKS[name], source, f"--to {name} was given", f"--to {name}")
     if no_write:
         return ()
     return tuple(
-        kind for kind in SINKS.values() if (kind.name in asked if asked else kind.default and kind.behind(source))
+        kind for kind in SINKS.values() if (kind.name in asked if asked else kind.default and kind.fits(source))
     )
 
 
-def check_behind(kind: SinkKind, source: SourceKind, given: str, without: str = "") -> None:
+def check_has_sink(kind: SinkKind, source: SourceKind, given: str, without: str = "") -> None:
     """Check that the source has such a sink.
 
     Parameters
@@ -52,9 +52,9 @@ def check_behind(kind: SinkKind, source: SourceKind, given: str, without: str = 
     ------
     UsageError : it does not.
     """
-    if not kind.behind(source):
+    if not kind.fits(source):
         has = "has no sensor to write to" if source.origin is Origin.FILE else f"has no {kind.name}"
-        remedy = one_of(filter(kind.behind, SOURCES)) + (", or leave it out" if without else "")
+        remedy = one_of(filter(kind.fits, SOURCES)) + (", or leave it out" if without else "")
         raise UsageError(f"{given}, but {source.flag} {has}", remedy, without=without)
 
 
@@ -74,13 +74,13 @@ def default_sinks() -> str:
 
 def source_flags(kind: SinkKind) -> list[str]:
     """Return the command-line options of the sources that have the sink."""
-    return [option.flag for option in unique(source.option for source in SOURCES if kind.behind(source))]
+    return [option.flag for option in unique(source.option for source in SOURCES if kind.fits(source))]
 
 
 def interrupted_writes(kind: SourceKind, options: Mapping[str, Any]) -> Iterator[str]:
     """Yield a sentence for each sink of a source where a write was interrupted, as by a power cut."""
     for sink in SINKS.values():
-        left = Journal.of(sink.name, options[kind.option.name]).interrupted() if sink.behind(kind) else None
+        left = Journal.of(sink.name, options[kind.option.name]).interrupted() if sink.fits(kind) else None
         if left is not None:
             yield (
                 f"a write to {sink.where} was cut off at {left[AT]}: it may hold old and new values;"

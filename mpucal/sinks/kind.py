@@ -60,7 +60,7 @@ class SinkKind:
 
     Attributes
     ----------
-    name : for `--to` and `mpucal write`. behind : returns True if devices of a kind of source have such a sink.
+    name : for `--to` and `mpucal write`. fits : returns True if devices of a kind of source have such a sink.
     where : its name in messages. holds : the part of a calibration that it holds, for the documentation.
     opener : "module:function" of a context manager from a Device to a Sink; imported when it is opened.
     default : a session on such a device writes to it without --to.
@@ -68,7 +68,7 @@ class SinkKind:
     """
 
     name: str
-    behind: Callable[[SourceKind], bool]
+    fits: Callable[[SourceKind], bool]
     where: str
     holds: str
     opener: str
@@ -81,7 +81,7 @@ class SinkKind:
 
         Raises
         ------
-        SourceError : the device cannot be opened; KeepsNothing if it has no memory for a calibration.
+        SourceError : the device cannot be opened; NoStorage if it has no memory for a calibration.
         """
         opener: Callable[[Device], AbstractContextManager[Sink]] = resolve_name(self.opener)
         return opener(device)

@@ -25,7 +25,7 @@ SINKS = {
     for kind in (
         SinkKind(
             CHIP,
-            behind=lambda source: source.origin is Origin.CHIP,
+            fits=lambda source: source.origin is Origin.CHIP,
             where="the chip's offset registers",
             holds="only b_a, in steps of 1 mg, until the next power cycle or reset",
             opener="mpucal.sinks.chip:open_chip",
@@ -34,7 +34,7 @@ SINKS = {
         ),
         SinkKind(
             KERNEL,
-            behind=lambda source: source.option.name == "iio",
+            fits=lambda source: source.option.name == "iio",
             where="the kernel's driver",
             holds="D as ACCEL_MOUNT_MATRIX of udev; b_a in calibbias of an MPU-6050, until its next power cycle",
             opener="mpucal.iio_device.sink:open_kernel",
@@ -43,7 +43,7 @@ SINKS = {
         ),
         SinkKind(
             BRIDGE,
-            behind=lambda source: bool(source.store),
+            fits=lambda source: bool(source.store),
             default=True,
             where="the bridge's memory",
             holds="the config blob: D, b_a, K, b_omega, and b_a(T) if known",
@@ -52,7 +52,7 @@ SINKS = {
         ),
         SinkKind(
             AUTOPILOT,
-            behind=lambda source: source.origin is Origin.VEHICLE,
+            fits=lambda source: source.origin is Origin.VEHICLE,
             default=True,
             where="the autopilot",
             holds="offsets and scales; without cross-axis terms, and mpucal prints the error that remains",

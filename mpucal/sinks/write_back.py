@@ -10,7 +10,7 @@ from typing import Any
 
 from ..arguments import read_limited
 from ..data import Recording
-from ..errors import KeepsNothing, OutputError, RecordingError, SourceError, WriteBackError
+from ..errors import NoStorage, OutputError, RecordingError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import now
 from ..result.keys import FORMAT
@@ -96,7 +96,7 @@ def write_to_all(
                     (in_doubt or ask)(f"{objection}. Write it to {sink.where} anyway?")
                 applied = write_to(kind, sink, calibration, folder, record, device.say)
         except SourceError as error:
-            if isinstance(error, KeepsNothing) and kind.name not in asked:
+            if isinstance(error, NoStorage) and kind.name not in asked:
                 device.say(f"{error.what}: the result is only in files.")
                 continue
             raise WriteBackError(f"nothing was written to {kind.where}: {error.what}", error.remedy) from error

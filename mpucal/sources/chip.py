@@ -13,8 +13,8 @@ from ..chip.driver import Driver
 from ..files.messages import BUS
 from ..origin import Origin
 from ..session.ports import Source
-from .apart import CAN_FORK, SourceApart
-from .opened_source import ActiveSource, NewRecords, OpenedSource, Say
+from .opened_source import ActiveSource, CaptureRecorder, OpenedSource, Say
+from .reading_process import CAN_FORK, ProcessSource
 from .replay import Tap
 
 
@@ -24,11 +24,11 @@ class OpenedChip(OpenedSource):
 
     Attributes
     ----------
-    apart : True to read its bus in a process of its own, as one whose FIFO does not wait for this program.
+    own_process : True to read its bus in a process of its own, as one whose FIFO does not wait for this program.
     """
 
     _: KW_ONLY
-    apart: bool = False
+    own_process: bool = False
     origin = Origin.CHIP
     topic = BUS
 
@@ -53,7 +53,7 @@ class OpenedChip(OpenedSource):
         return Driver(bus, self.plan.config, name, say)
 
     @contextmanager
-    def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
+    def recorded(self, recorder: CaptureRecorder, name: str, say: Say) -> Iterator[ActiveSource]:
         """See OpenedSource."""
 
         tap = Tap(self.bus, recorder.transaction)
@@ -64,9 +64,9 @@ class OpenedChip(OpenedSource):
                 say(f"  {text}.")
 
         driver, event = self.driver(tap, name, tell), recorder.event
-        if not (self.apart and CAN_FORK):
+        if not (self.own_process and CAN_FORK):
             yield ActiveSource(driver, event)
             return
-        with closing(SourceApart(driver, tap, self.parts, self.hands)) as source:
+        with closing(ProcessSource(driver, tap, self.parts, self.hands)) as source:
             self.hands = (source.hear,)
             yield ActiveSource(source, event)

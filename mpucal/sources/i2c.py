@@ -32,7 +32,7 @@ LEAST_LIMIT_BYTES = 4
 def open_source(request: Request) -> OpenedChip:
     """Open the chip on the bus that --bus names; see I2cBus."""
     return OpenedChip(
-        I2cBus(request.value, request.values.get("address")), request.plan, words=request.words, apart=True
+        I2cBus(request.value, request.values.get("address")), request.plan, words=request.words, own_process=True
     )
 
 

@@ -40,7 +40,7 @@ class ActiveSource(NamedTuple):
     note: Note
 
 
-class NewRecords:
+class CaptureRecorder:
     """Recorder of a session; of a resumed one, without what is replayed.
 
     The time of day stands before the first successful access, so that the samples can be merged with other recordings;
@@ -152,7 +152,7 @@ class OpenedSource(ABC):
         with closing(self.line), CaptureWriter(capture) as writer:
             head = {"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()}
             writer.start(head, self.topic)
-            with self.recorded(NewRecords(writer, self.parts), capture.name, say) as active:
+            with self.recorded(CaptureRecorder(writer, self.parts), capture.name, say) as active:
                 yield active
         if self.parts is not None and self.parts.unread():
             raise CaptureError(
@@ -161,7 +161,7 @@ class OpenedSource(ABC):
             )
 
     @abstractmethod
-    def recorded(self, recorder: NewRecords, name: str, say: Say) -> AbstractContextManager[ActiveSource]:
+    def recorded(self, recorder: CaptureRecorder, name: str, say: Say) -> AbstractContextManager[ActiveSource]:
         """Measure during a `with` block, and record it; `name` is that of the recording."""
 
     @abstractmethod

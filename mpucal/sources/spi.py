@@ -30,7 +30,7 @@ DATA = (*range(reg.ACCEL_XOUT_H, reg.ACCEL_XOUT_H + reg.FRAME_BYTES), reg.FIFO_R
 
 def open_source(request: Request) -> OpenedChip:
     """Open the chip on the device that --spi names; see SpiBus."""
-    return OpenedChip(SpiBus(request.value), request.plan, words=request.words, apart=True)
+    return OpenedChip(SpiBus(request.value), request.plan, words=request.words, own_process=True)
 
 
 class SpiBus(RegisterBus):

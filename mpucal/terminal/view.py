@@ -12,16 +12,17 @@ from ..session import events
 from ..session.attitude import rotate
 from ..session.boards import BOARD, flat_description
 
-# Time for which the headline shows the use of the last orientation in place of the next turn. At 240 words a minute a
-# word is read in 0.25 s; this one comes with a tone and a tick that stays.
+# Time for which the headline shows the use of the last orientation before the next turn. A word is read in 0.25 s (240
+# words a minute); "taken" also has a tone, and a mark that stays.
 USE_SHOWN_S = {events.Use.TAKEN: 0.5, events.Use.USEFUL: 1.2, events.Use.SEEN: 1.2}
 USE_HEADLINES = {
     events.Use.TAKEN: "TAKEN",
     events.Use.USEFUL: "NOT THAT ONE, BUT USEFUL",
     events.Use.SEEN: "SEEN ALREADY",
 }
-# Angle from the wanted orientation below which the headline asks to hold still, also where the board comes to rest: it
-# turns by less than their difference from one meter to the next (0.25 s). A board that passes by is not held.
+# The headline asks to hold still within NEAR_DEG of the wanted orientation, or within NEAR_HELD_DEG if the board turns
+# more slowly than RESTS_DPS: in the 0.25 s between two meters it then moves by no more than the difference of the two
+# angles. A board that turns faster than PASSES_DPS passes by the orientation.
 NEAR_DEG, NEAR_HELD_DEG, RESTS_DPS, PASSES_DPS = 15.0, 20.0, 20.0, 70.0
 # A countdown that is not renewed for this time has ended; for the second one, if the board moves.
 COUNTDOWN_HOLDS_S, BUMP_S = 1.0, 0.4
@@ -41,8 +42,8 @@ CONNECTING = "WAIT"
 TURNING = (events.PromptKind.ROTATE, events.PromptKind.VERIFY)
 
 
-# Eyes [deg] from which a board is seen, in the order of preference, and the least visible share of its face: of another
-# eye, and of the present one, which a tremor does not change.
+# Directions [deg] from which a board is drawn, in the order of preference. A new direction must show at least the share
+# LEAST_FACE of the board's face; the present one is kept down to KEPT_FACE, so that a tremor does not change it.
 _TURNS_DEG, _TILTS_DEG = (-14.0, 14.0, -28.0, 28.0, -48.0, 48.0), (32.0, 52.0, 16.0, 68.0)
 LEAST_FACE, KEPT_FACE = 0.5, 0.38
 _LAID = (1.0, 0.0, 0.0, 0.0)

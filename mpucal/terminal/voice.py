@@ -27,7 +27,7 @@ class Tone(StrEnum):
 
 
 @dataclass(frozen=True)
-class Said:
+class Announcement:
     """Announcement number `number`, at the session's time `t_s`: its words, and the tone before them."""
 
     number: int
@@ -65,7 +65,7 @@ class Voice:
     """
 
     def __init__(self) -> None:
-        self.said: Said | None = None
+        self.said: Announcement | None = None
         self._moment = self._told = Moment.CONNECTING
         self._since_s = self._t_s = 0.0
         self._held: Held | None = None
@@ -100,7 +100,7 @@ class Voice:
 
     @property
     def _is_settled(self) -> bool:
-        """True if the board is not being held, and neither the moment nor what was said is of the last second."""
+        """True if the board is not held, and for SETTLED_S the moment has not changed and nothing was said."""
         lasts_s = min(self._t_s - self._since_s, self._quiet_s)
         return self._moment not in (Moment.COUNTING, Moment.DECIDED) and lasts_s >= SETTLED_S
 
@@ -129,4 +129,4 @@ class Voice:
 
     def _say(self, words: str, tone: Tone) -> None:
         self._told = self._moment
-        self.said = Said(0 if self.said is None else self.said.number + 1, self._t_s, words, tone)
+        self.said = Announcement(0 if self.said is None else self.said.number + 1, self._t_s, words, tone)

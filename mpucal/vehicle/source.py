@@ -26,7 +26,7 @@ from ..origin import Origin
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..sources.kind import Request
-from ..sources.opened_source import ActiveSource, NewRecords, OpenedSource, Say
+from ..sources.opened_source import ActiveSource, CaptureRecorder, OpenedSource, Say
 from ..sources.recorded_parts import RecordedParts
 from ..sources.replay import PacketReplay
 
@@ -131,7 +131,7 @@ class OpenedVehicle(OpenedSource):
         return OpenedLog(PacketReplay((), capture.name), plan, **how, packets=packets, measured=measured)
 
     @contextmanager
-    def recorded(self, recorder: NewRecords, name: str, say: Say) -> Iterator[ActiveSource]:
+    def recorded(self, recorder: CaptureRecorder, name: str, say: Say) -> Iterator[ActiveSource]:
         """See OpenedSource."""
         link = self.link = Link(self.line, recorder.packet, self.key, self.own_system)
 
@@ -204,7 +204,7 @@ class OpenedLog(OpenedVehicle):
     measured: Recording
 
     @contextmanager
-    def recorded(self, recorder: NewRecords, _name: str, _say: Say) -> Iterator[ActiveSource]:
+    def recorded(self, recorder: CaptureRecorder, _name: str, _say: Say) -> Iterator[ActiveSource]:
         """Copy the log as the capture; see OpenedSource."""
         for packet in self.packets:
             recorder.packet(*packet)

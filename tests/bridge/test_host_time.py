@@ -16,7 +16,7 @@ from mpucal.files.mcap import read_capture
 from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.chip.models import MODELS, FactoryTrim
-from mpucal.sources.opened_source import NewRecords
+from mpucal.sources.opened_source import CaptureRecorder
 from mpucal.sources.replay import EndOfCapture, ReplayBus, Tap
 from tools.lab.bridge import EmulatedBridge, EmulatedLine
 
@@ -40,7 +40,7 @@ def recorded(tmp_path, numbered):
         path = tmp_path / "capture.mcap"
         with CaptureWriter(path) as writer:
             writer.start({})
-            driver = Driver(Tap(BridgeBus(line), NewRecords(writer).transaction), Config())
+            driver = Driver(Tap(BridgeBus(line), CaptureRecorder(writer).transaction), Config())
             driver.start()
             while clock.now() < seconds * 1e9:
                 if reset_s is not None and clock.now() > reset_s * 1e9:

@@ -150,7 +150,7 @@ def run(files, devices, seconds=4.0, said=None, **kind):
 
 
 def test_two_devices_are_one_sensor_in_the_accelerometers_frame():
-    files = simulated(apart=True)
+    files = simulated(two_devices=True)
     files._devices["iio:device1"].texts["in_mount_matrix"] = "0, 1, 0; -1, 0, 0; 0, 0, 1"
     one, two = run(simulated(), BOTH), run(files, Devices("iio:device0", "iio:device1"))
     count = min(len(one), len(two))
@@ -213,7 +213,7 @@ def change(files, name, text):
         (lambda f: None, {"trigger": "mine"}, r"no trigger mine: use --trigger NAME \(available: hrtimer-0\)"),
         (lambda f: f._devices.clear(), {}, "iio:device0 is gone"),
         (lambda f: change(f, "in_mount_matrix", "0,0,0;0,0,0;0,0,0"), {}, "which is not a mount matrix"),
-        (lambda f: f._devices.update(simulated(apart=True)._devices), {}, "iio:device0 has no gyroscope: give"),
+        (lambda f: f._devices.update(simulated(two_devices=True)._devices), {}, "iio:device0 has no gyroscope: give"),
     ],
 )
 def test_errors_of_the_start_are_one_sentence(spoil, kind, says):

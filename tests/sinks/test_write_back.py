@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.cli.person import ask_in_doubt
-from mpucal.errors import BusError, KeepsNothing, OutputError, WriteBackError
+from mpucal.errors import BusError, NoStorage, OutputError, WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.sinks.kind import Applied, Device, Effect, Sink, SinkKind
 from mpucal.sinks.table import SINKS
@@ -62,7 +62,7 @@ class Registers(Sink):
 
 KIND = SinkKind(
     "made",
-    behind=lambda source: True,
+    fits=lambda source: True,
     where="the made-up sink",
     holds="all",
     opener="made_up_sink:opened",
@@ -142,7 +142,7 @@ def test_what_cannot_be_written_is_told_or_a_failure(tmp_path, monkeypatch):
     with pytest.raises(WriteBackError, match="nothing was written to the made-up sink: there is no serial port"):
         write_all(monkeypatch, gone, measured(), tmp_path, as_it_is)
     # a device that keeps nothing is a failure only where it was asked for
-    keeps_nothing = KeepsNothing("the firmware of the bridge on x keeps no calibration", "flash another")
+    keeps_nothing = NoStorage("the firmware of the bridge on x keeps no calibration", "flash another")
     assert write_all(monkeypatch, keeps_nothing, measured(), tmp_path, as_it_is, said=said.append) == []
     assert "only in files" in said[0]
     with pytest.raises(WriteBackError):

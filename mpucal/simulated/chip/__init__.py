@@ -71,20 +71,20 @@ def _truth(options: ChipOptions, gravity: float) -> SensorTruth:
     )
 
 
-# A simulation at full speed has no operator who waits for samples, and no host that is late.
-SELDOM_S = 0.25
+# Time between two polls of a simulation at full speed, where no operator waits for samples and no host is late.
+LONG_POLL_S = 0.25
 
 
-def polled_seldom(plan: Plan, real_time: bool) -> Plan:
-    """Return the plan of a session with a simulation that may run at full speed."""
+def with_long_polls(plan: Plan, real_time: bool) -> Plan:
+    """Return the plan with longer times between polls, unless the simulation runs in real time."""
     config = plan.config
-    seldom = replace(config, poll_s=min(SELDOM_S, MAX_FRAMES_A_POLL / config.rate_hz))
-    return plan if real_time else replace(plan, config=seldom)
+    polled = replace(config, poll_s=min(LONG_POLL_S, MAX_FRAMES_A_POLL / config.rate_hz))
+    return plan if real_time else replace(plan, config=polled)
 
 
 def open_source(request: Request) -> OpenedChip:
     """Open the chip that `sim:key=value,...` describes, in the gravity of the plan; see open_simulated."""
     bus = open_simulated(request.value, request.plan.gravity, request.values.get("seed"))
-    plan = polled_seldom(request.plan, bus.real_time)
+    plan = with_long_polls(request.plan, bus.real_time)
     live, words = bus.real_time, request.words
-    return OpenedChip(bus, plan, (bus.hear,), bus.truth_document, words=words, real_time=live, apart=live)
+    return OpenedChip(bus, plan, (bus.hear,), bus.truth_document, words=words, real_time=live, own_process=live)

@@ -7,7 +7,7 @@ from typing import Any
 from ...iio.driver import Devices
 from ...iio_device.source import OpenedIio
 from ...sources.kind import Request
-from ..chip import open_simulated, polled_seldom
+from ..chip import open_simulated, with_long_polls
 from .files import SimulatedFiles
 
 __all__ = ["SimulatedFiles", "open_source"]
@@ -20,13 +20,13 @@ def open_source(request: Request) -> OpenedIio:
     files: Any = SimulatedFiles(bus)
     return OpenedIio(
         files,
-        polled_seldom(request.plan, bus.real_time),
+        with_long_polls(request.plan, bus.real_time),
         (bus.hear,),
         bus.truth_document,
         words=request.words,
         real_time=bus.real_time,
         # The buffers are filled while they are read.
-        apart=bus.real_time,
+        own_process=bus.real_time,
         devices=Devices(DEVICE, DEVICE),
         trigger=request.values.get("trigger"),
     )

@@ -40,15 +40,15 @@ class SimulatedFiles(Bus):
 
     Parameters
     ----------
-    bus : to the chip. apart : two devices, the accelerometer's first. buffered : the devices have buffers.
+    bus : to the chip. two_devices : one for each sensor, the accelerometer's first. buffered : they have buffers.
     """
 
-    def __init__(self, bus: SimulatedBus, *, apart: bool = False, buffered: bool = True) -> None:
+    def __init__(self, bus: SimulatedBus, *, two_devices: bool = False, buffered: bool = True) -> None:
         self._bus = bus
         self._port = Port(bus)
         part = PARTS[read_identity(self._port)]
         self._place = part.family.accel_offset_h
-        kinds = [[ACCEL], [GYRO]] if apart else [[ACCEL, GYRO]]
+        kinds = [[ACCEL], [GYRO]] if two_devices else [[ACCEL, GYRO]]
         self._devices = {f"iio:device{i}": _Device(each, part, buffered) for i, each in enumerate(kinds)}
         self._driver: Driver | None = None
         self._written: Words | None = None

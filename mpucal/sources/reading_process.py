@@ -33,7 +33,7 @@ CAN_FORK = sys.platform == "linux"
 STOP = None
 
 
-class SourceApart:
+class ProcessSource:
     """Source that a process of its own reads from `start` on.
 
     Parameters

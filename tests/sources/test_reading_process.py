@@ -14,7 +14,7 @@ from mpucal.chip.registers import FIFO_COUNT_H, USER_CTRL
 from mpucal.errors import BusError, EndOfCapture, NoAnswer
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
-from mpucal.sources.apart import CAN_FORK, SourceApart
+from mpucal.sources.reading_process import CAN_FORK, ProcessSource
 from mpucal.sources.replay import ReplayBus, Tap
 from tools.lab.feeds import open_recorded
 
@@ -34,9 +34,9 @@ def tapped(bus):
     return Tap(bus, accesses.append), accesses
 
 
-def apart(bus, hands=(), parts=None):
+def in_a_process(bus, hands=(), parts=None):
     tap, accesses = tapped(bus)
-    return SourceApart(Driver(tap, Config()), tap, parts, hands), accesses
+    return ProcessSource(Driver(tap, Config()), tap, parts, hands), accesses
 
 
 def measure(source, polls=10**6):
@@ -52,7 +52,7 @@ def measure(source, polls=10**6):
 
 
 def test_stops_the_sensor_after_what_the_session_used():
-    opened, accesses = apart(open_simulated("sim", seed=1))
+    opened, accesses = in_a_process(open_simulated("sim", seed=1))
     with closing(opened) as source:
         samples = measure(source, polls=5)
         source.stop()
@@ -72,7 +72,7 @@ def test_raises_the_error_of_a_bus_and_a_fault_of_the_program_with_its_place(err
         raise error
 
     bus = SimpleNamespace(read=fails, sleep_until=lambda t_ns: None)
-    with closing(apart(bus)[0]) as source, pytest.raises(type(error), match=str(error)) as raised:
+    with closing(in_a_process(bus)[0]) as source, pytest.raises(type(error), match=str(error)) as raised:
         source.start()
     notes = getattr(raised.value, "__notes__", [])
     assert any("in fails" in note for note in notes) is isinstance(error, ZeroDivisionError)
@@ -88,7 +88,7 @@ def test_says_that_the_process_was_killed():
 
     bus = SimpleNamespace(read=killing, write=simulated.write, sleep_until=simulated.sleep_until)
     with (
-        closing(apart(bus)[0]) as source,
+        closing(in_a_process(bus)[0]) as source,
         pytest.raises(BusError, match="reads the sensor was killed by signal 9: start again"),
     ):
         measure(source)
@@ -97,7 +97,7 @@ def test_says_that_the_process_was_killed():
 def test_the_hand_gets_the_prompts_in_the_process():
     seen, told = os.pipe()
     prompt = Prompt(PromptKind.LAY_FLAT, "Lay it flat")
-    opened, _ = apart(open_simulated("sim", seed=1), hands=[lambda prompt: os.write(told, prompt.text.encode())])
+    opened, _ = in_a_process(open_simulated("sim", seed=1), hands=[lambda prompt: os.write(told, prompt.text.encode())])
     with closing(opened) as source:
         measure(source, polls=1)
         source.hear(prompt)
@@ -122,7 +122,7 @@ def test_ends_with_the_session_and_stops_the_sensor():
     if not pid:
         # A session that is killed.
         session = os.getpid()
-        measure(apart(bus)[0], polls=1)
+        measure(in_a_process(bus)[0], polls=1)
         os.kill(session, signal.SIGKILL)
     os.close(told)
     os.waitpid(pid, 0)
@@ -144,7 +144,7 @@ def test_a_resumed_session_is_replayed_here_before_the_process_goes_on():
     assert chain.go_on()
     measure(driver)
     chain = resumed()
-    opened, accesses = apart(chain, parts=chain)
+    opened, accesses = in_a_process(chain, parts=chain)
     with closing(opened) as source:
         measure(source)
         assert chain.go_on()
