@@ -235,11 +235,13 @@ class AutopilotSink(Sink):
         """Reboot the vehicle if the user agrees, and yield clauses on its horizon and on its pre-arm check."""
         left = NOT_REBOOTED
         try:
-            now = self._await_prearm()
+            # A reboot loses ids that were not saved; a complaint that takes time to end is waited for after it.
+            now = self._check_prearm()
             if not self._confirm(REBOOT.format(self.where), True):
                 yield NOT_REBOOTED
                 if self._firmware == PX4:
                     yield f"leave it powered for {SAVED_NS // S} more seconds, as PX4 saves late"
+                now = self._await_agreement(now)
                 if now.complaints:
                     yield f"before, it {before}; now it {now}"
                 return
@@ -265,7 +267,7 @@ class AutopilotSink(Sink):
         """
         end_ns = self._link.now_ns() + READY_NS
         stays = {complaint for complaint in before.complaints if not INCONSISTENT.search(complaint)}
-        now = self._await_prearm()
+        now = self._check_prearm()
         while not now.ready and self._link.now_ns() < end_ns:
             # one that would not arm and gives no reason yet is still starting
             if set(now.complaints) <= stays and (now.complaints or now.ready is None):
@@ -286,18 +288,22 @@ class AutopilotSink(Sink):
                     "connect the vehicle that was calibrated, or calibrate this one",
                 )
 
-    def _await_prearm(self) -> PrearmState:
-        """Return the pre-arm state once it has settled; an ArduPilot with wrong saved ids saves those of its sensors.
+    def _check_prearm(self) -> PrearmState:
+        """Return the pre-arm state; an ArduPilot whose saved ids are wrong saves those of its sensors before.
 
-        ArduPilot calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
         Its id parameters show the sensors' ids without being saved (AP_InertialSensor::register_accel).
         """
         now = check_prearm(self._link)
-        if self._firmware != ARDUPILOT:
-            return now
-        if any(map(UNCALIBRATED.search, now.complaints)):
+        if self._firmware == ARDUPILOT and any(map(UNCALIBRATED.search, now.complaints)):
             send_command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
             now = check_prearm(self._link)
+        return now
+
+    def _await_agreement(self, now: PrearmState) -> PrearmState:
+        """Return the pre-arm state once it has settled.
+
+        ArduPilot calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
+        """
         until_ns = self._link.now_ns() + AGREE_NS
         while any(map(INCONSISTENT.search, now.complaints)) and self._link.now_ns() < until_ns:
             now = check_prearm(self._link)
