@@ -4,12 +4,12 @@
     python -m tools.lab vehicle_accuracy --seeds 0:4    # of the first four seeds, and half as many of PX4
     python -m tools.lab vehicle_accuracy --hand placing # put down on its sides instead of held
 
-Each runs `mpucal session --mavlink sim:... --yes --no-write` as fast as it can. `took` [s] is
-the time of its samples; `offset` [m/s^2] and `scale` are how far the new parameters are from the sensors' truth, at
-worst over axes and IMUs; `level` [deg] is by how much the attitude of the vehicle, which stands where it was levelled,
-differs after the result was written and the vehicle rebooted; `z` is the rms over D and b_a of all
-IMUs of (estimate - truth) / standard uncertainty. The exit code is 1 where one that is good is more than OFFSET_MPS2,
-SCALE or LEVEL_DEG off, or the z of all of them is not within Z.
+Each runs `mpucal session --mavlink sim:... --yes --no-write` as fast as it can. `took` [s] is the time of its samples;
+`offset` [m/s^2] and `scale` are how far the new parameters are from the sensors' truth, at worst over axes and IMUs;
+`level` [deg] is by how much the attitude of the vehicle, which stands where it was levelled, differs after the result
+was written and the vehicle rebooted, which a refused one does not have; `z` is the rms over D and b_a of all IMUs of
+(estimate - truth) / standard uncertainty. The exit code is 1 where one that is good is more than OFFSET_MPS2, SCALE or
+LEVEL_DEG off, or the z of all of them is not within Z.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mpucal.mavlink.parameters.slots import slot_of
 from mpucal.mavlink.requests import send_command
 from mpucal.mavlink.rest import ATTITUDE
 from mpucal.mavlink.texts import ReceivedPrompt, encode_prompt
-from mpucal.result.calibration import GOOD, Calibration
+from mpucal.result.calibration import GOOD, REFUSED, Calibration
 from mpucal.simulated.hands import HANDS
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.firmware import LEVEL
@@ -88,7 +88,8 @@ def of_vehicle(words: str, *, hand: Annotated[str, HANDS, "that turns the vehicl
     offset, scale = map(max, zip(*far, strict=True))
     row = Row(words=words, code=done.code, verdict=done.calibration.verdict, z=tuple(z), offset=offset, scale=scale)
     row.took = float(document["fit"]["seconds"])
-    row.level = level_change_deg(words, done.calibration)
+    if done.calibration.verdict != REFUSED:
+        row.level = level_change_deg(words, done.calibration)
     return row
 
 
