@@ -33,7 +33,7 @@ class Aim:
     target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
     least_of_vehicle : the same of a vehicle, whose samples are filtered, rounded, or late.
     longest_s : time limit of the turning [s]. verify : number of new orientations for the verification.
-    sides : orientations that are enough for a vehicle that is put down in each, in place of `least`; 0: they are not.
+    least_placed : the same of a vehicle that is put down in each, in place of `least`; 0: it makes no difference.
     flat_s : time for which the board lies flat first.
     """
 
@@ -42,7 +42,7 @@ class Aim:
     least_of_vehicle: int
     longest_s: float
     verify: int
-    sides: int = 0
+    least_placed: int = 0
     flat_s: float = FLAT_S
 
 
@@ -55,9 +55,10 @@ NORMAL = "normal"
 # An autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows what is left of it.
 FLAT_OF_VEHICLE_S = 5.0
 # Directions that point down on the six sides of a vehicle, as a pilot takes them: level, left, right, nose down, nose
-# up, back. One that rests on things needs no more, as no hand moves it, and one new orientation for its verification.
+# up, back. One that rests on things needs one more, tilted, which with the gyroscope gives the angles between the axes,
+# and one new orientation for its verification: no hand moves it.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1)], np.float64)
-VERIFY_PLACED = 1
+PLACED, VERIFY_PLACED = len(SIDES) + 1, 1
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
@@ -65,7 +66,7 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     aim = AIMS[target]
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
-    return replace(aim, least=aim.least_of_vehicle, sides=len(SIDES), flat_s=FLAT_OF_VEHICLE_S)
+    return replace(aim, least=aim.least_of_vehicle, least_placed=PLACED, flat_s=FLAT_OF_VEHICLE_S)
 
 
 def unseen_rad(tilt_only: bool) -> float:

@@ -25,8 +25,9 @@ from .aims import AIMS, directions, unseen_rad
 from .events import Checked, Event, FitKind, Knowledge, Learnt, Target, Tried, down_of, triple
 from .live_verification import explain_contradiction, is_much_clipped, judge_verification, select_unseen
 from .plan import Plan
+from .verify import CONTRADICTION
 
-CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
+CLIPPED = "gyro_clipped"
 
 
 class Task(NamedTuple):

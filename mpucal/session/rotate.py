@@ -47,7 +47,7 @@ class Rotate(PoseStep):
 
     def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         super().__init__(flat, plan)
-        self._takes_sides = aim.sides > 0 and not (plan.tilt_only or plan.until_end)
+        self._takes_sides = aim.least_placed > 0 and not (plan.tilt_only or plan.until_end)
         self._aim, self._coverage = aim, coverage
         self._passes = Windows(PASS_WINDOW_S, spread=False)
         acc = np.array(flat.acc)
@@ -123,7 +123,7 @@ class Rotate(PoseStep):
     @property
     def _least(self) -> int:
         if self._coverage.placed:
-            return self._aim.sides
+            return self._aim.least_placed
         return TILTS if self._plan.tilt_only else self._aim.least
 
     @property

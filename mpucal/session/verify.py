@@ -83,6 +83,8 @@ BENT = 1.1
 TRY_WAIT_S = 3.0
 # Number of orientations that may be requested in place of ones that the calibration has seen after all.
 MOST_MORE = 2
+# Reason's code where the rests of the turning contradict each other.
+CONTRADICTION = "inconsistent"
 
 
 class Verify(NewPoses):
@@ -98,7 +100,7 @@ class Verify(NewPoses):
         of = VERIFY_PLACED if coverage.placed else aim.verify
         super().__init__(flat, plan, of, coverage.rested, BENT * unseen_rad(plan.tilt_only))
         self._refusal: events.Finished | None = None
-        self._more = MOST_MORE
+        self._more, self._doubted = MOST_MORE, False
         self._now_s = 0.0
 
     def begin(self) -> list[events.Output]:
@@ -155,11 +157,22 @@ class Verify(NewPoses):
             self._number = self._of - 1
             self.prompt = self._next()
             return [self.prompt]
+        if not self._doubted and _is_doubt(checked):
+            return self._try_again(checked)
         self.checked = checked
         if checked.reason is None:
             agreement = events.Finished("verified: the new orientations agree with the predicted uncertainty")
             return [*checked.verifications, agreement]
         return [*checked.verifications, *self._refused(events.Finished(checked.reason.what), checked.reason)]
+
+    def _try_again(self, checked: events.Checked) -> events.Outputs:
+        """Compute the first calibration again, with the orientations so far, and request one more to verify it."""
+        self._doubted, self._closed, self._begun_s = True, False, None
+        self._of, self._number = VERIFY_PLACED, 0
+        self.prompt = self._next()
+        doubt = checked.reason.what if checked.reason else ""
+        caution = events.Caution(self._now_s, "doubtful", doubt, "one more orientation decides if that matters")
+        return [*checked.verifications, events.RequestFit(events.FitKind.TRY, TRY_WAIT_S), caution, self.prompt]
 
     def _refused(self, refusal: events.Finished, against: Reason) -> events.Outputs:
         """Return the refusal, or offer to turn the board again, where that may help and somebody can answer."""
@@ -175,6 +188,13 @@ class Verify(NewPoses):
         """See NewPoses; the direction farthest from all rests is asked for."""
         text = f"Verification {self._number + 1} of {self._of}: {{}}, then hold it still."
         return self._ask_for(events.PromptKind.VERIFY, self._farthest(self._seen), text)
+
+
+def _is_doubt(checked: events.Checked) -> bool:
+    """Return True if rests of the turning contradict each other, but too little to refuse, and the new ones agree."""
+    against = checked.reason
+    doubts = against is not None and against.code == CONTRADICTION and not against.refuse
+    return doubts and all(verification.agrees for verification in checked.verifications)
 
 
 ORIENTATIONS = 3

@@ -13,6 +13,7 @@ from mpucal.session.table import TRANSITIONS, IllegalEvent, State
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
 DOWN = (0.0, 0.6, -0.8)
 MOVED = Reason("verification_failed", "the sensor moved on its mount", "fasten it", True)
+DOUBT = Reason("inconsistent", "a part contradicts the rest", "hold it more calmly", False)
 
 
 def learnt(overall=0.1, advice=True, down=DOWN):
@@ -171,9 +172,10 @@ def placed(make_board, tremor, target="normal", late=False):
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_a_vehicle_that_is_put_down_on_six_sides_needs_no_more(make_board, late):
-    session, held = placed(make_board, 0.0, "best", late)
-    assert held == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
+def test_a_vehicle_that_is_put_down_on_six_sides_needs_one_tilt_more(make_board, late):
+    session, (*sides, tilt) = placed(make_board, 0.0, "best", late)
+    assert sides == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
+    assert "tilted" in tilt
     assert session.state is State.VERIFY
     assert "Verification 1 of 1" in session.of(events.Prompt)[-1].text
 
@@ -327,6 +329,21 @@ def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, v
     assert verifying.of(events.Prompt)[-1] == asked
     verifying.feed(board.still(40.0))
     assert verifying.machine.checked.agrees is None
+
+
+@pytest.mark.parametrize("then", [events.Checked((), True), events.Checked((), False, DOUBT)], ids=["settled", "stays"])
+def test_a_contradiction_that_new_orientations_do_not_share_is_decided_by_one_more(board, verifying, then):
+    verifying.checked = events.Checked((), False, DOUBT)
+    for number in range(4):
+        assert verifying.state is State.VERIFY
+        verifying.checked = then if number == 3 else verifying.checked
+        asked = verifying.of(events.Prompt)[-1]
+        verifying.feed(board.turn_to([-v for v in asked.down])).feed(board.still(2.0))
+    assert "1 of 1" in asked.text
+    assert [caution.what for caution in verifying.of(events.Caution) if caution.code == "doubtful"] == [DOUBT.what]
+    assert [request.kind for request in verifying.of(events.RequestFit)].count(events.FitKind.TRY) == 2
+    assert verifying.state is State.CALIBRATE
+    assert verifying.machine.checked == then
 
 
 def test_the_verification_times_out(board, verifying):
