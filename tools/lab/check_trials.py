@@ -23,7 +23,7 @@ from mpucal.calibration.rotation import rotation
 from mpucal.calibration.verification import BIAS_RAD_S, FLOOR_MPS2, FLOOR_RAD
 from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
-from mpucal.recheck.observed import BETA, NOISE, NONLINEAR, apply_errors
+from mpucal.recheck.observed import BETA, NOISE, TURN_NONLINEARITY, apply_errors
 from mpucal.result.calibration import REFUSED
 from mpucal.simulated.sensor import SensorTruth
 
@@ -91,7 +91,7 @@ def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.R
         rest, move = (recording.t >= FLAT_S + every_s * k + begun for begun in (MOVE_S, 0.0))
         move &= ~rest
         angle = float(np.linalg.norm(gyr[move] - gyr[recording.t < FLAT_S].mean(0), axis=1).sum()) * step_s
-        std = np.sqrt(FLOOR_RAD**2 + (NONLINEAR * angle) ** 2 + (BIAS_RAD_S * every_s) ** 2)
+        std = np.sqrt(FLOOR_RAD**2 + (TURN_NONLINEARITY * angle) ** 2 + (BIAS_RAD_S * every_s) ** 2)
         gyr[move] += rng.normal(0.0, std, 3) / MOVE_S
         rest &= recording.t < FLAT_S + every_s * (k + 1) + MOVE_S
         acc[rest] += rng.normal(0.0, FLOOR_MPS2, 3)

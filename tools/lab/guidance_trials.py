@@ -35,7 +35,7 @@ from mpucal.simulated.hand import IN_THE_HAND, MISS_RAD, ON_THE_TABLE, REACTION_
 from mpucal.simulated.hands import HANDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
-from mpucal.terminal.voice import HOLD, REPEAT_S, SETTLED_S, Said, Tone, Voice
+from mpucal.terminal.voice import HOLD, REPEAT_S, SETTLED_S, Announcement, Tone, Voice
 
 from .runner import Trial, each_seed
 from .sessions import session
@@ -101,7 +101,7 @@ class Transcript:
     said : announcements, with the moment of each.
     """
 
-    said: list[tuple[Said, Moment]] = field(default_factory=list)
+    said: list[tuple[Announcement, Moment]] = field(default_factory=list)
     wrong: Counter[str] = field(default_factory=Counter)
     voice: Voice = field(default_factory=Voice)
 
@@ -115,7 +115,7 @@ class Transcript:
             self._compare(*self.said[-1], now, view)
         self.said.append((now, view.moment))
 
-    def _compare(self, last: Said, moment: Moment, now: Said, view: View) -> None:
+    def _compare(self, last: Announcement, moment: Moment, now: Announcement, view: View) -> None:
         after_s = now.t_s - last.t_s
         senses = SENSES.get(moment), SENSES.get(view.moment)
         opposite = senses in ((STAY, GO), (GO, STAY)) and bool(last.words and now.words)
