@@ -115,7 +115,7 @@ def test_a_chip_with_samples_of_its_own_gives_a_good_calibration(chip, name):
 
 
 @pytest.mark.slow
-def test_the_filters_of_a_6500_are_found_and_told():
+def test_the_filter_delay_of_a_6500_is_found_and_assumed():
     """The gyroscope is a millisecond later than its accelerometer, and the estimate is drawn towards that."""
 
     def fitted(recording, **told):

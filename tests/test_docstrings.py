@@ -18,6 +18,8 @@ RIDDLES = {
     *("That", "Those", "These", "This", "It", "Its", "They", "Their", "Both", "All", "One", "Another", "Other", "Such"),
     *("Nothing", "Nobody", "None", "Neither", "Not", "No", "Again", "Let"),
 }
+# Of a test's name: it begins with what is tested.
+RIDDLES_OF_TESTS = ("what", "whatever", "who", "whose", "why", "how", "it", "its", "they", "of", "nobody", "nothing")
 # Names that did not say what they name.
 RETIRED_NAMES = {
     *("Apart", "Bench", "Beside", "Choose", "Flips", "Here", "Looked", "LookedClock", "Questions", "Tally", "Tells"),
@@ -41,7 +43,7 @@ def definitions(node):
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
-def test_docstrings_begin_with_a_verb_or_a_noun_and_no_retired_name_comes_back(folder):
+def test_docstrings_and_names_begin_with_what_they_name(folder):
     wrong = []
     for path in (PROJECT / folder).rglob("*.py"):
         for node in definitions(ast.parse(path.read_text(encoding="utf-8"))):
@@ -50,6 +52,8 @@ def test_docstrings_begin_with_a_verb_or_a_noun_and_no_retired_name_comes_back(f
             where = f"{path.relative_to(PROJECT)}:{getattr(node, 'lineno', 1)}"
             if (text := ast.get_docstring(node)) and is_wrong(text):
                 wrong.append(f"{where}: {text[:80]}")
+            if getattr(node, "name", "").startswith(tuple(f"test_{word}_" for word in RIDDLES_OF_TESTS)):
+                wrong.append(f"{where}: {node.name}")
             if folder == "mpucal" and getattr(node, "name", "") in RETIRED_NAMES:
                 wrong.append(f"{where}: {node.name}")
     assert wrong == []

@@ -27,7 +27,7 @@ def test_every_module_can_be_imported_without():
     assert done.stdout.strip() == "all", done.stderr
 
 
-def test_without_pymavlink_a_sentence_says_what_to_install():
+def test_missing_pymavlink_is_reported_with_its_install_command():
     program = "import sys; sys.modules['pymavlink'] = None\nfrom mpucal.__main__ import run; sys.exit(run())"
     words = [sys.executable, "-c", program, "session", "--mavlink", "sim", "--no-write"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

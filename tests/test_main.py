@@ -29,7 +29,7 @@ def test_ctrl_c_while_python_imports_is_one_sentence(tmp_path, module):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_records_nothing_keeps_nothing(tmp_path):
+def test_an_interrupted_command_without_a_recording_keeps_nothing(tmp_path):
     done = interrupted("mpucal.cli.apply", ["apply", "calibration.json", "walk.csv", "-o", str(tmp_path / "out.csv")])
     assert done.stderr.lstrip() == "mpucal: interrupted.\n"
     assert done.returncode == 4
@@ -42,6 +42,6 @@ def interrupted(module, words):
 
 
 @pytest.mark.parametrize("stderr", ["2>/dev/full", "2>&-"])
-def test_what_cannot_be_said_changes_no_exit_code(stderr):
+def test_an_unwritable_stderr_changes_no_exit_code(stderr):
     words = f"{sys.executable} -m mpucal show nothing.json {stderr}"
     assert subprocess.run(words, shell=True, check=False).returncode == 3

@@ -116,7 +116,7 @@ def test_the_gyroscope_carries_gravity_to_where_the_accelerometer_finds_it(sessi
     assert transported_deg(by_accel.file) <= 1.3
 
 
-def test_what_no_pose_shows_is_not_claimed(session):
+def test_parameters_that_no_pose_shows_have_large_standard_deviations(session):
     """Poses that never tilt x and y together do not determine their cross-axis terms by |a|."""
     D_std = session.found.D_std
     assert D_std[0, 1] > 10 * D_std[0, 0]
@@ -126,7 +126,7 @@ def test_what_no_pose_shows_is_not_claimed(session):
 
 @pytest.mark.parametrize(("name", "most_deg"), [("mpu9150_a", 0.1), ("imucal_session", 0.15)])
 @pytest.mark.slow
-def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
+def test_a_recording_of_unguided_motion_is_calibrated(tmp_path, name, most_deg):
     """Use recordings that lie flat for less than ten seconds; those of the MPU-9150s begin with spikes to 74 m/s^2."""
     recording = RECORDINGS / f"{name}.npz"
     make_capture(recording, tmp_path / "capture.mcap", 9.81, LONG_POLL_S)

@@ -62,7 +62,7 @@ def test_a_row_is_whole():
             assert not row.remedy.endswith(".")
 
 
-def test_who_decides_whether_it_refuses():
+def test_the_table_or_the_caller_decides_whether_a_reason_refuses():
     assert reason("never_still", "at_all").refuse
     assert not reason("gyro_clipped", "samples", False, count=1, share=0.01).refuse
     for refuse, of in ((None, ("gyro_clipped", "samples")), (False, ("never_still", "at_all"))):

@@ -59,7 +59,7 @@ def test_the_deviation_is_that_of_allantools(lying):
         np.testing.assert_allclose(ours, theirs, rtol=0.03)
 
 
-def test_it_does_not_depend_on_how_the_samples_come_nor_take_memory(lying):
+def test_octaves_are_independent_of_the_division_of_samples_and_of_bounded_size(lying):
     values = lying.gyr[:50_000]
     at_once, in_parts = Octaves(3), Octaves(3)
     at_once.add(values)
@@ -102,13 +102,13 @@ def test_intervals_hold_the_truth_at_their_rate():
     np.testing.assert_allclose(values / truth, 1.0, atol=0.1)
 
 
-def test_beside_the_data_sheet(found):
+def test_noise_is_compared_with_the_data_sheet(found):
     # 400 ug/sqrt(Hz), one-sided
     assert found.data_sheet["accelerometer"] == pytest.approx(2.774e-3, rel=1e-3)
     assert found.suspicious == ()
 
 
-def test_what_is_suspicious(lying):
+def test_tones_steps_and_temperature_changes_are_reported(lying):
     t = lying.t
     tone = 2e-2 * np.sin(2 * np.pi * 11.7 * t)
     acc, gyr = lying.acc.copy(), lying.gyr.copy()

@@ -49,7 +49,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("call", "kind", "says"), WRONG.values(), ids=WRONG)
-def test_one_sentence_says_what_is_wrong(call, kind, says):
+def test_a_wrong_argument_is_reported_in_one_sentence(call, kind, says):
     with pytest.raises(MpucalError, match=says) as raised:
         call()
     assert isinstance(raised.value, kind)

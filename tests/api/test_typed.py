@@ -41,7 +41,7 @@ def test_each_public_name_is_used():
 @pytest.mark.parametrize(
     ("name", "checker"), [("mypy", by_mypy), pytest.param("basedpyright", by_pyright, marks=pytest.mark.slow)]
 )
-def test_the_api_is_typed_and_each_wrong_line_is_told(name, checker, tmp_path):
+def test_type_checkers_report_exactly_the_wrong_lines(name, checker, tmp_path):
     for needed in (name, "matplotlib", "polars"):
         pytest.importorskip(needed)
     assert checker(tmp_path) == {(WRONG.name, line) for line in MARKED}

@@ -29,7 +29,7 @@ def calibration(recording):
     return mpucal.calibrate(recording, "hand")
 
 
-def test_they_say_in_a_line_what_they_are(recording, calibration):
+def test_recordings_and_calibrations_describe_themselves_in_a_line(recording, calibration):
     seconds = recording.t[-1] - recording.t[0]
     rate = 1.0 / np.median(np.diff(recording.t))
     assert repr(recording) == f"<Recording mpu6500.mcap: {len(recording)} samples, {seconds:.1f} s at {rate:.1f} Hz>"
@@ -38,7 +38,7 @@ def test_they_say_in_a_line_what_they_are(recording, calibration):
     assert "nan" in repr(mpucal.calibrate(recording.part(0, 50)))
 
 
-def test_results_say_so_too_and_compare_by_value(recording, calibration):
+def test_results_describe_themselves_in_a_line_and_compare_by_value(recording, calibration):
     checked, noise = mpucal.check(calibration, recording), mpucal.noise(recording)
     assert repr(checked).startswith("<CheckResult: still good; the bias is within ")
     assert repr(noise).startswith("<Noise of MPU-6500: white noise ")
@@ -81,7 +81,7 @@ def test_the_figure_of_a_calibration_holds_its_parameters(calibration):
     assert drawn == [value for row in rows for value, cell in zip(row.value, row.cells, strict=True) if cell]
 
 
-def test_they_arrive_as_they_were_and_differ_by_a_single_value(recording, calibration):
+def test_copies_and_pickles_are_equal_and_a_changed_value_is_not(recording, calibration):
     imu = replace(recording, autopilot=Autopilot("PX4", 1, "HIGHRES_IMU", {"a": 1.0}), others=(recording,))
     for way in (lambda value: pickle.loads(pickle.dumps(value)), copy, deepcopy):
         assert [way(value) for value in (imu, calibration)] == [imu, calibration]
@@ -96,7 +96,7 @@ def test_they_arrive_as_they_were_and_differ_by_a_single_value(recording, calibr
             hash(value)
 
 
-def test_its_mappings_are_those_of_the_document_and_do_not_change(calibration):
+def test_mappings_of_a_calibration_equal_its_document_and_are_read_only(calibration):
     assert json.loads(json.dumps(calibration.fit)) == calibration.document()["fit"]
     for change in (
         lambda fit: fit.update(model="imu"),

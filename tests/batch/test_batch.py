@@ -106,7 +106,7 @@ row.compute_digest = lambda path: os._exit(1) if path.stem == "deadly" else comp
 
 # one run in eight of all tests lost the connection to the scheduler here, where the worker died amid an answer
 @pytest.mark.slow
-def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path):
+def test_a_recording_that_kills_workers_is_told_from_the_others_of_its_task(tmp_path):
     """Several recordings make a task; each is tried alone after that."""
     paths = [f"/none/{i}.mcap" for i in range(100)]
     paths[40] = "/none/deadly.mcap"
@@ -208,7 +208,7 @@ def test_the_page_names_what_is_odd(tmp_path):
     assert 0.9 < float(rms) < 1.1
 
 
-def test_workers_that_are_killed_while_they_start_are_told(tmp_path, capfd):
+def test_workers_that_are_killed_while_they_start_are_reported(tmp_path, capfd):
     (deadly := tmp_path / "deadly.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n")
     words = ["batch", str(FIXTURES / "sessions" / "mpu6050.mcap"), "-o", str(tmp_path / "fleet"), "--workers", "1"]
     with changed({"distributed.worker.preload": [str(deadly)]}):

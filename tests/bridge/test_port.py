@@ -114,7 +114,7 @@ def test_the_ports_are_listed_where_the_name_is_wrong(monkeypatch, text, what, k
     ],
     ids=["EACCES", "EBUSY", "EIO", "baud"],
 )
-def test_what_opening_can_say(monkeypatch, failure, words):
+def test_each_reason_that_a_port_cannot_be_opened_is_reported(monkeypatch, failure, words):
     def refuse(*arguments, **how):
         raise failure
 
@@ -124,7 +124,7 @@ def test_what_opening_can_say(monkeypatch, failure, words):
     assert caught.value.__cause__ is failure
 
 
-def test_nobody_serves_the_socket():
+def test_a_socket_without_a_server_is_reported():
     with socket.socket() as bound:
         bound.bind(("127.0.0.1", 0))
         name = f"socket://127.0.0.1:{bound.getsockname()[1]}"
@@ -132,7 +132,7 @@ def test_nobody_serves_the_socket():
             SerialPort(name)
 
 
-def test_nothing_stays_open_where_nobody_answers(monkeypatch):
+def test_a_port_without_a_bridge_is_closed_again(monkeypatch):
     def nobody(link, address):
         raise BusError("nothing answers", "plug it in")
 

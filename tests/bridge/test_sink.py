@@ -73,7 +73,7 @@ def calibration():
     ],
     ids=["refused", "not finite", "another chip", "lost"],
 )
-def test_what_is_refused_touches_nothing(calibration, changes, store, words):
+def test_an_unfit_calibration_is_refused_before_the_memory_is_written(calibration, changes, store, words):
     held = FakeStore(**store)
     with pytest.raises(WriteBackError, match=words):
         BridgeSink(held).write(replace(calibration, **changes))
@@ -96,7 +96,7 @@ def test_what_is_refused_touches_nothing(calibration, changes, store, words):
     ],
     ids=["reset", "reset, empty", "gone", "spoiled", "spoiled, empty", "worn out"],
 )
-def test_what_fails_leaves_the_old_one_and_says_so(calibration, store, words, left):
+def test_a_failed_write_keeps_the_old_calibration_and_is_reported(calibration, store, words, left):
     held = FakeStore(**store)
     with pytest.raises(WriteBackError, match=words):
         BridgeSink(held).write(calibration)

@@ -50,7 +50,7 @@ def runs(hand):
     return [hand(seed, "pose12") for seed in range(2)]
 
 
-def test_it_is_as_well_known_as_the_first_one(runs):
+def test_the_second_sensor_is_determined_as_well_as_the_first(runs):
     pairs = [together(run, second(run)) for run in runs]
     for first, other in pairs:
         assert other.verdict == "good"
@@ -60,7 +60,7 @@ def test_it_is_as_well_known_as_the_first_one(runs):
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 0.004])
-def test_its_frame_is_claimed_as_well_as_the_rates_of_both_tell_it(runs, lag_s):
+def test_the_frame_of_the_second_has_right_standard_deviations(runs, lag_s):
     apart = []
     for run in runs:
         other = together(run, turned(run, lag_s))[1]
@@ -68,7 +68,7 @@ def test_its_frame_is_claimed_as_well_as_the_rates_of_both_tell_it(runs, lag_s):
     assert 0.3 < np.sqrt(np.mean(np.square(apart))) < 0.9
 
 
-def test_one_that_slipped_or_was_recorded_at_another_time_keeps_its_own_estimate(runs):
+def test_a_sensor_that_slipped_or_recorded_at_another_time_keeps_its_own_estimate(runs):
     other = second(runs[0])
     acc = other.acc.copy()
     acc[len(other) // 2 :] += 0.2

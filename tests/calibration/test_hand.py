@@ -48,7 +48,7 @@ def rests(recording):
     ],
     ids=lambda value: value if isinstance(value, str) else "trembling" if value == {"tremble": True} else "",
 )
-def test_it_finds_the_sensor_in_a_hand_with_right_standard_deviations(hand, motion, how, mean, worst):
+def test_a_sensor_in_a_hand_is_found_with_right_standard_deviations(hand, motion, how, mean, worst):
     runs = [hand(seed, motion, **how) for seed in range(2)]
     fits = [fitted(run.recording) for run in runs]
     assert all(fit.converged for fit in fits)
@@ -129,7 +129,7 @@ def test_a_tremor_jerks_and_a_drift_do_little(hand, motion, spoil, times):
 
 
 @pytest.mark.parametrize("how", ["left out", "drawn as a line"])
-def test_one_lost_move_does_little(in_hand, pick, how):
+def test_one_lost_move_changes_the_estimate_little(in_hand, pick, how):
     recording = in_hand.recording
     runs = rests(recording)
     first, last = runs[6][1], runs[7][0]
@@ -180,7 +180,7 @@ def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
         assert given == pytest.approx(wanted, rel=0.03, abs=1e-6), name
 
 
-def test_of_an_estimate_that_diverged_some_direction_is_next(in_hand):
+def test_a_diverged_estimate_still_has_a_next_orientation(in_hand):
     recording = in_hand.recording.part(0, 2000)
     known = interim_estimate(recording, flat_statistics(recording, find_flat(recording)), 9.82, None)
     diverged = replace(known, theta=replace(known.theta, u=np.full(3, np.nan)))

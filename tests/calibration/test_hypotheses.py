@@ -179,7 +179,7 @@ def test_each_cause_of_what_surely_happened_is_held():
         assert not surely or (len(held) > 1 and (expected > mean).any())
 
 
-def test_what_surely_happened_is_taken_out_of_the_scores():
+def test_an_accepted_hypothesis_is_taken_out_of_the_scores():
     A, y, parts = linear_parts()
     theta = parts.left - parts.gradient.sum(0)  # by the unit prior
     (step,) = _explain([Hypothesis("accelerometer", "step")], _Groups.of(parts, 5), parts, np.eye(3))
@@ -189,7 +189,7 @@ def test_what_surely_happened_is_taken_out_of_the_scores():
     np.testing.assert_allclose(without.left, gradient.sum(0) + there[0], rtol=1e-9, atol=1e-9)
 
 
-def test_of_two_things_that_happened_the_lesser_is_not_hidden_by_the_greater():
+def test_a_small_drift_is_found_beside_a_large_one():
     """Drift of the gyroscope's bias by 3,000 standard deviations of a part, and of the accelerometer's by 300."""
     rng = np.random.default_rng(4)
     k, p, m = 48, 18, 12

@@ -94,7 +94,7 @@ def test_a_line_drawn_through_lost_rates_is_a_gap():
     assert not gap[421:].any()
 
 
-def test_one_axis_alone_on_a_line_a_constant_rate_and_computed_rates_are_no_gap():
+def test_a_line_of_one_axis_a_constant_rate_and_computed_rates_are_no_gap():
     gyr = noise().gyr.copy()
     gyr[:400] = 0.01  # as of a sensor with coarse steps at rest
     t = 0.01 * np.arange(1000)

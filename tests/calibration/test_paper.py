@@ -20,7 +20,7 @@ def fitted(recording):
     return fit_paper(recording, flat_statistics(recording, recording.flat), G)
 
 
-def test_it_finds_a_simulated_sensor_with_right_standard_deviations():
+def test_a_simulated_sensor_is_found_with_right_standard_deviations():
     simulated = paper_scenario(0, rate_hz=10)
     fit, truth = fitted(simulated.recording), simulated.truth
     assert fit.converged
@@ -31,7 +31,7 @@ def test_it_finds_a_simulated_sensor_with_right_standard_deviations():
     assert 0.5 < np.sqrt(np.mean(np.square(error / fit.std(*D_NAMES, *B_A_NAMES)))) < 1.9
 
 
-def test_cost_is_equation_8_whatever_the_blocks(monkeypatch):
+def test_cost_is_equation_8_at_any_block_size(monkeypatch):
     simulated = paper_scenario(5, rate_hz=10)
     recording, truth = simulated.recording, simulated.truth
     ekf = Ekf.after(flat_statistics(recording, recording.flat), recording, G)
@@ -44,7 +44,7 @@ def test_cost_is_equation_8_whatever_the_blocks(monkeypatch):
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.008], ids=["even", "jittered"])
-def test_true_parameters_leave_no_innovation_whatever_the_time_steps(jitter):
+def test_true_parameters_leave_no_innovation_at_any_time_steps(jitter):
     rng = np.random.default_rng(0)
     D, b_a = np.eye(3) + 0.2 * rng.normal(size=(3, 3)), np.array([0.3, -0.2, 0.5])
     t = np.cumsum(0.01 + jitter * rng.uniform(-0.5, 0.5, 300))

@@ -22,7 +22,7 @@ def slipped(recording, at_s, degrees=3.0):
 
 
 @pytest.mark.parametrize(("seed", "at_s"), [(2, 30.0), (3, 33.0), (4, 28.0)])
-def test_a_mount_that_slips_between_rests_is_told_with_its_time(hand, seed, at_s):
+def test_a_mount_that_slips_between_rests_is_reported_with_its_time(hand, seed, at_s):
     calibration = calibrate(slipped(hand(seed, "pose12").recording, at_s), "auto", G)
     (reason,) = calibration.quality["reasons"]
     assert (calibration.verdict, reason["code"]) == ("refused", "inconsistent")

@@ -25,7 +25,7 @@ def sigmas(calibration, D, b_a):
 
 
 @pytest.mark.parametrize("rate", [0.0, np.nan], ids=["a dead gyroscope", "no gyroscope"])
-def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, rate):
+def test_the_static_model_finds_the_truth_beside_a_faulty_gyroscope(hand, rate):
     made = hand(60, "pose12")
     calibration = calibrate(replace(made.recording, gyr=np.full_like(made.recording.gyr, rate)), "auto", G)
     assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
@@ -34,7 +34,7 @@ def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, rate):
     assert np.isnan(calibration.K_std).all()
 
 
-def test_it_is_an_ellipsoid_through_the_rests(hand):
+def test_the_static_model_is_an_ellipsoid_through_the_rests(hand):
     recording = hand(60, "pose12").recording
     calibration = calibrate(recording, "static", G)
     runs = RestFinder(recording, flat_statistics(recording, find_flat(recording))).typical()
@@ -71,7 +71,7 @@ def test_rests_that_differ_little_are_refused(hand):
     assert calibration.verdict == "refused"
 
 
-def test_it_is_compared_and_checked_in_the_accelerometers_own_axes(hand):
+def test_a_static_calibration_is_compared_and_checked_in_the_accelerometers_own_axes(hand):
     made = hand(60, "pose12")
     with_gyroscope = calibrate(made.recording, "auto", G)
     dead = replace(made.recording, gyr=np.zeros_like(made.recording.gyr))

@@ -157,7 +157,7 @@ def test_other_words_stay_as_they_are(sound, change):
     assert (decode(recording).recording, decode(recording).corrected) == (recording, "")
 
 
-def test_at_rest_an_axis_follows_the_others(sound):
+def test_words_of_a_resting_axis_are_decoded_like_the_others(sound):
     """Infer from the others how a constant axis, which shows nothing, was read."""
     resting = replace(sound, acc=np.column_stack([sound.acc[:, :2], np.full(len(sound), 8000 * LSB + 0xC0 * LSB)]))
     corrected, _, axes = decode(read_signed(resting))
@@ -165,7 +165,7 @@ def test_at_rest_an_axis_follows_the_others(sound):
     np.testing.assert_allclose(corrected.acc, resting.acc, rtol=1e-12)
 
 
-def test_the_calibration_is_that_of_the_true_words_and_says_so_and_a_check_sees_them_too(sound):
+def test_signed_low_bytes_are_corrected_and_reported_in_calibrations_and_checks(sound):
     expected, found = (calibrate(recording, "hand", G) for recording in (sound, read_signed(sound)))
     np.testing.assert_allclose(found.D, expected.D, atol=1e-8)
     np.testing.assert_allclose(found.b_a, expected.b_a, atol=1e-7)

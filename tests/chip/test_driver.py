@@ -75,7 +75,7 @@ def test_every_sample_comes_once(started, stream, check, model):
 
 
 @pytest.mark.parametrize("times", [TRIES - 1, 2 * TRIES + 1])
-def test_a_count_that_failed_or_came_amid_a_frame_is_read_again(started, stream, times):
+def test_a_count_that_failed_or_was_read_within_a_frame_is_read_again(started, stream, times):
     rig, driver = started()
     odd = iter([5])
     rig.before["answer", reg.FIFO_COUNT_H] = lambda data: bytes([data[0], data[1] + next(odd, 0)])
@@ -303,7 +303,7 @@ def test_a_late_host_does_not_count_as_a_slow_bus(started):
     assert driver.recording().gap.sum() == 10
 
 
-def test_every_time_is_right_whatever_is_paused(rig, stream, numbers, same, monkeypatch):
+def test_times_are_right_whichever_read_is_paused(rig, stream, numbers, same, monkeypatch):
     """Pause this computer between the time of a read and its transfer: times that are too early are not used."""
     made, times_s, rng = rig(), [], np.random.default_rng(1)
     timer, feed = HostBus(), made.chip._feed

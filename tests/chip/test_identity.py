@@ -93,7 +93,7 @@ def test_a_foreign_chip_is_refused_by_reading_alone(registers, says):
     assert foreign.writes == 0
 
 
-def test_a_part_of_the_table_whose_fifo_never_fills_is_refused():
+def test_a_known_part_whose_fifo_never_fills_is_refused():
     foreign = ForeignChip({reg.WHO_AM_I: 0x68, reg.PWR_MGMT_1: 0x01})
     counts, read = itertools.count(1), foreign.read
 

@@ -81,7 +81,7 @@ FORMS = {".csv": as_text, ".npy": np.save}
 
 
 @pytest.mark.parametrize("ending", FORMS)
-def test_what_is_missing_stays_missing_in_every_form(mpucal, session, calibration, ending):
+def test_missing_numbers_stay_missing_in_every_format(mpucal, session, calibration, ending):
     """Leave out one number, one sample and two seconds of a recording in g and deg/s."""
     recording = load(session.folder)
     rows = np.column_stack([recording.t, recording.acc / STANDARD_GRAVITY_MPS2, np.degrees(recording.gyr)])

@@ -16,14 +16,14 @@ def calibration(session):
     return session.folder / "calibration.json"
 
 
-def test_of_a_recording(mpucal, session, calibration):
+def test_check_of_a_recording(mpucal, session, calibration):
     told = mpucal("check", calibration, session.folder)
     assert (told.code, told.out.split(":")[0]) == (0, "Still good")
     document = json.loads(mpucal("check", calibration, session.folder, "--json").out)
     assert (document["format"], document["verdict"], document["what"]) == (FORMAT, "still good", "nothing")
 
 
-def test_of_a_sensor_in_half_a_minute_with_its_biases_updated(mpucal, calibration, tmp_path):
+def test_check_of_a_sensor_takes_half_a_minute_and_updates_its_biases(mpucal, calibration, tmp_path):
     told = mpucal(
         "check", calibration, "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "today", "--to", "chip", "--yes"
     )
@@ -43,7 +43,7 @@ def test_of_a_sensor_in_half_a_minute_with_its_biases_updated(mpucal, calibratio
         assert mpucal("check", calibration, *words).out.splitlines()[0] == told.out.splitlines()[0]
 
 
-def test_a_changed_calibration_is_used_only_with_force_and_its_outputs_say_so(mpucal, session, spoilt, tmp_path):
+def test_an_altered_calibration_is_used_only_with_force_and_its_outputs_name_it(mpucal, session, spoilt, tmp_path):
     assert mpucal("check", spoilt, session.folder).code == 0
     words = ("check", spoilt, session.folder, "-o", "today")
     refused = mpucal(*words)
@@ -59,7 +59,7 @@ def test_a_changed_calibration_is_used_only_with_force_and_its_outputs_say_so(mp
     assert "no digest" in Calibration.load(tmp_path / "again.json").doubt
 
 
-def test_of_another_sensor(mpucal, calibration, tmp_path):
+def test_check_refuses_another_sensor(mpucal, calibration, tmp_path):
     told = mpucal("check", calibration, "--bus", "sim", "--seed", "4", "--rate", "100", "-o", "other", "--yes")
     assert told.code == 5
     assert told.out.startswith("Another sensor: its offset registers hold")

@@ -59,7 +59,7 @@ def test_avrdude_gets_the_image_and_the_port(installed, programs, board, baud):
     assert said[-1] == f"flash:w:{installed / firmware.HEX}:i"
 
 
-def test_a_board_that_was_not_written_is_said(installed, programs, capsys):
+def test_a_failed_write_of_the_firmware_is_reported(installed, programs, capsys):
     program(programs, 1)
     assert run(["firmware", "--flash", "/dev/ttyX"]) == 6
     assert "could not write to the board on /dev/ttyX" in capsys.readouterr().err

@@ -20,7 +20,7 @@ def lying(save, tmp_path):
     return save(Recording.from_arrays(np.arange(18_000) / 100.0, acc, gyr, sensor=sensor), tmp_path / "lying.npz")
 
 
-def test_of_a_recording_and_taken_by_other_commands(mpucal, session, lying, tmp_path):
+def test_noise_of_a_recording_is_used_by_other_commands(mpucal, session, lying, tmp_path):
     told = mpucal("noise", "lying.npz", "-o", "noise")
     assert told.code == 0, told.err
     assert "white noise, ug/√Hz" in told.out
@@ -42,7 +42,7 @@ def test_of_a_recording_and_taken_by_other_commands(mpucal, session, lying, tmp_
     assert fitted["quality"]["verdict"] == "good"
 
 
-def test_of_a_sensor_for_some_hours(mpucal):
+def test_noise_of_a_sensor_over_hours(mpucal):
     told = mpucal("noise", "--bus", "sim", "--rate", "100", "--hours", "0.01", "--json")
     assert told.code == 0, told.err
     assert "let go of it" in told.err
@@ -57,7 +57,7 @@ def test_of_a_sensor_for_some_hours(mpucal):
     assert document["accelerometer"]["data_sheet"]["white_noise"] == pytest.approx(2.77e-3, rel=0.01)
 
 
-def test_ctrl_c_keeps_the_result_so_far(mpucal, monkeypatch):
+def test_noise_after_ctrl_c_is_that_of_the_samples_so_far(mpucal, monkeypatch):
     from mpucal.allan import NoiseMeter
 
     add, calls = NoiseMeter.add, []
@@ -74,7 +74,7 @@ def test_ctrl_c_keeps_the_result_so_far(mpucal, monkeypatch):
     assert json.loads(told.out)["samples"] == sum(calls)
 
 
-def test_a_sensor_that_fails_keeps_the_result_so_far(mpucal):
+def test_noise_of_a_sensor_that_fails_is_that_of_the_samples_so_far(mpucal):
     told = mpucal("noise", "--bus", "sim:hand=still,fault=unplugged@20", "--rate", "100", "--json")
     assert told.code == 3
     assert 10.0 < json.loads(told.out)["seconds"] < 20.0

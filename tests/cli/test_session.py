@@ -38,7 +38,7 @@ def test_a_session_writes_its_files_and_prints_the_summary(session):
         assert heading not in out
 
 
-def test_without_a_source_it_lists_those_there_are_with_the_whole_command(mpucal, tmp_path, monkeypatch):
+def test_a_session_without_a_source_lists_the_connected_ones_as_commands(mpucal, tmp_path, monkeypatch):
     for channel in ("in_accel_x_raw", "in_anglvel_x_raw", "name"):
         for device in ("iio:device0", "iio:device1"):
             (tmp_path / device).mkdir(exist_ok=True)

@@ -15,7 +15,7 @@ OPTIONS = {
 }
 
 
-def test_the_new_parameters_are_there_and_the_files_say_so(flown):
+def test_a_session_sets_the_parameters_and_notes_them_in_its_files(flown):
     assert flown.code == 0, flown.err
     document = json.loads(flown.out)
     assert document == json.loads((flown.folder / "calibration.json").read_text())
@@ -45,7 +45,7 @@ def test_a_recording_before_the_write_takes_the_calibration_before_it(flown, mpu
     assert "while these samples were taken" in other.err
 
 
-def test_a_write_that_was_killed_is_told_before_the_next_session():
+def test_an_interrupted_write_is_reported_before_the_next_session():
     options = {**OPTIONS, "mavlink": "sim:imus=1,seed=77"}
     kind = matching_kinds(options)[0]
     assert list(interrupted_writes(kind, options)) == []

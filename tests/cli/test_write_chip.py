@@ -63,7 +63,7 @@ def test_a_question_is_asked_on_a_terminal_only(monkeypatch, answer):
     assert len(asked) == (answer is not None)
 
 
-def test_a_session_writes_to_the_chip_and_says_so(mpucal):
+def test_a_session_writes_to_the_chip_and_notes_it_in_its_files(mpucal):
     source = ("--bus", "sim", "--seed", "3", "--rate", "50", "--target", "quick")
     with quick():
         result = mpucal("session", *source, "--to", "chip", "-o", "board", "--json", "--yes")

@@ -17,7 +17,7 @@ def shown(t_ns, start_us=0):
     fast_ppm=st.floats(-5000, 5000),
     latency_ms=st.lists(st.floats(1, 30), min_size=20, max_size=20),
 )
-def test_it_unwraps_whatever_the_pauses(start_us, pauses_s, fast_ppm, latency_ms):
+def test_counter_wraps_are_counted_over_pauses(start_us, pauses_s, fast_ppm, latency_ms):
     """Half an hour of silence and a resonator that is 0.5 % off are allowed; a wrap takes 71 minutes."""
     clock, true_ns, first = BridgeClock(), 0, None
     for pause_s, late_ms in zip(pauses_s, latency_ms, strict=False):
@@ -29,7 +29,7 @@ def test_it_unwraps_whatever_the_pauses(start_us, pauses_s, fast_ppm, latency_ms
 
 
 @pytest.mark.parametrize("fast_ppm", [-5000, 0, 5000])
-def test_it_knows_what_the_bridge_shows_now(fast_ppm):
+def test_the_present_time_of_the_bridge_is_estimated(fast_ppm):
     clock = BridgeClock()
     for i in range(2000):
         host_ns = i * 20 * MS

@@ -55,7 +55,7 @@ def held_back():
         "a busy computer",
     ],
 )
-def test_what_arrives_late_was_measured_evenly(stamps, within):
+def test_stamps_of_late_arrivals_become_even_times(stamps, within):
     found = fit_clock(stamps)
     assert found.rate_hz == pytest.approx(HZ, rel=2e-4)
     assert not found.gap.any()
@@ -64,7 +64,7 @@ def test_what_arrives_late_was_measured_evenly(stamps, within):
     assert "without gaps" in found.remark
 
 
-def test_lost_is_what_is_missing():
+def test_lost_samples_are_gaps_at_their_places():
     lost = np.zeros(N, bool)
     for first in (700, 2000, 2080, 5000):
         lost[first : first + 5] = True

@@ -44,7 +44,7 @@ def test_a_chip_under_another_name_is_recognised_and_a_correction_in_it_noticed(
     ],
     ids=["nobody", "bound", "stuck"],
 )
-def test_what_stands_in_the_way_is_told(sound, adapter, topic, words):
+def test_obstacles_are_reported_with_their_remedy(sound, adapter, topic, words):
     with sound.but_for(adapter):
         result, findings = examined(sound, "--json")
     assert result.code == 3

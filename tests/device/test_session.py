@@ -22,7 +22,7 @@ def calibration(b_a):
     return Calibration(np.eye(3), np.array(b_a), quality={"verdict": "good", "reasons": []})
 
 
-def test_a_chip_that_is_recorded_is_nobody_elses(sound):
+def test_a_chip_in_use_is_refused_to_other_commands(sound):
     calibration([0.1] * 3).save(sound.folder / "c.json")
     before = sorted(sound.folder.rglob("*"))
     commands = {"session": ("--yes", "-o", "two"), "doctor": (), "write": ("c.json", "chip", "--yes")}
@@ -100,7 +100,7 @@ def test_an_smbus_only_adapter_measures_too(device):
 
 
 @pytest.mark.slow
-def test_faults_that_pass_leave_no_hole_that_is_not_told(device):
+def test_passing_faults_leave_only_marked_gaps(device):
     faults = {"nack": 2, "brownout": 4, "overflow": 6, "timeout": 10, "slip": 12, "frozen": 14}
     mocked = device("sim:fault=" + "/".join(f"{name}@{at_s}" for name, at_s in faults.items()))
     result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "18", "--rate", "50")

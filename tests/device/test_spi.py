@@ -35,7 +35,7 @@ def test_both_sensors_at_1_khz_are_recorded_over_spi(device, chip, name, data_hz
     asked_for(mocked, data_hz)
 
 
-def test_a_chip_that_is_recorded_is_nobody_elses(device):
+def test_a_chip_in_use_is_refused_to_another_session(device):
     mocked = device("sim:chip=mpu6500")
     with mocked.recording("--spi", NODE):
         refused = mocked.mpucal("session", "--spi", NODE, "--yes", "-o", "two")

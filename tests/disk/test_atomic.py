@@ -102,7 +102,7 @@ def test_a_new_file_has_the_rights_of_the_umask_and_an_old_one_keeps_its_own(tmp
     ],
     ids=["link", "link to nothing", "pipe"],
 )
-def test_what_is_no_file_is_never_replaced(tmp_path, make, what):
+def test_links_devices_and_folders_are_never_replaced(tmp_path, make, what):
     (tmp_path / "other").write_bytes(b"other")
     path = tmp_path / "a.json"
     make(path)

@@ -32,7 +32,7 @@ def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("make", [lambda path: path.write_bytes(b"other"), lambda path: path.symlink_to("nothing")])
-def test_what_is_there_already_stays(tmp_path, make):
+def test_an_existing_file_is_not_replaced(tmp_path, make):
     make(path := tmp_path / "capture.mcap")
     with pytest.raises(OutputError, match="exists already"):
         check_free(path)
@@ -49,7 +49,7 @@ def test_what_is_there_already_stays(tmp_path, make):
     ],
     ids=["shortened", "removed", "replaced"],
 )
-def test_one_that_others_spoil_meanwhile_is_told(tmp_path, meddle, what):
+def test_a_file_that_another_program_changes_is_reported(tmp_path, meddle, what):
     file = GrowingFile(tmp_path / "capture.mcap")
     file.write(b"bytes")
     file.flush()
@@ -60,7 +60,7 @@ def test_one_that_others_spoil_meanwhile_is_told(tmp_path, meddle, what):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a file went")
-def test_one_in_a_folder_that_is_renamed_is_found(tmp_path):
+def test_a_file_in_a_renamed_folder_is_found(tmp_path):
     (tmp_path / "board").mkdir()
     file = GrowingFile(tmp_path / "board" / "capture.mcap")
     file.write(b"bytes")

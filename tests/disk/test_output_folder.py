@@ -10,7 +10,7 @@ from mpucal.errors import OutputError
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell who has a lock")
-def test_a_second_one_is_refused_and_told_who_has_it(tmp_path):
+def test_a_folder_in_use_is_refused_with_the_process_that_uses_it(tmp_path):
     with OutputFolder(tmp_path / "board"), pytest.raises(OutputError, match=rf"\(process {os.getpid()}\)"):
         OutputFolder(tmp_path / "board")
     with OutputFolder(tmp_path / "board") as again:
@@ -29,7 +29,7 @@ def test_new_ones_have_names_of_their_own(tmp_path):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a folder went")
-def test_one_that_is_renamed_is_followed_and_one_that_is_replaced_is_not_written_to(tmp_path):
+def test_a_renamed_folder_is_followed_and_a_replaced_one_is_refused(tmp_path):
     with OutputFolder(tmp_path / "board") as folder:
         (tmp_path / "board").rename(tmp_path / "seven")
         (tmp_path / "board").mkdir()
@@ -39,7 +39,7 @@ def test_one_that_is_renamed_is_followed_and_one_that_is_replaced_is_not_written
             _ = folder.path
 
 
-def test_one_that_was_made_for_nothing_is_removed(tmp_path):
+def test_a_new_folder_that_stays_empty_is_removed(tmp_path):
     (tmp_path / "there").mkdir()
     for name in ("there", "made", "filled"):
         with OutputFolder(tmp_path / name) as folder:

@@ -189,7 +189,7 @@ def test_the_yaml_as_imu_calib_applies_it(calibrated, samples):
     np.testing.assert_array_equal(covariance, np.diag(calibrated.noise_std**2))
 
 
-def test_what_the_yaml_says_of_the_gyroscope(calibration):
+def test_the_ros_file_describes_the_gyroscope(calibration):
     """Expect no remaining bias, since imu_calib subtracts the mean of the first samples, and no covariance of zeros.
 
     Zeros would tell ROS that it is unknown.
@@ -268,7 +268,7 @@ def test_json_and_blob_make_each_other(calibrated, tmp_path):
 
 
 @pytest.mark.parametrize("name", [row.name for row in FORMS if row.only_usable])
-def test_what_must_not_be_used_is_not_exported(calibration, name):
+def test_unusable_calibrations_are_not_exported(calibration, name):
     for changes in ({"quality": {"verdict": "refused"}}, {"b_a": np.full(3, math.nan)}, {"D": np.ones((3, 3))}):
         with pytest.raises(RefusedError, match="nothing was exported"):
             form(name).export(replace(calibration, **changes))

@@ -73,7 +73,7 @@ def test_the_registers_that_i2cdevlib_sets_take_the_biases_away(calibration, sam
 
 
 @pytest.mark.parametrize("name", ["kalibr", "openvins", "i2cdevlib"])
-def test_what_nobody_knows_is_not_made_up(calibration, name):
+def test_unknown_values_are_refused_rather_than_invented(calibration, name):
     unknown = replace(calibration.sensor, accel_offsets=None)
     with pytest.raises(WriteBackError, match=r"lacks the (noise|content of the accelerometer's offset registers)"):
         form(name).export(replace(calibration, sensor=unknown, gyro_noise_std=np.full(3, np.nan)))

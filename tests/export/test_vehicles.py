@@ -132,6 +132,6 @@ def test_a_document_that_no_session_wrote_is_refused(key):
     [("px4", GAIN, "PX4"), ("ardupilot", [0.5, 1.0, 1.0], "beyond")],
     ids=["another firmware", "beyond ArduPilot's own limits"],
 )
-def test_what_ardupilot_does_not_take_is_refused(name, gain, says):
+def test_gains_that_ardupilot_does_not_take_are_refused(name, gain, says):
     with pytest.raises(WriteBackError, match=says):
         form("ardupilot").export(of_vehicle(name, np.diag(gain)))

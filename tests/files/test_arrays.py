@@ -153,7 +153,7 @@ def test_arrays_are_read_at_the_first_try(name, walk, walk_ns, tmp_path):
     assert (read.utc_ns == walk_ns[0]) == (name in ("Parquet", "Parquet with dates", "Parquet with an index of dates"))
 
 
-def test_its_columns_are_named(walk, walk_ns, assert_same, tmp_path):
+def test_columns_of_a_data_frame_are_chosen_by_name(walk, walk_ns, assert_same, tmp_path):
     made = frame(walk, when=walk.t)
     made.columns = ["when", *"abcdef"]
     made[["when", *"adbecf"]].to_parquet(tmp_path / "walk.parquet")

@@ -30,7 +30,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path, monkeypa
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not count all memory")
-def test_what_takes_more_than_it_says_is_stopped_but_not_other_threads_of_a_caller(tmp_path, monkeypatch):
+def test_reading_is_stopped_at_the_memory_limit_except_in_threads_of_a_caller(tmp_path, monkeypatch):
     import resource
 
     def limited():

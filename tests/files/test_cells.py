@@ -31,5 +31,5 @@ def test_each_spelling_is_its_number(text, found):
 
 
 @pytest.mark.parametrize("text", ["", "nan", "1e999", "12:3", "32.13.2024 12:03:04", "1.1.2024 " * 2000, "a", "1.2.3"])
-def test_what_is_no_number(text):
+def test_cells_without_a_number(text):
     assert not is_number(text)

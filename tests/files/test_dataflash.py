@@ -133,7 +133,7 @@ def test_damage_never_raises_anything_else(dataflash, tmp_path, junk, cut):
         assert error.remedy
 
 
-def test_what_is_skipped_is_not_printed(dataflash, tmp_path, capfd):
+def test_skipped_bytes_are_not_printed(dataflash, tmp_path, capfd):
     for k in range(100):
         dataflash.add("IMU", 1_000_000 + 20_000 * k, 0, 0, 0, 0, 0, 0, -9.8, 0, 0, 30.0, 1, 1, 50, 50)
     whole = dataflash.bytes()

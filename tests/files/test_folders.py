@@ -145,7 +145,7 @@ def test_a_letter_in_a_files_name_is_no_sensor(walk, assert_same, tmp_path):
     assert_same(mpucal.load(tmp_path / "house_f_158_accm.csv"), walk)
 
 
-def test_one_table_of_two_is_read_with_the_other_if_that_is_there(walk, walk_ns, assert_same, tmp_path):
+def test_a_table_is_read_with_the_other_of_its_pair_if_that_exists(walk, walk_ns, assert_same, tmp_path):
     phyphox(tmp_path, walk, walk_ns)
     for given in ("Accelerometer.csv", "Gyroscope.csv"):
         assert_same(mpucal.load(tmp_path / given), walk, 1e-9, 1e-9, 1e-9)
@@ -168,7 +168,7 @@ def test_pairs_of_tables_are_told_apart_by_their_names(walk, walk_ns, assert_sam
 
 
 @pytest.mark.parametrize("said", ["ax,ay,az,t", "t=4,ax=1,ay=2,az=3,gx=1,gy=2,gz=3"])
-def test_two_tables_without_names_whose_columns_are_said(said, walk, walk_ns, assert_same, tmp_path):
+def test_two_tables_without_names_are_read_by_given_columns(said, walk, walk_ns, assert_same, tmp_path):
     pair(tmp_path, walk, walk_ns, (1, 2, 3, 0))
     with pytest.raises(RecordingError):
         mpucal.load(tmp_path)

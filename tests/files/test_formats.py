@@ -82,7 +82,7 @@ def test_a_format_that_is_loaded_whole_has_rows_too(made_up, tmp_path):
     np.testing.assert_array_equal(rows.recording().acc, mpucal.load(tmp_path / "a.two").acc)
 
 
-def test_what_no_dialect_recognises_is_told_by_the_last_of_its_suffix(made_up, tmp_path):
+def test_a_file_without_a_dialect_is_refused_by_the_last_of_its_suffix(made_up, tmp_path):
     (tmp_path / "a.csv").write_text("one,two\n")
     with pytest.raises(RecordingError, match="names no columns of"):
         mpucal.load(tmp_path / "a.csv")
@@ -125,7 +125,7 @@ def test_a_capture_gives_what_the_driver_gave(save, tmp_path):
         ("folder", r"holds no capture\.mcap"),
     ],
 )
-def test_what_is_no_recording(tmp_path, name, says):
+def test_other_paths_are_refused_with_their_reason(tmp_path, name, says):
     (tmp_path / "no_ending").write_text("hello")
     (tmp_path / "folder").mkdir()
     with pytest.raises(RecordingError, match=says) as raised:

@@ -164,7 +164,7 @@ def test_a_killed_program_loses_its_last_second_at_most(tmp_path):
         assert f"{kept} records" in capture.recovered
 
 
-def test_of_a_file_cut_anywhere_all_whole_chunks_are_read(path, monkeypatch):
+def test_all_whole_chunks_of_a_cut_file_are_read(path, monkeypatch):
     records = polls(120)
     with killed_at_the_end(monkeypatch):
         write(path, records)
@@ -229,7 +229,7 @@ def test_a_chunk_longer_than_any_memory_is_damage(sixty_polls, path):
         pytest.param(b"\x89MCAP0\r\n\x05\x05" + bytes(29), "lacks the metadata", id="a message of 5 bytes"),
     ],
 )
-def test_what_is_no_capture_is_refused(path, content, says):
+def test_other_content_is_refused(path, content, says):
     path.write_bytes(content)
     with pytest.raises(CaptureError, match=says):
         read_capture(path)
@@ -320,7 +320,7 @@ def test_a_cut_capture_gives_what_is_whole(tmp_path):
         ([(float("1e400"), 1)], "an event forget without a whole number"),
     ],
 )
-def test_what_was_forgotten_is_left_out(forgotten, lost, tmp_path):
+def test_forgotten_polls_are_left_out(forgotten, lost, tmp_path):
     """Leave out whole polls, and what lies beyond the end."""
     capture = read_capture(FIXTURES / "faults" / "overflow.mcap")
     with CaptureWriter(tmp_path / "c.mcap") as writer:

@@ -131,7 +131,7 @@ SMALL = {
     ("extra", "flat"),
     [({}, None), ({"flat": (5, 15)}, (5, 15)), ({"flat_samples": 20}, (0, 20)), ({"flat_samples": [20]}, (0, 20))],
 )
-def test_what_an_archive_does_not_hold_is_unknown(extra, flat, tmp_path):
+def test_values_missing_from_an_archive_are_unknown(extra, flat, tmp_path):
     np.savez(tmp_path / "a.npz", **SMALL, **extra, units="s, m/s^2, rad/s", notes="ignored")
     read = load(tmp_path / "a.npz")
     assert (read.flat, read.sensor) == (flat, Sensor())
@@ -276,7 +276,7 @@ def test_a_failure_leaves_the_old_file_and_no_other(ending, archive, tmp_path):
 
 
 @pytest.mark.parametrize("target", [".csv", ".mcap"])
-def test_memory_is_that_of_a_run_however_many_there_are(target, tmp_path):
+def test_memory_is_that_of_one_run_at_any_length(target, tmp_path):
     def peak(runs):
         whole = recording(runs * ROWS)
         path = tmp_path / f"{runs}.csv"

@@ -94,7 +94,7 @@ def test_logs_that_are_none(walk, t_us, tmp_path):
             load(path)
 
 
-def test_a_damaged_log_says_so_in_what_was_taken_alone(walk, t_us, tmp_path, capsys):
+def test_damage_of_a_log_is_reported_with_the_interpretation_alone(walk, t_us, tmp_path, capsys):
     path = ulog(tmp_path / "log.ulg", ("sensor_combined", 0, combined(t_us, walk)))
     data = bytearray(path.read_bytes())
     half = len(data) // 2

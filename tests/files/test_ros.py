@@ -84,7 +84,7 @@ def test_headers_without_times_give_those_of_receipt(write_bag, walk, walk_ns, a
     assert "of receipt" in read.taken
 
 
-def test_of_several_topics_two_are_joined_or_one_is_named(write_bag, walk, walk_ns, assert_same, tmp_path):
+def test_topics_are_joined_by_sensor_or_chosen_by_name(write_bag, walk, walk_ns, assert_same, tmp_path):
     read = load(write_bag(tmp_path / "walk", walk, walk_ns, "mcap", (ACC, GYR), gyro_late_ns=1_000_000))
     assert "from /camera/accel/sample and /camera/gyro/sample" in read.taken
     assert "the gyroscope begins +1.00 ms after the accelerometer" in read.taken
@@ -107,7 +107,7 @@ def test_a_bag_without_imus_names_its_topics(tmp_path):
         load(tmp_path / "walk.mcap")
 
 
-def test_what_apply_wrote_is_read_and_not_calibrated_twice(walk, assert_same, tmp_path):
+def test_output_of_apply_is_read_and_not_calibrated_twice(walk, assert_same, tmp_path):
     with open_writer(tmp_path / "out.mcap", Rows(iter(())), "calibrated with c.json") as write:
         write(walk)
     read = load(tmp_path / "out.mcap")

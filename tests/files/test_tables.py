@@ -445,7 +445,7 @@ def test_a_date_without_a_zone_is_no_time_of_day(spec, utc_ns, read, walk, asser
         (f"time [s],{AXES}", "ms a w", "t=ms", r"t is said to be in s, but the step of .* suggests ms"),
     ],
 )
-def test_doubtful_units_are_refused_and_can_be_said(head, spec, units, says, read, walk, assert_same):
+def test_doubtful_units_are_refused_and_can_be_given(head, spec, units, says, read, walk, assert_same):
     with pytest.raises(RecordingError, match=says) as refused:
         read(head, spec)
     assert refused.value.options == f"--units {units}"
@@ -474,7 +474,7 @@ def test_named_columns_beside_columns_of_words(said, read, walk, assert_same):
     assert_same(found, walk, 1e-9, 1e-9, 1e-9)
 
 
-def test_what_physics_does_not_confirm_is_not_guessed(read, walk):
+def test_columns_that_physics_does_not_confirm_are_not_guessed(read, walk):
     turned_otherwise = replace(walk, gyr=np.roll(walk.gyr, 300, axis=0))
     with pytest.raises(RecordingError, match="name its columns in their order"):
         read("", "t a w", " ", turned_otherwise)
@@ -482,7 +482,7 @@ def test_what_physics_does_not_confirm_is_not_guessed(read, walk):
         read("a,b,c,d,e,f,g\n", "t a w", columns="t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g")
 
 
-def test_columns_of_a_second_imu_are_said_to_be_left_out(read, walk, assert_same):
+def test_unread_columns_of_a_second_imu_are_reported(read, walk, assert_same):
     second = ",".join(f"imu2_{sensor}{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
     found = read(f"time,{AXES.strip()},{second}\n", "t a w field w")
     assert_same(found, walk, 1e-9, 1e-9, 1e-9)
@@ -574,7 +574,7 @@ def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, tmp_path):
 
 
 @pytest.mark.parametrize("centre", [[1.65, 1.65, 1.65], [0.0, 1.2, 0.6]])
-def test_a_zero_elsewhere_is_said_wherever_it_is(centre, walk, tmp_path):
+def test_a_shifted_zero_is_reported_at_any_place(centre, walk, tmp_path):
     """Say it of volts, and of a zero that is only 1.3 g away."""
     acc = walk.acc / G + np.array(centre) / (0.3 if centre[0] else 1.0)
     made = np.column_stack([walk.t, acc, walk.gyr])
@@ -615,7 +615,7 @@ def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, tmp_path):
         mpucal.load(tmp_path / "walk.csv")
 
 
-def test_of_two_sensors_under_one_name_both_parts_are_of_one(walk, assert_same, tmp_path):
+def test_accelerometer_and_gyroscope_are_of_one_sensor_where_names_repeat(walk, assert_same, tmp_path):
     """Read the gyroscope of the accelerometer that shows gravity, and mix no axes where a name is there twice."""
     names = AXES.strip().split(",")
     header = f"sensor,{','.join(['left'] * 6 + ['right'] * 6)}\naxis,{','.join(names * 2)}"
@@ -631,7 +631,7 @@ def test_of_two_sensors_under_one_name_both_parts_are_of_one(walk, assert_same, 
 
 
 @pytest.mark.parametrize("name", ["framestamp", "sample_at"])
-def test_times_whose_name_counts_are_times_if_they_have_parts_of_a_second(name, walk, assert_same, tmp_path):
+def test_fractional_times_under_the_name_of_a_counter_are_times(name, walk, assert_same, tmp_path):
     made = np.column_stack([walk.t, walk.acc, walk.gyr])
     np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header=f"{name},{AXES.strip()}", comments="", fmt="%.17g")
     assert_same(mpucal.load(tmp_path / "walk.csv"), walk)
@@ -718,7 +718,7 @@ def test_three_parts_of_an_attitude_are_no_accelerometer(read, walk):
         read("time,acc_x,acc_y,acc_z,q_w,q_x,q_y,q_z\n", "t jerk g 0.1")
 
 
-def test_gravity_that_is_missing_or_hidden_is_told(read, walk):
+def test_missing_or_hidden_gravity_is_reported(read, walk):
     none = replace(walk, acc=np.random.default_rng(1).normal(0, 0.3, walk.acc.shape))
     with pytest.raises(RecordingError, match="gravity is not in it"):
         read(f"time,{AXES}", "t a w", of=none)
@@ -843,7 +843,7 @@ def test_lines_that_repeat_a_sample_are_left_out(read, walk, walk_ns, assert_sam
 
 
 @pytest.mark.parametrize("odd", ["", "nan", "inf"])
-def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, walk_ns, tmp_path):
+def test_lines_that_lack_a_number_are_left_out_and_counted(odd, walk, walk_ns, tmp_path):
     some = lines(",", "a w", walk, walk_ns).splitlines()
     some[100] = f"{odd},{some[100].partition(',')[2]}"
     timed = [f"{t!r},{line}" for t, line in zip(walk.t.tolist(), some, strict=True)]
@@ -858,7 +858,7 @@ def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, walk_ns, tmp_
 
 
 @pytest.mark.parametrize("timed", [True, False])
-def test_labelled_lines_that_lack_a_number_are_said(timed, walk, walk_ns, tmp_path):
+def test_labelled_lines_that_lack_a_number_are_counted(timed, walk, walk_ns, tmp_path):
     """Count the samples left out, whose time passes all the same; where several in a row are missing, is a gap."""
     line = FORMS["lines that name each number"].line
     line = line if timed else line.replace(",t:{}", "")
@@ -900,7 +900,7 @@ def test_lines_that_hold_one_sensor_each(walk, walk_ns, tmp_path):
     assert "+2.00 ms after" in found.taken
 
 
-def test_times_that_begin_anew_are_an_interruption(walk, walk_ns, tmp_path):
+def test_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
     """Tell a sketch that is started again from a clock that is set back a little."""
     half = len(walk) // 2
     t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
@@ -934,7 +934,7 @@ def test_a_temperature_is_kept_everywhere(walk, tmp_path):
     assert mpucal.load(tmp_path / "counts.csv").sensor.temperature_c is None
 
 
-def test_what_was_read_without_rates_is_used_for_what_needs_none(stored_calibration, tmp_path):
+def test_recordings_without_rates_serve_all_that_needs_no_rate(stored_calibration, tmp_path):
     """Calibrate statically, report and check a table of counts without a rate, of which `noise` asks for one."""
     from mpucal.report import render
 

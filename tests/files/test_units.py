@@ -130,7 +130,7 @@ def test_columns_of_different_times_are_refused(walk, tmp_path):
         mpucal.load(tmp_path / "a.json")
 
 
-def test_samples_whose_cells_hold_their_units_are_no_heads(walk, tmp_path):
+def test_rows_of_cells_with_units_are_not_taken_for_heads(walk, tmp_path):
     rows = [
         ",".join([f"{t:.6f} s", *(f"{x:.9g} m/s^2" for x in acc), *(f"{x:.9g} rad/s" for x in gyr)])
         for t, acc, gyr in zip(walk.t - walk.t[0], walk.acc, walk.gyr, strict=True)

@@ -72,7 +72,7 @@ def test_agrees_with_every_golden_vector(path, call, load):
     assert (status, w) == (OK, pytest.approx(np.array(wanted["w"]), abs=1e-5))
 
 
-def test_at_a_temperature_that_is_not_known_b_a_is_the_blobs(call):
+def test_bias_at_an_unknown_temperature_is_that_of_the_blob(call):
     data, counts = (VECTORS / "blob_sloped.bin").read_bytes(), (100, -200, 8000)
     either = [
         call("apply_at", data, ctypes.c_float(celsius), counts=counts)[1].tolist()
@@ -220,7 +220,7 @@ def test_fixed_point_is_within_a_count_over_the_whole_range(call):
 
 
 @pytest.mark.parametrize("changes", [{"D": (0.5, 0, 0, 0, 1, 0, 0, 0, 1)}, {"b_a": (5000.0, 0, 0)}], ids=["D", "b_a"])
-def test_what_has_no_room_in_fixed_point_is_refused(changes, call):
+def test_values_too_large_for_fixed_point_are_refused(changes, call):
     assert call("apply_fixed", replace(MEASURED, **changes).encode(), ctypes.c_uint32(1), made=np.int32)[0] == NO_ROOM
 
 

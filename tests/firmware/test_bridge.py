@@ -150,7 +150,7 @@ def test_answers_as_the_golden_talks_say(fresh):
         fresh.ask(wire.BlobErase())
 
 
-def test_before_hello_every_request_is_told_so(fresh):
+def test_requests_before_hello_are_refused(fresh):
     for kind in (0x02, 0x05, 0x10, 0x14, 0x33):
         (frame,) = fresh.frames(Frame(kind, 5).encode())
         assert (frame.type, frame.seq, frame.payload[0]) == (kind | wire.REPLY_BIT, 5, Status.NO_HELLO)
@@ -260,7 +260,7 @@ def test_a_hello_that_is_none_changes_nothing(fresh):
         assert fresh.ask(wire.Read(0x75, 1)).status == Status.NO_HELLO
 
 
-def test_unknown_requests_are_told_so_and_replies_ignored(bridge):
+def test_unknown_requests_are_refused_and_replies_ignored(bridge):
     assert [bridge.frames(Frame(kind, 1).encode()) for kind in range(0x80, 0x100)] == [[]] * 0x80
     unknown = [kind for kind in range(0x80) if kind not in wire.REQUESTS]
     frames = [bridge.frames(Frame(kind, 1).encode())[0] for kind in unknown]
@@ -301,7 +301,7 @@ def test_repeats_of_blob_messages_do_no_harm(bridge):
     assert [bridge.ask(commit).generation for _ in range(3)] == [1, 1, 1]
 
 
-def test_what_is_no_blob_leaves_the_old_one(bridge):
+def test_an_invalid_blob_leaves_the_old_one(bridge):
     bridge.store(OTHER)
     for path in (*VECTORS.glob("blob_bad_*.bin"), VECTORS / "blob_not_finite.bin"):
         assert bridge.store(path.read_bytes()).status == Status.BAD_BLOB, path
@@ -329,7 +329,7 @@ def test_blob_messages_out_of_order_are_refused(bridge):
         assert bridge.stored() == BLOB
 
 
-def test_a_memory_that_does_not_keep_its_bytes_is_told(on_core):
+def test_a_memory_that_loses_bytes_is_reported(on_core):
     bridge = on_core()
     bridge.ask(wire.Hello())
     bridge.eeprom.stuck.update(range(1024))
@@ -406,7 +406,7 @@ def test_both_bridges_answer_alike(told, on_core, tmp_path_factory):
 
 @settings(max_examples=60)
 @given(told=st.lists(st.one_of(st.binary(max_size=90), frames.map(Frame.encode)), max_size=30))
-def test_whatever_comes_the_core_sends_nothing_but_answers_and_keeps_its_blob(told, host, core):
+def test_the_core_answers_any_bytes_with_replies_alone_and_keeps_its_blob(told, host, core):
     chip = Chip()
     bridge = host.HostBridge(core, host.Eeprom(), chip.read, chip.write)
     asking = Asking(bridge.receive, chip)

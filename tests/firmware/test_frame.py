@@ -79,7 +79,7 @@ pieces = st.one_of(
 
 
 @given(data=st.lists(pieces, max_size=6).map(b"".join))
-def test_finds_the_same_frames_as_python_in_whatever_comes(data, found):
+def test_finds_the_same_frames_as_python_in_any_bytes(data, found):
     assert found(data) == list(Deframer().feed(data))
 
 

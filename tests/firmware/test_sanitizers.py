@@ -37,7 +37,7 @@ def test_the_core_passes_its_tests_under_sanitizers(sanitized):
 
 
 @pytest.mark.slow
-def test_and_the_sanitizers_are_awake(sanitized, host, monkeypatch, tmp_path):
+def test_the_sanitizers_report_a_read_out_of_bounds(sanitized, host, monkeypatch, tmp_path):
     monkeypatch.setenv("MPUCAL_SANITIZE", "1")
     host.compile_core(tmp_path)
     too_far = "ctypes.create_string_buffer(8), 200"

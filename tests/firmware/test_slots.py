@@ -97,7 +97,7 @@ def test_power_loss_at_any_write_leaves_the_old_blob_or_the_new_one(before, torn
 
 @settings(max_examples=40)
 @given(cuts=st.lists(st.tuples(st.integers(0, 210), st.integers(0, 255)), min_size=1, max_size=5))
-def test_power_loss_upon_power_loss_leaves_a_blob_that_was_once_whole(cuts, host, slots):
+def test_repeated_power_losses_leave_a_blob_that_was_once_whole(cuts, host, slots):
     content, whole = holding(host, slots, OLD), OLD
     for number, (cut_at, torn) in enumerate(cuts):
         blob = replace(MEASURED, created="", b_a=(0.0, float(number), 1.0)).encode()

@@ -102,7 +102,7 @@ def test_all_that_was_counted_comes_in_as_few_messages_as_hold_it(frames, stream
     assert [message.index for message in messages] == list(range(0, frames, 4))
 
 
-def test_what_comes_during_a_look_is_for_the_next(stream):
+def test_frames_that_come_during_a_look_are_left_to_the_next(stream):
     stream.make(8)
     first = stream.look()
     stream.make(2)
@@ -110,7 +110,7 @@ def test_what_comes_during_a_look_is_for_the_next(stream):
     assert (numbers(*first), numbers(*second), len(stream.fifo)) == ([0, 1, 2, 3], [4, 5, 6, 7], 2 * BYTES)
 
 
-def test_after_100_ms_pushes_what_there_is_even_nothing(stream):
+def test_pushes_a_message_every_100_ms_even_without_frames(stream):
     stream.make(1)
     assert [numbers(message) for message in stream.look(100_000)] == [[0]]
     assert stream.look(99_000) == []
@@ -135,7 +135,7 @@ def test_a_transfer_that_fails_halts_the_stream(code, host, core):
         assert (message.status, message.drops, message.frames) == (code, 1, b""), register
 
 
-def test_more_frames_than_a_chip_holds_are_an_overflow_told_every_100_ms(stream):
+def test_more_frames_than_a_chip_holds_are_an_overflow_reported_every_100_ms(stream):
     stream.make(74)
     (message,) = stream.look()
     assert (message.status, message.drops, message.left, message.frames) == (Status.OVERFLOW, 1, 0, b"")
@@ -146,7 +146,7 @@ def test_more_frames_than_a_chip_holds_are_an_overflow_told_every_100_ms(stream)
     assert stream.reads == []
 
 
-def test_stream_starts_anew_and_drops_count_on_until_a_hello(stream):
+def test_a_restarted_stream_counts_its_drops_on_until_a_hello(stream):
     for hello, drops in ((False, 1), (True, 0)):
         stream.make(74)
         stream.look()
@@ -161,7 +161,7 @@ def test_stream_starts_anew_and_drops_count_on_until_a_hello(stream):
 
 
 @pytest.mark.parametrize("request_", [wire.Stream(0, 0), wire.BlobBegin(188)], ids=["stop", "blob"])
-def test_stops_when_told_even_within_a_look(request_, stream):
+def test_stops_on_request_even_within_a_look(request_, stream):
     stream.make(8)
     stream.look()
     (reply,) = stream.ask(request_)

@@ -45,7 +45,7 @@ def test_each_way_to_store_a_count(text, stored, value):
     assert layout.columns(stored)["in_accel_x"].tolist() == [value]
 
 
-def test_what_is_no_type_and_what_is_no_frame_says_so():
+def test_invalid_types_and_frames_are_reported():
     for text in ("s16/16>>0", "le:s0/16>>0", "le:s16/16>>4", "le:s16/16X0>>0"):
         with pytest.raises(ChipError, match="storage of in_accel_x as"):
             element("in_accel_x", 0, text)
@@ -58,7 +58,7 @@ CALLS = st.lists(st.tuples(st.integers(0, 1), st.integers(0, 5)), max_size=30)
 
 
 @given(STEPS, STEPS, CALLS)
-def test_alignment_is_numpys_interpolation_however_the_samples_come(one, other, calls):
+def test_alignment_is_numpys_interpolation_for_any_division_of_the_samples(one, other, calls):
     t, s = np.cumsum(one), np.cumsum(other)
     values, held = np.sin(t)[:, None], np.cos(s)[:, None] * [1.0, 2.0]
     aligned, rows = StreamAligner([1, 2]), []

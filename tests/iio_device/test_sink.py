@@ -73,7 +73,7 @@ def test_b_a_is_gone_from_the_samples_and_udev_has_the_rest(made, tmp_path):
     assert not list(tmp_path.glob("*.rules"))
 
 
-def test_of_an_mpu_6500_calibbias_is_left_alone(made):
+def test_calibbias_of_an_mpu_6500_is_left_alone(made):
     sink, files, found = made("mpu6500")
     before = files._words()
     applied = sink.write(found)
@@ -82,7 +82,7 @@ def test_of_an_mpu_6500_calibbias_is_left_alone(made):
     assert "calibbias is not used, as the driver writes to wrong registers" in applied.what
 
 
-def test_what_is_not_seen_in_the_samples_is_put_back(made, tmp_path, monkeypatch):
+def test_a_change_that_the_samples_do_not_show_is_undone(made, tmp_path, monkeypatch):
     sink, files, found = made()
     before, write = files._words(), files._write_words
 
@@ -97,7 +97,7 @@ def test_what_is_not_seen_in_the_samples_is_put_back(made, tmp_path, monkeypatch
     assert not list(tmp_path.glob("*.rules"))
 
 
-def test_what_is_refused_or_no_state_is_not_written(made, tmp_path):
+def test_refused_calibrations_and_invalid_states_are_not_written(made, tmp_path):
     sink, _, found = made()
     with pytest.raises(WriteBackError, match="nothing was written: the calibration was refused"):
         sink.write(replace(found, quality={"verdict": REFUSED}))

@@ -68,7 +68,7 @@ def frames(*counts, every_ns=20_000_000):
     )
 
 
-def test_it_is_set_up_read_and_left_as_it_was(tree):
+def test_the_device_is_set_up_read_and_restored(tree):
     before = {path: path.read_text() for path in tree.rglob("*") if path.is_file()}
     files = IioFiles()
     files.check("iio:device0")

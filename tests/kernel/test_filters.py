@@ -132,7 +132,9 @@ def test_a_trace_has_the_innovations_of_the_value(hand_problem, theta, instructi
         ("hand", {}, {"tail": 0.5}, "tail"),
     ],
 )
-def test_what_a_filter_cannot_use_is_refused(exact_problem, hand_problem, theta, filter_, series, constants, message):
+def test_input_that_a_filter_cannot_use_is_refused(
+    exact_problem, hand_problem, theta, filter_, series, constants, message
+):
     problem, parameters = (exact_problem, ACCEL) if filter_ == "exact" else (hand_problem, HAND)
     with pytest.raises(ValueError, match=message):
         evaluate(replace(problem, series=replace(problem.series, **series), **constants), theta, parameters)

@@ -35,7 +35,7 @@ def test_a_session_ends_good_with_the_chips_own_truth(guest, near):
     assert near(guest).quality["verdict"] == "good"
 
 
-def test_its_capture_replays_elsewhere(guest, tmp_path):
+def test_the_capture_of_the_guest_replays_on_the_host(guest, tmp_path):
     """The host has another processor: the samples are equal, and the numbers but for their last digits."""
     words = ["session", "--replay", str(guest.out / "session"), "-o", str(tmp_path / "again"), "--yes", "--json"]
     assert run(words) == 0

@@ -32,7 +32,7 @@ def data_of(found):
 
 
 @given(order=st.lists(st.integers(0, 4), max_size=8), cuts=st.lists(st.integers(0, 400), max_size=6))
-def test_a_stream_gives_its_packets_however_it_is_cut(packets, order, cuts):
+def test_a_stream_gives_its_packets_in_any_pieces(packets, order, cuts):
     chosen = [bytes(packets[k]) for k in order]
     whole = b"".join(chosen)
     edges = [0, *sorted(min(cut, len(whole)) for cut in cuts), len(whole)]

@@ -31,7 +31,7 @@ def locked(transport, key=None):
     return link, record
 
 
-def test_it_only_reads_until_it_is_locked_and_then_beats_once_a_second(script, station, decoded):
+def test_a_link_only_reads_until_it_is_locked_and_then_sends_a_heartbeat_a_second(script, station, decoded):
     transport = script(heartbeats(station(), HOME))
     link = unlocked(transport)
     (vehicle,) = link.listen()
@@ -134,7 +134,7 @@ def test_a_wrong_signing_key_is_named(script, station):
         unlocked(script(heartbeats(station(key=KEY), HOME)), b"x" * 32).listen()
 
 
-def test_a_vehicle_whose_clock_stood_still_is_believed(script, station):
+def test_a_signed_vehicle_with_a_stopped_clock_is_accepted(script, station):
     vehicle, now_s = station(key=KEY), 1_750_000_000
     vehicle.mav.signing.timestamp = 7
     transport = script([(now_s + 0.5, HOME, vehicle.heartbeat())])
@@ -176,7 +176,7 @@ def test_a_loop_that_is_left_early_loses_no_message(script, station):
         pytest.param([(0.0, 0), (2.5, 77), (2.6, 79)], 1, id="a reboot, and 78"),
     ],
 )
-def test_lost_packets_are_counted_late_ones_and_those_of_a_silence_are_not(script, station, come, lost):
+def test_lost_packets_are_counted_and_late_or_silent_ones_are_not(script, station, come, lost):
     vehicle = station()
     heartbeat, packets = vehicle.heartbeat(), [vehicle.raw(k) for k in range(256)]
     arriving = [(3.0 + t, HOME, packets[k]) for t, k in come]

@@ -56,7 +56,7 @@ def test_offsets_are_exact_and_the_residuals_those_of_the_worst_attitude(seed, n
     np.testing.assert_allclose(old.recorrect(new, R, stream(C, bias, old, R, f)), after, atol=1e-9)
 
 
-def test_an_autopilot_is_calibrated_to_standard_gravity_wherever_it_is():
+def test_an_autopilot_is_calibrated_to_standard_gravity_at_any_place():
     C, bias, local = np.diag([1.02, 0.98, 1.01]), np.array([0.1, -0.2, 0.3]), 9.78
     # a fit that takes local gravity for `local` sees C in these units
     new = composed(C, bias, SAME, np.eye(3), local).correction
@@ -127,7 +127,7 @@ def turn(degrees):
     offsets=st.tuples(OFFSETS, OFFSETS),
     scales=st.tuples(SCALES, SCALES),
 )
-def test_what_was_level_stays_level(firmware, trim, board, offsets, scales):
+def test_a_level_vehicle_stays_level(firmware, trim, board, offsets, scales):
     R_0 = turn([0, 0, 45 * board])
     old, new = (Correction(*pair) for pair in zip(offsets, scales, strict=True))
     R_old = turn(trim) if firmware == "PX4" else np.eye(3)
@@ -142,7 +142,7 @@ def test_what_was_level_stays_level(firmware, trim, board, offsets, scales):
 
 
 @pytest.mark.parametrize("trim", [0.0, 1e-6])
-def test_a_trim_that_nobody_measured_stays(trim):
+def test_an_unmeasured_trim_stays(trim):
     biased = Correction(np.array([0.3, 0.0, 0.0]), np.ones(3))
     held = np.array([trim, 0.0, 0.0])
     np.testing.assert_array_equal(Leveller("PX4", held, SAME, biased, np.eye(3)).keep().wanted_deg, held)

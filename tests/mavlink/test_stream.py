@@ -49,7 +49,7 @@ def test_a_vehicle_that_acknowledges_nothing_is_asked_by_groups_and_over_a_slow_
     assert streams("highres=no", 2.0).streams.start() == Stream("RAW_IMU", 1)
 
 
-def test_a_denied_rate_is_followed_by_a_lower_one_which_is_told_once(streams):
+def test_a_denied_rate_is_followed_by_a_lower_one_which_is_announced_once(streams):
     to = streams("highres=yes", 400.0)
     to.streams.start()
     assert watched_hz(to, 10) == pytest.approx(200, rel=0.02)
@@ -78,7 +78,7 @@ def test_a_slightly_lower_rate_is_accepted(streams):
     assert to.said == []
 
 
-def test_a_vehicle_whose_time_goes_slowly_was_slowed_by_nobody(streams, monkeypatch):
+def test_a_slow_clock_of_a_vehicle_is_not_reported_as_a_lowered_rate(streams, monkeypatch):
     to = streams("highres=no")
     to.streams.start()
     watched_hz(to, 10)

@@ -163,7 +163,7 @@ def test_the_share_of_lost_packets_is_that_of_the_part_in_which_it_is_reported(o
     assert 0.05 < share < 0.15
 
 
-def test_after_a_reboot_its_streams_are_asked_for_again_and_join(opened):
+def test_streams_are_requested_again_after_a_reboot_and_joined(opened):
     to = opened("imus=2,fault=reboot@6")
     t = started(to, 13)
     assert [text.partition(": ")[2] for text in to.said if "rebooted" in text] == [

@@ -72,7 +72,7 @@ def test_a_client_that_reads_nothing_does_not_block_the_session(feed):
         assert followed(feed.url, lambda shown: shown["prompt"]["text"].endswith("19999"))["headline"] == "Turn it"
 
 
-def test_a_client_that_stays_is_told_of_the_end_and_then_left(feed, monkeypatch):
+def test_a_connected_client_receives_the_end_before_the_server_closes(feed, monkeypatch):
     monkeypatch.setattr(feed_module, "LINGER_S", 0.5)
     with closing(urllib.request.urlopen(f"{feed.url}events", timeout=60.0)) as events:
         events.readline()

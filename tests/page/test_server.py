@@ -92,7 +92,7 @@ def test_there_are_four_clients_at_most_and_one_that_leaves_makes_room(server, m
         assert status()[0] == b"200"
 
 
-def test_a_client_that_stalls_gets_the_latest_and_holds_up_nobody(server, monkeypatch):
+def test_a_stalled_client_gets_the_latest_and_delays_no_other(server, monkeypatch):
     monkeypatch.setattr(module, "WAITING_BYTES", 4096)
     stalled, _ = server.follow()
     reading, _ = server.follow()

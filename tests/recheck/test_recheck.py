@@ -125,7 +125,7 @@ def test_a_known_b_a_of_t_is_not_called_a_drift():
     assert mpucal.check(known, shown(warm, temperature_c=45.0), days=1.0).verdict == "still good"
 
 
-def test_too_few_orientations_cannot_be_told():
+def test_too_few_orientations_allow_no_verdict():
     recording = shown(TRUTH)
     still = recording.part(0, round(9.0 * recording.rate_hz))
     told = mpucal.check(CALIBRATION, still, days=1.0)

@@ -46,7 +46,7 @@ def look(page):
 
 
 @pytest.mark.parametrize("width", [375, 1200], ids=["phone", "desk"])
-def test_nothing_sticks_out_and_all_pictures_are_seen(look, page, width):
+def test_the_page_fits_its_window_and_shows_all_pictures(look, page, width):
     seen = look(width)
     assert seen["wide"] <= width
     assert seen["sticking_out"] == seen["cut"] == 0

@@ -141,7 +141,7 @@ def test_the_top_says_the_verdict_its_reasons_and_what_to_do(result, verdict, ex
 
 
 @pytest.mark.parametrize(("name", "recording"), [("mpu6050.mcap", "mpu6050.mcap"), ("capture-2.mcap", ".")])
-def test_it_says_how_to_fit_it_again(result, name, recording):
+def test_the_page_names_the_commands_that_repeat_the_fit(result, name, recording):
     """Fit a session's folder, of all its captures, or another file alone."""
     page = render(result.calibration, replace(result.recording, name=name))
     fit = result.document["fit"]
@@ -184,7 +184,7 @@ def test_the_formula_computes_what_the_calibration_does(result, applied):
     np.testing.assert_allclose(a, calibration.apply(list(y.values())), atol=2e-5)
 
 
-def test_whose_calibration_it_is_and_of_what(result):
+def test_the_page_names_the_sensor_and_the_recording(result):
     made = replace(result.calibration, created="2024-05-17T09:30:00+00:00", extra={"name": "left wing"})
     sentence = "capture.mcap was never closed: its 7 records are whole."
     page = render(made, replace(result.recording, recovered=sentence))
@@ -195,7 +195,7 @@ def test_whose_calibration_it_is_and_of_what(result):
     assert {name: [value] for name, value in settings.items()}.items() <= table(page, "settings").items()
 
 
-def test_what_is_unknown_is_called_so(result):
+def test_unknown_values_are_named_unknown(result):
     page = render(Calibration(np.full((3, 3), np.nan), np.full(3, np.nan)))
     assert element(page, "verdict").startswith("Refused")
     assert table(page, "parameters")["D x"][0] == "unknown"

@@ -28,7 +28,7 @@ UP, ASIDE, REST, TURNING = np.array([0, 0, 9.8]), np.array([9.8, 0, 0]), np.zero
 
 
 @pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
-def test_it_finds_the_ten_seconds_at_the_start(hand, rate_hz):
+def test_the_ten_flat_seconds_at_the_start_are_found(hand, rate_hz):
     for made in (paper_scenario(0, rate_hz=rate_hz), *([hand(0, "pose9")] if rate_hz == 100.0 else [])):
         first, last = find_flat(replace(made.recording, flat=None))
         assert first <= 1.0 * rate_hz

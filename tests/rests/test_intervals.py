@@ -18,7 +18,7 @@ def found(simulated):
 
 
 @pytest.mark.parametrize(("motion", "tremble"), [("pose6", True), ("pose12", False), ("pose12", True)])
-def test_it_finds_every_pose_and_nothing_else(hand, motion, tremble):
+def test_every_pose_and_nothing_else_is_found(hand, motion, tremble):
     simulated = hand(1, motion, tremble=tremble)
     recording, _, runs = found(simulated)
     number = int(motion[4:])

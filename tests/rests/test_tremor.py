@@ -65,7 +65,7 @@ def test_the_low_pass_leaves_a_sway():
         np.testing.assert_array_equal(hand.acc[last + 10 : last + 20], measured[last + 10 : last + 20])
 
 
-def test_a_board_that_nobody_touches_is_left_as_it_is():
+def test_samples_of_an_untouched_board_are_left_unchanged():
     runs, measured, hand = held(lambda t: 0.0)
     unchanged = [np.array_equal(hand.acc[first:last], measured[first:last]) for first, last in runs]
     assert np.mean(unchanged) > 0.5  # by chance, the noise of some is a tenth above that of the flat segment

@@ -60,7 +60,7 @@ def test_deviations_that_few_turns_tell_count_as_such(model, least, most):
     assert least <= share < most
 
 
-def test_what_changed_is_named():
+def test_changed_parameters_are_named():
     moved = replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 0.098, 0.0]))
     found = compare(TRUTH, moved)
     assert found.same is False
@@ -108,7 +108,7 @@ def test_without_uncertainties_nothing_is_claimed():
         ({"extra": {"autopilot": {"params_old": {"INS_ACCOFFS_X": 1.0}}}}, "parameters of the autopilot"),
     ],
 )
-def test_what_else_differs_is_said(change, says):
+def test_other_differences_are_remarked_on(change, says):
     first = replace(TRUTH, sensor=Sensor(who_am_i=0x68, temperature_c=20.0, accel_offsets=(1, 2, 3)))
     (remark,) = compare(first, replace(first, **change)).remarks
     assert re.search(says, remark)

@@ -32,11 +32,11 @@ def through(parameters):
     ],
     ids=["a chip's to a vehicle", "a vehicle's to a chip", "other parameters"],
 )
-def test_what_does_not_belong_together_is_refused(calibration, sensor, autopilot, says):
+def test_a_calibration_of_another_sensor_is_refused(calibration, sensor, autopilot, says):
     with pytest.raises(UsageError, match=says):
         make_correction(calibration, sensor, autopilot)
 
 
 @pytest.mark.parametrize("calibration", [made(), made(extra=VEHICLE)], ids=["of anything", "of the vehicle"])
-def test_what_nobody_can_tell_apart_is_taken(calibration):
+def test_a_sensor_of_unknown_identity_is_accepted(calibration):
     assert make_correction(calibration, Sensor(), through(OLD)).calibration is calibration

@@ -60,7 +60,7 @@ def loaded(folder, text):
         ("later", "x" * 70_000),
     ],
 )
-def test_what_is_wrong_is_one_sentence(tmp_path, where, wrong):
+def test_a_wrong_document_is_reported_in_one_sentence(tmp_path, where, wrong):
     document = json.loads(ONE.json())
     *path, last = [int(key) if key.isdecimal() else key for key in where.split()]
     inner = reduce(lambda value, key: value[key], path, document)
@@ -82,7 +82,7 @@ def test_no_json_is_one_sentence(tmp_path, text):
         loaded(tmp_path, text)
 
 
-def test_a_file_without_digest_is_read_and_doubted_and_one_whose_numbers_read_the_same_is_not(tmp_path):
+def test_a_file_without_digest_is_doubted_and_one_of_equal_numbers_is_not(tmp_path):
     document = json.loads(ONE.json())
     assert not loaded(tmp_path, ONE.json()).doubt
     # as a language writes it whose numbers are all doubles
@@ -108,7 +108,7 @@ def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at)
 
 
 @pytest.mark.parametrize("unknown", ["D", "K"])
-def test_what_is_not_known_is_not_applied(tmp_path, unknown):
+def test_unknown_parameters_are_not_applied(tmp_path, unknown):
     read = loaded(tmp_path, replace(ONE, **{unknown: np.full_like(getattr(ONE, unknown), np.nan)}).json())
     assert read.verdict == "good"
     with pytest.raises(UsageError, match="the calibration lacks"):

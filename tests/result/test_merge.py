@@ -67,7 +67,7 @@ def test_the_merged_one_corrects_at_every_temperature(tmp_path):
     ],
     ids=["too near", "flat", "curved"],
 )
-def test_what_the_data_do_not_support_is_said(changes, says):
+def test_unsupported_temperature_models_are_reported(changes, says):
     rng = np.random.default_rng(3)
     temperatures = changes.pop("temperatures", (5.0, 15.0, 31.0))
     made = merge([session(T, rng, **changes) for T in temperatures])
@@ -77,7 +77,7 @@ def test_what_the_data_do_not_support_is_said(changes, says):
     assert len(made.calibration.blob().encode()) == LENGTHS[2]
 
 
-def test_a_gain_that_changes_is_said():
+def test_a_gain_that_changes_with_temperature_is_reported():
     rng = np.random.default_rng(4)
     made = merge([session(T, rng, D_slope=2e-4) for T in (5.0, 15.0, 31.0)])
     assert "D changed with temperature" in made.remarks[0]
@@ -99,7 +99,7 @@ RNG = np.random.default_rng(5)
         ([session(30.0, RNG, b_a_slope=np.ones(3))], UsageError, "merged already"),
     ],
 )
-def test_what_does_not_belong_together_is_refused(others, error, says):
+def test_calibrations_that_cannot_be_merged_are_refused(others, error, says):
     with pytest.raises(error, match=says):
         merge([session(10.0, RNG), *others])
 

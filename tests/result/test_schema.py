@@ -37,7 +37,7 @@ def unknown_keys(document, schema, path=""):
     return [f"{path}.{key}" for key in document.keys() - known.keys()] + inner
 
 
-def test_a_calibration_satisfies_it_and_so_does_a_refused_one(document):
+def test_good_and_refused_calibrations_satisfy_the_schema(document):
     Draft202012Validator.check_schema(SCHEMA)
     VALIDATOR.validate(document)
     assert not unknown_keys(document, SCHEMA)
@@ -49,7 +49,7 @@ def test_a_calibration_satisfies_it_and_so_does_a_refused_one(document):
     assert not unknown_keys(document, SCHEMA)
 
 
-def test_it_describes_the_entries_of_merges_vehicles_and_noise():
+def test_the_schema_describes_the_entries_of_merges_vehicles_and_noise():
     one, other = (
         Calibration(
             np.eye(3) * 1.01,

@@ -433,7 +433,7 @@ def test_silence_before_turning_is_abandoned(board):
     assert "no samples for 5 s" in session.words()
 
 
-def test_decides_the_same_however_the_samples_arrive(make_board, varied):
+def test_decisions_are_the_same_for_any_division_of_the_samples(make_board, varied):
     def decided(poll):
         board, session = make_board(), Session()
         parts = [board.shaken(1.0, 2.0), board.still(11.0)]

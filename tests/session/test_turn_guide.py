@@ -19,7 +19,7 @@ def test_the_missing_turn_leads_to_the_wanted_orientation():
         assert turn.missing_deg - 1e-6 <= between <= turn.missing_deg + 5.0, down
 
 
-def test_who_turns_by_the_words_comes_nearer():
+def test_turning_by_the_words_approaches_the_target():
     """Turn by the angle and the words alone, from 200 random attitudes: at most 0.6 of it is left."""
     rng = np.random.default_rng(1)
     words = [f"deg more, {each}" for each in TURN_WORDS]

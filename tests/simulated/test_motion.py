@@ -80,7 +80,7 @@ def test_the_shortest_turn(a, b):
 
 
 @pytest.mark.parametrize("late_s", [0.001, -0.001])
-def test_one_of_the_two_may_be_that_of_earlier(late_s):
+def test_force_or_rate_may_lag_behind_the_other(late_s):
     edges = np.arange(400) * PERIOD_S
     said = [prompt("rotate")]
 

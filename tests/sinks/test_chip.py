@@ -232,7 +232,7 @@ def test_a_fault_at_any_step_leaves_the_old_state_or_the_new(
         assert board.words() == written
 
 
-def test_a_wire_that_stays_pulled_is_told_with_its_remedy(calibration):
+def test_a_wire_that_stays_pulled_is_reported_with_its_remedy(calibration):
     board = Board()
     board.fails = dict.fromkeys(range(300, 100_000), False)
     with pytest.raises(WriteBackError, match=r"could not be restored .*switch the chip's supply off and on"):
@@ -253,7 +253,7 @@ def test_an_interrupted_write_is_undone(calibration):
     assert board.words() == TRIM
 
 
-def test_a_chip_that_is_gone_is_told_before_anything_is_written(calibration):
+def test_a_missing_chip_is_reported_before_anything_is_written(calibration):
     board = Board()
     board.read = Mock(side_effect=NoAnswer("nothing answers at 0x68 on the bus", "check VCC, GND, SDA and SCL"))
     with pytest.raises(WriteBackError, match="nothing was written: nothing answers"):

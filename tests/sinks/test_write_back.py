@@ -94,7 +94,7 @@ def as_it_is(kind, now):
 
 @settings(max_examples=50)
 @given(fails=st.sets(st.integers(1, 4), max_size=2), full_after=st.none() | st.integers(0, 4), memory=st.booleans())
-def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, fails, full_after, memory):
+def test_a_failure_leaves_the_old_or_the_new_state_and_files_that_agree(tmp_path_factory, fails, full_after, memory):
     folder = tmp_path_factory.mktemp("faults")
     calibration = measured()
     calibration.save(folder / "calibration.json")
@@ -134,7 +134,7 @@ def test_a_place_that_cannot_be_restored_says_what_it_keeps_and_takes_calibratio
         write_to(kind, sink, measured(), tmp_path, unsaved, print)
 
 
-def test_what_cannot_be_written_is_told_or_a_failure(tmp_path, monkeypatch):
+def test_a_device_without_storage_fails_only_if_it_was_asked_for(tmp_path, monkeypatch):
     sink, said = Registers(set()), []
     assert write_all(monkeypatch, sink, measured(verdict="refused"), tmp_path, as_it_is) == []
     assert not sink.held.any()
@@ -177,7 +177,7 @@ def test_without_a_person_only_what_is_verified_and_better_is_written(
     assert bool(sink.held.any()) is (objection is None)
 
 
-def test_what_was_measured_stays_where_another_stream_comes_now(tmp_path):
+def test_the_measured_calibration_is_kept_beside_that_of_the_new_stream(tmp_path):
     first = measured()
     now = replace(first, D=2 * np.eye(3), extra={"written": [{"to": "autopilot"}]})
     held = session_recorder(tmp_path, first, None, None)(SINKS["autopilot"], now)

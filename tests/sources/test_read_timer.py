@@ -37,7 +37,7 @@ def read(host):
     return read
 
 
-def test_of_nothing_but_pauses_no_time_is_known(host, read):
+def test_reads_that_are_all_paused_give_no_time(host, read):
     host.takes_ns = [14_000_000, 5_000_000, 9_000_000]
     with pytest.raises(LateRead, match="took 9 ms longer than usual"):
         read()
@@ -45,7 +45,7 @@ def test_of_nothing_but_pauses_no_time_is_known(host, read):
 
 
 @pytest.mark.parametrize(("matters", "tries"), [(True, 2), (False, 1)])
-def test_only_a_read_whose_time_matters_is_made_again(host, read, matters, tries):
+def test_only_a_read_whose_time_matters_is_repeated(host, read, matters, tries):
     host.takes_ns = [14_000_000]
     before = next(host.read)
     read(matters)

@@ -137,14 +137,14 @@ def test_the_driver_measures_and_i2c_stays_off(opened, chip):
         (errno.EIO, "/dev/spidev0.0 does not work"),
     ],
 )
-def test_why_it_cannot_be_opened(opened, monkeypatch, number, says):
+def test_each_reason_that_a_device_cannot_be_opened_is_reported(opened, monkeypatch, number, says):
     _, device = opened()
     monkeypatch.setattr(type(device), "opens", number)
     with pytest.raises(BusError, match=says):
         SpiBus("/dev/spidev0.0")
 
 
-def test_without_the_library_it_says_what_to_install(monkeypatch):
+def test_a_missing_library_is_reported_with_its_install_command(monkeypatch):
     usual = builtins.__import__
 
     def without(name, *rest):

@@ -55,7 +55,7 @@ def test_replaced_characters_keep_the_styles_in_their_places(views):
     assert [row.plain[row.spans[-1].start :][:9] for row in rows] == ["  (target"] * 2
 
 
-def test_on_a_low_screen_the_words_are_left(views):
+def test_a_low_screen_shows_the_words_without_a_picture(views):
     drawn = text_of(views["turned"], 40, 12)
     assert not BRAILLE.search("".join(drawn))
     assert "ROLL LEFT 60" in drawn[1]

@@ -25,7 +25,7 @@ def test_the_bell_rings_at_new_prompts_only(out):
     assert "\a" not in silent.getvalue()
 
 
-def test_a_whole_session_is_told(out, session):
+def test_a_whole_session_is_printed(out, session):
     lines = Lines(out, Keys())
     for output in session:
         lines.hear(output)
@@ -64,7 +64,7 @@ def test_every_event_is_a_line_of_json(out, session):
     }
 
 
-def test_a_session_whose_listener_left_goes_on():
+def test_a_session_continues_after_its_output_pipe_is_closed():
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w", buffering=1) as pipe:

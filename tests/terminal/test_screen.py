@@ -77,7 +77,7 @@ def drawn(screen, out, words):
     raise AssertionError(f"{words!r} was never drawn")
 
 
-def test_a_terminal_that_takes_nothing_stops_nobody():
+def test_a_blocked_terminal_does_not_stop_the_session():
     """The session goes on although, after Ctrl-S, the terminal's buffer is full."""
     person, program = pty.openpty()
     os.set_blocking(person, False)

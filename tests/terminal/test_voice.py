@@ -75,7 +75,7 @@ def test_the_turn_is_repeated_after_a_while_and_at_once_for_another_orientation(
     assert [(t_s, said[:2]) for t_s, _, said in words[1:]] == [(1.0, "60"), (6.1, "40"), (7.2, "90")]
 
 
-def test_a_caution_is_said_once_and_not_late():
+def test_a_caution_is_spoken_once_and_not_late():
     caution = Caution(2.0, "too_fast", "turned too fast", "turn it more slowly")
     told = (2.0, Tone.WRONG, "turned too fast. turn it more slowly")
     assert told in spoken(SIDE, left(1.0), caution, left(2.25), left(2.5))

@@ -42,7 +42,7 @@ def _has_main(path):
     return any("main" in each for each in names)
 
 
-def test_a_program_that_is_not_there_is_said_so(monkeypatch):
+def test_an_unknown_program_is_reported(monkeypatch):
     monkeypatch.setattr("sys.argv", ["lab", "nonsense"])
     with pytest.raises(SystemExit, match="has no program 'nonsense'"):
         programs.run("lab")

@@ -200,7 +200,7 @@ def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmwa
     assert re.search(said, applied.what)
 
 
-def test_it_is_level_as_it_stands_where_the_person_says_so():
+def test_a_vehicle_is_level_as_it_stands_if_the_person_confirms_it():
     vehicle, _, link = vehicle_of("px4", ",imus=1" + LEVELLED["px4"])
     applied = AutopilotSink(link, confirm=lambda question, with_yes: True).write(calibration_of(vehicle))
     assert np.abs(attitude_deg(vehicle, link)).max() < 0.1
@@ -210,7 +210,7 @@ def test_it_is_level_as_it_stands_where_the_person_says_so():
     np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
 
 
-def test_a_vehicle_whose_horizon_cannot_be_checked_after_its_reboot_need_not_reboot_again(monkeypatch):
+def test_an_unchecked_horizon_after_a_reboot_asks_for_no_second_reboot(monkeypatch):
     def silent(*_):
         raise LinkError("it is silent", "look")
 
@@ -220,7 +220,7 @@ def test_a_vehicle_whose_horizon_cannot_be_checked_after_its_reboot_need_not_reb
     assert "it is silent: look, and look whether its horizon is level before it flies" in applied.what
 
 
-def test_a_level_that_nobody_set_is_not_made_of_old_offsets_and_a_vehicle_reboots_only_on_request():
+def test_an_unset_level_is_not_derived_and_a_reboot_only_on_request():
     vehicle, _, link = vehicle_of("ardupilot", ",imus=1")
     applied = AutopilotSink(link).write(calibration_of(vehicle))
     assert not vehicle.firmware.trim_deg.any()
@@ -229,7 +229,7 @@ def test_a_level_that_nobody_set_is_not_made_of_old_offsets_and_a_vehicle_reboot
     assert "would arm" not in applied.what
 
 
-def test_what_was_kept_is_put_back(tmp_path):
+def test_saved_parameters_are_restored(tmp_path):
     vehicle, _, link = vehicle_of("ardupilot", ",imus=1" + LEVELLED["ardupilot"])
     sink = AutopilotSink(link)
     old = stored(vehicle)
@@ -283,7 +283,7 @@ def of_px4(calibration):
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )
-def test_nothing_is_written_that_does_not_belong_there(firmware, words, change, why):
+def test_an_unfit_calibration_is_not_written(firmware, words, change, why):
     vehicle, transport, link = vehicle_of(firmware, words)
     with pytest.raises(WriteBackError, match=rf"nothing was written.*{why}"):
         AutopilotSink(link).write(change(calibration_of(vehicle)))
@@ -381,7 +381,7 @@ def reboot(transport, number):
     fault=st.sampled_from([lose, arm, refuse, spoil, reboot, vanish]),
     number=st.integers(1, 18),
 )
-def test_whatever_happens_at_whichever_step_it_holds_the_old_or_the_new(firmware, fault, number):
+def test_a_fault_at_any_step_leaves_the_old_or_the_new_parameters(firmware, fault, number):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1" + LEVELLED[firmware])
     calibration = calibration_of(vehicle)
     old = stored(vehicle)
@@ -430,7 +430,7 @@ def test_an_imu_that_would_not_become_better_keeps_its_parameters():
     assert "as good as the new ones" in sink.reason_to_keep(once)
 
 
-def test_px4_is_not_said_to_hold_what_lies_in_its_dead_band():
+def test_parameters_within_the_dead_band_of_px4_are_reported_as_kept():
     vehicle, _, link = vehicle_of("px4")
     vehicle.imus.truths = (vehicle.imus.truths[0], replace(vehicle.imus.truths[1], D=np.eye(3), b_a=np.full(3, 0.004)))
     calibration = calibration_of(vehicle)
@@ -475,7 +475,7 @@ def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
 
 @pytest.mark.parametrize("number", [1, 3, 5, 6])
 @pytest.mark.parametrize("firmware", FIRMWARES)
-def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_path):
+def test_the_next_write_after_a_kill_restores_the_old_parameters(firmware, number, tmp_path):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, journal = stored(vehicle), Journal(tmp_path / "note.json")
     calibration = calibration_of(vehicle)
@@ -492,7 +492,7 @@ def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_
     assert AutopilotSink(link, journal=journal).recover() is None
 
 
-def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_off(tmp_path):
+def test_parameters_of_an_interrupted_write_are_not_restored_to_another_vehicle(tmp_path):
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     journal = Journal(tmp_path / "note.json")
     strike(transport, 3, kill)
@@ -513,7 +513,7 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
         ("values", "the address forged"),
     ],
 )
-def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
+def test_an_attacked_write_sets_no_other_parameter(kind, attacker, monkeypatch):
     key = hostile.KEY if attacker == hostile.SIGNED else None
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1"), key=key)
     attack = hostile.Attack(kind, attacker, "ardupilot", 0, 40.0)
@@ -537,7 +537,7 @@ def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
         assert value in (before, pytest.approx(new[name]))
 
 
-def test_who_answers_in_the_vehicles_place_is_told_by_its_answers():
+def test_an_impostor_of_the_vehicle_is_detected_by_its_answers():
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     impostor = dialect().MAVLink(None, 1, 1)
     send = transport.send

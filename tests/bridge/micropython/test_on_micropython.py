@@ -31,7 +31,7 @@ from mpucal.terminal.console import console
 BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
 
 
-def test_it_samples_at_one_kilohertz_and_leaves_the_repl_as_it_was(rig, board, numbers, stream):
+def test_the_board_samples_at_one_kilohertz_and_returns_to_its_repl(rig, board, numbers, stream):
     made = rig()
     there = board(made.chip, made.clock)
     bus = BridgeBus(MicroPythonPort(there, (4, "SCL")))
@@ -56,7 +56,7 @@ def test_a_program_that_runs_gives_way(board, rig):
     assert BridgeBus(MicroPythonPort(there)).read(0x75, 1).data == b"\x68"
 
 
-def test_its_flash_keeps_a_calibration_over_restarts(board, capsys, monkeypatch, tmp_path):
+def test_flash_keeps_a_calibration_over_restarts(board, capsys, monkeypatch, tmp_path):
     there, path = board(), tmp_path / "calibration.bin"
     path.write_bytes(BLOB.read_bytes())
     monkeypatch.setattr(pasting, "SerialPort", lambda _text, _bauds: there)
@@ -70,7 +70,7 @@ def test_its_flash_keeps_a_calibration_over_restarts(board, capsys, monkeypatch,
     assert BlobStore(link).read() is None
 
 
-def test_it_answers_as_the_protocol_settles(board, rig):
+def test_the_board_conforms_to_the_protocol(board, rig):
     made = rig()
     link = Link(MicroPythonPort(board(made.chip, made.clock)))
     link.greet()

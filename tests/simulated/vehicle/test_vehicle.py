@@ -96,7 +96,7 @@ def test_whole_milli_g_are_truncated_toward_zero():
 
 
 @pytest.mark.parametrize("words", ["rotate_at=0,fault=reboot@2", "firmware=px4,fault=autocal@2"], ids=str)
-def test_how_its_time_is_moved_on_changes_nothing(words):
+def test_packets_are_the_same_for_any_steps_of_time(words):
     sent = []
     for stops_us in (range(2_500_000, 2_500_001), range(3000, 2_500_001, 1000), (700_000, 710_100, 2_500_000)):
         station = Station(words)

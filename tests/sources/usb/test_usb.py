@@ -78,7 +78,7 @@ def adapter(request, plugged):
     return partial(request.param[1], SPELLED[request.param[0]])
 
 
-def test_an_address_where_nothing_is_is_told(adapter):
+def test_an_address_without_a_chip_is_reported(adapter):
     with pytest.raises(NoAnswer, match=r"0x69"):
         adapter(0x69)
     bus = adapter()
@@ -98,12 +98,12 @@ def test_the_driver_samples_over_it(adapter):
     bus.close()
 
 
-def test_what_is_plugged_in_is_listed(plugged):
+def test_plugged_adapters_are_listed(plugged):
     assert [spelled for spelled, _ in adapters()] == ["ftdi://ftdi:232h:FT232H/1", "mcp2221"]
 
 
 @pytest.mark.parametrize("enumerated", [True, False])
-def test_of_several_each_is_named_by_its_serial(enumerated, chip, monkeypatch):
+def test_several_adapters_are_named_by_their_serials(enumerated, chip, monkeypatch):
     """Out of the factory none enumerates with it, and it is found by the one in its flash."""
     hid = _beside("mcp2221_device").Hid(chip, ("0001", "0002"), enumerated)
     monkeypatch.setattr("EasyMCP2221.MCP2221.hid", hid)
@@ -131,7 +131,7 @@ def test_the_doctor_lists_adapters_and_examines_the_chip(name, plugged, capsys, 
 
 
 @pytest.mark.parametrize("name", ["ftdi://ftdi:2232h/1", "mcp2221:none"])
-def test_an_adapter_that_is_not_there_is_told(name, plugged):
+def test_a_missing_adapter_is_reported(name, plugged):
     kind = Ftdi if name.startswith("ftdi") else Mcp2221
     with pytest.raises(BusError, match=r"the USB adapter .* cannot be opened"):
         kind(name)

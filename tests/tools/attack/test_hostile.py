@@ -47,7 +47,7 @@ def test_readers_refuse_mutated_bytes(fuzzed, capsys):
     assert fuzzed(1) == 0, capsys.readouterr().out
 
 
-def test_by_coverage(holds):
+def test_readers_withstand_input_guided_by_coverage(holds):
     pytest.importorskip("atheris")
     holds("attack", "fuzz", "--guided", "--seconds", "2", "--first", "1", "bridge", "mcap's messages")
 
@@ -59,13 +59,13 @@ def test_the_firmwares_core_on_hostile_requests(holds):
 
 
 @pytest.mark.parametrize(("seed", "target"), [("207790003882", "npz"), ("207790000083", "dataflash")])
-def test_what_once_ended_in_a_trace(fuzzed, capsys, seed, target):
+def test_input_that_once_ended_in_a_traceback(fuzzed, capsys, seed, target):
     assert fuzzed(seed, target) == 0, capsys.readouterr().out
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux") or not shutil.which("cc"), reason="needs Linux and cc")
-def test_files_are_old_or_new_whatever_call_or_allocation_fails(holds):
+def test_files_are_old_or_new_after_any_failed_call_or_allocation(holds):
     holds("attack", "syscalls", "export", "write", "--most", "6", "--allocations", "1", "--seed", "1")
 
 
@@ -81,12 +81,12 @@ def test_an_output_that_cannot_be_written_is_left_as_it_is(holds):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc")
-def test_what_is_struck_ends_as_it_may(holds):
+def test_sessions_under_attack_end_in_an_allowed_way(holds):
     holds("lab", "campaign", "--sessions", "16", "--recordings", "40", "--first", "1")
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs named pipes and ulimit")
-def test_a_pipe_is_not_replayed_and_too_little_room_is_said(tmp_path, capsys):
+def test_a_pipe_is_not_replayed_and_a_full_disk_is_reported(tmp_path, capsys):
     os.mkfifo(tmp_path / "capture.mcap")
     assert run(["session", "--replay", str(tmp_path)]) == 3
     assert "is a pipe or device" in capsys.readouterr().err

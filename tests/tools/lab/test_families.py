@@ -38,7 +38,7 @@ def test_noise_has_the_density_that_was_asked_for():
         assert np.sqrt(psd[passed].mean()) == pytest.approx(0.02, rel=0.05)
 
 
-def test_words_are_garbled_as_said():
+def test_words_are_garbled_as_documented():
     rng = np.random.default_rng(0)
     counts = rng.integers(-20_000, 20_000, (5000, 6)).astype(np.int32)
     dead = faults.low_byte_zero(counts.copy(), rng)
@@ -64,7 +64,7 @@ def verdict(*, family="poses", **values):
     return families.row(judgement(**{"verdict": "good", "error": 0.01, "claim": 0.01, "family": family, **values}))
 
 
-def test_limits_that_are_broken_are_told_by_name():
+def test_broken_limits_are_reported_by_name():
     right = [verdict(), verdict(family="quiet poses", error=1e-4, claim=1e-4)]
     assert families.broken(right) == []
     assert verdict(error=0.031).false and verdict(claim=float("nan")).false

@@ -8,14 +8,14 @@ from tools.lab import guidance_trials as trials
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hand", ["by words", "wandering"])
-def test_what_a_person_is_shown_is_right(hand):
+def test_guidance_shown_to_a_person_is_right(hand):
     """A hand that has nothing but the words comes to a good end, and one that does as it likes is told so."""
     trial = trials.of_hand((hand, 1))
     assert (trial.verdict, trial.wrong) == ("good", {})
     assert trial.holds >= 10
 
 
-def test_what_is_wrong_is_counted():
+def test_wrong_guidance_is_counted():
     watcher = trials.Watcher()
     near, far = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
     words = "90 deg more, tip it away from you"

@@ -25,7 +25,7 @@ def test_a_trial_prints_its_table_and_writes_its_rows(trial, words, said, tmp_pa
     assert json.loads((tmp_path / "rows.json").read_text())
 
 
-def test_what_is_not_an_option_is_refused(capsys):
+def test_unknown_options_are_refused(capsys):
     with pytest.raises(SystemExit):
         noise_trials.main(["--hour"])
     assert "usage" in capsys.readouterr().err

@@ -29,7 +29,7 @@ def defined(tree, name):
     return False
 
 
-def test_what_it_points_at_is_there():
+def test_references_of_the_documentation_exist():
     for path, name in sorted(REFERENCES):
         found = next((folder / path for folder in (ROOT / "mpucal", ROOT) if (folder / path).exists()), None)
         assert found is not None, path
@@ -45,5 +45,5 @@ def test_the_tests_and_tools_that_a_page_names_are_there():
     assert [each for each in sorted(named) if not (ROOT / each[1]).exists()] == []
 
 
-def test_what_is_made_is_made_anew():
+def test_generated_files_are_up_to_date():
     assert not list(pages.outdated()), "run `python -m tools.make pages`"

@@ -48,7 +48,7 @@ def test_gravity_and_gyroscope_follow_the_attitude_from_a_flat_rest(motion):
     assert (np.abs(angle.sum(0)) < 5 * noise * np.sqrt(len(angle))).all()
 
 
-def test_a_seed_is_the_same_sensor_and_motion_whatever_else_is_asked():
+def test_a_seed_gives_the_same_sensor_and_motion_beside_other_options():
     plain, trembling = by_hand(3, "pose6"), by_hand(3, "pose6", tremble=True)
     np.testing.assert_array_equal(plain.truth.D, by_hand(3, "continuous").truth.D)
     np.testing.assert_array_equal(plain.truth.D, trembling.truth.D)
@@ -88,7 +88,7 @@ def test_uncalibrated_sensors_are_as_far_off_as_is_known(draw, error_mps2):
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the other simulator's recordings are not beside this checkout")
 @pytest.mark.parametrize(("file", "motion"), [("pose6_0", "pose6"), ("rot_0", "continuous")])
-def test_it_agrees_with_another_simulator_in_what_can_be_counted(file, motion):
+def test_noise_and_rates_agree_with_another_simulator(file, motion):
     with np.load(SHARED / f"{file}.npz") as other:
         omega = (other["gyr"] - other["true_b_omega"]) @ other["true_K"].T
         beyond = other["acc"] - other["true_specific_force"] @ other["true_D"].T - other["true_b_a"]
