@@ -192,9 +192,11 @@ class _Search:
         """Search with Huber's loss, which converges from afar, then with the redescending one and the best sigma."""
         prepared = self.prepared
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
-        sigma, sigmas = HAND_MPS2[0], HAND_MPS2 if prepared.rests_often else WHITE_MPS2
-        for _ in range(2):
-            sigma = most_likely_sigma(prepared.white, sigmas, theta, sigma)
+        sigmas = HAND_MPS2 if prepared.rests_often else WHITE_MPS2
+        first = most_likely_sigma(prepared.white, sigmas, theta, HAND_MPS2[0])
+        theta = self._roughly(prepared.white(first), theta)
+        sigma = most_likely_sigma(prepared.white, sigmas, theta, first)
+        if sigma != first:
             theta = self._roughly(prepared.white(sigma), theta)
         if sigma == 0.0:
             return theta, Noise("none", 0.0)

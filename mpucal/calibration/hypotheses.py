@@ -310,7 +310,8 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
         of_x = likelihood.U.swapaxes(3, 4) @ B.swapaxes(1, 2)[:, None, None]
         basis = np.concatenate([basis, of_x], axis=2)
         weights = np.concatenate([np.ones((*shapes.shape[:2], 1)), shapes], axis=2)
-    products = np.einsum("hmadp,hmbdp->hmabp", basis, squares[:, :, None] @ basis)
+    across = (squares[:, :, None] @ basis).transpose(0, 1, 4, 3, 2)
+    products = (basis.transpose(0, 1, 4, 2, 3) @ across).transpose(0, 1, 3, 4, 2)
     pairs = (weights[:, :, :, None] * weights[:, :, None]).swapaxes(0, 1)
     away2 = pairs.reshape(len(pairs), -1) @ products.reshape(len(alike), -1, products.shape[-1])
     away = np.sqrt(np.maximum(away2, 0.0))

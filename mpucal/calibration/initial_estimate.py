@@ -16,7 +16,7 @@ from .rotation import fibonacci_sphere, tangents
 from .theta import Theta
 
 POINTS = 300
-REFINEMENTS = 5
+REFINEMENTS = 3
 # The ridge keeps the equations solvable for a board that hardly turned; a second of data outweighs it.
 RIDGE = 1e-9
 # So many of the longest stretches between gaps are tried.

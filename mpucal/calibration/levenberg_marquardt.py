@@ -6,12 +6,13 @@ Source: Nocedal, Wright, "Numerical Optimization" (2006), section 10.3; Marquard
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data import Vector
+from ..data import Mask, Vector
 from .fit import Fit
 from .likelihood import Evaluation, evaluate
 from .parameters import HAND, NAMES, PLACES
@@ -107,23 +108,22 @@ def minimise(
     free = np.ones(parameters, bool)
     for name in fixed:
         free[PLACES[name]] = False
-    at, damping, iterations, converged = _At(problem, theta, parameters, prior, ends), DAMPING, 0, False
+    at, damping, iterations, converged = _At(problem, theta, free, prior, ends), DAMPING, 0, False
     least, in_vain, last = np.inf, 0, np.zeros(parameters)
     while iterations < most and damping < HOPELESS and in_vain < MOST_IN_VAIN:
-        gradient, H = at.gradient[free], at.H[np.ix_(free, free)]
-        decrement = at.decrement(free)
+        gradient, H, decrement = at.gradient, at.free_H, at.decrement
         least, in_vain = (decrement, 0) if decrement < HALF * least else (least, in_vain + 1)
         if decrement < until:
             converged = True
             break
         step = np.zeros(parameters)
         if decrement < unseen * until:
-            last[free] = -_solve(H, gradient)
+            last[free] = at.newton
             converged, iterations = True, iterations + 1
             break
         step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
-        trial = _At(problem, at.theta.moved(step), parameters, prior, ends)
-        if trial.V < at.V or (frozen and _nearer(trial, at, free, decrement)):
+        trial = _At(problem, at.theta.moved(step), free, prior, ends)
+        if trial.V < at.V or (frozen and _nearer(trial, at)):
             at, damping, iterations = trial, damping * EASIER, iterations + 1
         elif not frozen and -float(gradient @ step[free]) < until:
             converged = True  # nor does V fall along the gradient
@@ -135,32 +135,38 @@ def minimise(
     return Minimum(theta, V, nis, at.H, free, iterations, converged, (at.theta, at.data), last)
 
 
-def _nearer(trial: _At, at: _At, free: Vector, decrement: float) -> bool:
+def _nearer(trial: _At, at: _At) -> bool:
     """Return True if a step came nearer to the root of the gradient with frozen gains."""
-    then, risen = trial.decrement(free), trial.V - at.V
-    return then < decrement and risen < (SLACK_NEAR_A_ROOT if then < NEAR_A_ROOT * decrement else FROZEN_SLACK)
+    shrunk, risen = trial.decrement / at.decrement, trial.V - at.V
+    return shrunk < 1.0 and risen < (SLACK_NEAR_A_ROOT if shrunk < NEAR_A_ROOT else FROZEN_SLACK)
 
 
 class _At:
-    """V, gradient and H at theta, with the prior's share."""
+    """V and H at theta, with the prior's share; the gradient, and what follows from it, of the free parameters."""
 
     def __init__(
-        self, problem: Problem, theta: Theta, parameters: int, prior: Prior, ends: NDArray[np.int64] | None
+        self, problem: Problem, theta: Theta, free: Mask, prior: Prior, ends: NDArray[np.int64] | None
     ) -> None:
-        self.theta = theta
+        self.theta, parameters = theta, len(free)
         self.data: Evaluation = evaluate(problem, theta, parameters, ends)
         away = (theta.values() - prior.mean)[:parameters]
         precision = prior.precision[:parameters]
         self.V = self.data.V + 0.5 * float(precision @ (away * away))
         if not np.isfinite(self.V):
             self.V = np.inf
-        self.gradient = self.data.gradient + precision * away
         self.H = self.data.fisher + np.diag(precision)
+        self.free_H = self.H[np.ix_(free, free)]
+        self.gradient = (self.data.gradient + precision * away)[free]
 
-    def decrement(self, free: Vector) -> float:
-        """Return the Newton decrement g' H^-1 g / 2 over the free parameters, by which V would still fall."""
-        gradient = self.gradient[free]
-        return float(gradient @ _solve(self.H[np.ix_(free, free)], gradient)) / 2.0
+    @cached_property
+    def newton(self) -> Vector:
+        """Newton's step."""
+        return -_solve(self.free_H, self.gradient)
+
+    @cached_property
+    def decrement(self) -> float:
+        """Newton decrement g' H^-1 g / 2, by which V would still fall."""
+        return -0.5 * float(self.gradient @ self.newton)
 
 
 def information(problem: Problem, theta: Theta, prior: Prior) -> Vector:

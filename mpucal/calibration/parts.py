@@ -82,7 +82,7 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
     t = np.concatenate([[0.0], np.cumsum(series.dt)])
     starts = np.concatenate([[0], ends[:-1]]).astype(np.intp)  # 32 bits on some ARMs
     mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]
-    s = (mean - theta.b_a) @ np.linalg.pinv(theta.D).T
+    s = (mean - theta.b_a) @ theta.inverse.T
     axis = np.abs(s).argmax(1)
     away, precision = theta.values()[: len(free)] - prior.mean[: len(free)], prior.precision[: len(free)]
     left = scores.gradient.sum(0) + scores.flat.gradient + precision * away

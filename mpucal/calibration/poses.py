@@ -25,12 +25,14 @@ class Poses:
 
     Attributes
     ----------
-    runs : (k, 2) rests in samples of the recording. variance : (k,) rad^2 an axis, of the direction of gravity.
+    spans : k - 1 slices, the steps of the series from one rest to the next. of_gyro, variance : (k - 1,) rad^2 an axis,
+        of the angle by which these miss the next rest: by the gyroscope's noise, and by all noise.
     end : (k, 4) Z at the last sample. products : (k, 4, 4) means of Z (y, 1)'.
     mean : (k, 3) m/s^2, of y.
     """
 
-    runs: Intervals
+    spans: list[slice]
+    of_gyro: Vector
     variance: Vector
     end: Vector
     products: Vector
@@ -50,15 +52,20 @@ class Poses:
         (mean, spread), n = statistics(recording.acc, runs), runs[:, 1] - runs[:, 0]
         tremor = np.maximum(np.mean(spread - flat.Sigma_a, axis=1), 0.0)
         of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S * recording.rate_hz / n) ** 2
-        variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / problem.gravity**2
-        return cls(runs, variance, end, products, mean)
+        direction = (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / problem.gravity**2
+        spans = [slice(*span) for span in zip(runs[:-1, 1] - flat.last, runs[1:, 0] + 1 - flat.last, strict=True)]
+        of_gyro = flat.Sigma_omega.mean() * np.array([series.dt[span] @ series.dt[span] for span in spans])
+        variance = of_gyro + direction[:-1] + direction[1:]
+        if series.q_extra is not None:
+            variance += [series.q_extra[span].sum() for span in spans]
+        return cls(spans, of_gyro, variance, end, products, mean)
 
     def forces(self, theta: Theta) -> tuple[Vector, Vector]:
         """Return the mean specific forces (k, 3) [m/s^2], in the body's axes at each rest's first and last sample.
 
         A board in a hand turns a little as it rests: each sample is rotated into the axes of either end.
         """
-        inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D, and must not stop there
+        inverse = theta.inverse
         s = (self.mean - theta.b_a) @ inverse.T
         of_Z = np.column_stack([theta.K, -theta.K @ theta.b_omega])
         of_y = np.column_stack([inverse, -inverse @ theta.b_a])

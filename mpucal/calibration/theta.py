@@ -55,6 +55,14 @@ class Theta:
         return self if np.linalg.det(self.D) > 0.0 else replace(self, D=-self.D, u=-self.u)
 
     @cached_property
+    def inverse(self) -> Vector:
+        """Inverse of D, or its pseudoinverse: a search may pass through a singular D, and must not stop there."""
+        try:
+            return np.asarray(np.linalg.inv(self.D))
+        except np.linalg.LinAlgError:
+            return np.asarray(np.linalg.pinv(self.D))
+
+    @cached_property
     def packed(self) -> Vector:
         """The hand's filter's structure: matrices whole, u with its derivatives by the tilts."""
         return self._packed(TABLE)

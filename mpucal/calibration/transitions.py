@@ -46,22 +46,16 @@ class Transition(NamedTuple):
 
 def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     """Return the transitions under theta; none where they are too few to be compared."""
-    series, flat, poses = prepared.problem.series, prepared.flat, prepared.poses
-    runs, direction = poses.runs, poses.variance
-    if len(runs) <= FEWEST_TRANSITIONS:
+    series, poses = prepared.problem.series, prepared.poses
+    if len(poses.spans) < FEWEST_TRANSITIONS:
         return []
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
     coming, leaving = poses.forces(theta)
-    spans = [slice(*span) for span in zip(runs[:-1, 1] - flat.last, runs[1:, 0] + 1 - flat.last, strict=True)]
-    F, leaving, coming = np.array([turned(turns[span]) for span in spans]), leaving[:-1], coming[1:]
+    F, leaving, coming = np.array([turned(turns[span]) for span in poses.spans]), leaving[:-1], coming[1:]
     # The miss is the sine of the angle between two directions, along their axis.
     carried = np.einsum("kij,kj->ki", F, leaving)
     miss = cross_rows(carried, coming) / (lengths(carried) * lengths(coming))[:, None]
-    of_gyro = flat.Sigma_omega.mean() * np.array([series.dt[span] @ series.dt[span] for span in spans])
-    variance = of_gyro + direction[:-1] + direction[1:]
-    if series.q_extra is not None:
-        variance += [series.q_extra[span].sum() for span in spans]
-    columns = spans, F, leaving, coming, miss, variance.tolist(), of_gyro.tolist()
+    columns = poses.spans, F, leaving, coming, miss, poses.variance.tolist(), poses.of_gyro.tolist()
     return [Transition(*of) for of in zip(*columns, strict=True)]
 
 
@@ -152,9 +146,9 @@ def _jacobians(transitions: Sequence[Transition], series: Series, theta: Theta) 
     phi = np.zeros((len(transitions), 3, len(NAMES)))
     phi[:, :, PLACES["K"]] = by_K[:, :, *UPPER]
     F, leaving, v = (np.array([getattr(of, name) for of in transitions]) for name in ("F", "leaving", "coming"))
-    u, inverse = np.einsum("kij,kj->ki", F, leaving), np.asarray(np.linalg.pinv(theta.D))
-    du = F @ _by_accelerometer(inverse, leaving) - cross(u) @ phi
-    J = cross(u) @ _by_accelerometer(inverse, v) - cross(v) @ du
+    u = np.einsum("kij,kj->ki", F, leaving)
+    du = F @ _by_accelerometer(theta.inverse, leaving) - cross(u) @ phi
+    J = cross(u) @ _by_accelerometer(theta.inverse, v) - cross(v) @ du
     return np.asarray(J / (lengths(u) * lengths(v))[:, None, None])
 
 

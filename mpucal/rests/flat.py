@@ -11,7 +11,7 @@ from ..data import Recording, Vector
 from ..kernel import _kernel
 from .limits import QUIET
 from .stillness import Detector, still_windows
-from .windows import WINDOW_S, cut
+from .windows import WINDOW_S, CutWindows
 
 FEWEST = 4  # samples of a window, which is longer than WINDOW_S below 8 Hz
 SHORTEST_FLAT_S = 1.0
@@ -75,12 +75,12 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     session on a table, except that the gyroscope's bias may have any size and that a bump ends a run.
     """
     n = samples_of_window(recording)
-    spreads, windows = cut(with_rates(recording), n)
+    windows = CutWindows.of(with_rates(recording), n)
     if len(windows) < 2:
         return None
-    detector = Detector(QUIET, tuple(np.quantile([spreads.acc_sd, spreads.gyr_sd], 0.05, axis=1)), math.inf)
+    detector = Detector(QUIET, tuple(np.quantile([windows.acc_sd, windows.gyr_sd], 0.05, axis=1)), math.inf)
     runs: list[tuple[int, int, int]] = []
-    for run, first, last in still_windows(detector, spreads, windows):
+    for run, first, last in still_windows(detector, windows):
         goes_on = runs and runs[-1][0] == run and runs[-1][2] == first
         if len(runs) == 1 and not goes_on and runs[0][2] - runs[0][1] >= ENOUGH_FLAT_S * recording.rate_hz:
             break  # the first one is long enough, whatever follows

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ from .limits import (
     Limits,
     learned,
 )
-from .windows import Spreads, Window, of_rows
+from .windows import CutWindows, Spreads, Window, of_rows
 
 # A bump ends within this time, and turns the board by no more than this angle.
 BUMP_S = 2.0
@@ -254,16 +254,15 @@ def _shook(acc_sd: Vector, ratio: Vector) -> str:
     return f"shaking by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"
 
 
-def still_windows(detector: Detector, spreads: Spreads, windows: Sequence[Window]) -> Iterator[tuple[int, int, int]]:
+def still_windows(detector: Detector, windows: CutWindows) -> Iterator[tuple[int, int, int]]:
     """Yield the number of its run, and the first and last + 1 of its samples, for each still window.
 
-    spreads : the same windows. The limits are known beforehand: between runs, those beyond them need no detector.
+    The limits are known beforehand: between runs, windows beyond them need no detector.
     """
-    last, moving = 0, detector.shares(spreads).level > 1.0
-    for window, moves in zip(windows, moving.tolist(), strict=True):
-        first, last = last, last + window.count
+    moving = detector.shares(windows).level > 1.0
+    for k, moves in enumerate(moving.tolist()):
         if moves and not detector.seconds:
             continue
-        state = detector.add(window)
+        state = detector.add(windows[k])
         if isinstance(state, Still):
-            yield state.run, first, last
+            yield state.run, k * windows.n, (k + 1) * windows.n

@@ -94,14 +94,27 @@ class Windows:
         return windows
 
 
-def cut(recording: Recording, n: int) -> tuple[Spreads, list[Window]]:
-    """Cut a whole recording into windows of n samples, without an incomplete last one: all as one, and each."""
-    length_s, m = n / recording.rate_hz, len(recording) // n
-    acc_rows, gyr_rows = (values[: m * n].reshape(m, n, 3) for values in (recording.acc, recording.gyr))
-    gyr, acc_sd, gyr_sd, noise, acc = _of_rows(acc_rows, gyr_rows)
-    spans = (_span(recording, k * n, (k + 1) * n, length_s) for k in range(m))
-    rows = zip(gyr, acc_sd, gyr_sd, noise, acc, spans, strict=True)
-    return Spreads(gyr, acc_sd, gyr_sd, noise), [Window(*of, *span) for *of, span in rows]
+@dataclass(frozen=True)
+class CutWindows(Spreads):
+    """All windows of n samples of a recording, without an incomplete last one; acc : (m, 3) m/s^2, means."""
+
+    acc: Vector
+    recording: Recording
+    n: int
+
+    @classmethod
+    def of(cls, recording: Recording, n: int) -> CutWindows:
+        """Cut a recording into windows of n samples."""
+        m = len(recording) // n
+        acc, gyr = (values[: m * n].reshape(m, n, 3) for values in (recording.acc, recording.gyr))
+        return cls(*_of_rows(acc, gyr), recording, n)
+
+    def __len__(self) -> int:
+        return len(self.acc)
+
+    def __getitem__(self, k: int) -> Window:
+        span = _span(self.recording, k * self.n, (k + 1) * self.n, self.n / self.recording.rate_hz)
+        return Window(self.gyr[k], self.acc_sd[k], self.gyr_sd[k], self.acc_noise[k], self.acc[k], *span)
 
 
 def of_rows(acc: Vector, gyr: Vector, start_s: float = 0.0, end_s: float = 1.0, whole: bool = True) -> Window:
