@@ -22,7 +22,8 @@ from ..files.rows import drop_incomplete
 from ..report.noise import render, summary
 from ..result.clock import now
 from ..result.noise import Noise
-from ..session.lay_flat import put_down
+from ..session.boards import speak_of, usual_board
+from ..session.lay_flat import PUT_DOWN, put_down
 from ..session.ports import Source, polled
 from ..session.results import save
 from ..sources.opening import open_source
@@ -93,7 +94,7 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noi
             sensor = measuring.source.start()
             skipped = 0 if options["replay"] else PUT_DOWN_RUNS
             if skipped:
-                put_down(source.listeners, say)
+                put_down(source.listeners, say, speak_of(PUT_DOWN, usual_board(source.origin)))
             for samples in islice(_runs(measuring.source), skipped, None):
                 meter = meter or NoiseMeter(sensor)
                 meter.add(samples)

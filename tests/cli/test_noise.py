@@ -57,6 +57,13 @@ def test_noise_of_a_sensor_over_hours(mpucal):
     assert document["accelerometer"]["data_sheet"]["white_noise"] == pytest.approx(2.77e-3, rel=0.01)
 
 
+def test_noise_of_a_vehicle_asks_for_a_vehicle_to_be_put_down(mpucal):
+    told = mpucal("noise", "--mavlink", "sim:imus=1", "--hours", "0.003", "--json")
+    assert told.code == 0, told.err
+    assert "Put the vehicle on a firm surface" in told.err
+    assert "board" not in told.err
+
+
 def test_noise_after_ctrl_c_is_that_of_the_samples_so_far(mpucal, monkeypatch):
     from mpucal.allan import NoiseMeter
 
