@@ -28,7 +28,7 @@ sys.path.append(str(Path(__file__).parents[1]))
 
 from mpucal.session.beside import ONE_THREAD
 
-# programs that tests start find mpucal compiled, whatever the shell asks for: each would compile it for half a second
+# let programs that tests start use compiled bytecode, which a shell may forbid: compiling mpucal takes half a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # Debian keeps i2c-tools' programs where a user's PATH may not go
 os.environ["PATH"] = os.pathsep.join((os.environ["PATH"], "/usr/sbin", "/sbin"))
@@ -42,13 +42,13 @@ PROJECT = str(Path(__file__).parents[1])
 UNTRACKED = pytest.StashKey[set[str]]()
 LEFT = pytest.StashKey[list[str]]()
 
-# a shell in the background, or nohup, has these ignored, and what a test starts inherits that
+# in the background or under nohup these are ignored, which a test's programs would inherit
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # `gate` runs the same examples every time; `search` draws others, by the seed of --hypothesis-seed (`make search`).
-# How long a busy machine takes says nothing about what is tested, and what a test's fixtures give is not changed.
+# Durations on a busy machine prove nothing, and no test changes the values of its fixtures.
 QUIET = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
 PATIENT = {"deadline": None, "database": None, "suppress_health_check": QUIET}
 settings.register_profile("gate", derandomize=True, **PATIENT)
@@ -59,7 +59,7 @@ if settings.get_current_profile_name() == "gate":
     # depends on the tests that a worker ran before.
     providers._get_local_constants = lambda: providers._local_constants
 
-# some of what tests import; a slice of them needs less
+# some imports of all tests; a few tests may need less
 NEEDED = ("jsonschema", "matplotlib", "mypy", "polars", "pyarrow", "pymavlink", "rosbags", "yaml")
 
 

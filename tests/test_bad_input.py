@@ -41,7 +41,7 @@ def failing(number):
     return fail
 
 
-# what the kernel says where somebody opens a bus, or asks for a chip on it, and what a person is told
+# errors of the kernel on opening a bus or selecting a chip, and the sentence that a user reads
 BUSES = {
     "no permission": (False, errno.EACCES, "no permission to use /dev/i2c-1: add yourself to its group"),
     "no adapter": (False, errno.ENXIO, "the I2C bus /dev/i2c-1 is gone: plug it in"),
@@ -71,7 +71,7 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-# Words that contradict each other or name nothing, and a part of what is said.
+# Options that contradict each other or name nothing, and a part of the message.
 WRONG = """
 session --bus sim --gravity -9.81                   | '-9.81' is not a local gravity
 session --bus sim --gravity nan                     | 'nan' is not a local gravity

@@ -1,4 +1,4 @@
-"""Chips that are claimed: with faults and without, each ends in a true calibration or a true refusal.
+"""Supported chips, with faults and without: each session ends in a true calibration or a justified refusal.
 
 Each part is simulated from its row: the driver calls it by its name and knows its temperature. Sessions with faults are
 those of the campaign, and their replays those of test_session_replay.py.

@@ -1,4 +1,4 @@
-"""The recipes of CONTRIBUTING.md, followed: the module and the row that stand there, used through the commands."""
+"""The recipes of CONTRIBUTING.md, followed: each module and row is added, and used through the commands."""
 
 import json
 import re
@@ -24,7 +24,7 @@ RECIPES = {
     for title, text in re.findall(r"^### (.+?)\n(.*?)(?=^### |\Z)", PAGE, re.DOTALL | re.MULTILINE)
 }
 
-# what a contributor does by hand: the modules where they are to be, then each row at the end of its table
+# the steps of a contributor: each module into its folder, and each row to the end of its table
 PROGRAM = """
 import importlib.util
 import json

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 from mpucal.session.events import Key
 from mpucal.terminal.keys import Keys
 
-# of which Windows has none, and macOS not all as Linux has them
+# modules that Windows lacks, and of which macOS has other versions
 LINUX = ("fcntl", "grp", "pwd", "pty", "resource", "termios", "tty")
-# installed where somebody has a vehicle, or wants pictures
+# optional: for vehicles and for pictures
 EXTRAS = ("pymavlink", "matplotlib", "pandas", "polars")
 IMPORT_ALL = f"""
 import importlib, pkgutil, sys

@@ -1,4 +1,4 @@
-"""Ctrl-C before anything listens for it."""
+"""Ctrl-C before the program handles it."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The package as a whole: its names, its version, and that the README says what is so."""
+"""The package as a whole: its names, its version, and true statements of the README."""
 
 import re
 import shlex

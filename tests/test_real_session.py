@@ -1,4 +1,4 @@
-"""The main job on what a real MPU-6050 measured: counts to registers, registers to a session, that to D and b_a."""
+"""The main task on a real MPU-6050's measurements: counts to registers, to a session, to D and b_a."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"
 RECORDINGS = SHARED / "recordings"
 RECORDING = RECORDINGS / "mpu6050_session.npz"
-# a session looks five times as often, for the person's sake
+# a session polls five times as often, to guide the person
 LONG_POLL_S = 0.2
 YARDSTICK = SHARED / "check" / "gravity_transport.py"
 

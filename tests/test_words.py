@@ -1,4 +1,4 @@
-"""Terms that a user reads are those of docs/glossary.md: words that were given up do not come back."""
+"""Terms that a user reads are those of docs/glossary.md, and retired words do not return."""
 
 import ast
 import re
@@ -19,7 +19,7 @@ PROJECT = Path(__file__).parents[1]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").glob("*.md"))]
 CAPTURE = PROJECT / "fixtures" / "sessions" / "enter.mcap"
 
-# what was said: what is said instead
+# retired word: its replacement
 RETIRED = {
     r"(?<!kalman )\bgains?\b": "scale factor, scale factor error",
     r"\bleans?\b( \w+)? to\b": "misalignment x->y",

@@ -1,4 +1,4 @@
-"""The Allan deviation held to allantools, the coefficients to simulated noise, and what is suspicious found."""
+"""Allan deviation compared with allantools, coefficients with simulated noise, and disturbances of a rest."""
 
 import json
 from dataclasses import replace
@@ -55,7 +55,7 @@ def test_the_deviation_is_that_of_allantools(lying):
         every = sizes[: len(theirs)] <= 16
         np.testing.assert_allclose(ours[every], theirs[every], rtol=1e-9)
         np.testing.assert_array_equal(counts[: len(theirs)][every], n[every])
-        # beyond, a 16th of tau lies between one difference and the next
+        # longer intervals are averaged only at every 16th of tau
         np.testing.assert_allclose(ours, theirs, rtol=0.03)
 
 
@@ -65,7 +65,7 @@ def test_octaves_are_independent_of_the_division_of_samples_and_of_bounded_size(
     at_once.add(values)
     for part in np.array_split(values, 1001):
         in_parts.add(part)
-    # the first part's mean is taken away, which only digits see
+    # each subtracts the mean of its first part, which changes the last digits
     for one, other in zip(at_once.variances(), in_parts.variances(), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-7)
     assert sum(len(level._tail) for level in in_parts._levels) <= 32 * len(in_parts._levels)
@@ -89,7 +89,7 @@ def test_the_coefficients_are_those_that_were_simulated(found):
 
 
 def test_intervals_hold_the_truth_at_their_rate():
-    """40 rests at once, of coefficients that their octaves hardly tell apart."""
+    """Fit 40 rests at once, of coefficients that the octaves hardly separate."""
     truth, n = np.array([1.0, 0.35, 0.01]), 2**15
     octaves = Octaves(40)
     octaves.add(np.stack([noise(np.random.default_rng(seed), n, 1.0, *truth) for seed in range(40)], axis=1))
@@ -137,10 +137,10 @@ def test_a_board_that_was_turned_has_no_tones(lying):
     (moved,) = noise_of(replace(lying, acc=acc)).suspicious
     assert moved["code"] == "moved"
     assert "gravity by 8 deg, from 30" in moved["message"]
-    # half of it upside down: no direction is the usual one
+    # half of it upside down: neither direction is the common one
     (moved,) = noise_of(replace(lying, acc=lying.acc * np.where(t < t.mean(), 1.0, -1.0)[:, None])).suspicious
     assert "gravity by 180 deg" in moved["message"]
-    # about the vertical, which gravity does not see
+    # a turn about the vertical does not change gravity
     gyr = lying.gyr.copy()
     gyr[turned, 2] += 0.1
     (moved,) = noise_of(replace(lying, gyr=gyr)).suspicious

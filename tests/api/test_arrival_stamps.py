@@ -1,4 +1,4 @@
-"""Arrays whose stamps are those of bursts calibrate as those of an even clock, and lost bursts are said to be lost."""
+"""Arrays with the stamps of bursts calibrate like those of an even clock, and lost bursts are reported."""
 
 from dataclasses import replace
 

@@ -36,7 +36,7 @@ def test_a_frame_is_calibrated_in_place_of_its_columns_and_comes_back_as_it_went
     back = Recording.from_dataframe(applied)
     np.testing.assert_array_equal(back.acc, a)
     np.testing.assert_array_equal(back.gyr, omega)
-    assert Recording.from_dataframe(frame) == RECORDING  # which is left as it was
+    assert Recording.from_dataframe(frame) == RECORDING  # the frame itself is unchanged
 
 
 def test_the_index_is_kept_and_gives_the_time():

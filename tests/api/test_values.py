@@ -110,7 +110,7 @@ def test_mappings_of_a_calibration_equal_its_document_and_are_read_only(calibrat
     assert {**calibration.fit, "model": "imu"}["model"] == "imu"
 
 
-@pytest.mark.slow  # what is sent is pickled, which the gate proves
+@pytest.mark.slow  # the gate tests pickling, by which values are sent
 def test_a_pool_of_processes_calibrates_as_this_process_does(recording, calibration):
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         there = pool.submit(mpucal.calibrate, recording, "hand").result()

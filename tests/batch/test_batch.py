@@ -1,4 +1,4 @@
-"""A batch on workers that are processes of their own, against the same rows made here one by one."""
+"""A batch on worker processes, compared with the same rows made one by one in this process."""
 
 import csv
 import json
@@ -47,7 +47,7 @@ def client():
 
 @pytest.fixture
 def captures(tmp_path):
-    """A line's folder: two sessions of one sensor, short captures, one of junk, one that is cut and one not there."""
+    """Folder of a production line: two sessions of one sensor, short captures, junk, a cut file and a missing one."""
     folder = tmp_path / "line-3"
     folder.mkdir()
     for name in ("mpu6050", "mpu6500"):
@@ -80,13 +80,13 @@ def test_a_worker_is_killed_and_then_the_program(client, captures, tmp_path):
     assert (progress.done, progress.kept) == (len(captures), 0)
     assert make_table(journal.rows(captures)).equals(expected)
     journal.close()
-    # a line that a kill of the program has cut, and a capture that changed since
+    # a row cut by a kill of the program, and a capture that was changed later
     with (tmp_path / "rows.jsonl").open("ab") as file:
         file.write(b'{"settings": "')
     journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
     Path(captures[0]).write_bytes(Path(captures[1]).read_bytes())
     *_, progress = run_batch(captures, client, journal, SETTINGS)
-    # what changed and what could not be read is done again
+    # only changed and unreadable captures are calibrated again
     assert progress.kept == len(captures) - 1 - errors.count(expected["error"][-1].as_py())
     again = make_table(journal.rows(captures))
     assert again.slice(1).equals(expected.slice(1))
@@ -94,7 +94,7 @@ def test_a_worker_is_killed_and_then_the_program(client, captures, tmp_path):
     journal.close()
 
 
-# loaded by each worker: it dies of one path
+# loaded by each worker: one path kills it
 MORTAL = """
 import os
 from mpucal.batch import row
@@ -104,7 +104,7 @@ row.compute_digest = lambda path: os._exit(1) if path.stem == "deadly" else comp
 """
 
 
-# one run in eight of all tests lost the connection to the scheduler here, where the worker died amid an answer
+# if the worker died during an answer, the client lost its scheduler in one run of all tests in eight
 @pytest.mark.slow
 def test_a_recording_that_kills_workers_is_told_from_the_others_of_its_task(tmp_path):
     """Several recordings make a task; each is tried alone after that."""
@@ -122,7 +122,7 @@ def test_a_recording_that_kills_workers_is_told_from_the_others_of_its_task(tmp_
     journal.close()
 
 
-@pytest.mark.slow  # those that are killed while they start are told in the gate
+@pytest.mark.slow  # the gate tests workers that are killed while they start
 def test_a_worker_that_comes_back_late_is_waited_for():
     """Wait longer than dask does by default, which is 0 s here."""
     with changed({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
@@ -182,7 +182,7 @@ def test_a_url_that_nothing_can_read_says_what_is_lacking(monkeypatch):
 
 
 def test_the_page_names_what_is_odd(tmp_path):
-    """Made-up boards: one far off, one refused, all seen twice with the differences that their deviations promise."""
+    """Made-up boards, each calibrated twice within its standard deviations: one far off, one refused."""
     rng, rows = np.random.default_rng(3), []
     for board in range(200):
         b_a = rng.normal(0.0, 0.1, 3) + (2.0 if board == 77 else 0.0)

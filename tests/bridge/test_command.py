@@ -85,7 +85,7 @@ def test_the_doctor_tells_bridge_and_chip():
     assert found["bridge"].data["name"] == "emulated bridge"
     assert found["bridge"].data["pushes"]
     assert found["offset registers"].data["place"] == 0x06
-    # what passes through a serial line does not show the speed of the bus behind it
+    # the speed of the chip's bus is unknown behind a serial line
     assert "serial line" in found
     assert "bus speed" not in found
 

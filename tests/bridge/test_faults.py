@@ -1,4 +1,4 @@
-"""Faults of the line: the session continues after a marked gap, or ends with a true sentence."""
+"""Faults of the line: the session continues after a marked gap, or ends with its reason."""
 
 import re
 
@@ -72,7 +72,7 @@ def test_a_reset_of_the_bridge(started, numbers, stream, after_ms, boot_ms, rate
     assert recording.gap.sum() == 1
     assert (np.diff(recording.t) > 0).all()
     assert np.diff(recording.t)[recording.gap[1:]][0] < 1.5 + boot_ms * 1e-3
-    # the time that the bridge was away has passed on its bus, too
+    # the chip's time includes the restart of the bridge
     assert driver.now_ns() - made.clock.now() == pytest.approx(ahead_ns, abs=50 * MS)
     assert recording.t[-1] == pytest.approx(driver.now_ns() * 1e-9, abs=0.1)
 

@@ -1,4 +1,4 @@
-"""A calibration into an emulated bridge's memory: kept, compared, or the old one is there."""
+"""Writes of a calibration to an emulated bridge's memory: stored and compared, or the old one is kept."""
 
 from dataclasses import replace
 

@@ -153,7 +153,7 @@ def test_every_recording_gets_a_verdict(arrays, model):
     if calibration.verdict == "refused":
         assert document["quality"]["reasons"]
     else:
-        # an estimate from the rests alone says nothing of the gyroscope
+        # the static model estimates no gyroscope
         of_gyro = () if calibration.fit["model"] == "static" else ("b_omega", "K")
         for name in ("D", "b_a", "b_a_std", *of_gyro):
             assert np.isfinite(getattr(calibration, name)).all(), name

@@ -177,7 +177,7 @@ USABLE = {
         "in 2 places (0.84 s in all)",
         "use a faster bus",
     ),
-    # a foreign file says nothing of the bus that it comes from
+    # the bus of another program's file is unknown
     "lost in a file": ("bench", without((700, 710)), "data_lost", "in 1 place (", "let what records it keep up"),
     "gains alike": ("bench", changed(lambda acc: 1.3 * acc), "units_suspect", "data sheets allow 3 %"),
     "warming": (

@@ -1,4 +1,4 @@
-"""Estimators without a hand, and what they are made of, compared with the truth, with the EKF, and with each other."""
+"""Estimators without a hand and their parts, compared with the truth, with the EKF, and with each other."""
 
 import importlib
 from dataclasses import replace

@@ -148,7 +148,7 @@ def test_one_lost_move_changes_the_estimate_little(in_hand, pick, how):
 
 @pytest.mark.parametrize("move", [3, 6, 9])
 def test_a_move_that_the_gyroscope_did_not_see_hardly_counts(in_hand, move):
-    """The first guess of the search is 57 deg wrong by the one in the middle."""
+    """Start the search 57 deg wrong, by an unseen move in the middle."""
     recording = in_hand.recording
     runs, gyr, rng = rests(recording), recording.gyr.copy(), np.random.default_rng(0)
     unseen = slice(runs[move][1], runs[move + 1][0])

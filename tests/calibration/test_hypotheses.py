@@ -122,7 +122,7 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
         "each": [np.eye(k)],
         "step": [np.array([[float(j >= i)] for j in range(k)]) for i in range(1, k)]
         + [(np.arange(k) + 0.5)[:, None] / 4.5],
-        # theta is what the flat segment has not, if the pulse is there
+        # a pulse in the flat segment shifts all other parts
         "pulse": [np.array([[inside - window[0]] for inside in window[1:]]) for window in windows],
     }[shape]
     design, y = A.reshape(k * m, p), y.ravel()

@@ -1,4 +1,4 @@
-"""Masks: clipped samples and gaps are found, and nothing else is, and the series counts them as it should."""
+"""Masks: exactly the clipped samples and gaps are found, and the series treats them as such."""
 
 from dataclasses import replace
 

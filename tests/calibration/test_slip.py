@@ -1,4 +1,4 @@
-"""Slip of the mount: found where the board slips between two rests, and told as what it is; a lost turn is none."""
+"""Slip of the mount between two rests: found and reported as such; a lost turn is not taken for one."""
 
 import re
 from dataclasses import replace

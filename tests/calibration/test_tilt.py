@@ -1,4 +1,4 @@
-"""Estimator for a board that was only tilted: right within the tilts, and no claim beyond."""
+"""Estimator for a board that was only tilted: right within the tilts, and uncertain elsewhere."""
 
 from itertools import pairwise
 

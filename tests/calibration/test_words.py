@@ -88,7 +88,7 @@ def test_an_honest_sensor_and_a_stream_in_coarse_units_are_not_accused(counted, 
     r = counted(sensor)
     assert against(r) is None
     assert against(counted(sensor, dead(slice(3), 0xF))) is None
-    for step in (9.80665e-3, 1e-2):  # an autopilot's mG, and two digits
+    for step in (9.80665e-3, 1e-2):  # steps of an autopilot's mG, and of two decimals
         coarse = replace(r, acc=np.rint(r.acc / step) * step, gyr=np.rint(r.gyr / 1e-3) * 1e-3)
         assert against(coarse) is None
 

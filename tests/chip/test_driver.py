@@ -53,7 +53,7 @@ def test_a_start_resets_the_chip_and_waits_as_its_register_map_asks(started):
     # corrections that the reset removes
     before = [(t.register, t.count) for t in rig.transactions if t.op == "read"]
     assert before.index((0x06, 6)) < before.index((reg.XG_OFFSET_H, 6))
-    # the chip is left awake, with its FIFO stopped; a dead bus leaves it as it is
+    # the chip is left awake, with its FIFO stopped; a dead bus leaves it unchanged
     driver.stop()
     assert rig.writes()[-2:] == [(reg.FIFO_EN, b"\0"), (reg.USER_CTRL, b"\0")]
     assert rig.inner.read(reg.PWR_MGMT_1, 1).data == b"\x01"
@@ -260,7 +260,7 @@ def test_after_any_faults_samples_are_true_and_gaps_are_marked(started, stream, 
 
 
 def test_forgetting_does_not_change_the_samples(started):
-    """An overflow amid them begins a new segment of the clock."""
+    """An overflow among them begins a new segment of the clock."""
 
     def polled(forget):
         rig, driver = started()

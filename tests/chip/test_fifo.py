@@ -65,7 +65,7 @@ def test_values_are_counts_times_nominal_scale(frames):
 
 
 def test_a_frame_that_may_be_flipped_waits_for_the_next():
-    """Repair of a flipped word before anybody sees it; a blow is passed on as it is, one poll later."""
+    """Repair a flipped word before it is delivered; deliver a blow unchanged, one poll later."""
     flipped, blow = (*QUIET[:6], 7 ^ 1 << 13), (8000, *QUIET[1:])
     decoder = fresh()
     poll(decoder, packed(*calm(4), flipped), 1)

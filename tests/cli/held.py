@@ -1,4 +1,4 @@
-"""The command line of a measurement that stops at a step until it may go on, so that what happens there is no race.
+"""The command line of a measurement that waits at a step until it may continue, for tests of that moment.
 
     held.py STEP CALL WORDS...
 

@@ -1,4 +1,4 @@
-"""`mpucal check`: from a sensor, from a recording, and what it leaves."""
+"""`mpucal check` of a sensor and of a recording, and the files that it writes."""
 
 import json
 from pathlib import Path

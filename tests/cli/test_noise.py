@@ -1,4 +1,4 @@
-"""`mpucal noise`: from a recording and from a sensor, and what other commands take of it."""
+"""`mpucal noise` of a recording and of a sensor, and its result in other commands."""
 
 import json
 

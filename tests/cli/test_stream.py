@@ -1,4 +1,4 @@
-"""`mpucal stream`: calibrated samples as they come, for hours if need be, to whoever still listens."""
+"""`mpucal stream`: calibrated samples at once, in bounded memory, and readers that go away."""
 
 import io
 import json
@@ -44,7 +44,7 @@ def made(tmp_path_factory):
 
 
 class Weighing(io.StringIO):
-    """A reader that keeps nothing, and each time it is given something weighs what was kept since the first time."""
+    """Output that keeps nothing, and measures the memory allocated since its first write at each further one."""
 
     def __init__(self):
         super().__init__()
@@ -60,7 +60,7 @@ class Weighing(io.StringIO):
 
 
 def test_memory_does_not_grow(made, monkeypatch):
-    """Kept, the second half's samples would weigh 170 kB, a third of which is left to chance."""
+    """Keep less than a third of the 170 kB that the samples of the second half take."""
     listener = Weighing()
     monkeypatch.setattr(sys, "stdout", listener)
     try:

@@ -1,4 +1,4 @@
-"""A session over MAVLink writes to the autopilot it was measured on, or leaves it as it was and ends with 6."""
+"""A session over MAVLink writes to the autopilot that it measured, or leaves it unchanged and ends with 6."""
 
 import json
 

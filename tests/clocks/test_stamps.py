@@ -1,4 +1,4 @@
-"""Stamps of arrival give the sensor's own clock, lost is only what is missing, and true times stay as they are."""
+"""Stamps of arrival become the sensor's own clock with gaps at lost samples, and true times are unchanged."""
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_lost_samples_are_gaps_at_their_places():
     lost = np.zeros(N, bool)
     for first in (700, 2000, 2080, 5000):
         lost[first : first + 5] = True
-    # and a logger that stopped for a while
+    # a logger that paused for 7.3 s
     true = TRUE + np.where(np.arange(N) >= 6500, 7.3, 0.0)
     stamps = np.maximum.accumulate(true + np.random.default_rng(3).exponential(3e-3, N))[~lost]
     found = fit_clock(stamps)

@@ -51,7 +51,7 @@ def test_time_goes_on_over_a_reset_and_a_late_packet_keeps_its_time():
 
 
 def test_a_burst_that_is_read_late_is_not_a_clock_that_was_set():
-    # read until 100.5, then not for 300 s: of what came meanwhile the first was kept, and the newest follow
+    # no read from 100.5 s on for 300 s: the first packet of that time was kept, and the newest follow
     pairs = [(1_000_000, 100.5), (1_010_000, 400.5), (301_000_000, 400.51), (301_010_000, 400.52)]
     found = run(1, pairs)
     assert [t_us for t_us, _ in found] == [raw for raw, _ in pairs]

@@ -22,7 +22,7 @@ HARNESS = Path(__file__).parent / "harness"
 UPTIME_NS = 900 * 10**9
 PRELOAD = "LD_PRELOAD"
 INSTALLED = Path(sys.executable).parent / "mpucal"
-# what commands import when they need it
+# packages that commands import on demand
 COMMANDS = [
     f"mpucal.{room}" for room in ("cli", "doctor", "calibration", "chip", "files", "report", "session", "sinks")
 ]
@@ -124,7 +124,7 @@ class Device:
         command = ("record", *words, "--seconds", "100000", "-o", capture)
         with self.program(COMMAND, INSTALLED, *command) as (program, _, err):
             try:
-                # it has the chip, and records as fast as it can; stopped amid an ioctl it would block the device
+                # it records as fast as it can; a process that is stopped within an ioctl would block the device
                 err.readline()
                 yield
             finally:
@@ -155,7 +155,7 @@ def clock(once):
     """Library of harness/clock.c, built once."""
     for library in ("libumockdev.so.0", "libumockdev-preload.so.0"):
         try:
-            # the second one is for other programs: found is enough
+            # the second one is preloaded by other programs: it is only looked for
             ctypes.CDLL(library) if "preload" not in library else _find(library)
         except OSError:
             pytest.skip(f"{library} is missing: install Debian's umockdev, as tools/ci_packages does")

@@ -16,7 +16,7 @@ def examined(mocked, *words):
 
 @pytest.fixture(scope="module")
 def sound(device_of_module):
-    """A device on which nothing is amiss; who changes it puts that right."""
+    """A device without faults; a test that changes it restores it."""
     return device_of_module("sim:seed=3")
 
 
@@ -31,7 +31,7 @@ def test_a_chip_under_another_name_is_recognised_and_a_correction_in_it_noticed(
     assert findings["genuine?"]["mark"] == "note"
     assert findings["factory trim"]["mark"] == "note"
     assert findings["factory trim"]["data"]["held"][0] == 0x1234
-    # it stays
+    # the examination leaves it unchanged
     assert mocked.run("i2cget", "-y", "1", "0x68", "0x77").out.strip() == "0x12"
 
 

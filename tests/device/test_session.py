@@ -14,7 +14,7 @@ NODE, UPTIME_S = "/dev/i2c-1", 900
 
 @pytest.fixture(scope="module")
 def sound(device_of_module):
-    """A device on which nothing is amiss; who changes it puts that right."""
+    """A device without faults; a test that changes it restores it."""
     return device_of_module()
 
 
@@ -109,7 +109,7 @@ def test_passing_faults_leave_only_marked_gaps(device):
     steps = np.diff(recording.t) * recording.rate_hz
     assert len(recording) > 600
     assert steps[~recording.gap[1:]].max() < 1.5
-    # the device was there before the program
+    # the device's time began before the program
     gaps_s = recording.t[recording.gap] - UPTIME_S
     after_s = gaps_s - [faults[name] for name in ("brownout", "overflow", "slip", "frozen")]
     assert ((after_s > 0) & (after_s < 2.2)).all()

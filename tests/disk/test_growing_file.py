@@ -1,4 +1,4 @@
-"""A capture reaches the disk: what was synced last is all of it."""
+"""A capture is synced to the disk whole, at last."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""A folder is one process's while it is written to, and is found again where it went."""
+"""A folder that is written to belongs to one process, and is found under its new name."""
 
 import os
 import sys

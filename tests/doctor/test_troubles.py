@@ -8,7 +8,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "doctor.md"
 HEAD = "| trouble | reported | `--bus sim:` | the doctor says |\n|---|---|---|---|\n"
 
 
-# other rows have the same finding
+# troubles with the finding of another row
 REPEATED = ("zero_acc", "stuck_ax", "full_acc", "zero_gyro", "stuck_gy", "zero_acc/zero_gyro", "overflow@6", "stuckbit")
 
 
@@ -17,7 +17,7 @@ def rows():
     for line in lines:
         trouble, _, words, says = (cell.strip() for cell in line.strip("|").split(" | "))
         words = words.strip("`")
-        # tests/chip identifies the families in the gate, too
+        # tests/chip identifies the families in the gate
         repeated = words.startswith("chip=") or words.removeprefix("fault=") in REPEATED
         yield pytest.param(words, says, id=trouble, marks=[pytest.mark.slow] if repeated else [])
 

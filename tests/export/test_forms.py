@@ -17,7 +17,7 @@ from mpucal.errors import MpucalError, RefusedError
 from mpucal.export.forms import FORMS, form
 from mpucal.result.calibration import Calibration
 
-# what the header says of itself
+# error of float32 that the header states
 FLOAT_MPS2 = 2e-4
 APPLIED = np.array([0.25, -0.2, 1.0])
 FOLLOWING = {"b_a_slope": np.array([0.001, -0.02, 0.003]), "temperature_range_c": np.array([5.0, 40.0])}
@@ -102,7 +102,7 @@ def test_the_factors_for_the_rates_of_libraries(calibration, code):
         np.testing.assert_allclose(calibration.apply(np.zeros(3), rates)[1], w, rtol=2e-6, atol=1e-6)
 
 
-# what a sketch needs of Arduino: a chip at 0x68 that answers with the counts on stdin, and a port that is stdout
+# the part of Arduino that a sketch uses: a chip at 0x68 with counts from stdin, and a serial port on stdout
 ARDUINO = """
 #pragma once
 #include <stdint.h>
@@ -160,7 +160,7 @@ def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibration, comp
     out = run("".join(" ".join(map(str, row)) + "\n" for row in counts))
     y = counts[:, :3] * range_g * STANDARD_GRAVITY_MPS2 / 32768
     a, w = calibrated.apply(y, counts[:, 4:] * np.radians(range_g / 2 / 131), counts[:, 3] / 340 + 36.53)
-    # it prints four digits
+    # the sketch prints four decimals
     assert np.abs(out[:, :3] - a).max() < 6e-5 + range_g * 1e-5
     np.testing.assert_allclose(out[:, 3:], w, atol=6e-5)
 
@@ -237,13 +237,13 @@ def test_the_sysfs_commands_as_iio_means_them(calibrated, samples, tmp_path, wri
     words = ["sh", str(tmp_path / "calibrate.sh"), str(folder)]
     said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     left = float(re.search(r"up to (\S+) m/s\^2 of b_a", " ".join(notes))[1])
-    # what registers subtracted before is in their words: the whole of b_a is to be subtracted of what the chip trims
+    # the new words include the subtraction of the old ones, so the whole of b_a is subtracted
     wanted = replace(calibrated, applied_in_hardware=np.zeros(3)).apply(samples)
     a = seen_by_iio(folder, said, samples, trim)
     assert np.abs(a - wanted).max() < 1.1 * np.sqrt(3) * left
-    # which would be the gyroscope's, too
+    # the device has one matrix, which the gyroscope would share
     assert "mount-matrix =" not in said
-    # twice does what once does
+    # a second run changes nothing
     before = {path.name: path.read_text() for path in folder.iterdir()}
     subprocess.run(words, capture_output=True, check=True)
     assert {path.name: path.read_text() for path in folder.iterdir()} == before
@@ -284,7 +284,7 @@ def test_a_chips_calibration_is_none_of_a_vehicle(calibration, name):
 def test_each_says_what_temperature_and_registers_leave(calibration, name):
     text, notes = form(name).export(replace(calibration, applied_in_hardware=APPLIED, **FOLLOWING))
     said = " ".join(notes)
-    # these measure the temperature themselves
+    # these two correct the temperature themselves
     assert name in ("arduino", "esphome") or "the error is up to 0.02 m/s^2 per degree away from that" in said
     assert name == "linux-iio" or "after a reset" in said
     assert all(note in text.replace("\n * ", " ") for note in notes)

@@ -1,4 +1,4 @@
-"""Names and dates that are no names and no dates: refused where they are read, and only remarks where they are written.
+"""Hostile names and dates: refused by the reader, and written only into comments.
 
 Each form's consumer is the judge: what it makes of the file is the same whatever the sensor is called.
 """
@@ -127,7 +127,7 @@ def test_a_name_or_a_date_changes_nothing_but_remarks(calibration, row, tmp_path
             tmp_path, f"calibration{row.suffix}", row.export(named)[0]
         )
 
-    # what a form makes of a chip it does not know, under a plain name
+    # the file of an unknown chip with a harmless name
     plain = meaning("another")
     for words in HOSTILE:
         assert meaning(words, words) == plain, words

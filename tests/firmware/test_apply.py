@@ -119,7 +119,7 @@ def random_blobs(rng, count):
     data = rng.integers(0, 256, (count, MAX_LENGTH), np.uint8)
     data[:, :48] = np.frombuffer(MEASURED.encode()[:48], np.uint8)
     data[:, 52:56] = rng.choice(np.float32([0, 2, 4, 8, 16, np.nan, -4]), (count, 1)).view(np.uint8)
-    # mostly unknown: a date takes Python longer than all the rest
+    # mostly unknown: Python decodes dates slowly
     data[:, 112:120] = (rng.integers(0, LAST_SECOND, (count, 1)) * (rng.random((count, 1)) < 0.1)).view(np.uint8)
     for at, numbers in ((60, 9), (96, 3), (124, 3)):
         values = rng.normal(size=(count, numbers)) * 10.0 ** rng.integers(-3, 3, (count, 1))
@@ -135,7 +135,7 @@ def random_blobs(rng, count):
     for row, size in zip(data, sizes, strict=True):
         row[size - 4 : size] = np.frombuffer(struct.pack("<I", zlib.crc32(row[: size - 4])), np.uint8)
     spoilt = np.flatnonzero(rng.random(count) < 0.2)
-    # the first bytes are few, and each of them decides
+    # half of the damage is in the header
     at = np.where(
         rng.random(len(spoilt)) < 0.5, rng.integers(0, 8, len(spoilt)), rng.integers(0, LENGTHS[0], len(spoilt))
     )
@@ -178,7 +178,7 @@ def test_reads_random_blobs_as_python_does(core):
     assert np.array_equal(checked == OK, accepted)
     assert fields[accepted].tobytes() == wanted.tobytes()
     computed = check_computed(loaded[accepted] == OK, wanted, counts[accepted], a[accepted])
-    # the draw was no formality
+    # each outcome occurs in a tenth of the blobs or more
     assert min(accepted.sum(), (~accepted).sum(), computed) > BLOBS / 10
 
 

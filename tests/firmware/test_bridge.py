@@ -450,7 +450,7 @@ def test_the_build_for_an_uno_has_all_talks(switch_on, greeted):
     assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
     assert {finding.topic for finding in found} == talks().keys()
     BlobStore(link).write(BLOB)
-    # what is stored there stays
+    # the stored blob is kept
     left_out = {finding.topic for finding in examine_conformance(link) if finding.mark is Mark.UNKNOWN}
     assert left_out == {name for name, talk in talks().items() if "blob" in talk["needs"]}
     assert BlobStore(link).read().data == BLOB

@@ -76,7 +76,7 @@ CTAGS = {
     "pattern": '"{cmd.path}" -u --language-force=c++ -f - --c++-kinds=svpf --fields=KSTtzns --line-directives'
     ' "{source_file}"',
 }
-# in a gate that is to be quick
+# the only core of the quick gate
 ONCE = ("esp32",)
 
 

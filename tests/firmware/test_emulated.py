@@ -193,6 +193,6 @@ def test_power_loss_at_any_cycle_of_a_blob_write_leaves_the_old_blob_or_the_new(
     rng = np.random.default_rng(torn)
     found = [held_after(cut) for cut in rng.integers(0, cycles, 4)]
     assert set(found) <= {OLD, NEW}
-    # the last bytes that are written make the difference
+    # the write becomes valid with its last bytes
     assert held_after(2 * cycles) == NEW
     assert held_after(cycles // 2) == OLD

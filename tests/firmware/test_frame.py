@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mpucal.bridge.frame import MAX_CONTENT, MAX_ENCODED, MAX_PAYLOAD, Deframer, Frame, stuff
 
 VECTORS = sorted((Path(__file__).parents[2] / "fixtures" / "vectors").glob("line_*.bin"))
-# a sanitizer has seen all of it long before
+# fewer with sanitizers, which are slow
 RANDOM_FRAMES = 200_000 if "MPUCAL_SANITIZE" in os.environ else 1_000_000
 
 
@@ -66,7 +66,7 @@ def test_encodes_as_python_does_and_decodes_what_it_encoded(frame, found, closed
     assert found(closed(frame)) == [frame]
 
 
-# what a line does to frames: some as they are, some damaged, some bytes that never were one
+# bytes from a line: whole frames, damaged ones, and noise
 pieces = st.one_of(
     frames.map(Frame.encode),
     st.binary(max_size=2 * MAX_ENCODED),
@@ -92,5 +92,5 @@ def test_a_piece_of_any_length_leaves_it_ready_for_the_next_frame(found):
 def test_accepts_no_more_random_frames_than_16_bits_let_through(core):
     by_chance = RANDOM_FRAMES / 2**16
     accepted = core.host_accepted(1, RANDOM_FRAMES)
-    # five standard deviations: more would be a weak check, fewer a codec that refuses what is right
+    # five standard deviations of chance
     assert abs(accepted - by_chance) < 5 * by_chance**0.5

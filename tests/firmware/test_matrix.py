@@ -17,7 +17,7 @@ ARM = {
 RISCV = {"rv32imac": ("riscv64-unknown-elf-gcc", "-march=rv32imac", "-mabi=ilp32", "--specs=picolibc.specs")}
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
 PROCESSORS = AVR | ARM | RISCV
-# what a compiler warns of hangs on its family, hardly on the part: of each, the gate compiles for the first
+# warnings depend on the family rather than the part: the gate compiles for the first part of each
 FIRST = [next(iter(family)) for family in (AVR, ARM, RISCV)]
 OPTIMISED = [
     pytest.param(name, option, marks=[] if (name, option) in [(first, "-Os") for first in FIRST] else pytest.mark.slow)
@@ -52,7 +52,7 @@ SKETCHES = ("mpucal_bridge", "mpucal_corrected")
     "board", [pytest.param(name, marks=[] if name == "AVR_UNO" else pytest.mark.slow) for name in BOARDS]
 )
 def test_the_sketches_compile_without_a_warning_of_theirs(board, sketch, tmp_path):
-    """Stricter than the IDE, which has no -Wconversion; the core itself does not stand it."""
+    """Stricter than the IDE, which has no -Wconversion; the core itself does not pass with it."""
     if shutil.which("avr-g++") is None or not CORE.exists():
         pytest.skip("needs avr-g++ and arduino-core-avr, of the packages in tools/ci_packages.txt")
     mcu, variant = BOARDS[board]

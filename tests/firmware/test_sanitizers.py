@@ -20,7 +20,7 @@ def sanitized(core):
     library = Path(found.stdout.strip())
     if not library.is_absolute():
         pytest.skip("needs gcc's libasan")
-    # Python keeps much until it ends; that is no leak of the core's
+    # Python frees much only at its end, which is no leak of the core
     asan = {"LD_PRELOAD": str(library), "ASAN_OPTIONS": "detect_leaks=0", "PYTHONMALLOC": "malloc"}
     return {**os.environ, **asan, "MPUCAL_SANITIZE": "1"}
 

@@ -89,7 +89,7 @@ def test_power_loss_at_any_write_leaves_the_old_blob_or_the_new_one(before, torn
         after = host.Eeprom(eeprom.content)
         seen.add(slots.read(after))
         assert seen <= {old, NEW}
-        # and whatever is left does not stand in the way of the next one
+        # the remains do not prevent the next write
         assert slots.store(after, NEWER)
         assert slots.read(after) == NEWER
     assert old in seen
@@ -115,7 +115,7 @@ def test_a_byte_that_does_not_keep_its_value_leaves_the_old_blob(host, slots):
         eeprom = host.Eeprom(content)
         eeprom.stuck.add(stuck)
         stored = slots.store(eeprom, NEW)
-        # a byte that is stuck at what it was to be is no failure
+        # a byte that is stuck at its new value is no failure
         assert slots.read(eeprom) == (NEW if stored else OLD)
 
 

@@ -1,4 +1,4 @@
-"""A driver of the kernel as a sink: calibbias seen in the samples, the rule of udev, and all put back on failure."""
+"""A kernel driver as a sink: calibbias verified in the samples, the udev rule, and everything restored on failure."""
 
 import json
 from dataclasses import replace

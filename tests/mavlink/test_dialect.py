@@ -43,7 +43,7 @@ def test_a_stream_gives_its_packets_in_any_pieces(packets, order, cuts):
 
 @given(junk=st.binary(max_size=60))
 def test_a_packet_after_junk_is_found(packets, junk):
-    # so many bytes that whatever the junk seems to announce comes to its end
+    # enough bytes to complete any packet that the junk seems to begin
     stream = junk + b"".join(packets) * 8
     found = data_of(parser().stream(stream))
     assert found[-1] == bytes(packets[-1])

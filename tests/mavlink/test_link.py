@@ -105,7 +105,7 @@ def test_a_stranger_changes_nothing(script, station, key):
     own = heartbeats(vehicle, HOME, 2) + [(2 + 0.02 * k, HOME, vehicle.raw(20_000 * k)) for k in range(100)]
     forged = [(2 + 0.02 * k, STRANGER, forger.raw(20_000 * k, acc=(9, 9, 9))) for k in range(100)]
     cut = [(2.01 + 0.02 * k, STRANGER, forger.raw(k)[:-4]) for k in range(100)]
-    # These are kept in the capture, but they are not heard.
+    # Of these, the capture keeps a record, but no message is returned.
     gimbal = [(3.1, HOME, station(1, component=154, key=key).raw(1)), (3.2, HOME, station(3, key=key).raw(1))]
     heard = []
     for arriving in (own, in_order(own, forged, cut, gimbal)):

@@ -99,7 +99,7 @@ def test_the_filters_tell_by_how_much_both_sensors_are_apart(opened, words, cuto
 
 def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise(opened):
     source = opened("highres=no").source
-    # of the live fits and of the last one
+    # for the live fits and the final one
     assert min(source.start().least_noise) > 0.0
     polled(source, 3)
     recording = source.recording()
@@ -108,7 +108,7 @@ def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise(opened):
     assert recording.flat is not None
 
 
-# the loss is told once 2000 packets were sent: 10 s of two IMUs
+# the loss is reported after 2000 packets: 10 s of two IMUs
 @pytest.mark.parametrize(("fault", "seconds"), [("loss", 12), ("reorder,fault=duplicate", 3)])
 def test_faults_of_the_line_leave_samples_in_order(opened, fault, seconds):
     to = opened(f"fault={fault}")
@@ -175,7 +175,7 @@ def test_streams_are_requested_again_after_a_reboot_and_joined(opened):
     for one in (recording, *recording.others):
         assert one.gap.sum() == 1
         before = int(np.flatnonzero(one.gap)[0])
-        # as long as the silence, and what it took to notice that the streams had ended
+        # the silence, and the time until it was noticed
         assert 2.0 < one.t[before] - one.t[before - 1] < 6.0
         assert len(one) - before > 300
     again = replay_of(to)
@@ -192,7 +192,7 @@ def test_offsets_that_px4_commits_meanwhile_are_composed(opened):
     new = recording.autopilot.parameters
     assert sum(abs(new[f"CAL_ACC0_{axis}OFF"]) for axis in "XYZ") > 0.02
     (cut,) = np.flatnonzero(recording.gap)
-    # before the change as after it: as if the new offsets had been there all the time
+    # the samples before the change are converted to the new offsets
     np.testing.assert_allclose(recording.acc[:cut].mean(0), recording.acc[cut:].mean(0), atol=0.01)
     assert np.linalg.norm([new[f"CAL_GYRO0_{axis}OFF"] for axis in "XYZ"]) > 2e-3
     np.testing.assert_allclose(recording.gyr[:cut].mean(0), recording.gyr[cut:].mean(0), atol=5e-4)

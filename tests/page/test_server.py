@@ -1,4 +1,4 @@
-"""The server over real connections: what gets through, and what a slow or hostile client can do."""
+"""The server over real connections: its answers, and slow or hostile clients."""
 
 import json
 import time

@@ -248,7 +248,7 @@ def test_a_wrong_calibration_shows_in_the_innovations(result):
     both = (track, Track(result.recording, wrong))
     rms = [np.sqrt(np.mean(t.innovations[t.resting[-len(t.innovations) :]] ** 2)) for t in both]
     assert rms[1] > 1.3 * rms[0]
-    # without a flat segment nothing is foretold
+    # without a flat segment there is no prediction
     middle = len(result.recording) // 2
     alone = Track(replace(result.recording.part(middle, middle + 60), flat=None), result.calibration)
     assert alone.innovations is None

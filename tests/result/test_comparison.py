@@ -123,7 +123,7 @@ def test_halves_of_a_real_recording_agree_and_two_real_sensors_differ():
     found = compare(first, second)
     assert not found.changed
     assert found.same or not first.verdict == second.verdict == "good"
-    # not because they know nothing: 15 mg on an axis would be seen
+    # the deviations are not simply large: 15 mg on an axis would be found
     moved = replace(second, b_a=second.b_a + np.array([0.0, 0.0, 0.147]))
     assert compare(first, moved).same is False
     assert compare(second, of_other).same is False
@@ -140,7 +140,7 @@ def test_the_worst_magnitude_error_is_that_over_attitudes(scale, bias, axis):
     f = 9.8 * points / np.linalg.norm(points, axis=1, keepdims=True)
     worst = np.abs(np.linalg.norm(f @ D.T + b_a, axis=1) - 9.8).max()
     assert worst <= worst_magnitude_error(true, np.eye(3), np.zeros(3)) + 1e-9
-    # along the axis of both errors the bound is met
+    # with both errors along one axis the bound is reached
     assert worst == pytest.approx(9.8 * abs(scale) + abs(bias), abs=0.02)
 
 

@@ -21,7 +21,7 @@ def test_six_positions_measure_the_same(true):
     np.testing.assert_allclose(error_model.bias_mg(true.b_a), ((up + down) / 2.0).mean(1) / G * 1000.0)
     angle = error_model.misalignment(true.D)
     for i, j in ((0, 1), (1, 2), (2, 0), (1, 0)):
-        # turned in its plane until the axis reads most, which is where it points
+        # the axis points to where it reads most
         at = np.radians(np.linspace(-10.0, 10.0, 200_001))
         reading = response[i, i] * np.cos(at) + response[i, j] * np.sin(at)
         assert angle[i, j] == pytest.approx(np.degrees(at[np.argmax(reading)]), abs=2e-4)

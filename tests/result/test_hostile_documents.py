@@ -1,4 +1,4 @@
-"""calibration.json as an attacker or a bad disk leaves it: one sentence, or the numbers that were saved."""
+"""calibration.json changed by an attacker or a bad disk: one sentence, or the numbers that were saved."""
 
 import json
 from dataclasses import replace
@@ -85,7 +85,7 @@ def test_no_json_is_one_sentence(tmp_path, text):
 def test_a_file_without_digest_is_doubted_and_one_of_equal_numbers_is_not(tmp_path):
     document = json.loads(ONE.json())
     assert not loaded(tmp_path, ONE.json()).doubt
-    # as a language writes it whose numbers are all doubles
+    # written by a language without integers
     as_others = ONE.json().replace("0.0,", "0,").replace('": 1.0', '": 1')
     assert as_others != ONE.json()
     assert not loaded(tmp_path, as_others).doubt
@@ -104,7 +104,7 @@ def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at)
         read = loaded(tmp_path_factory.getbasetemp(), bytes(data))
     except RecordingError:
         return
-    assert read.doubt or replace(read, created=ONE.created) == ONE  # when it was made is no number
+    assert read.doubt or replace(read, created=ONE.created) == ONE  # its date is not a number
 
 
 @pytest.mark.parametrize("unknown", ["D", "K"])

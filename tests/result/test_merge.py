@@ -49,7 +49,7 @@ def test_the_merged_one_corrects_at_every_temperature(tmp_path):
     for T in (7.0, 30.0):
         y = np.diag([1.02, 0.99, 1.0]) @ s + np.array([0.3, -0.2, 1.1]) + SLOPE * (T - 25.0)
         assert made.apply(y, temperature_c=T) == pytest.approx(s, abs=0.03)
-    # beyond what was seen it stays as at the end
+    # beyond the measured range it is that of the range's end
     assert np.array_equal(made.apply(s, temperature_c=80.0), made.apply(s, temperature_c=31.0))
     assert np.array_equal(made.apply(s, temperature_c=np.nan), made.apply(s))
     for name in ("c.json", "c.bin"):

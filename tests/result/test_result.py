@@ -64,7 +64,7 @@ def test_the_document_has_the_keys_of_its_contract(calibration):
         "applied_in_hardware": {"b_a"},
     }
     for key, inner in expected.items():
-        assert set(document[key]) >= inner  # keys are only added
+        assert set(document[key]) >= inner  # later versions only add keys
     assert document["accelerometer"]["formula"] == "a = inv(D) @ (y - b_a)"
     assert document["gyroscope"]["formula"] == "w = K @ (y - b_omega)"
     assert {"fit", "quality", "created", "others"} <= set(document)
@@ -103,7 +103,7 @@ def test_a_document_with_a_gain_and_a_bias_alone_is_enough():
     np.testing.assert_array_equal(calibration.K, np.eye(3))
     assert np.isnan(calibration.D_std).all()
     assert calibration.verdict == "refused"  # nobody judged it
-    # a bias of the gyroscope that is not known counts as none
+    # an unknown bias of the gyroscope is taken for zero
     _, omega = calibration.apply(np.zeros(3), np.array([0.1, 0.2, 0.3]))
     np.testing.assert_array_equal(omega, [0.1, 0.2, 0.3])
 

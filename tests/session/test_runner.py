@@ -225,7 +225,7 @@ def test_recording_ends_when_asked_and_leaves_the_key_that_replays_it(person, se
     source, notes = Source(), Notes()
     assert Runner(source, person, notes, plan=Plan(until_end=True)).record(seconds) == polls * POLL
     assert [note.data for note in notes] == [{module.KEY: key}]
-    # nothing is computed
+    # no fit was made
     assert PromptKind.REST not in {of.kind for of in person.heard if isinstance(of, Prompt)}
     assert source.stops == 1
     assert not source.parts

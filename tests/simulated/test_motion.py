@@ -39,7 +39,7 @@ def test_the_rates_integrate_to_the_attitude(kind):
     moved = Motion(HANDS[kind](hand), motion, GRAVITY)
     R = matrix(moved.attitude(0.0))
     for first in range(0, int(20.0 / PERIOD_S), POLL):
-        # a prompt that comes again is ignored
+        # a repeated prompt is ignored
         moved.hear(prompt("lay_flat" if first * PERIOD_S < 12.0 else "rotate"), first * PERIOD_S)
         edges = np.arange(first, first + POLL + 1) * PERIOD_S
         R = R @ product(moved.means(edges)[1])

@@ -1,4 +1,4 @@
-"""b_a in a chip's offset registers: where it lands, what it does, and that no failure leaves anything in between."""
+"""b_a in a chip's offset registers: its words, their effect, and the old or the new state after each failure."""
 
 from dataclasses import replace
 from unittest.mock import Mock
@@ -151,7 +151,7 @@ def test_the_old_words_come_back_from_their_file(calibration, tmp_path):
     (kept,) = board.sink().keep(tmp_path)
     board.sink().write(calibration())
     assert board.words() != TRIM
-    # what was kept is not written over
+    # a saved state is not overwritten
     assert board.sink().keep(tmp_path) != (kept,)
     assert CHIP_OFFSETS.name in board.sink().put_back(kept)
     assert board.words() == TRIM

@@ -1,4 +1,4 @@
-"""A calibration on its way to a sink: what is kept, what is recorded, and what is left of a failure."""
+"""Writes of a calibration to a sink: the saved state, the notes in files, and the state after failures."""
 
 import json
 import sys
@@ -27,7 +27,7 @@ def measured(**quality):
 
 
 class Registers(Sink):
-    """A place that subtracts what was written, where each step may fail: keep, write, read back, put back."""
+    """Sink that subtracts the written bias, of which each step may fail: keep, write, read back, put back."""
 
     where = "the chip of the test"
 
@@ -118,7 +118,7 @@ def test_a_failure_leaves_the_old_or_the_new_state_and_files_that_agree(tmp_path
             new = True
             assert applied.calibration.extra["written"][0]["where"] == sink.where
     assert np.array_equal(sink.held, BIAS if new else np.zeros(3))
-    # whoever reads the file subtracts what is left, and never twice
+    # readers of the file subtract only the rest of the bias
     of_file = Calibration.load(folder / "calibration.json")
     assert np.array_equal(of_file.applied_in_hardware, sink.held)
     assert new == (not fails & {1, 2, 3} and full_after != 0)

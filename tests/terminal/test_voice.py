@@ -1,4 +1,4 @@
-"""The voice: one thing at a time, and nothing that the next second contradicts."""
+"""The voice: one sentence at a time, and none that is out of date within a second."""
 
 from dataclasses import replace
 

@@ -15,7 +15,7 @@ APART = {"__main__", "sanitized", "fuzz_kernel", "syscalls", "syscalls_commands"
 
 
 def test_every_program_loads_and_says_what_it_is():
-    """Most are started by no test: without this one, who needs a program would be the first to miss what moved.
+    """Load each program, since no other test starts most of them and a moved module would go unnoticed.
 
     In one test, so that one of several workers loads them.
     """

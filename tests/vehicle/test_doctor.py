@@ -1,4 +1,4 @@
-"""Examination of the simulated vehicle, with the faults that a pilot should know of before lifting one."""
+"""Examination of the simulated vehicle, with faults that endanger a flight."""
 
 import pytest
 

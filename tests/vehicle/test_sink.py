@@ -154,7 +154,7 @@ def test_every_imu_reads_gravity_better_and_a_second_write_changes_nothing(firmw
         assert error_mps2(vehicle, imu) < 0.5 * before[imu]
         assert error_mps2(vehicle, imu) == pytest.approx(autopilot["residual_mps2"], rel=0.1, abs=0.01)
     assert "would arm" in applied.what.rpartition("now it ")[2]
-    # what is returned is of the streams as they are now
+    # the returned calibration is of the present streams
     truth = vehicle.truth_document()
     np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
     np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
@@ -179,7 +179,7 @@ def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmwa
     vehicle, _, link = vehicle_of(firmware, ",imus=1")
     calibration = calibration_of(vehicle)
     assert send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 2) == 0
-    # what it learnt of the old offsets
+    # a bias that the estimator learnt with the old offsets
     vehicle.firmware.bias = np.array([0.2, -0.3, 0.1])
     old_deg = vehicle.firmware.trim_deg
     questions, tilted = [], []
@@ -426,7 +426,7 @@ def test_an_imu_that_would_not_become_better_keeps_its_parameters():
     assert changed
     assert not any("ACC1" in name for name in changed)
     assert "IMU 2 keeps its old ones, which are predicted to be as good" in applied.what
-    # and a whole vehicle that is calibrated already is left to a person
+    # a vehicle that is already calibrated is written to only if a person confirms it
     assert "as good as the new ones" in sink.reason_to_keep(once)
 
 

@@ -13,7 +13,7 @@ from mpucal.simulated.chip.bus import FastClock
 
 ROOT = Path(__file__).parents[3]
 PACKAGE, VERSION = "@micropython/micropython-webassembly-pyscript", "1.27.0"
-# how long the bridge waits between two looks, and how much of its input it is given at once
+# time between two looks of the bridge, and the most bytes that it is given at once
 STEP_NS, MOST = 10_000_000, 255
 TICKS = 2**30
 ENODEV = 19

@@ -26,7 +26,7 @@ M_RD, MAX_MESSAGES, MAX_BYTES = 0x0001, 42, 8192
 QUICK, BYTE, BYTE_DATA, WORD_DATA, I2C_BLOCK_DATA = 0, 1, 2, 3, 8
 UNION_BYTES, BLOCK_BYTES = 34, 32
 
-# what a bus's error is to the kernel, where the bus does not say it itself
+# errno of a bus's error that does not name one itself
 NOBODY, BROKEN = errno.EREMOTEIO, errno.EIO
 
 

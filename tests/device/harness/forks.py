@@ -75,7 +75,7 @@ def load(name: str) -> None:
     """Import a module and its submodules."""
     module = importlib.import_module(name)
     for inner in pkgutil.walk_packages(getattr(module, "__path__", ()), f"{name}."):
-        # some need an extra that is not there
+        # some need an extra that is not installed
         with contextlib.suppress(ImportError):
             importlib.import_module(inner.name)
 

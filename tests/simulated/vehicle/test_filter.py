@@ -8,7 +8,7 @@ from mpucal.simulated.vehicle.ardupilot import LowPass
 
 def test_each_row_is_filtered_by_its_own_cutoff():
     steps = np.random.default_rng(1).normal(size=(49, 2, 3))
-    # the first one has been there for ever
+    # the filter starts in the steady state of the first one
     steps[0] = 0.0
     expected = scipy.signal.lfilter(*scipy.signal.butter(2, 20.0, fs=200.0), steps[:, 0], axis=0)
     low = LowPass((20.0, 0.0), 200.0)

@@ -110,7 +110,7 @@ def test_several_adapters_are_named_by_their_serials(enumerated, chip, monkeypat
     monkeypatch.setattr("EasyMCP2221.Device._catalog", {})
     monkeypatch.setitem(sys.modules, "hid", hid)
     names = ["mcp2221:0001", "mcp2221:0002"] if enumerated else ["mcp2221:SERIAL"] * 2
-    # without a look at what is there, then after one
+    # before and after a search for adapters
     for _ in range(2):
         for name, path in (("mcp2221:0002", b"2"), ("mcp2221:0001", b"1")):
             bus = Mcp2221(name)

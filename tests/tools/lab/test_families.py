@@ -1,4 +1,4 @@
-"""The families: what their world does is physics, and no verdict on a small set of them is false."""
+"""The families: their world obeys physics, and no verdict on a small set of them is false."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from tools.lab import guidance_trials as trials
 @pytest.mark.slow
 @pytest.mark.parametrize("hand", ["by words", "wandering"])
 def test_guidance_shown_to_a_person_is_right(hand):
-    """A hand that has nothing but the words comes to a good end, and one that does as it likes is told so."""
+    """A hand that follows only the words ends with a good calibration, and a careless one is cautioned."""
     trial = trials.of_hand((hand, 1))
     assert (trial.verdict, trial.wrong) == ("good", {})
     assert trial.holds >= 10

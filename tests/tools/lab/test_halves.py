@@ -26,7 +26,7 @@ def test_the_cut_is_in_a_rest_near_the_middle(poses):
 
 def test_without_a_rest_in_the_middle_the_second_half_is_read_backwards():
     recording = hand_scenario(0, "continuous", rate_hz=50.0).recording
-    # it ends as it began
+    # its last orientation is its first one
     there_and_back = halves.reversed_in_time(recording)
     n, bias = len(recording), recording.gyr[:500].mean(0)
     whole = replace(

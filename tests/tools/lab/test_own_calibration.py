@@ -1,4 +1,4 @@
-"""ArduPilot's own calibration, spoken by a made-up vehicle that asks for its sides one after another."""
+"""ArduPilot's own calibration, with a made-up vehicle that asks for one side after another."""
 
 from types import SimpleNamespace
 

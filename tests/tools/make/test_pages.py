@@ -1,4 +1,4 @@
-"""The pages and drawings of docs/ are those of the tables and imports, and what they name is there."""
+"""The pages and drawings of docs/ agree with the tables and imports, and the names in them exist."""
 
 import ast
 import re

@@ -61,7 +61,7 @@ def test_a_seed_gives_the_same_sensor_and_motion_beside_other_options():
 def test_a_delay_is_the_accelerometers():
     plain, late = by_hand(3, "continuous"), by_hand(3, "continuous", delay_s=0.01)
     np.testing.assert_array_equal(late.recording.gyr, plain.recording.gyr)
-    # what the accelerometer lags is its derivative times the delay
+    # the lag of the accelerometer is its derivative times the delay
     derivative = np.gradient(plain.specific_force @ plain.truth.D.T, plain.recording.t, axis=0)
     lag = late.recording.acc - plain.recording.acc
     assert (lag * derivative).sum() / (derivative**2).sum() == pytest.approx(-0.01, rel=0.1)
