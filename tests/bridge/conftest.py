@@ -82,18 +82,6 @@ def started(rig):
 
 
 @pytest.fixture(scope="session")
-def numbered():
-    """Kind of feed whose samples are numbered."""
-    return feeds.NumberedFeed
-
-
-@pytest.fixture(scope="session")
-def numbers():
-    """Returns the numbers of the feed's samples in a recording."""
-    return feeds.numbers
-
-
-@pytest.fixture(scope="session")
 def stream():
     """Polls a started driver for some seconds."""
 

@@ -21,6 +21,7 @@ from mpucal.simulated.chip.bus import FastClock
 from mpucal.simulated.faults import Where, fault_kinds
 from tools.lab.bridge import EmulatedLine, Memory
 from tools.lab.bridge.line import LineFaults
+from tools.lab.feeds import numbers
 
 MS = 1_000_000
 
@@ -30,7 +31,7 @@ faults = st.lists(
 )
 
 
-def is_consistent(recording, numbers):
+def is_consistent(recording):
     """Return True if missing samples are at marked gaps, and none is there twice."""
     steps = np.diff(numbers(recording))
     return bool(((steps == 1) | (recording.gap[1:] & (steps > 1))).all())
@@ -44,7 +45,7 @@ def spoil(line, to_host, to_device, shorter):
 
 @settings(max_examples=8)
 @given(to_host=faults, to_device=faults, rate_hz=st.sampled_from([200, 1000]))
-def test_spoiled_bytes(rig, numbers, stream, to_host, to_device, rate_hz):
+def test_spoiled_bytes(rig, stream, to_host, to_device, rate_hz):
     made = rig()
     driver = Driver(made.bus(), Config(rate_hz=rate_hz))
     spoil(made.line, to_host, to_device, shorter=(1, 16))
@@ -54,14 +55,14 @@ def test_spoiled_bytes(rig, numbers, stream, to_host, to_device, rate_hz):
     made.line.to_host = made.line.to_device = bytes
     stream(driver, 1.0)
     recording = driver.recording()
-    assert is_consistent(recording, numbers)
+    assert is_consistent(recording)
     assert recording.t[-1] > driver.now_ns() * 1e-9 - 0.2
     assert len(recording) > 0.5 * rate_hz
 
 
 @settings(max_examples=4)
 @given(after_ms=st.integers(0, 900), boot_ms=st.sampled_from([0, 300, 2000]), rate_hz=st.sampled_from([200, 1000]))
-def test_a_reset_of_the_bridge(started, numbers, stream, after_ms, boot_ms, rate_hz):
+def test_a_reset_of_the_bridge(started, stream, after_ms, boot_ms, rate_hz):
     """The bridge's clock begins anew; the chip continues."""
     made, driver = started(rate_hz=rate_hz)
     stream(driver, 0.2 + after_ms * 1e-3)
@@ -78,7 +79,7 @@ def test_a_reset_of_the_bridge(started, numbers, stream, after_ms, boot_ms, rate
 
 
 @pytest.mark.parametrize("chip_loses_its_supply", [False, True])
-def test_unplugged_and_plugged_in_again(started, numbers, stream, chip_loses_its_supply):
+def test_unplugged_and_plugged_in_again(started, stream, chip_loses_its_supply):
     made, driver = started()
     stream(driver, 0.5)
     made.line.unplugged = True

@@ -19,17 +19,18 @@ from mpucal.simulated.chip.models import MODELS, FactoryTrim
 from mpucal.sources.opened_source import CaptureRecorder
 from mpucal.sources.replay import EndOfCapture, ReplayBus, Tap
 from tools.lab.bridge import EmulatedBridge, EmulatedLine
+from tools.lab.feeds import NumberedFeed
 
 MS = 1_000_000
 
 
 @pytest.fixture
-def recorded(tmp_path, numbered):
+def recorded(tmp_path):
     """Records behind a bridge whose clock is off: (recording, path of the capture)."""
 
     def run(seconds, ppm, drift_ppm_a_minute=0.0, burst_ms=1, rate_error_ppm=2500.0, reset_s=None):
         clock = FastClock()
-        chip = SimulatedBus(Chip(MODELS["mpu6050"], numbered(), rate_error_ppm, FactoryTrim()), clock)
+        chip = SimulatedBus(Chip(MODELS["mpu6050"], NumberedFeed(), rate_error_ppm, FactoryTrim()), clock)
         drift = 0.5 * drift_ppm_a_minute * 1e-6 / 60 * 1e-9
 
         def shown():

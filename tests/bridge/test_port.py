@@ -18,6 +18,7 @@ from mpucal.bridge.port import BAUDS, SerialPort, split_port
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, UsageError
+from tools.lab.feeds import numbers
 
 
 @pytest.mark.parametrize(
@@ -34,7 +35,7 @@ def test_a_port_and_its_rate(text, name, bauds):
     assert split_port(text) == (name, bauds)
 
 
-def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream):
+def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream):
     made = rig()
     bus = BridgeBus(SerialPort(serve(made.line.device, made.clock).name))
     driver = Driver(bus, Config(rate_hz=1000))
@@ -49,7 +50,7 @@ def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream):
     assert len(recording) > 100
 
 
-def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_path):
+def test_a_port_that_goes_away_and_comes_back(rig, serve, stream, tmp_path):
     """A cable is plugged in again: the name stays, and the device behind it is new."""
     made = rig()
     first, name = serve(made.line.device, made.clock), tmp_path / "ttyUSB0"

@@ -118,12 +118,6 @@ def stream():
 
 
 @pytest.fixture(scope="session")
-def numbers():
-    """Returns the numbers of the feed's samples in a recording."""
-    return feeds.numbers
-
-
-@pytest.fixture(scope="session")
 def same():
     """Compares two recordings bit by bit."""
     names = ("t", "acc", "gyr", "temperature_c", "gap", "acc_clipped", "gyr_clipped")

@@ -15,6 +15,7 @@ from mpucal.errors import BusError, BusHeld, ChipError, EndOfCapture, NoAnswer, 
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.host_bus import LATE_NS, HostBus
 from mpucal.sources.replay import ReplayBus
+from tools.lab.feeds import numbers
 
 CHIPS = ["mpu6050", "mpu6500", "mpu6500_512", "clone98", "icm20690", "icm20602", "mpu6886"]
 FAST = Config(rate_hz=1000)
@@ -22,20 +23,15 @@ FAST = Config(rate_hz=1000)
 STOPPING = 2
 
 
-@pytest.fixture
-def check(numbers):
-    """Checks that a recording has only samples of the feed, in order, and a gap wherever some are missing."""
-
-    def check_recording(recording, gaps=None):
-        np.testing.assert_array_equal(recording.gyr, np.broadcast_to(recording.gyr[0], recording.gyr.shape))
-        assert (recording.acc[:, 1:] == recording.acc[0, 1:]).all()
-        steps = np.diff(numbers(recording))
-        assert (steps >= 1).all()
-        assert recording.gap[1:].tolist() == (steps != 1).tolist()
-        assert (np.diff(recording.t) > 0).all()
-        assert gaps is None or recording.gap.sum() == gaps
-
-    return check_recording
+def check(recording, gaps=None):
+    """Check that a recording has only samples of the feed, in order, and a gap wherever some are missing."""
+    np.testing.assert_array_equal(recording.gyr, np.broadcast_to(recording.gyr[0], recording.gyr.shape))
+    assert (recording.acc[:, 1:] == recording.acc[0, 1:]).all()
+    steps = np.diff(numbers(recording))
+    assert (steps >= 1).all()
+    assert recording.gap[1:].tolist() == (steps != 1).tolist()
+    assert (np.diff(recording.t) > 0).all()
+    assert gaps is None or recording.gap.sum() == gaps
 
 
 def test_a_start_resets_the_chip_and_waits_as_its_register_map_asks(started):
@@ -63,7 +59,7 @@ def test_a_start_resets_the_chip_and_waits_as_its_register_map_asks(started):
 
 
 @pytest.mark.parametrize("model", CHIPS)
-def test_every_sample_comes_once(started, stream, check, model):
+def test_every_sample_comes_once(started, stream, model):
     """Count the bits on the bus, too: 30 of each access beside its bytes, of 9 bits each."""
     rig, driver = started(model, Config(rate_hz=1000))
     rig.transactions.clear()
@@ -86,7 +82,7 @@ def test_a_count_that_failed_or_was_read_within_a_frame_is_read_again(started, s
 
 
 @pytest.mark.parametrize("register", [reg.FIFO_R_W, reg.INT_ENABLE], ids=["FIFO", "status"])
-def test_a_failed_destructive_read_is_not_repeated(started, stream, check, register):
+def test_a_failed_destructive_read_is_not_repeated(started, stream, register):
     """A second read of the FIFO would begin within a frame; one of the status would not show an overflow."""
     rig, driver = started()
     stream(driver, 0.5)
@@ -241,7 +237,7 @@ def test_a_replay_makes_the_same_accesses_and_samples(started, stream, same):
 )
 @example("mpu6500", 1000, [("slip", 4), ("stall", 700), ("data", 1), ("reset", 1)])
 @example("mpu6050", 200, [("slip", 4), ("stall", 700), ("data", 1), ("reset", 1)])
-def test_after_any_faults_samples_are_true_and_gaps_are_marked(started, stream, check, same, model, rate_hz, faults):
+def test_after_any_faults_samples_are_true_and_gaps_are_marked(started, stream, same, model, rate_hz, faults):
     rig, driver = started(model, Config(rate_hz=rate_hz))
     registers = {"data": reg.FIFO_R_W, "count": reg.FIFO_COUNT_H, "status": reg.INT_ENABLE}
     for fault, amount in faults:
@@ -303,7 +299,7 @@ def test_a_late_host_does_not_count_as_a_slow_bus(started):
     assert driver.recording().gap.sum() == 10
 
 
-def test_times_are_right_whichever_read_is_paused(rig, stream, numbers, same, monkeypatch):
+def test_times_are_right_whichever_read_is_paused(rig, stream, same, monkeypatch):
     """Pause this computer between the time of a read and its transfer: times that are too early are not used."""
     made, times_s, rng = rig(), [], np.random.default_rng(1)
     timer, feed = HostBus(), made.chip._feed

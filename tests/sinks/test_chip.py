@@ -91,15 +91,10 @@ class Board:
         return self.fails.get(self.accesses)
 
 
-@pytest.fixture(scope="module")
-def calibration():
+def calibration(accel_offsets=TRIM, **changes):
     """Return a calibration of that board from before any write."""
-
-    def make(**changes):
-        sensor = Sensor(chip="MPU-6050", who_am_i=None, accel_offsets=changes.pop("accel_offsets", TRIM))
-        return Calibration(np.eye(3), BIAS_G * STANDARD_GRAVITY_MPS2, sensor=sensor, **changes)
-
-    return make
+    sensor = Sensor(chip="MPU-6050", who_am_i=None, accel_offsets=accel_offsets)
+    return Calibration(np.eye(3), BIAS_G * STANDARD_GRAVITY_MPS2, sensor=sensor, **changes)
 
 
 def corrected(lsb_per_g):
@@ -113,7 +108,7 @@ def corrected(lsb_per_g):
     ("model", "scale", "who_am_i"),
     [("mpu6050", "2048", None), ("mpu6050", "4096", None), ("mpu6500", "2048", 0x68), ("clone98", "4096", 0x68)],
 )
-def test_the_bias_lands_where_it_belongs_and_all_else_stays(calibration, model, scale, who_am_i):
+def test_the_bias_lands_where_it_belongs_and_all_else_stays(model, scale, who_am_i):
     board = Board(model, scale, who_am_i)
     before = board.inner.read(reg.SMPLRT_DIV, 5).data, board.inner.read(reg.PWR_MGMT_1, 2).data
     applied = board.sink().write(calibration())
@@ -125,7 +120,7 @@ def test_the_bias_lands_where_it_belongs_and_all_else_stays(calibration, model, 
     assert (board.inner.read(reg.SMPLRT_DIV, 5).data, board.inner.read(reg.PWR_MGMT_1, 2).data) == before
 
 
-def test_the_bias_is_removed_once(calibration):
+def test_the_bias_is_removed_once():
     """Correct samples after the write by the calibration that it returns: only gravity is left."""
     board = Board()
     applied = board.sink().write(calibration()).calibration
@@ -139,14 +134,14 @@ def test_the_bias_is_removed_once(calibration):
 
 
 @pytest.mark.parametrize("known", [TRIM, None], ids=["trim_known", "trim_unknown"])
-def test_writing_twice_is_writing_once(calibration, known):
+def test_writing_twice_is_writing_once(known):
     board = Board()
     for _ in range(2):
         board.sink().write(calibration(accel_offsets=known))
         assert board.words() == corrected(2048.0)
 
 
-def test_the_old_words_come_back_from_their_file(calibration, tmp_path):
+def test_the_old_words_come_back_from_their_file(tmp_path):
     board = Board("mpu6500")
     (kept,) = board.sink().keep(tmp_path)
     board.sink().write(calibration())
@@ -185,13 +180,13 @@ def test_another_file_is_not_put_back(tmp_path, text):
     ],
     ids=["read_only", "other_piece", "refused", "autopilot", "moves", "who_am_i", "gravity"],
 )
-def test_a_refusal_leaves_all_as_it_was(calibration, board, changes, words):
+def test_a_refusal_leaves_all_as_it_was(board, changes, words):
     with pytest.raises(WriteBackError, match=words):
         board.sink().write(replace(calibration(), **changes))
     assert board.words() == TRIM
 
 
-def test_a_bias_that_does_not_fit_is_refused(calibration):
+def test_a_bias_that_does_not_fit_is_refused():
     board = Board(trim=(32000, 0, 0))
     with pytest.raises(WriteBackError, match="cannot hold"):
         board.sink().write(replace(calibration(accel_offsets=None), b_a=np.array([-9.0, 0.0, 0.0])))
@@ -211,9 +206,7 @@ ACCESSES = 700
     count=st.integers(1, 12),
     done=st.booleans(),
 )
-def test_a_fault_at_any_step_leaves_the_old_state_or_the_new(
-    calibration, model, corrected_before, trim_known, first, count, done
-):
+def test_a_fault_at_any_step_leaves_the_old_state_or_the_new(model, corrected_before, trim_known, first, count, done):
     """Transfers `first` to `first + count` fail, those of them that write with or without effect."""
     board, written = Board(model), corrected(2048.0)
     if corrected_before:
@@ -232,14 +225,14 @@ def test_a_fault_at_any_step_leaves_the_old_state_or_the_new(
         assert board.words() == written
 
 
-def test_a_wire_that_stays_pulled_is_reported_with_its_remedy(calibration):
+def test_a_wire_that_stays_pulled_is_reported_with_its_remedy():
     board = Board()
     board.fails = dict.fromkeys(range(300, 100_000), False)
     with pytest.raises(WriteBackError, match=r"could not be restored .*switch the chip's supply off and on"):
         board.sink().write(calibration())
 
 
-def test_an_interrupted_write_is_undone(calibration):
+def test_an_interrupted_write_is_undone():
     class Interrupted(Board):
         def read(self, register, count):
             if self.accesses == 300:
@@ -253,7 +246,7 @@ def test_an_interrupted_write_is_undone(calibration):
     assert board.words() == TRIM
 
 
-def test_a_missing_chip_is_reported_before_anything_is_written(calibration):
+def test_a_missing_chip_is_reported_before_anything_is_written():
     board = Board()
     board.read = Mock(side_effect=NoAnswer("nothing answers at 0x68 on the bus", "check VCC, GND, SDA and SCL"))
     with pytest.raises(WriteBackError, match="nothing was written: nothing answers"):

@@ -27,11 +27,12 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import FastClock
 from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
+from tools.lab.feeds import numbers
 
 BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
 
 
-def test_the_board_samples_at_one_kilohertz_and_returns_to_its_repl(rig, board, numbers, stream):
+def test_the_board_samples_at_one_kilohertz_and_returns_to_its_repl(rig, board, stream):
     made = rig()
     there = board(made.chip, made.clock)
     bus = BridgeBus(MicroPythonPort(there, (4, "SCL")))
