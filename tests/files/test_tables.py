@@ -576,12 +576,35 @@ def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, tmp_path):
 @pytest.mark.parametrize("centre", [[1.65, 1.65, 1.65], [0.0, 1.2, 0.6]])
 def test_a_shifted_zero_is_reported_at_any_place(centre, walk, tmp_path):
     """Say it of volts, and of a zero that is only 1.3 g away."""
-    acc = walk.acc / G + np.array(centre) / (0.3 if centre[0] else 1.0)
+    acc = walk.acc / G * (0.3 if centre[0] else 1.0) + np.array(centre)
     made = np.column_stack([walk.t, acc, walk.gyr])
-    header = "time,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z"
-    np.savetxt(tmp_path / "zero.csv", made, delimiter=",", header=header, comments="")
-    with pytest.raises(RecordingError, match="in place of zero"):
-        mpucal.load(tmp_path / "zero.csv")
+    for header in ("time,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z", "t,ax,ay,az,gx,gy,gz"):
+        np.savetxt(tmp_path / "zero.csv", made, delimiter=",", header=header, comments="")
+        with pytest.raises(RecordingError, match="in place of zero"):
+            mpucal.load(tmp_path / "zero.csv")
+        assert len(mpucal.load(tmp_path / "zero.csv", units="acc=g")) == len(walk)
+
+
+def test_lengths_that_vary_about_any_point_have_no_offset(tmp_path):
+    """Say no zero elsewhere of an aeroplane that pulls up and rolls, wherever the centre of its sphere is."""
+    k = np.arange(6000)
+    slow, faster, pull = np.sin(k / 300), np.sin(k / 170), 1.0 + 0.35 * np.abs(np.sin(k / 250))
+    shaken = np.random.default_rng(3).normal(0.0, 0.4, (6000, 3))
+    acc = G * np.column_stack([0.25 * slow, 0.15 * faster, -pull]) + shaken
+    made = np.column_stack([k / 100 + 0.005, acc])
+    np.savetxt(tmp_path / "a.csv", made, delimiter=",", header="t,acc_x,acc_y,acc_z", comments="")
+    np.testing.assert_allclose(mpucal.load(tmp_path / "a.csv").acc, acc)
+
+
+def test_the_numbers_of_frames_are_no_rates(tmp_path):
+    """Refuse positions of a robot beside the numbers of the frames, as a camera tracks it, though they turn alike."""
+    n = 1000
+    angle = 5e-5 * np.arange(n) ** 2
+    places = np.column_stack([0.3 * np.sin(angle / 9), np.sin(angle), np.cos(angle)]) * G
+    made = np.column_stack([np.arange(n) * 3, np.sin(angle), np.cos(angle), places])
+    np.savetxt(tmp_path / "robot.csv", made, delimiter=",", header="frame,u,v,x1,y1,z1", comments="")
+    with pytest.raises(RecordingError, match="holds no three columns as long as gravity"):
+        mpucal.load(tmp_path / "robot.csv")
 
 
 def test_shocks_near_some_sphere_have_no_offset(tmp_path):
@@ -840,6 +863,16 @@ def test_lines_that_repeat_a_sample_are_left_out(read, walk, walk_ns, assert_sam
     found = mpucal.load(tmp_path / "walk.csv")
     assert_same(found, walk)
     assert f"{-(-len(walk) // 7)} repeated samples were left out" in found.taken
+
+
+def test_rates_that_stay_the_same_within_a_burst_repeat_no_sample(walk, tmp_path):
+    """Keep rates beside the accelerations of their line, where the lines of a burst have one time and rates of 0."""
+    gyr = np.where(np.abs(walk.gyr) < 0.5, 0.0, walk.gyr)
+    made = np.column_stack([walk.t // 0.08 * 0.08, walk.acc, gyr])
+    np.savetxt(tmp_path / "burst.csv", made, delimiter=",", header=f"time,{AXES.strip()}", comments="")
+    found = mpucal.load(tmp_path / "burst.csv")
+    assert "interpolated" not in found.taken
+    np.testing.assert_allclose(found.gyr, gyr)
 
 
 @pytest.mark.parametrize("odd", ["", "nan", "inf"])

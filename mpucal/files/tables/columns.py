@@ -51,7 +51,7 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
         if named:
             columns = [*columns, *(Column(table.header[place], place, TIME) for place in even[:1])]
             remark = "".join(f"{table.name_of(place)} is taken for the time" for place in even[:1])
-        elif found := guess_columns(of, hints):
+        elif found := guess_columns({at: of[at] for at in of if at not in counts}, hints):
             times = {} if clocks else dict(zip("t", even, strict=False))
             found = times | {role: place for role, place in found.items() if role != "t" or not clocks}
             order = _order(found | ({"t": clocks[0].place} if clocks else {}))

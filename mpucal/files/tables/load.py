@@ -15,7 +15,7 @@ from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
-from ..reading import HELD, MOST_ODD, check_size, first_bytes, reading
+from ..reading import HELD, MOST_ODD, SNIFFED, check_size, first_bytes, reading
 from .cells import OF_DAY, Kind
 from .columns import find_columns
 from .guess import is_index
@@ -35,16 +35,19 @@ from .names import (
     plausible_celsius,
     with_sensor,
 )
+from .several import NAMES_SENSORS, of_one_sensor
 from .streams import index_with_gravity, join_streams
 from .table import Table
 from .text import HEAD, PREAMBLE, decode_text, find_bare_table, find_named_table, find_wanted_table, stated_rate_hz
 from .times import Stream
-from .units import OF_BNO055, QUANTITIES, acceleration_unit, likely_rate_hz, seem_counts
+from .units import OF_BNO055, QUANTITIES, acceleration_unit, likely_rate_hz, offset, seem_counts
 
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"t": "0.1ms", "acc": "m/s^2", "gyr": "rad/s"}}
 # seconds since 1970, and nanoseconds, as the first cells of `ros2 topic echo --csv`
-STAMP = re.compile(r"[12]\d{9},\d{1,9},").match
+STAMP = re.compile(r"[12]\d{9},\d{7,9},").match
+# bytes in which a board is turned
+TURNED = 1 << 20
 FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
 # stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
 IN_G_ON_IOS, EITHER_SIGN = "accelerometeruncalibrated_", "totalacceleration_"
@@ -60,21 +63,30 @@ def is_own_table(path: Path) -> bool:
     first = next(iter(first_bytes(path).decode("utf-8-sig", "replace").splitlines()), "")
     named = {name.strip(' "').lower() for name in first.split(",")}
     table = _begun(path) if set(COLUMNS) <= named else None
-    return table is not None and _may_be_si(table) and not _may_be_no_seconds(table, path)
+    if table is None or any(map(NAMES_SENSORS, table.header)) or of_one_sensor(table) is not table:
+        return False
+    return _may_be_si(table, path) and not _may_be_no_seconds(table, path)
 
 
-def _begun(path: Path) -> Table | None:
+def _begun(path: Path, count: int = SNIFFED) -> Table | None:
     try:
-        return find_any_table(decode_text(first_bytes(path), path.name), path.name)
+        return find_any_table(decode_text(first_bytes(path, count), path.name), path.name)
     except RecordingError:
         return None
 
 
-def _may_be_si(table: Table) -> bool:
-    """Return True unless the accelerations show a unit other than m/s^2."""
+def _may_be_si(table: Table, path: Path) -> bool:
+    """Return True unless the accelerations show a unit other than m/s^2, or turn about another point than zero."""
+    values = _accelerations(table)
+    if len(values) < FEWEST or (unit := acceleration_unit(values)) == "m/s^2":
+        return True
+    turned = None if unit or seem_counts(values) else _begun(path, TURNED)
+    return turned is not None and offset(_accelerations(turned)) is None
+
+
+def _accelerations(table: Table) -> Vector:
     values = table.numbers(first_triple(table.columns, ACC))
-    values = values[np.isfinite(values).all(axis=1)]
-    return len(values) < FEWEST or (not seem_counts(values) and acceleration_unit(values) in ("", "m/s^2"))
+    return np.asarray(values[np.isfinite(values).all(axis=1)])
 
 
 def _may_be_no_seconds(table: Table, path: Path) -> bool:
@@ -157,6 +169,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     ------
     RecordingError : it does not say all that is needed; the message names what is missing.
     """
+    table = of_one_sensor(table)
     ranges = table.ranges if not (hints.accel_range_g or hints.gyro_range_dps) else None
     if ranges:
         hints = replace(hints, accel_range_g=ranges[0], gyro_range_dps=ranges[1])

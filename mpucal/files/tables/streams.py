@@ -86,9 +86,7 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         if hints.rate_hz is None:
             of_rate = "this sample rate is assumed, as nothing shows it (--rate HZ)"
             left_out = left_out or "without rates"
-    new = [are_new(stream.at_once, stream.values) for stream in (acc, gyr)]
-    if untimed and alike:
-        new = [are_new(None, np.hstack([acc.values, gyr.values]))] * 2
+    new = _new_samples(acc, gyr)
     acc, gyr = acc.part(new[0]), gyr.part(new[1])
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
         if np.count_nonzero(stream.complete) < 2:
@@ -161,6 +159,20 @@ def _checked(stream: Stream, what: str, name: str) -> Stream:
     return replace(stream, values=_among(stream.complete, signed, np.nan))
 
 
+def _new_samples(acc: Stream, gyr: Stream) -> list[Mask]:
+    """Return (n,) of both sensors, False where a sample repeats the one before; see are_new.
+
+    Of samples in the same lines, both repeat: rates alone may be the same within a burst at one time, such as 0.
+    """
+    at_once, also = acc.at_once, gyr.at_once
+    if np.array_equal(acc.number, gyr.number):
+        if at_once is None or also is None:
+            return [are_new(None, np.hstack([acc.values, gyr.values]))] * 2
+        if np.array_equal(at_once, also):
+            return [are_new(at_once, np.hstack([acc.values, gyr.values]))] * 2
+    return [are_new(stream.at_once, stream.values) for stream in (acc, gyr)]
+
+
 def _among(complete: Mask, values: NDArray[Any], missing: float) -> NDArray[Any]:
     """Return values of all samples: those of the complete ones (n,), and `missing` for the others."""
     found = np.full((len(complete), *values.shape[1:]), missing, values.dtype)
@@ -193,10 +205,11 @@ def _accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside
     beside : the unit of the rates that their turning shows, COUNTS if it is none; empty if it shows nothing.
     """
     said = hints.units.get("acc", said)
-    if (centre := units.offset(values)) is not None:
+    if "acc" not in hints.units and (centre := units.offset(values)) is not None:
         raise RecordingError(
             f"{name}: the accelerations turn about {', '.join(f'{at:.4g}' for at in centre)} in place of zero",
-            "subtract from each axis what its converter gives at 0 g, such as half of its range",
+            "subtract from each axis what its converter gives at 0 g, such as half of its range, or name the unit with"
+            " --units acc=UNIT if zero is right",
         )
     size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
     whole = not said and units.are_counts(values)

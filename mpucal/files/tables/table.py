@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
 from itertools import islice
@@ -87,6 +87,12 @@ class Table:
         """Return (n,) True where a row has a cell in a column."""
         cells = self.cells[column.place]
         return np.ones(len(self), bool) if isinstance(cells, np.ndarray) else np.array([bool(c.strip()) for c in cells])
+
+    def part(self, kept: Mask) -> Table:
+        """Return the rows where `kept` (n,) is True."""
+        places = np.flatnonzero(kept).tolist()
+        cells = [of[kept] if isinstance(of, np.ndarray) else [of[at] for at in places] for of in self.cells]
+        return replace(self, cells=cells, lines=[self.lines[at] for at in places] if self.lines else ())
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """Return (n, k) numbers; NaN where a cell is empty, or is one of a few damaged ones.

@@ -161,13 +161,16 @@ def offset(values: Vector) -> Vector | None:
     """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is outside; None otherwise.
 
     Each axis has to cover more than the radius, so that the sphere is determined, and not by noise or shocks alone;
-    and the lengths have to scatter less about the centre than about zero.
+    and the centre has to explain why the lengths vary about zero: those of a flight, or of a rest with shocks, do
+    about any point.
     """
     x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), (values**2).sum(axis=1), rcond=None)
-    radius, scatter = typical_size(values - x[:3])
-    cover, without_shocks = (float(np.ptp(of, axis=0).min()) for of in (values, averaged(values)))
-    known = scatter < typical_size(values)[1] and scatter < SCATTER * radius < min(SCATTER * cover, without_shocks)
-    return x[:3] if known and radius < float(np.linalg.norm(x[:3])) else None
+    centre, means = x[:3], averaged(values)
+    radius, scatter = typical_size(values - centre)
+    cover, without_shocks = (float(np.ptp(of, axis=0).min()) for of in (values, means))
+    left, all_of_it = (float(np.linalg.norm(of, axis=1).std()) for of in (means - centre, means))
+    known = left < SCATTER * all_of_it and scatter < SCATTER * radius < min(SCATTER * cover, without_shocks)
+    return centre if known and radius < float(np.linalg.norm(centre)) else None
 
 
 def to_signed(values: Vector) -> Vector:

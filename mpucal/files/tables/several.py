@@ -1,0 +1,81 @@
+"""Lines of several sensors of one kind, which a column tells apart, as boards and gateways log them."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...clocks.stamps import FEWEST
+from ...data import Vector
+from ...errors import RecordingError
+from .cells import Cells, Kind
+from .names import ACC, GYR, Column
+from .table import Table
+from .units import BEYOND
+
+# names of such a column, whose words may come one after the other
+NAMES_SENSORS = re.compile(
+    r"(?:sensor|device|imu|node|board|module|mac)(?:[ _.-]?(?:id|no|nr|num|number|name|index|addr|address|mac))?",
+    re.IGNORECASE,
+).fullmatch
+MOST_SENSORS = 32
+# lines among which a column of any name has to alternate
+BEGUN = 2000
+# columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
+FEWEST_COLUMNS, FARTHER = 3, 2.0
+
+
+def of_one_sensor(table: Table) -> Table:
+    """Return the lines of the first of several sensors; the same table if no column tells lines of sensors apart.
+
+    The column is called so, or alternates, and the sensors' numbers lie farther apart than those of one of them.
+    """
+    for place, cells in enumerate(table.cells):
+        named = bool(NAMES_SENSORS(table.name_of(place)))
+        if not named and not 1 < len(set(_words(cells[:BEGUN]))) <= MOST_SENSORS:
+            continue
+        words = _words(cells)
+        of_words = {word: number for number, word in enumerate(dict.fromkeys(filter(str.strip, words)))}
+        if not 1 < len(of_words) <= MOST_SENSORS:
+            continue
+        sensors = np.array([of_words.get(word, -1) for word in words])
+        first = sensors == 0
+        whole = all(table.has(column)[first].any() for column in table.columns if column.quantity in (ACC, GYR))
+        if whole and (named or _lie_apart(_others(table, place), sensors)):
+            called = table.name_of(place) or f"column {place + 1}"
+            said = f"its lines are of several sensors ({called}: {', '.join(of_words)}), of which the first was read"
+            return replace(table.part(first), remarks=(*table.remarks, said))
+    return table
+
+
+def _words(cells: Cells) -> list[str]:
+    return [str(cell) for cell in cells]
+
+
+def _others(table: Table, place: int) -> Vector:
+    """Return the numbers in the other columns, (n, k), 0 where there is none; (n, 0) if the table is damaged."""
+    with suppress(RecordingError):
+        found = table.numbers([Column("", at, "") for at in table.places(Kind.NUMBER) if at != place])
+        return np.where(np.abs(found) < BEYOND, found, 0.0)
+    return np.zeros((len(table), 0))
+
+
+def _lie_apart(values: Vector, sensors: NDArray[np.int_]) -> bool:
+    """Return True if most lines are of another of the `sensors` (n,) than the line before, and their `values` differ.
+
+    From one sensor to another, (n, k) values then change by more than those of one sensor until its next line, although
+    that comes later.
+    """
+    changes, order = sensors[1:] != sensors[:-1], np.argsort(sensors, kind="stable")
+    again = sensors[order][1:] == sensors[order][:-1]
+    if 2 * np.count_nonzero(changes) < len(changes) or np.count_nonzero(again) < FEWEST:
+        return False
+    apart, alone = (
+        np.median(np.abs(np.diff(of, axis=0))[where], axis=0)
+        for of, where in ((values, changes), (values[order], again))
+    )
+    return int(np.count_nonzero(apart > FARTHER * alone)) >= FEWEST_COLUMNS

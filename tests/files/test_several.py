@@ -1,0 +1,58 @@
+"""Tables whose lines are of several sensors: those of the first are read, whatever the column that tells them apart."""
+
+import numpy as np
+import pytest
+
+import mpucal
+
+AXES = "ax,ay,az,gx,gy,gz"
+
+
+def write(path, walk, header, labels, order="line"):
+    """Write a line for each sample and board, whose axes point elsewhere; or the lines of a board after the other's."""
+    turned = (np.eye(3), np.diag([1.0, -1.0, -1.0]), np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]))[: len(labels)]
+    lines = [
+        [
+            f"{label},{t!r},{','.join(map(repr, [*(R @ a).tolist(), *(R @ w).tolist()]))}\n"
+            for label, R in zip(labels, turned, strict=True)
+        ]
+        for t, a, w in zip(walk.t.tolist(), walk.acc, walk.gyr, strict=True)
+    ]
+    lines = lines if order == "line" else zip(*lines, strict=True)
+    path.write_text(header + "".join(line for group in lines for line in group))
+
+
+@pytest.mark.parametrize(
+    ("header", "labels", "called"),
+    [
+        (f"channel,time,{AXES}\n", (0, 2, 5), "channel: 0, 2, 5"),
+        (f"device,t,{AXES}\n", ("left", "right"), "device: left, right"),
+        ("", (3, 4), "column 1: 3, 4"),
+    ],
+)
+def test_lines_of_several_sensors_in_turn(header, labels, called, walk, assert_same, tmp_path):
+    write(tmp_path / "boards.csv", walk, header, labels)
+    found = mpucal.load(tmp_path / "boards.csv")
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert f"its lines are of several sensors ({called}), of which the first was read" in found.taken
+
+
+def test_lines_of_one_sensor_after_the_other(walk, assert_same, tmp_path):
+    """Read the first, and no interruption where the times of the next begin."""
+    write(tmp_path / "boards.csv", walk, f"sensor_id,t,{AXES}\n", ("a", "b"), order="board")
+    assert_same(mpucal.load(tmp_path / "boards.csv"), walk, 1e-9, 1e-9, 1e-9)
+
+
+@pytest.mark.parametrize("name", ["gait", "sensor"])
+def test_a_column_that_tells_no_sensors_apart(name, walk, assert_same, tmp_path):
+    """Read all lines where a column alternates on its own, or where the lines of one word lack a sensor."""
+    words = np.where(np.arange(len(walk)) % 2, "swing", "stance")
+    rows = zip(words.tolist(), walk.t.tolist(), walk.acc.tolist(), walk.gyr.tolist(), strict=True)
+    text = f"{name},time,{AXES}\n"
+    for word, t, acc, gyr in rows:
+        if name == "gait":
+            text += f"{word},{t!r},{','.join(map(repr, [*acc, *gyr]))}\n"
+        else:
+            text += f"acc,{t!r},{','.join(map(repr, acc))},,,\ngyr,{t!r},,,,{','.join(map(repr, gyr))}\n"
+    (tmp_path / "walk.csv").write_text(text)
+    assert_same(mpucal.load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
