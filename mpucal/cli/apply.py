@@ -48,7 +48,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     if target is not None:
         check_not_input(target, (calibration, file, *captures_in(file)))
     rows = open_rows(file, make_hints(hints))
-    say_interpretation(rows.taken)
+    say_interpretation(rows)
     if rows.done:
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give the uncalibrated recording")
     ready = make_correction(load_calibration(calibration), rows.sensor, rows.autopilot)
@@ -76,7 +76,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
 def _remarks(rows: Rows) -> tuple[str, ...]:
     others = f"{rows.name} holds {rows.others} more IMUs; only the first one is converted." if rows.others else None
     undated = f"{rows.name} holds no time of day; its times are kept." if rows.utc_ns is None else None
-    return tuple(filter(None, (rows.recovered, others, undated)))
+    return tuple(filter(None, (others, undated)))
 
 
 class _Totals:

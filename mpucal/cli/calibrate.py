@@ -50,9 +50,7 @@ def command(
 ) -> int:
     """Calibrate from a recording, and print or write the result."""
     samples = load(recording, make_hints(hints))
-    say_interpretation(samples.taken)
-    if samples.recovered is not None:
-        click.echo(f"mpucal: {samples.recovered}", err=True)
+    say_interpretation(samples)
     known = None if noise is None else Noise.load(noise)
     if known is not None:
         samples = replace(samples, sensor=known.at_least(samples.sensor, samples.rate_hz))

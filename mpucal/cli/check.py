@@ -89,7 +89,7 @@ def command(
             check_not_input(folder / name, [calibration])
     if file is not None:
         recording = load(file, given_hints(options))
-        say_interpretation(recording.taken)
+        say_interpretation(recording)
         if folder is not None:
             check_owner(folder, old, None, "check", str(calibration), str(file))
         with nullcontext() if folder is None else OutputFolder(folder) as place:

@@ -76,7 +76,7 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
 
 def _measure_file(file: Path, options: dict[str, Any]) -> Noise:
     rows = open_rows(file, given_hints(options))
-    say_interpretation(rows.taken)
+    say_interpretation(rows)
     meter = NoiseMeter(rows.sensor)
     for samples in rows.runs:
         meter.add(drop_incomplete(samples))

@@ -1,4 +1,4 @@
-"""Options for properties that a recording does not state itself, and the message about how it was interpreted."""
+"""Options for properties that a recording does not state itself, and the messages about how it was read."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from typing import Any
 import click
 
 from ..arguments import read_limited
+from ..data import Recording
 from ..errors import UsageError
 from ..files.hints import Hints, parse_columns, parse_span, parse_units
 from ..files.reading import MOST_MB, VARIABLE, allowed_bytes
+from ..files.rows import Rows
 from .arguments import Decorator, together
 from .options import ABOVE_ZERO, Parsed, given_options
 from .person import say
@@ -135,7 +137,8 @@ def _HINTS(**_hints: Any) -> None:  # noqa: N802 - a command that only parses op
     """Parse the options after a pattern on a line of a hints file."""
 
 
-def say_interpretation(remark: str | None) -> None:
-    """Print how a file's columns and units were interpreted, if that had to be guessed."""
-    if remark is not None:
-        say(remark)
+def say_interpretation(read: Recording | Rows) -> None:
+    """Print how a file was interpreted, if that had to be guessed, and what was read of a damaged one."""
+    for remark in (read.taken, read.recovered):
+        if remark is not None:
+            say(remark)

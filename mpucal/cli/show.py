@@ -80,8 +80,7 @@ def _show_calibration(where: str, calibration: Calibration, as_json: bool) -> No
 
 def _show_recording(file: Path, hints: Hints, as_json: bool) -> None:
     recording = load(file, hints)
-    for remark in (recording.taken, recording.recovered):
-        say_interpretation(remark)
+    say_interpretation(recording)
     facts = _facts(recording)
     click.echo(json.dumps(facts, indent=2) if as_json else _recording_page(file, facts))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from html import escape as without_marks
+from html import escape as escape_markup
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ CSS = (Path(__file__).parent / "report.css").read_text(encoding="utf-8")
 
 def escape(text: str) -> str:
     """Return text as HTML that only shows it."""
-    return without_marks(escape_controls(text))
+    return escape_markup(escape_controls(text))
 
 
 def document(title: str, heading: str, *content: str) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from ..data import Vector
 from ..errors import RefusedError, UsageError
 from ..reasons import reason
-from .calibration import REFUSED, Calibration
+from .calibration import GOOD, REFUSED, Calibration
 from .comparison import compare, in_body_frame
 from .correlation import UNCORRELATED
 
@@ -182,7 +182,7 @@ def _weighted_mean(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibr
         for c, t in zip(all_, T, strict=True)
     ]
     last = max(all_, key=lambda c: c.created)
-    worst = max(all_, key=lambda c: c.verdict != "good")
+    worst = max(all_, key=lambda c: c.verdict != GOOD)
     return replace(
         last,
         D=np.asarray(D),

@@ -1,4 +1,4 @@
-"""Hints about a recording: every command takes the same ones, and a refusal names those that are missing."""
+"""Recordings in commands: all take the same hints, a refusal names missing ones, and a damaged file is reported."""
 
 import json
 import pickle
@@ -39,6 +39,14 @@ def test_a_command_takes_columns_and_span(mpucal, table, recording):
     assert json.loads(mpucal("show", "odd.csv", "--json", *SAID).out)["samples"] == len(recording)
     cut = mpucal("show", "odd.csv", "--json", *SAID, "--span", "2:7")
     assert json.loads(cut.out)["samples"] == pytest.approx(5 * recording.rate_hz, abs=1)
+
+
+@pytest.mark.parametrize("command", ["calibrate", "check", "noise", "apply", "show"])
+def test_each_command_reports_that_a_capture_is_cut_short(mpucal, session, command):
+    whole = (session.folder / "capture.mcap").read_bytes()
+    Path("cut.mcap").write_bytes(whole[: len(whole) // 2])
+    calibration = [session.folder / "calibration.json"] if command in ("check", "apply") else []
+    assert "cut.mcap is cut short or damaged" in mpucal(command, *calibration, "cut.mcap").err
 
 
 def test_a_batch_takes_hints_by_pattern(table, recording, tmp_path):
