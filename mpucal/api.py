@@ -15,7 +15,7 @@ from .files.hints import Hints, parse_columns, parse_span, parse_units
 from .recheck import check as _check
 from .recheck.outcome import CheckResult as CheckResult  # noqa: PLC0414 - exported by mpucal
 from .result.calibration import Calibration
-from .result.clock import now
+from .result.clock import iso_utc
 from .result.keys import Model
 from .result.noise import Noise as Noise  # noqa: PLC0414
 
@@ -143,7 +143,7 @@ def noise(recording: Recording | str | PathLike[str]) -> Noise:
     ------
     WrongType : an argument of another type. RecordingError : too few samples.
     """
-    return noise_of(recording_of(recording), now().isoformat())
+    return noise_of(recording_of(recording), iso_utc())
 
 
 def recording_of(given: Recording | str | PathLike[str]) -> Recording:

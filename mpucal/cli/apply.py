@@ -23,6 +23,7 @@ from ..result.correction import make_correction
 from ..result.session_files import captures_in
 from .arguments import PATH, calibration_argument, json_option, output_option
 from .loading import load_calibration
+from .person import say
 from .recording_options import hint_options, make_hints, say_interpretation
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
@@ -53,7 +54,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give the uncalibrated recording")
     ready = make_correction(load_calibration(calibration), rows.sensor, rows.autopilot)
     for remark in (*ready.remarks, *_remarks(rows)):
-        click.echo(f"mpucal: {remark}", err=True)
+        say(remark)
     noise = np.array([ready.calibration.noise_std, ready.calibration.gyro_noise_std])
     done = f"calibrated with {calibration.name} of {ready.calibration.created or 'an unknown time'}"
     totals = _Totals()

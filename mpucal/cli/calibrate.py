@@ -19,6 +19,7 @@ from ..result.session_files import BLOB
 from ..session.results import check_owner, result_files, save
 from .arguments import PATH, json_option, noise_option, output_option
 from .options import fit_options
+from .person import say
 from .recording_options import hint_options, make_hints, say_interpretation
 from .summary import next_steps, summary
 
@@ -70,5 +71,5 @@ def command(
     if calibration.verdict != REFUSED:
         return 0
     if folder is not None and (folder / BLOB.name).exists():
-        click.echo(f"mpucal: {folder / BLOB.name} is that of an earlier calibration; it was not changed.", err=True)
+        say(f"{folder / BLOB.name} is that of an earlier calibration; it was not changed.")
     return RefusedError.exit_code

@@ -22,7 +22,7 @@ from ..recheck import check
 from ..recheck.outcome import CheckResult
 from ..recheck.update import update_biases
 from ..result.calibration import Calibration
-from ..result.clock import now
+from ..result.clock import iso_utc
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import SessionFolder, check_owner, save
 from ..sinks.choose import choose_sinks
@@ -121,7 +121,7 @@ def _check(
         return result, []
     files = {CHECK_FILE: (json.dumps(result.document(), indent=2) + "\n").encode()}
     if result.only_biases:
-        new = update_biases(old, result, recording, now().isoformat())
+        new = update_biases(old, result, recording, iso_utc())
         files |= {BLOB.name: new.blob().encode(), DOCUMENT.name: new.json().encode()}
     save(folder.path, files)
     click.echo(f"\nWritten to {folder.path}:\n  {', '.join(files)}", err=as_json)

@@ -14,6 +14,7 @@ from ..result.noise import Noise, with_noise
 from ..result.session_files import DOCUMENT
 from .arguments import calibration_argument, json_option, noise_option, output_option
 from .loading import load_calibration
+from .person import say
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
 # Not a form of a calibration, but of a vehicle's capture.
@@ -56,7 +57,7 @@ def command(calibration: Path, name: str, file: Path | None, noise: Path | None,
     if file is not None:
         write_atomically(file, text.encode())
     for note in notes:
-        click.echo(f"mpucal: {note}", err=True)
+        say(note)
     if as_json:
         document = {"to": name, "ending": chosen.suffix, "text": text, "cannot_carry": notes}
         click.echo(json.dumps(document, indent=2))

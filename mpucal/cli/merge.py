@@ -13,6 +13,7 @@ from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import check_owner, save
 from .arguments import CALIBRATION_PATH, json_option, output_option
 from .loading import force_option, load_trusted
+from .person import say
 from .summary import slope, summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
@@ -39,7 +40,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as
             document, blob = made.calibration.json().encode(), made.calibration.blob().encode()
             save(into.path, {BLOB.name: blob, DOCUMENT.name: document})
     for sentence in (made.why, *made.remarks):
-        click.echo(f"mpucal: {sentence}", err=True)
+        say(sentence)
     if as_json:
         click.echo(made.calibration.json(), nl=False)
         return

@@ -20,7 +20,7 @@ from ..errors import EndOfCapture, RecordingError, SourceError
 from ..files import open_rows
 from ..files.rows import drop_incomplete
 from ..report.noise import render, summary
-from ..result.clock import now
+from ..result.clock import iso_utc
 from ..result.noise import Noise
 from ..session.boards import speak_of, usual_board
 from ..session.lay_flat import PUT_DOWN, put_down
@@ -80,7 +80,7 @@ def _measure_file(file: Path, options: dict[str, Any]) -> Noise:
     meter = NoiseMeter(rows.sensor)
     for samples in rows.runs:
         meter.add(drop_incomplete(samples))
-    return meter.result(now().isoformat())
+    return meter.result(iso_utc())
 
 
 def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noise, SourceError | None]:
@@ -88,7 +88,7 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noi
     source = open_source(options, given_options(), until_end=True)
     meter: NoiseMeter | None = None
     failure: SourceError | None = None
-    with source.measuring(Path(os.devnull), say, now().isoformat()) as measuring, _progress() as show_progress:
+    with source.measuring(Path(os.devnull), say, iso_utc()) as measuring, _progress() as show_progress:
         # The result so far is kept, whatever ends the measurement.
         try:
             sensor = measuring.source.start()
@@ -109,7 +109,7 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noi
         with suppress(EndOfCapture, SourceError):
             measuring.source.stop()
     try:
-        return (meter or NoiseMeter(Sensor())).result(now().isoformat()), failure
+        return (meter or NoiseMeter(Sensor())).result(iso_utc()), failure
     except RecordingError as error:
         raise failure or error from None
 

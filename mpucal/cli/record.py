@@ -10,7 +10,7 @@ import click
 
 from ..disk.atomic import check_free
 from ..errors import Abandoned, OutputError, SourceError
-from ..result.clock import stamp
+from ..result.clock import file_stamp
 from ..sources.opening import open_source
 from ..terminal.console import console
 from ..terminal.hangup import logging_after_hangup
@@ -35,7 +35,7 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     """
     check_source(click.get_current_context())
     source = open_source(options, given_options(), until_end=True)
-    file = file or Path(f"record-{stamp()}{MCAP}")
+    file = file or Path(f"record-{file_stamp()}{MCAP}")
     if file.suffix.lower() != MCAP:
         raise OutputError(f"{file} does not end with {MCAP}, by which other commands know a capture", f"add {MCAP}")
     check_free(file)

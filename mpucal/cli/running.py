@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..result.clock import now
+from ..result.clock import iso_utc
 from ..session.live_scheduler import InlineWorker, ProcessWorker
 from ..session.runner import Runner
 from ..sources.opened_source import OpenedSource
@@ -21,7 +21,7 @@ def open_runner(source: OpenedSource, capture: Path, person: Console, checking: 
     ------
     CaptureError : a replay ended before its capture did.
     """
-    with source.measuring(capture, person.say, now().isoformat()) as measuring, person.listening():
+    with source.measuring(capture, person.say, iso_utc()) as measuring, person.listening():
         if source.recovered is not None:
             person.say(f"  {source.recovered}")
         yield Runner(

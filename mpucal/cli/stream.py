@@ -23,7 +23,7 @@ from ..page.address import Address
 from ..page.live import live_page
 from ..recheck import days_since
 from ..recheck.watch import Contradiction, DriftMonitor
-from ..result.clock import now
+from ..result.clock import iso_utc
 from ..result.correction import Correction, make_correction
 from ..session.events import Caution
 from ..session.ports import Source, polled
@@ -77,7 +77,7 @@ def command(
     on_page = nullcontext() if page is None else live_page(page, source_title(options), choose_board(board, source))
     events = JsonLines(sys.stderr, Keys()) if json_events else None
     tell = say if events is None else events.say
-    capture = source.measuring(file or Path(os.devnull), tell, now().isoformat())
+    capture = source.measuring(file or Path(os.devnull), tell, iso_utc())
     with capture as measuring, on_page as screen, suppress(KeyboardInterrupt):
         ready: Correction | None = None
         monitor: DriftMonitor | None = None

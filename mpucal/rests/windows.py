@@ -96,7 +96,7 @@ class Windows:
 
 @dataclass(frozen=True)
 class CutWindows(Spreads):
-    """All windows of n samples of a recording, without an incomplete last one; acc : (m, 3) m/s^2, means."""
+    """Windows of n samples, all of a recording but an incomplete last one; acc : (m, 3) m/s^2, means."""
 
     acc: Vector
     recording: Recording

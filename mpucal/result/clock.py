@@ -10,16 +10,16 @@ LEAST_YEAR = 2025
 
 def warn_unset() -> str:
     """Return a warning if the computer's clock is not set, else empty."""
-    if now().year >= LEAST_YEAR:
+    if (now := datetime.now(UTC)).year >= LEAST_YEAR:
         return ""
-    return f"The computer's clock shows {now():%Y-%m-%d}: set it, or names and dates of the results are wrong."
+    return f"The computer's clock shows {now:%Y-%m-%d}: set it, or names and dates of the results are wrong."
 
 
-def now() -> datetime:
-    """Return the time of day in UTC, in whole seconds."""
-    return datetime.now(UTC).replace(microsecond=0)
+def iso_utc() -> str:
+    """Return the date and time of day in UTC, as ISO 8601 writes them."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def stamp() -> str:
-    """Return the time of day as a part of a file name."""
-    return now().strftime("%Y%m%d-%H%M%S")
+def file_stamp() -> str:
+    """Return the date and time of day in UTC as a part of a file name."""
+    return datetime.now(UTC).strftime("%Y%m%d-%H%M%S")

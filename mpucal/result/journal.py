@@ -17,7 +17,7 @@ from typing import Any
 from ..disk.atomic import make_folders, sync_folder, write_atomically
 from ..errors import OutputError
 from ..strict_json import parse_json
-from .clock import now
+from .clock import iso_utc
 
 AT = "at"
 
@@ -40,7 +40,7 @@ class Journal:
             return
         with suppress(OSError, OutputError):
             make_folders(self._path.parent)
-            write_atomically(self._path, json.dumps({AT: now().isoformat(), **content}, indent=2).encode())
+            write_atomically(self._path, json.dumps({AT: iso_utc(), **content}, indent=2).encode())
 
     def end(self) -> None:
         """Remove the note: the device is in one state again, the old or the new one."""

@@ -18,7 +18,7 @@ from ..disk.output_folder import OutputFolder, free_name
 from ..errors import MpucalError, OutputError, UsageError
 from ..report import render
 from ..result.calibration import REFUSED, Calibration
-from ..result.clock import stamp
+from ..result.clock import file_stamp
 from ..result.session_files import BLOB, DOCUMENT, REPORT, TRUTH, captures_in
 
 
@@ -102,7 +102,7 @@ class SessionFolder(OutputFolder):
     """
 
     def __init__(self, given: Path | None, capture_name: str, again: bool = False) -> None:
-        self._stamp = stamp()
+        self._stamp = file_stamp()
         self._given = given is not None
         self._capture_name = capture_name
         super().__init__(given or Path(f"session-{self._stamp}"), new=given is None)

@@ -12,7 +12,7 @@ from ..arguments import read_limited
 from ..data import Recording
 from ..errors import NoStorage, OutputError, RecordingError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
-from ..result.clock import now
+from ..result.clock import iso_utc
 from ..result.keys import FORMAT
 from ..result.session_files import DOCUMENT
 from ..session.results import result_files, save
@@ -51,7 +51,7 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
     kept = keep(kind, sink, folder, say)
     with _report_interruption(sink):
         applied = sink.write(calibration)
-    entry = {"to": kind.name, "where": sink.where, "what": applied.what, "at": now().isoformat()}
+    entry = {"to": kind.name, "where": sink.where, "what": applied.what, "at": iso_utc()}
     extra = {**applied.calibration.extra, WRITTEN: [*applied.calibration.extra.get(WRITTEN, ()), entry]}
     try:
         return replace(applied, calibration=record(kind, replace(applied.calibration, extra=extra)))

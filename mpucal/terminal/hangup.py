@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from ..result.clock import now
+from ..result.clock import iso_utc
 
 _DESCRIPTORS = (0, 1, 2)
 
@@ -54,7 +54,7 @@ def _redirect(descriptors: Sequence[int], log: Path) -> None:
     except OSError:
         end = os.open(os.devnull, os.O_RDWR)
     nothing = os.open(os.devnull, os.O_RDONLY)
-    os.write(end, f"{now().isoformat()}: the terminal went away.\n".encode())
+    os.write(end, f"{iso_utc()}: the terminal went away.\n".encode())
     for number in descriptors:
         os.dup2(end if number else nothing, number)
     os.close(end)
