@@ -18,7 +18,7 @@ from .hints import NO_HINTS, Hints
 from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
 from .reading import HELD, check_size, first_bytes, import_extra, reading
-from .tables.array_table import table_of_arrays, tables_of_arrays
+from .tables.array_table import table_of_arrays, table_of_labels, tables_of_arrays
 from .tables.cells import is_number
 from .tables.labelled import pivot
 from .tables.load import recording_from_table
@@ -66,7 +66,7 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise RecordingError(f"{path} is not a whole file of arrays ({said})", _REMEDY) from error
     if not hints.columns and is_pair(tables := tables_of_arrays(found)):
         return recording_of_tables(path.name, tables, hints)
-    table = table_of_arrays(path.name, found)
+    table = table_of_labels(path.name, found) or table_of_arrays(path.name, found)
     if table is None:
         raise RecordingError(f"{path.name} holds no columns of numbers", _REMEDY)
     return recording_from_table(pivot(table) or table, hints)

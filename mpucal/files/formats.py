@@ -121,6 +121,7 @@ FORMATS = (
     *_others(".json .jsonl .ndjson", "samples in JSON", _ARRAYS, "arrays:is_json_of_samples"),
     Format(".npz", "a NumPy archive", rows=f"{_HERE}.npz:npz_rows", writer=f"{_HERE}.npz:npz_file"),
     *_others(".parquet", "a Parquet file", _ARRAYS, only=False),
+    *_others(".xlsx", "a workbook", "workbook:load_workbook", only=False),
     Format(
         ".csv",
         "a table",

@@ -1,6 +1,7 @@
 """Arrays of a MATLAB file of level 5, as written by `save(NAME, '-v7')` or `'-v6'` (MAT-File Format, MathWorks).
 
-SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers and structures of them. The
+SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers, structures of them, and cells
+of texts. The
 contents of objects, such as timetables, stand in a form that MathWorks does not describe: they are refused. Files of
 `'-v7.3'` are HDF5, which h5py reads.
 """
@@ -29,7 +30,9 @@ ORDERS = {b"IM": "<", b"MI": ">"}
 # data types of elements, and classes of arrays
 MATRIX, COMPRESSED = 14, 15
 DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-STRUCTURE, NUMBERS, OBJECT = 2, range(6, 16), 17
+# of letters in UTF-8, UTF-16 and UTF-32
+DTYPES |= {16: "u1", 17: "u2", 18: "u4"}
+CELLS, STRUCTURE, LETTERS, NUMBERS, OBJECT = 1, 2, 4, range(6, 16), 17
 DEEPEST, MOST_DIMENSIONS = 8, 8
 
 
@@ -126,6 +129,10 @@ def _matrix(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
         if len(found) != prod(shape):
             raise ValueError(f"{name} holds {len(found)} numbers")
         return name, found.reshape(shape, order="F")
+    if of == LETTERS and len(parts) > 3:
+        return name, "".join(map(chr, _numbers(*parts[3], order).tolist()))
+    if of == CELLS:
+        return name, [_matrix(part, order, depth + 1)[1] for kind, part in parts[3:] if kind == MATRIX]
     if of == STRUCTURE and prod(shape) == 1 and len(parts) > 4:
         length = max(int(_numbers(*parts[3], order)[0]), 1)
         names = bytes(parts[4][1])
@@ -138,6 +145,8 @@ def _matrix(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
 def _arrays(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
     if isinstance(value, np.ndarray):
         yield name, value
+    elif isinstance(value, list) and value and all(isinstance(each, str) for each in value):
+        yield name, np.array(value)
     elif isinstance(value, dict):
         for field, each in value.items():
             yield from _arrays(f"{name}.{field}", each)

@@ -69,6 +69,19 @@ def as_hdf5(path, walk, ns):
         file["imu/t"], file["imu/acc"], file["imu/gyro"] = walk.t, walk.acc, walk.gyr
 
 
+def as_mission_planner(path, walk, ns):
+    """Write the log of two IMUs by turns, beside another message, with the columns' names in cells."""
+    instance = np.zeros(len(walk))
+    one = np.column_stack([2 * np.arange(len(walk)), np.rint(walk.t * 1e6), instance, walk.gyr, walk.acc, instance])
+    other = np.column_stack([one[:, 0] + 1, one[:, 1], instance + 1, walk.gyr + 0.01, walk.acc + 0.02, instance])
+    labels = {
+        "RATE_label": np.array(["LineNo", "TimeUS", "R"], object),
+        "IMU_label": np.array(["LineNo", "TimeUS", "I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ", "EG"], object),
+    }
+    lines = np.stack([one, other], axis=1).reshape(-1, one.shape[1])
+    savemat(path, {**labels, "RATE": np.tile(one[:, :3], (4, 1)), "IMU": lines})
+
+
 def in_json(document):
     return lambda path, walk, ns: path.write_text(json.dumps(document(walk)))
 
@@ -93,6 +106,7 @@ WRITTEN = {
         *("a.mat", lambda p, w, ns: savemat(p, {"imu": {"time": w.t, "acc": w.acc, "gyro": w.gyr}, "Fs": 100.0})),
         "times in s",
     ),
+    "Mission Planner's log": ("a.mat", as_mission_planner, "of several sensors (imu: 0.0, 1.0)"),
     "a matrix of MATLAB without names": ("a.mat", as_matlabs_matrix, "counts of ±4 g"),
     "Parquet": ("a.parquet", lambda p, w, ns: frame(w, timestamp=ns).to_parquet(p), "accelerations in g"),
     "Parquet with dates": (

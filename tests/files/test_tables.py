@@ -1,7 +1,6 @@
 """Tables of text as programs and people write them: each form is a row of data, and gives the walk's samples back."""
 
 import contextlib
-import zipfile
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -685,13 +684,6 @@ def test_an_order_is_suggested_in_which_accelerations_keep_their_length(walk, tm
     assert raised.value.options == "--columns gx,gy,gz,ax,ay,az"
 
 
-def test_a_workbook_is_to_be_exported(tmp_path):
-    with zipfile.ZipFile(tmp_path / "walk.xlsx", "w", zipfile.ZIP_DEFLATED) as book:
-        book.writestr("xl/worksheets/sheet1.xml", np.random.default_rng(3).bytes(1 << 16))
-    with pytest.raises(RecordingError, match=r"not a recording that mpucal knows: export a table as \.csv"):
-        mpucal.load(tmp_path / "walk.xlsx")
-
-
 def test_counts_beside_an_index_have_no_rate(read, walk):
     """Take no index for milliseconds: any range of counts would fit these."""
     found = read("", "i 10.0 counts")
@@ -838,6 +830,17 @@ def test_the_unit_of_rates_that_turn_nothing_is_one_of_a_gyroscope(unit, si, tmp
     np.testing.assert_allclose(found.gyr, rates)
 
 
+def test_units_beside_the_sensors_names_of_each_line(tmp_path):
+    """Read the units that a sketch prints on each line, where no turn shows them."""
+    rows = np.random.default_rng(2).normal(0.0, 0.001, (300, 6))
+    rows[:, 2] += 9.81
+    line = "12:00:{:06.3f} I (5) Accel[m/s2]: {:9.4f} {:9.4f} {:9.4f}  |  Gyro[dps]: {:9.4f} {:9.4f} {:9.4f}\n"
+    (tmp_path / "log.txt").write_text("".join(line.format(k / 10, *row) for k, row in enumerate(rows.tolist())))
+    found = mpucal.load(tmp_path / "log.txt")
+    assert found.taken.split("accelerations ")[1].startswith("in m/s^2 and rates in deg/s.")
+    np.testing.assert_allclose(np.column_stack([found.acc, np.degrees(found.gyr)]), rows, atol=6e-5)
+
+
 def test_a_board_that_never_turned_has_an_accelerometer_all_the_same(tmp_path):
     rng = np.random.default_rng(7)
     acc, rates = np.array([9.85, 0.1, -0.3]) + rng.normal(0, 0.05, (900, 3)), rng.normal(0, 0.004, (900, 3))
@@ -846,6 +849,18 @@ def test_a_board_that_never_turned_has_an_accelerometer_all_the_same(tmp_path):
     assert "its columns were guessed from the length of gravity: --columns t,-,-,-,ax,ay,az" in found.taken
     np.testing.assert_allclose(found.acc, acc)
     assert np.isnan(found.gyr).all()
+
+
+def test_a_sample_beyond_all_sensors_is_left_out(walk, tmp_path):
+    """Leave out one whose bits a bus mixed up; refuse a file in which many are so."""
+    made = np.column_stack([walk.t, walk.acc, walk.gyr])
+    for spoiled, name in ((slice(7, 8), "one.csv"), (slice(0, 100), "many.csv")):
+        rows = made.copy()
+        rows[spoiled, 5] = -1e26
+        np.savetxt(tmp_path / name, rows, delimiter=",", header=f"time,{AXES.strip()}", comments="")
+    np.testing.assert_allclose(mpucal.load(tmp_path / "one.csv").acc, np.delete(walk.acc, 7, axis=0))
+    with pytest.raises(RecordingError, match="the rates of sample 0 are not a sensor's"):
+        mpucal.load(tmp_path / "many.csv")
 
 
 def test_lines_that_repeat_a_sample_are_left_out(read, walk, walk_ns, assert_same, tmp_path):

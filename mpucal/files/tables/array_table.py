@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .names import axes_of, parse_header
+from .names import ACC, GYR, axes_of, first_triple, parse_header
+from .several import INSTANCE
 from .table import Table
 from .text import stated_rate_hz
 
@@ -25,6 +26,17 @@ def table_of_arrays(name: str, arrays: Arrays) -> Table | None:
     header = list(columns) if len(columns) != len(UNNAMED) or parse_header(list(columns)) else UNNAMED
     rate_hz = stated_rate_hz(_single_numbers(arrays))
     return Table(name, header, [*columns.values()], rate_hz=rate_hz) if columns else None
+
+
+def table_of_labels(name: str, arrays: Arrays) -> Table | None:
+    """Return the first matrix of both sensors whose columns the texts NAME_label name, as Mission Planner writes it."""
+    for of, labels in arrays.items():
+        matrix = arrays.get(of.removesuffix("_label"), labels)
+        if labels.dtype.kind == "U" and matrix.ndim > 1 and matrix.shape[1] == labels.size:
+            table = Table(name, [INSTANCE.get(label, label) for label in labels.ravel().tolist()], [*matrix.T])
+            if all(first_triple(table.columns, quantity) for quantity in (ACC, GYR)):
+                return table
+    return None
 
 
 def _columns(arrays: Arrays) -> dict[str, NDArray[Any]]:

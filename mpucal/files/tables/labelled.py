@@ -20,8 +20,10 @@ from .names import (
     parse_column_name,
     parse_header,
 )
+from .several import INSTANCE
 from .table import Table
 from .text import read_table, table_of_rows
+from .units import find_unit
 
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
 _NAME = r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})"
@@ -36,13 +38,16 @@ _TIMES = (
 )
 _QUOTES = dict.fromkeys(map(ord, "{}'\""))
 # three axes at once, below their sensor or beside it: `accel=(9252, -5612, -12084)`, `GYRO: X=0.1,Y=0.2,Z=0.3`,
-# `Accel  x 0.1  y 0.2  z 9.8`
+# `Accel  x 0.1  y 0.2  z 9.8`, `Gyro [dps]: 0.6 -0.8 -0.2`
 _AXES = (rf"(?:{axis}[ \t]{{0,9}}[:=]?[ \t]{{0,9}})?({NUMBER}|nan)" for axis in ("[Xx]", "[Yy]", "[Zz]"))
 _THREE = re.compile(
-    r"(?<![\w.])([A-Za-z_]\w{0,40})[ \t]{0,9}[:=]?\s{0,3}[(\[]?[ \t]{0,9}"
+    r"(?<![\w.])([A-Za-z_]\w{0,40})[ \t]{0,9}(?:[(\[]([^\d()\[\],;\s][^()\[\],;\s]{0,11})[)\]])?"
+    + r"[ \t]{0,9}[:=]?\s{0,3}[(\[]?[ \t]{0,9}"
     + r"(?:[ \t]{0,9}[,;|][ \t]{0,9}|[ \t]{1,9})".join(_AXES)
     + r"(?![\w.])(?![ \t]{0,9}[,;|]?[ \t]{0,9}[-+.\d])"
 )
+# unit -> how a name ends that has it
+_TAILS = {"m/s^2": "_mps2", "g": "_g", "mg": "_mg", "rad/s": "_rads", "deg/s": "_dps", "mdeg/s": "_mdps"}
 # lines of which one names numbers: the log of a board that starts comes before
 BEGUN = 2000
 # as `rostopic echo` and `ros2 topic echo` print messages
@@ -95,7 +100,8 @@ def dataflash_text_table(text: str, name: str) -> Table | None:
     """Return the table in an ArduPilot log as text, whose FMT line names the columns; None for other text."""
     named = re.search(r"^FMT, ?\d+, ?\d+, ?IMU, ?\w+, ?([\w,]+)\r?$", text, re.MULTILINE)
     lines = re.findall(r"^IMU, ?(.+)\n", text, re.MULTILINE)
-    return read_table("\n".join(lines), name, named[1].split(","), 0, ",") if named and lines else None
+    header = [INSTANCE.get(label, label) for label in named[1].split(",")] if named else []
+    return read_table("\n".join(lines), name, header, 0, ",") if named and lines else None
 
 
 def labelled_table(text: str, name: str) -> Table | None:
@@ -158,9 +164,10 @@ def _join_records(text: str) -> str:
 
 
 def _name_axes(found: re.Match[str]) -> str:
-    """Return `NAME_x=..., NAME_y=..., NAME_z=...` of a sensor's three numbers; other words as they are."""
-    named = zip(axes_of(found[1]), found.groups()[1:], strict=False)
-    return ", ".join(f"{axis}={cell}" for axis, cell in named) or found[0]
+    """Return `NAME_x_UNIT=..., NAME_y_UNIT=...` and so on of a sensor's three numbers; other words as they are."""
+    unit = _TAILS.get(find_unit(found[2] or ""), "")
+    named = zip(axes_of(found[1]), found.groups()[2:], strict=False)
+    return ", ".join(f"{axis}{unit}={cell}" for axis, cell in named) or found[0]
 
 
 def _numbers(line: str) -> dict[str, str]:

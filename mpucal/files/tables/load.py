@@ -117,7 +117,17 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     ------
     RecordingError : it cannot be read, or does not say all that is needed; the message names what is missing.
     """
-    text = _read_text(path)
+    return table_of_text(_read_text(path), path, hints)
+
+
+def is_table_of_sensors(text: str, name: str) -> bool:
+    """Return True if a text names the columns of an accelerometer and a gyroscope."""
+    table = find_named_table(text, name)
+    return table is not None and all(first_triple(table.columns, quantity) for quantity in (ACC, GYR))
+
+
+def table_of_text(text: str, path: Path, hints: Hints) -> Recording:
+    """Return the recording in the text of a table; see load_table."""
     if not text.strip():
         raise RecordingError(f"{path} is empty", "record it again")
     table = find_any_table(text, path.name, [*hints.columns.values()])

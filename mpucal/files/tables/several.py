@@ -22,6 +22,8 @@ NAMES_SENSORS = re.compile(
     r"(?:sensor|device|imu|node|board|module|mac)(?:[ _.-]?(?:id|no|nr|num|number|name|index|addr|address|mac))?",
     re.IGNORECASE,
 ).fullmatch
+# ArduPilot's name of it -> one of those
+INSTANCE = {"I": "imu"}
 MOST_SENSORS = 32
 # lines among which a column of any name has to alternate
 BEGUN = 2000

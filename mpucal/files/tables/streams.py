@@ -16,6 +16,7 @@ from ...errors import RecordingError
 from ..hints import Hints
 from ..rows import make_recording
 from . import times, units
+from .table import MOST_BAD
 from .times import Stream
 from .units import COUNTS, OF_BNO055, QUANTITIES, resolve_unit
 
@@ -148,11 +149,12 @@ def _checked(stream: Stream, what: str, name: str) -> Stream:
     """Return a stream whose counts have their sign, if it holds numbers that a sensor may give."""
     if np.count_nonzero(stream.complete) < 2:
         raise RecordingError(f"{name} holds {np.count_nonzero(stream.complete)} {what}", "record for longer")
-    beyond = (np.abs(stream.values) >= units.BEYOND).any(axis=1)
-    if beyond.any():
+    beyond = np.asarray((np.abs(stream.values) >= units.BEYOND).any(axis=1))
+    if np.count_nonzero(beyond) > MOST_BAD * len(beyond):
         raise RecordingError(
             f"{name}: the {what} of sample {int(beyond.argmax())} are not a sensor's", "leave that sample out"
         )
+    stream = replace(stream, values=np.where(beyond[:, None], np.nan, stream.values)) if beyond.any() else stream
     if stream.unit not in ("", COUNTS):
         return stream
     signed = units.to_signed(stream.values[stream.complete])
