@@ -8,6 +8,7 @@ import numpy as np
 
 from ..chip.families import Family, family_of
 from ..data import Vector
+from ..origin import name_thing
 from ..result.calibration import REFUSED, Calibration
 from .elements import paragraph, table
 from .units import AXES, ParameterRow, accelerometer, unbroken
@@ -38,11 +39,11 @@ def accelerometer_table(c: Calibration, id_: str) -> str:
 
 def about(c: Calibration) -> str:
     """Return the notes on the table."""
-    sheet = family_of(c.sensor.chip)
+    sheet, described = family_of(c.sensor.chip), name_thing(NOTE, c.sensor.origin)
     if sheet is None:
-        return paragraph(NOTE, note=True)
+        return paragraph(described, note=True)
     return paragraph(
-        f"{NOTE} The data sheet is {sheet.data_sheet}; unusual means beyond two thirds of its tolerance."
+        f"{described} The data sheet is {sheet.data_sheet}; unusual means beyond two thirds of its tolerance."
         f" Its cross-axis sensitivity is ±{sheet.cross_axis_percent:g} %; its nonlinearity,"
         f" {sheet.nonlinearity_percent:g} % of the range, is not estimated.",
         note=True,

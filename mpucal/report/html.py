@@ -12,6 +12,7 @@ import numpy as np
 from .. import __version__
 from ..data import Recording
 from ..files.formats import is_of_session
+from ..origin import Origin
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
 from . import sections
@@ -113,7 +114,7 @@ def _magnitudes(track: Track | None) -> str:
 def _settings(calibration: Calibration, recording: Recording | None) -> str:
     sensor, fit = calibration.sensor, calibration.fit
     rows = [
-        ("chip", sensor.chip),
+        ("sensor" if sensor.origin is Origin.VEHICLE else "chip", sensor.chip),
         ("WHO_AM_I", None if sensor.who_am_i is None else f"0x{sensor.who_am_i:02x}"),
         ("accelerometer range", quantity(sensor.accel_range_g, "g", "±")),
         ("gyroscope range", quantity(sensor.gyro_range_dps, "deg/s", "±")),

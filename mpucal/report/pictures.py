@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..data import Vector
+from ..origin import name_thing
 from ..result.error_model import MG_PER_MPS2
 from .elements import figure
 from .figure import AFTER, BEFORE, INK, LINE, XYZ, Axes, dots
@@ -29,15 +30,17 @@ COVERAGE = (
 
 def gallery(track: Track) -> Mapping[str, str]:
     """Return the figures by name; empty if the recording lacks the data."""
-    return {
-        "residuals": figure(residuals(track), RESIDUALS),
-        "magnitude": figure(magnitude(track), MAGNITUDE),
-        "sphere": figure(sphere(track), SPHERE),
-        "innovations": figure(innovations(track), _about_innovations(track)),
-        "coverage": figure(coverage(track), COVERAGE),
-        "rates": figure(rates(track), _about_rates(track)),
-        "temperature": figure(temperature(track), ""),
+    drawn = {
+        "residuals": (residuals(track), RESIDUALS),
+        "magnitude": (magnitude(track), MAGNITUDE),
+        "sphere": (sphere(track), SPHERE),
+        "innovations": (innovations(track), _about_innovations(track)),
+        "coverage": (coverage(track), COVERAGE),
+        "rates": (rates(track), _about_rates(track)),
+        "temperature": (temperature(track), ""),
     }
+    origin = track.calibration.sensor.origin
+    return {name: figure(picture, name_thing(caption, origin)) for name, (picture, caption) in drawn.items()}
 
 
 def _about_innovations(track: Track) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..chip.families import family_of
+from ..origin import Origin
 from ..result.calibration import REFUSED, USABLE, Calibration
 from ..result.keys import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
@@ -18,8 +19,8 @@ from .units import AXES, gyroscope, unbroken, with_std
 
 # docs/method.md, "Precision and repeatability"
 REPEATABILITY = (
-    "The uncertainties are those of this measurement. Such a chip repeats its biases less precisely: to about 2 mg from"
-    " one session to the next, and 2 to 10 mg while it warms up. mpucal check tells whether they have moved."
+    "The uncertainties are those of this measurement. Such a sensor repeats its biases less precisely: to about 2 mg"
+    " from one session to the next, and 2 to 10 mg while it warms up. mpucal check tells whether they have moved."
 )
 NO_FORMULA = "D cannot be inverted: no correction is possible."
 UNOBSERVABLE = " ± ?: not observable from this recording."
@@ -27,6 +28,16 @@ TO_SINKS = (
     ("a bridge's memory", "mpucal write calibration.json bridge --serial PORT"),
     ("the chip's offset registers (only the bias)", "mpucal write calibration.json chip --bus /dev/i2c-1"),
     ("other programs", "mpucal export calibration.json --to FORMAT"),
+)
+# How long a calibration stays valid, besides the temperature, and what tells
+OF_CHIP = (
+    "As long as the chip is not disturbed: soldering, a bent board, a shock or remounting may change it.",
+    "When in doubt: <code>mpucal check calibration.json --bus /dev/i2c-1</code>.",
+)
+OF_VEHICLE = (
+    "As long as the autopilot stays on its mount: a crash, or its removal, may change it.",
+    "When in doubt: <code>mpucal check calibration.json --mavlink URL</code>, or after a write with"
+    " calibration-on-autopilot.json.",
 )
 TO_AUTOPILOT = (("the autopilot's parameters", "mpucal write calibration.json autopilot --mavlink URL"),)
 RESERVED = "Consider the reservations above; to remove them, follow their remedies and repeat the session."
@@ -57,11 +68,8 @@ def _validity(c: Calibration) -> list[str]:
     drift = "" if sheet is None else f" ({escape(sheet.zero_g_drift)} by the data sheet)"
     at = f", {escape(warm)}" if warm else ""
     near = f"Near the temperature of the session{at}: the bias changes with temperature{drift}."
-    return [
-        "Within the range of measured temperatures." if c.follows_temperature else near,
-        "As long as the chip is not disturbed: soldering, a bent board, a shock or remounting may change it.",
-        "When in doubt: <code>mpucal check calibration.json --bus /dev/i2c-1</code>.",
-    ]
+    within = "Within the range of measured temperatures." if c.follows_temperature else near
+    return [within, *(OF_VEHICLE if c.sensor.origin is Origin.VEHICLE else OF_CHIP)]
 
 
 def _list(items: list[str]) -> str:

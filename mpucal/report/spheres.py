@@ -81,7 +81,7 @@ def coverage(track: Track) -> str:
             marks.append(text(float(x), float(y), letter, colour=FAINT))
         for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
             marks.append(dots(*disc.place(_project(units[sign * units[:, 2] >= 0.0])), radius, colour))
-    label = "Direction that pointed down, in the board's axes: large dots held still, small dots moving"
+    label = "Direction that pointed down, in the axes of x, y and z: large dots held still, small dots moving"
     return svg("coverage", label, _COVERAGE_HEIGHT, *marks)
 
 

@@ -272,3 +272,14 @@ def test_a_vehicle_has_its_parameters_beside_what_they_were_and_each_other_imu(r
     assert REASON["message"] in page
     assert page.count('<table id="accelerometer') == 2
     assert "The vehicle" not in result.html
+
+
+def test_the_page_of_a_vehicle_speaks_of_a_vehicle(result):
+    sensor = Sensor(chip="ArduPilot-IMU1", message="RAW_IMU")
+    extra = MappingProxyType({"autopilot": {"firmware": "ArduPilot"}})
+    page = html.unescape(render(replace(result.calibration, sensor=sensor, extra=extra), result.recording))
+    assert re.findall(r"[^<>]*\b(?:board|chip|firmware|soldering)\b[^<>]*", page) == []
+    assert "in the vehicle's axes" in page
+    assert "mpucal check calibration.json --mavlink URL" in page
+    assert "in the board's axes" in html.unescape(result.html)
+    assert "mpucal check calibration.json --bus /dev/i2c-1" in result.html
