@@ -116,11 +116,13 @@ class Checked(Event):
     ----------
     verifications : one for each orientation. agrees : None where too little was shown to tell.
     reason : the likeliest cause, where they do not agree.
+    doubtful : True if another calibration, with these orientations, and one more orientation may tell.
     """
 
     verifications: tuple[Verification, ...]
     agrees: bool | None
     reason: Reason | None = None
+    doubtful: bool = False
 
 
 Answer = Learnt | Tried | Checked

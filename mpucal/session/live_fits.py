@@ -25,9 +25,8 @@ from .aims import AIMS, directions, unseen_rad
 from .events import Checked, Event, FitKind, Knowledge, Learnt, Target, Tried, down_of, triple
 from .live_verification import explain_contradiction, is_much_clipped, judge_verification, select_unseen
 from .plan import Plan
-from .verify import CONTRADICTION
 
-CLIPPED = "gyro_clipped"
+CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
 
 
 class Task(NamedTuple):
@@ -99,7 +98,8 @@ class Fits:
         reasons = find_reasons(evidence)
         # The rests may suffice for an estimate; without a gyroscope nothing can be verified.
         told = verdict(reasons) if evidence.gyroscope is None and evidence.is_of_now else REFUSED
-        return Tried(told, _most_specific_reason(reasons, evidence.recording))
+        against = _most_specific_reason(reasons, evidence.recording)
+        return Tried(told, against and against.about(recording.sensor.origin))
 
     def _check(self, of: int) -> Event:
         evidence = self._tried

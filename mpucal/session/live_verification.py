@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..calibration.checks.estimate import USABLE_RMS_MPS2
 from ..calibration.evidence import Evidence
-from ..calibration.verification import NewOrientation
+from ..calibration.verification import MOST_STD, NewOrientation
 from ..data import Recording, Vector
 from ..origin import Origin
 from ..reasons import Reason, reason
@@ -57,7 +58,8 @@ def judge_verification(
 ) -> Checked:
     """Return whether the rests agree with the first calibration, and the likeliest reason where they do not.
 
-    With fewer than `of` unseen orientations nothing counts as verified, although nothing speaks against it.
+    With fewer than `of` unseen orientations nothing counts as verified, although nothing speaks against it; nor if they
+    could not have shown an error for which a calibration is refused.
 
     Parameters
     ----------
@@ -68,16 +70,18 @@ def judge_verification(
     shown = [rest for rest in rests if any(rest is other for other in unseen) or not rest.agrees]
     t_s, number_of = float(recording.t[-1]), max(of, len(shown))
     verifications = tuple(_verification(rest, i + 1, number_of, t_s) for i, rest in enumerate(shown))
-    against, agrees = _find_reason(rests, shown, recording, contradiction), None
+    against, agrees, doubtful = _find_reason(rests, shown, recording, contradiction), None, False
     if against is not None:
-        agrees = False
+        agrees, doubtful = False, not against.refuse and all(rest.agrees for rest in shown)
     elif rests and all(rest.clipped for rest in rests):
         against = reason("verification_failed", "lost")
     elif len(unseen) < of:
         against = reason("verification_failed", "too_few", number=len(unseen), of=of)
+    elif (least := max(MOST_STD * rest.magnitude_std for rest in unseen)) > USABLE_RMS_MPS2:
+        against, doubtful = reason("verification_failed", "unsure", least=least), True
     else:
         return Checked(verifications, True)
-    return Checked(verifications, agrees, against.about(recording.sensor.origin))
+    return Checked(verifications, agrees, against.about(recording.sensor.origin), doubtful)
 
 
 def _find_reason(

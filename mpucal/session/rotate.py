@@ -103,7 +103,7 @@ class Rotate(PoseStep):
             side = self._next_side()
             # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
             # even if the estimate takes up for down, as for a sensor whose axes are mirrored. Once the target is
-            # reached, only a new orientation counts towards the least number.
+            # reached, or the vehicle was put down on all its sides, only a new orientation counts.
             down = np.array(knowledge.down)
             if side is not None:
                 down = side
@@ -213,8 +213,8 @@ class Rotate(PoseStep):
         return self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _adds_nothing(self, down: Vector) -> bool:
-        """Return True for an orientation that was seen, where the target is reached."""
-        return self._is_certain() and self._coverage.paused.near(-down)
+        """Return True for an orientation that was seen, where the target is reached or a vehicle was on all sides."""
+        return (self._is_certain() or self._coverage.placed) and self._coverage.paused.near(-down)
 
     def _is_enough(self) -> bool:
         if self._coverage.placed:

@@ -83,8 +83,6 @@ BENT = 1.1
 TRY_WAIT_S = 3.0
 # Number of orientations that may be requested in place of ones that the calibration has seen after all.
 MOST_MORE = 2
-# Reason's code where the rests of the turning contradict each other.
-CONTRADICTION = "inconsistent"
 
 
 class Verify(NewPoses):
@@ -151,14 +149,14 @@ class Verify(NewPoses):
 
     def _check(self, checked: events.Checked) -> events.Outputs:
         """Take the comparison with the new orientations."""
-        if checked.agrees is None and self._number >= self._of and self._more:
+        if checked.doubtful and not self._doubted:
+            return self._try_again(checked)
+        if checked.agrees is None and self._number >= self._of and self._more and not self._doubted:
             # The fit has seen one of these orientations after all: another one replaces it.
             self._more, self._closed, self._begun_s = self._more - 1, False, None
             self._number = self._of - 1
             self.prompt = self._next()
             return [self.prompt]
-        if not self._doubted and _is_doubt(checked):
-            return self._try_again(checked)
         self.checked = checked
         if checked.reason is None:
             agreement = events.Finished("verified: the new orientations agree with the predicted uncertainty")
@@ -188,13 +186,6 @@ class Verify(NewPoses):
         """See NewPoses; the direction farthest from all rests is asked for."""
         text = f"Verification {self._number + 1} of {self._of}: {{}}, then hold it still."
         return self._ask_for(events.PromptKind.VERIFY, self._farthest(self._seen), text)
-
-
-def _is_doubt(checked: events.Checked) -> bool:
-    """Return True if rests of the turning contradict each other, but too little to refuse, and the new ones agree."""
-    against = checked.reason
-    doubts = against is not None and against.code == CONTRADICTION and not against.refuse
-    return doubts and all(verification.agrees for verification in checked.verifications)
 
 
 ORIENTATIONS = 3

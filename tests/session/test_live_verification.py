@@ -11,9 +11,9 @@ from mpucal.session.events import Checked
 from mpucal.session.live_verification import add_verification, judge_verification
 
 
-def rest(magnitude=0.0, direction=0.0, turn=(1.2, 0.0, 0.0), miss=(0.0, 0.0, 0.0), clipped=False):
+def rest(magnitude=0.0, direction=0.0, turn=(1.2, 0.0, 0.0), miss=(0.0, 0.0, 0.0), clipped=False, std=0.005):
     down = np.array([0.0, 0.6, -0.8])
-    return NewOrientation(down, magnitude, 0.005, direction, np.radians(0.1), np.array(turn), np.array(miss), clipped)
+    return NewOrientation(down, magnitude, std, direction, np.radians(0.1), np.array(turn), np.array(miss), clipped)
 
 
 def recording(warmer_c=0.0, acc_clipped=0, gyr_clipped=0, message=None):
@@ -77,6 +77,20 @@ def test_the_likeliest_reason_is_given(rests, data, contradiction, code, words):
     else:
         assert checked.reason is None
     assert len(checked.verifications) == len(rests)
+
+
+@pytest.mark.parametrize(
+    ("rests", "contradiction", "agrees", "code"),
+    [
+        ([rest()], CONTRADICTION, False, "inconsistent"),
+        ([rest(0.3, std=0.2)], None, None, "verification_failed"),
+    ],
+    ids=["contradiction", "an error that could not have been seen"],
+)
+def test_agreement_that_tells_little_is_doubtful(rests, contradiction, agrees, code):
+    checked = judge_verification(rests, rests, 1, recording(), contradiction)
+    assert (checked.agrees, checked.reason.code, checked.doubtful) == (agrees, code, True)
+    assert not judge_verification([rest(0.05)], [rest(0.05)], 1, recording(), contradiction).doubtful
 
 
 MOVED = Reason("verification_failed", "it moved", "fasten it", True)

@@ -147,10 +147,10 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
     assert rotating.feed(board.still(3.0)).prompts().count(events.PromptKind.ROTATE) == 2
 
 
-def placed(make_board, tremor, target="normal", late=False):
+def placed(make_board, tremor, target="normal", late=False, known=1.0, down=DOWN):
     """A vehicle is put on its sides as it is asked for, by somebody who lets go of it (no tremor) or does not.
 
-    late : the answer of what is known comes in the middle of the first hold.
+    late : the answer of what is known comes in the middle of the first hold. known, down : see learnt.
     """
     board, session = make_board(), Session()
     board.up = np.array([0.0, 0.0, -1.0])
@@ -166,7 +166,7 @@ def placed(make_board, tremor, target="normal", late=False):
         session.feed(board.turn_to(-np.array(session.of(events.Prompt)[-1].down)))
         if late:
             session.feed(board.still(1.0)).give(learnt(1.0, advice=False))
-        session.feed(board.shaken(1.5, tremor) if tremor else board.still(1.5)).give(learnt(1.0))
+        session.feed(board.shaken(1.5, tremor) if tremor else board.still(1.5)).give(learnt(known, down=down))
         late = False
     return session, held
 
@@ -178,6 +178,13 @@ def test_a_vehicle_that_is_put_down_on_six_sides_needs_one_tilt_more(make_board,
     assert "tilted" in tilt
     assert session.state is State.VERIFY
     assert "Verification 1 of 1" in session.of(events.Prompt)[-1].text
+
+
+def test_a_vehicle_that_was_on_all_its_sides_is_not_put_on_one_again(make_board):
+    session, (*_, last) = placed(make_board, 0.0, known=0.1, down=(0.0, 1.0, 0.0))
+    assert "tilted" in last
+    assert session.state is State.ROTATE
+    assert "tilted" in session.of(events.Prompt)[-1].text
 
 
 def test_a_vehicle_in_a_hand_is_turned_to_more_orientations(make_board):
@@ -331,9 +338,12 @@ def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, v
     assert verifying.machine.checked.agrees is None
 
 
-@pytest.mark.parametrize("then", [events.Checked((), True), events.Checked((), False, DOUBT)], ids=["settled", "stays"])
-def test_a_contradiction_that_new_orientations_do_not_share_is_decided_by_one_more(board, verifying, then):
-    verifying.checked = events.Checked((), False, DOUBT)
+STAYS = events.Checked((), False, DOUBT, doubtful=True)
+
+
+@pytest.mark.parametrize("then", [events.Checked((), True), STAYS], ids=["settled", "stays"])
+def test_a_doubt_that_new_orientations_do_not_share_is_decided_by_one_more(board, verifying, then):
+    verifying.checked = STAYS
     for number in range(4):
         assert verifying.state is State.VERIFY
         verifying.checked = then if number == 3 else verifying.checked
