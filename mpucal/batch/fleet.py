@@ -90,8 +90,8 @@ def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
         for k, axis in enumerate(AXES)
     ]
     angles = misalignment(D)[:, ~np.eye(3, dtype=bool)]
-    cross = np.degrees(np.arctan(tolerance(lambda family: family.cross_axis_percent)[:, 0] / 100.0))
-    made.insert(2 * len(AXES), Parameter("largest misalignment", "deg", np.max(np.abs(angles), axis=1), cross))
+    allowed = tolerance(lambda family: family.misalignment_deg)[:, 0]
+    made.insert(2 * len(AXES), Parameter("largest misalignment", "deg", np.max(np.abs(angles), axis=1), allowed))
     return made
 
 

@@ -7,6 +7,7 @@ Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from ..errors import ChipError
@@ -76,6 +77,11 @@ class Family:
     nonlinearity_percent: float = 0.5
     spi_data_hz: int = 8_000_000
     zero_g_drift: str = ""
+
+    @property
+    def misalignment_deg(self) -> float:
+        """Tolerance of an angle between the sensitive axes and the chip's, by the cross-axis sensitivity."""
+        return math.degrees(math.atan(0.01 * self.cross_axis_percent))
 
     def accel_lag_s(self, dlpf_cfg: int) -> float:
         """Return the time by which the accelerometer lags behind the gyroscope; 0 if not documented."""

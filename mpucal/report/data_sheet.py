@@ -56,7 +56,7 @@ def tolerance(row: ParameterRow, sheet: Family) -> Vector:
         return np.array(sheet.zero_g_mg)
     if row.unit == "%":
         return np.full(3, sheet.scale_percent)
-    return np.full(3, math.degrees(math.atan(0.01 * sheet.cross_axis_percent)))
+    return np.full(3, sheet.misalignment_deg)
 
 
 def describe_comparison(row: ParameterRow, sheet: Family) -> str:
