@@ -30,7 +30,7 @@ def open_runner(source: OpenedSource, capture: Path, person: Console, checking: 
             measuring.note,
             source.plan,
             source.listeners,
-            source.go_on,
+            source.open_next_part,
             source.is_late,
             ProcessWorker if source.real_time else InlineWorker,
             checking,

@@ -23,8 +23,8 @@ Say = Callable[[str], None]
 Confirm = Callable[[str, bool], bool]
 
 
-def nobody(_question: str, _with_yes: bool) -> bool:
-    """Answer for a user who is not there: no."""
+def decline(_question: str, _with_yes: bool) -> bool:
+    """Answer no, where there is no user to ask."""
     return False
 
 
@@ -50,7 +50,7 @@ class Device:
     name: str
     open: Callable[[], Any]
     say: Say
-    confirm: Confirm = nobody
+    confirm: Confirm = decline
     values: Mapping[str, Any] = field(default_factory=dict)
 
 

@@ -173,9 +173,9 @@ class OpenedSource(ABC):
         SourceError : the sensor does not answer.
         """
 
-    def go_on(self) -> bool:
-        """Begin the next part; return False if there is none."""
-        return self.parts is not None and self.parts.go_on()
+    def open_next_part(self) -> bool:
+        """Open the next part; return False if there is none."""
+        return self.parts is not None and self.parts.open_next_part()
 
     @property
     def replaying(self) -> bool:

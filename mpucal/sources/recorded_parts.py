@@ -21,8 +21,8 @@ Item = TypeVar("Item")
 class RecordedParts(ABC, Generic[Item]):
     """Items (accesses or packets) of a session in their order, with the session events among them.
 
-    Each part ends with EndOfCapture, and `go_on` begins the next. A replay that calls `pending_events` where the
-    session read its keyboard gets each event in its place.
+    Each part ends with EndOfCapture, and `open_next_part` opens the next. A replay that calls `pending_events` where
+    the session read its keyboard gets each event in its place.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ class RecordedParts(ABC, Generic[Item]):
         """True if no part follows."""
         return not self._later and self.resumes is not self.replaying
 
-    def go_on(self) -> bool:
-        """Begin the next part; return False if there is none."""
+    def open_next_part(self) -> bool:
+        """Open the next part; return False if there is none."""
         if self.is_last:
             return False
         if self._later:

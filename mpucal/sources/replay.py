@@ -64,13 +64,13 @@ class PacketReplay(RecordedParts[RawPacket]):
 
     datagrams, outward = True, False
 
-    def go_on(self) -> bool:
+    def open_next_part(self) -> bool:
         """See RecordedParts."""
-        goes_on = super().go_on()
+        opened = super().open_next_part()
         if not self.replaying:
             self.name, self.datagrams, self.outward = self._live.name, self._live.datagrams, self._live.outward
             self._begin_clock(self._live.now_ns())
-        return goes_on
+        return opened
 
     def _is_item(self, record: Record) -> bool:
         return isinstance(record, RawPacket) and not is_own(record.data)

@@ -35,7 +35,7 @@ from ..mavlink.rest import Horizon, RestMeans, RestMonitor
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.lay_flat import STAND, put_down
-from ..sinks.kind import Applied, Confirm, Device, Say, Sink, nobody
+from ..sinks.kind import Applied, Confirm, Device, Say, Sink, decline
 from ..sinks.old_state import interrupting, nothing_written
 from ..sinks.table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 from .source import OpenedVehicle
@@ -92,7 +92,7 @@ class AutopilotSink(Sink):
         link: Link,
         journal: Journal | None = None,
         say: Say = lambda _sentence: None,
-        confirm: Confirm = nobody,
+        confirm: Confirm = decline,
     ) -> None:
         self._say, self._confirm = say, confirm
         self._stands_level: bool | None = None

@@ -154,12 +154,12 @@ class OpenedVehicle(OpenedSource):
             # Nothing came after this time, so that a replay ends its last poll here.
             self.end()
 
-    def go_on(self) -> bool:
+    def open_next_part(self) -> bool:
         """See OpenedSource."""
         if self.parts is None or self.parts.is_last or self.link is None:
             return False
         self.end()
-        self.parts.go_on()
+        self.parts.open_next_part()
         self.link.restart()
         return True
 

@@ -141,13 +141,13 @@ def test_a_resumed_session_is_replayed_here_before_the_process_goes_on():
     bus, alone = tapped(chain)
     driver = Driver(bus, Config())
     measure(driver)
-    assert chain.go_on()
+    assert chain.open_next_part()
     measure(driver)
     chain = resumed()
     opened, accesses = in_a_process(chain, parts=chain)
     with closing(opened) as source:
         measure(source)
-        assert chain.go_on()
+        assert chain.open_next_part()
         assert measure(source)
         assert accesses == alone
         np.testing.assert_array_equal(source.recording().t, driver.recording().t)

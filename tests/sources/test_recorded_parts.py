@@ -46,7 +46,7 @@ class Young:
 def test_a_clock_continues_the_earlier_one():
     young = Young()
     bus = ReplayBus([read(7)], live=young)
-    assert bus.go_on()
+    assert bus.open_next_part()
     bus.sleep_until(3 * S)
     assert young.slept_ns == []
     first_ns = bus.read(0x75, 1).t_ns
