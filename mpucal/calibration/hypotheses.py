@@ -93,6 +93,9 @@ LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1,
 VARIANCES = 10.0 ** np.arange(-8.0, 0.1, 0.5)
 # Odds above which something is said to have happened, against nothing and against what else it may be.
 SURE = 100.0
+# The true cause need not be in the table, and then odds between wrong ones mean little: those whose evidence is, in
+# logs, more than this share of the likeliest one's may be like it.
+SHARE = 0.7
 # Share of the largest eigenvalue, below which a direction of x is left out: the parts say next to nothing of it.
 UNSEEN = 3e-4
 PULSES = (1, 2, 3)  # groups that a pulse lasts
@@ -111,7 +114,7 @@ class Explanation(NamedTuple):
     freed : (p,) share of itself by which the variance of the estimate grows, if x is estimated too.
     weight : probability among all hypotheses and nothing.
     is_sure : True for a change of the accelerometer against which all else is unlikely.
-    is_possible : True if something surely happened, and the likeliest explanation does not exclude this one.
+    is_possible : True if something surely happened, and this explains it, or nearly as much of it as the likeliest one.
     """
 
     hypothesis: Hypothesis
@@ -198,7 +201,9 @@ def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Ex
     found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
     found.sort(key=lambda each: -each.weight)
     if total > np.log(SURE):
-        found = [each._replace(is_possible=SURE * each.weight > found[0].weight) for each in found]
+        most = found[0].log_share
+        least = min(most - np.log(SURE), SHARE * most)
+        found = [each._replace(is_possible=each.log_share > least) for each in found]
     changes = [each for each in found if each.hypothesis.kind == "change"]
     if sum(each.weight for each in changes) > 1.0 - 1.0 / SURE:
         of_sure = changes[0]._replace(weight=1.0, is_sure=True)

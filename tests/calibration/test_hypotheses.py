@@ -179,6 +179,17 @@ def test_each_cause_of_what_surely_happened_is_held():
         assert not surely or (len(held) > 1 and (expected > mean).any())
 
 
+def test_a_cause_that_explains_nearly_as_much_is_held_though_odds_exclude_it():
+    _, _, parts = linear_parts()
+    found = rank(replace(parts, gradient=8.0 * parts.gradient, left=8.0 * parts.left), np.eye(3))
+    most = found[0].log_share
+    nearly = [each for each in found if each.log_share > 0.75 * most and SURE * each.weight < found[0].weight]
+    held = np.diag(UncertaintyClaim(parts.covariance, 1.0, 1.0, found).widen())
+    assert nearly and all((held > each.away**2).all() for each in nearly)
+    far = [each for each in found if each.log_share < 0.65 * most]
+    assert far and any((held < each.away**2).any() for each in far)
+
+
 def test_an_accepted_hypothesis_is_taken_out_of_the_scores():
     A, y, parts = linear_parts()
     theta = parts.left - parts.gradient.sum(0)  # by the unit prior
