@@ -56,3 +56,24 @@ def test_a_column_that_tells_no_sensors_apart(name, walk, assert_same, tmp_path)
             text += f"acc,{t!r},{','.join(map(repr, acc))},,,\ngyr,{t!r},,,,{','.join(map(repr, gyr))}\n"
     (tmp_path / "walk.csv").write_text(text)
     assert_same(mpucal.load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "place"), [("Accel{}_{}", "right leg"), ("{1}_acc_{0}", "chest"), ("acc.{1}.{0}", "left")]
+)
+def test_columns_of_several_places(name, place, walk, assert_same, tmp_path):
+    """Read the first IMU, whose columns another's precede, and mix no sensors of two."""
+    of_place = [
+        [
+            name.replace("Accel", word).replace("acc", word).format(axis, at)
+            for word in ("Accel", "Gyro")
+            for axis in "XYZ"
+        ]
+        for at in (place.replace(" ", "_"), "hip")
+    ]
+    header = ["time", *of_place[0][:3], *of_place[1], *of_place[0][3:]]
+    made = np.column_stack([walk.t, walk.acc, -walk.acc, walk.gyr + 1.0, walk.gyr])
+    np.savetxt(tmp_path / "body.csv", made, delimiter=",", header=",".join(header), comments="")
+    found = mpucal.load(tmp_path / "body.csv")
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert f"of its columns, those called {place} were read" in found.taken

@@ -35,7 +35,7 @@ from .names import (
     plausible_celsius,
     with_sensor,
 )
-from .several import NAMES_SENSORS, of_one_sensor
+from .several import NAMES_SENSORS, of_one_place, of_one_sensor
 from .streams import index_with_gravity, join_streams
 from .table import Table
 from .text import HEAD, PREAMBLE, decode_text, find_bare_table, find_named_table, find_wanted_table, stated_rate_hz
@@ -179,7 +179,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     ------
     RecordingError : it does not say all that is needed; the message names what is missing.
     """
-    table = of_one_sensor(table)
+    table = of_one_sensor(table if hints.columns else of_one_place(table))
     ranges = table.ranges if not (hints.accel_range_g or hints.gyro_range_dps) else None
     if ranges:
         hints = replace(hints, accel_range_g=ranges[0], gyro_range_dps=ranges[1])

@@ -1,4 +1,7 @@
-"""Lines of several sensors of one kind, which a column tells apart, as boards and gateways log them."""
+"""Several sensors of one kind in a table, of which the first is read, as of gateways and of people who wear them.
+
+A column tells their lines apart, or a word in the names their columns.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind
-from .names import ACC, GYR, Column
+from .names import ACC, GYR, Column, first_triple, parse_header
 from .table import Table
 from .units import BEYOND
 
@@ -29,6 +32,36 @@ MOST_SENSORS = 32
 BEGUN = 2000
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
 FEWEST_COLUMNS, FARTHER = 3, 2.0
+
+
+# what separates the words of a name, and the most words of a name that is looked at
+_BETWEEN, MOST_WORDS = re.compile(r"[_ .\-]+"), 6
+
+
+def of_one_place(table: Table) -> Table:
+    """Return a table without the words by which the names of the first accelerometer and gyroscope say where they are.
+
+    AccelX_right_leg is AccelX, if there is a whole IMU called so. The same table if its columns are known as they are.
+    """
+    if first_triple(table.columns, ACC):
+        return table
+    split = [_BETWEEN.split(name.strip()) for name in table.header]
+    for words in split:
+        size = len(words) if len(words) <= MOST_WORDS else 0
+        for place in (words[i:j] for i in range(size) for j in range(i + 1, size + 1)):
+            header = ["_".join(_without(place, of)) for of in split]
+            found = parse_header(header)
+            if first_triple(found, ACC) and first_triple(found, GYR):
+                names = [short or name for short, name in zip(header, table.header, strict=True)]
+                said = f"of its columns, those called {' '.join(place)} were read"
+                return replace(table, header=names, remarks=(*table.remarks, said))
+    return table
+
+
+def _without(place: list[str], words: list[str]) -> list[str]:
+    """Return the words without those of a place; none if they lack them."""
+    at = next((i for i in range(len(words)) if words[i : i + len(place)] == place), None)
+    return [] if at is None else words[:at] + words[at + len(place) :]
 
 
 def of_one_sensor(table: Table) -> Table:
