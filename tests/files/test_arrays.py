@@ -144,6 +144,10 @@ WRITTEN = {
     "Edge Impulse without units": ("a.json", in_json(edge_impulse), "a rate of 100 Hz"),
     "JSON of Sensor Logger": ("a.json", in_json(of_sensor_logger), "its lines of one time were joined"),
     "HDF5": ("a.h5", as_hdf5, "times in s"),
+    "a rate with all its digits": (
+        *("a.npz", lambda p, w, ns: np.savez(p, acc=w.acc, gyr=w.gyr, sampling_rate=100.00000000000001)),
+        "a rate of 100 Hz",
+    ),
     "JSON at a frequency": ("a.json", in_json(at_a_frequency), "a rate of 100 Hz"),
     "an object on each line, of which the last is torn": (
         "a.jsonl",

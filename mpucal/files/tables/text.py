@@ -56,7 +56,7 @@ RATE = re.compile(
     r"(?:^[#%/ ]{0,5}|(?<![a-z])(?:sampl(?:e|ing)|data|output|acquisition|update|sensor|imu|log(?:ging)?|recording))"
     r"[ _]?"
     r"(?:(?<![a-z])fs|rate|freq\w{0,6})[^\w\n]{1,9}(?:\(?Hz\)?[^\w\n]{1,9})?"
-    r"([1-9]\d{0,4}(?:\.\d{1,6})?)[ ,]*(?:Hz|$)",
+    r"([1-9]\d{0,4}(?:\.\d{1,17})?)[ ,]*(?:Hz|$)",
     re.IGNORECASE | re.MULTILINE,
 )
 
