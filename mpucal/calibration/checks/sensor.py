@@ -96,8 +96,11 @@ def gyro_range(e: Evidence) -> Reason | None:
 
 def gyro_contradicts(e: Evidence) -> Reason | None:
     """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest."""
-    if is_trustworthy(e) and e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2:
-        return None
+    if is_trustworthy(e) and e.uncertainty is not None:
+        # Where white noise explains the samples, the rates carry gravity to each of them.
+        carried = e.model in ("accel", "imu") and inconsistent(e) is None
+        if carried or e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2:
+            return None
     within, of_all = e.gyro_miss
     if within > MOST_MISS_RAD:
         if (by := e.gyro_axes) is not None:
