@@ -184,7 +184,7 @@ class Streams:
         remedy = STOP_IT if self._is_px4 or stream.name == HIGHRES else STREAMRATE
         self._say(
             f"{stream.name} was slowed down {slowed}, and has been asked for again: "
-            f"another ground station lowers it ({remedy}){TOO_MUCH if self._is_px4 else ''}."
+            f"probably another ground station lowers it ({remedy}){TOO_MUCH if self._is_px4 else ''}."
         )
 
     def _report_rates(self, rates: Mapping[Stream, float]) -> None:
