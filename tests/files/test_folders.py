@@ -158,6 +158,18 @@ def test_a_table_is_read_with_the_other_of_its_pair_if_that_exists(walk, walk_ns
         mpucal.load(tmp_path / "Gyroscope.csv")
 
 
+def test_the_given_one_of_two_recordings_in_a_folder_is_read(walk, assert_same, tmp_path):
+    """Read accel.csv with gyro.csv, also beside another recording's accelerometer.csv and gyroscope.csv."""
+    for acc, gyr, sign in (("accel", "gyro", 1), ("accelerometer", "gyroscope", -1)):
+        put(tmp_path, f"{acc}.csv", walk.t, sign * walk.acc, list("xyz"), "time")
+        put(tmp_path, f"{gyr}.csv", walk.t, walk.gyr, list("xyz"), "time")
+    for given in ("accel.csv", "gyro.csv"):
+        found = mpucal.load(tmp_path / given)
+        assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+        assert "from accel.csv and gyro.csv" in found.taken
+    assert "from accelerometer.csv and gyroscope.csv" in mpucal.load(tmp_path / "gyroscope.csv").taken
+
+
 def test_pairs_of_tables_are_told_apart_by_their_names(walk, walk_ns, assert_same, tmp_path):
     phyphox(tmp_path, walk, walk_ns, prefix="run1_")
     phyphox(tmp_path, walk.part(0, 600), walk_ns, prefix="run2_")

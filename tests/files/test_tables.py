@@ -968,6 +968,16 @@ def test_fractions_of_a_second_are_no_milliseconds(read, walk):
     assert "0.4 s apart (2.5 Hz), too far to follow a turn" in reason["message"]
 
 
+def test_times_of_day_show_their_unit_at_any_rate(walk, walk_ns, tmp_path):
+    """Read ms since 1970 that lie 0.3 s apart, which would be 3 kHz in us."""
+    ms = (walk_ns[0] // 10**6) + 300 * np.arange(len(walk))
+    made = np.column_stack([ms, walk.acc, walk.gyr / 30])
+    np.savetxt(tmp_path / "slow.csv", made, delimiter=",", header=f"time,{AXES.strip()}", comments="")
+    found = mpucal.load(tmp_path / "slow.csv")
+    np.testing.assert_allclose(found.t, 0.3 * np.arange(len(walk)))
+    assert found.utc_ns == ms[0] * 10**6
+
+
 def test_a_temperature_is_kept_everywhere(walk, tmp_path):
     warm = np.linspace(30.0, 32.0, len(walk))
     np.savez(tmp_path / "a.npz", t=walk.t, acc=walk.acc, gyr=walk.gyr, temperature=warm)

@@ -46,6 +46,8 @@ _OF_GYR = "gyroscopeuncalibrated gyroscope gyro gyr gyrm rotationrate angularvel
 NAMES = {ACC: _OF_ACC.split(), GYR: _OF_GYR.split()}
 # imu_tk names tables of text .mat, too
 SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat")
+# letters of the longest of the words that are no app's
+SHORT = len("accel")
 METADATA, TIMES_OF_DAY = "metadata.csv", "meta/time.csv"
 # of a table within a file
 OF_FILE = ".table"
@@ -149,6 +151,11 @@ class _Member(NamedTuple):
     rank: int
     name: str
 
+    @property
+    def is_short(self) -> bool:
+        """Return True if the sensor's word is a short one, such as acc or gyro, and not an app's."""
+        return len(NAMES[self.quantity][self.rank]) <= SHORT
+
 
 def _parse(name: str) -> _Member | None:
     """Return the table of that name; None for other files."""
@@ -180,13 +187,16 @@ def _recording(
     """Return the recording in the pair of tables that holds `wanted`, or in the first."""
     pairs = _pairs(names)
     pair = next((pair for pair in pairs if wanted in {member.name for member in pair}), pairs[0])
+    chosen = next((member for member in pair if member.name == wanted), pair[0])
     beside = [(member, read(member)) for member in names if member.lower().endswith((METADATA, TIMES_OF_DAY))]
     flipped, zero_ns, remark = _read_app_metadata([(name, data) for name, data in beside if isinstance(data, bytes)])
 
     def stream_of(quantity: str) -> tuple[str, Stream]:
         """Return the first table that can be read, of an accelerometer with gravity if there is one."""
         found: list[tuple[str, Stream]] = []
-        members = [member.name for member in pair if member.quantity == quantity]
+        # beside accel.csv, gyro.csv is rather meant than gyroscope.csv
+        alike = sorted(pair, key=lambda member: wanted != "" and member.is_short != chosen.is_short)
+        members = [member.name for member in alike if member.quantity == quantity]
         for member in members:
             try:
                 of = f"{name}/{Path(member).name}" if member != name else name

@@ -23,6 +23,7 @@ ANEW_S = 1.0
 COUNTER_BITS, OVERFLOW_STEPS = (16, 32), 100.0
 # ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
 UTC_NS = (10**18, 41 * 10**17)
+_NS_OF = {unit: round(s * NS) for unit, s in QUANTITIES["t"].items()}
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     step, named = sample_period(ticks), hints.units.get("t", stream.time_unit)
     # milliseconds are whole numbers: a fraction of them is a slow recording's second
     slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
-    seen = hints.units.get("t", units.time_unit(step, named or slow))
+    seen = hints.units.get("t", units.time_unit(step, named or _unit_of_date(stream.origin) or slow))
     unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}")
     t = ticks * QUANTITIES["t"][unit]
     anew, said = np.flatnonzero(np.diff(t) < -ANEW_S) + 1, f"times in {unit}"
@@ -127,6 +128,12 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     # a clock that was set back, or a sample that came late
     kept = t >= np.maximum.accumulate(t)
     return fit_clock(np.interp(stream.number, stream.number[kept], t[kept]), stream.number), said
+
+
+def _unit_of_date(origin: Decimal) -> str:
+    """Return the unit in which a first time is a time of day, since 1970; empty if it is none."""
+    units_of_dates = (unit for unit in ("s", "ms", "us", "ns") if plausible_utc_ns(int(origin * _NS_OF[unit])))
+    return next(units_of_dates, "")
 
 
 def _unwrap(ticks: Vector) -> tuple[Vector, int]:
