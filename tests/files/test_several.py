@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import mpucal
+from mpucal.files.tables import several
+from mpucal.files.tables.table import Table
 
 AXES = "ax,ay,az,gx,gy,gz"
 
@@ -77,3 +79,10 @@ def test_columns_of_several_places(name, place, walk, assert_same, tmp_path):
     found = mpucal.load(tmp_path / "body.csv")
     assert_same(found, walk, 1e-9, 1e-9, 1e-9)
     assert f"of its columns, those called {place} were read" in found.taken
+
+
+def test_columns_of_no_axis_name_no_places(monkeypatch):
+    """Search a wide table of other things only once for an IMU."""
+    table = Table("wide", [f"mean_of_{number}_value" for number in range(300)], [])
+    monkeypatch.setattr(several, "parse_header", lambda _header: pytest.fail("it was searched again"))
+    assert several.of_one_place(table) is table

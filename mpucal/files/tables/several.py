@@ -1,11 +1,12 @@
 """Several sensors of one kind in a table, of which the first is read, as of gateways and of people who wear them.
 
-A column tells their lines apart, or a word in the names their columns.
+A column tells their lines apart, or a word in the names of their columns.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -16,7 +17,7 @@ from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind
-from .names import ACC, GYR, Column, first_triple, parse_header
+from .names import ACC, GYR, Column, first_triple, parse_column_name, parse_header
 from .table import Table
 from .units import BEYOND
 
@@ -32,8 +33,6 @@ MOST_SENSORS = 32
 BEGUN = 2000
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
 FEWEST_COLUMNS, FARTHER = 3, 2.0
-
-
 # what separates the words of a name, and the most words of a name that is looked at
 _BETWEEN, MOST_WORDS = re.compile(r"[_ .\-]+"), 6
 
@@ -46,21 +45,28 @@ def of_one_place(table: Table) -> Table:
     if first_triple(table.columns, ACC):
         return table
     split = [_BETWEEN.split(name.strip()) for name in table.header]
-    for words in split:
-        size = len(words) if len(words) <= MOST_WORDS else 0
-        for place in (words[i:j] for i in range(size) for j in range(i + 1, size + 1)):
-            header = ["_".join(_without(place, of)) for of in split]
-            found = parse_header(header)
-            if first_triple(found, ACC) and first_triple(found, GYR):
-                names = [short or name for short, name in zip(header, table.header, strict=True)]
-                said = f"of its columns, those called {' '.join(place)} were read"
-                return replace(table, header=names, remarks=(*table.remarks, said))
+    for place in dict.fromkeys(place for words in split for place in _places(words)):
+        header = ["_".join(_without(place, of)) for of in split]
+        found = parse_header(header)
+        if first_triple(found, ACC) and first_triple(found, GYR):
+            names = [short or name for short, name in zip(header, table.header, strict=True)]
+            said = f"of its columns, those called {' '.join(place)} were read"
+            return replace(table, header=names, remarks=(*table.remarks, said))
     return table
 
 
-def _without(place: list[str], words: list[str]) -> list[str]:
+def _places(words: list[str]) -> Iterator[tuple[str, ...]]:
+    """Yield the words of a name without which it is that of an axis."""
+    size = len(words) if len(words) <= MOST_WORDS else 0
+    for place in (tuple(words[i:j]) for i in range(size) for j in range(i + 1, size + 1)):
+        column = parse_column_name("_".join(_without(place, words)), 0)
+        if column is not None and column.quantity in (ACC, GYR):
+            yield place
+
+
+def _without(place: tuple[str, ...], words: list[str]) -> list[str]:
     """Return the words without those of a place; none if they lack them."""
-    at = next((i for i in range(len(words)) if words[i : i + len(place)] == place), None)
+    at = next((i for i in range(len(words)) if tuple(words[i : i + len(place)]) == place), None)
     return [] if at is None else words[:at] + words[at + len(place) :]
 
 
