@@ -11,6 +11,7 @@ from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError, UsageError
 from mpucal.files import load
 from mpucal.files.hints import Hints, parse_columns, parse_units
+from mpucal.files.tables.units import QUANTITIES
 
 COUNTS = np.r_[[32768 / (4 * G)] * 3, [32750 / np.radians(500)] * 3]
 STAMPS = np.datetime64("2025-10-04T16:35:12")
@@ -839,6 +840,20 @@ def test_units_beside_the_sensors_names_of_each_line(tmp_path):
     found = mpucal.load(tmp_path / "log.txt")
     assert found.taken.split("accelerations ")[1].startswith("in m/s^2 and rates in deg/s.")
     np.testing.assert_allclose(np.column_stack([found.acc, np.degrees(found.gyr)]), rows, atol=6e-5)
+
+
+@pytest.mark.parametrize(
+    ("acc", "gyr"),
+    [("cm/s^2", "rad/s"), ("mm/s^2", "mdeg/s"), ("ft/s^2", "mrad/s"), ("ug", "udeg/s"), ("g", "deg/h"), ("mg", "rpm")],
+)
+def test_each_unit_beside_a_sensors_name_counts(acc, gyr, walk, tmp_path):
+    """Read cm/s² as such, whose numbers are nearly those of mg."""
+    rows = np.column_stack([1000 * walk.t, walk.acc / QUANTITIES["acc"][acc], walk.gyr / QUANTITIES["gyr"][gyr]])
+    line = f"ms={{:.3f}} Accel[{acc}]: {{:.9f}} {{:.9f}} {{:.9f}} | Gyro[{gyr}]: {{:.9f}} {{:.9f}} {{:.9f}}\n"
+    (tmp_path / "log.txt").write_text("".join(line.format(*row) for row in rows.tolist()))
+    found = mpucal.load(tmp_path / "log.txt")
+    assert f"accelerations in {acc} and rates in {gyr}" in found.taken
+    np.testing.assert_allclose(np.hstack([found.acc, found.gyr]), np.hstack([walk.acc, walk.gyr]), atol=1e-7)
 
 
 def test_a_board_that_never_turned_has_an_accelerometer_all_the_same(tmp_path):

@@ -47,7 +47,22 @@ _THREE = re.compile(
     + r"(?![\w.])(?![ \t]{0,9}[,;|]?[ \t]{0,9}[-+.\d])"
 )
 # unit -> how a name ends that has it
-_TAILS = {"m/s^2": "_mps2", "g": "_g", "mg": "_mg", "rad/s": "_rads", "deg/s": "_dps", "mdeg/s": "_mdps"}
+_TAILS = {
+    "m/s^2": "_mps2",
+    "cm/s^2": "_cm_s2",
+    "mm/s^2": "_mm_s2",
+    "ft/s^2": "_ft_s2",
+    "g": "_g",
+    "mg": "_mg",
+    "ug": "_ug",
+    "rad/s": "_rads",
+    "mrad/s": "_mrads",
+    "deg/s": "_dps",
+    "mdeg/s": "_mdps",
+    "udeg/s": "_udps",
+    "deg/h": "_deg_h",
+    "rpm": "_rpm",
+}
 # lines of which one names numbers: the log of a board that starts comes before
 BEGUN = 2000
 # as `rostopic echo` and `ros2 topic echo` print messages

@@ -80,7 +80,7 @@ _TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)").fullmatch
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 _UNIT_TAIL = re.compile(
     r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|ug|dps|mdps|udps|mps2|m_s2|m/s2|ms2|cm_s2|mm_s2|ft_s2|rad_s"
-    r"|rads|rad|deg_s|degs|deg|deg_per_s|rad_per_s|deg_h|deg_hr|rpm)"
+    r"|rads|mrads|rad|deg_s|degs|deg|deg_per_s|rad_per_s|deg_h|deg_hr|rpm)"
 )
 
 

@@ -65,7 +65,7 @@ _SPELLED = {
     "rad/s": "rad/s radpers rads-1 radps rads rad/sec radians/s rps rad",
     "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s degrees/sec deg",
     "mdeg/s": "mdeg/s mdps",
-    "mrad/s": "mrad/s",
+    "mrad/s": "mrad/s mrads",
     "deg/h": "deg/h deg/hr degh deghr",
     "rpm": "rpm rev/min",
     "udeg/s": "udeg/s udps",
