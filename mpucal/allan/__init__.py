@@ -10,6 +10,7 @@ import numpy as np
 from ..chip.families import part_named
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
+from ..origin import name_thing
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
 from .model import fit_coefficients
 from .octaves import Octaves
@@ -133,7 +134,8 @@ class NoiseMeter:
         if turn is not None:
             block, angle = turn
             what = f"the board was turned, gravity by {math.degrees(angle):.0f} deg, from {block * seconds:.0f} s on"
-            return [{"code": "moved", "message": f"{what}: these numbers are of the motion, not of the sensor"}]
+            message = name_thing(f"{what}: these numbers are of the motion, not of the sensor", self._sensor.origin)
+            return [{"code": "moved", "message": message}]
         found = []
         for tone in self._spectrum.tones(rate_hz):
             if tone.rms > LEAST_TONE * white[tone.axis] * math.sqrt(rate_hz):
@@ -143,7 +145,8 @@ class NoiseMeter:
                 found.append({"code": "tone", "message": f"{what}, as from a fan or a pump"})
         for block, axis, size in find_steps(course[:, :6]):
             what = f"{AXES[axis]}: a step of {size:+.2g} {UNITS[axis]} after {block * seconds:.0f} s"
-            found.append({"code": "step", "message": f"{what}: the board was moved, or its bias jumped"})
+            moved = name_thing("the board was moved, or its bias jumped", self._sensor.origin)
+            found.append({"code": "step", "message": f"{what}: {moved}"})
         T = course[:, 6]
         if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > WARMED_C:
             found.append({"code": "temperature", "message": _temperature_sentence(course[np.isfinite(T)])})

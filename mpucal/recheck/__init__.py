@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ..data import Recording, Vector
+from ..origin import name_thing
 from ..result.calibration import Calibration
 from ..result.correction import make_correction, other_who_am_i, same_trim
 from . import drift
@@ -58,6 +59,11 @@ def check(calibration: Calibration, recording: Recording, days: float | None = N
     ------
     UsageError : the calibration was refused, or is of samples of another kind (a chip's own, an autopilot's stream).
     """
+    result, origin = _check(calibration, recording, days), recording.sensor.origin
+    return replace(result, message=name_thing(result.message, origin), remedy=name_thing(result.remedy, origin))
+
+
+def _check(calibration: Calibration, recording: Recording, days: float | None) -> CheckResult:
     then, now = calibration.sensor, recording.sensor
     if message := other_who_am_i(then.who_am_i, now.who_am_i):
         return CheckResult(ANOTHER_SENSOR, "another sensor", message, CALIBRATE_AGAIN)
@@ -132,7 +138,8 @@ def _describe_unchanged(result: CheckResult, bias: Change) -> CheckResult:
     """
     axis = int(np.argmax(bias.std))
     if result.orientations < LEAST_ORIENTATIONS:
-        message, remedy = f"{result.orientations} orientations were seen, and {LEAST_ORIENTATIONS} are needed", REPEAT
+        message = f"the samples show {result.orientations} of the {LEAST_ORIENTATIONS} orientations that are needed"
+        remedy = REPEAT
     elif bias.std[axis] > MOST_BIAS_STD_MG:
         message = f"the bias of {'xyz'[axis]} is known to {bias.std[axis]:.1f} mg only (1 sigma)"
         remedy = f"hold the board in further orientations, also with side +{'XYZ'[axis]} or −{'XYZ'[axis]} down"

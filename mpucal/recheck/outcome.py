@@ -109,7 +109,7 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
         lines += ["", *(_row(name, change) for name, change in self.changes.items())] if self.changes else []
         if self.probability is not None:
             lines += ["", f"An unchanged sensor shows as much in {100.0 * self.probability:.3g} % of checks."]
-        lines += [f"{self.orientations} orientations in {self.seconds:.0f} s."] if self.seconds else []
+        lines += [f"Orientations: {self.orientations} in {self.seconds:.0f} s."] if self.seconds else []
         return "\n".join(lines)
 
 

@@ -136,7 +136,9 @@ def test_a_board_that_was_turned_has_no_tones(lying):
     ]
     (moved,) = noise_of(replace(lying, acc=acc)).suspicious
     assert moved["code"] == "moved"
-    assert "gravity by 8 deg, from 30" in moved["message"]
+    assert "the board was turned, gravity by 8 deg, from 30" in moved["message"]
+    vehicle = replace(lying, acc=acc, sensor=replace(SENSOR, message="RAW_IMU"))
+    assert noise_of(vehicle).suspicious[0]["message"] == moved["message"].replace("board", "vehicle")
     # half of it upside down: neither direction is the common one
     (moved,) = noise_of(replace(lying, acc=lying.acc * np.where(t < t.mean(), 1.0, -1.0)[:, None])).suspicious
     assert "gravity by 180 deg" in moved["message"]

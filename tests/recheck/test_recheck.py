@@ -70,6 +70,13 @@ def test_a_check_names_the_change(name):
             update_biases(CALIBRATION, result, shown(truth), "")
 
 
+def test_a_check_of_a_vehicle_speaks_of_the_vehicle():
+    sensor = Sensor(chip="ArduPilot-IMU1", message="RAW_IMU")
+    moving = replace(shown(TRUTH), acc=np.random.default_rng(1).normal(0.0, 9.0, (len(shown(TRUTH)), 3)), sensor=sensor)
+    result = mpucal.check(replace(CALIBRATION, sensor=sensor), moving, days=1.0)
+    assert (result.message, result.remedy[:20]) == ("the vehicle never rested", "lay the vehicle flat")
+
+
 @pytest.mark.parametrize(("sensor", "words"), [("acc", "3 times on the accel"), ("gyr", "3.1 times on the gyro")])
 def test_noise_that_grew_is_named(sensor, words):
     quiet = shown(TRUTH, seed=6)
@@ -130,7 +137,7 @@ def test_too_few_orientations_allow_no_verdict():
     still = recording.part(0, round(9.0 * recording.rate_hz))
     told = mpucal.check(CALIBRATION, still, days=1.0)
     assert (told.verdict, told.exit_code) == ("cannot be told", 4)
-    assert "1 orientations were seen" in told.message
+    assert "1 of the 4 orientations" in told.message
     moving = recording.part(len(recording) - 50, len(recording))
     assert mpucal.check(CALIBRATION, moving).verdict == "cannot be told"
 
