@@ -5,12 +5,13 @@ Dates are days since 1900 in the file, and are read as days.
 
 from __future__ import annotations
 
+import csv
 import lzma
 import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
-from io import BytesIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, iterparse
 
@@ -40,19 +41,22 @@ def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
             sheets = [*_sheets(archive)]
     except (*_DAMAGE, ParseError) as error:
         raise RecordingError(f"{path} is not a whole workbook ({error})", "save its sheet as .csv") from error
-    chosen = next((text for text in sheets if is_table_of_sensors(text, path.name)), "".join(sheets[:1]))
+    if not sheets:
+        raise RecordingError(f"{path} holds no xl/worksheets/sheet1.xml", "save its sheet as .csv")
+    chosen = next((text for text in sheets if is_table_of_sensors(text, path.name)), sheets[0])
     return table_of_text(chosen, path, hints)
 
 
 def _sheets(archive: zipfile.ZipFile) -> Iterator[str]:
-    """Yield the text of each sheet, whose cells are separated by tabs."""
+    """Yield the text of each sheet, whose cells are separated by commas."""
     strings = []
     if _STRINGS in archive.namelist():
         strings = [_text(item) for item in _elements(archive.read(_STRINGS), "si")]
     found = sorted((int(match[1]), name) for name in archive.namelist() if (match := _SHEET(name)))
     for _, name in found:
-        rows = ("\t".join(_cells(row, strings)) for row in _elements(archive.read(name), "row"))
-        yield "".join(f"{row}\n" for row in rows)
+        text, rows = StringIO(), (_cells(row, strings) for row in _elements(archive.read(name), "row"))
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        yield text.getvalue()
 
 
 def _elements(data: bytes, tag: str) -> Iterator[Element]:

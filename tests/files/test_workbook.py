@@ -51,12 +51,21 @@ NOTES = (
 @pytest.mark.parametrize("sheets", [(), (NOTES,)], ids=["one sheet", "behind a sheet of notes"])
 def test_a_sheet_is_read_as_a_table(sheets, namespace, walk, assert_same, tmp_path):
     write(tmp_path / "walk.xlsx", rows_of(walk, walk.t), sheets, namespace)
-    assert_same(mpucal.load(tmp_path / "walk.xlsx"), walk)
+    found = mpucal.load(tmp_path / "walk.xlsx")
+    assert_same(found, walk)
+    assert found.taken.endswith("times in s, accelerations in m/s^2 and rates in rad/s.")
 
 
 def test_dates_are_days(walk, assert_same, tmp_path):
     write(tmp_path / "walk.xlsx", rows_of(walk, 45413.5 + walk.t / 86400))
     assert_same(mpucal.load(tmp_path / "walk.xlsx"), walk, t=2e-6)
+
+
+def test_text_in_cells_may_hold_commas(walk, assert_same, tmp_path):
+    rows = rows_of(walk, walk.t)
+    rows[1:] = [[f"{number!r}".replace(".", ",") for number in row] for row in rows[1:]]
+    write(tmp_path / "walk.xlsx", [("walked, then turned",), *rows])
+    assert_same(mpucal.load(tmp_path / "walk.xlsx"), walk)
 
 
 def test_cells_that_are_left_out_are_empty(walk, tmp_path):
@@ -91,5 +100,5 @@ def test_a_workbook_without_samples_is_refused(tmp_path):
         mpucal.load(tmp_path / "notes.xlsx")
     with zipfile.ZipFile(tmp_path / "none.xlsx", "w"):
         pass
-    with pytest.raises(RecordingError, match="is empty"):
+    with pytest.raises(RecordingError, match=r"holds no xl/worksheets/sheet1\.xml: save its sheet as \.csv"):
         mpucal.load(tmp_path / "none.xlsx")
