@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..calibration.checks.sensor import OFF_PPM
 from ..chip.families import Family
 from ..chip.losses import Loss
 from ..clocks.sample_clock import RATE_TOLERANCE
@@ -17,8 +18,6 @@ from .finding import Finding, Mark
 NOISY_RATIO, BROKEN_RATIO = 1.5, 3.0
 # Relative change of the sample clock's rate that warming of the chip does not explain.
 LEAST_RATE_CHANGE = 0.002
-# Five times the tolerance of a quartz crystal.
-MOST_RATE_ERROR_PPM = 500.0
 # Scale factor within 3 %, and zero-g level within 80 mg.
 MOST_ERROR_G = 0.11
 # The samples may be shorter than asked for by the first and the last poll.
@@ -70,9 +69,9 @@ def examine_clock(topic: str, ppm: float, std: float) -> Finding:
     what = f"{ppm:+.0f} ppm against this computer's (1 sigma {std * 1e6:.0f})"
     data = {"ppm": ppm, "std_ppm": std * 1e6}
     remedy = "nothing has to be done: times are corrected for that"
-    if std * 1e6 > MOST_RATE_ERROR_PPM:
+    if std * 1e6 > OFF_PPM:
         remedy = "observe for longer (--seconds 30): its rate is not known yet"
-    return Finding.check(topic, max(abs(ppm), std * 1e6) <= MOST_RATE_ERROR_PPM, what, remedy, data)
+    return Finding.check(topic, max(abs(ppm), std * 1e6) <= OFF_PPM, what, remedy, data)
 
 
 def _rate(recording: Recording, nominal_hz: float) -> Finding:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..data import Samples, Vector
-from .events import Direction, Quaternion
+from .events import LAID, Direction, Quaternion
 
 # Length of an integration step, in which the rates count as constant.
 STEP_S = 0.04
@@ -24,14 +24,14 @@ CORRECT_RAD_S = math.radians(60.0)
 # Until the end of the flat rest, a board at rest is turned about the vertical towards straight, at most so fast.
 STRAIGHTEN_RAD_S = math.radians(30.0)
 # A board that lies on its component side was turned over about its x axis.
-_LAID, _TURNED_OVER = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
+_TURNED_OVER: Quaternion = (0.0, 1.0, 0.0, 0.0)
 
 
 class Attitude:
     """Attitude filter of one board. It computes with plain floats, which are faster than arrays for single steps."""
 
     def __init__(self) -> None:
-        self._q: Quaternion = _LAID
+        self._q: Quaternion = LAID
         self._begun = self._levelled = False
         self._rest = Samples.empty()
         self._bias_rad_s: Vector = np.zeros(3)
@@ -144,7 +144,7 @@ def turned_up(attitude: Quaternion, up: Direction) -> Quaternion:
 
 def straight(up: Direction) -> Quaternion:
     """Return the attitude nearest to a board laid straight in which the unit vector `up` of its axes points up."""
-    return turned_up(_LAID if up[2] >= 0.0 else _TURNED_OVER, up)
+    return turned_up(LAID if up[2] >= 0.0 else _TURNED_OVER, up)
 
 
 def canonical(q: Quaternion) -> Quaternion:

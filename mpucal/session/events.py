@@ -12,6 +12,7 @@ from ..reasons import Reason
 
 Direction = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+LAID: Quaternion = (1.0, 0.0, 0.0, 0.0)  # attitude of a board that lies face up
 
 
 def triple(v: Vector) -> Direction:
@@ -240,7 +241,7 @@ class Meter:
     turning_dps: float
     rate_hz: float
     temperature_c: float | None
-    attitude: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    attitude: Quaternion = LAID
     missing_deg: float | None = None
     turn: str = ""
     wanted: Quaternion | None = None

@@ -12,7 +12,7 @@ from ..rests.limits import HAND
 from ..rests.stillness import Detector, Moved
 from ..rests.windows import Window, Windows
 from .attitude import Attitude, canonical, compose, from_vector, rotate, turned_up, yaw_between
-from .events import Caution, Direction, Meter, Output, Quaternion, down_of
+from .events import LAID, Caution, Direction, Meter, Output, Quaternion, down_of
 from .step import HAND_WINDOW_S, SAY_AGAIN_S
 
 NEAR_RANGE = 0.8
@@ -138,7 +138,7 @@ class TurnGuide:
         self._to: Direction | None = None
         self._heading = 0.0
         self._word_index = 0
-        self._wanted: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        self._wanted = LAID
 
     def turn_to(self, down: Direction, attitude: Quaternion) -> Turn:
         """Return the turn of a board with this attitude that points the unit vector `down` of its axes down."""

@@ -46,7 +46,6 @@ TURNING = (events.PromptKind.ROTATE, events.PromptKind.VERIFY)
 # LEAST_FACE of the board's face; the present one is kept down to KEPT_FACE, so that a tremor does not change it.
 _TURNS_DEG, _TILTS_DEG = (-14.0, 14.0, -28.0, 28.0, -48.0, 48.0), (32.0, 52.0, 16.0, 68.0)
 LEAST_FACE, KEPT_FACE = 0.5, 0.38
-_LAID = (1.0, 0.0, 0.0, 0.0)
 
 
 class Eye(NamedTuple):
@@ -130,7 +129,7 @@ class View:
                 return self.noted(why)
             case events.Meter():
                 laying = self.prompt is not None and self.prompt.kind is events.PromptKind.LAY_FLAT
-                wanted = _LAID if laying else output.wanted or output.attitude
+                wanted = events.LAID if laying else output.wanted or output.attitude
                 view = replace(self, meter=output, eye=self.eye.moved((output.attitude, wanted)))
             case events.Countdown() | events.Progress() | events.Knowledge() | events.Caution():
                 latest: dict[str, Any] = {type(output).__name__.lower(): output}
