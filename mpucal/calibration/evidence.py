@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, wraps
-from itertools import permutations, product
+from itertools import pairwise, permutations, product
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -275,8 +275,11 @@ def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
 
 def _miss(turns: list[_Turn], by: Vector) -> float:
     """Return the median angle [rad] by which the rates, multiplied by (3, 3), miss gravity after the turns."""
-    carried = np.array([turned(-turn.steps @ by.T) @ turn.before for turn in turns])
-    return float(np.median(_angles(carried, np.array([turn.after for turn in turns]))))
+    steps = -np.concatenate([turn.steps for turn in turns]) @ by.T
+    ends = np.cumsum([len(turn.steps) for turn in turns]).tolist()
+    F = [turned(steps[first:last]) for first, last in pairwise([0, *ends])]
+    before, after = (np.array([getattr(turn, name) for turn in turns]) for name in ("before", "after"))
+    return float(np.median(_angles(np.einsum("kij,kj->ki", F, before), after)))
 
 
 def _means(values: Vector, n: int) -> Vector:
