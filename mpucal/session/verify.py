@@ -98,7 +98,9 @@ class Verify(NewPoses):
         of = VERIFY_PLACED if coverage.placed else aim.verify
         super().__init__(flat, plan, of, coverage.rested, BENT * unseen_rad(plan.tilt_only))
         self._refusal: events.Finished | None = None
-        self._more, self._doubted = MOST_MORE, False
+        self._more = MOST_MORE
+        self._doubt: events.Checked | None = None
+        self._known = 0  # new orientations that the first calibration holds, once it is computed again
         self._now_s = 0.0
 
     def begin(self) -> list[events.Output]:
@@ -120,9 +122,11 @@ class Verify(NewPoses):
             outputs += self._remind(t_s, self._prompted_s, "this orientation has not been held yet")
             if t_s - self._begun_s < VERIFY_PATIENCE_S:
                 return outputs
-            self._closed = self._number > 0
+            self._closed = self._number > self._known
         if self._closed:
-            return [*outputs, events.RequestFit(events.FitKind.CHECK, WAIT_S, self._of)]
+            return [*outputs, events.RequestFit(events.FitKind.CHECK, WAIT_S, self._of - self._known)]
+        if self._doubt is not None:
+            return [*outputs, *self._end(self._doubt)]
         not_shown = reason("verification_failed", "not_shown")
         self.checked = events.Checked((), None, not_shown)
         return [*outputs, events.Finished(not_shown.what)]
@@ -149,24 +153,27 @@ class Verify(NewPoses):
 
     def _check(self, checked: events.Checked) -> events.Outputs:
         """Take the comparison with the new orientations."""
-        if checked.doubtful and not self._doubted:
+        if checked.doubtful and self._doubt is None:
             return self._try_again(checked)
-        if checked.agrees is None and self._number >= self._of and self._more and not self._doubted:
+        if checked.agrees is None and self._number >= self._of and self._more and self._doubt is None:
             # The fit has seen one of these orientations after all: another one replaces it.
             self._more, self._closed, self._begun_s = self._more - 1, False, None
             self._number = self._of - 1
             self.prompt = self._next()
             return [self.prompt]
+        return [*checked.verifications, *self._end(checked)]
+
+    def _end(self, checked: events.Checked) -> events.Outputs:
+        """Return the result of the verification."""
         self.checked = checked
         if checked.reason is None:
-            agreement = events.Finished("verified: the new orientations agree with the predicted uncertainty")
-            return [*checked.verifications, agreement]
-        return [*checked.verifications, *self._refused(events.Finished(checked.reason.what), checked.reason)]
+            return [events.Finished("verified: the new orientations agree with the predicted uncertainty")]
+        return self._refused(events.Finished(checked.reason.what), checked.reason)
 
     def _try_again(self, checked: events.Checked) -> events.Outputs:
         """Compute the first calibration again, with the orientations so far, and request one more to verify it."""
-        self._doubted, self._closed, self._begun_s = True, False, None
-        self._of, self._number = VERIFY_PLACED, 0
+        self._doubt, self._closed, self._begun_s = checked, False, None
+        self._known, self._of = self._number, self._number + 1
         self.prompt = self._next()
         doubt = checked.reason.what if checked.reason else ""
         caution = events.Caution(self._now_s, "doubtful", doubt, "one more orientation decides if that matters")

@@ -349,11 +349,22 @@ def test_a_doubt_that_new_orientations_do_not_share_is_decided_by_one_more(board
         verifying.checked = then if number == 3 else verifying.checked
         asked = verifying.of(events.Prompt)[-1]
         verifying.feed(board.turn_to([-v for v in asked.down])).feed(board.still(2.0))
-    assert "1 of 1" in asked.text
+    assert "4 of 4" in asked.text
     assert [caution.what for caution in verifying.of(events.Caution) if caution.code == "doubtful"] == [DOUBT.what]
     assert [request.kind for request in verifying.of(events.RequestFit)].count(events.FitKind.TRY) == 2
     assert verifying.state is State.CALIBRATE
     assert verifying.machine.checked == then
+
+
+def test_a_doubt_stands_where_nobody_holds_one_more_orientation(board, verifying):
+    verifying.checked = STAYS
+    for _ in range(3):
+        asked = verifying.of(events.Prompt)[-1]
+        verifying.feed(board.turn_to([-v for v in asked.down])).feed(board.still(2.0))
+    verifying.feed(board.still(50.0))
+    assert verifying.state is State.CALIBRATE
+    assert verifying.machine.checked == STAYS
+    assert "in none of the requested orientations" not in verifying.words()
 
 
 def test_the_verification_times_out(board, verifying):
