@@ -42,6 +42,9 @@ STANDARD_GRAVITY_MPS2 = 9.80665
 # deg/s, each half of it at the next range (32.75 and 16.375 are printed as 32.8 and 16.4).
 ACCEL_COUNTS = 32768.0
 GYRO_COUNTS = 32750.0
+# ppm of a clock's rate beyond a quartz crystal's, which is within 100 ppm; as a scale factor error it is a tenth of the
+# accuracy wanted
+MOST_CLOCK_PPM = 500.0
 # full-scale ranges of sensors in recordings, [g] and [deg/s]; those of a chip are in its registers
 ACCEL_RANGES_G, GYRO_RANGES_DPS = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000)
 # names are exported to scripts and source code: these characters cannot end a string or comment there

@@ -95,7 +95,7 @@ VARIANCES = 10.0 ** np.arange(-8.0, 0.1, 0.5)
 SURE = 100.0
 # The true cause need not be in the table, and then odds between wrong ones mean little: those whose evidence is, in
 # logs, more than this share of the likeliest one's may be like it.
-SHARE = 0.7
+LEAST_EVIDENCE = 0.7
 # Share of the largest eigenvalue, below which a direction of x is left out: the parts say next to nothing of it.
 UNSEEN = 3e-4
 PULSES = (1, 2, 3)  # groups that a pulse lasts
@@ -202,7 +202,7 @@ def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Ex
     found.sort(key=lambda each: -each.weight)
     if total > np.log(SURE):
         most = found[0].log_share
-        least = min(most - np.log(SURE), SHARE * most)
+        least = min(most - np.log(SURE), LEAST_EVIDENCE * most)
         found = [each._replace(is_possible=each.log_share > least) for each in found]
     changes = [each for each in found if each.hypothesis.kind == "change"]
     if sum(each.weight for each in changes) > 1.0 - 1.0 / SURE:

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..calibration.checks.sensor import OFF_PPM
 from ..chip.families import Family
 from ..chip.losses import Loss
 from ..clocks.sample_clock import RATE_TOLERANCE
-from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from ..data import MOST_CLOCK_PPM, STANDARD_GRAVITY_MPS2, Recording, Vector
 from .dead_axes import dead_axes, live_axes
 from .finding import Finding, Mark
 
@@ -69,9 +68,9 @@ def examine_clock(topic: str, ppm: float, std: float) -> Finding:
     what = f"{ppm:+.0f} ppm against this computer's (1 sigma {std * 1e6:.0f})"
     data = {"ppm": ppm, "std_ppm": std * 1e6}
     remedy = "nothing has to be done: times are corrected for that"
-    if std * 1e6 > OFF_PPM:
+    if std * 1e6 > MOST_CLOCK_PPM:
         remedy = "observe for longer (--seconds 30): its rate is not known yet"
-    return Finding.check(topic, max(abs(ppm), std * 1e6) <= OFF_PPM, what, remedy, data)
+    return Finding.check(topic, max(abs(ppm), std * 1e6) <= MOST_CLOCK_PPM, what, remedy, data)
 
 
 def _rate(recording: Recording, nominal_hz: float) -> Finding:

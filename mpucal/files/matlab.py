@@ -1,9 +1,8 @@
 """Arrays of a MATLAB file of level 5, as written by `save(NAME, '-v7')` or `'-v6'` (MAT-File Format, MathWorks).
 
 SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers, structures of them, and cells
-of texts. The
-contents of objects, such as timetables, stand in a form that MathWorks does not describe: they are refused. Files of
-`'-v7.3'` are HDF5, which h5py reads.
+of texts. The contents of objects, such as timetables, stand in a form that MathWorks does not describe: they are
+refused. Files of `'-v7.3'` are HDF5, which h5py reads.
 """
 
 from __future__ import annotations

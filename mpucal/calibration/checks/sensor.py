@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...data import Mask, Vector
+from ...data import MOST_CLOCK_PPM, Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
@@ -21,8 +21,6 @@ GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
 # MOST_SCALE, or its inverse, the unit is wrong: the paper simulates sensors of 0.5 to 1.5.
 SCALE_OFF, MOST_SCALE = 0.1, 2.5
 ALIKE = 0.05  # largest difference of three scale factors that agree on one
-# A quartz crystal is within 100 ppm; a scale factor error of so much is a tenth of the accuracy wanted.
-OFF_PPM = 500.0
 # These models estimate no scale factor of the gyroscope.
 TRUSTING = ("accel", "paper", "tilt")
 # Filters of one clock leave 10 ms at most; those of an autopilot are set by its owner, and differ.
@@ -134,11 +132,11 @@ def clock_off(e: Evidence) -> Reason | None:
     ppm, std = e.recording.sensor.clock_ppm, e.recording.sensor.clock_std
     if ppm is None or std is None:
         return None
-    if std > 1e-6 * OFF_PPM:
+    if std > 1e-6 * MOST_CLOCK_PPM:
         if e.model in TRUSTING:
             return reason("clock_off", "trusted", std=std * 1e6, model=e.model)
         return reason("clock_off", "unknown", std=std * 1e6)
-    return reason("clock_off", "corrected", ppm=ppm, std=std * 1e6) if abs(ppm) > OFF_PPM else None
+    return reason("clock_off", "corrected", ppm=ppm, std=std * 1e6) if abs(ppm) > MOST_CLOCK_PPM else None
 
 
 def sensors_lag(e: Evidence) -> Reason | None:
