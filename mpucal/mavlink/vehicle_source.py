@@ -39,6 +39,7 @@ class VehicleSource:
     say : shows the operator a sentence. name : of the recording.
     writes : the result will be written to the vehicle: then its parameters must name its sensors.
     prepare : prepare a PX4; see Preparation. begun : called when the first message is heard that counts.
+    replayed : see lock_to_vehicle.
     """
 
     def __init__(
@@ -51,13 +52,14 @@ class VehicleSource:
         writes: bool = False,
         prepare: bool = False,
         begun: Callable[[], None] = lambda: None,
+        replayed: bool = False,
     ) -> None:
         self._link = link
         self._rate_hz = rate_hz
         self._system = system
         self._say = say
         self._name = name
-        self._writes = writes
+        self._writes, self._replayed = writes, replayed
         self._preparation = Preparation(link, say) if prepare else None
         self._begun = begun
         self._log = Log("")
@@ -80,7 +82,7 @@ class VehicleSource:
         ------
         NoAnswer : no vehicle. UsageError : several. LinkError : it sends no accelerations, or the link broke.
         """
-        vehicle = lock_to_vehicle(self._link, self._system, self._say)
+        vehicle = lock_to_vehicle(self._link, self._system, self._say, replayed=self._replayed)
         self._system, firmware = vehicle.system, vehicle.family
         if first := not self._log.firmware:
             self._log = Log(firmware, over_reboots=True)
@@ -241,15 +243,19 @@ class VehicleSource:
         return f"has sent {what} for {(now_ns - since_ns) // S} s"
 
 
-def lock_to_vehicle(link: Link, system: int | None, say: Callable[[str], None]) -> Vehicle:
+def lock_to_vehicle(link: Link, system: int | None, say: Callable[[str], None], *, replayed: bool = False) -> Vehicle:
     """Listen, say which vehicle it is, and lock the link to it; nothing is sent before the operator can see that.
+
+    Parameters
+    ----------
+    replayed : the packets are those of a capture, and nothing is sent.
 
     Raises
     ------
     NoAnswer, LinkError : see Link.listen. UsageError : see choose_vehicle.
     """
     vehicle = choose_vehicle(link.listen(), system)
-    say(f"This is {vehicle}; nothing is sent to any other.")
+    say(f"This is {vehicle}{'' if replayed else '; nothing is sent to any other'}.")
     link.lock(vehicle)
     return vehicle
 

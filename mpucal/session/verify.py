@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..data import Samples
@@ -161,7 +163,15 @@ class Verify(NewPoses):
             self._number = self._of - 1
             self.prompt = self._next()
             return [self.prompt]
-        return [*checked.verifications, *self._end(checked)]
+        return [*(self._counted(each) for each in checked.verifications), *self._end(checked)]
+
+    def _counted(self, verification: events.Verification) -> events.Verification:
+        """Return a verification with its number among all orientations that were asked for; see `_known`."""
+        if not self._known:
+            return verification
+        number, of = verification.number + self._known, verification.of + self._known
+        text = verification.text.replace(f"{verification.number} of {verification.of}", f"{number} of {of}", 1)
+        return replace(verification, number=number, of=of, text=text)
 
     def _end(self, checked: events.Checked) -> events.Outputs:
         """Return the result of the verification."""

@@ -138,13 +138,15 @@ class OpenedVehicle(OpenedSource):
         def note(event: str, _t_ns: int = 0, data: Mapping[str, Any] | None = None) -> None:
             recorder.event(event, link.now_ns(), data)
 
+        replayed = self.parts is not None and not self.parts.resumes
+
         def say_new(sentence: str) -> None:
             # The operator of a resumed session was told before what its recorded part says.
-            if not (self.replaying and self.parts is not None and self.parts.resumes):
+            if replayed or not self.replaying:
                 say(sentence)
 
         rate_hz, begun, self.end = self.plan.config.rate_hz, lambda: note(BEGUN), lambda: note(END)
-        source = VehicleSource(link, rate_hz, self.system, say_new, name, self.writes, self.prepare, begun)
+        source = VehicleSource(link, rate_hz, self.system, say_new, name, self.writes, self.prepare, begun, replayed)
         note(OPENED)
         try:
             yield ActiveSource(source, note)

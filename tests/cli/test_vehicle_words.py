@@ -39,6 +39,12 @@ def test_a_vehicle_takes_rates_that_a_chip_does_not(tmp_path):
     assert float(re.search(r"at ([\d.]+) Hz", shown).group(1)) > 299
 
 
+def test_a_replay_sends_nothing_and_does_not_say_to_whom(recorded, tmp_path):
+    result = run("session", "--replay", recorded, "-o", tmp_path)
+    assert "This is system 1" in result.output
+    assert "nothing is sent" not in result.output
+
+
 def test_a_source_says_what_it_is_and_the_drawn_board_follows_from_it(recorded):
     chip = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
     for values, origin, drawn in (

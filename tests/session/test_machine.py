@@ -339,9 +339,10 @@ def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, v
 
 
 STAYS = events.Checked((), False, DOUBT, doubtful=True)
+LAST = events.Verification(60.0, 1, 1, DOWN, 0.004, 0.003, 0.02, 0.03, True, "new orientation 1 of 1: |a| error")
 
 
-@pytest.mark.parametrize("then", [events.Checked((), True), STAYS], ids=["settled", "stays"])
+@pytest.mark.parametrize("then", [events.Checked((LAST,), True), STAYS], ids=["settled", "stays"])
 def test_a_doubt_that_new_orientations_do_not_share_is_decided_by_one_more(board, verifying, then):
     verifying.checked = STAYS
     for number in range(4):
@@ -354,6 +355,8 @@ def test_a_doubt_that_new_orientations_do_not_share_is_decided_by_one_more(board
     assert [request.kind for request in verifying.of(events.RequestFit)].count(events.FitKind.TRY) == 2
     assert verifying.state is State.CALIBRATE
     assert verifying.machine.checked == then
+    told = [(each.number, each.of, each.text) for each in verifying.of(events.Verification)]
+    assert told == [(4, 4, "new orientation 4 of 4: |a| error")] * len(then.verifications)
 
 
 def test_a_doubt_stands_where_nobody_holds_one_more_orientation(board, verifying):

@@ -10,6 +10,7 @@ from .cells import MOMENT, NUMBER, Kind
 from .guess import is_clock
 from .names import (
     ACC,
+    ENDINGS_OF_SENSORS,
     GYR,
     TIME,
     WITHOUT_GRAVITY,
@@ -46,23 +47,8 @@ _THREE = re.compile(
     + r"(?:[ \t]{0,9}[,;|][ \t]{0,9}|[ \t]{1,9})".join(_AXES)
     + r"(?![\w.])(?![ \t]{0,9}[,;|]?[ \t]{0,9}[-+.\d])"
 )
-# unit -> how a name ends that has it
-_TAILS = {
-    "m/s^2": "_mps2",
-    "cm/s^2": "_cm_s2",
-    "mm/s^2": "_mm_s2",
-    "ft/s^2": "_ft_s2",
-    "g": "_g",
-    "mg": "_mg",
-    "ug": "_ug",
-    "rad/s": "_rads",
-    "mrad/s": "_mrads",
-    "deg/s": "_dps",
-    "mdeg/s": "_mdps",
-    "udeg/s": "_udps",
-    "deg/h": "_deg_h",
-    "rpm": "_rpm",
-}
+# unit -> how a name ends that has it: the first of those that are read
+_ENDINGS = {find_unit(ending): f"_{ending}" for ending in reversed(ENDINGS_OF_SENSORS)}
 # lines of which one names numbers: the log of a board that starts comes before
 BEGUN = 2000
 # as `rostopic echo` and `ros2 topic echo` print messages
@@ -180,7 +166,7 @@ def _join_records(text: str) -> str:
 
 def _name_axes(found: re.Match[str]) -> str:
     """Return `NAME_x_UNIT=..., NAME_y_UNIT=...` and so on of a sensor's three numbers; other words as they are."""
-    unit = _TAILS.get(find_unit(found[2] or ""), "")
+    unit = _ENDINGS.get(find_unit(found[2] or ""), "")
     named = zip(axes_of(found[1]), found.groups()[2:], strict=False)
     return ", ".join(f"{axis}{unit}={cell}" for axis, cell in named) or found[0]
 

@@ -78,10 +78,13 @@ _CLOCK = re.compile(r"(?<![a-z])(?:time|timestamp|stamp|millis|micros|date)(?![a
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)").fullmatch
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
-_UNIT_TAIL = re.compile(
-    r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|ug|dps|mdps|udps|mps2|m_s2|m/s2|ms2|cm_s2|mm_s2|ft_s2|rad_s"
-    r"|rads|mrads|rad|deg_s|degs|deg|deg_per_s|rad_per_s|deg_h|deg_hr|rpm)"
-)
+# the ends of names that are units
+_ENDINGS = ("ns", "us", "ms", "s", "sec", "seconds")
+ENDINGS_OF_SENSORS = (
+    "mps2 m_s2 m/s2 ms2 cm_s2 mm_s2 ft_s2 g gs mg ug rads rad_s rad rad_per_s mrads dps deg_s degs deg deg_per_s mdps udps"
+    " deg_h deg_hr rpm"
+).split()
+_WITH_ENDING = re.compile(rf"(.*?[a-z\]0-9])[_ ]({'|'.join((*_ENDINGS, *ENDINGS_OF_SENSORS))})")
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ def parse_column_name(name: str, place: int) -> Column | None:
             return None
     text = text.lower()
     found = _match_stem(name, place, text, axis, unit)
-    if found is None and not unit and (tail := _UNIT_TAIL.fullmatch(text)):
+    if found is None and not unit and (tail := _WITH_ENDING.fullmatch(text)):
         text, unit = tail[1], find_unit(tail[2])
         found = _match_stem(name, place, text, axis, unit)
     words = _CAMEL.sub("_", name).lower()
