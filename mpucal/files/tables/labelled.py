@@ -48,7 +48,7 @@ _THREE = re.compile(
     + r"(?![\w.])(?![ \t]{0,9}[,;|]?[ \t]{0,9}[-+.\d])"
 )
 # unit -> how a name ends that has it: the first of those that are read
-_ENDINGS = {find_unit(ending): f"_{ending}" for ending in reversed(ENDINGS_OF_SENSORS)}
+_ENDINGS = {find_unit(ending): f"_{ending}" for ending in reversed(ENDINGS_OF_SENSORS.split())}
 # lines of which one names numbers: the log of a board that starts comes before
 BEGUN = 2000
 # as `rostopic echo` and `ros2 topic echo` print messages

@@ -79,12 +79,12 @@ _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)").fullmatch
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 # the ends of names that are units
-_ENDINGS = ("ns", "us", "ms", "s", "sec", "seconds")
+_ENDINGS_OF_TIMES = "ns us ms s sec seconds"
 ENDINGS_OF_SENSORS = (
-    "mps2 m_s2 m/s2 ms2 cm_s2 mm_s2 ft_s2 g gs mg ug rads rad_s rad rad_per_s mrads dps deg_s degs deg deg_per_s mdps udps"
-    " deg_h deg_hr rpm"
-).split()
-_WITH_ENDING = re.compile(rf"(.*?[a-z\]0-9])[_ ]({'|'.join((*_ENDINGS, *ENDINGS_OF_SENSORS))})")
+    "mps2 m_s2 m/s2 ms2 cm_s2 mm_s2 ft_s2 g gs mg ug rads rad_s rad rad_per_s mrads dps deg_s degs deg deg_per_s"
+    " mdps udps deg_h deg_hr rpm"
+)
+_WITH_ENDING = re.compile(rf"(.*?[a-z\]0-9])[_ ]({'|'.join(f'{_ENDINGS_OF_TIMES} {ENDINGS_OF_SENSORS}'.split())})")
 
 
 @dataclass(frozen=True)
