@@ -135,7 +135,12 @@ class Driver:
         return replace(settings.sensor, rate_hz=self._config.rate_hz) if settings.polled else settings.sensor
 
     def poll(self) -> Samples:
-        """Wait for the next poll, and return the samples since the last one with provisional times.
+        """Wait for the next poll, and return the samples since the last one with provisional times; see `read`."""
+        self.read()
+        return self._fifo.take()
+
+    def read(self) -> None:
+        """Wait for the next poll, and read the samples since the last one.
 
         After an overflow, misaligned frames or a failed read of the FIFO, the FIFO is restarted, which leaves a gap.
         After a reset of the chip, or if the sensor repeats itself, the chip is set up again before that.
@@ -145,7 +150,7 @@ class Driver:
         BusError, ChipError : the reason why no valid sample came for two seconds.
         BusError : the bus is too slow for the rate.
         """
-        begun_ns = self._port.now_ns
+        begun_ns, accepted = self._port.now_ns, self._fifo.accepted
         self._port.sleep_until(self._next_poll_ns)
         trouble: BusError | ChipError | None = None
         try:
@@ -157,11 +162,10 @@ class Driver:
             trouble = error
             self._plan_next_poll()
         self._check_pace()
-        samples = self._fifo.take()
-        self._fruitless_ns = 0 if len(samples) else self._fruitless_ns + self._spent_ns(begun_ns, trouble)
+        fruitful = self._fifo.accepted > accepted
+        self._fruitless_ns = 0 if fruitful else self._fruitless_ns + self._spent_ns(begun_ns, trouble)
         if self._fruitless_ns > DEAD_NS:
             raise trouble or self._diagnose_silence()
-        return samples
 
     def recording(self) -> Recording:
         """Return all samples with final times, and the measured rate and temperature."""

@@ -200,11 +200,10 @@ class FifoDecoder:
             yield samples
 
     def forget(self) -> None:
-        """Forget all samples taken: `recording` holds those from now on."""
-        self._runs, self._taken = self._runs[self._taken :], 0
+        """Forget all samples: `recording` holds those from now on."""
+        self.release()
         self._host.forget()
-        if not self._runs:
-            self._clock.forget()
+        self._clock.forget()
 
     def recording(self, name: str) -> Recording:
         """Return all samples with final times, and the sensor with its measured rate."""

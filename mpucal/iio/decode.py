@@ -117,6 +117,11 @@ class IioDecoder:
         rate_hz = read_number(self.texts(device), *names, default=0.0)
         return rate_hz if rate_hz > 0 else None
 
+    @property
+    def has_new(self) -> bool:
+        """True if there are samples since the last `take`."""
+        return bool(self._new)
+
     def take(self) -> Samples:
         """Return the samples since the last `take`."""
         new, self._new = self._new, []
@@ -124,7 +129,7 @@ class IioDecoder:
 
     def forget(self) -> None:
         """Forget all samples."""
-        self._samples = []
+        self._samples, self._new = [], []
 
     def recording(self) -> Recording:
         """Return all samples."""

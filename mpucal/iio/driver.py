@@ -138,7 +138,12 @@ class IioDriver:
         return self._decoder.sensor
 
     def poll(self) -> Samples:
-        """Wait for the next poll, and return the samples since the last one.
+        """Wait for the next poll, and return the samples since the last one; see `read`."""
+        self.read()
+        return self._decoder.take()
+
+    def read(self) -> None:
+        """Wait for the next poll, and read the samples since the last one.
 
         Raises
         ------
@@ -159,13 +164,11 @@ class IioDriver:
             raise
         except BusError as error:
             trouble = error
-        samples = self._decoder.take()
-        self._fruitless_ns = 0 if len(samples) else self._fruitless_ns + self.now_ns() - begun_ns
+        self._fruitless_ns = 0 if self._decoder.has_new else self._fruitless_ns + self.now_ns() - begun_ns
         if self._fruitless_ns > DEAD_NS:
             raise trouble or ChipError(
                 f"the buffer of {' and '.join(self._devices.each)} stays empty", NO_INTERRUPT_HINT
             )
-        return samples
 
     def recording(self) -> Recording:
         """Return all samples."""

@@ -112,7 +112,13 @@ def open_source(request: Request) -> OpenedIio:
     if request.values.get("writes"):
         files.check_writable(devices.accel)
     return OpenedIio(
-        files, request.plan, words=request.words, devices=devices, trigger=request.values.get("trigger"), rules=RULES
+        files,
+        request.plan,
+        words=request.words,
+        own_process=True,
+        devices=devices,
+        trigger=request.values.get("trigger"),
+        rules=RULES,
     )
 
 

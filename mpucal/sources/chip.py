@@ -12,9 +12,8 @@ from ..chip.contents import chip_contents
 from ..chip.driver import Driver
 from ..files.messages import BUS
 from ..origin import Origin
-from ..session.ports import Source
 from .opened_source import ActiveSource, CaptureRecorder, OpenedSource, Say
-from .reading_process import CAN_FORK, ProcessSource
+from .reading_process import CAN_FORK, BusDriver, ProcessSource
 from .replay import Tap
 
 
@@ -48,7 +47,7 @@ class OpenedChip(OpenedSource):
         with closing(self.bus):
             return {"where": self.where, **chip_contents(self.bus)}
 
-    def driver(self, bus: Any, name: str, say: Say) -> Source:
+    def driver(self, bus: Any, name: str, say: Say) -> BusDriver:
         """Make the driver that measures over `bus`."""
         return Driver(bus, self.plan.config, name, say)
 

@@ -12,12 +12,13 @@ import signal
 import sys
 import traceback
 import warnings
+from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from multiprocessing.connection import Connection, Pipe
 from queue import SimpleQueue
 from threading import Thread
-from typing import Any
+from typing import Any, Protocol
 
 from ..chip.access import Transaction
 from ..data import Sensor
@@ -31,6 +32,15 @@ from .replay import ReplayBus, Tap, as_asked, successful
 CAN_FORK = sys.platform == "linux"
 # Message by which the session asks the process to stop, and the process marks the end of its polls.
 STOP = None
+# Time for the process to stop the sensor.
+STOP_S = 2.0
+
+
+class BusDriver(Source, Protocol):
+    """Source that reads by accesses to a bus, which depend on the replies alone."""
+
+    def read(self) -> None:
+        """Wait a little, and read the samples that came meanwhile, as `poll`, which returns them."""
 
 
 class ProcessSource:
@@ -43,7 +53,7 @@ class ProcessSource:
     """
 
     def __init__(
-        self, driver: Source, tap: Tap, parts: RecordedParts[Any] | None, hands: Sequence[Callable[[Prompt], None]]
+        self, driver: BusDriver, tap: Tap, parts: RecordedParts[Any] | None, hands: Sequence[Callable[[Prompt], None]]
     ) -> None:
         self._driver, self._tap, self._parts, self._hands = driver, tap, parts, hands
         self.poll, self.recording = driver.poll, driver.recording
@@ -77,15 +87,16 @@ class ProcessSource:
             self._followed.tell(prompt)
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, which stops the sensor if nobody did."""
         if self._followed is not None:
             self._followed.close()
 
     def _read(self, session: Connection) -> None:
         """Read the bus until the session says so or has ended; the main function of the process, which ends here."""
         try:
-            # Ctrl-C reaches the session alone.
-            os.setpgid(0, 0)
+            # Ctrl-C reaches the session alone. Where the kernel schedules each session's processes as one group, this
+            # group has a process that sleeps most of the time.
+            os.setsid()
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.SIG_DFL)
             # Real-time priority, if the user may set it; the process sleeps between two polls.
@@ -93,17 +104,19 @@ class ProcessSource:
                 os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
             outbox = Outbox(session)
             self._tap.record = outbox.put
-            try:
-                self._driver.start()
-                while not self._is_to_stop(session):
-                    self._driver.poll()
-                    self._driver.forget()
-                outbox.put(STOP)
-                self._driver.stop()
-            except Exception as error:  # the session raises it at this place
-                error.add_note(f"in the reading process:\n{traceback.format_exc()}")
-                outbox.put(error)
-            outbox.close()
+            with closing(outbox), closing(self._tap):
+                try:
+                    self._driver.start()
+                    outbox.send()
+                    while not self._is_to_stop(session):
+                        self._driver.read()
+                        outbox.send()
+                        self._driver.forget()
+                    outbox.put(STOP)
+                    self._driver.stop()
+                except Exception as error:  # the session raises it at this place
+                    error.add_note(f"in the reading process:\n{traceback.format_exc()}")
+                    outbox.put(error)
         finally:
             os._exit(0)
 
@@ -121,23 +134,33 @@ class ProcessSource:
 
 
 class Outbox:
-    """Queue in the reading process, which never waits for the session; it grows while the session reads nothing."""
+    """Queue in the reading process, which never waits for the session; it grows while the session reads nothing.
+
+    What is put into it goes out at the next `send`, at once.
+    """
 
     def __init__(self, session: Connection) -> None:
-        self._queue: SimpleQueue[Any] = SimpleQueue()
-        self.put = self._queue.put
+        self._items: list[Any] = []
+        self.put = self._items.append
+        self._queue: SimpleQueue[list[Any] | None] = SimpleQueue()
         self._thread = Thread(target=self._send, args=(session,))
         self._thread.start()
 
+    def send(self) -> None:
+        """Send what was put into it."""
+        self._queue.put(self._items[:])
+        self._items.clear()
+
     def close(self) -> None:
         """Send what is left."""
-        self.put(self)
+        self.send()
+        self._queue.put(None)
         self._thread.join()
 
     def _send(self, session: Connection) -> None:
         with suppress(OSError):
-            while (item := self._queue.get()) is not self:
-                session.send(item)
+            while (items := self._queue.get()) is not None:
+                session.send(items)
 
 
 class FollowedBus(ReplayBus):
@@ -151,6 +174,7 @@ class FollowedBus(ReplayBus):
     def __init__(self, process: Connection, pid: int) -> None:
         super().__init__((), "the reading process")
         self._process, self.pid = process, pid
+        self._arrived: deque[Any] = deque()
         self._ended: BusError | None = None
 
     def tell(self, wish: Prompt | None) -> None:
@@ -166,8 +190,12 @@ class FollowedBus(ReplayBus):
                 pass
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, after it has stopped the sensor."""
         if self._ended is None:
+            self.tell(STOP)
+            with suppress(OSError, EOFError):
+                while self._process.poll(STOP_S):
+                    self._process.recv_bytes()
             os.kill(self.pid, signal.SIGKILL)
             os.waitpid(self.pid, 0)
         self._process.close()
@@ -180,11 +208,13 @@ class FollowedBus(ReplayBus):
         if self._ended is not None:
             raise self._ended
         try:
-            item = self._process.recv()
+            while not self._arrived:
+                self._arrived.extend(self._process.recv())
         except (OSError, EOFError):
             code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
             self._ended = BusError(f"the process that reads the sensor {describe_end(code)}", "start again")
             raise self._ended from None
+        item = self._arrived.popleft()
         if isinstance(item, Exception):
             raise item
         return item

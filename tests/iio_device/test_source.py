@@ -118,6 +118,20 @@ def test_attributes_are_restored_as_the_files_are_closed(tree):
     assert {path: path.read_text().strip() for path in before} == before | {calibbias: "7"}
 
 
+def test_attributes_are_restored_by_the_process_that_reads_the_buffer(tree, tmp_path):
+    before = {path: path.read_text().strip() for path in tree.rglob("*") if path.is_file()}
+    writer = os.open(source.DEVICES / "iio:device0", os.O_RDWR | os.O_NONBLOCK)
+    os.write(writer, frames((1, 2, 8192, -4, 5, 6), (1, 2, 8190, -4, 5, 7)))
+    opened = open_source({"iio": "iio:device0", "rate": 50.0})
+    with pytest.raises(ZeroDivisionError), opened.measuring(tmp_path / "board.mcap", print, "now") as measuring:
+        measuring.source.start()
+        assert len(measuring.source.poll()) == 2
+        assert (tree / "buffer/enable").read_text() == "1"
+        raise ZeroDivisionError
+    os.close(writer)
+    assert {path: path.read_text().strip() for path in before} == before
+
+
 def test_polled_channels_are_interpolated_to_common_times(tree):
     """Each channel grows with its own time, so that all of one kind are equal at common times."""
     accesses = []

@@ -107,27 +107,41 @@ def test_the_hand_gets_the_prompts_in_the_process():
     os.close(told)
 
 
-def test_ends_with_the_session_and_stops_the_sensor():
-    written, told = os.pipe()
-    simulated = open_simulated("sim", seed=1)
+@pytest.fixture
+def written():
+    """A simulated chip, and a stream of the bytes that a reading process writes to its USER_CTRL."""
+    here, told = os.pipe()
+    simulated, session = open_simulated("sim", seed=1), os.getpid()
 
     def write(register, data):
         if register == USER_CTRL and os.getpid() != session:
             os.write(told, data)
         return simulated.write(register, data)
 
-    session = os.getpid()
-    bus = SimpleNamespace(read=simulated.read, write=write, sleep_until=simulated.sleep_until)
+    with os.fdopen(here, "rb") as stream:
+        bus = SimpleNamespace(read=simulated.read, write=write, sleep_until=simulated.sleep_until, close=lambda: None)
+        yield bus, stream, lambda: os.close(told)
+
+
+def test_ends_with_the_session_and_stops_the_sensor(written):
+    bus, stream, close = written
     pid = os.fork()
     if not pid:
         # A session that is killed.
-        session = os.getpid()
         measure(in_a_process(bus)[0], polls=1)
-        os.kill(session, signal.SIGKILL)
-    os.close(told)
+        os.kill(os.getpid(), signal.SIGKILL)
+    close()
     os.waitpid(pid, 0)
-    with os.fdopen(written, "rb") as stream:
-        assert stream.read()[-1:] == b"\0"
+    assert stream.read()[-1:] == b"\0"
+
+
+def test_stops_the_sensor_if_the_session_fails_before_it_does(written):
+    bus, stream, close = written
+    with pytest.raises(ZeroDivisionError), closing(in_a_process(bus)[0]) as source:
+        measure(source, polls=1)
+        raise ZeroDivisionError
+    close()
+    assert stream.read()[-1:] == b"\0"
 
 
 def test_a_resumed_session_is_replayed_here_before_the_process_goes_on():
