@@ -7,7 +7,7 @@ import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -174,6 +174,10 @@ class Samples:  # noqa: PLW1641 - arrays have no hash either
         """Return the samples whose arrays are `function` of these arrays, such as a part of each."""
         return Samples(*map(function, _arrays(self)))
 
+    def at(self, places: Any) -> Samples:
+        """Return the samples at some places: a slice, a mask (n,), or numbers of samples."""
+        return self.each(itemgetter(places))
+
     @classmethod
     def empty(cls) -> Samples:
         """Return an empty run of samples."""
@@ -325,19 +329,17 @@ class Recording(Samples):
         if self.flat is not None:
             a, b = max(self.flat[0], first) - first, min(self.flat[1], last) - first
             flat = (a, b) if b > a else None
-        arrays = {f.name: getattr(self, f.name)[first:last] for f in fields(Samples)}
-        return replace(self, flat=flat, **arrays)
+        return replace(self, flat=flat, **vars(self.at(slice(first, last))))
 
     def without(self, first: int, last: int) -> Self:
         """Return all samples except first..last-1, with a gap in their place; `flat` is kept if it lies before them."""
         if first >= last:
             return self
-        kept = np.r_[0:first, last : len(self)]
-        arrays = {f.name: getattr(self, f.name)[kept] for f in fields(Samples)}
+        kept = self.at(np.r_[0:first, last : len(self)])
         if first < len(kept):
-            arrays["gap"][first] = True
+            kept.gap[first] = True
         flat = self.flat if self.flat is not None and self.flat[1] <= first else None
-        return replace(self, flat=flat, **arrays)
+        return replace(self, flat=flat, **vars(kept))
 
 
 def clock_of(stamps: Vector, sensor: Sensor) -> Clock:

@@ -193,6 +193,5 @@ def _without(runs: Iterator[Samples], forgotten: Mapping[int, int]) -> Iterator[
             kept &= (number < first) | (number >= last)
         gap = samples.gap | (kept & ~np.concatenate(([not cut], kept[:-1])))
         at, cut = at + len(samples), not kept[-1]
-        columns = {name: getattr(samples, name)[kept] for name in Samples.__dataclass_fields__}
         if kept.any():
-            yield Samples(**columns | {"gap": gap[kept]})
+            yield replace(samples, gap=gap).at(kept)

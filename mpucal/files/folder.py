@@ -6,7 +6,7 @@ of one turning of it; the motion between two files is unknown: a gap, long enoug
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,8 +87,7 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
         end = float(t[-1][-1])
     whole = Samples.joined([replace(part, t=at) for part, at in zip(parts, t, strict=True)])
     starts = np.cumsum([len(part) for part in parts])[:-1]
-    arrays = {f.name: getattr(whole, f.name) for f in fields(Samples)}
-    arrays["gap"][starts] = True
+    whole.gap[starts] = True
     first = parts[0]
     taken = (
         f"{path.name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
@@ -96,7 +95,7 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     )
     if failed:
         taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
-    return Recording(**arrays, sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=taken.strip())
+    return Recording(**vars(whole), sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=taken.strip())
 
 
 def _recordings(path: Path) -> list[Path]:

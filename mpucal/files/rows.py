@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,7 +17,6 @@ from .tables.units import QUANTITIES, acceleration_unit, gyro_unit, rate_factor
 # 16 Ki samples take 1 MB, which fits a cache; for larger products BLAS starts threads, which takes longer
 ROWS = 1 << 14
 SI = {"acc": "m/s^2", "gyr": "rad/s"}
-SAMPLE_FIELDS = tuple(f.name for f in fields(Samples))
 S = TypeVar("S", bound=Samples)
 
 
@@ -141,7 +140,7 @@ def drop_incomplete(samples: S) -> S:
     # a gap before a sample that is left out is one before the next
     gaps = np.cumsum(samples.gap)[at]
     gap = (np.diff(gaps, prepend=0) > 0) | are_gaps(at)
-    kept: dict[str, Any] = {key: getattr(samples, key)[at] for key in SAMPLE_FIELDS} | {"gap": gap}
+    kept: dict[str, Any] = vars(samples.at(at)) | {"gap": gap}
     if isinstance(samples, Recording) and samples.flat is not None:
         kept["flat"] = tuple(np.searchsorted(at, samples.flat).tolist())
     return replace(samples, **kept)
@@ -192,7 +191,7 @@ def cut_span(runs: Iterator[Samples], span: tuple[float, float], name: str) -> I
         first, last = np.searchsorted(samples.t - origin, span)
         if last > first:
             some = True
-            yield Samples(**{key: getattr(samples, key)[first:last] for key in SAMPLE_FIELDS})
+            yield samples.at(slice(first, last))
         if last < len(samples):
             break
     if not some:

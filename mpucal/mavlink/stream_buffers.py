@@ -160,8 +160,7 @@ def _recording(buffer: StreamBuffer, exact_us: Vector | None, autopilot: Autopil
         sensor_of(stream, autopilot.firmware, autopilot.parameters, rate_hz),
         temperature_c=float(known.mean()) if len(known) else None,
     )
-    columns = {key: getattr(samples, key) for key in Samples.__dataclass_fields__}
-    return Recording(**columns, sensor=sensor, name=name, autopilot=autopilot)
+    return Recording(**vars(samples), sensor=sensor, name=name, autopilot=autopilot)
 
 
 def _refine(times_us: Vector, exact_us: Vector) -> Vector:

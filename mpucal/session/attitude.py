@@ -59,7 +59,7 @@ class Attitude:
         while cuts[-1] < len(t) and (cut := bisect_left(t, t[cuts[-1]] + STEP_S - 1e-9)) < len(t):
             cuts.append(cut)
         first = cuts[-1]
-        self._rest = Samples(*(array[first:] for array in vars(pending).values()))
+        self._rest = pending.at(slice(first, None))
         if not first:
             return
         counts = np.diff(cuts)[:, None]

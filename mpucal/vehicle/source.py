@@ -56,9 +56,9 @@ class RecordedSource:
             raise EndOfCapture
         self._now_s += POLL_S
         last = int(self._recording.t.searchsorted(self._now_s))
-        part = self._recording.part(self._at, last)
+        samples = self._recording.at(slice(self._at, last))
         self._at = last
-        return Samples(*(getattr(part, name) for name in Samples.__dataclass_fields__))
+        return samples
 
     def recording(self) -> Recording:
         """Return the whole recording."""

@@ -1,12 +1,12 @@
 """Recordings of a nearly ideal sensor with a known truth, and files of others."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mpucal.data import Recording, Samples
+from mpucal.data import Recording
 from mpucal.simulated.sensor import SensorTruth, density
 from tools.lab.scenarios.recordings import paper_scenario
 
@@ -31,8 +31,7 @@ def near_ideal(seed=0, D=None, G_gyro=None, **scenario):
 
 def samples_of(recording, kept):
     """Return the recording with the samples `kept` (n,) bool, and without a known flat segment."""
-    arrays = {f.name: getattr(recording, f.name)[kept] for f in fields(Samples)}
-    return replace(recording, flat=None, **arrays)
+    return replace(recording, flat=None, **vars(recording.at(kept)))
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,6 @@
 """Live fits: right about what is known, and the same for the same samples."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def poses():
 def part(recording, first_s, last_s=None):
     """The samples of that time."""
     chosen = slice(round(first_s * 200), None if last_s is None else round(last_s * 200))
-    return Samples(*(getattr(recording, field.name)[chosen] for field in fields(Samples)))
+    return recording.at(chosen)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_faster_samples_are_averaged(rate_hz, size):
     samples = Samples(t, np.tile(t[:, None], (1, 3)), np.zeros((n, 3)), np.full(n, 25.0), gap, no, no)
     store = SampleStore(Sensor(rate_hz=rate_hz))
     for first in range(0, n, 7):
-        store.add(Samples(*(array[first : first + 7] for array in vars(samples).values())))
+        store.add(samples.at(slice(first, first + 7)))
     recording = store.recording()
     assert len(recording) == n // size
     np.testing.assert_allclose(recording.acc[:, 0], recording.t)

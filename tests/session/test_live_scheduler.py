@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 from concurrent.futures import Future
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,13 +24,12 @@ PLAN = Plan(gravity=GRAVITY_MPS2)
 
 def nothing(n):
     """n samples of no meaning."""
-    return Samples(*(np.zeros((n, 3) if field.name in ("acc", "gyr") else n) for field in fields(Samples)))
+    return Samples.empty().each(lambda none: np.zeros((n, *none.shape[1:])))
 
 
 @pytest.fixture(scope="module")
 def poses():
-    recording = hand_scenario(3, "pose12").recording
-    return Samples(*(getattr(recording, field.name)[: 200 * 22] for field in fields(Samples)))
+    return hand_scenario(3, "pose12").recording.at(slice(200 * 22))
 
 
 class Slow:

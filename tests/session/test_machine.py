@@ -43,8 +43,7 @@ class Session:
         for first in range(0, len(samples), poll):
             if self.state not in MEASURING:
                 break
-            part = slice(first, first + poll)
-            self.give(events.Measured(Samples(*(array[part] for array in vars(samples).values()))))
+            self.give(events.Measured(samples.at(slice(first, first + poll))))
         return self
 
     def give(self, event):
