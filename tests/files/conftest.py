@@ -51,6 +51,18 @@ def assert_same():
     return check
 
 
+@pytest.fixture
+def table(tmp_path):
+    """Return a function that writes columns of numbers below their names, and returns the file's path."""
+
+    def write(names, *columns, file="walk.csv"):
+        made = np.column_stack(columns)
+        np.savetxt(tmp_path / file, made, "%.17g", ",", header=names, comments="", encoding="utf-8")
+        return tmp_path / file
+
+    return write
+
+
 @cache
 def typestores():
     """Return the types of ROS 1 and of ROS 2, which take long to load."""

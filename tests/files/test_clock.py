@@ -8,7 +8,7 @@ from mpucal.files import open_rows
 
 
 @pytest.mark.parametrize("ending", [".csv", ".npz"])
-def test_a_recording_by_radio_is_the_one_by_wire_also_in_runs(ending, walk, tmp_path):
+def test_a_recording_by_radio_is_the_one_by_wire_also_in_runs(ending, walk, table, tmp_path):
     """Estimate the clock as `calibrate` does and as `apply` does: with a gap at each step no rest would be found."""
     # in bursts of four as well, each with one stamp
     last = np.minimum((np.arange(len(walk)) // 4 + 1) * 4 - 1, len(walk) - 1)
@@ -16,8 +16,7 @@ def test_a_recording_by_radio_is_the_one_by_wire_also_in_runs(ending, walk, tmp_
     if ending == ".npz":
         np.savez(tmp_path / "walk.npz", t=stamps, acc=walk.acc, gyr=walk.gyr)
     else:
-        table, names = np.column_stack([stamps, walk.acc, walk.gyr]), "t,ax,ay,az,gx,gy,gz"
-        np.savetxt(tmp_path / f"walk{ending}", table, delimiter=",", header=names, comments="")
+        table("t,ax,ay,az,gx,gy,gz", stamps, walk.acc, walk.gyr)
     read, runs = mpucal.load(tmp_path / f"walk{ending}"), open_rows(tmp_path / f"walk{ending}")
     off = read.t - walk.t
     assert np.abs(off - np.median(off)).max() < 2e-3

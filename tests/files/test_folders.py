@@ -137,12 +137,10 @@ def test_two_tables_are_joined_by_time(walk, walk_ns, tmp_path):
         mpucal.load(tmp_path)
 
 
-def test_a_letter_in_a_files_name_is_no_sensor(walk, assert_same, tmp_path):
+def test_a_letter_in_a_files_name_is_no_sensor(walk, assert_same, table):
     for name, values in (("accm", walk.acc), ("gyrm", walk.gyr)):
-        made = np.column_stack([walk.t, values])
-        header = "time,X_value,Y_value,Z_value"
-        np.savetxt(tmp_path / f"house_f_158_{name}.csv", made, "%.17g", ",", header=header, comments="")
-    assert_same(mpucal.load(tmp_path / "house_f_158_accm.csv"), walk)
+        path = table("time,X_value,Y_value,Z_value", walk.t, values, file=f"house_f_158_{name}.csv")
+    assert_same(mpucal.load(path), walk)
 
 
 def test_a_table_is_read_with_the_other_of_its_pair_if_that_exists(walk, walk_ns, assert_same, tmp_path):

@@ -59,12 +59,11 @@ def made_up(monkeypatch):
     monkeypatch.setattr(formats, "FORMATS", rows)
 
 
-def test_a_format_is_read_written_and_named(made_up, walk, tmp_path, monkeypatch):
+def test_a_format_is_read_written_and_named(made_up, walk, table, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with open_writer(Path("walk.words"), Rows.of(walk), "") as write:
         write(walk)
-    table = np.column_stack([walk.t * 1000, walk.acc, walk.gyr])
-    np.savetxt("walk.csv", table, delimiter=",", header="# ms\nt,ax,ay,az,gx,gy,gz", comments="")
+    table("# ms\nt,ax,ay,az,gx,gy,gz", walk.t * 1000, walk.acc, walk.gyr)
     for name in ("walk.words", "walk.csv"):
         rows = open_rows(Path(name))
         np.testing.assert_allclose(np.concatenate([samples.t for samples in rows.runs]), walk.t, atol=1e-12)

@@ -63,7 +63,7 @@ def test_a_column_that_tells_no_sensors_apart(name, walk, assert_same, tmp_path)
 @pytest.mark.parametrize(
     ("name", "place"), [("Accel{}_{}", "right leg"), ("{1}_acc_{0}", "chest"), ("acc.{1}.{0}", "left")]
 )
-def test_columns_of_several_places(name, place, walk, assert_same, tmp_path):
+def test_columns_of_several_places(name, place, walk, assert_same, table):
     """Read the first IMU, whose columns another's precede, and mix no sensors of two."""
     of_place = [
         [
@@ -74,9 +74,7 @@ def test_columns_of_several_places(name, place, walk, assert_same, tmp_path):
         for at in (place.replace(" ", "_"), "hip")
     ]
     header = ["time", *of_place[0][:3], *of_place[1], *of_place[0][3:]]
-    made = np.column_stack([walk.t, walk.acc, -walk.acc, walk.gyr + 1.0, walk.gyr])
-    np.savetxt(tmp_path / "body.csv", made, delimiter=",", header=",".join(header), comments="")
-    found = mpucal.load(tmp_path / "body.csv")
+    found = mpucal.load(table(",".join(header), walk.t, walk.acc, -walk.acc, walk.gyr + 1.0, walk.gyr))
     assert_same(found, walk, 1e-9, 1e-9, 1e-9)
     assert f"of its columns, those called {place} were read" in found.taken
 

@@ -563,62 +563,57 @@ def test_counts_of_an_analog_accelerometer_have_an_offset(read, walk):
         read("ms,ax,ay,az\n", "ms a", of=whole)
 
 
-def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, tmp_path):
+def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, table):
     """Fit a sphere to neither: any few points lie on one."""
     noise = np.random.default_rng(1).uniform(-0.1, 0.1, size=(len(walk), 3))
     faces = np.repeat(G * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]]), 100, axis=0)
     for name, acc in (("rest", noise + np.array([0, 0, G])), ("faces", faces + noise[: len(faces)])):
-        made = np.column_stack([np.arange(len(acc)) / 100 + 0.005, acc])
-        np.savetxt(tmp_path / f"{name}.csv", made, delimiter=",", header="t,ax,ay,az", comments="")
-        np.testing.assert_allclose(mpucal.load(tmp_path / f"{name}.csv").acc, acc)
+        made = table("t,ax,ay,az", np.arange(len(acc)) / 100 + 0.005, acc, file=f"{name}.csv")
+        np.testing.assert_allclose(mpucal.load(made).acc, acc)
 
 
 @pytest.mark.parametrize("centre", [[1.65, 1.65, 1.65], [0.0, 1.2, 0.6]])
-def test_a_shifted_zero_is_reported_at_any_place(centre, walk, tmp_path):
+def test_a_shifted_zero_is_reported_at_any_place(centre, walk, table):
     """Say it of volts, and of a zero that is only 1.3 g away."""
     acc = walk.acc / G * (0.3 if centre[0] else 1.0) + np.array(centre)
-    made = np.column_stack([walk.t, acc, walk.gyr])
     for header in ("time,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z", "t,ax,ay,az,gx,gy,gz"):
-        np.savetxt(tmp_path / "zero.csv", made, delimiter=",", header=header, comments="")
+        path = table(header, walk.t, acc, walk.gyr)
         with pytest.raises(RecordingError, match="in place of zero"):
-            mpucal.load(tmp_path / "zero.csv")
-        assert len(mpucal.load(tmp_path / "zero.csv", units="acc=g")) == len(walk)
+            mpucal.load(path)
+        assert len(mpucal.load(path, units="acc=g")) == len(walk)
 
 
-def test_lengths_that_vary_about_any_point_have_no_offset(tmp_path):
+def test_lengths_that_vary_about_any_point_have_no_offset(table):
     """Say no zero elsewhere of an aeroplane that pulls up and rolls, wherever the centre of its sphere is."""
     k = np.arange(6000)
     slow, faster, pull = np.sin(k / 300), np.sin(k / 170), 1.0 + 0.35 * np.abs(np.sin(k / 250))
     shaken = np.random.default_rng(3).normal(0.0, 0.4, (6000, 3))
     acc = G * np.column_stack([0.25 * slow, 0.15 * faster, -pull]) + shaken
-    made = np.column_stack([k / 100 + 0.005, acc])
-    np.savetxt(tmp_path / "a.csv", made, delimiter=",", header="t,acc_x,acc_y,acc_z", comments="")
-    np.testing.assert_allclose(mpucal.load(tmp_path / "a.csv").acc, acc)
+    np.testing.assert_allclose(mpucal.load(table("t,acc_x,acc_y,acc_z", k / 100 + 0.005, acc)).acc, acc)
 
 
-def test_the_numbers_of_frames_are_no_rates(tmp_path):
+def test_the_numbers_of_frames_are_no_rates(table):
     """Refuse positions of a robot beside the numbers of the frames, as a camera tracks it, though they turn alike."""
     n = 1000
     angle = 5e-5 * np.arange(n) ** 2
     places = np.column_stack([0.3 * np.sin(angle / 9), np.sin(angle), np.cos(angle)]) * G
-    made = np.column_stack([np.arange(n) * 3, np.sin(angle), np.cos(angle), places])
-    np.savetxt(tmp_path / "robot.csv", made, delimiter=",", header="frame,u,v,x1,y1,z1", comments="")
+    path = table("frame,u,v,x1,y1,z1", np.arange(n) * 3, np.sin(angle), np.cos(angle), places)
     with pytest.raises(RecordingError, match="holds no three columns as long as gravity"):
-        mpucal.load(tmp_path / "robot.csv")
+        mpucal.load(path)
 
 
-def test_shocks_near_some_sphere_have_no_offset(tmp_path):
+def test_shocks_near_some_sphere_have_no_offset(table):
     """Refuse what scatters too much, without a zero that none has."""
     directions = np.random.default_rng(4).normal(size=(1000, 3))
     acc = 35.0 * directions / np.linalg.norm(directions, axis=1)[:, None] + np.array([26, 7, 32])
-    np.savetxt(tmp_path / "a.csv", np.column_stack([np.arange(1000) / 100, acc]), delimiter=",", header="t,ax,ay,az")
+    path = table("# t,ax,ay,az", np.arange(1000) / 100, acc)
     with pytest.raises(RecordingError) as raised:
-        mpucal.load(tmp_path / "a.csv")
+        mpucal.load(path)
     assert "in place of zero" not in str(raised.value)
 
 
 @pytest.mark.parametrize("order", [[0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5], [0, 1, 2, 3, 4, 5] * 2])
-def test_two_sensors_under_one_name(order, walk, assert_same, tmp_path):
+def test_two_sensors_under_one_name(order, walk, assert_same, table):
     """Read the first of both, as of pandas' columns of two levels."""
     one, other = (np.column_stack([of * walk.acc, walk.gyr]) for of in (1.0, -1.0))
     names = [AXES.strip().split(",")[at] for at in order]
@@ -626,38 +621,29 @@ def test_two_sensors_under_one_name(order, walk, assert_same, tmp_path):
     columns = [(one if is_first else other)[:, at] for is_first, at in zip(first, order, strict=True)]
     sides = ["left" if is_first else "right" for is_first in first]
     header = f"sensor,{','.join(sides)}\naxis,{','.join(names)}"
-    made = np.column_stack([walk.t, *columns])
-    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header=header, comments="", fmt="%.17g")
-    assert_same(mpucal.load(tmp_path / "walk.csv"), walk)
+    assert_same(mpucal.load(table(header, walk.t, *columns)), walk)
 
 
-def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, tmp_path):
-    made = np.column_stack([walk.t, walk.gyr, 0.6 / G * walk.acc])
-    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header="time,pA,pB,pC,MagX,MagY,MagZ", comments="")
+def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, table):
+    path = table("time,pA,pB,pC,MagX,MagY,MagZ", walk.t, walk.gyr, 0.6 / G * walk.acc)
     with pytest.raises(RecordingError):
-        mpucal.load(tmp_path / "walk.csv")
+        mpucal.load(path)
 
 
-def test_accelerometer_and_gyroscope_are_of_one_sensor_where_names_repeat(walk, assert_same, tmp_path):
+def test_accelerometer_and_gyroscope_are_of_one_sensor_where_names_repeat(walk, assert_same, table):
     """Read the gyroscope of the accelerometer that shows gravity, and mix no axes where a name is there twice."""
     names = AXES.strip().split(",")
     header = f"sensor,{','.join(['left'] * 6 + ['right'] * 6)}\naxis,{','.join(names * 2)}"
-    other = np.column_stack([0.01 * walk.acc, -walk.gyr])
-    made = np.column_stack([walk.t, other, walk.acc, walk.gyr])
-    np.savetxt(tmp_path / "two.csv", made, delimiter=",", header=header, comments="", fmt="%.17g")
-    assert_same(mpucal.load(tmp_path / "two.csv"), walk)
-    made = np.column_stack([walk.t, -walk.acc[:, 0], walk.acc, walk.gyr])
+    assert_same(mpucal.load(table(header, walk.t, 0.01 * walk.acc, -walk.gyr, walk.acc, walk.gyr)), walk)
     header = f"sensor,{','.join(['left'] + ['right'] * 6)}\naxis,{','.join([names[0], *names])}"
-    np.savetxt(tmp_path / "mixed.csv", made, delimiter=",", header=header, comments="", fmt="%.17g")
     with contextlib.suppress(RecordingError):
-        np.testing.assert_allclose(mpucal.load(tmp_path / "mixed.csv").acc, walk.acc)
+        mixed = mpucal.load(table(header, walk.t, -walk.acc[:, 0], walk.acc, walk.gyr))
+        np.testing.assert_allclose(mixed.acc, walk.acc)
 
 
 @pytest.mark.parametrize("name", ["framestamp", "sample_at"])
-def test_fractional_times_under_the_name_of_a_counter_are_times(name, walk, assert_same, tmp_path):
-    made = np.column_stack([walk.t, walk.acc, walk.gyr])
-    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header=f"{name},{AXES.strip()}", comments="", fmt="%.17g")
-    assert_same(mpucal.load(tmp_path / "walk.csv"), walk)
+def test_fractional_times_under_the_name_of_a_counter_are_times(name, walk, assert_same, table):
+    assert_same(mpucal.load(table(f"{name},{AXES.strip()}", walk.t, walk.acc, walk.gyr)), walk)
 
 
 @pytest.mark.parametrize("above", range(0, 130, 13))
@@ -669,10 +655,9 @@ def test_a_line_that_the_beginning_cuts_does_not_show_the_separator(above, walk,
     assert "times in s" in mpucal.load(tmp_path / "walk.txt").taken
 
 
-def test_numbers_of_packets_are_no_times(walk, tmp_path):
-    made = np.column_stack([2 * np.arange(len(walk)), walk.acc, walk.gyr])
-    np.savetxt(tmp_path / "walk.csv", made, delimiter=",", header=f"Packet number,{AXES.strip()}", comments="")
-    found = mpucal.load(tmp_path / "walk.csv", units="gyr=rad/s")
+def test_numbers_of_packets_are_no_times(walk, table):
+    path = table(f"Packet number,{AXES.strip()}", 2 * np.arange(len(walk)), walk.acc, walk.gyr)
+    found = mpucal.load(path, units="gyr=rad/s")
     assert "this sample rate is that at which its rates turn gravity" in found.taken
 
 
@@ -692,11 +677,10 @@ def test_counts_beside_an_index_have_no_rate(read, walk):
     assert "this sample rate is assumed" in found.taken
 
 
-def test_counts_at_the_end_of_the_range_are_clipped(walk, tmp_path):
+def test_counts_at_the_end_of_the_range_are_clipped(walk, table):
     made = counts(walk)
     made[7, 1], made[9, 5] = 32767, -32768
-    np.savetxt(tmp_path / "walk.csv", made, "%d", ",", header=AXES.strip(), comments="")
-    found = mpucal.load(tmp_path / "walk.csv", rate=100, accel_range=4, gyro_range=500)
+    found = mpucal.load(table(AXES.strip(), made), rate=100, accel_range=4, gyro_range=500)
     assert np.flatnonzero(found.acc_clipped).tolist() == [7]
     assert np.flatnonzero(found.gyr_clipped).tolist() == [9]
 
@@ -816,16 +800,14 @@ def shaken(shaking_mps2):
 
 
 @pytest.mark.parametrize(("unit", "si"), [("rad/s", 1.0), ("deg/s", np.radians(1)), (None, 0.3)])
-def test_the_unit_of_rates_that_turn_nothing_is_one_of_a_gyroscope(unit, si, tmp_path):
+def test_the_unit_of_rates_that_turn_nothing_is_one_of_a_gyroscope(unit, si, table):
     acc, rates = shaken(0.5)
     rates = rates if unit else np.random.default_rng(3).normal(0, 0.3, rates.shape) * si
-    rows = np.column_stack([np.arange(900) / 100, acc, rates / si])
-    head = "time,accX,accY,accZ,gyroX,gyroY,gyroZ"
-    np.savetxt(tmp_path / "shaken.csv", rows, delimiter=",", header=head, comments="")
-    found = mpucal.load(tmp_path / "shaken.csv")
+    path = table("time,accX,accY,accZ,gyroX,gyroY,gyroZ", np.arange(900) / 100, acc, rates / si)
+    found = mpucal.load(path)
     if unit is None:
         assert "rates left out, because nothing shows their unit (--units gyr=UNIT)" in found.taken
-        assert np.isfinite(mpucal.load(tmp_path / "shaken.csv", units="gyr=deg/s").gyr).all()
+        assert np.isfinite(mpucal.load(path, units="gyr=deg/s").gyr).all()
         return
     assert f"rates in {unit} (by their noise and bias, as gravity hardly turns)" in found.taken
     np.testing.assert_allclose(found.gyr, rates)
@@ -866,16 +848,18 @@ def test_a_board_that_never_turned_has_an_accelerometer_all_the_same(tmp_path):
     assert np.isnan(found.gyr).all()
 
 
-def test_a_sample_beyond_all_sensors_is_left_out(walk, tmp_path):
+def test_a_sample_beyond_all_sensors_is_left_out(walk, table):
     """Leave out one whose bits a bus mixed up; refuse a file in which many are so."""
-    made = np.column_stack([walk.t, walk.acc, walk.gyr])
-    for spoiled, name in ((slice(7, 8), "one.csv"), (slice(0, 100), "many.csv")):
-        rows = made.copy()
-        rows[spoiled, 5] = -1e26
-        np.savetxt(tmp_path / name, rows, delimiter=",", header=f"time,{AXES.strip()}", comments="")
-    np.testing.assert_allclose(mpucal.load(tmp_path / "one.csv").acc, np.delete(walk.acc, 7, axis=0))
+
+    def spoilt(numbers):
+        gyr = walk.gyr.copy()
+        gyr[numbers, 1] = -1e26
+        return table(f"time,{AXES.strip()}", walk.t, walk.acc, gyr)
+
+    np.testing.assert_allclose(mpucal.load(spoilt(7)).acc, np.delete(walk.acc, 7, axis=0))
+    many = spoilt(range(100))
     with pytest.raises(RecordingError, match="the rates of sample 0 are not a sensor's"):
-        mpucal.load(tmp_path / "many.csv")
+        mpucal.load(many)
 
 
 def test_lines_that_repeat_a_sample_are_left_out(read, walk, walk_ns, assert_same, tmp_path):
@@ -895,12 +879,10 @@ def test_lines_that_repeat_a_sample_are_left_out(read, walk, walk_ns, assert_sam
     assert f"{-(-len(walk) // 7)} repeated samples were left out" in found.taken
 
 
-def test_rates_that_stay_the_same_within_a_burst_repeat_no_sample(walk, tmp_path):
+def test_rates_that_stay_the_same_within_a_burst_repeat_no_sample(walk, table):
     """Keep rates beside the accelerations of their line, where the lines of a burst have one time and rates of 0."""
     gyr = np.where(np.abs(walk.gyr) < 0.5, 0.0, walk.gyr)
-    made = np.column_stack([walk.t // 0.08 * 0.08, walk.acc, gyr])
-    np.savetxt(tmp_path / "burst.csv", made, delimiter=",", header=f"time,{AXES.strip()}", comments="")
-    found = mpucal.load(tmp_path / "burst.csv")
+    found = mpucal.load(table(f"time,{AXES.strip()}", walk.t // 0.08 * 0.08, walk.acc, gyr))
     assert "interpolated" not in found.taken
     np.testing.assert_allclose(found.gyr, gyr)
 
@@ -983,41 +965,37 @@ def test_fractions_of_a_second_are_no_milliseconds(read, walk):
     assert "0.4 s apart (2.5 Hz), too far to follow a turn" in reason["message"]
 
 
-def test_times_of_day_show_their_unit_at_any_rate(walk, walk_ns, tmp_path):
+def test_times_of_day_show_their_unit_at_any_rate(walk, walk_ns, table):
     """Read ms since 1970 that lie 0.3 s apart, which would be 3 kHz in us."""
     ms = (walk_ns[0] // 10**6) + 300 * np.arange(len(walk))
-    made = np.column_stack([ms, walk.acc, walk.gyr / 30])
-    np.savetxt(tmp_path / "slow.csv", made, delimiter=",", header=f"time,{AXES.strip()}", comments="")
-    found = mpucal.load(tmp_path / "slow.csv")
+    found = mpucal.load(table(f"time,{AXES.strip()}", ms, walk.acc, walk.gyr / 30))
     np.testing.assert_allclose(found.t, 0.3 * np.arange(len(walk)))
     assert found.utc_ns == ms[0] * 10**6
 
 
-def test_a_temperature_is_kept_everywhere(walk, tmp_path):
+def test_a_temperature_is_kept_everywhere(walk, table, tmp_path):
     warm = np.linspace(30.0, 32.0, len(walk))
     np.savez(tmp_path / "a.npz", t=walk.t, acc=walk.acc, gyr=walk.gyr, temperature=warm)
-    rows = np.column_stack([walk.t, walk.acc, walk.gyr, warm])
-    for name, last in (("own", "temperature_c"), ("other", "Temp (°C)"), ("counts", "temp")):
-        rows[:, 7] = 4000 if name == "counts" else warm
-        head = f"{'time' if name == 'counts' else 't'},{AXES.strip()},{last}"
-        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header=head, comments="", encoding="utf-8")
+    for name, first, last in (("own", "t", "temperature_c"), ("other", "t", "Temp (°C)"), ("counts", "time", "temp")):
+        column = warm if first == "t" else np.full(len(walk), 4000)
+        table(f"{first},{AXES.strip()},{last}", walk.t, walk.acc, walk.gyr, column, file=f"{name}.csv")
     for name in ("a.npz", "own.csv", "other.csv"):
         assert mpucal.load(tmp_path / name).sensor.temperature_c == pytest.approx(31.0)
     assert mpucal.calibrate(tmp_path / "own.csv").sensor.temperature_c == pytest.approx(31.0)
     assert mpucal.load(tmp_path / "counts.csv").sensor.temperature_c is None
 
 
-def test_recordings_without_rates_serve_all_that_needs_no_rate(stored_calibration, tmp_path):
+def test_recordings_without_rates_serve_all_that_needs_no_rate(stored_calibration, table):
     """Calibrate statically, report and check a table of counts without a rate, of which `noise` asks for one."""
     from mpucal.report import render
 
     whole, calibration = stored_calibration
-    np.savetxt(tmp_path / "walk.csv", counts(whole), "%d", ",", header=AXES.strip(), comments="")
-    found = mpucal.load(tmp_path / "walk.csv")
+    path = table(AXES.strip(), counts(whole))
+    found = mpucal.load(path)
     assert np.isnan(found.gyr).all()
     static = mpucal.calibrate(found)
     assert (static.verdict, static.fit["model"]) == ("usable", "static")
     assert 'id="accelerometer"' in render(static, found)
     assert mpucal.check(calibration, found).verdict == "still good"
     with pytest.raises(RecordingError, match=r"was read without rates: .*--rate HZ"):
-        mpucal.noise(tmp_path / "walk.csv")
+        mpucal.noise(path)

@@ -13,6 +13,7 @@ from mpucal.errors import RecordingError
 
 G = 9.80665
 NAMES = [f"{of}_{axis}" for of in ("acc", "gyr") for axis in "xyz"]
+HEADER = f"ms,{','.join(NAMES)}"
 TWO_PERCENT = 0.02
 
 
@@ -35,12 +36,9 @@ def same(found, walk, rtol=1e-6, gyr_atol=1e-6):
         ("mm_s2", 0.001, "rad_s", 1.0),
     ],
 )
-def test_named_units(acc, mps2, gyr, rad_s, walk, ms, tmp_path):
+def test_named_units(acc, mps2, gyr, rad_s, walk, ms, table):
     names = [f"a{axis}_{acc}" for axis in "xyz"] + [f"g{axis}_{gyr}" for axis in "xyz"]
-    made = pd.DataFrame(np.column_stack([walk.acc / mps2, walk.gyr / rad_s]), columns=names)
-    made.insert(0, "ms", ms)
-    made.to_csv(tmp_path / "a.csv", index=False)
-    same(mpucal.load(tmp_path / "a.csv"), walk)
+    same(mpucal.load(table(f"ms,{','.join(names)}", ms, walk.acc / mps2, walk.gyr / rad_s)), walk)
 
 
 @pytest.mark.parametrize(
@@ -51,12 +49,9 @@ def test_named_units(acc, mps2, gyr, rad_s, walk, ms, tmp_path):
         (G / 1000, math.radians(0.1), r"accelerations in (mg|cm/s\^2) and rates in deg/s/10.* or else --units acc="),
     ],
 )
-def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, tmp_path):
+def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, table):
     """Tell them from counts, and name the units that |a| cannot tell from these."""
-    made = pd.DataFrame(np.rint(np.column_stack([walk.acc / mps2, walk.gyr / rad_s])).astype(int), columns=NAMES)
-    made.insert(0, "ms", ms)
-    made.to_csv(tmp_path / "a.csv", index=False)
-    found = mpucal.load(tmp_path / "a.csv")
+    found = mpucal.load(table(HEADER, ms, np.rint(walk.acc / mps2), np.rint(walk.gyr / rad_s)))
     assert re.search(says, found.taken), found.taken
     same(found, walk, TWO_PERCENT, rad_s)
 
@@ -69,35 +64,26 @@ def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, tmp_path):
         (1024, "accelerations in counts of ±32 g (by |a|; if these are in mg, give --units acc=mg)"),
     ],
 )
-def test_whole_numbers_near_1000_for_1_g(per_g, says, walk, ms, tmp_path):
+def test_whole_numbers_near_1000_for_1_g(per_g, says, walk, ms, table):
     """Read them in the nearest unit, and name the other."""
     of_g = walk.acc / np.median(np.linalg.norm(walk.acc, axis=1))
-    made = pd.DataFrame(np.rint(per_g * of_g).astype(int), columns=NAMES[:3])
-    made.insert(0, "ms", ms)
-    made.to_csv(tmp_path / "a.csv", index=False)
-    found = mpucal.load(tmp_path / "a.csv")
+    path = table("ms,acc_x,acc_y,acc_z", ms, np.rint(per_g * of_g))
+    found = mpucal.load(path)
     assert says in found.taken
     np.testing.assert_allclose(found.acc, G * of_g, atol=0.01)
-    np.testing.assert_allclose(mpucal.load(tmp_path / "a.csv", units="acc=mg").acc, G / 1000 * made[NAMES[:3]])
+    np.testing.assert_allclose(mpucal.load(path, units="acc=mg").acc, G / 1000 * np.rint(per_g * of_g))
 
 
 @pytest.mark.parametrize("per_g", [980, 1000, 1024])
-def test_whole_mg_beside_mdeg(per_g, walk, ms, tmp_path):
+def test_whole_mg_beside_mdeg(per_g, walk, ms, table):
     """Take these for the units of a driver, and a gain of 2 % for the sensor's."""
     of_g = walk.acc / np.median(np.linalg.norm(walk.acc, axis=1))
-    whole = np.rint(np.column_stack([per_g * of_g, 1e3 * np.rad2deg(walk.gyr)])).astype(int)
-    made = pd.DataFrame(whole, columns=NAMES)
-    made.insert(0, "ms", ms)
-    made.to_csv(tmp_path / "a.csv", index=False)
-    assert "accelerations in mg and rates in mdeg/s" in mpucal.load(tmp_path / "a.csv").taken
+    path = table(HEADER, ms, np.rint(per_g * of_g), np.rint(1e3 * np.rad2deg(walk.gyr)))
+    assert "accelerations in mg and rates in mdeg/s" in mpucal.load(path).taken
 
 
-def test_counts_stay_counts(walk, ms, tmp_path):
-    counts = np.column_stack([walk.acc * 8192 / G, np.rad2deg(walk.gyr) * 65.536])
-    made = pd.DataFrame(np.rint(counts).astype(int), columns=NAMES)
-    made.insert(0, "ms", ms)
-    made.to_csv(tmp_path / "a.csv", index=False)
-    found = mpucal.load(tmp_path / "a.csv")
+def test_counts_stay_counts(walk, ms, table):
+    found = mpucal.load(table(HEADER, ms, np.rint(walk.acc * 8192 / G), np.rint(np.rad2deg(walk.gyr) * 65.536)))
     assert "counts of ±4 g" in found.taken
     same(found, walk, 1e-3, 1e-3)
 
@@ -163,12 +149,11 @@ def test_two_lines_of_names_and_that_of_the_index(walk, tmp_path):
     same(mpucal.load(tmp_path / "a.csv"), walk)
 
 
-def test_lines_below_the_names_that_hold_no_numbers(walk, ms, tmp_path):
+def test_lines_below_the_names_that_hold_no_numbers(walk, ms, table):
     """Read what Shimmer's program says of each column, and then its unit."""
     heads = [["Timestamp", *NAMES], ["CAL"] * 7, ["ms", *["m/(s^2)"] * 3, *["deg/s"] * 3]]
-    rows = np.column_stack([ms, walk.acc, np.rad2deg(walk.gyr)]).tolist()
-    (tmp_path / "a.csv").write_text("\n".join(",".join(map(str, row)) for row in [*heads, *rows]) + "\n")
-    same(mpucal.load(tmp_path / "a.csv"), walk)
+    head = "\n".join(",".join(row) for row in heads)
+    same(mpucal.load(table(head, ms, walk.acc, np.rad2deg(walk.gyr))), walk)
 
 
 def test_lines_of_a_value_called_by_its_path(walk, tmp_path):
