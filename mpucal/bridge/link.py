@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from itertools import cycle
 
-from ..clocks.bridge_clock import BridgeClock
+from ..clocks.device_clocks import BridgeClock
 from ..errors import BusError, LinkError
 from .frame import DELIMITER, Deframer, Frame
 from .messages import (

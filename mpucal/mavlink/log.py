@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..clocks.vehicle_clock import Jump
+from ..clocks.device_clocks import Jump
 from ..data import Recording
 from ..errors import RecordingError
 from ..rests.flat import find_flat

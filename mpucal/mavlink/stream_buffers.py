@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..clocks.vehicle_clock import VehicleClock
+from ..clocks.device_clocks import VehicleClock
 from ..data import Autopilot, Recording, Samples, Sensor, Vector
 from .firmwares import accel_lag_s, preferred_messages
 from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream

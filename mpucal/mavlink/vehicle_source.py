@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ..clocks.vehicle_clock import Jump
+from ..clocks.device_clocks import Jump
 from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError, WriteBackError
 from .dialect import Message

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..clocks.device_clocks import Jump
 from ..clocks.host_clock import HostClock
-from ..clocks.vehicle_clock import Jump
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..doctor.finding import Finding, Mark
 from ..doctor.measure import examine_clock, examine_gravity

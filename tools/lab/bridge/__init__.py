@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from mpucal.bridge import board
 from mpucal.bridge.messages import Feature, Status
 from mpucal.chip.access import Bus
-from mpucal.clocks.bridge_clock import US, WRAP_US
+from mpucal.clocks.device_clocks import US, WRAP
 from mpucal.errors import BusError, NoAnswer
 from mpucal.result.blob import MAGIC
 
@@ -93,7 +93,7 @@ class EmulatedBridge(board.Bridge):
 
     def clock(self) -> int:
         """Return the time, us."""
-        return self._now_ns() // US % WRAP_US
+        return self._now_ns() // US % WRAP
 
     def blob_begin(self, length: int) -> Any:
         """Prepare for a blob unless the memory holds other data."""
