@@ -25,9 +25,10 @@ from .mcap import CALIBRATED, IMU, ROS1, profile
 from .reading import first_bytes, import_extra
 from .rows import Rows
 from .tables.cells import since_first
+from .tables.shown_units import acceleration_unit
 from .tables.streams import join_streams
 from .tables.times import Stream
-from .tables.units import COUNTS, NS, acceleration_unit
+from .tables.units import COUNTS, NS
 
 IMU_OF_ROS1 = "sensor_msgs/Imu"
 REMEDY = "give a bag with sensor_msgs/Imu"

@@ -12,7 +12,8 @@ from ..arguments import is_plausible
 from ..clocks.stamps import FEWEST, Clock, are_gaps
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector, clock_of
 from ..errors import RecordingError
-from .tables.units import QUANTITIES, acceleration_unit, gyro_unit, rate_factor
+from .tables.shown_units import acceleration_unit, gyro_unit, rate_factor
+from .tables.units import QUANTITIES
 
 # 16 Ki samples take 1 MB, which fits a cache; for larger products BLAS starts threads, which takes longer
 ROWS = 1 << 14

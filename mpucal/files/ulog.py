@@ -24,9 +24,9 @@ from .hints import NO_HINTS, Hints
 from .npz import DAMAGED
 from .reading import import_extra, reading
 from .tables.cells import since_first
+from .tables.shown_units import SLOWEST_HZ
 from .tables.streams import join_streams
 from .tables.times import Stream
-from .tables.units import SLOWEST_HZ
 
 COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
 # size and type of a message; bytes that are checked for zeros

@@ -25,8 +25,8 @@ from .names import (
     first_triple,
     parse_column_name,
 )
+from .shown_units import BEYOND
 from .table import Table
-from .units import BEYOND
 
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
 _GIVE_VALUES = "export the accelerometer's own values and the rates of the gyroscope"

@@ -7,7 +7,6 @@ units. Nothing is guessed that physics does not confirm.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
@@ -15,15 +14,13 @@ import numpy as np
 from ...clocks.stamps import FEWEST, sample_period
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..hints import ROLES, Hints
-from .units import (
+from .shown_units import (
     ANY_HZ,
     EXPLAINED,
     FASTEST_HZ,
-    FEWEST_PER_G,
-    MOST_PER_G,
-    QUANTITIES,
     acceleration_unit,
     are_counts,
+    counts_per_g,
     gyro_unit,
     mean_acceleration_unit,
     time_unit,
@@ -31,6 +28,7 @@ from .units import (
     turning,
     typical_size,
 )
+from .units import QUANTITIES
 
 # place -> (n,)
 Columns = Mapping[int, Vector]
@@ -110,7 +108,7 @@ def _is_one_g(acc: Vector) -> bool:
     size, scatter = typical_size(acc)
     units = [QUANTITIES["acc"]["m/s^2"] / STANDARD_GRAVITY_MPS2, 1.0]
     if size > 0.0 and are_counts(acc):
-        units = [2.0 ** -min(max(round(math.log2(size)), FEWEST_PER_G), MOST_PER_G)]
+        units = [1.0 / counts_per_g(size)]
     return 0.0 < scatter < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
 
 

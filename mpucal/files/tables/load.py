@@ -36,11 +36,12 @@ from .names import (
     with_sensor,
 )
 from .several import NAMES_SENSORS, of_one_place, of_one_sensor
+from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts
 from .streams import index_with_gravity, join_streams
 from .table import Table
 from .text import HEAD, PREAMBLE, decode_text, find_bare_table, find_named_table, find_wanted_table, stated_rate_hz
 from .times import Stream
-from .units import OF_BNO055, QUANTITIES, acceleration_unit, likely_rate_hz, offset, seem_counts
+from .units import OF_BNO055, QUANTITIES
 
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"t": "0.1ms", "acc": "m/s^2", "gyr": "rad/s"}}

@@ -34,11 +34,12 @@ from .array_table import table_of_arrays
 from .columns import columns_by_hint
 from .load import FLIPPED, find_any_table, sensor_stream
 from .names import ACC, GYR, TIME, first_triple, parse_header, with_sensor
+from .shown_units import acceleration_unit, seem_counts
 from .streams import join_streams
 from .table import Table
 from .text import decode_text, find_named_table
 from .times import Stream
-from .units import NS, acceleration_unit, seem_counts
+from .units import NS
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"

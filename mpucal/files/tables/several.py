@@ -18,8 +18,8 @@ from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind
 from .names import ACC, GYR, Column, first_triple, parse_column_name, parse_header
+from .shown_units import BEYOND
 from .table import Table
-from .units import BEYOND
 
 # names of such a column, whose words may come one after the other
 NAMES_SENSORS = re.compile(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
@@ -14,14 +15,16 @@ from numpy.typing import NDArray
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
-from .cells import DAY_NS, Cells, Kind, kind_of, parse_cell, since_first, since_midnight, with_point
+from .cells import DAY_NS, Cells, Kind, is_number, kind_of, parse_cell, since_first, since_midnight, with_point
 from .names import NANOSECONDS, TIME, Column, parse_header
-from .units import NS, QUANTITIES
+from .units import NS, QUANTITIES, find_unit
 
 # the share of lines that may be damaged
 MOST_BAD = 0.01
 # units of a column beside whole seconds
 BELOW_A_SECOND = ("ms", "us", "ns")
+# a number and its unit in one cell
+_WITH_UNIT = re.compile(r"[-+.\d][-+.,\deE]*( ?[^-+.,\d\s][^\d]{0,9}\d?)").fullmatch
 
 
 @dataclass(frozen=True)
@@ -178,3 +181,18 @@ class Table:
             f"{self.name}: line {self.lines[i]}: {name} is {self.cells[column.place][i]!r}, which is not a number",
             "correct that line or leave it out",
         )
+
+
+def holds_number(cell: str) -> bool:
+    """Return True for a number, also with a unit behind it."""
+    return is_number(cell) or _WITH_UNIT(cell.strip()) is not None
+
+
+def with_units_of_cells(table: Table) -> Table:
+    """Return a table with the units of its cells in their columns' names."""
+    header, columns = [*table.header], [*table.cells]
+    for place, cells in enumerate(columns):
+        if (found := _WITH_UNIT(cells[0])) and find_unit(found[1]):
+            header[place] += f" ({found[1].strip()})"
+            columns[place] = [cell.removesuffix(found[1]) for cell in cells]
+    return replace(table, header=header, cells=columns)

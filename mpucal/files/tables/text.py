@@ -6,7 +6,6 @@ import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
@@ -17,7 +16,7 @@ from ...errors import RecordingError
 from ..reading import check_size, is_text
 from .cells import CLOCK, MOMENT, NUMBER, is_number
 from .names import ACC, GYR, axes_of, parse_axis_name, parse_header
-from .table import Table
+from .table import Table, holds_number, with_units_of_cells
 from .units import find_unit
 
 # separator -> its name for messages; None: any blanks
@@ -47,8 +46,6 @@ MONITORED = re.compile(
 _MARKS = re.compile(r"\x1b\[[0-9;]{0,9}m|\*[0-9A-F]{2}(?=\r?$)", re.MULTILINE)
 # of Fortran's double precision
 _EXPONENT = re.compile(r"(?<=\d)D(?=[-+]\d\d)")
-# a number and its unit in one cell
-_WITH_UNIT = re.compile(r"[-+.\d][-+.,\deE]*( ?[^-+.,\d\s][^\d]{0,9}\d?)").fullmatch
 _NUMBER_OR_MOMENT = re.compile(rf"(?<![\w.])(?:{MOMENT}|{NUMBER})(?!\w)")
 
 # above a table without times, as `Fs,100`, `Sample rate: 52 Hz` or `# Config: data_rate = 2000.0 Hz, filter = ...`
@@ -238,7 +235,7 @@ def read_table(text: str, name: str, header: Cells, first: int, separator: str |
     if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]):
         # the logger was switched off
         rows[-1] = []
-    while header and rows and not any(map(_holds_number, rows[0])) and lines[0] <= first + MORE_HEADS:
+    while header and rows and not any(map(holds_number, rows[0])) and lines[0] <= first + MORE_HEADS:
         # units, the name of pandas' index, or what a program says of each column
         more = [cell.strip(" ()[]") for cell in rows[0]]
         has_units, pairs = any(map(find_unit, more)), zip_longest(header, more, fillvalue="")
@@ -246,19 +243,4 @@ def read_table(text: str, name: str, header: Cells, first: int, separator: str |
         rows, lines = rows[1:], lines[1:]
     remarks = [] if separator == "," else [f"its cells are separated by {SEPARATORS[separator]}"]
     table = table_of_rows(name, header, rows, lines, *remarks)
-    return _with_units_of_cells(table) if table.header and rows else table
-
-
-def _holds_number(cell: str) -> bool:
-    """Return True for a number, also with a unit behind it."""
-    return is_number(cell) or _WITH_UNIT(cell.strip()) is not None
-
-
-def _with_units_of_cells(table: Table) -> Table:
-    """Return a table with the units of its cells in their columns' names."""
-    header, columns = [*table.header], [*table.cells]
-    for place, cells in enumerate(columns):
-        if (found := _WITH_UNIT(cells[0])) and find_unit(found[1]):
-            header[place] += f" ({found[1].strip()})"
-            columns[place] = [cell.removesuffix(found[1]) for cell in cells]
-    return replace(table, header=header, cells=columns)
+    return with_units_of_cells(table) if table.header and rows else table

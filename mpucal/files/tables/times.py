@@ -12,7 +12,7 @@ from ...clocks.stamps import FEWEST, Clock, Numbers, are_gaps, fit_clock, sample
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
-from . import units
+from . import shown_units as units
 from .units import DAYS, NS, QUANTITIES, resolve_unit
 
 # s between two files, or parts of one, without a common clock: longer than the gaps that a bus leaves

@@ -1,0 +1,212 @@
+"""The units that samples show.
+
+The step shows the unit of times, since sample rates lie between 5 Hz and 8 kHz; the median of |a|, which is gravity in
+a recording that was turned by hand, shows that of accelerations; and how fast gravity turns shows that of rates, since
+d(a)/dt = -w x a for a vector that is fixed in space.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...data import ACCEL_COUNTS, GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
+from .units import QUANTITIES
+
+# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 20 at ±0.5 g or 24 at ±8 g; and the largest count
+FEWEST_PER_G, MOST_PER_G, MOST_COUNTS = 8, 20, 2.0**23
+# the units that samples show without a name; the others are too near to these, to counts, or to a magnetic field in uT
+SHOWN = {"acc": ("m/s^2", "g", "mg"), "gyr": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h")}
+SLOWEST_HZ, FASTEST_HZ = 5.0, 8000.0
+# s: the longest step in a named unit; such a recording is too slow to calibrate, but readable
+SLOW_S = 2.0
+# m/s^2: whole numbers that are larger are counts
+LARGEST_OF_SI = 300.0
+# |a| / g: a sensor may have gains of 0.5 to 1.5
+LEAST_OF_G, MOST_OF_G = 0.45, 2.0
+# true over measured rate: the same gains
+LEAST_TURNED, MOST_TURNED = 0.6, 1.6
+# quartile distance of |a| over its median, beyond which it is not gravity
+SCATTER = 0.45
+# a rate to try on samples without times, and the rates of most loggers
+ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
+# samples over which shaking averages out: a few of its periods at the rates of most loggers
+SHAKEN = 100
+# octaves by which a sample rate may change in the second round
+SETTLED = 0.25
+# the fastest rate of a hand and of usual sensors
+FASTEST_RAD_S = 37.0
+# samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; the largest
+# bias, of the MPU-6050; and how much more than it does gravity may seem to turn by noise
+QUIET, LEAST_NOISE_RAD_S, MOST_BIAS_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), math.radians(20.0), 3.0
+# larger numbers are not from a sensor in any unit; their squares are finite
+BEYOND = 1e12
+# the least duration of a recording that shows how gravity turns, in halves of TURN_S
+LEAST_TURNS = 30
+# s over which the change of gravity is taken, and the correlation with the rates that it needs at least
+TURN_S, EXPLAINED = 0.2, 0.5
+
+
+def time_unit(step: float, said: str = "") -> str:
+    """Return the unit of times that lie `step` apart: `said` if plausible, else by the sample rate; or empty."""
+    if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= SLOW_S:
+        return said
+    units = QUANTITIES["t"].items()
+    return next((unit for unit, s in units if 1 / FASTEST_HZ <= step * s <= 1 / SLOWEST_HZ), "")
+
+
+def acceleration_unit(acc: Vector, said: str = "") -> str:
+    """Return the unit in which the median of (n, 3) accelerations is gravity; empty if none is.
+
+    The unit `said` by the file is tried first. Without gravity, |a| of a hand scatters by more than half of its median.
+    """
+    if not (np.abs(acc) < BEYOND).all():
+        return ""
+    size, scatter = typical_size(acc)
+    if scatter > SCATTER * size:
+        return ""
+    units = (*filter(None, [said]), *SHOWN["acc"])
+    of_g = {unit: size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2 for unit in units}
+    return next((unit for unit, ratio in of_g.items() if LEAST_OF_G <= ratio <= MOST_OF_G), "")
+
+
+def mean_acceleration_unit(values: Vector) -> str:
+    """Return the unit in which (n, 3) accelerations are gravity on average; empty if there is none."""
+    whole = values[np.isfinite(values).all(axis=1)]
+    return acceleration_unit(averaged(whole)) if len(whole) > 1 else ""
+
+
+def averaged(values: Vector) -> Vector:
+    """Return means of adjacent samples (n, 3): shaking averages out, and gravity does not."""
+    width = min(SHAKEN, len(values) // 2)
+    return np.column_stack([np.convolve(axis, np.full(width, 1 / width), "valid") for axis in values.T])
+
+
+def typical_size(values: Vector) -> tuple[float, float]:
+    """Return the median of the lengths of (n, 3) numbers, and the distance of their quartiles."""
+    low, size, high = np.percentile(np.linalg.norm(values, axis=1), [25, 50, 75]).tolist()
+    return size, high - low
+
+
+def offset(values: Vector) -> Vector | None:
+    """Return the centre (3,) of the sphere on which (n, 3) accelerations lie, if zero is outside; None otherwise.
+
+    Each axis has to cover more than the radius, so that the sphere is determined, and not by noise or shocks alone;
+    and the centre has to explain why the lengths vary about zero: those of a flight, or of a rest with shocks, do
+    about any point.
+    """
+    x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), (values**2).sum(axis=1), rcond=None)
+    centre, means = x[:3], averaged(values)
+    radius, scatter = typical_size(values - centre)
+    cover, without_shocks = (float(np.ptp(of, axis=0).min()) for of in (values, means))
+    left, all_of_it = (float(np.linalg.norm(of, axis=1).std()) for of in (means - centre, means))
+    known = left < SCATTER * all_of_it and scatter < SCATTER * radius < min(SCATTER * cover, without_shocks)
+    return centre if known and radius < float(np.linalg.norm(centre)) else None
+
+
+def counts_per_g(size: float) -> int:
+    """Return the counts for 1 g, of those that sensors have, that are nearest to an acceleration."""
+    return 1 << min(max(round(math.log2(max(size, 1.0))), FEWEST_PER_G), MOST_PER_G)
+
+
+def to_signed(values: Vector) -> Vector:
+    """Return (n, 3) 16-bit counts with their sign, if they were read as unsigned or count from the lowest value."""
+    if values.min() < 0 or not ACCEL_COUNTS <= values.max() < 2 * ACCEL_COUNTS or not (values == np.rint(values)).all():
+        return values
+    wrapped, shifted = np.where(values >= ACCEL_COUNTS, values - 2 * ACCEL_COUNTS, values), values - ACCEL_COUNTS
+    # the wrong reading jumps from one end of the range to the other
+    steps = [float(np.abs(np.diff(each, axis=0)).sum()) for each in (wrapped, shifted)]
+    return np.asarray(wrapped if steps[0] < steps[1] else shifted)
+
+
+def are_counts(values: Vector) -> bool:
+    """Return True if all values are whole numbers of 24 bits at most."""
+    return bool((values == np.rint(values)).all() and np.abs(values).max() <= MOST_COUNTS)
+
+
+def seem_counts(values: Vector) -> bool:
+    """Return True if (n, 3) numbers are whole, and larger than in any other unit."""
+    return len(values) > 0 and are_counts(to_signed(values)) and bool(np.abs(values).max() > LARGEST_OF_SI)
+
+
+def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
+    """Return the factor by which (n, 3) rates turn (n, 3) accelerations as these turn; None if it is not determined.
+
+    Parameters
+    ----------
+    t : (n,) s. acc : in any unit. gyr : in rad/s if the factor is 1.
+    """
+    factor, correlation = turning(t, acc, gyr)
+    return factor if correlation >= EXPLAINED else None
+
+
+def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
+    """Return the factor of rate_factor, and the correlation of both turnings, 0 if there is none.
+
+    The factor is the ratio of their sizes: the hand's own acceleration disturbs both, so that the regression of one on
+    the other would be too small.
+    """
+    # stamps of arrival may repeat
+    dt = (float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)) if len(t) >= LEAST_TURNS else 0.0
+    width = max(1, round(min(TURN_S / 2 / dt, len(t)))) if dt > 0.0 else len(t)
+    if len(t) < LEAST_TURNS * width:
+        return math.inf, 0.0
+    kernel = np.full(width, 1.0 / width)
+    smooth = np.column_stack([np.convolve(column, kernel, "same") for column in acc.T])
+    rates = np.column_stack([np.convolve(column, kernel, "same") for column in gyr.T])
+    # how it turned in a gap is unknown
+    steps = np.cross(rates, smooth) * -np.minimum(np.gradient(t), GAP_INTERVALS * dt)[:, None]
+    path = np.cumsum(steps, axis=0)
+    inner = slice(width, len(t) - width)
+    lag = 2 * width
+    seen, predicted = (values[inner][lag:] - values[inner][:-lag] for values in (smooth, path))
+    sizes, both = [math.sqrt(float((each**2).sum())) for each in (seen, predicted)], float((seen * predicted).sum())
+    if 0.0 in sizes:
+        return math.inf, 0.0
+    return math.copysign(sizes[0] / sizes[1], both), abs(both) / (sizes[0] * sizes[1])
+
+
+def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
+    """Return the sample rate at which (n, 3) rates in `unit`, or in the only likely one, turn gravity; else None."""
+    fastest = float(np.percentile(np.abs(gyr), 99))
+    shown = (si for name in SHOWN["gyr"] if fastest * (si := QUANTITIES["gyr"][name]) < FASTEST_RAD_S)
+    units = [QUANTITIES["gyr"][unit]] if unit else [*shown]
+    likely = []
+    for si in units:
+        # the second time with the right smoothing
+        hz = [ANY_HZ]
+        while len(hz) < 3 and (factor := rate_factor(np.arange(len(acc)) / hz[-1], acc, gyr)):
+            hz.append(hz[-1] * si / abs(factor))
+        if len(hz) == 3 and LIKELY_HZ[0] < hz[2] < LIKELY_HZ[1] and abs(math.log2(hz[2] / hz[1])) < SETTLED:
+            likely.append(float(f"{hz[2]:.3g}"))
+    return likely[0] if len(likely) == 1 else None
+
+
+def gyro_unit(factor: float | None, said: str = "") -> str:
+    """Return the unit of rates with this rate_factor, first the one `said` by the file; empty if there is none."""
+    units = {unit: QUANTITIES["gyr"][unit] for unit in (*filter(None, [said]), *SHOWN["gyr"])}
+    return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
+
+
+def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:
+    """Return the only usual unit in which (n, 3) rates are those of a sensor that hardly turned gravity; or empty.
+
+    In larger units its rates would turn gravity, or its bias be too large; in smaller ones it would be too quiet.
+    """
+    width = min(len(gyr), QUIET)
+    parts = gyr[: len(gyr) // width * width].reshape(-1, width, 3)
+    quiet = min(parts, key=lambda part: float(part.std(axis=0).sum()))
+    noise, bias = float(quiet.std(axis=0).max()), float(np.abs(quiet.mean(axis=0)).max())
+    fastest = float(np.percentile(np.abs(gyr), 99))
+    ratio = abs(turning(t, acc, gyr)[0])
+    likely = [
+        unit
+        for unit, si in QUANTITIES["gyr"].items()
+        if unit in ("rad/s", "deg/s")
+        and si < MOST_TURNED_MORE * ratio
+        and bias * si < MOST_BIAS_RAD_S
+        and fastest * si < FASTEST_RAD_S
+        and not 0.0 < noise * si < LEAST_NOISE_RAD_S
+    ]
+    return likely[0] if len(likely) == 1 else ""
