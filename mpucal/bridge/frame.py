@@ -9,7 +9,8 @@ import binascii
 import re
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from ..frozen import dataclass
 
 DELIMITER = b"\0"
 DELIMITERS = re.compile(rb"\0+")

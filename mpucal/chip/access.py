@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
+
+from ..frozen import dataclass
 
 
 class Reply(NamedTuple):

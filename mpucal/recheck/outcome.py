@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, Literal
 
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..frozen import dataclass
 from ..result.calibration import Calibration
 from .observed import BETA, DELTA, UPPER, E, G
 

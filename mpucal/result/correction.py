@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..data import Autopilot, Samples, Sensor
 from ..errors import UsageError
+from ..frozen import dataclass
 from ..origin import Origin
 from .calibration import Calibration
 

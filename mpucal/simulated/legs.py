@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
 from ..data import Vector
+from ..frozen import dataclass
 from . import rotation
 
 STEP_HZ = 2000

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import codecs
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TextIO
+
+from ..frozen import dataclass
 
 ROWS = 5
 WIDTH, GAP = 5, 1

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+from ..frozen import dataclass
 from ..session import events
 from ..session.attitude import rotate
 from ..session.boards import BOARD, flat_description
