@@ -158,6 +158,30 @@ def elsewhere(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def need():
+    """Return a function that skips a test where one of the programs or files that it names is missing."""
+
+    def need(*wanted: str | Path) -> None:
+        missing = [str(of) for of in wanted if not (of.exists() if isinstance(of, Path) else shutil.which(of))]
+        if missing:
+            pytest.skip(f"needs {' and '.join(missing)}; programs are of the packages in tools/ci_packages.txt")
+
+    return need
+
+
+@pytest.fixture(scope="session")
+def shared(need):
+    """Return a function that returns the paths of recordings of others, which may lie beside the project."""
+
+    def paths(*names: str) -> list[Path]:
+        found = [Path(PROJECT).parent / "shared" / name for name in names]
+        need(*found)
+        return found
+
+    return paths
+
+
+@pytest.fixture(scope="session")
 def chromium():
     """A browser, of which the headless shell is twice as fast; playwright runs once in a process."""
     names = ("chromium-headless-shell", "chromium", "google-chrome")

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -193,7 +192,7 @@ def test_a_chip(call):
     assert shown["temperature_c"] == pytest.approx(31, abs=0.1)
 
 
-def test_a_parameter_of_the_model(tmp_path):
+def test_a_parameter_of_the_model(tmp_path, need):
     """The table with the row, run as CMake does it, and its header compiled."""
     ((path, row),) = RECIPES["A parameter of the model"].items()
     source = (ROOT / path).read_text(encoding="utf-8")
@@ -206,8 +205,7 @@ def test_a_parameter_of_the_model(tmp_path):
     subprocess.run([sys.executable, "parameters.py", "parameters.hpp"], cwd=tmp_path, check=True)
     header = (tmp_path / "parameters.hpp").read_text()
     assert re.search(r"struct HandParameters : Parameters \{[^}]*double s\[3\];", header)
-    if shutil.which("g++") is None:
-        pytest.skip("needs g++")
+    need("g++")
     (tmp_path / "uses.cpp").write_text(
         '#include "parameters.hpp"\nstatic_assert(mpucal::Lanes::s == 27 && mpucal::LanesUsed::hand == 30);\n'
     )

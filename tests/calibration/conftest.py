@@ -1,7 +1,6 @@
 """Recordings of a nearly ideal sensor with a known truth, and files of others."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from mpucal.data import Recording
 from mpucal.simulated.sensor import SensorTruth, density
 from tools.lab.scenarios.recordings import paper_scenario
 
-SHARED = Path(__file__).parents[2].parent / "shared"
 G = 9.82
 
 
@@ -47,14 +45,11 @@ def pick():
 
 
 @pytest.fixture(scope="session")
-def others():
+def others(shared):
     """Return a function that loads the arrays of a file of others, by its path without the suffix."""
 
     def load(name):
-        path = SHARED / f"{name}.npz"
-        if not path.exists():
-            pytest.skip("the recordings of others are not beside this checkout")
-        with np.load(path) as file:
+        with np.load(*shared(f"{name}.npz")) as file:
             return dict(file)
 
     return load

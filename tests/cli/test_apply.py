@@ -12,8 +12,6 @@ from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.files import load
 from mpucal.result.calibration import Calibration
 
-ROOT = Path(__file__).parents[2]
-RECORDINGS = ROOT.parent / "shared" / "recordings"
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
 B_A = np.array([0.31, -0.22, 1.08])
 K = np.array([[1.01, 0.002, 0.0], [0.002, 0.98, -0.004], [0.0, -0.004, 1.0]])
@@ -33,10 +31,8 @@ def formula(recording):
     return (recording.acc - B_A) @ np.linalg.inv(D).T, (recording.gyr - B_OMEGA) @ K.T
 
 
-def test_a_real_recording_comes_out_as_the_formula_says(mpucal, calibration):
-    path = RECORDINGS / "mpu9150_a.npz"
-    if not path.exists():
-        pytest.skip("the real recordings are not beside the project")
+def test_a_real_recording_comes_out_as_the_formula_says(mpucal, calibration, shared):
+    (path,) = shared("recordings/mpu9150_a.npz")
     assert mpucal("apply", "c.json", path, "-o", "out.npz").code == 0
     recording, out = load(path), load("out.npz")
     acc, gyr = formula(recording)

@@ -151,7 +151,7 @@ class Device:
 
 
 @pytest.fixture(scope="session")
-def clock(once):
+def clock(once, need):
     """Library of harness/clock.c, built once."""
     for library in ("libumockdev.so.0", "libumockdev-preload.so.0"):
         try:
@@ -159,10 +159,8 @@ def clock(once):
             ctypes.CDLL(library) if "preload" not in library else _find(library)
         except OSError:
             pytest.skip(f"{library} is missing: install Debian's umockdev, as tools/ci_packages does")
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("there is no C compiler for the clock of harness/clock.c")
-    command = [compiler, "-O2", "-shared", "-fPIC", "-o", "clock.so", HARNESS / "clock.c", "-ldl"]
+    need("cc")
+    command = ["cc", "-O2", "-shared", "-fPIC", "-o", "clock.so", HARNESS / "clock.c", "-ldl"]
     return once("device-clock", lambda folder: subprocess.run(command, cwd=folder, check=True)) / "clock.so"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -47,13 +46,12 @@ def samples():
 
 
 @pytest.fixture(scope="session")
-def compiled():
+def compiled(need):
     """Return a function that compiles a program, and returns what runs it: text in, rows of numbers out."""
 
     def compiled(folder, name, source, *flags):
         compiler = "g++" if name.endswith(".cpp") else "gcc"
-        if shutil.which(compiler) is None:
-            pytest.skip(f"needs {compiler}")
+        need(compiler)
         (folder / name).write_text(source)
         words = [compiler, "-Wall", "-Werror", *flags, "-I.", f"-I{LIBRARY}", "-o", "program", name]
         subprocess.run(words, cwd=folder, check=True)

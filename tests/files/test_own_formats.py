@@ -3,7 +3,6 @@
 import csv
 import tracemalloc
 from dataclasses import replace
-from pathlib import Path
 
 import hypothesis.extra.numpy as hnp
 import numpy as np
@@ -186,12 +185,9 @@ def test_an_archive_of_objects_runs_no_code(tmp_path):
         load(tmp_path / "a.npz")
 
 
-def test_real_and_simulated_recordings_of_others_are_read():
-    shared = Path(__file__).parents[2].parent / "shared"
-    paths = sorted([*shared.glob("recordings/*.npz"), *shared.glob("simulated/*.npz")])
-    if not paths:
-        pytest.skip("the folder shared with recordings of others is not beside the project")
-    for path in paths:
+def test_real_and_simulated_recordings_of_others_are_read(shared):
+    recordings, simulated = shared("recordings", "simulated")
+    for path in [*recordings.glob("*.npz"), *simulated.glob("*.npz")]:
         with np.load(path) as archive:
             read = load(path)
             np.testing.assert_array_equal(read.acc, archive["acc"])

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import importlib.util
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -28,12 +27,6 @@ def _module(path: Path):
     return module
 
 
-def _need(*programs: str) -> None:
-    missing = [program for program in programs if shutil.which(program) is None]
-    if missing:
-        pytest.skip(f"needs {' and '.join(missing)}, of the packages in tools/ci_packages.txt")
-
-
 @pytest.fixture(scope="session")
 def host():
     """Module that compiles and runs the firmware's core on this machine."""
@@ -41,16 +34,16 @@ def host():
 
 
 @pytest.fixture(scope="session")
-def core(host, once):
+def core(host, once, need):
     """Library of the firmware's core, compiled for this machine."""
-    _need("gcc")
+    need("gcc")
     return host.load_core(once("firmware-core", host.compile_core))
 
 
 @pytest.fixture(scope="session")
-def make(once):
+def make(once, need):
     """Makes a target of the firmware's Makefile: (folder, output)."""
-    _need("avr-gcc", "make")
+    need("avr-gcc", "make")
 
     def run(target, *settings):
         def build(folder):
@@ -73,28 +66,23 @@ def avr_build(make):
 
 
 @pytest.fixture(scope="session")
-def sketches(make):
+def sketches(make, need):
     """Folder with the Arduino sketches, built for an Uno."""
-    if not ARDUINO.exists():
-        pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
+    need(ARDUINO)
     return make("sketches")[0]
 
 
 @pytest.fixture(scope="session")
-def stock_sketches(make):
+def stock_sketches(make, need):
     """Builds the sketches as a stock Arduino IDE does for a board; returns their folder with the compiler's output."""
-    if not ARDUINO.exists():
-        pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
-    _need("arduino-builder", "arduino-ctags")
+    need("arduino-builder", "arduino-ctags", ARDUINO)
     return lambda board: make(f"{{}}/stock/{board}")[0] / "stock" / board
 
 
 @pytest.fixture(scope="session")
-def emulator(once):
+def emulator(once, need):
     """Modules of the emulated board, its library, and the line to it."""
-    _need("gcc")
-    if not SIMAVR.exists():
-        pytest.skip("needs libsimavr-dev, of the packages in tools/ci_packages.txt")
+    need("gcc", SIMAVR)
     module = _module(HERE / "emulator" / "board.py")
     library = module.load_library(once("firmware-board", module.compile_library))
     return module, library, _module(HERE / "emulator" / "port.py")

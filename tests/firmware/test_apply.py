@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import json
 import os
-import shutil
 import struct
 import subprocess
 import zlib
@@ -228,9 +227,8 @@ STANDARDS = [("gcc", "c99"), ("g++", "c++11"), ("g++", "c++17")]
 
 
 @pytest.mark.parametrize(("compiler", "standard"), STANDARDS, ids=[standard for _, standard in STANDARDS])
-def test_compiles_without_a_warning(compiler, standard, tmp_path):
-    if shutil.which(compiler) is None:
-        pytest.skip(f"needs {compiler}")
+def test_compiles_without_a_warning(compiler, standard, tmp_path, need):
+    need(compiler)
     source = tmp_path / ("main.c" if compiler == "gcc" else "main.cpp")
     source.write_text('#include "mpucal_apply.h"\nint main(void) { return 0; }\n')
     flags = [f"-std={standard}", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -103,10 +102,8 @@ def _core(folder, name):
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in ONCE else pytest.mark.slow) for name in CORES])
-def test_the_built_sketch_holds_the_storage_of_its_core(name, tmp_path):
-    for program in ("arduino-builder", "arduino-ctags", "g++", "nm"):
-        if shutil.which(program) is None:
-            pytest.skip(f"needs {program}, of the packages in tools/ci_packages.txt")
+def test_the_built_sketch_holds_the_storage_of_its_core(name, tmp_path, need):
+    need("arduino-builder", "arduino-ctags", "g++", "nm")
     _core(tmp_path, name)
     (tmp_path / "libraries").mkdir()
     (tmp_path / "libraries" / "mpucal").symlink_to(FIRMWARE)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -68,9 +67,8 @@ def test_flash_and_ram_leave_room(avr_build):
 
 
 @pytest.mark.slow
-def test_the_readme_gives_the_cycles_that_are_counted(make):
-    if shutil.which("simavr") is None:
-        pytest.skip("needs simavr, of the packages in tools/ci_packages.txt")
+def test_the_readme_gives_the_cycles_that_are_counted(make, need):
+    need("simavr")
     said = make("cycles")[1]
     counted = re.findall(r"\d+ cycles", said)
     readme = (ROOT / "mpucal" / "firmware" / "README.md").read_text()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -27,10 +26,9 @@ OPTIMISED = [
 
 
 @pytest.mark.parametrize(("processor", "optimised"), OPTIMISED)
-def test_the_core_compiles_without_a_warning(processor, optimised, tmp_path):
+def test_the_core_compiles_without_a_warning(processor, optimised, tmp_path, need):
     compiler, *flags = PROCESSORS[processor]
-    if shutil.which(compiler) is None:
-        pytest.skip(f"needs {compiler}, of the packages in tools/ci_packages.txt")
+    need(compiler)
     sources = [str(path) for path in sorted(SOURCES.glob("*.c"))]
     words = [compiler, "-std=c99", optimised, *flags, *WARNINGS, f"-I{SOURCES}", "-c", *sources]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -51,10 +49,9 @@ SKETCHES = ("mpucal_bridge", "mpucal_corrected")
 @pytest.mark.parametrize(
     "board", [pytest.param(name, marks=[] if name == "AVR_UNO" else pytest.mark.slow) for name in BOARDS]
 )
-def test_the_sketches_compile_without_a_warning_of_theirs(board, sketch, tmp_path):
+def test_the_sketches_compile_without_a_warning_of_theirs(board, sketch, tmp_path, need):
     """Stricter than the IDE, which has no -Wconversion; the core itself does not pass with it."""
-    if shutil.which("avr-g++") is None or not CORE.exists():
-        pytest.skip("needs avr-g++ and arduino-core-avr, of the packages in tools/ci_packages.txt")
+    need("avr-g++", CORE)
     mcu, variant = BOARDS[board]
     folders = (CORE / "cores/arduino", CORE / "variants" / variant, CORE / "libraries/Wire/src")
     named = {"F_CPU": "16000000UL", "ARDUINO": "10819", "DECIMAL_DIG": "__DECIMAL_DIG__", f"ARDUINO_{board}": "1"}

@@ -15,15 +15,12 @@ from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 
-CAPTURES = Path(__file__).parents[2].parent / "shared" / "captures"
 S = 1_000_000_000
 
 
 @pytest.fixture
-def captures() -> Path:
-    if not CAPTURES.is_dir():
-        pytest.skip("the folder of real captures is not beside this checkout")
-    return CAPTURES
+def captures(shared) -> Path:
+    return shared("captures")[0]
 
 
 class Script:

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,6 @@ from mpucal.result.calibration import Calibration
 from mpucal.result.comparison import CONFIDENCE, compare, is_better, worst_magnitude_error
 from tools.lab.halves import halves
 
-ROOT = Path(__file__).parents[2]
-RECORDINGS = ROOT.parent / "shared" / "recordings"
 DRAWS = 500
 
 D_STD = np.full((3, 3), 2e-4) * [[1.0, 0.5, 2.0], [0.7, 1.5, 0.3], [1.1, 0.9, 0.4]]
@@ -114,11 +111,8 @@ def test_other_differences_are_remarked_on(change, says):
     assert re.search(says, remark)
 
 
-def test_halves_of_a_real_recording_agree_and_two_real_sensors_differ():
-    paths = [RECORDINGS / f"mpu9150_{which}.npz" for which in "ab"]
-    if not all(path.exists() for path in paths):
-        pytest.skip("the real recordings are not beside the project")
-    recording, other = map(mpucal.load, paths)
+def test_halves_of_a_real_recording_agree_and_two_real_sensors_differ(shared):
+    recording, other = map(mpucal.load, shared("recordings/mpu9150_a.npz", "recordings/mpu9150_b.npz"))
     first, second, of_other = (mpucal.calibrate(part, gravity=9.81) for part in (*halves(recording), other))
     found = compare(first, second)
     assert not found.changed

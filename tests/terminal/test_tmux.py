@@ -3,7 +3,6 @@
 import itertools
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 import time
@@ -58,9 +57,8 @@ class Tmux:
 
 
 @pytest.fixture
-def terminal(tmp_path):
-    if shutil.which("tmux") is None:
-        pytest.skip("there is no tmux here")
+def terminal(tmp_path, need):
+    need("tmux")
     opened = []
 
     def open_(columns=80, rows=24, **environment):

@@ -1,7 +1,6 @@
 """MicroPython itself, in node, on a port whose time runs only while the host waits."""
 
 import contextlib
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -22,10 +21,9 @@ RAW_PASTE, WINDOW = b"\x05A\x01", 128
 
 
 @pytest.fixture(scope="session")
-def micropython(once):
+def micropython(once, need):
     """The folder of MicroPython for node, which npm installs beneath build/; it is asked for once in a run."""
-    if shutil.which("node") is None or shutil.which("npm") is None:
-        pytest.skip("needs node and npm, to run MicroPython")
+    need("node", "npm")
     folder = ROOT / "build" / "node"
     package = folder / "node_modules" / PACKAGE
     if not (package / "micropython.wasm").is_file():

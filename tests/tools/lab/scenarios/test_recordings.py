@@ -1,7 +1,6 @@
 """The simulated hands and the paper's simulation: their physics, and what can be counted beside another simulator."""
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from tools.lab.scenarios.body import attitudes, board_from_world, lever_accelera
 from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
 from tools.lab.scenarios.sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
 
-SHARED = Path(__file__).parents[4].parent / "shared" / "simulated"
 # each is simulated once, and changed by no test
 by_hand, as_in_the_paper = cache(hand_scenario), cache(paper_scenario)
 
@@ -86,10 +84,9 @@ def test_uncalibrated_sensors_are_as_far_off_as_is_known(draw, error_mps2):
     assert np.mean(errors) == pytest.approx(error_mps2, rel=0.06)
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the other simulator's recordings are not beside this checkout")
 @pytest.mark.parametrize(("file", "motion"), [("pose6_0", "pose6"), ("rot_0", "continuous")])
-def test_noise_and_rates_agree_with_another_simulator(file, motion):
-    with np.load(SHARED / f"{file}.npz") as other:
+def test_noise_and_rates_agree_with_another_simulator(file, motion, shared):
+    with np.load(*shared(f"simulated/{file}.npz")) as other:
         omega = (other["gyr"] - other["true_b_omega"]) @ other["true_K"].T
         beyond = other["acc"] - other["true_specific_force"] @ other["true_D"].T - other["true_b_a"]
         assert float(other["gravity"]) == GRAVITY_MPS2
