@@ -13,13 +13,15 @@ from ..errors import WrongValue
 from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.intervals import RestFinder
+from .bias_changes import without_changes
 from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
 from .checks.estimate import GOOD_RMS_MPS2
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
-from .hypotheses import SURE, Explanation, explain, gyroscope_change, rank, remove_change
+from .hand import HandFit
+from .hypotheses import Explanation, explain, gyroscope_change, rank, remove_change
 from .masks import find_reset, with_masks
-from .model_selection import METHODS, ModelChoice, fit_model
+from .model_selection import METHODS, fit_model
 from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
@@ -27,7 +29,6 @@ from .words import decode
 
 MODELS = ("auto", *METHODS)
 NOTHING = {"why": "nothing could be estimated"}
-MOST_CHANGES = 3  # each is what is left of a drift after the one before
 
 
 def estimate(
@@ -137,34 +138,39 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     before = replace(before, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
-    choice, explanations, walks = _fit(recording, flat, gravity, model)
+    fitted = without_changes(_Fitted(recording, flat, gravity, model))
+    choice, plain = fitted.choice, fitted.choice.plain
     # the share of the variance that the removed changes added
-    freed = sum((walk.freed[ACCELEROMETER] for walk in walks), np.zeros(len(D_NAMES + B_A_NAMES)))
+    freed = sum((change.freed[ACCELEROMETER] for change in fitted.changes), np.zeros(len(D_NAMES + B_A_NAMES)))
     fit = choice.honest()
-    claim = claim_uncertainty(fit, gravity, explanations, freed)
+    claim = claim_uncertainty(fit, gravity, explain(plain.parts, plain.D, fitted.explanations), freed)
     fit = inflate(fit, claim).right_handed()
-    evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=walks)
+    evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=fitted.changes)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if end is not None else "")}
 
 
-def _fit(
-    recording: Recording, flat: Flat, gravity: float, model: str
-) -> tuple[ModelChoice, list[Explanation], tuple[Explanation, ...]]:
-    """Return the fit without changes of the gyroscope's bias during the turning, what explains the rest, and them."""
-    choice = fit_model(model, recording, flat, gravity)
-    fit = choice.plain
-    found = rank(fit.parts, fit.D)
-    walks: tuple[Explanation, ...] = ()
-    for _ in range(MOST_CHANGES):
-        change = gyroscope_change(found)
-        if change is None or not fit.converged:
-            break
-        recording = remove_change(recording, flat, change)
-        without = fit_model(model, recording, flat, gravity)
-        # A change whose removal explains nothing is none.
-        if not fit.V - np.log(SURE) > without.plain.V:
-            break
-        choice, fit, walks = without, without.plain, (*walks, change)
-        found = rank(fit.parts, fit.D)
-    return choice, explain(fit.parts, fit.D, found), walks
+class _Fitted:
+    """Fit by the model that was asked for, with what explains what it leaves."""
+
+    def __init__(
+        self, recording: Recording, flat: Flat, gravity: float, model: str, changes: tuple[Explanation, ...] = ()
+    ) -> None:
+        self._recording, self._of = recording, (flat, gravity, model)
+        self.choice, self.changes = fit_model(model, recording, flat, gravity), changes
+        if isinstance(self.choice.found, HandFit):  # which removes changes itself
+            self._recording, self.changes = self.choice.found.recording, changes + self.choice.found.changes
+        self.explanations = rank(self.choice.plain.parts, self.choice.plain.D)
+
+    def cost(self) -> float:
+        """Return the cost function (8) where the search ended."""
+        return self.choice.plain.V
+
+    def find_change(self) -> Explanation | None:
+        """Return the change of the gyroscope's bias that explains what the fit leaves; None if the search failed."""
+        return gyroscope_change(self.explanations) if self.choice.plain.converged else None
+
+    def without(self, change: Explanation) -> _Fitted:
+        """Fit the recording without one more change."""
+        recording = remove_change(self._recording, self._of[0], change)
+        return _Fitted(recording, *self._of, (*self.changes, change))

@@ -267,9 +267,14 @@ def _measured(turns: list[_Turn]) -> list[_Turn]:
 
 def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
     """Return which of matrices (3, 3) makes the rates miss least, the first if in doubt, and the median angle [rad]."""
-    misses = [_miss(turns, M) for M in by]
+    first = _miss(turns, by[0])
+    before, after = (np.array([getattr(turn, name) for turn in turns]) for name in ("before", "after"))
+    # The nearest others, half the rates, leave gravity half of its turn from where the first one carries it.
+    if first + first / CLEARLY < 0.5 * np.median(_angles(before, after)):
+        return by[0], first
+    misses = [first, *(_miss(turns, M) for M in by[1:])]
     least = int(np.argmin(misses))
-    least = least if misses[0] > CLEARLY * misses[least] else 0
+    least = least if first > CLEARLY * misses[least] else 0
     return by[least], misses[least]
 
 

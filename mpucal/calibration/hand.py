@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..rests.windows import noise_ratio
+from .bias_changes import without_changes
 from .downsampling import SEARCH_HZ, blocks, downsampled, means
 from .fit import Fit
 from .hand_noise import (
@@ -30,6 +32,7 @@ from .hand_noise import (
     pivot_sigma,
     remove_tremor,
 )
+from .hypotheses import Explanation, gyroscope_change, rank, remove_change
 from .hypothesis_tests import WALD_99, undetermined, wald
 from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
@@ -40,7 +43,16 @@ from .preprocessing import Preprocessed, find_rests, prepare
 from .problem import Problem
 from .slip import find_slip
 from .theta import Prior, Theta
-from .transitions import Transition, each_variance, leverages, miss_variances, over_spans, q_scale, transitions_of
+from .transitions import (
+    Transition,
+    are_explained,
+    each_variance,
+    leverages,
+    miss_variances,
+    over_spans,
+    q_scale,
+    transitions_of,
+)
 
 MOST_ITERATIONS = 20  # of a rough search
 PASSES = 3
@@ -54,6 +66,7 @@ class HandFit:
     ----------
     fit : with the covariance by the model alone. minimum : where the search ended. noise : of the hand as it moves.
     rough, fine : the recording as means over blocks, and sample by sample.
+    recording : without the `changes` of the gyroscope's bias.
     """
 
     fit: Fit
@@ -61,6 +74,8 @@ class HandFit:
     noise: Noise
     rough: Preprocessed
     fine: Preprocessed
+    recording: Recording
+    changes: tuple[Explanation, ...]
 
     def honest(self) -> Fit:
         """Return the fit with its honest covariance."""
@@ -76,23 +91,41 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
     A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
     perfect sensor.
     """
-    recording, runs = find_rests(recording, flat)
-    noise_factor = noise_ratio(recording, flat.Sigma_a)
-    fine = prepare(recording, (flat.first, flat.last), runs, gravity, noise_factor)
-    thin, at = downsampled(recording, flat, SEARCH_HZ)
-    of_means = means(noise_factor, recording, flat, SEARCH_HZ)
-    rough = prepare(thin, at, blocks(runs, recording, flat, SEARCH_HZ), gravity, of_means)
-    found = _fit_from(initialise(rough.problem, fine.flat.b_omega), rough, fine)
+    scales = _Scales(recording, flat, gravity)
+    found = _fit_from(initialise(scales.rough.problem, scales.rough.flat.b_omega), scales)
     if found.fit.converged:
         return found
-    again = _fit_from(perfect(rough.problem, fine.flat.b_omega), rough, fine)
+    again = _fit_from(perfect(scales.rough.problem, scales.rough.flat.b_omega), scales)
     return again if again.fit.converged else found
 
 
-def _fit_from(begin: Theta, rough: Preprocessed, fine: Preprocessed) -> HandFit:
-    """Fit means over blocks first, then sample by sample."""
-    search = _Search(rough)
-    theta, noise = search.run(begin)
+class _Scales:
+    """Recording as means over blocks, for the search, and sample by sample."""
+
+    def __init__(self, recording: Recording, flat: Flat, gravity: float) -> None:
+        self.recording, self.flat, self.gravity = recording, flat, gravity
+        self._without_drift, self._runs = find_rests(recording, flat)
+        self._noise_factor = noise_ratio(self._without_drift, flat.Sigma_a)
+
+    @cached_property
+    def fine(self) -> Preprocessed:
+        """Every sample."""
+        at = self.flat.first, self.flat.last
+        return prepare(self._without_drift, at, self._runs, self.gravity, self._noise_factor)
+
+    @cached_property
+    def rough(self) -> Preprocessed:
+        """Means over blocks."""
+        recording, flat = self._without_drift, self.flat
+        thin, at = downsampled(recording, flat, SEARCH_HZ)
+        of_means = means(self._noise_factor, recording, flat, SEARCH_HZ)
+        return prepare(thin, at, blocks(self._runs, recording, flat, SEARCH_HZ), self.gravity, of_means)
+
+
+def _fit_from(begin: Theta, scales: _Scales) -> HandFit:
+    """Fit means over blocks first, without changes of the gyroscope's bias, then sample by sample."""
+    search = without_changes(_Search(scales, begin))
+    fine, theta, noise = search.scales.fine, search.theta, search.noise
     if search.trembles:
         fine = remove_tremor(fine)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
@@ -110,7 +143,9 @@ def _fit_from(begin: Theta, rough: Preprocessed, fine: Preprocessed) -> HandFit:
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
-    return HandFit(replace(fit, slip=slip), minimum, noise, search.prepared, fine)
+    return HandFit(
+        replace(fit, slip=slip), minimum, noise, search.prepared, fine, search.scales.recording, search.changes
+    )
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
@@ -179,16 +214,41 @@ def _scaled(problem: Problem, factor: Vector) -> Problem:
 class _Search:
     """Search for theta and the hand's noise in turn, by rough fits.
 
-    trembles : True where the tremor has a lever arm of its own, and is removed from what is `prepared`.
+    Attributes
+    ----------
+    theta, noise : where it ended. changes : of the gyroscope's bias, removed before.
+    prepared : the means over blocks; if it `trembles`, the tremor has a lever arm of its own, and is removed from them.
     """
 
-    def __init__(self, prepared: Preprocessed) -> None:
-        self.prepared = prepared
-        self.prior = prepared.prior()
+    def __init__(self, scales: _Scales, begin: Theta, changes: tuple[Explanation, ...] = ()) -> None:
+        self.scales, self.prepared, self.changes = scales, scales.rough, changes
         self.iterations = 0
         self.trembles = False
+        self._prior = self.prepared.prior()
+        self.theta, self.noise = self._run(begin)
 
-    def run(self, theta: Theta) -> tuple[Theta, Noise]:
+    def cost(self) -> float:
+        """Return the cost function (8) where the search ended."""
+        return self._last[1].V
+
+    def find_change(self) -> Explanation | None:
+        """Return the change of the gyroscope's bias that explains what the search leaves, or None.
+
+        None too where the search failed, and where the gyroscope's noise explains the transitions between rests.
+        """
+        transitions = transitions_of(self.prepared, self.theta)
+        if not self._last[1].converged or are_explained(transitions):
+            return None
+        weighed = _with_each_variance(*self._last, transitions)
+        return gyroscope_change(rank(parts_of(*weighed, self._prior), self.theta.D))
+
+    def without(self, change: Explanation) -> _Search:
+        """Search once more, from where this one ended, in the recording without one more change."""
+        scales = self.scales
+        recording = remove_change(scales.recording, scales.flat, change)
+        return _Search(_Scales(recording, scales.flat, scales.gravity), self.theta, (*self.changes, change))
+
+    def _run(self, theta: Theta) -> tuple[Theta, Noise]:
         """Search with Huber's loss, which converges from afar, then with the redescending one and the best sigma."""
         prepared = self.prepared
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
@@ -229,8 +289,9 @@ class _Search:
         return theta, Noise("pivot", pivot_sigma(most_likely_sigma(pivot, PIVOT_MPS2, theta, sigma)))
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
-        minimum = _roughly(problem, theta, self.prior)
+        minimum = _roughly(problem, theta, self._prior)
         self.iterations += minimum.iterations
+        self._last = problem, minimum
         return minimum.theta
 
 

@@ -51,9 +51,8 @@ class Parts:
 
     def grouped(self, groups: NDArray[np.intp]) -> tuple[Vector, Vector]:
         """Return gradients (m, p) and Fisher matrices (m, p, p) of groups; `groups` (k,) is the group of each part."""
-        order = np.argsort(groups, kind="stable")
-        first = np.unique(groups[order], return_index=True)[1]
-        return np.add.reduceat(self.gradient[order], first), np.add.reduceat(self.fisher[order], first)
+        of = np.equal.outer(np.unique(groups), groups).astype(np.float64)
+        return of @ self.gradient, np.tensordot(of, self.fisher, 1)
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
         """Return (k,) the group of each part, in `groups` stretches of time."""

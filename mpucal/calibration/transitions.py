@@ -71,6 +71,11 @@ def miss_variances(transitions: Sequence[Transition], leverage: Vector | float =
     return np.asarray(c / np.where(weight < WORTHLESS, weight, 1.0) * known)
 
 
+def are_explained(transitions: Sequence[Transition]) -> bool:
+    """Return True if the known noise explains the misses, those of lost transitions excepted."""
+    return not transitions or bool(_scales(transitions, 0.0)[1] == 1.0)
+
+
 def each_variance(transitions: Sequence[Transition]) -> tuple[Vector, Vector]:
     """Return the variance (k,) [rad^2 an axis] of each miss, if the gyroscope's error beyond its noise varies.
 
