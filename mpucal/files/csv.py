@@ -20,6 +20,7 @@ from ..data import Samples, Vector
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ._text import lines, numbers
+from .hints import ROLES
 from .reading import LONGEST_LINE, reading
 from .rows import Rows, Write, check_runs
 from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
@@ -27,14 +28,13 @@ from .tables.text import decode_text, read_table
 from .tables.times import plausible_utc_ns
 from .tables.units import NS
 
-COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 TEMPERATURE, UTC = "temperature_c", "utc_s"
-ALL = (*COLUMNS, TEMPERATURE)
+ALL = (*ROLES, TEMPERATURE)
 # bytes that are parsed at once, some 16000 lines
 BLOCK = 1 << 21
 _REMEDY = (
-    f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s), or with"
-    f" --columns t=NAME,ax=NAME,... or, in their order, --columns {','.join(COLUMNS)}"
+    f"name the columns in the first line, in any order: {','.join(ROLES)} (s, m/s^2, rad/s), or with"
+    f" --columns t=NAME,ax=NAME,... or, in their order, --columns {','.join(ROLES)}"
 )
 
 
@@ -80,7 +80,7 @@ def _utc_ns(header: list[str], second: bytes) -> int | None:
 def _column_places(header: list[str], path: Path) -> dict[str, int]:
     """Return column name -> place, for the columns that are read."""
     warm = [c.name for c in parse_header(header) if c.quantity == TEMPERATURE]
-    wanted = (*COLUMNS, *sorted(warm, key=TEMPERATURE.__ne__)[:1])
+    wanted = (*ROLES, *sorted(warm, key=TEMPERATURE.__ne__)[:1])
     twice = [name for name in wanted if header.count(name) > 1]
     if twice:
         raise RecordingError(f"{path}: its first line names {', '.join(twice)} twice", _REMEDY)
@@ -140,9 +140,9 @@ def _blocks(file: IO[bytes], path: Path) -> Iterator[bytes]:
 def _samples(values: Vector, sure: bool) -> Samples:
     n = len(values)
     warm = np.full(n, np.nan)
-    if values.shape[1] > len(COLUMNS):
+    if values.shape[1] > len(ROLES):
         # under another name than temperature_c it may be counts or Kelvin
-        given = values[:, len(COLUMNS)]
+        given = values[:, len(ROLES)]
         warm = np.where(sure | (given > COLDEST_C) & (given < WARMEST_C), given, np.nan)
     no = np.zeros(n, bool)
     return Samples(values[:, 0], values[:, 1:4], values[:, 4:7], warm, no, no, no)

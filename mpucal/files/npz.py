@@ -8,10 +8,8 @@ processing of calibrated samples. Other keys are ignored.
 from __future__ import annotations
 
 import json
-import lzma
 import tokenize
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, replace
@@ -25,7 +23,7 @@ from ..data import Samples, Sensor
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ..strict_json import parse_json
-from .reading import check_size, reading
+from .reading import DAMAGED_ZIP, check_size, reading
 from .rows import Rows, Write, check_runs, describe, make_recording, shown_units, to_si
 from .tables.times import plausible_utc_ns
 
@@ -34,10 +32,10 @@ TEMPERATURES = ("temperature_c", "temperature")
 MASKS = ("gap", "acc_clipped", "gyr_clipped")
 DONE, UTC = "done", "utc_ns"
 READ = (*NEEDED, *TEMPERATURES, *MASKS, "flat", "flat_samples", "sensor", DONE, UTC)
-# errors of zipfile, its decompressors and numpy: damaged, encrypted, of an unknown method, longer than memory
+# also errors of numpy: damaged, encrypted, longer than memory
 DAMAGED = (
-    *(ValueError, TypeError, AttributeError, ArithmeticError, LookupError, EOFError, RuntimeError, MemoryError),
-    *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+    *(*DAMAGED_ZIP, TypeError, AttributeError, ArithmeticError, LookupError, MemoryError, SyntaxError),
+    tokenize.TokenError,
 )
 _REMEDY = "give an .npz with t [s] (n,), acc [m/s^2] (n, 3) and gyr [rad/s] (n, 3)"
 

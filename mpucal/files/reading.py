@@ -7,8 +7,11 @@ threads, it is not done unless $MPUCAL_MOST_MB is set, as the command line does.
 
 from __future__ import annotations
 
+import lzma
 import os
 import threading
+import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from importlib import import_module
@@ -31,6 +34,8 @@ SNIFFED = 1 << 16
 # the share of NUL bytes beyond which a file is binary, of words beyond which a column is no clock, and of empty lines
 # beyond which these are another sensor's
 MOST_ODD = 0.1
+# errors of zipfile and its decompressors; RuntimeError includes NotImplementedError, of an unknown compression
+DAMAGED_ZIP = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
 _ONE = threading.RLock()
 
 

@@ -6,10 +6,8 @@ Dates are days since 1900 in the file, and are read as days.
 from __future__ import annotations
 
 import csv
-import lzma
 import re
 import zipfile
-import zlib
 from collections.abc import Iterator, Sequence
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -18,14 +16,13 @@ from xml.etree.ElementTree import Element, ParseError, iterparse
 from ..data import Recording
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
-from .reading import HELD, check_size, reading
+from .reading import DAMAGED_ZIP, HELD, check_size, reading
 from .tables.load import is_table_of_sensors, table_of_text
 
 _SHEET = re.compile(r"xl/worksheets/sheet(\d{1,4})\.xml").fullmatch
 _STRINGS = "xl/sharedStrings.xml"
 # columns of a sheet, of which the last is XFD
 MOST_COLUMNS = 16384
-_DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, KeyError, IndexError, ValueError, zlib.error, lzma.LZMAError)
 
 
 def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -39,7 +36,7 @@ def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
         with reading(path), zipfile.ZipFile(path) as archive:
             check_size(path, HELD * sum(member.file_size for member in archive.infolist()))
             sheets = [*_sheets(archive)]
-    except (*_DAMAGE, ParseError) as error:
+    except (*DAMAGED_ZIP, LookupError, ParseError) as error:
         raise RecordingError(f"{path} is not a whole workbook ({error})", "save its sheet as .csv") from error
     if not sheets:
         raise RecordingError(f"{path} holds no xl/worksheets/sheet1.xml", "save its sheet as .csv")

@@ -10,14 +10,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..data import Recording, Sensor
 from ..disk.atomic import remove_file, write_atomically, write_together
 from ..disk.output_folder import OutputFolder, free_name
 from ..errors import MpucalError, OutputError, UsageError
 from ..report import render
-from ..result.calibration import REFUSED, Calibration
+from ..result.calibration import Calibration
 from ..result.clock import file_stamp
 from ..result.session_files import BLOB, DOCUMENT, REPORT, TRUTH, captures_in
 
@@ -27,11 +25,11 @@ def result_files(
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the name and content of each file of a result, one at a time.
 
-    A refused calibration, or one without D or b_a, has no blob, and a real sensor no `truth`: the true parameters of a
+    A calibration with an objection has no blob, and a real sensor no `truth`: the true parameters of a
     simulated one.
     """
     yield DOCUMENT.name, calibration.json().encode()
-    if calibration.verdict != REFUSED and np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all():
+    if not calibration.objection:
         yield BLOB.name, calibration.blob().encode()
     yield REPORT.name, render(calibration, recording).encode()
     if truth is not None:

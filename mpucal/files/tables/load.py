@@ -13,8 +13,7 @@ import numpy as np
 from ...clocks.stamps import FEWEST
 from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
-from ..csv import COLUMNS
-from ..hints import NO_HINTS, Hints
+from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import HELD, MOST_ODD, SNIFFED, check_size, first_bytes, reading
 from .cells import OF_DAY, Kind
 from .columns import find_columns
@@ -63,7 +62,7 @@ def is_own_table(path: Path) -> bool:
     """Return True if a file begins as a table in mpucal's own format and units."""
     first = next(iter(first_bytes(path).decode("utf-8-sig", "replace").splitlines()), "")
     named = {name.strip(' "').lower() for name in first.split(",")}
-    table = _begun(path) if set(COLUMNS) <= named else None
+    table = _begun(path) if set(ROLES) <= named else None
     if table is None or any(map(NAMES_SENSORS, table.header)) or of_one_sensor(table) is not table:
         return False
     return _may_be_si(table, path) and not _may_be_no_seconds(table, path)

@@ -12,10 +12,8 @@ the platform: on iOS accelerations have the opposite sign, unless `standardisati
 from __future__ import annotations
 
 import csv
-import lzma
 import re
 import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -29,7 +27,7 @@ from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..hints import NO_HINTS, Hints
 from ..matlab import MATLAB, read_matlab_arrays
-from ..reading import HELD, check_size, first_bytes, reading
+from ..reading import DAMAGED_ZIP, HELD, check_size, first_bytes, reading
 from .array_table import table_of_arrays
 from .columns import columns_by_hint
 from .load import FLIPPED, find_any_table, sensor_stream
@@ -55,8 +53,6 @@ OF_FILE = ".table"
 SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|face|side)(?![a-z])")
 # MATLAB's spelling of a hyphen in a name
 HYPHEN = "0x2d"
-# RuntimeError includes NotImplementedError, of an unknown compression
-_DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
 
 
 def is_folder_of_tables(path: Path) -> bool:
@@ -77,7 +73,7 @@ def is_archive_of_tables(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as archive:
             return bool(_pairs(archive.namelist()))
-    except (OSError, *_DAMAGE):
+    except (OSError, *DAMAGED_ZIP):
         return False
 
 
@@ -128,7 +124,7 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
                 return archive.read(name)
 
             return _recording(path.name, list(sizes), read, "", hints)
-    except _DAMAGE as error:
+    except DAMAGED_ZIP as error:
         raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
 
 

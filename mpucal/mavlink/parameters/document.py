@@ -46,12 +46,10 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
         return document | {"why": f"the recording does not hold the vehicle's {missing}"}
     if not np.all(old.scale):
         return document | {"why": f"{slot.scale[0]} and the like are 0: IMU {autopilot.imu} streams nothing yet"}
-    known = np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()
-    if not known or np.linalg.matrix_rank(calibration.D) < 3:
+    if not calibration.is_regular:
         return document | {"why": "the calibration was refused"}
-    gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
     old = slot.effective(old)
-    composed = compose(calibration.D, calibration.b_a, old, R_b, gravity)
+    composed = compose(calibration.D, calibration.b_a, old, R_b, calibration.gravity)
     new = slot.effective(composed.correction)
     return document | {
         NEW: slot.values(new),
