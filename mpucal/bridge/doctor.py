@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from ..doctor.bus_speed import LONG_BYTES, median_ms
 from ..doctor.examine import examine_chip
 from ..doctor.finding import Finding, Mark
+from ..doctor.measure import LONG_BYTES, median_ms
 from ..sources.chip import OpenedChip
 from . import BridgeBus
 from .conformance import Talk, run_talk, talks

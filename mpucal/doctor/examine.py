@@ -28,10 +28,9 @@ from ..data import Sensor
 from ..errors import BoardMoved, ChipError, ChipReset, SourceError, UnknownOffsets
 from ..session.ports import polled
 from ..sources.chip import OpenedChip
-from .bus_speed import examine_speed
 from .dead_axes import DEAD_AXIS, REPLACE, STUCK_BITS, examine_bits
 from .finding import Finding, Mark
-from .measure import examine_stream
+from .measure import examine_speed, examine_stream
 
 # Shares of failed transfers: above the first a session is in danger, above the second nothing works.
 MANY_FAILED, MOST_FAILED = 0.05, 0.5

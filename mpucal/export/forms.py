@@ -8,7 +8,7 @@ from functools import partial
 from ..frozen import dataclass
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..result.calibration import Calibration
-from . import arduino, c_code, esphome, i2cdevlib, linux_iio, micropython, python, ros, vehicles, vio
+from . import arduino, c_code, esphome, i2cdevlib, linux_iio, python_modules, ros, vehicles, vio
 from .losses import (
     LossNotes,
     check_usable,
@@ -79,7 +79,7 @@ FORMS = (
         ".py",
         "NumPy",
         "`apply(y, temperature_c)`, `apply_gyro(y)`",
-        python.text,
+        python_modules.numpy_text,
         (scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(
@@ -146,7 +146,7 @@ FORMS = (
         ".py",
         "MicroPython, CircuitPython",
         "`apply(y, temperature_c)`, `apply_gyro(y)` of one sample, without NumPy; of counts, with a check of the range",
-        micropython.text,
+        python_modules.micropython_text,
         (float_rounding, scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(
