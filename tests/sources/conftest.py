@@ -89,7 +89,20 @@ def still_chip():
 
 
 @pytest.fixture
-def adapter(monkeypatch, tmp_path, still_chip):
+def host_time(monkeypatch):
+    """Makes a clock, which runs only during waits, that of the host."""
+
+    def make(clock):
+        time = SimpleNamespace(monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9)))
+        monkeypatch.setattr(mpucal.sources.host_bus, "time", time)
+        # Time that only waiting takes waits for one process alone.
+        monkeypatch.setattr("mpucal.sources.chip.CAN_FORK", False)
+
+    return make
+
+
+@pytest.fixture
+def adapter(monkeypatch, tmp_path, still_chip, host_time):
     """Makes an adapter at a path that smbus2 can open; its clock becomes the host's."""
 
     def make(model="mpu6050", address=0x68):
@@ -98,10 +111,7 @@ def adapter(monkeypatch, tmp_path, still_chip):
         kernel.path = tmp_path / "i2c-1"
         kernel.path.touch()
         monkeypatch.setattr(smbus2, "ioctl", kernel.ioctl)
-        time = SimpleNamespace(monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9)))
-        monkeypatch.setattr(mpucal.sources.host_bus, "time", time)
-        # Time that only waiting takes waits for one process alone.
-        monkeypatch.setattr("mpucal.sources.chip.CAN_FORK", False)
+        host_time(clock)
         return kernel
 
     return make

@@ -4,7 +4,7 @@ import builtins
 import errno
 import os
 import sys
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -16,7 +16,6 @@ from mpucal.errors import BusError, UsageError
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import FastClock
-from mpucal.sources import host_bus
 from mpucal.sources.spi import SpiBus
 
 
@@ -52,7 +51,7 @@ class SpiDev:
 
 
 @pytest.fixture
-def opened(monkeypatch):
+def opened(monkeypatch, host_time):
     """Makes a bus to a simulated chip, and returns it with the device that it opened."""
 
     def make(words="chip=mpu6500,hand=still"):
@@ -62,12 +61,7 @@ def opened(monkeypatch):
         library = ModuleType("spidev")
         library.SpiDev = type("SpiDev", (SpiDev,), {"chip": chip})
         monkeypatch.setitem(sys.modules, "spidev", library)
-        stopped = SimpleNamespace(
-            monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9))
-        )
-        monkeypatch.setattr(host_bus, "time", stopped)
-        # Time that only waiting takes waits for one process alone.
-        monkeypatch.setattr("mpucal.sources.chip.CAN_FORK", False)
+        host_time(clock)
         bus = SpiBus("/dev/spidev0.0")
         return bus, library.SpiDev.made
 
