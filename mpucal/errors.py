@@ -170,7 +170,10 @@ class EndOfCapture(Exception):  # noqa: N818 - not an error, and without an exit
 
 def did_you_mean(word: str, names: Iterable[str]) -> str:
     """Return the end of a message such as "; did you mean session?" if one of `names` is close to `word`, else ""."""
+    names = list(names)
+    if word in names:
+        return ""
     from difflib import get_close_matches  # noqa: PLC0415 - only needed after a typo
 
     near = get_close_matches(word, names, 1)
-    return f"; did you mean {near[0]}?" if near and near[0] != word else ""
+    return f"; did you mean {near[0]}?" if near else ""

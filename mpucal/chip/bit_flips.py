@@ -50,8 +50,11 @@ class BitFlipFilter:
     @property
     def is_open(self) -> bool:
         """True if the last frame may be flipped: it must wait for the next one."""
-        steps = np.abs(np.diff(self._before.astype(np.float64), axis=0))
-        return bool((steps >= LEAST_STEP * self._near).any())
+        rows = self._before.tolist()
+        return len(rows) == 2 and any(
+            abs(last - before) >= LEAST_STEP * near
+            for before, last, near in zip(*rows, self._near.tolist(), strict=True)
+        )
 
     def repair(self, frames: Counts, waiting: Counts) -> Counts:
         """Return `frames` with the flipped words repaired that have a neighbour on both sides.

@@ -121,13 +121,12 @@ class FifoDecoder:
             return Loss.MISALIGNED
         self._read += len(frames)
         kept = np.concatenate((self._waiting, kept))
-        # the first frame of each run of equal ones
-        begins = np.flatnonzero(np.concatenate(([True], (kept[1:] != kept[:-1]).any(axis=1)))[: len(kept)])
-        if (np.diff(begins, append=len(kept)) >= self._stuck_frames).any():
+        longest, last = _equal_frames(kept)
+        if longest >= self._stuck_frames:
             return Loss.STUCK
         if look is not None:
             self._clock.add(*np.array([look]).T)
-        self._accept(kept, len(kept) - int(begins[-1]) if len(begins) else 0)
+        self._accept(kept, last)
         return None
 
     def accept_plain_polls(self, looks_ns: Whole, frames: Counts, lengths: Whole) -> int:
@@ -241,15 +240,18 @@ class FifoDecoder:
         """Return (n,) True where the temperature jumps, as in a frame that is not aligned."""
         if not len(frames):
             return np.zeros(0, bool)
-        temperature = frames[:, TEMPERATURE].astype(np.int64)
+        temperature = frames[:, TEMPERATURE].astype(np.int32)
         before = temperature[0] if self._temperature is None else self._temperature
+        if max(temperature.max(), before) - min(temperature.min(), before) <= MAX_TEMPERATURE_STEP:
+            return np.zeros(len(frames), bool)
         return np.asarray(np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP)
 
     def _after(self, last_t_s: float | None, samples: Samples) -> Samples:
         """Move the samples' times, if needed, so that each is later than `last_t_s`."""
-        if last_t_s is None:
+        step_s = LEAST_STEP / self._clock.rate_hz
+        if last_t_s is None or samples.t[0] - last_t_s >= step_s:
             return samples
-        t = make_increasing(np.concatenate(([last_t_s], samples.t)), LEAST_STEP / self._clock.rate_hz)[1:]
+        t = make_increasing(np.concatenate(([last_t_s], samples.t)), step_s)[1:]
         return replace(samples, t=t)
 
     def _samples(self, runs: list[Run], times_s: Times) -> Samples:
@@ -284,5 +286,14 @@ class FifoDecoder:
 
 def _clipped(counts: Counts) -> Mask:
     """Return (n,) True if one of the counts (n, 3) is at either end of int16."""
-    at_end = np.abs(counts.astype(np.int32)) >= FULL_SCALE_COUNT
-    return np.asarray(at_end.any(axis=1))
+    at_end = (counts >= FULL_SCALE_COUNT) | (counts <= -FULL_SCALE_COUNT)
+    return np.asarray(at_end[:, 0] | at_end[:, 1] | at_end[:, 2])
+
+
+def _equal_frames(frames: Counts) -> tuple[int, int]:
+    """Return the length of the longest run of equal frames, and of the last one."""
+    same = (frames[1:] == frames[:-1]).all(axis=1)
+    if not same.any():
+        return min(len(frames), 1), min(len(frames), 1)
+    lengths = np.diff(np.flatnonzero(~same), prepend=-1, append=len(same))
+    return int(lengths.max()), int(lengths[-1])

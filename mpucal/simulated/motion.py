@@ -29,6 +29,8 @@ from .legs import STEP_HZ, STEP_S, Leg, steps
 AHEAD_S = 0.9 * REACTION_S[0]
 
 SINES = 12
+# A sum of sines is computed for so many steps at once, whose phases differ from those of the first by fixed angles.
+BLOCK = 128
 
 
 class BandNoise:
@@ -43,27 +45,33 @@ class BandNoise:
         self._pulsation = 2 * np.pi * rng.uniform(*band_hz, (3, SINES))
         self._phase = rng.uniform(0.0, 2 * np.pi, (3, SINES))
         self._amplitude = rms * np.sqrt(2 / SINES)
-        angle = self._pulsation[:, :, None] * np.arange(steps(AHEAD_S) + 1) * STEP_S
+        angle = self._pulsation[:, :, None] * np.arange(BLOCK) * STEP_S
         self._waves = np.concatenate((np.cos(angle), np.sin(angle)), axis=1)
 
     def at(self, first: int, n: int) -> Vector:
-        """Return (n, 3) at the steps from `first` on, AHEAD_S at most."""
-        angle = self._pulsation * (first * STEP_S) + self._phase
-        return self._sum(np.sin(angle), np.cos(angle), n)
+        """Return (n, 3) at the steps from `first` on."""
+        return self._sum(*self._phases(first, n), n)
 
     def integral(self, first: int, n: int) -> Vector:
         """Return (n, 3) the integral over time, without its mean, at the steps from `first` on."""
-        angle = self._pulsation * (first * STEP_S) + self._phase
-        return self._sum(-np.cos(angle) / self._pulsation, np.sin(angle) / self._pulsation, n)
+        sine, cosine = self._phases(first, n)
+        return self._sum(-cosine / self._pulsation[:, None], sine / self._pulsation[:, None], n)
 
     def second_derivative(self, first: int, n: int) -> Vector:
         """Return (n, 3) the second derivative by time at the steps from `first` on."""
-        angle = self._pulsation * (first * STEP_S) + self._phase
-        return self._sum(-(self._pulsation**2) * np.sin(angle), -(self._pulsation**2) * np.cos(angle), n)
+        sine, cosine = self._phases(first, n)
+        square = self._pulsation[:, None] ** 2
+        return self._sum(-square * sine, -square * cosine, n)
+
+    def _phases(self, first: int, n: int) -> tuple[Vector, Vector]:
+        """Return sine and cosine (3, k, SINES) at the first step of each block."""
+        begin_s = np.arange(first, first + n, BLOCK)[:, None] * STEP_S
+        angle = self._pulsation[:, None] * begin_s + self._phase[:, None]
+        return np.sin(angle), np.cos(angle)
 
     def _sum(self, cosines: Vector, sines: Vector, n: int) -> Vector:
-        weights = np.concatenate((cosines, sines), axis=1) * self._amplitude
-        return np.asarray(np.matmul(weights[:, None, :], self._waves[:, :, :n])[:, 0].T)
+        weights = np.concatenate((cosines, sines), axis=2) * self._amplitude
+        return np.asarray((weights @ self._waves).reshape(3, -1)[:, :n].T)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,9 @@ import numpy as np
 
 from ..data import Vector
 
+# In place of an angle of zero, by which nothing can be divided.
+LEAST = 1e-300
+
 
 def product(p: Vector, q: Vector) -> Vector:
     """Return the quaternions p q of (..., 4) and (..., 4): first q, then p."""
@@ -25,15 +28,24 @@ def product(p: Vector, q: Vector) -> Vector:
 def exp(turn_rad: Vector) -> Vector:
     """Return the quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
     half = 0.5 * np.asarray(turn_rad)
-    angle = np.linalg.norm(half, axis=-1, keepdims=True)
-    return np.concatenate((np.cos(angle), half * np.sinc(angle / np.pi)), axis=-1)
+    angle = np.maximum(_norm(half), LEAST)
+    q = np.empty((*half.shape[:-1], 4))
+    q[..., 0] = np.cos(angle)
+    q[..., 1:] = half * (np.sin(angle) / angle)[..., None]
+    return q
 
 
 def log(q: Vector) -> Vector:
     """Return the shortest rotation vectors (..., 3) [rad] of quaternions (..., 4)."""
-    v = np.where(q[..., :1] < 0.0, -q[..., 1:], q[..., 1:])
-    sine = np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-300)
-    return np.asarray(2.0 * np.arctan2(sine, np.abs(q[..., :1])) / sine * v)
+    w, v = q[..., 0], q[..., 1:]
+    sine = np.maximum(_norm(v), LEAST)
+    return np.asarray(v * (np.copysign(2.0, w) * np.arctan2(sine, np.abs(w)) / sine)[..., None])
+
+
+def _norm(v: Vector) -> Vector:
+    """Return the lengths (...) of (..., 3), in half the time of np.linalg.norm."""
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def cross_rows(a: Vector, b: Vector) -> Vector:
