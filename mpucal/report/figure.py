@@ -29,15 +29,14 @@ def svg(name: str, label: str, height: float, *marks: str) -> str:
 
 def line(x: Vector, y: Vector, colour: str, width: float = 1.0, dashed: bool = False) -> str:
     """Return a line through the points [px], interrupted at NaN."""
-    pen, steps = "M", []
-    for at_x, at_y in zip(x.tolist(), y.tolist(), strict=True):
-        if math.isnan(at_x) or math.isnan(at_y):
-            pen = "M"
-            continue
-        steps.append(f"{pen}{at_x:.1f} {at_y:.1f}")
-        pen = "L"
+    known = ~(np.isnan(x) | np.isnan(y))
+    places = np.column_stack((x, y))
+    path = ""
+    for first, last in np.flatnonzero(np.diff(known, prepend=False, append=False)).reshape(-1, 2).tolist():
+        # One format for all points takes 0.6 of the time of one for each.
+        path += "M" + "L".join(["%.1f %.1f"] * (last - first)) % tuple(places[first:last].ravel().tolist())
     dashes = ' stroke-dasharray="4 3"' if dashed else ""
-    return f'<path d="{"".join(steps)}" style="fill: none; stroke: {colour}" stroke-width="{width:g}"{dashes}/>'
+    return f'<path d="{path}" style="fill: none; stroke: {colour}" stroke-width="{width:g}"{dashes}/>'
 
 
 def dots(x: Vector, y: Vector, radius: float, colour: str, hollow: bool = False) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..chip.access import Bus
 from ..chip.contents import chip_contents
@@ -13,8 +14,12 @@ from ..chip.driver import Driver
 from ..files.messages import BUS
 from ..origin import Origin
 from .opened_source import ActiveSource, CaptureRecorder, OpenedSource, Say
-from .reading_process import CAN_FORK, BusDriver, ProcessSource
 from .replay import Tap
+
+if TYPE_CHECKING:
+    from .reading_process import BusDriver
+
+CAN_FORK = sys.platform == "linux"
 
 
 @dataclass
@@ -66,6 +71,8 @@ class OpenedChip(OpenedSource):
         if not (self.own_process and CAN_FORK):
             yield ActiveSource(driver, event)
             return
+        from .reading_process import ProcessSource  # noqa: PLC0415 - only for a sensor that does not wait
+
         with closing(ProcessSource(driver, tap, self.parts, self.hands)) as source:
             self.hands = (source.hear,)
             yield ActiveSource(source, event)

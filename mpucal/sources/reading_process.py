@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import traceback
 import warnings
 from collections import deque
@@ -29,7 +28,6 @@ from ..session.ports import Source
 from .recorded_parts import RecordedParts
 from .replay import ReplayBus, Tap, as_asked, successful
 
-CAN_FORK = sys.platform == "linux"
 # Message by which the session asks the process to stop, and the process marks the end of its polls.
 STOP = None
 # Time for the process to stop the sensor.

@@ -14,7 +14,8 @@ from mpucal.chip.registers import FIFO_COUNT_H, USER_CTRL
 from mpucal.errors import BusError, EndOfCapture, NoAnswer
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
-from mpucal.sources.reading_process import CAN_FORK, ProcessSource
+from mpucal.sources.chip import CAN_FORK
+from mpucal.sources.reading_process import ProcessSource
 from mpucal.sources.replay import ReplayBus, Tap
 from tools.lab.feeds import open_recorded
 
