@@ -13,8 +13,7 @@ from ..data import Vector
 from ..frozen import dataclass
 from ..rests.limits import OF_NORMAL
 from ..result.calibration import REFUSED
-from ..result.error_model import bias_mg, misalignment, scale_factor_error
-from .row import AXES
+from ..result.error_model import AXES, bias_mg, misalignment, scale_factor_error
 
 # robust standard deviations from the fleet's median, beyond which a value is an outlier
 OUTLIER_STD = 5.0

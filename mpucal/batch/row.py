@@ -23,9 +23,9 @@ from ..frozen import dataclass
 from ..mavlink.parameters.document import calibrate_vehicle
 from ..report import render
 from ..result.calibration import Calibration
+from ..result.error_model import AXES
 from .locations import compute_digest, fetch
 
-AXES = "xyz"
 TEXTS = (
     "path",
     "batch",

@@ -21,9 +21,9 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
 from ..iio.attributes import ACCEL, MPU_SCALES, PRINTED_SCALES
 from ..result.calibration import Calibration
+from ..result.error_model import AXES
 from .losses import format_xyz, heading
 
-AXES = "xyz"
 LSB_PER_G = 2048.0
 
 

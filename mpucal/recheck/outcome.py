@@ -8,9 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import Vector
 from ..frozen import dataclass
 from ..result.calibration import Calibration
+from ..result.error_model import AXES, MG_PER_MPS2
 from .observed import BETA, DELTA, UPPER, E, G
 
 FORMAT, VERSION = "mpucal.check", 1
@@ -22,7 +23,6 @@ ANOTHER_SENSOR: Verdict = "another sensor"
 CANNOT_BE_TOLD: Verdict = "cannot be told"
 EXIT_CODES: Mapping[Verdict, int] = {STILL_GOOD: 0, DRIFTED: 5, REMOUNTED: 5, ANOTHER_SENSOR: 5, CANNOT_BE_TOLD: 4}
 CORRECTED_BY_BIASES = ("nothing", "bias", "gyroscope's bias", "temperature")
-AXES = "xyz"
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def changes_of(calibration: Calibration, theta: Vector, covariance: Vector) -> d
     of_E, on_G = covariance[E, E], np.flatnonzero(UPPER[0] == UPPER[1])
     of_G = covariance[G, G][np.ix_(on_G, on_G)]
     return {
-        "bias": Change.of("mg", D @ theta[BETA], D @ covariance[BETA, BETA] @ D.T, 1e3 / STANDARD_GRAVITY_MPS2),
+        "bias": Change.of("mg", D @ theta[BETA], D @ covariance[BETA, BETA] @ D.T, MG_PER_MPS2),
         "scale": Change.of("%", theta[E][diagonal], of_E[np.ix_(diagonal, diagonal)], 100.0),
         "mount": Change.of("deg", to_turn @ theta[E], to_turn @ of_E @ to_turn.T, degrees),
         "gyroscope's bias": Change.of("deg/s", theta[DELTA], covariance[DELTA, DELTA], degrees),

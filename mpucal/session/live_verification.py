@@ -16,11 +16,11 @@ from ..origin import Origin
 from ..reasons import Reason, reason
 from ..rests.intervals import RestFinder
 from ..result.calibration import REFUSED, USABLE, Calibration
+from ..result.error_model import AXES
 from ..result.keys import Quality
 from .events import Checked, Verification, triple
 from .rotate import REST_S
 
-AXES = "xyz"
 # A shorter turn shows too little of a scale factor error to blame one.
 LEAST_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0

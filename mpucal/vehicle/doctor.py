@@ -8,7 +8,7 @@ import numpy as np
 
 from ..clocks.device_clocks import Jump
 from ..clocks.host_clock import HostClock
-from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..data import Recording
 from ..doctor.finding import Finding, Mark
 from ..doctor.measure import examine_clock, examine_gravity
 from ..errors import RecordingError, SourceError
@@ -24,6 +24,7 @@ from ..mavlink.stream import MOST, Streams
 from ..mavlink.transport import US
 from ..mavlink.vehicle_source import LOSS_SHARE
 from ..rests.flat import flat_statistics
+from ..result.error_model import MG_PER_MPS2
 from ..session.lay_flat import STAND, put_down
 from .source import OpenedVehicle
 
@@ -166,13 +167,12 @@ def _rest(topic: str, recording: Recording) -> Iterator[Finding]:
         return
     still = flat_statistics(recording, recording.flat)
     noise, step = np.sqrt(still.Sigma_a.max()), recording.sensor.steps[0]
-    mg = 1e3 / STANDARD_GRAVITY_MPS2
     known = np.isfinite(recording.temperature_c)
     celsius = f", {recording.temperature_c[known].mean():.1f} °C" if known.any() else ""
-    rounded = f" in steps of {step * mg:.0f} mg" if step else ""
-    yield examine_gravity(f"{topic}, at rest", still.y, f", noise {noise * mg:.1f} mg{rounded}{celsius}")
+    rounded = f" in steps of {step * MG_PER_MPS2:.0f} mg" if step else ""
+    yield examine_gravity(f"{topic}, at rest", still.y, f", noise {noise * MG_PER_MPS2:.1f} mg{rounded}{celsius}")
     if still.rounded:
-        what = f"its readings stay on one step of {step * mg:.0f} mg at rest, which no time makes finer"
+        what = f"its readings stay on one step of {step * MG_PER_MPS2:.0f} mg at rest, which no time makes finer"
         remedy = "hold the vehicle in your hands, whose tremor moves them, or raise INS_ACCEL_FILTER for the session"
         yield Finding(f"{topic}, rounding", Mark.NOTE, what, remedy)
 
