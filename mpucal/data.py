@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import reprlib
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from operator import attrgetter, itemgetter
 from pkgutil import resolve_name
@@ -30,7 +30,6 @@ from .arguments import Vector as Vector  # noqa: PLC0414
 from .clocks.sample_clock import GAP_INTERVALS as GAP_INTERVALS  # noqa: PLC0414
 from .clocks.stamps import FEWEST, Clock, fit_clock
 from .errors import WrongType, escape_line
-from .frozen import dataclass
 from .origin import Origin
 
 if TYPE_CHECKING:

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Required, Self, TypedDict
 
-from .frozen import dataclass
 from .origin import Origin, name_thing
 
 if TYPE_CHECKING:

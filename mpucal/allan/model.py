@@ -15,11 +15,11 @@ as for wavelet variances (Percival, Biometrika 1995; Guerrier et al., JASA 2013)
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 
 CONFIDENCE = 0.95
 # an octave with fewer non-overlapping differences has almost no information

@@ -7,11 +7,11 @@ segments (Welch, 1967).
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from ..rests.limits import OF_NORMAL
 
 BLOCKS = 2048

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -10,7 +11,6 @@ import numpy as np
 
 from ..chip.families import PARTS, Family
 from ..data import Vector
-from ..frozen import dataclass
 from ..rests.limits import OF_NORMAL
 from ..result.calibration import REFUSED
 from ..result.error_model import AXES, bias_mg, misalignment, scale_factor_error

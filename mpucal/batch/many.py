@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +15,6 @@ from typing import Any
 
 from ..errors import SourceError, UsageError
 from ..files.reading import VARIABLE, allowed_bytes
-from ..frozen import dataclass
 from .journal import RowJournal
 from .row import Settings, make_rows
 

@@ -6,6 +6,7 @@ Units are those of calibration.json: m/s^2, rad/s, degrees Celsius, s.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from fnmatch import fnmatch
 from pathlib import Path, PurePosixPath
@@ -19,7 +20,6 @@ from ..disk.atomic import write_atomically
 from ..errors import MpucalError
 from ..files import load
 from ..files.hints import NO_HINTS, Hints
-from ..frozen import dataclass
 from ..mavlink.parameters.document import calibrate_vehicle
 from ..report import render
 from ..result.calibration import Calibration

@@ -9,8 +9,7 @@ import binascii
 import re
 import struct
 from collections.abc import Iterator
-
-from ..frozen import dataclass
+from dataclasses import dataclass
 
 DELIMITER = b"\0"
 DELIMITERS = re.compile(rb"\0+")

@@ -6,10 +6,9 @@ See firmware_protocol.md, "Messages"; each class is the table of its name there.
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import ClassVar, Self, dataclass_transform
-
-from ..frozen import dataclass
 
 MAGIC = b"MPUB"
 MAJOR, MINOR = 1, 0

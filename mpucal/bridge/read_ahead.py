@@ -6,9 +6,9 @@ See firmware_protocol.md, "FRAMES": a look is one reading of FIFO_COUNT and all 
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 
 from ..chip.registers import FRAME_BYTES
-from ..frozen import dataclass
 from .messages import MAX_BATCH, Frames, Status
 
 INDEX_WRAP = 2**16

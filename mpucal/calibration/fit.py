@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import Vector
 from .parameters import D_NAMES
-
-if TYPE_CHECKING:
-    from .parts import Parts
-    from .slip import Slip
+from .parts import Parts
+from .slip import Slip
 
 
 @dataclass(frozen=True)

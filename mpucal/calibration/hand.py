@@ -38,9 +38,9 @@ from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import evaluate, value
 from .parameters import HAND
-from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, find_rests, prepare
 from .problem import Problem
+from .scores import ends_of, parts_of
 from .slip import find_slip
 from .theta import Prior, Theta
 from .transitions import (

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +14,11 @@ from numpy.typing import NDArray
 from ..data import Mask, Vector
 from .fit import Fit
 from .likelihood import Evaluation, evaluate
+from .normal_equations import inverse, solve
 from .parameters import HAND, NAMES, PLACES
+from .parts import Parts
 from .problem import Problem
 from .theta import Prior, Theta
-
-if TYPE_CHECKING:
-    from .parts import Parts
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 ROUGHLY = 0.05  # the decrement at which a search on block means ends
@@ -121,7 +119,7 @@ def minimise(
             last[free] = at.newton
             converged, iterations = True, iterations + 1
             break
-        step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
+        step[free] = -solve(H + damping * np.diag(np.diag(H)), gradient)
         trial = _At(problem, at.theta.moved(step), free, prior, ends)
         if trial.V < at.V or (frozen and _nearer(trial, at)):
             at, damping, iterations = trial, damping * EASIER, iterations + 1
@@ -161,7 +159,7 @@ class _At:
     @cached_property
     def newton(self) -> Vector:
         """Newton's step."""
-        return -_solve(self.free_H, self.gradient)
+        return -solve(self.free_H, self.gradient)
 
     @cached_property
     def decrement(self) -> float:
@@ -172,26 +170,3 @@ class _At:
 def information(problem: Problem, theta: Theta, prior: Prior) -> Vector:
     """Return the Fisher matrix (p, p) of the hand's filter over all parameters, with the prior's."""
     return np.asarray(evaluate(problem, theta, HAND).fisher + np.diag(prior.precision))
-
-
-def inverse(H: Vector) -> Vector:
-    """Return H^-1 (..., p, p), scaled to a unit diagonal; directions without information get huge variances."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(H, axis1=-2, axis2=-1), 1e-300))
-    scale = scale[..., :, None] * scale[..., None, :]
-    scaled = H * scale
-    try:
-        result = np.linalg.inv(scaled)
-    except np.linalg.LinAlgError:
-        result = np.linalg.pinv(scaled, hermitian=True)
-    return np.asarray(result * scale)
-
-
-def _solve(H: Vector, g: Vector) -> Vector:
-    """Return H^-1 g with H scaled to a unit diagonal; zero along directions without information."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    scaled = H * np.outer(scale, scale)
-    try:
-        x = np.linalg.solve(scaled, g * scale)
-    except np.linalg.LinAlgError:
-        x = np.linalg.lstsq(scaled, g * scale, rcond=1e-12)[0]
-    return np.asarray(x * scale)

@@ -26,10 +26,10 @@ from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
 from .parameters import ACCEL, IMU
-from .parts import ends_of, parts_of
 from .problem import Problem, Series
 from .rotation import lengths
 from .sampling import with_sampling_errors
+from .scores import ends_of, parts_of
 from .static import fit_static
 from .theta import Prior, Theta
 from .tilt import fit_tilt

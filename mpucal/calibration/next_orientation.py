@@ -13,8 +13,8 @@ import numpy as np
 
 from ..data import Vector
 from .interim import InterimEstimate
-from .levenberg_marquardt import inverse
 from .likelihood import evaluate, trace
+from .normal_equations import inverse
 from .parameters import ACCELEROMETER, HAND, PLACES
 from .poses import POSE_MPS2
 from .preprocessing import CORRELATION_S, MOVING_RAD_S, jerk_density

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
-
-from ..frozen import dataclass
 
 
 class Reply(NamedTuple):

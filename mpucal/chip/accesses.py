@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from operator import attrgetter
 from typing import Any, Literal
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..clocks.sample_clock import Whole
-from ..frozen import dataclass
 from .access import Failure, Transaction
 from .registers import FIFO_R_W, FRAME_BYTES, FRAME_WORDS
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from ..errors import ChipError, UsageError
-from ..frozen import dataclass
 from . import registers as reg
 from .families import Part
 from .settings import Settings

@@ -8,10 +8,9 @@ Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ..errors import ChipError
-from ..frozen import dataclass
 from . import registers as reg
 
 # A full FIFO may show a frame less than its size.

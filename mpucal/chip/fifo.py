@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ import numpy as np
 from ..clocks.host_clock import HostClock
 from ..clocks.sample_clock import NS, PolledClock, SampleClock, Times, Whole, make_increasing
 from ..data import Mask, Recording, Samples, Sensor, Vector
-from ..frozen import dataclass
 from . import registers as reg
 from .bit_flips import BitFlipFilter, Counts
 from .losses import Loss

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from ..data import Vector
 from ..errors import BoardMoved, BusError, ChipError, UnknownOffsets
-from ..frozen import dataclass
 from .families import FAMILIES
 from .port import Port
 from .quick_measure import TemporaryMeasurement

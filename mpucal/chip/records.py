@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
-
-from ..frozen import dataclass
 
 # Names of session events. KEY holds the key under its own name; LATE: an answer was late; FORGET: samples
 # first..last-1 are not used; RESUMED: the session was resumed; UTC: the time of day, ns since 1970.

@@ -6,10 +6,11 @@ for the 6500 RM-MPU-9250A r1.4, registers 0 to 15, with the limits of Linux' dri
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from . import registers as reg
 from .families import Part
 from .port import Port

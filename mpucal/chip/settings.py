@@ -6,11 +6,11 @@ Source: RM-MPU-6000A r4.2 registers 25 to 28, RM-MPU-9250A r1.4 register 29.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Self
 
 from ..data import Sensor
 from ..errors import RecordingError
-from ..frozen import dataclass
 from . import registers as reg
 from .families import Part
 

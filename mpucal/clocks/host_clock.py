@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Vector
-from ..frozen import dataclass
 from .sample_clock import NS, Whole
 
 # A ceramic resonator is within 0.5 %, and RC oscillators within 1 %; warming moves either by some 50 ppm a minute.

@@ -6,12 +6,12 @@ the points on either side of it are searched in the same way.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from ..arguments import Vector
-from ..frozen import dataclass
 
 # A break must explain this many times the residual variance. Chance alone, over all places, stays below 30.
 LEAST_BREAK_RATIO = 100.0

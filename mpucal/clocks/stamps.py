@@ -12,6 +12,7 @@ a longer step between them is a gap, as it is to the estimate and to a driver th
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -20,7 +21,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..arguments import Mask, Vector
-from ..frozen import dataclass
 from .sample_clock import GAP_INTERVALS, NS, SampleClock, make_increasing
 
 FEWEST = 100

@@ -6,12 +6,11 @@ import json
 import platform
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Self
 
 from ..errors import SourceError
-from ..frozen import dataclass
 
 FORMAT, VERSION = "mpucal.doctor", 1
 TOPIC, WIDTH = 24, 100

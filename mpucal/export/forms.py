@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
-from ..frozen import dataclass
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..result.calibration import Calibration
 from . import arduino, c_code, esphome, i2cdevlib, linux_iio, python_modules, ros, vehicles, vio

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from ..chip.families import MPU6050, part_named
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS, mps2_per_lsb, rad_s_per_lsb
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
-from ..frozen import dataclass
 from .scan_elements import ScanElement
 
 AXES = "xyz"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
-from ..frozen import dataclass
 from .dialect import Message, dialect
 from .imu import DATAFLASH, HIGHRES, RAW, SCALED
 

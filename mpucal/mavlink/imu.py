@@ -7,11 +7,11 @@ milli-g and mrad/s, which ArduPilot and PX4 truncate toward zero.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..arguments import LARGEST
 from ..data import STANDARD_GRAVITY_MPS2
-from ..frozen import dataclass
 from .dialect import Message
 
 Xyz = tuple[float, float, float]

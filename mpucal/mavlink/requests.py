@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
 from ..errors import LinkError
-from ..frozen import dataclass
 from .dialect import Message, dialect
 from .firmwares import PX4
 from .link import Link, S

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..calibration.rotation import rotation
 from ..data import Vector
 from ..errors import LinkError
-from ..frozen import dataclass
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Still
 from ..rests.windows import of_rows

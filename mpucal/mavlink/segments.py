@@ -6,11 +6,11 @@ With known corrections, the output of an IMU under one is transformed to its out
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from .firmwares import EKF2_IMU_CTRL, PX4
 from .parameters.mounting import mounting
 from .parameters.slots import Correction, Slot, Values, find_slot, px4_slot

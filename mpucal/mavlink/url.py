@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import re
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from ..arguments import read_limited
 from ..errors import RecordingError, UsageError
-from ..frozen import dataclass
 
 FORMS = "udp:PORT, udp:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, or a serial device such as /dev/ttyACM0:115200"
 EVERYWHERE = "0.0.0.0"

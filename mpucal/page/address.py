@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import socket
+from dataclasses import dataclass
 from io import StringIO
-
-from ..frozen import dataclass
 
 LOOPBACK, LAN = "127.0.0.1", "lan"
 _ALL_INTERFACES = ("0.0.0.0", "::")

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import hmac
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import NamedTuple
-
-from ..frozen import dataclass
 
 PAGE_FILES = {
     "": ("page.html", "text/html; charset=utf-8"),

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..frozen import dataclass
 from ..result.calibration import Calibration
 from ..result.correlation import standard_deviations
 from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, UPPER, E, G

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +27,6 @@ from ..calibration.rotation import cross, turned
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S, carried
 from ..calibration.words import decode
 from ..data import Recording, Vector
-from ..frozen import dataclass
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from ..result.calibration import Calibration
 from ..result.error_model import AXES, MG_PER_MPS2
 from .observed import BETA, DELTA, UPPER, E, G

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..calibration.verification import BIAS_RAD_S, FLOOR_MPS2
 from ..data import Samples, Vector
-from ..frozen import dataclass
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Window, Windows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,6 @@ from ..calibration.likelihood import trace
 from ..calibration.preprocessing import Preprocessed, preprocess
 from ..calibration.theta import Theta
 from ..data import Mask, Recording, Vector
-from ..frozen import dataclass
 from ..rests.flat import find_flat, flat_statistics
 from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from ..result import error_model
 from ..result.calibration import REFUSED, Calibration, unknown
 

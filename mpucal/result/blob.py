@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import islice
 from typing import Any
-
-from ..frozen import dataclass
 
 MAGIC = b"MPUC"
 MAJOR = 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from pkgutil import resolve_name
@@ -19,7 +19,6 @@ from ..arguments import check_path, check_shape, check_vectors, read_limited
 from ..data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
-from ..frozen import dataclass
 from ..strict_json import MOST_BYTES, parse_json
 from .blob import NO_RANGE, Blob, BlobError
 from .correlation import UNCORRELATED

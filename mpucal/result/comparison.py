@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from . import error_model
 from .calibration import GOOD, Calibration
 from .correction import same_trim

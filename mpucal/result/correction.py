@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..data import Autopilot, Samples, Sensor
 from ..errors import UsageError
-from ..frozen import dataclass
 from ..origin import Origin
 from .calibration import Calibration
 

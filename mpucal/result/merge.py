@@ -9,14 +9,13 @@ are independent. D is the weighted mean: if D changes too, half of its change re
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..data import Vector
 from ..errors import RefusedError, UsageError
-from ..frozen import dataclass
 from ..reasons import reason
 from .calibration import GOOD, REFUSED, Calibration
 from .comparison import compare, in_body_frame

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,7 +15,6 @@ from ..arguments import read_limited
 from ..data import Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError
-from ..frozen import dataclass
 from ..strict_json import MOST_BYTES, parse_json
 from .calibration import Calibration
 from .document import plain

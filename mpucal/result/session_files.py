@@ -6,10 +6,9 @@ The table in docs/session.md has the same rows. A sink's files are in the sink's
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from itertools import count, takewhile
 from pathlib import Path
-
-from ..frozen import dataclass
 
 
 @dataclass(frozen=True)

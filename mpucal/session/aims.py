@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
 from ..data import Sensor, Vector
-from ..frozen import dataclass
 from ..origin import Origin
 from .events import Direction, Target
 

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
-from ..frozen import dataclass
 from ..origin import Origin, name_thing
 from ..result.orientation import AXES, named_axes
 from .events import Direction, Output

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from ..data import Samples, Sensor, Vector
-from ..frozen import dataclass
 from ..reasons import Reason
 
 Direction = tuple[float, float, float]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
@@ -11,7 +11,6 @@ from ..chip.config import Config
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
 from ..files.recorders import CHIP, DRIVER, recorder_of
-from ..frozen import dataclass
 from .aims import AIMS, NORMAL
 from .boards import BOARDS
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..data import Samples, Vector
-from ..frozen import dataclass
 from ..rests.limits import HAND, UNTOUCHED
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from ..result.error_model import MG_PER_MPS2
 from .legs import minimum_jerk
 from .rotation import cross_rows

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from enum import StrEnum
 from errno import EREMOTEIO, ETIMEDOUT
 from functools import partial
 from typing import Self
 
 from ..chip.registers import FIFO_COUNT_H, FIFO_R_W
-from ..frozen import dataclass
 from .disturbance import Change, Mishap, knock, slip, warming, zero_step
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..calibration.rotation import shortest_turn
 from ..data import Vector
-from ..frozen import dataclass
 from ..mavlink.texts import Prompt
 from . import rotation
 from .disturbance import Change, Mishap

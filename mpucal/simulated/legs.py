@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from . import rotation
 
 STEP_HZ = 2000

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from ..data import Vector
-from ..frozen import dataclass
 from ..mavlink.texts import Prompt
 from . import rotation
 from .disturbance import (

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, Self, get_origin, get_type_hints
 
 from ..errors import UsageError, did_you_mean
-from ..frozen import dataclass
 from .faults import Fault, Where, fault_kinds
 
 FAULT = "fault"

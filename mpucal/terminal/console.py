@@ -8,9 +8,9 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Any, Protocol, TextIO
 
-from ..frozen import dataclass
 from ..report.units import UNKNOWN
 from ..result.document import plain
 from ..session.boards import BOARD

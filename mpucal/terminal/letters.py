@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import codecs
 from collections.abc import Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TextIO
-
-from ..frozen import dataclass
 
 ROWS = 5
 WIDTH, GAP = 5, 1

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise, product
 
 from rich.text import Text
 
-from ..frozen import dataclass
 from ..session.attitude import rotate
 from ..session.boards import BOARDS
 from ..session.events import Direction, Quaternion

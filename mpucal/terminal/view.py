@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from ..frozen import dataclass
 from ..session import events
 from ..session.attitude import rotate
 from ..session.boards import BOARD, flat_description

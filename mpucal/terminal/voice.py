@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from enum import StrEnum
 
-from ..frozen import dataclass
 from ..session.events import Caution, Held, Prompt, PromptKind, Use
 from .view import HEADLINES, USE_HEADLINES, Moment, View
 

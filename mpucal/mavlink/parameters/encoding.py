@@ -6,12 +6,12 @@ import math
 import re
 import struct
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import RecordingError
-from ...frozen import dataclass
 from ..dialect import HEADER, Message
 from ..firmwares import PX4
 

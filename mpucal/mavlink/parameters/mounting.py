@@ -9,11 +9,11 @@ it.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
-from ...frozen import dataclass
 from ..dialect import dialect
 from ..firmwares import PX4
 from .slots import AXES, Correction, Slot, Values

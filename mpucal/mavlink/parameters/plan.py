@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...data import Vector
 from ...errors import WriteBackError
-from ...frozen import dataclass
 from ...result.calibration import REFUSED, Calibration
 from ...result.comparison import is_better
 from ..imu import Stream, live_stream

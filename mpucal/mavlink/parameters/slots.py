@@ -11,12 +11,11 @@ R_b M (s - o') is f itself. An autopilot holds M's diagonal only.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
-from ...frozen import dataclass
 from ..firmwares import PX4
 
 

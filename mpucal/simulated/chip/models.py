@@ -6,7 +6,7 @@ means 2620 * 1.01^(c - 1) counts at the smallest full scale (also in Linux' driv
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from ...chip import registers as reg
 from ...chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6880, MPU6886, Family
 from ...data import Vector
-from ...frozen import dataclass
 
 Whole = NDArray[np.int64]
 Three = tuple[float, ...]

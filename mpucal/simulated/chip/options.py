@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from ...data import Vector
-from ...frozen import dataclass
 from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_CHIP, Fault, Where
 from ..hands import HANDS

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Annotated
 
-from ...frozen import dataclass
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES
 from ...mavlink.parameters.slots import ARDUPILOT_IMUS
 from ..disturbance import ARMS, USUAL_ARM

@@ -1,0 +1,52 @@
+"""Scores of the parts of a series at a minimum."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .levenberg_marquardt import Minimum
+from .likelihood import evaluate, part_scores
+from .parts import Parts
+from .problem import Problem
+from .theta import Prior
+
+MOST_PARTS, FEWEST_SAMPLES = 96, 16
+
+
+def ends_of(problem: Problem) -> NDArray[np.int64] | None:
+    """Return (k,) where the parts of a problem end; None for a series too short to be cut."""
+    n = len(problem.series)
+    k = min(MOST_PARTS, n // FEWEST_SAMPLES)
+    return np.arange(1, k + 1, dtype=np.int64) * n // k if k > 1 else None
+
+
+def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
+    """Return the parts of a problem at its minimum; None for a series too short to be cut.
+
+    A minimum that was found with sums up to the parts' ends needs no further pass of the filter.
+    """
+    series, theta, free, ends = problem.series, minimum.theta, minimum.free, ends_of(problem)
+    if ends is None:
+        return None
+    seen, at = minimum.seen
+    to_ends = at.to_ends or evaluate(problem, seen, len(free), ends).to_ends
+    assert to_ends is not None
+    scores, k = part_scores(problem, seen, len(free), to_ends).moved(minimum.last), len(ends)
+    t = np.concatenate([[0.0], np.cumsum(series.dt)])
+    starts = np.concatenate([[0], ends[:-1]]).astype(np.intp)  # 32 bits on some ARMs
+    mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]
+    s = (mean - theta.b_a) @ theta.inverse.T
+    axis = np.abs(s).argmax(1)
+    away, precision = theta.values()[: len(free)] - prior.mean[: len(free)], prior.precision[: len(free)]
+    left = scores.gradient.sum(0) + scores.flat.gradient + precision * away
+    H = scores.fisher.sum(0) + scores.flat.fisher + np.diag(precision)
+    return Parts(
+        scores.gradient[:, free],
+        scores.fisher[:, free][:, :, free],
+        H[np.ix_(free, free)],
+        left[free],
+        t[starts],
+        t[ends],
+        2 * axis + (s[np.arange(k), axis] > 0.0),
+    )
