@@ -79,6 +79,23 @@ def test_columns_of_several_places(name, place, walk, assert_same, table):
     assert f"of its columns, those called {place} were read" in found.taken
 
 
+@pytest.mark.parametrize(
+    ("of", "place"),
+    [
+        (("accelerometer_lsm6ds3_c.{}", "mag.{}", "linear_Acceleration.{}", "gyroscope_lsm6ds3_c.{}"), "lsm6ds3 c"),
+        (("KX_imu_a{}", "imu_m{}", "euler_{}", "imu_g{}"), "KX"),
+        (("Accel{}_high", "Mag{}", "v{}", "Gyro{}"), "high"),
+    ],
+)
+def test_columns_with_a_chips_name(of, place, walk, assert_same, table):
+    """Read them beside the linear acceleration of a phone, and where only the accelerometer has such a name."""
+    header = ["timestamp", *(name.format(axis) for name in of for axis in "xyz")]
+    made = table(",".join(header), walk.t, walk.acc, 0.1 * walk.acc, 0.2 * walk.gyr, walk.gyr)
+    found = mpucal.load(made)
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert f"of its columns, those called {place} were read" in found.taken
+
+
 def test_columns_of_no_axis_name_no_places(monkeypatch):
     """Search a wide table of other things only once for an IMU."""
     table = Table("wide", [f"mean_of_{number}_value" for number in range(300)], [])

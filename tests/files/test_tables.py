@@ -60,6 +60,10 @@ COLUMNS = {
     "micros": lambda w, ns: dates(w).astype(int) % 10**6,
     "minutes": lambda w, ns: minutes(w),
     "serial": lambda w, ns: 45413.5 + w.t / 86400,
+    "min": lambda w, ns: w.t / 60,
+    "h": lambda w, ns: 0.25 + w.t / 3600,
+    "dashes": lambda w, ns: [f"{date.item():%Y-%-m-%-d--%H-%M-%S-%f}"[:-3] for date in dates(w)],
+    "unpadded": lambda w, ns: [f"12:{n // 600:02}:{n // 10 % 60:02}.{n % 10 * 100 + 50}" for n in range(len(w))],
     "overflow": lambda w, ns: (2**32 - 5_000_000 + np.rint(w.t * 1e6).astype(np.int64)) % 2**32,
     "digits": lambda w, ns: [f"{date.item():%Y%m%d%H%M%S%f}"[:-3] for date in dates(w)],
     "hhmmss": lambda w, ns: [f"{date.item():%H%M%S.%f}" for date in dates(w) + 45_000_000],
@@ -331,6 +335,12 @@ FORMS = {
     ),
     "numbers of rows without a name": Form(f"time,{AXES}", "i t a w"),
     "days": Form(f"Time,{AXES}", "serial a w", says="times in days"),
+    "minutes by name": Form(f"Time (min),{AXES}", "min a w", says="times in min,"),
+    "hours by name": Form(f"time [h],{AXES}", "h a w", says="times in h,"),
+    "a date with dashes alone": Form(f"Time,{AXES}", "dashes a w", says="times in ns"),
+    "Xsens MTi without a heading": Form(
+        "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n", "i ticks a w", says="times in 0.1ms"
+    ),
     "a counter that overflows": Form(
         f"micros,{AXES}", "overflow a w", says="times in us, whose counter overflows 1 times"
     ),
@@ -759,13 +769,23 @@ def driven(order, acc_at_rest, spread):
         "acc": np.array(acc_at_rest) + rng.normal(0.0, spread, (900, 3)),
         "gyr": rng.normal(0.0, 0.1, (900, 3)),
         "mag": np.array([20.0, -4.0, 40.0]) + rng.normal(0.0, 1.0, (900, 3)),
+        "label": np.zeros(900),
     }
+    # seldom turned, through a field that varies more
+    sensors["slow"] = np.rint(sensors["gyr"] * 4.0) + (n[:, None] > 20) * [0.0, 0.5, 1.0]
+    sensors["mag"] *= np.where(n > 600, 8.0, 1.0)[:, None] if "slow" in order else 1.0
     return np.column_stack([14953 + n, 4908.696 + n / 100, *(sensors[of] for of in order.split())])
 
 
 @pytest.mark.parametrize(
     ("order", "said"),
-    [("gyr acc", "-,t,gx,gy,gz,ax,ay,az"), ("acc mag gyr", "-,t,ax,ay,az,-,-,-,gx,gy,gz"), ("gyr mag", None)],
+    [
+        ("gyr acc", "-,t,gx,gy,gz,ax,ay,az"),
+        ("acc mag gyr", "-,t,ax,ay,az,-,-,-,gx,gy,gz"),
+        ("label acc gyr", "-,t,-,ax,ay,az,gx,gy,gz"),
+        ("acc slow mag", "-,t,ax,ay,az,gx,gy,gz"),
+        ("gyr mag", None),
+    ],
 )
 def test_the_command_for_unknown_columns_works_at_once(order, said, tmp_path):
     np.savetxt(tmp_path / "drive.txt", driven(order, [0.0, 0.0, G], 6.0))
@@ -956,6 +976,14 @@ def test_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
     np.testing.assert_array_equal(found.acc, walk.acc)
     assert np.flatnonzero(found.gap).tolist() == [half]
     assert np.diff(found.t)[half - 1] == pytest.approx(15.0, abs=0.02)
+
+
+def test_times_of_day_that_go_back_are_no_counter_that_overflows(read, walk):
+    """Refuse fractions of a second whose first zeros were not written, whichever way the times are named."""
+    order = {"columns": "t,ax,ay,az,gx,gy,gz"}
+    for head, hints in ((f"time,{AXES}", {}), ("", order)):
+        with pytest.raises(RecordingError, match="time does not increase at sample"):
+            read(head, "unpadded a w", **hints)
 
 
 def test_fractions_of_a_second_are_no_milliseconds(read, walk):

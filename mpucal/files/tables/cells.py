@@ -37,7 +37,11 @@ _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.
 _COMPACT = re.compile(
     r"(20\d\d)(0[1-9]|1[0-2])([0-3]\d)[T_ -]?([01]\d|2[0-3])([0-5]\d)([0-5]\d)[._]?(\d{0,6})(Z?)"
 ).fullmatch
-# the same without the date, as the first cell of a column has it; the numbers then show if it is one
+# the same with marks other than those of ISO 8601 between all parts: 2024-5-1--12-03-04-123
+_MARKED = re.compile(
+    r"(20\d\d)[-_/.](\d\d?)[-_/.](\d\d?)[-_ T]{1,2}(\d\d?)[-_.](\d\d?)[-_.](\d\d?)(?:[-_.,:](\d{1,6}))?(Z?)"
+).fullmatch
+# the time of day without the date, as the first cell of a column has it; the numbers then show if it is one
 OF_DAY = re.compile(r"\s*([01]\d|2[0-3])([0-5]\d){2}(\.\d+|\d{3})?\s*").fullmatch
 _ISO = re.compile(r"\d{4}-\d\d-\d\d").match
 _MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
@@ -79,8 +83,8 @@ def parse_cell(text: str) -> Decimal:
     ValueError : it is none of these.
     """
     text = text.strip()
-    if compact := _COMPACT(text):
-        text = "{}-{}-{}T{}:{}:{}.{:0<6}{}".format(*compact.groups())
+    if found := _COMPACT(text) or _MARKED(text):
+        text = "{}-{:0>2}-{:0>2}T{:0>2}:{:0>2}:{:0>2}.{:0<6}{}".format(*found.groups(""))
     try:
         number = Decimal(with_point(text))
         if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
@@ -130,7 +134,8 @@ def is_number(cell: str, dates: bool = True) -> bool:
     """Return True if a cell holds a number, or a date or time of day if `dates`."""
     try:
         parse_cell(cell)
-        return dates or (not _COMPACT(cell.strip()) and Decimal(with_point(cell.strip())).is_finite())
+        text = cell.strip()
+        return dates or (not (_COMPACT(text) or _MARKED(text)) and Decimal(with_point(text)).is_finite())
     except (ValueError, InvalidOperation):
         return False
 

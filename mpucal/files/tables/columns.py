@@ -15,6 +15,7 @@ from .cells import Kind
 from .guess import guess_columns, is_even_clock, likely_columns
 from .names import (
     ACC,
+    CHOSEN,
     COUNTER,
     ESTIMATED,
     GYR,
@@ -85,7 +86,7 @@ def columns_by_hint(header: Sequence[str], roles: Mapping[str, str | int]) -> li
         known = parse_column_name(name, place)
         quantity = TIME if role == "t" else ACC if role[0] == "a" else GYR
         unit = known.unit if known and known.quantity == quantity else ""
-        found.append(Column(name, place, quantity, "xyz".find(role[-1]) if role != "t" else 0, unit))
+        found.append(Column(name, place, quantity, "xyz".find(role[-1]) if role != "t" else 0, unit, CHOSEN))
     return found
 
 

@@ -7,7 +7,7 @@ units. Nothing is guessed that physics does not confirm.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from .units import QUANTITIES
 
 # place -> (n,)
 Columns = Mapping[int, Vector]
+Places = tuple[int, ...]
 WIDEST = 16
 # relative error of |a| at rest that is still nearly 1 g: the scale factors and biases of usual sensors
 ONE_G = 0.04
@@ -62,7 +63,11 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
             if found is not None:
                 return dict(zip(ROLES[1:], found, strict=True)) | ({} if at is None else {"t": at})
     # a board that hardly turned: the only triple of columns as long as gravity
-    found_alone = [triple for triple in _triples(of, clocks[:1]) if _is_one_g(_stacked(of, triple))]
+    found_alone = [
+        triple
+        for triple in _triples([place for place in of if place not in clocks[:1]])
+        if _is_one_g(_stacked(of, triple))
+    ]
     alone = dict(zip(ROLES[1:4], found_alone[0], strict=True)) if len(found_alone) == 1 else {}
     return alone | (dict(zip("t", clocks, strict=False)) if alone else {})
 
@@ -74,21 +79,33 @@ def likely_columns(of: Columns, clocks: Sequence[int]) -> tuple[dict[str, int], 
     """
     increasing = [place for place in of if is_clock(of[place])]
     clocks = clocks or [place for place in increasing if is_even_clock(of[place])]
-    triples = {triple: _stacked(of, triple) for triple in _triples(of, {*clocks, *increasing})}
-    sized = [triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)]
+    places = [place for place in of if place not in {*clocks, *increasing}]
+    vary = [place for place in places if np.ptp(of[place]) > 0.0]
+    # other columns may be before theirs, such as a label that never changes
+    alignments = [_sized_triples(of, some) for some in (places, vary, vary[1:], vary[2:])]
+    triples, sized, acc = next((found for found in alignments if found[2]), alignments[0])
     if not sized:
         return None if triples else ({}, "")
-    acc = next((triple for triple in sized if _keeps_size(triples[triple])), sized[0])
-    # rates are none at times, other than a magnetic field
-    others = sorted((triple for triple in triples if triple != acc), key=lambda triple: _steadiness(triples[triple]))
+    acc = acc or sized[0]
+    values, t = triples[acc], _seconds(next((of[at] for at in clocks if at in of), None), len(triples[acc]), Hints())
+    # rates turn gravity and are none at times, other than a magnetic field
+    others = [triple for triple in triples if triple != acc]
+    others.sort(key=lambda triple: _least(triples[triple]) - turning(t, values, triples[triple])[1])
     found = [place for triple in (acc, *others[:1]) for place in triple]
     roles = dict(zip(ROLES[1:], found, strict=False)) | dict(zip("t", clocks, strict=False))
-    return roles, "" if _has_size(triples[acc]) else mean_acceleration_unit(triples[acc])
+    return roles, "" if _has_size(values) else mean_acceleration_unit(values)
 
 
-def _triples(of: Columns, without: Collection[int]) -> list[tuple[int, ...]]:
+def _sized_triples(of: Columns, places: Sequence[int]) -> tuple[dict[Places, Vector], list[Places], Places]:
+    """Return the triples of columns, those that may be as long as gravity, and the first that keeps its length."""
+    triples = {triple: _stacked(of, triple) for triple in _triples(places)}
+    sized = [triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)]
+    steady = (triple for triple in sized if _keeps_size(triples[triple]) and all(np.ptp(of[at]) > 0.0 for at in triple))
+    return triples, sized, next(steady, ())
+
+
+def _triples(places: Sequence[int]) -> list[tuple[int, ...]]:
     """Return the places of the columns in threes."""
-    places = [place for place in of if place not in without]
     return [tuple(places[first : first + 3]) for first in range(0, len(places) - 2, 3)]
 
 
@@ -97,10 +114,10 @@ def _stacked(of: Columns, places: Sequence[int]) -> Vector:
     return to_signed(np.column_stack([of[place] for place in places]))
 
 
-def _steadiness(values: Vector) -> float:
-    """Return the first quartile of the lengths of (n, 3) over their median."""
-    low, size = np.percentile(np.linalg.norm(values, axis=1), [25, 50]).tolist()
-    return low / size if size else 0.0
+def _least(values: Vector) -> float:
+    """Return about the least length of (n, 3) numbers, over their median."""
+    least, size = np.percentile(np.linalg.norm(values, axis=1), [1, 50]).tolist()
+    return least / size if size else 0.0
 
 
 def _is_one_g(acc: Vector) -> bool:

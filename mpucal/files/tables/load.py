@@ -22,6 +22,7 @@ from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
 from .names import (
     ACC,
     BY_A_WORD,
+    CHOSEN,
     GYR,
     TEMPERATURE,
     TIME,
@@ -233,7 +234,7 @@ def sensor_stream(
     for clock in sorted(of_sensor, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit)):
         has = kept if others else ~empty | table.has(clock)
         found = table.times(clock, has)
-        weak = clock.rank == BY_A_WORD or clock.name.strip().lower() == "t"
+        weak = clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() == "t")
         is_time = _increases(found[0]) if weak else True
         # the numbers of samples are no times
         if is_time and (found[2] or not is_index(found[0])):

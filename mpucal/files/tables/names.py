@@ -57,6 +57,8 @@ STEMS = {
 UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}
 # SensorLog has a clock for each sensor
 SENSOR_CLOCKS = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
+# counts of 0.1 ms (Xsens MTi) or of us (Movella DOT), and the longest step of the former, of 5 Hz
+COUNTS_OF_XSENS, LONGEST_OF_MTI = "sampletimefine", 2000
 COLDEST_C, WARMEST_C = -60.0, 130.0
 # iOS has the opposite sign of specific force: at rest it reads -1 g along the axis that points upwards
 FLIPPED_STEMS = ("accelerometeracceleration",)
@@ -69,6 +71,8 @@ ESTIMATED = re.compile(r"gravity|^mag|magnet|quat|^q[_.]?[wxyz0-3]$", re.IGNOREC
 COUNTER = re.compile(r"^(?!.*(?:stamp|time)).*(?:packet|number|index|sequence|frame|sample|counter)", re.IGNORECASE)
 # names that are remembered
 MOST_NAMES = 1024
+# the rank of a column that the user or physics chose
+CHOSEN = -1
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
 BY_A_WORD = len(STEMS[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")

@@ -17,7 +17,7 @@ from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind
-from .names import ACC, GYR, Column, first_triple, parse_column_name, parse_header
+from .names import ACC, GYR, WITHOUT_GRAVITY, Column, first_triple, parse_column_name, parse_header
 from .shown_units import BEYOND
 from .table import Table
 
@@ -40,16 +40,17 @@ _BETWEEN, MOST_WORDS = re.compile(r"[_ .\-]+"), 6
 def of_one_place(table: Table) -> Table:
     """Return a table without the words by which the names of the first accelerometer and gyroscope say where they are.
 
-    AccelX_right_leg is AccelX, if there is a whole IMU called so. The same table if its columns are known as they are.
+    AccelX_right_leg is AccelX, if there is a whole IMU called so, or a gyroscope without such words. The same table if
+    its columns are known as they are, other than of an acceleration without gravity beside no gyroscope.
     """
-    if first_triple(table.columns, ACC):
+    known = first_triple(table.columns, ACC)
+    if known and (first_triple(table.columns, GYR) or not WITHOUT_GRAVITY.match(known[0].name)):
         return table
     split = [_BETWEEN.split(name.strip()) for name in table.header]
     for place in dict.fromkeys(place for words in split for place in _places(words)):
-        header = ["_".join(_without(place, of)) for of in split]
-        found = parse_header(header)
-        if first_triple(found, ACC) and first_triple(found, GYR):
-            names = [short or name for short, name in zip(header, table.header, strict=True)]
+        short = ["_".join(_without(place, of)) for of in split]
+        names = [of or name for of, name in zip(short, table.header, strict=True)]
+        if first_triple(parse_header(short), ACC) and first_triple(parse_header(names), GYR):
             said = f"of its columns, those called {' '.join(place)} were read"
             return replace(table, header=names, remarks=(*table.remarks, said))
     return table

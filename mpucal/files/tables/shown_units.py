@@ -12,12 +12,16 @@ import math
 import numpy as np
 
 from ...data import ACCEL_COUNTS, GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
-from .units import QUANTITIES
+from .units import DAYS, QUANTITIES
 
 # counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 20 at ±0.5 g or 24 at ±8 g; and the largest count
 FEWEST_PER_G, MOST_PER_G, MOST_COUNTS = 8, 20, 2.0**23
 # the units that samples show without a name; the others are too near to these, to counts, or to a magnetic field in uT
-SHOWN = {"acc": ("m/s^2", "g", "mg"), "gyr": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h")}
+SHOWN = {
+    "t": ("s", "ms", "us", "ns", "0.1ms", DAYS),
+    "acc": ("m/s^2", "g", "mg"),
+    "gyr": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
+}
 SLOWEST_HZ, FASTEST_HZ = 5.0, 8000.0
 # s: the longest step in a named unit; such a recording is too slow to calibrate, but readable
 SLOW_S = 2.0
@@ -52,8 +56,8 @@ def time_unit(step: float, said: str = "") -> str:
     """Return the unit of times that lie `step` apart: `said` if plausible, else by the sample rate; or empty."""
     if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= SLOW_S:
         return said
-    units = QUANTITIES["t"].items()
-    return next((unit for unit, s in units if 1 / FASTEST_HZ <= step * s <= 1 / SLOWEST_HZ), "")
+    of = QUANTITIES["t"]
+    return next((unit for unit in SHOWN["t"] if 1 / FASTEST_HZ <= step * of[unit] <= 1 / SLOWEST_HZ), "")
 
 
 def acceleration_unit(acc: Vector, said: str = "") -> str:

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clocks.stamps import sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from .cells import DAY_NS, Cells, Kind, is_number, kind_of, parse_cell, since_first, since_midnight, with_point
-from .names import NANOSECONDS, TIME, Column, parse_header
+from .names import COUNTS_OF_XSENS, LONGEST_OF_MTI, NANOSECONDS, TIME, Column, parse_header
 from .units import NS, QUANTITIES, find_unit
 
 # the share of lines that may be damaged
@@ -146,7 +147,10 @@ class Table:
             more = self._exact(parts[0], kept) * ticks
             if len(more) and max(more) < NS:
                 found, unit = found * (1 if unit == "ns" else NS) + more, "ns"
-        return *since_first(found), unit
+        since, first = since_first(found)
+        if not unit and column.name.strip().lower() == COUNTS_OF_XSENS and sample_period(since) <= LONGEST_OF_MTI:
+            unit = "0.1ms"
+        return since, first, unit
 
     def _exact(self, column: Column, kept: Mask) -> NDArray[Any]:
         """Return times without rounding: whole numbers, decimals, or floats if the file holds such."""

@@ -105,7 +105,7 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
         return Clock(stream.number / rate_hz, are_gaps(stream.number), rate_hz), f"a rate of {rate_hz:g} Hz"
     if not (np.abs(stream.ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
-    ticks, wraps = _unwrap(stream.ticks + float(stream.origin - first.origin))
+    ticks, wraps = _unwrap(stream.ticks + float(stream.origin - first.origin), float(first.origin))
     step, named = sample_period(ticks), hints.units.get("t", stream.time_unit)
     # milliseconds are whole numbers: a fraction of them is a slow recording's second
     slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
@@ -136,12 +136,16 @@ def _unit_of_date(origin: Decimal) -> str:
     return next(units_of_dates, "")
 
 
-def _unwrap(ticks: Vector) -> tuple[Vector, int]:
-    """Return times (n,) of which a counter of COUNTER_BITS overflowed as if it had not, and how often it did."""
-    steps = np.diff(ticks)
-    usual = float(np.median(np.abs(steps))) if len(steps) else 0.0
+def _unwrap(ticks: Vector, origin: float) -> tuple[Vector, int]:
+    """Return times (n,) of which a counter of COUNTER_BITS overflowed as if it had not, and how often it did.
+
+    Times count from `origin`. A counter goes on at its lowest number, which is not that of times of day.
+    """
+    steps, after = np.diff(ticks), ticks[1:] + origin
+    most = OVERFLOW_STEPS * float(np.median(np.abs(steps))) if len(steps) else 0.0
     for size in (2.0**bits for bits in COUNTER_BITS):
-        over = (steps < 0.0) & (steps + size >= 0.0) & (steps + size <= OVERFLOW_STEPS * usual)
+        begins = [(after >= lowest) & (after <= lowest + most) for lowest in (0.0, -size / 2)]
+        over = (steps < 0.0) & (steps + size >= 0.0) & (steps + size <= most) & np.any(begins, axis=0)
         if over.any():
             return ticks + size * np.append(0, np.cumsum(over)), int(over.sum())
     return ticks, 0

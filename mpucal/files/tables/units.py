@@ -11,7 +11,7 @@ NS = 1_000_000_000
 COUNTS, DAYS = "counts", "days"
 # quantity -> unit -> SI
 QUANTITIES = {
-    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4, DAYS: 86400.0},
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4, DAYS: 86400.0, "h": 3600.0, "min": 60.0},
     "acc": {
         "m/s^2": 1.0,
         "g": STANDARD_GRAVITY_MPS2,
@@ -44,6 +44,8 @@ _SPELLED = {
     "us": "us usec micros microsec microsecond microseconds",
     "ns": "ns nsec nanos nanosec nanosecond nanoseconds",
     DAYS: "d day days",
+    "h": "h hr hrs hour hours",
+    "min": "min mins minute minutes",
     "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/(s2) m/s**2 meters/second2 m/sec2",
     "g": "g gs g's g-force gforce gee g0",
     "mg": "mg milli-g millig",
