@@ -124,12 +124,16 @@ class BridgeBus:
         self.link.close()
 
     def _wait(self, left_ns: Callable[[int], int]) -> None:
-        """Take what is pushed until `left_ns` of the host's time is 0."""
-        while (left := left_ns(host_ns := self._port.now_ns())) > 0:
+        """Take what is pushed until `left_ns` of the host's time is 0; a late program takes what came until now."""
+        begun_ns = self._port.now_ns()
+        while True:
+            left = left_ns(host_ns := self._port.now_ns())
             try:
-                self.link.wait(host_ns + left)
+                heard_ns = self.link.wait(host_ns + max(left, 0))
             except BusError:
                 # The next access raises it.
+                return
+            if left <= 0 and (heard_ns is None or heard_ns >= begun_ns):
                 return
 
     def _wait_out_of_step(self) -> None:
@@ -187,10 +191,11 @@ class BridgeBus:
         give_up_ns = self._port.now_ns() + GONE_NS + self.link.latency.most_ns
         while not ahead.can_count:
             try:
-                if self._port.now_ns() >= give_up_ns:
-                    raise LinkLost(*no_reply(self._port.name))
                 self._chip.repeat_if_overdue()
-                self.link.wait(min(give_up_ns, self._port.now_ns() + REPEAT_NS))
+                heard_ns = self.link.wait(min(give_up_ns, self._port.now_ns() + REPEAT_NS))
+                # What came in time counts, also if this busy program reads it late.
+                if (self._port.now_ns() if heard_ns is None else heard_ns) >= give_up_ns:
+                    raise LinkLost(*no_reply(self._port.name))
             except BusError as error:
                 self._recover(error)
                 raise

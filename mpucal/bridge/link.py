@@ -157,17 +157,18 @@ class Link:
         """Return the sequence number of the next request (n = 0), or of the n-th after it."""
         return (self._seq + 1 + n) % 256
 
-    def wait(self, until_ns: int) -> bool:
-        """Take what is pushed until the host's clock shows `until_ns`; return True as soon as something came.
+    def wait(self, until_ns: int) -> int | None:
+        """Take what is pushed until the host's clock shows `until_ns`; return as soon as something came, with its time.
 
         Raises
         ------
         BusError : the port is gone.
         """
         chunk = self.port.read(until_ns)
-        if chunk is not None:
-            self._handle(chunk, [])
-        return chunk is not None
+        if chunk is None:
+            return None
+        self._handle(chunk, [])
+        return chunk.t_ns
 
     def close(self) -> None:
         """Close the port."""

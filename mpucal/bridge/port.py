@@ -1,18 +1,31 @@
-"""Serial port of pyserial, read by its own thread, so that no bytes are lost while the host computes."""
+"""Serial port of pyserial, read by a process or thread of its own, so that no bytes are lost while the host computes.
+
+A process is scheduled by itself, however busy the session is, and the time of an arrival is that of the read. Systems
+other than Linux, and ports without a file descriptor, have a thread.
+"""
 
 from __future__ import annotations
 
+import errno
+import os
 import queue
 import select
+import signal
 import time
-from contextlib import suppress
+from collections import deque
+from contextlib import closing, suppress
+from functools import partial
+from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from ..errors import BusError, UsageError
+from ..sources.chip import CAN_FORK
 from .port_errors import opening_error, other_ports, port_gone
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
     from serial import Serial
 
 # Rate of a bridge, and of one for which that is too fast.
@@ -22,6 +35,8 @@ CHUNK_BYTES = 4096
 # Several minutes of a bridge's bytes: a port with more unread ones is flooded.
 UNREAD_CHUNKS = 1 << 14
 REOPEN_S = 0.25
+# Errors of pyserial for a port that was unplugged or closed.
+GONE = (OSError, ValueError, TypeError)
 
 
 class Chunk(NamedTuple):
@@ -87,9 +102,7 @@ class SerialPort:
         if not text:
             raise UsageError("no serial port was named", other_ports())
         self.name, self.bauds = split_port(text, bauds)
-        self._chunks: queue.SimpleQueue[Chunk | BusError] = queue.SimpleQueue()
-        self._closing = Event()
-        self._thread: Thread | None = None
+        self._failure: BusError | None = None
         self._open()
 
     def now_ns(self) -> int:
@@ -98,13 +111,9 @@ class SerialPort:
 
     def read(self, until_ns: int) -> Chunk | None:
         """See Port."""
-        try:
-            got = self._chunks.get(timeout=max(0, until_ns - time.monotonic_ns()) * 1e-9)
-        except queue.Empty:
-            return None
+        got = self._failure or self._reader.get(max(0, until_ns - time.monotonic_ns()) * 1e-9)
         if isinstance(got, BusError):
-            # The next read raises it again.
-            self._chunks.put(got)
+            self._failure = got
             raise got
         return got
 
@@ -138,9 +147,7 @@ class SerialPort:
 
     def close(self) -> None:
         """See Port."""
-        self._closing.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._reader.close()
         with suppress(OSError):
             self._serial.close()
 
@@ -154,12 +161,11 @@ class SerialPort:
         # By default an FTDI adapter holds bytes back for 16 ms.
         with suppress(AttributeError, NotImplementedError, OSError, ValueError):
             self._serial.set_low_latency_mode(True)
-        self._chunks = queue.SimpleQueue()
-        self._closing = Event()
-        self._thread = Thread(
-            target=_read_loop, args=(self._serial, self._chunks, self._closing, self.name), name=self.name, daemon=True
+        self._failure = None
+        handle = _handle(self._serial) if CAN_FORK else None
+        self._reader: Reader = (
+            ThreadReader(self._serial, self.name) if handle is None else ProcessReader(handle, self.name)
         )
-        self._thread.start()
 
 
 def split_port(text: str, bauds: tuple[int, ...] = BAUDS) -> tuple[str, tuple[int, ...]]:
@@ -170,29 +176,118 @@ def split_port(text: str, bauds: tuple[int, ...] = BAUDS) -> tuple[str, tuple[in
     return text, bauds[:1] if "://" in text else bauds
 
 
-def _read_loop(serial: Serial, chunks: queue.SimpleQueue[Chunk | BusError], closing: Event, name: str) -> None:
-    """Read until the port is closed or gone."""
-    try:
-        while not closing.is_set():
-            if chunks.qsize() >= UNREAD_CHUNKS:
-                closing.wait(WAKE_S)
-                continue
-            data = _read_available(serial)
-            if data:
-                chunks.put(Chunk(data, time.monotonic_ns()))
-    except (OSError, ValueError, TypeError) as error:
-        # These are pyserial's errors for a port that was unplugged or closed.
-        failure = port_gone(name)
-        failure.__cause__ = error
-        chunks.put(failure)
+class Reader(Protocol):
+    """Reads the bytes that a serial port receives, from when it is made until it is closed."""
+
+    def get(self, timeout_s: float) -> Chunk | BusError | None:
+        """Return the next chunk, or the error that ended the reading; None if there is none within `timeout_s`."""
+        ...
+
+    def close(self) -> None:
+        """Stop reading."""
+        ...
+
+
+class ThreadReader:
+    """Reader in a thread; see Reader."""
+
+    def __init__(self, serial: Serial, name: str) -> None:
+        self._serial, self._name = serial, name
+        self._chunks: queue.SimpleQueue[Chunk | BusError] = queue.SimpleQueue()
+        self._closing = Event()
+        self._thread = Thread(target=self._read, name=name, daemon=True)
+        self._thread.start()
+
+    def get(self, timeout_s: float) -> Chunk | BusError | None:
+        """See Reader."""
+        with suppress(queue.Empty):
+            return self._chunks.get(timeout=timeout_s)
+        return None
+
+    def close(self) -> None:
+        """See Reader."""
+        self._closing.set()
+        self._thread.join()
+
+    def _read(self) -> None:
+        try:
+            while not self._closing.is_set():
+                if self._chunks.qsize() >= UNREAD_CHUNKS:
+                    self._closing.wait(WAKE_S)
+                elif data := _read_available(self._serial):
+                    self._chunks.put(Chunk(data, time.monotonic_ns()))
+        except GONE as error:
+            self._chunks.put(_gone(self._name, error))
+
+
+class ProcessReader:
+    """Reader of a file descriptor in a process, which ends with this one; see Reader."""
+
+    def __init__(self, handle: int, name: str) -> None:
+        from ..sources.reading_process import start_reading  # noqa: PLC0415 - for an open port alone
+
+        self._name = name
+        self._arrived: deque[Chunk | BusError] = deque()
+        self._process, self._pid = start_reading(partial(_read_apart, handle, name))
+
+    def get(self, timeout_s: float) -> Chunk | BusError | None:
+        """See Reader."""
+        try:
+            if not self._arrived and self._process.poll(timeout_s):
+                self._arrived.extend(self._process.recv())
+        except (EOFError, OSError) as error:
+            return _gone(self._name, error)
+        return self._arrived.popleft() if self._arrived else None
+
+    def close(self) -> None:
+        """See Reader."""
+        if not self._process.closed:
+            os.kill(self._pid, signal.SIGKILL)
+            os.waitpid(self._pid, 0)
+            self._process.close()
+
+
+def _read_apart(handle: int, name: str, session: Connection) -> None:
+    """Read in a process, and send what was read to the session, until that has ended."""
+    from ..sources.reading_process import Outbox  # noqa: PLC0415 - loaded before the fork
+
+    # What the session has open besides is to be closed when it closes that.
+    for path in [*Path("/proc/self/fd").iterdir()]:
+        if int(path.name) not in (0, 1, 2, handle, session.fileno()):
+            with suppress(OSError):
+                os.close(int(path.name))
+    with closing(Outbox(session)) as outbox:
+        try:
+            while session.fileno() not in select.select([handle, session.fileno()], [], [])[0]:
+                if outbox.unsent >= UNREAD_CHUNKS:
+                    time.sleep(WAKE_S)
+                    continue
+                with suppress(BlockingIOError):
+                    if not (data := os.read(handle, CHUNK_BYTES)):
+                        raise OSError(errno.EIO, os.strerror(errno.EIO))
+                    outbox.put(Chunk(data, time.monotonic_ns()))
+                    outbox.send()
+        except OSError as error:
+            outbox.put(_gone(name, error))
+
+
+def _gone(name: str, error: Exception) -> BusError:
+    gone = port_gone(name)
+    gone.__cause__ = error
+    return gone
+
+
+def _handle(serial: Serial) -> int | None:
+    """Return the file descriptor; None on Windows and for rfc2217://."""
+    with suppress(AttributeError, OSError):
+        return int(serial.fileno())
+    return None
 
 
 def _read_available(serial: Serial) -> bytes:
     """Read the received bytes; return none after WAKE_S."""
-    try:
-        handle = serial.fileno()
-    except (AttributeError, OSError):
-        # There is no file descriptor on Windows and for rfc2217://.
+    handle = _handle(serial)
+    if handle is None:
         serial.timeout = WAKE_S
         return bytes(serial.read(max(1, serial.in_waiting)))
     ready, _, _ = select.select([handle], [], [], WAKE_S)

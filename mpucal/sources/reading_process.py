@@ -61,16 +61,7 @@ class ProcessSource:
     def start(self) -> Sensor:
         """Start the process, and the sensor in it; see Source."""
         if self._parts is None or not self._parts.replaying:
-            here, there = Pipe()
-            with warnings.catch_warnings():
-                # Python 3.12 warns of a fork beside threads; the process uses none of their locks.
-                warnings.simplefilter("ignore", DeprecationWarning)
-                pid = os.fork()
-            if not pid:
-                here.close()
-                self._read(there)
-            there.close()
-            self._followed = self._tap.bus = FollowedBus(here, pid)
+            self._followed = self._tap.bus = FollowedBus(*start_reading(self._read))
         return self._driver.start()
 
     def stop(self) -> None:
@@ -90,33 +81,22 @@ class ProcessSource:
             self._followed.close()
 
     def _read(self, session: Connection) -> None:
-        """Read the bus until the session says so or has ended; the main function of the process, which ends here."""
-        try:
-            # Ctrl-C reaches the session alone. Where the kernel schedules each session's processes as one group, this
-            # group has a process that sleeps most of the time.
-            os.setsid()
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-                signal.signal(number, signal.SIG_DFL)
-            # Real-time priority, if the user may set it; the process sleeps between two polls.
-            with suppress(OSError):
-                os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
-            outbox = Outbox(session)
-            self._tap.record = outbox.put
-            with closing(outbox), closing(self._tap):
-                try:
-                    self._driver.start()
+        """Read the bus until the session says so or has ended."""
+        outbox = Outbox(session)
+        self._tap.record = outbox.put
+        with closing(outbox), closing(self._tap):
+            try:
+                self._driver.start()
+                outbox.send()
+                while not self._is_to_stop(session):
+                    self._driver.read()
                     outbox.send()
-                    while not self._is_to_stop(session):
-                        self._driver.read()
-                        outbox.send()
-                        self._driver.forget()
-                    outbox.put(STOP)
-                    self._driver.stop()
-                except Exception as error:  # the session raises it at this place
-                    error.add_note(f"in the reading process:\n{traceback.format_exc()}")
-                    outbox.put(error)
-        finally:
-            os._exit(0)
+                    self._driver.forget()
+                outbox.put(STOP)
+                self._driver.stop()
+            except Exception as error:  # the session raises it at this place
+                error.add_note(f"in the reading process:\n{traceback.format_exc()}")
+                outbox.put(error)
 
     def _is_to_stop(self, session: Connection) -> bool:
         """Pass what the session sent to the hands; return True if it wishes to stop, or has ended."""
@@ -131,6 +111,36 @@ class ProcessSource:
         return True
 
 
+def start_reading(read: Callable[[Connection], None]) -> tuple[Connection, int]:
+    """Fork a process that does nothing but `read`; return the connection to it, and its process id.
+
+    Parameters
+    ----------
+    read : called in the process with its end of the connection; the process ends with it.
+    """
+    here, there = Pipe()
+    with warnings.catch_warnings():
+        # Python 3.12 warns of a fork beside threads; the process uses none of their locks.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pid = os.fork()
+    if pid:
+        there.close()
+        return here, pid
+    try:
+        here.close()
+        # Ctrl-C reaches the session alone. Where the kernel schedules each session's processes as one group, this
+        # group has a process that sleeps most of the time.
+        os.setsid()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+        # Real-time priority, if the user may set it; the process sleeps between two reads.
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+        read(there)
+    finally:
+        os._exit(0)
+
+
 class Outbox:
     """Queue in the reading process, which never waits for the session; it grows while the session reads nothing.
 
@@ -143,6 +153,11 @@ class Outbox:
         self._queue: SimpleQueue[list[Any] | None] = SimpleQueue()
         self._thread = Thread(target=self._send, args=(session,))
         self._thread.start()
+
+    @property
+    def unsent(self) -> int:
+        """Number of parcels that the session has no room for yet."""
+        return self._queue.qsize()
 
     def send(self) -> None:
         """Send what was put into it."""

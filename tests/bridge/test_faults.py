@@ -12,6 +12,7 @@ from mpucal.bridge.link import Link
 from mpucal.bridge.port import Chunk
 from mpucal.bridge.sink import BridgeSink
 from mpucal.bridge.store import BlobStore
+from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer, WriteBackError
@@ -76,6 +77,26 @@ def test_a_reset_of_the_bridge(started, stream, after_ms, boot_ms, rate_hz):
     # the chip's time includes the restart of the bridge
     assert driver.now_ns() - made.clock.now() == pytest.approx(ahead_ns, abs=50 * MS)
     assert recording.t[-1] == pytest.approx(driver.now_ns() * 1e-9, abs=0.1)
+
+
+def test_what_came_in_time_counts_although_a_busy_program_reads_it_late(started, stream):
+    made, driver = started()
+    stream(driver, 0.5)
+    bus, wait = made.opened, made.opened.link.wait
+
+    def busy(_until_ns):
+        """Take a reply that is no part of the stream, and be busy for two seconds."""
+        heard_ns, bus.link.wait = made.line.now_ns(), wait
+        for _ in range(2000):
+            made.line._step()
+        return heard_ns
+
+    bus.link.wait = busy
+    while bus.link.wait is busy:
+        count = int.from_bytes(bus.read(reg.FIFO_COUNT_H, 2).data, "big")
+        bus.read(reg.FIFO_R_W, count)
+    assert count > 0
+    assert not driver.recording().gap.any()
 
 
 @pytest.mark.parametrize("chip_loses_its_supply", [False, True])

@@ -12,6 +12,7 @@ import serial
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
+from mpucal.bridge import port
 from mpucal.bridge.bus import BridgeBus
 from mpucal.bridge.link import Link
 from mpucal.bridge.port import BAUDS, SerialPort, split_port
@@ -35,7 +36,9 @@ def test_a_port_and_its_rate(text, name, bauds):
     assert split_port(text) == (name, bauds)
 
 
-def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream):
+@pytest.mark.parametrize("can_fork", [True, False], ids=["process", "thread"])
+def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream, monkeypatch, can_fork):
+    monkeypatch.setattr(port, "CAN_FORK", can_fork and port.CAN_FORK)
     made = rig()
     bus = BridgeBus(SerialPort(serve(made.line.device, made.clock).name))
     driver = Driver(bus, Config(rate_hz=1000))
@@ -50,8 +53,10 @@ def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream):
     assert len(recording) > 100
 
 
-def test_a_port_that_goes_away_and_comes_back(rig, serve, stream, tmp_path):
+@pytest.mark.parametrize("can_fork", [True, False], ids=["process", "thread"])
+def test_a_port_that_goes_away_and_comes_back(rig, serve, stream, tmp_path, monkeypatch, can_fork):
     """A cable is plugged in again: the name stays, and the device behind it is new."""
+    monkeypatch.setattr(port, "CAN_FORK", can_fork and port.CAN_FORK)
     made = rig()
     first, name = serve(made.line.device, made.clock), tmp_path / "ttyUSB0"
     name.symlink_to(first.name)
@@ -71,10 +76,11 @@ def test_a_port_that_goes_away_and_comes_back(rig, serve, stream, tmp_path):
 def test_two_at_once(rig, serve):
     made = rig()
     name = serve(made.line.device, made.clock).name
-    port = SerialPort(name)
+    first = SerialPort(name)
     with pytest.raises(BusError, match=f"another program uses {name}: close it"):
         SerialPort(name)
-    port.close()
+    first.close()
+    first.close()
     SerialPort(name).close()
 
 
