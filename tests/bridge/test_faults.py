@@ -79,7 +79,7 @@ def test_a_reset_of_the_bridge(started, stream, after_ms, boot_ms, rate_hz):
     assert recording.t[-1] == pytest.approx(driver.now_ns() * 1e-9, abs=0.1)
 
 
-def test_what_came_in_time_counts_although_a_busy_program_reads_it_late(started, stream):
+def test_a_busy_program_reads_late_what_came_in_time(started, stream):
     made, driver = started()
     stream(driver, 0.5)
     bus, wait = made.opened, made.opened.link.wait

@@ -12,13 +12,13 @@ import serial
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from mpucal.bridge import port
 from mpucal.bridge.bus import BridgeBus
 from mpucal.bridge.link import Link
 from mpucal.bridge.port import BAUDS, SerialPort, split_port
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, UsageError
+from mpucal.sources.chip import CAN_FORK
 from tools.lab.feeds import numbers
 
 
@@ -38,7 +38,7 @@ def test_a_port_and_its_rate(text, name, bauds):
 
 @pytest.mark.parametrize("can_fork", [True, False], ids=["process", "thread"])
 def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream, monkeypatch, can_fork):
-    monkeypatch.setattr(port, "CAN_FORK", can_fork and port.CAN_FORK)
+    monkeypatch.setattr("mpucal.bridge.port.CAN_FORK", can_fork and CAN_FORK)
     made = rig()
     bus = BridgeBus(SerialPort(serve(made.line.device, made.clock).name))
     driver = Driver(bus, Config(rate_hz=1000))
@@ -56,7 +56,7 @@ def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream, monkeypat
 @pytest.mark.parametrize("can_fork", [True, False], ids=["process", "thread"])
 def test_a_port_that_goes_away_and_comes_back(rig, serve, stream, tmp_path, monkeypatch, can_fork):
     """A cable is plugged in again: the name stays, and the device behind it is new."""
-    monkeypatch.setattr(port, "CAN_FORK", can_fork and port.CAN_FORK)
+    monkeypatch.setattr("mpucal.bridge.port.CAN_FORK", can_fork and CAN_FORK)
     made = rig()
     first, name = serve(made.line.device, made.clock), tmp_path / "ttyUSB0"
     name.symlink_to(first.name)
