@@ -134,7 +134,7 @@ def command_again(
     if recording is not None and said:
         words = amended(words, said[1], "")
     elif recording is not None:
-        free = str(free_name(recording.with_suffix(""), recording.suffix))
+        free = str(free_name(recording.parent / recording.stem, recording.suffix))
         words = [free if Path(word) == recording else word for word in words]
     elif calibration.sensor.origin is Origin.CHIP:
         codes = {reason["code"] for reason in reasons}

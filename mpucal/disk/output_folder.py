@@ -83,6 +83,8 @@ class OutputFolder:
 
 def free_name(path: Path, suffix: str = "") -> Path:
     """Return `path` with `suffix`, with the first free number between them if that exists."""
+    if path.name in ("", ".."):  # the present folder, or the one above it
+        path = path.resolve()
     return next(name for name in _numbered(str(path), suffix) if not os.path.lexists(name))
 
 

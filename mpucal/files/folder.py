@@ -72,7 +72,7 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
         first_error = next(iter(failed.values()))
         what = f"{path.name}: {first_error.what}"
         raise RecordingError(what, first_error.remedy, first_error.options) from first_error
-    parts = list(read.values())
+    parts, name = list(read.values()), path.resolve().name
     begins_ns = [(part.utc_ns or 0) + part.t[0] * 1e9 for part in parts]
     known = all(part.utc_ns is not None for part in parts)
     if known:
@@ -90,12 +90,12 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     whole.gap[starts] = True
     first = parts[0]
     taken = (
-        f"{path.name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
+        f"{name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
         f" {', '.join(read)}. {first.taken or ''}"
     )
     if failed:
         taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
-    return Recording(**vars(whole), sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=taken.strip())
+    return Recording(**vars(whole), sensor=first.sensor, name=name, utc_ns=first.utc_ns, taken=taken.strip())
 
 
 def _recordings(path: Path) -> list[Path]:

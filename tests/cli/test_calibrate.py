@@ -101,6 +101,15 @@ def test_a_session_s_folder_is_its_capture(mpucal, session):
     assert offline["accelerometer"]["D"] == online["accelerometer"]["D"]
 
 
+def test_the_present_folder_is_called_by_its_name(mpucal, tmp_path):
+    for name in ("a.npz", "b.npz"):
+        np.savez(tmp_path / name, **REFUSED["never turned"][0](turning()))
+    result = mpucal("calibrate", ".")
+    assert result.code == 5
+    assert f"{tmp_path.name} was read as one recording of 2 files" in result.err
+    assert f"mpucal calibrate {tmp_path}-2" in result.out + result.err
+
+
 def test_a_folder_is_one_recording_s(mpucal, session, tmp_path):
     """Results are not written beside the capture of another recording, nor over the results of another one."""
     np.savez(tmp_path / "walk.npz", **turning())

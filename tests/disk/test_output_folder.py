@@ -2,6 +2,7 @@
 
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -26,6 +27,12 @@ def test_new_ones_have_names_of_their_own(tmp_path):
         folder.close()
     assert {path.name for path in tmp_path.iterdir()} == {"mpu6050", "mpu6050-2", "mpu6050-3"}
     assert free_name(tmp_path / "mpu6050") == tmp_path / "mpu6050-4"
+
+
+def test_a_free_name_beside_the_present_folder_and_the_one_above_is_theirs_with_a_number(tmp_path, monkeypatch):
+    (tmp_path / "board" / "parts").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "board" / "parts")
+    assert [free_name(Path(here)) for here in (".", "..")] == [tmp_path / "board" / "parts-2", tmp_path / "board-2"]
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a folder went")
