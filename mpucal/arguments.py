@@ -24,6 +24,9 @@ LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2 = 1e-3, 1e4
 # m/s^2: limits on Earth, from mountains on the equator to the poles (GRS 80: 9.780 and 9.832 at sea level)
 LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2 = 9.76, 9.84
 
+# remedy for times that do not increase
+UNSORTED = "sort the samples by time and drop repeated ones; if another recording begins there, give each by itself"
+
 Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -101,7 +104,7 @@ def check_increasing(t: Vector, name: str) -> Vector:
         i = int((steps <= 0).argmax()) + 1
         raise ArraysError(
             f"{name}: time does not increase at sample {i} ({t[i - 1]:.6f} s, then {t[i]:.6f} s)",
-            "sort the samples by time and drop repeated ones",
+            UNSORTED,
         )
     if steps.min() < SHORTEST_S or not most < LONGEST_S:
         raise ArraysError(f"{name}: t has steps of {steps.min():g} s within {most:g} s", "give times in seconds")

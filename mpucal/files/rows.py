@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..arguments import is_plausible
+from ..arguments import UNSORTED, is_plausible
 from ..clocks.stamps import FEWEST, Clock, are_gaps
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector, clock_of
 from ..errors import RecordingError
@@ -170,7 +170,7 @@ def check_runs(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
         if back.any():
             raise RecordingError(
                 f"{name}: time does not increase at sample {at + int(back.argmax())}",
-                "sort the samples by time and drop repeated ones",
+                UNSORTED,
             )
         at, last = at + len(samples), samples.t[-1]
         yield samples

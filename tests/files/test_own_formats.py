@@ -197,7 +197,10 @@ def test_real_and_simulated_recordings_of_others_are_read(shared):
 @pytest.mark.parametrize("kind", [".csv", ".npz"])
 @pytest.mark.parametrize(
     ("at", "value", "said"),
-    [(ROWS + 100, np.nan, "t is not a finite number in sample"), (ROWS, 0.0, "time does not increase at sample")],
+    [
+        (ROWS + 100, np.nan, "t is not a finite number in sample"),
+        (ROWS, 0.0, "time does not increase at sample"),
+    ],
 )
 def test_a_bad_time_is_named_from_run_to_run_and_leaves_no_file(kind, at, value, said, tmp_path):
     made = recording()
@@ -210,8 +213,9 @@ def test_a_bad_time_is_named_from_run_to_run_and_leaves_no_file(kind, at, value,
         source.write_bytes(HEADER.encode() + lines(np.column_stack([t, made.acc, made.gyr])))
     # an archive is checked whole, and does not name the sample that lacks a time
     named = "t is not a finite number" if kind == ".npz" and np.isnan(value) else f"{said} {at}"
-    with pytest.raises(RecordingError, match=named):
+    with pytest.raises(RecordingError, match=named) as raised:
         through(source, tmp_path / "out.csv")
+    assert ("another recording begins there" in str(raised.value)) == (not np.isnan(value))
     assert not (tmp_path / "out.csv").exists()
 
 
