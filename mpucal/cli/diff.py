@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from ..report.units import with_std
 from ..result.comparison import CONFIDENCE, Comparison, compare
 from ..result.document import plain
+from ..result.error_model import with_std
 from .arguments import CALIBRATION_PATH, json_option
 from .loading import load_calibration
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from ..result.calibration import Calibration
-from ..result.error_model import AXES, MG_PER_MPS2
+from ..result.error_model import AXES, MG_PER_MPS2, with_std
 from .observed import BETA, DELTA, UPPER, E, G
 
 FORMAT, VERSION = "mpucal.check", 1
@@ -41,7 +41,7 @@ class Change:
     def text(self) -> str:
         """Return the values with standard deviations, without the unit."""
         return ", ".join(
-            f"{axis} {value:+.2g} ± {std:.1g}" for axis, value, std in zip(AXES, self.value, self.std, strict=True)
+            f"{axis} {with_std(value, std)}" for axis, value, std in zip(AXES, self.value, self.std, strict=True)
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..data import Vector
 from ..result import error_model
 from ..result.calibration import REFUSED, Calibration, unknown
+from ..result.error_model import with_std
 
 AXES = error_model.AXES
 # a standard uncertainty from here on, in the unit that is shown, means not observable
@@ -65,16 +66,6 @@ def _rows(matrix: Vector, std: Vector, bias: ParameterRow) -> list[ParameterRow]
         for j, other in enumerate(AXES)
     ]
     return [ParameterRow("scale factor error", "%", gain, gain_std), bias, *misalignments]
-
-
-def with_std(value: float, std: float, most_digits: int = 5) -> str:
-    """Return "value ± standard uncertainty", to the second digit of the latter."""
-    if not math.isfinite(value):
-        return "unknown"
-    if not math.isfinite(std) or std <= 0.0:
-        return f"{value:+.3f} ± ?"
-    digits = min(max(1 - math.floor(math.log10(std)), 0), most_digits)
-    return f"{value:+.{digits}f} ± {std:.{digits}f}"
 
 
 def unbroken(text: str) -> str:

@@ -15,6 +15,8 @@ propagated to first order without correlations.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
@@ -60,6 +62,16 @@ def bias_mg(b: Vector) -> Vector:
 def mg_text(b: Vector, decimals: int = 0) -> str:
     """Return a bias (3,) m/s^2 as text in mg, without the unit."""
     return ", ".join(f"{value:+.{decimals}f}" for value in bias_mg(b))
+
+
+def with_std(value: float, std: float, most_digits: int = 5) -> str:
+    """Return "value ± standard uncertainty", to the second digit of the latter."""
+    if not math.isfinite(value):
+        return "unknown"
+    if not math.isfinite(std) or std <= 0.0:
+        return f"{value:+.3f} ± ?"
+    digits = min(max(1 - math.floor(math.log10(std)), 0), most_digits)
+    return f"{value:+.{digits}f} ± {std:.{digits}f}"
 
 
 def error_before(D: Vector, b: Vector, gravity: float) -> float:

@@ -13,6 +13,7 @@ from mpucal.errors import RefusedError
 from mpucal.recheck import drift
 from mpucal.recheck.hypotheses import NOTHING, compare_hypotheses
 from mpucal.recheck.observed import CALIBRATED, PARAMETERS, apply_errors, observe
+from mpucal.recheck.outcome import Change
 from mpucal.recheck.update import update_biases
 from mpucal.recheck.watch import LEAST_RESTS, RESTS, DriftMonitor
 from mpucal.result.correlation import NAMES
@@ -98,6 +99,11 @@ def test_a_hand_that_trembles_on_the_first_rest_is_no_noise():
     known = replace(CALIBRATION, noise_std=np.full(3, 0.02), gyro_noise_std=np.full(3, 1e-3), sensor=sensor)
     tremble = 0.1 * np.sin(2.0 * np.pi * 4.0 * recording.t)[:, None]
     assert mpucal.check(known, replace(recording, acc=recording.acc + tremble), days=1.0).what != "noise"
+
+
+def test_values_are_printed_to_the_second_digit_of_their_uncertainties():
+    change = Change("deg", (5.6e-5, -1.234, 56.0), (0.02, 0.02, 0.3))
+    assert change.text() == "x +0.000 ± 0.020, y -1.234 ± 0.020, z +56.00 ± 0.30"
 
 
 def test_a_new_bias_is_estimated_and_its_history_kept():
