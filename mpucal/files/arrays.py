@@ -98,8 +98,8 @@ def _read_json(path: Path) -> Arrays:
     try:
         document = json.loads(text)
     except ValueError:
-        # an object on each line, of which the last may be torn
-        lines = [line for line in text.split("\n") if line.strip()]
+        # an object on each line, or one after the other, of which the last may be torn
+        lines = [line for line in text.replace("}{", "}\n{").split("\n") if line.strip()]
         document = [json.loads(line) for line in lines[: len(lines) if text.endswith("\n") else -1]]
     arrays = [*_json_arrays("", document)]
     indices = [array for name, array in arrays if name == INDEX]

@@ -334,6 +334,9 @@ FORMS = {
         *("", "clock, a w", "2024-05-01 {} - INFO - {}, {}, {}, {}, {}, {}\n", "walk.log", BY_GRAVITY)
     ),
     "numbers of rows without a name": Form(f"time,{AXES}", "i t a w"),
+    "numbers of rows at the end": Form(
+        "time_stamp acc_x acc_y acc_z angular_x angular_y angular_z\n", "t a w i", " ", "walk.txt"
+    ),
     "days": Form(f"Time,{AXES}", "serial a w", says="times in days"),
     "minutes by name": Form(f"Time (min),{AXES}", "min a w", says="times in min,"),
     "hours by name": Form(f"time [h],{AXES}", "h a w", says="times in h,"),
@@ -391,6 +394,11 @@ FORMS = {
         "TEMPERATURE: 25.31\nACCELERO  X: {}\tY: {}\tZ: {}\n"
         "GYRO      X: {}\tY: {}\tZ: {}\nACC ANGLE X: 1.2\tY: 2.1\n===\n",
         *("walk.txt", "accelerations in g and rates in deg/s", AT_100_HZ),
+    ),
+    "objects of JSON without lines": Form(
+        *("", "t a w"),
+        '{{"accelTime":{},"accelX":{},"accelY":{},"accelZ":{},"gyroX":{},"gyroY":{},"gyroZ":{}}}\n',
+        *("walk.txt", "times in s", None, 1e-9, ("\n", "")),
     ),
     "dictionaries": Form(
         *("", "a dps", "accel: {{'x': {}, 'y': {}, 'z': {}}}\ngyro: {{'x': {}, 'y': {}, 'z': {}}}\n", "walk.txt"),
@@ -638,6 +646,32 @@ def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, table):
     path = table("time,pA,pB,pC,MagX,MagY,MagZ", walk.t, walk.gyr, 0.6 / G * walk.acc)
     with pytest.raises(RecordingError):
         mpucal.load(path)
+
+
+def test_a_magnetic_field_as_long_as_gravity_is_not_guessed_to_be_it(walk, tmp_path):
+    """Read a shaken board, whose field in gauss the rates turn more nearly than its accelerations."""
+    rng = np.random.default_rng(11)
+    shaken, field = walk.acc / G + rng.normal(0.0, 0.3, walk.acc.shape), 0.55 * walk.acc / G
+    made = np.column_stack([walk.t, shaken, np.degrees(walk.gyr), field])
+    np.savetxt(tmp_path / "walk.txt", made)
+    assert mpucal.load(tmp_path / "walk.txt").taken.endswith(f"{BY_GRAVITY}t,ax,ay,az,gx,gy,gz.")
+
+
+def test_large_whole_numbers_that_hardly_change_are_no_gravity(table):
+    """Do not take a pressure or a place on the earth for an accelerometer, as a power of two is near any number."""
+    rng = np.random.default_rng(12)
+    made = [rng.integers(10, 40, 400), rng.integers(10, 40, 400), 2**18 + rng.integers(0, 2000, 400)]
+    others = [*(rng.integers(-99, 99, 400) for _ in range(3))]
+    with pytest.raises(RecordingError, match="holds no columns that are known"):
+        mpucal.load(table("dop,hdop,alt,p,q,r", *made, *others))
+
+
+def test_rates_of_known_names_stay_beside_guessed_accelerations(table):
+    still = np.array([0.1, 0.2, G]) + np.random.default_rng(13).normal(0.0, 0.02, (400, 3))
+    rates = 0.02 + np.random.default_rng(14).normal(0.0, 0.01, (400, 3))
+    found = mpucal.load(table("Time,f_x,f_y,f_z,w_x,w_y,w_z", np.arange(400) / 50, still, rates), units="gyr=rad/s")
+    np.testing.assert_allclose(found.acc, still)
+    np.testing.assert_allclose(found.gyr, rates)
 
 
 def test_accelerometer_and_gyroscope_are_of_one_sensor_where_names_repeat(walk, assert_same, table):

@@ -56,6 +56,15 @@ def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, table):
     same(found, walk, TWO_PERCENT, rad_s)
 
 
+def test_whole_numbers_near_10000_for_1_g(walk, ms, table):
+    """Read them in mm/s^2, and name the other unit; a column's name decides."""
+    made = np.rint(walk.acc / (G / 10000))
+    found = mpucal.load(table("ms,acc_x,acc_y,acc_z", ms, made))
+    assert "in mm/s^2 (by |a|; if these are in 0.1 mg or counts, give --units acc=mg/10 or acc=counts)" in found.taken
+    for names, hints in (("acc_x,acc_y,acc_z", {"units": "acc=mg/10"}), ("ax (0.1 mg),ay (0.1 mg),az (0.1 mg)", {})):
+        np.testing.assert_allclose(mpucal.load(table(f"ms,{names}", ms, made), **hints).acc, G / 10000 * made)
+
+
 @pytest.mark.parametrize(
     ("per_g", "says"),
     [

@@ -57,8 +57,8 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
             found = times | {role: place for role, place in found.items() if role != "t" or not clocks}
             order = _order(found | ({"t": clocks[0].place} if clocks else {}))
             by = "how gravity turns" if "gx" in found else "the length of gravity"
-            warm = [c for c in columns if c.quantity == TEMPERATURE]
-            columns = [*columns_by_hint(table.header, found), *clocks, *warm]
+            kept = [c for c in columns if c.quantity == TEMPERATURE or (c.quantity == GYR and "gx" not in found)]
+            columns = [*columns_by_hint(table.header, found), *clocks, *kept]
             remark = f"its columns were guessed from {by}: --columns {order}"
     if not first_triple(columns, ACC):
         raise _missing_sensors(table, columns)

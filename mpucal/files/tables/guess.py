@@ -12,12 +12,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...clocks.stamps import FEWEST, sample_period
-from ...data import STANDARD_GRAVITY_MPS2, Vector
+from ...data import ACCEL_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..hints import ROLES, Hints
 from .shown_units import (
     ANY_HZ,
     EXPLAINED,
     FASTEST_HZ,
+    LEAST_LIKELY,
+    MOST_LIKELY,
     acceleration_unit,
     are_counts,
     counts_per_g,
@@ -55,9 +57,9 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
         t = _seconds(None if at is None else of[at], n, hints)
         pairs = _pairs(of, [place for place in of if place != at])
         turned = {pair: _turned(of, pair, t, any_rate=at is None) for pair in pairs}
-        # rates turn a magnetic field, too
-        for sized in (True, False):
-            alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and _has_size(_stacked(of, pair[:3])) is sized]
+        # rates turn a magnetic field, too, which in gauss is about half as long as gravity in g
+        for size in (_is_about_one_g, _has_size, len):
+            alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and size(_stacked(of, pair[:3]))]
             best = max((turned[pair] for pair in alike), default=0.0)
             found = next((pair for pair in alike if turned[pair] >= best - ALIKE), None)
             if found is not None:
@@ -121,12 +123,19 @@ def _least(values: Vector) -> float:
 
 
 def _is_one_g(acc: Vector) -> bool:
-    """Return True if (n, 3) numbers are nearly 1 g long in m/s^2, g or counts, and vary."""
+    """Return True if (n, 3) numbers are nearly 1 g long in m/s^2, g or counts of 16 bits, and vary."""
     size, scatter = typical_size(acc)
     units = [QUANTITIES["acc"]["m/s^2"] / STANDARD_GRAVITY_MPS2, 1.0]
     if size > 0.0 and are_counts(acc):
-        units = [1.0 / counts_per_g(size)]
+        units = [1.0 / counts_per_g(size)] if size < ACCEL_COUNTS else []
     return 0.0 < scatter < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
+
+
+def _is_about_one_g(acc: Vector) -> bool:
+    """Return True if (n, 3) numbers are counts, or about 1 g long in the unit that they show."""
+    size, unit = typical_size(acc)[0], acceleration_unit(acc)
+    about = unit and LEAST_LIKELY <= size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
+    return are_counts(acc) or bool(about)
 
 
 def _has_size(acc: Vector) -> bool:

@@ -51,7 +51,7 @@ STEMS = {
     GYR: _stems(
         "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
         " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate angrate gyroadc:deg/s rotationrate"
-        " motionrotationrate rotation"
+        " motionrotationrate rotation angular"
     ),
 }
 UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}

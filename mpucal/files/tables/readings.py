@@ -17,8 +17,6 @@ from .units import COUNTS, OF_BNO055, QUANTITIES, resolve_unit
 # octaves: half way to the next range, which leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
 OF_COUNTS = "in counts of"
-# |a| / g of whole numbers that alone shows a unit: counts of 512 for 1 g are not mg
-LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # Largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther), or to tenths or hundredths of deg/s.
 NEAR = 0.08
 # remarks on a unit that |a| alone shows
@@ -67,9 +65,8 @@ def accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside:
     likely_whole = _whole_unit(size, beside) if whole and seen == "mg" else ""
     unclear = not seen or hints.accel_range_g or likely_whole == COUNTS
     if whole and _away(size, "mm/s^2") < NEAR and beside != COUNTS and not hints.accel_range_g:
-        return Reading.of(
-            values, QUANTITIES["acc"]["mm/s^2"], "in mm/s^2 (by |a|; if these are counts, give --units acc=counts)"
-        )
+        by = "(by |a|; if these are in 0.1 mg or counts, give --units acc=mg/10 or acc=counts)"
+        return Reading.of(values, QUANTITIES["acc"]["mm/s^2"], f"in mm/s^2 {by}")
     if said == COUNTS or (whole and unclear):
         return _scaled_counts(values, hints, name, size, OR_MG if likely_whole and not beside else BY_SIZE)
     near = "" if seen or said else units.mean_acceleration_unit(values)
@@ -84,7 +81,7 @@ def accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside:
             f"{name}: the median |a| is only {f'{size:.3g} {said}'.strip()}, so gravity is not in it",
             "give the accelerometer's own values, not the linear acceleration computed from them",
         )
-    likely = LEAST_LIKELY <= size * QUANTITIES["acc"].get(seen, 0.0) / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
+    likely = units.LEAST_LIKELY <= size * QUANTITIES["acc"].get(seen, 0.0) / STANDARD_GRAVITY_MPS2 <= units.MOST_LIKELY
     likely = likely or not (values == np.rint(values)).all()
     seen = hints.units.get("acc", (likely_whole or seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")

@@ -29,6 +29,8 @@ SLOW_S = 2.0
 LARGEST_OF_SI = 300.0
 # |a| / g: a sensor may have gains of 0.5 to 1.5
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
+# the same where nothing else shows that it is gravity in a unit: not counts of 512 for 1 g in mg, or a field in gauss
+LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 # true over measured rate: the same gains
 LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 # quartile distance of |a| over its median, beyond which it is not gravity

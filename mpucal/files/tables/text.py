@@ -81,7 +81,8 @@ def decode_text(data: bytes, name: str) -> str:
             # spreadsheets write "m/s²" and "µs" so
             text = data.decode("cp1252", "replace")
     if "\n" not in text:
-        text = text.replace("\r", "\n")
+        # objects of JSON may be one after the other
+        text = text.replace("\r", "\n").replace("}{", "}\n{")
     head = _QUOTED.sub(lambda quoted: " ".join(quoted[0].split("\n")), text[:HEAD])
     text = _EXPONENT.sub("E", _MARKS.sub("", head + text[HEAD:]))
     # what was read of the file may end within a line
@@ -202,14 +203,22 @@ def find_numbers(text: str, name: str) -> Table | None:
 def table_of_rows(name: str, header: Cells, rows: list[Cells], lines: list[int], *remarks: str) -> Table:
     """Return the table of the cells of each line; none of a line that was torn.
 
-    A line may have one cell more than names: the first is then an index.
+    A line may have one cell more than names: the first is then an index, or the last if only that counts the lines.
     """
     width = int(np.median([len(row) for row in rows])) if rows else 0
-    if header and width == len(header) + 1 and any(row[-1].strip() for row in rows if len(row) == width):
-        header = ["", *header]
+    whole = [row for row in rows if len(row) == width]
+    if header and width == len(header) + 1 and any(row[-1].strip() for row in whole):
+        counts = [_counts([row[place] for row in whole]) for place in (0, -1)]
+        header = [*header, ""] if counts == [False, True] else ["", *header]
     width = len(header) or width
     columns = [[*cells] for cells in zip_longest(*(row[:width] for row in rows), [""] * width, fillvalue="")]
     return Table(name, header, [cells[:-1] for cells in columns], lines, remarks=remarks)
+
+
+def _counts(cells: Cells) -> bool:
+    """Return True if cells are whole numbers, of which most are by 1 more than the one before."""
+    numbers = [int(cell) for cell in cells if cell.strip().isdecimal()]
+    return len(numbers) == len(cells) and 2 * int(np.count_nonzero(np.diff(numbers) == 1)) > len(numbers)
 
 
 def read_table(text: str, name: str, header: Cells, first: int, separator: str | None) -> Table:

@@ -20,6 +20,7 @@ QUANTITIES = {
         "mm/s^2": 0.001,
         "ft/s^2": 0.3048,
         "ug": STANDARD_GRAVITY_MPS2 / 1e6,
+        "mg/10": STANDARD_GRAVITY_MPS2 / 1e4,
         COUNTS: math.nan,
     },
     "gyr": {
@@ -53,6 +54,7 @@ _SPELLED = {
     "mm/s^2": "mm/s2 mms2",
     "ft/s^2": "ft/s2 fts2 ft/s/s feet/s2",
     "ug": "ug micro-g microg",
+    "mg/10": "mg/10 0.1mg 1/10mg",
     "rad/s": "rad/s radpers rads-1 radps rads rad/sec radians/s rps rad",
     "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s degrees/sec deg",
     "mdeg/s": "mdeg/s mdps",
