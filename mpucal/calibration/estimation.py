@@ -151,7 +151,7 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
 
 
 class _Fitted:
-    """Fit by the model that was asked for, with what explains what it leaves."""
+    """Fit by the requested model, with the hypotheses that explain its residuals, the likeliest first."""
 
     def __init__(
         self, recording: Recording, flat: Flat, gravity: float, model: str, changes: tuple[Explanation, ...] = ()

@@ -269,7 +269,8 @@ def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
     """Return which of matrices (3, 3) makes the rates miss least, the first if in doubt, and the median angle [rad]."""
     first = _miss(turns, by[0])
     before, after = (np.array([getattr(turn, name) for turn in turns]) for name in ("before", "after"))
-    # The nearest others, half the rates, leave gravity half of its turn from where the first one carries it.
+    # Each other matrix carries gravity to half of its turn or more from where the first one does, so that it cannot
+    # miss clearly less.
     if first + first / CLEARLY < 0.5 * np.median(_angles(before, after)):
         return by[0], first
     misses = [first, *(_miss(turns, M) for M in by[1:])]

@@ -100,7 +100,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
 
 
 class _Scales:
-    """Recording as means over blocks, for the search, and sample by sample."""
+    """A recording on two time scales: means over blocks, for the rough search, and every sample, for the last fit."""
 
     def __init__(self, recording: Recording, flat: Flat, gravity: float) -> None:
         self.recording, self.flat, self.gravity = recording, flat, gravity

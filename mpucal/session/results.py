@@ -25,8 +25,7 @@ def result_files(
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the name and content of each file of a result, one at a time.
 
-    A calibration with an objection has no blob, and a real sensor no `truth`: the true parameters of a
-    simulated one.
+    A calibration that must not be used has no blob. `truth` : the true parameters, which only a simulated sensor has.
     """
     yield DOCUMENT.name, calibration.json().encode()
     if not calibration.objection:
