@@ -53,12 +53,13 @@ AIMS: Mapping[str, Aim] = {
 }
 NORMAL = "normal"
 # An autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows what is left of it.
-FLAT_OF_VEHICLE_S = 5.0
-# Directions that point down on the six sides of a vehicle, as a pilot takes them: level, left, right, nose down, nose
-# up, back. One that rests on things needs one more, tilted, which with the gyroscope gives the angles between the axes,
-# and one new orientation for its verification: no hand moves it.
-SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1)], np.float64)
-PLACED, VERIFY_PLACED = len(SIDES) + 1, 1
+FLAT_OF_VEHICLE_S = 2.0
+# Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
+# quarter turn from the last, about another axis. One that rests on things needs one more, tilted, which with the
+# gyroscope gives the angles between the axes, and one new orientation for its verification: no hand moves it.
+SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
+SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
+PLACED, VERIFY_PLACED = len(SIDES), 1
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:

@@ -20,6 +20,8 @@ PASS_WINDOW_S = 0.1
 # Least length of a pause. A fit uses shorter rests, too.
 PAUSE_S = 1.0
 REST_S = 0.5
+# A vehicle that nobody touches has been put down, and stays there until a person has heard of the next side.
+PUT_DOWN_S, PUT_DOWN_WAIT_S = 0.5, 0.25
 # Nine tilts may be asked for; a sloppy hand makes this many different ones of them.
 TILTS = 6
 # Beyond these the hand's own acceleration hides the direction of gravity [m/s^2].
@@ -60,7 +62,8 @@ class Rotate(PoseStep):
         self._known_number = 0
         self._held: tuple[Pause, events.Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0
-        self.prompt = self._prompt_for(self._farthest(self._coverage.paused))
+        first = SIDES[1] if self._takes_sides and coverage.paused.near(-SIDES[0]) else self._farthest(coverage.paused)
+        self.prompt = self._prompt_for(first)
 
     def add(self, samples: Samples) -> events.Outputs:
         """Return the outputs for `samples`; Turned comes last and ends the step."""
@@ -100,14 +103,11 @@ class Rotate(PoseStep):
             return [*outputs, events.Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._prompted_s = knowledge.t_s
-            side = self._next_side()
             # Near level every tilt helps, so all of them are asked for. The same orientation is not asked for twice,
             # even if the estimate takes up for down, as for a sensor whose axes are mirrored. Once the target is
             # reached, or the vehicle was put down on all its sides, only a new orientation counts.
             down = np.array(knowledge.down)
-            if side is not None:
-                down = side
-            elif self._plan.tilt_only or knowledge.down == self.prompt.down or self._adds_nothing(down):
+            if self._plan.tilt_only or knowledge.down == self.prompt.down or self._adds_nothing(down):
                 down = self._farthest(self._coverage.paused)
             self.prompt = self._prompt_for(down)
             outputs.append(self.prompt)
@@ -140,29 +140,35 @@ class Rotate(PoseStep):
         return [] if self._plan.until_end else prompt
 
     def _hold(self, pause: Pause) -> events.Outputs:
-        # A pause that the coverage has counted is not new any more: its use was decided before.
-        if self._held is None or self._held[0].run != pause.run or pause.seconds < PAUSE_S - 1e-6:
-            self._held = pause, pause.use(self.prompt.down, not self._coverage.paused.near(pause.acc))
         # The advice ends the countdown of its pause, also where a bump had delayed it.
         advised = pause.run <= self._advised_run
+        # A pause that the coverage has counted is not new any more: its use was decided before.
+        if self._held is None or self._held[0].run != pause.run or (pause.seconds < PAUSE_S - 1e-6 and not advised):
+            self._held = pause, pause.use(self.prompt.down, not self._coverage.paused.near(pause.acc))
         outputs: events.Outputs = [*pause.counting(self._held[1])] if self._requested or not advised else []
         if pause.seconds >= REST_S - 1e-6:
             self._coverage.rested.add(pause.acc)
-        if pause.seconds >= PAUSE_S - 1e-6 and self._coverage.paused.add(pause.acc):
+        lies = self._takes_sides and not pause.touched and (self._coverage.placed or self._advised_run < 0)
+        least_s = PUT_DOWN_S if lies else HOLD_S - WAIT_S
+        ends = not (self._plan.until_end or advised) and pause.seconds >= least_s - 1e-6
+        if ends:
+            self._coverage.placed = lies
+        counts = pause.seconds >= PAUSE_S - 1e-6 or (ends and self._coverage.placed)
+        if counts and self._coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
             outputs.append(events.Seen(pause.t_s, len(self._coverage.paused), events.down_of(pause.acc), paused=True))
-        if self._plan.until_end or self._requested or advised:
-            return outputs
-        if pause.seconds >= HOLD_S - WAIT_S - 1e-6:
-            first = self._advised_run < 0
-            self._coverage.placed = self._takes_sides and not pause.touched and (self._coverage.placed or first)
+        if ends and (side := self._next_side()) is not None:
+            # It is known without a fit, and the vehicle lies still until the person has heard of it.
+            self._advised_run, self._prompted_s, self.prompt = pause.run, pause.t_s, self._prompt_for(side)
+            outputs += [pause.held(self._held[1]), self.prompt]
+        elif ends and not self._requested:
             self._advised_run = pause.run
-            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s))
+            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s, PUT_DOWN_WAIT_S if lies else WAIT_S))
         return outputs
 
-    def _request(self, kind: events.FitKind, t_s: float) -> events.RequestFit:
+    def _request(self, kind: events.FitKind, t_s: float, wait_s: float = WAIT_S) -> events.RequestFit:
         self._requested, self._known_s = True, t_s
-        return events.RequestFit(kind, WAIT_S)
+        return events.RequestFit(kind, wait_s)
 
     def _periodic(self, t_s: float) -> list[events.Output]:
         """Return the request of the next fit, the progress and the reminder, each if its time has come."""

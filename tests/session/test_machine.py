@@ -146,26 +146,30 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
     assert rotating.feed(board.still(3.0)).prompts().count(events.PromptKind.ROTATE) == 2
 
 
-def placed(make_board, tremor, target="normal", late=False, known=1.0, down=DOWN):
+def placed(make_board, tremor, target="normal", late=False, known=1.0, down=DOWN, elsewhere=()):
     """A vehicle is put on its sides as it is asked for, by somebody who lets go of it (no tremor) or does not.
 
-    late : the answer of what is known comes in the middle of the first hold. known, down : see learnt.
+    late : a fit is not done when the first hold ends. known, down : see learnt.
+    elsewhere : numbers of the prompts at which it is put on its tail.
     """
     board, session = make_board(), Session()
     board.up = np.array([0.0, 0.0, -1.0])
     session.machine = Machine(Plan(target=target))
     session.said = session.machine.handle(events.Connected(Sensor(message="RAW_IMU")))
-    assert "still for 5 s" in session.of(events.Prompt)[-1].text
-    session.feed(board.still(5.6))
+    assert "still for 2 s" in session.of(events.Prompt)[-1].text
+    session.feed(board.still(2.6))
     # The advice comes at the end of the hold.
     session.answer = lambda wish: learnt(1.0, advice=False) if wish is events.FitKind.KNOW and not late else None
     held = []
     while session.state is State.ROTATE and len(held) < 6:
-        held.append(session.of(events.Prompt)[-1].text.split(": ")[1].split(" (")[0])
-        session.feed(board.turn_to(-np.array(session.of(events.Prompt)[-1].down)))
+        asked, before = session.of(events.Prompt)[-1], len([one for one in session.said if is_advice(one)])
+        held.append(asked.text.split(": ")[1].split(" (")[0])
+        session.feed(board.turn_to((1.0, 0.0, 0.0) if len(held) in elsewhere else -np.array(asked.down)))
         if late:
             session.feed(board.still(1.0)).give(learnt(1.0, advice=False))
-        session.feed(board.shaken(1.5, tremor) if tremor else board.still(1.5)).give(learnt(known, down=down))
+        session.feed(board.shaken(1.5, tremor) if tremor else board.still(1.5))
+        if len([one for one in session.said if is_advice(one)]) > before:
+            session.give(learnt(known, down=down))
         late = False
     return session, held
 
@@ -173,10 +177,22 @@ def placed(make_board, tremor, target="normal", late=False, known=1.0, down=DOWN
 @pytest.mark.parametrize("late", [False, True])
 def test_a_vehicle_that_is_put_down_on_six_sides_needs_one_tilt_more(make_board, late):
     session, (*sides, tilt) = placed(make_board, 0.0, "best", late)
-    assert sides == ["on its back", "on its left side", "on its right side", "nose down", "nose up"]
+    assert sides == ["on its left side", "nose down", "on its back", "on its right side", "nose up"]
     assert "tilted" in tilt
     assert session.state is State.VERIFY
     assert "Verification 1 of 1" in session.of(events.Prompt)[-1].text
+
+
+def test_each_side_is_asked_for_as_soon_as_a_vehicle_lies_on_the_one_before(make_board):
+    session, (*sides, _) = placed(make_board, 0.0)
+    assert [each.use for each in session.of(events.Held)[: len(sides)]] == [events.Use.TAKEN] * len(sides)
+    asked = [one.kind for one in session.said if isinstance(one, events.Prompt) or is_advice(one)]
+    # the flat rest, the sides, the tilt, a fit that tells whether the target is reached, and the verification
+    assert asked == ["lay_flat", *["rotate"] * (len(sides) + 1), "advise", "verify"]
+
+
+def is_advice(output):
+    return isinstance(output, events.RequestFit) and output.kind is events.FitKind.ADVISE
 
 
 def test_a_vehicle_that_was_on_all_its_sides_is_not_put_on_one_again(make_board):
@@ -184,6 +200,12 @@ def test_a_vehicle_that_was_on_all_its_sides_is_not_put_on_one_again(make_board)
     assert "tilted" in last
     assert session.state is State.ROTATE
     assert "tilted" in session.of(events.Prompt)[-1].text
+
+
+def test_a_side_that_a_vehicle_was_not_put_on_is_asked_for_again_and_the_other_is_not(make_board):
+    _, sides = placed(make_board, 0.0, elsewhere=(2,))
+    assert sides[:5] == ["on its left side", "nose down", "on its back", "nose down", "on its right side"]
+    assert "tilted" in sides[5]
 
 
 def test_a_vehicle_in_a_hand_is_turned_to_more_orientations(make_board):

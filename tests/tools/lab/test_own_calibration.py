@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.mavlink.dialect import dialect
+from mpucal.session.boards import VEHICLE, describe
 from tools.lab import own_calibration
 from tools.lab.own_calibration import ORDER
 
@@ -42,6 +43,16 @@ class Vehicle:
         if number == dialect().MAV_CMD_ACCELCAL_VEHICLE_POS:
             self.confirmed.append((params[0], tuple(np.rint(-self.body.up))))
             self.side += 1
+
+
+def test_the_sides_are_in_the_order_in_which_the_vehicle_asks_for_them():
+    assert [describe(tuple(side), VEHICLE).split(" (")[0] for side in ORDER[1:].tolist()] == [
+        "on its left side",
+        "on its right side",
+        "nose down",
+        "nose up",
+        "on its back",
+    ]
 
 
 @pytest.mark.parametrize(("end", "succeeds"), [(own_calibration.SUCCESS, True), (own_calibration.FAILED, False)])
