@@ -6,6 +6,7 @@ of one turning of it; the motion between two files is unknown: a gap, long enoug
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,7 +45,10 @@ def _find_session(folder: Path) -> tuple[formats.Format, list[Path]]:
         if captures := capture.all_in(folder):
             return row, captures
     none = " and ".join(f"no {capture.name}" for capture in captured)
-    raise RecordingError(f"the folder {folder} holds {none}", "give the folder of a session, or a recording in it")
+    remedy, calibration = "give the folder of a session, or a recording in it", folder / DOCUMENT.name
+    if calibration.exists():
+        remedy += f"; `{shlex.join(['mpucal', 'show', str(calibration)])}` shows the calibration in it"
+    raise RecordingError(f"the folder {folder} holds {none}", remedy)
 
 
 def is_folder_of_recordings(path: Path) -> bool:

@@ -104,6 +104,15 @@ def test_the_folder_of_a_session_is_its_calibration(mpucal, session):
         assert by_folder.out == by_file.out != ""
 
 
+def test_the_folder_of_a_calibration_without_a_recording_is_told_how_to_show_it(mpucal, tmp_path):
+    folder = tmp_path / "of results"
+    folder.mkdir()
+    calibration().save(folder / "calibration.json")
+    result = mpucal("show", folder)
+    assert result.code == 3
+    assert f"`mpucal show '{folder}/calibration.json'` shows the calibration in it" in result.err
+
+
 def test_shows_a_calibration(mpucal, session):
     for name in ("calibration.json", "calibration.bin"):
         result = mpucal("show", session.folder / name)
