@@ -32,6 +32,7 @@ CLEARLY = 3.0  # ratio of misses above which another unit or range is the right 
 DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
+ALL_SIDES = 6
 FEWEST_RESTS = 3  # fewer cannot contradict each other
 BLOCK_S, MOVING_RAD_S = 0.01, 0.3
 SIGNED_PERMUTATIONS = [
@@ -111,6 +112,16 @@ class Evidence:
         if self.fit is None or self.uncertainty is None:
             return None
         return np.asarray((self.recording.acc - self.fit.b_a) @ np.linalg.inv(self.fit.D).T)
+
+    @cached_property
+    def was_held_all_around(self) -> bool:
+        """True if the board rested on all of its sides, and twice as often."""
+        if self.flat is None or self.calibrated is None:
+            return False
+        s = statistics(self.calibrated, RestFinder(self.recording, self.flat).typical())[0]
+        axis = np.abs(s).argmax(axis=1)
+        sides = np.unique(2 * axis + (s[np.arange(len(s)), axis] > 0.0))
+        return len(sides) == ALL_SIDES and len(s) >= 2 * ALL_SIDES
 
     @cached_property
     def magnitude(self) -> Vector:

@@ -365,6 +365,19 @@ def test_a_motor_that_starts_is_named(in_hand):
     assert "vibration" in reasons["vibrating"]
 
 
+@pytest.mark.parametrize("seed", [3, 4])
+def test_ground_that_moves_is_no_lack_of_orientations(hand, seed):
+    """A board on twelve of its sides and corners, on ground whose acceleration of 0.1 m/s^2 changes every 2 s."""
+    calm = hand(seed, "pose12").recording
+    at = np.arange(calm.t[0] + 12.0, calm.t[-1], 2.0)
+    sway = np.random.default_rng(seed).normal(0.0, 0.1, (len(at), 3))
+    moved = replace(calm, acc=calm.acc + np.stack([np.interp(calm.t, at, axis, left=0.0) for axis in sway.T], axis=1))
+    verdict, reasons = judged(moved)
+    assert (verdict, list(reasons)) == ("usable", ["inconsistent"])
+    assert "on all of its sides" in reasons["inconsistent"]
+    assert "in a vehicle or a lift" in reasons["inconsistent"]
+
+
 def test_a_sensor_that_changed_at_the_only_rest_is_refused(hand):
     # The board lies for 25 s, and is never still again.
     turned = hand(3, "continuous").recording

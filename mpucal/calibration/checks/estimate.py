@@ -24,7 +24,10 @@ LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 
 
 def few_orientations(e: Evidence) -> Reason | None:
-    """Find directions that the data leave open, where the model holds; after a slip, more orientations do not help."""
+    """Find directions that the data leave open, where the model holds; after a slip, more orientations do not help.
+
+    Nor do they where it rested in many: then it moved as it rested, with the hand or with the ground.
+    """
     rms = _model_rms(e)
     if _slip(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
         return None
@@ -34,6 +37,8 @@ def few_orientations(e: Evidence) -> Reason | None:
         f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", e.uncertainty.worst, strict=True) if abs(w) > 0.4
     )
     known = max(rms, e.uncertainty.rms_mps2) if _is_useless(e) else rms
+    if known < e.gravity and e.was_held_all_around:
+        return reason("inconsistent", "moved", _is_useless(e), rms=known)
     if known < e.gravity:
         return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
     return reason("few_orientations", "not_observable", side=side)
