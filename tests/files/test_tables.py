@@ -833,6 +833,15 @@ def test_the_command_for_unknown_columns_works_at_once(order, said, tmp_path):
     assert "times in s, accelerations in m/s^2 and rates" in found.taken
 
 
+def test_a_label_before_accelerations_along_z_is_left_out(tmp_path):
+    """Do not suggest z and two rates, which are as long as gravity, in place of all three axes."""
+    rows = driven("label acc gyr", [0.0, 0.0, G], [6.0, 6.0, 0.5])[:, 1:]
+    np.savetxt(tmp_path / "drive.txt", rows)
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(tmp_path / "drive.txt")
+    assert refused.value.options.startswith("--columns t,-,ax,ay,az,gx,gy,gz")
+
+
 def test_counts_of_a_runner_have_their_range_by_their_mean(tmp_path):
     rows = driven("acc gyr", [0.0, 4000.0, 7150.0], 6000.0)[:, 1:]
     rows[:, 4:] *= 9000

@@ -84,6 +84,7 @@ def likely_columns(of: Columns, clocks: Sequence[int]) -> tuple[dict[str, int], 
     places = [place for place in of if place not in {*clocks, *increasing}]
     vary = [place for place in places if np.ptp(of[place]) > 0.0]
     # other columns may be before theirs, such as a label that never changes
+    places = places[places.index(vary[0]) :] if vary else places
     alignments = [_sized_triples(of, some) for some in (places, vary, vary[1:], vary[2:])]
     triples, sized, acc = next((found for found in alignments if found[2]), alignments[0])
     if not sized:
