@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from .hypotheses import SURE
+from .parameters import PLACES
+from .problem import Series
 from .rotation import lengths
-from .transitions import DEGREES_OF_FREEDOM, Transition, likely_scale
+from .theta import Theta
+from .transitions import DEGREES_OF_FREEDOM, Transition, jacobians, likely_scale
 
 FEWEST_BESIDE = 3  # transitions before a slip and after it: with fewer, two of a lost gyroscope would look like one
 ITERATIONS = 8
@@ -36,10 +39,10 @@ class Slip(NamedTuple):
     transitions: Sequence[Transition]
 
 
-def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
-    """Return the slip that explains the misses of transitions between rests, or None.
+def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta) -> Slip | None:
+    """Return the slip that explains the misses of transitions between rests under theta, or None.
 
-    dt : (n,) s, the steps of the series.
+    K is estimated anew with it, and without, since a K that was estimated without it hides much of it.
     """
     k = len(transitions)
     if k < 2 * FEWEST_BESIDE + 1:
@@ -50,13 +53,15 @@ def find_slip(transitions: Sequence[Transition], dt: Vector) -> Slip | None:
     if not -_log_likelihood(misses, known) > cost:
         return None
     places = np.arange(FEWEST_BESIDE, k - FEWEST_BESIDE)
-    likelihood, x, left = _likeliest(misses, known, _directions(transitions, np.append(places, k)))
+    by_slip = _directions(transitions, np.append(places, k))
+    by_K = np.broadcast_to(jacobians(transitions, series, theta)[:, :, PLACES["K"]], by_slip.shape)
+    likelihood, x, left = _likeliest(misses, known, np.concatenate([by_slip, by_K], axis=3))
     best = int(likelihood[:-1].argmax())
     if not likelihood[best] > likelihood[-1] + cost:
         return None
-    t, span = np.cumsum(dt), transitions[places[best]].span
+    t, span = np.cumsum(series.dt), transitions[places[best]].span
     without = [each._replace(miss=miss) for each, miss in zip(transitions, left[best], strict=True)]
-    return Slip((float(t[max(span.start - 1, 0)]), float(t[span.stop - 1])), x[best, 3:] - x[best, :3], without)
+    return Slip((float(t[max(span.start - 1, 0)]), float(t[span.stop - 1])), x[best, 3:6] - x[best, :3], without)
 
 
 def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> Vector:
@@ -74,14 +79,14 @@ def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> 
 
 
 def _likeliest(misses: Vector, known: Vector, A: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the largest log likelihoods (m,) of misses + A x, with A (m, k, 3, 6), these x (m, 6), and what is left
+    """Return the largest log likelihoods (m,) of misses + A x, with A (m, k, 3, p), these x (m, p), and what is left
     of the misses (m, k, 3).
     """
     left = misses
     for _ in range(ITERATIONS):
         weight = likely_scale(left, known)[1]
-        weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, 6).swapaxes(1, 2)
-        N = weighted @ A.reshape(len(A), -1, 6)
+        weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, A.shape[3]).swapaxes(1, 2)
+        N = weighted @ A.reshape(len(A), -1, A.shape[3])
         x = -(np.linalg.pinv(N, rcond=LEAST_SEEN, hermitian=True) @ (weighted @ misses.ravel())[..., None])
         left = misses + (A @ x[:, None])[..., 0]
     return _log_likelihood(left, known), x[..., 0], left

@@ -136,12 +136,12 @@ def leverages(
 
     J (3, p) are the derivatives of the miss, C is the covariance (p, p) of theta from a fit with `variance` (k,).
     """
-    J = _jacobians(transitions, prepared.problem.series, theta)
+    J = jacobians(transitions, prepared.problem.series, theta)
     taken = np.sum((J @ covariance) * J, axis=(1, 2))
     return np.asarray(np.clip(taken / variance, 0.0, 2.0))
 
 
-def _jacobians(transitions: Sequence[Transition], series: Series, theta: Theta) -> Vector:
+def jacobians(transitions: Sequence[Transition], series: Series, theta: Theta) -> Vector:
     """Return derivatives (k, 3, p) of the misses u x v in the order of NAMES, with u and v near each other."""
     # phi is the error of the turn in the axes of its end; that of a step is -dt dK (omega - b_omega), as the rests
     # determine b_omega.

@@ -2,12 +2,15 @@
 
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate, estimate
 from mpucal.calibration.rotation import turned
+from tools.lab.scenarios import faults
+from tools.lab.scenarios.family import Family, drawn
 
 G = 9.82
 
@@ -28,6 +31,16 @@ def test_a_mount_that_slips_between_rests_is_reported_with_its_time(hand, seed, 
     assert (calibration.verdict, reason["code"]) == ("refused", "inconsistent")
     begin, end = map(float, re.findall(r"(\d+) s", reason["message"]))
     assert begin - 1.0 <= at_s <= end + 1.0
+
+
+@pytest.mark.parametrize("seed", [11, 14, 25, 31])
+def test_a_slip_that_the_gyroscope_s_matrix_could_hide_is_reported(seed):
+    """Any hand and sensor; a K that is estimated without the slip explains most of it."""
+    simulated = drawn(Family("a mount slips", faults=(partial(faults.slip, deg=1.5),)), seed)
+    calibration = calibrate(simulated.recording, "auto", simulated.truth.gravity)
+    (reason,) = calibration.quality["reasons"]
+    assert (calibration.verdict != "good", reason["code"]) == (True, "inconsistent")
+    assert "the sensor was not the same before" in reason["message"]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])

@@ -37,7 +37,7 @@ def few_orientations(e: Evidence) -> Reason | None:
         f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", e.uncertainty.worst, strict=True) if abs(w) > 0.4
     )
     known = max(rms, e.uncertainty.rms_mps2) if _is_useless(e) else rms
-    if known < e.gravity and e.was_held_all_around:
+    if known < e.gravity and e.was_held_all_around and contradiction(e) is None:
         return reason("inconsistent", "moved", _is_useless(e), rms=known)
     if known < e.gravity:
         return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
@@ -115,9 +115,12 @@ def contradiction(e: Evidence) -> Reason | None:
 
 
 def _slip(e: Evidence) -> Slip | None:
-    """Return the slip of the mount, if a calibration would not be good with it."""
-    slip = e.estimate.slip
-    return slip if slip is not None and e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
+    """Return the slip of the mount, if the mount explains most, and a calibration would not be good with it."""
+    slip, explanations = e.estimate.slip, () if e.claim is None else e.claim.explanations
+    likeliest = next((each.hypothesis.what for each in explanations if each.hypothesis.what != "gyroscope"), None)
+    if slip is None or likeliest != "mount":
+        return None
+    return slip if e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
 
 
 def _is_useless(e: Evidence) -> bool:
