@@ -154,8 +154,10 @@ class Detector:
         if self._learns:
             self._learn(window)
         shaken = self._shaken(window)
-        if shaken:
-            return self._bumped(window, shaken)
+        return self._bumped(window, shaken) if shaken else self.add_quiet(window)
+
+    def add_quiet(self, window: Window) -> Still | Moved:
+        """Take the next window, which is whole and shows no motion in itself, as `add` does."""
         # A window that is quiet in itself, but in another orientation, begins the next run.
         stepped = self._stepped(window)
         if stepped:
@@ -257,12 +259,13 @@ def _shook(acc_sd: Vector, ratio: Vector) -> str:
 def still_windows(detector: Detector, windows: CutWindows) -> Iterator[tuple[int, int, int]]:
     """Yield the number of its run, and the first and last + 1 of its samples, for each still window.
 
-    The limits are known beforehand: between runs, windows beyond them need no detector.
+    The limits are known beforehand: all windows are compared with them at once.
     """
     moving = detector.shares(windows).level > 1.0
     for k, moves in enumerate(moving.tolist()):
         if moves and not detector.seconds:
             continue
-        state = detector.add(windows[k])
+        window = windows[k]
+        state = detector.add_quiet(window) if window.whole and not moves else detector.add(window)
         if isinstance(state, Still):
             yield state.run, k * windows.n, (k + 1) * windows.n
