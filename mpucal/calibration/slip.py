@@ -47,7 +47,7 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta) -
     k = len(transitions)
     if k < 2 * FEWEST_BESIDE + 1:
         return None
-    cost = math.log(SURE) + 1.5 * math.log(2 * k) + math.log(k)  # of three numbers more, and of so many times
+    cost = math.log(SURE) + 4.5 * math.log(2 * k) + math.log(k)  # of nine numbers more, and of so many times
     misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
     # No likelihood is above 0, that of no misses at all.
     if not -_log_likelihood(misses, known) > cost:
