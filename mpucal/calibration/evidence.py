@@ -19,7 +19,7 @@ from ..rests.windows import WINDOW_S
 from .fit import Fit
 from .hypotheses import Explanation
 from .parameters import ACCELEROMETER
-from .rotation import fibonacci_sphere, lengths, turned
+from .rotation import fibonacci_sphere, lengths, sides_down, turned
 from .tilt import tilted_directions
 from .uncertainty import DIRECTIONS, Uncertainty, UncertaintyClaim, is_usable, propagate
 from .words import Decoded
@@ -32,7 +32,6 @@ CLEARLY = 3.0  # ratio of misses above which another unit or range is the right 
 DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
-ALL_SIDES = 6
 FEWEST_RESTS = 3  # fewer cannot contradict each other
 BLOCK_S, MOVING_RAD_S = 0.01, 0.3
 SIGNED_PERMUTATIONS = [
@@ -115,13 +114,12 @@ class Evidence:
 
     @cached_property
     def was_held_all_around(self) -> bool:
-        """True if the board rested on all of its sides, and twice as often."""
+        """True if the board rested on each of its six sides, and twelve times or more in all."""
         if self.flat is None or self.calibrated is None:
             return False
-        s = statistics(self.calibrated, RestFinder(self.recording, self.flat).typical())[0]
-        axis = np.abs(s).argmax(axis=1)
-        sides = np.unique(2 * axis + (s[np.arange(len(s)), axis] > 0.0))
-        return len(sides) == ALL_SIDES and len(s) >= 2 * ALL_SIDES
+        means = statistics(self.calibrated, RestFinder(self.recording, self.flat).typical())[0]
+        rests = np.bincount(sides_down(means), minlength=6)
+        return bool(rests.all()) and rests.sum() >= 2 * len(rests)
 
     @cached_property
     def magnitude(self) -> Vector:

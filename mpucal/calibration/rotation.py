@@ -68,6 +68,12 @@ def turned(phi: Vector) -> Vector:
     return _kernel.turn(np.ascontiguousarray(phi))[0]
 
 
+def sides_down(s: Vector) -> NDArray[np.intp]:
+    """Return (n,) 0 to 5, the axis nearest to each specific force s (n, 3), with its sign."""
+    axis = np.abs(s).argmax(axis=1)
+    return np.asarray(2 * axis + (s[np.arange(len(s)), axis] > 0.0), np.intp)
+
+
 def shortest_turn(a: Vector, b: Vector) -> Vector:
     """Return the rotation vector (3,) [rad] that takes the unit vector a to b."""
     axis = _cross_product(a, b)

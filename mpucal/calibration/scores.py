@@ -9,6 +9,7 @@ from .levenberg_marquardt import Minimum
 from .likelihood import evaluate, part_scores
 from .parts import Parts
 from .problem import Problem
+from .rotation import sides_down
 from .theta import Prior
 
 MOST_PARTS, FEWEST_SAMPLES = 96, 16
@@ -32,12 +33,10 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
     seen, at = minimum.seen
     to_ends = at.to_ends or evaluate(problem, seen, len(free), ends).to_ends
     assert to_ends is not None
-    scores, k = part_scores(problem, seen, len(free), to_ends).moved(minimum.last), len(ends)
+    scores = part_scores(problem, seen, len(free), to_ends).moved(minimum.last)
     t = np.concatenate([[0.0], np.cumsum(series.dt)])
     starts = np.concatenate([[0], ends[:-1]]).astype(np.intp)  # 32 bits on some ARMs
     mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]
-    s = (mean - theta.b_a) @ theta.inverse.T
-    axis = np.abs(s).argmax(1)
     away, precision = theta.values()[: len(free)] - prior.mean[: len(free)], prior.precision[: len(free)]
     left = scores.gradient.sum(0) + scores.flat.gradient + precision * away
     H = scores.fisher.sum(0) + scores.flat.fisher + np.diag(precision)
@@ -48,5 +47,5 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
         left[free],
         t[starts],
         t[ends],
-        2 * axis + (s[np.arange(k), axis] > 0.0),
+        sides_down((mean - theta.b_a) @ theta.inverse.T),
     )
