@@ -12,7 +12,6 @@ from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..errors import WrongValue
 from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
-from ..rests.intervals import RestFinder
 from .bias_changes import without_changes
 from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
 from .checks.estimate import GOOD_RMS_MPS2
@@ -21,7 +20,7 @@ from .evidence import Evidence
 from .hand import HandFit
 from .hypotheses import Explanation, explain, gyroscope_change, rank, remove_change
 from .masks import find_reset, with_masks
-from .model_selection import METHODS, fit_model
+from .model_selection import METHODS, ModelChoice, fit_model
 from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
@@ -88,7 +87,7 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     clipped = np.flatnonzero(recording.acc_clipped | recording.gyr_clipped)
     if flat is None or (changed is None and not len(clipped)):
         return None
-    t, (starts, ends) = recording.t - recording.t[0], RestFinder(recording, flat).typical().T
+    t, (starts, ends) = recording.t - recording.t[0], whole.rests.T
     span = None if changed is None else changed.span
     first, last = (clipped[0], len(t)) if span is None else np.searchsorted(t, span)
     before = "before", "what follows", 0, int(ends[ends <= first].max(initial=0))
@@ -138,7 +137,7 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     before = replace(before, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
-    fitted = without_changes(_Fitted(recording, flat, gravity, model))
+    fitted = without_changes(_Fitted(recording, (flat, gravity, model)))
     choice, plain = fitted.choice, fitted.choice.plain
     # the share of the variance that the removed changes added
     freed = sum((change.freed[ACCELEROMETER] for change in fitted.changes), np.zeros(len(D_NAMES + B_A_NAMES)))
@@ -154,13 +153,21 @@ class _Fitted:
     """Fit by the requested model, with the hypotheses that explain its residuals, the likeliest first."""
 
     def __init__(
-        self, recording: Recording, flat: Flat, gravity: float, model: str, changes: tuple[Explanation, ...] = ()
+        self,
+        recording: Recording,
+        of: tuple[Flat, float, str],
+        changes: tuple[Explanation, ...] = (),
+        choice: ModelChoice | None = None,
     ) -> None:
-        self._recording, self._of = recording, (flat, gravity, model)
-        self.choice, self.changes = fit_model(model, recording, flat, gravity), changes
-        if isinstance(self.choice.found, HandFit):  # which removes changes itself
-            self._recording, self.changes = self.choice.found.recording, changes + self.choice.found.changes
+        self._recording, self._of, self._changes = recording, of, changes
+        self.choice = choice or fit_model(recording, *of)
         self.explanations = rank(self.choice.plain.parts, self.choice.plain.D)
+
+    @property
+    def changes(self) -> tuple[Explanation, ...]:
+        """Changes that were removed before the fit; a hand's fit removes changes itself."""
+        found = self.choice.found
+        return self._changes + (found.changes if isinstance(found, HandFit) else ())
 
     def cost(self) -> float:
         """Return the cost function (8) where the search ended."""
@@ -172,5 +179,9 @@ class _Fitted:
 
     def without(self, change: Explanation) -> _Fitted:
         """Fit the recording without one more change."""
+        found = self.choice.found
+        if isinstance(found, HandFit):
+            choice = self.choice._replace(found=found.without(change))
+            return _Fitted(self._recording, self._of, self._changes, choice)
         recording = remove_change(self._recording, self._of[0], change)
-        return _Fitted(recording, *self._of, (*self.changes, change))
+        return _Fitted(recording, self._of, (*self._changes, change))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..data import Recording, Vector
 from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
-from ..rests.intervals import RestFinder, statistics
+from ..rests.intervals import Intervals, RestFinder, statistics
 from ..rests.windows import WINDOW_S
 from .fit import Fit
 from .hypotheses import Explanation
@@ -113,11 +113,16 @@ class Evidence:
         return np.asarray((self.recording.acc - self.fit.b_a) @ np.linalg.inv(self.fit.D).T)
 
     @cached_property
+    def rests(self) -> Intervals:
+        """Typical rests (k, 2), first and last + 1 of their samples; there must be a flat segment."""
+        return RestFinder(self.recording, self.rest).typical()
+
+    @cached_property
     def was_held_all_around(self) -> bool:
         """True if the board rested on each of its six sides, and twelve times or more in all."""
         if self.flat is None or self.calibrated is None:
             return False
-        means = statistics(self.calibrated, RestFinder(self.recording, self.flat).typical())[0]
+        means = statistics(self.calibrated, self.rests)[0]
         rests = np.bincount(sides_down(means), minlength=6)
         return bool(rests.all()) and rests.sum() >= 2 * len(rests)
 
@@ -198,7 +203,7 @@ class Evidence:
 
     def _turns_of_rests(self, flat: Flat, longest_s: float = LONGEST_TURN_S) -> list[_Turn]:
         """Return the turns from rest to rest that move gravity far and take no longer than `longest_s`."""
-        r, runs = self.recording, RestFinder(self.recording, flat).typical()
+        r, runs = self.recording, self.rests
         u, first, last = _units(statistics(r.acc, runs)[0]), runs[1:, 0], runs[:-1, 1]
         far = (_angles(u[1:], u[:-1]) > LEAST_TURN_RAD) & (r.t[first] - r.t[last - 1] < longest_s)
         return [self._turn(flat, u[k], u[k + 1], last[k], first[k]) for k in np.flatnonzero(far).tolist()]

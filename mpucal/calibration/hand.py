@@ -32,7 +32,7 @@ from .hand_noise import (
     pivot_sigma,
     remove_tremor,
 )
-from .hypotheses import Explanation, gyroscope_change, rank, remove_change
+from .hypotheses import CHANGES, Explanation, gyroscope_change, rank, remove_change
 from .hypothesis_tests import WALD_99, undetermined, wald
 from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
@@ -64,22 +64,28 @@ class HandFit:
 
     Attributes
     ----------
-    fit : with the covariance by the model alone. minimum : where the search ended. noise : of the hand as it moves.
-    rough, fine : the recording as means over blocks, and sample by sample.
-    recording : without the `changes` of the gyroscope's bias.
+    fit : with the covariance by the model alone. minimum : where it ended. noise : of the hand as it moves.
+    search : by means over blocks, from which the fit began. fine : the recording sample by sample.
     """
 
     fit: Fit
     minimum: Minimum
     noise: Noise
-    rough: Preprocessed
+    search: _Search
     fine: Preprocessed
-    recording: Recording
-    changes: tuple[Explanation, ...]
+
+    @property
+    def changes(self) -> tuple[Explanation, ...]:
+        """Changes of the gyroscope's bias that were removed before the fit."""
+        return self.search.changes
+
+    def without(self, change: Explanation) -> HandFit:
+        """Fit the recording without one more change."""
+        return _fit_samples(self.search.without(change))
 
     def honest(self) -> Fit:
         """Return the fit with its honest covariance."""
-        minimum = _with_honest_information(self.minimum, self.noise, self.rough, self.fine)
+        minimum = _with_honest_information(self.minimum, self.noise, self.search.prepared, self.fine)
         covariance = minimum.covariance()
         known = undetermined(covariance) if minimum.free.all() else ()
         return replace(self.fit, covariance=covariance[np.ix_(minimum.free, minimum.free)], at_prior=known)
@@ -92,10 +98,11 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
     perfect sensor.
     """
     scales = _Scales(recording, flat, gravity)
-    found = _fit_from(initialise(scales.rough.problem, scales.rough.flat.b_omega), scales)
+    begin = scales.rough.problem, scales.rough.flat.b_omega
+    found = _fit_samples(without_changes(_Search(scales, initialise(*begin))))
     if found.fit.converged:
         return found
-    again = _fit_from(perfect(scales.rough.problem, scales.rough.flat.b_omega), scales)
+    again = _fit_samples(without_changes(_Search(scales, perfect(*begin))))
     return again if again.fit.converged else found
 
 
@@ -122,9 +129,8 @@ class _Scales:
         return prepare(thin, at, blocks(self._runs, recording, flat, SEARCH_HZ), self.gravity, of_means)
 
 
-def _fit_from(begin: Theta, scales: _Scales) -> HandFit:
-    """Fit means over blocks first, without changes of the gyroscope's bias, then sample by sample."""
-    search = without_changes(_Search(scales, begin))
+def _fit_samples(search: _Search) -> HandFit:
+    """Fit sample by sample, from where a search ended."""
     fine, theta, noise = search.scales.fine, search.theta, search.noise
     if search.trembles:
         fine = remove_tremor(fine)
@@ -143,9 +149,7 @@ def _fit_from(begin: Theta, scales: _Scales) -> HandFit:
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
-    return HandFit(
-        replace(fit, slip=slip), minimum, noise, search.prepared, fine, search.scales.recording, search.changes
-    )
+    return HandFit(replace(fit, slip=slip), minimum, noise, search, fine)
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
@@ -240,7 +244,7 @@ class _Search:
         if not self._last[1].converged or are_explained(transitions):
             return None
         weighed = _with_each_variance(*self._last, transitions)
-        return gyroscope_change(rank(parts_of(*weighed, self._prior), self.theta.D))
+        return gyroscope_change(rank(parts_of(*weighed, self._prior), self.theta.D, CHANGES))
 
     def without(self, change: Explanation) -> _Search:
         """Search once more, from where this one ended, in the recording without one more change."""

@@ -88,6 +88,7 @@ HYPOTHESES = (
     Hypothesis("accelerometer", "each", by_side=True),
     Hypothesis("scale", "each", by_side=True),
 )
+CHANGES = tuple(each for each in HYPOTHESES if each.is_change)
 # Standard deviations of x are tried from a 10,000th of these up to them: m/s^2, 1, rad, rad/s.
 LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1, "gyroscope": 0.03}
 VARIANCES = 10.0 ** np.arange(-8.0, 0.1, 0.5)
@@ -165,14 +166,14 @@ class Explanation(NamedTuple):
         return np.stack([np.interp(t, at, column) for column in delta.T], axis=1)
 
 
-def rank(parts: Parts | None, D: Vector) -> list[Explanation]:
+def rank(parts: Parts | None, D: Vector, hypotheses: Sequence[Hypothesis] = HYPOTHESES) -> list[Explanation]:
     """Return what each hypothesis says, weighed against the others and nothing, the likeliest first.
 
     Nothing where the fit failed, or has no parts.
     """
     if parts is None or not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
         return []
-    return _weigh(HYPOTHESES, parts, D)
+    return _weigh(hypotheses, parts, D)
 
 
 def explain(parts: Parts | None, D: Vector, found: list[Explanation]) -> list[Explanation]:
@@ -307,7 +308,7 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
     p /= p.sum(axis=(1, 2), keepdims=True)
     weighed = p[..., None] * x
     squares = weighed.swapaxes(2, 3) @ x
-    squares[..., range(x.shape[3]), range(x.shape[3])] += np.sum(p[..., None] * variance, axis=2)
+    np.einsum("hmdd->hmd", squares)[:] += np.einsum("hmq,hmqd->hmd", p, variance)
     # The estimate strays by x times a basis (h, m, a, d, p): by -follow, and where the sensor is another one in each
     # group by what the shapes weigh there. Its mean products need no array of every shape in every group.
     basis, weights = -likelihood.follow[:, :, None], np.ones((len(shapes), 1, 1))
@@ -315,14 +316,13 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
         of_x = likelihood.U.swapaxes(3, 4) @ B.swapaxes(1, 2)[:, None, None]
         basis = np.concatenate([basis, of_x], axis=2)
         weights = np.concatenate([np.ones((*shapes.shape[:2], 1)), shapes], axis=2)
-    across = (squares[:, :, None] @ basis).transpose(0, 1, 4, 3, 2)
-    products = (basis.transpose(0, 1, 4, 2, 3) @ across).transpose(0, 1, 3, 4, 2)
+    products = np.einsum("hmadp,hmbdp->hmabp", basis, squares[:, :, None] @ basis)
     pairs = (weights[:, :, :, None] * weights[:, :, None]).swapaxes(0, 1)
     away2 = pairs.reshape(len(pairs), -1) @ products.reshape(len(alike), -1, products.shape[-1])
     away = np.sqrt(np.maximum(away2, 0.0))
     found = []
     for k, (hypothesis, of) in enumerate(zip(alike, log_p, strict=True)):
-        m, best = np.unravel_index(of.argmax(), of.shape)
+        m, best = divmod(int(of.argmax()), of.shape[1])
         likeliest, follow = x[k, m, best], likelihood.follow[k, m]
         delta = shapes[m] @ (likelihood.U[k, m] @ likeliest)
         shift = np.vstack([np.zeros(3), delta]) @ B[k].T - likeliest @ follow

@@ -89,7 +89,7 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit | HandFit]] = {
 }
 
 
-def fit_model(model: str, recording: Recording, flat: Flat, gravity: float) -> ModelChoice:
+def fit_model(recording: Recording, flat: Flat, gravity: float, model: str) -> ModelChoice:
     """Fit the model of a name, or for "auto" the simplest one that explains the data."""
     if model == "auto":
         return choose_model(recording, flat, gravity)

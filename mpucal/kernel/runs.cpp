@@ -16,7 +16,6 @@ namespace {
 constexpr double kChord = 0.05;
 
 // A fourth difference has the coefficients 1, -4, 6, -4, 1, whose squares have this sum.
-constexpr std::size_t kOrder = 4;
 constexpr double kSquares = 70.0;
 
 // A spike exceeds so much, and so many times the departures of its neighbours from theirs; its neighbours differ by less
@@ -101,10 +100,11 @@ void moving_statistics(const double* x, std::size_t n, std::size_t size, double*
 }
 
 void noise_variance(const double* x, std::size_t n, std::size_t half, double* variance) {
-  std::vector<double> d(x, x + 3 * n), squares(3 * n);
-  for (std::size_t order = 1; order <= kOrder; ++order)
-    for (std::size_t i = 0; i + 3 * order < 3 * n; ++i) d[i] = d[i + 3] - d[i];
-  for (std::size_t i = 0; i + 3 * kOrder < 3 * n; ++i) squares[i + 3 * (kOrder / 2)] = d[i] * d[i] / kSquares;
+  std::vector<double> squares(3 * n);
+  for (std::size_t i = 0; i + 12 < 3 * n; ++i) {
+    const double d = x[i] + x[i + 12] - 4.0 * (x[i + 3] + x[i + 9]) + 6.0 * x[i + 6];
+    squares[i + 6] = d * d / kSquares;
+  }
   moving_mean(squares.data(), n, 3, half, variance);
 }
 

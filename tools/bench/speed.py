@@ -54,7 +54,7 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
     ):
         found = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
         flat = flat_statistics(recording, recording.flat)
-        estimation_s = median_s(lambda m=model, r=recording, f=flat: fit_model(m, r, f, GRAVITY_MPS2).honest(), runs)
+        estimation_s = median_s(lambda m=model, r=recording, f=flat: fit_model(r, f, GRAVITY_MPS2, m).honest(), runs)
         whole_s = median_s(lambda r=recording, m=model: mpucal.calibrate(r, model=m, gravity=GRAVITY_MPS2), runs)
         length_s = float(recording.t[-1] - recording.t[0])
         rows.append(
@@ -123,7 +123,7 @@ def growth(runs: int) -> list[dict[str, Any]]:
     for n in GROWTH:
         recording = turned(60.0, n / 60.0)
         flat = flat_statistics(recording, recording.flat)
-        s = median_s(lambda r=recording, f=flat: fit_model("accel", r, f, GRAVITY_MPS2), runs)
+        s = median_s(lambda r=recording, f=flat: fit_model(r, f, GRAVITY_MPS2, "accel"), runs)
         whole = peak_bytes(lambda r=recording: mpucal.calibrate(r, model="accel", gravity=GRAVITY_MPS2))
         rows.append(
             {

@@ -26,7 +26,7 @@ LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 def few_orientations(e: Evidence) -> Reason | None:
     """Find directions that the data leave open, where the model holds; after a slip, more orientations do not help.
 
-    Nor do they where it rested in many: then it moved as it rested, with the hand or with the ground.
+    Nor do they where a hand held it in many: then it moved as it rested, with the hand or with the ground.
     """
     rms = _model_rms(e)
     if _slip(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
@@ -37,7 +37,7 @@ def few_orientations(e: Evidence) -> Reason | None:
         f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", e.uncertainty.worst, strict=True) if abs(w) > 0.4
     )
     known = max(rms, e.uncertainty.rms_mps2) if _is_useless(e) else rms
-    if known < e.gravity and e.was_held_all_around and contradiction(e) is None:
+    if known < e.gravity and e.model == "hand" and e.was_held_all_around and contradiction(e) is None:
         return reason("inconsistent", "moved", _is_useless(e), rms=known)
     if known < e.gravity:
         return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
