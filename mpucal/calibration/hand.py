@@ -80,8 +80,8 @@ class HandFit:
         return self.search.changes
 
     def without(self, change: Explanation) -> HandFit:
-        """Fit the recording without one more change."""
-        return _fit_samples(self.search.without(change))
+        """Fit the recording without one more change, from the beginning: with it, the fit may be far from the truth."""
+        return _fit(*self.search.left_by(change))
 
     def honest(self) -> Fit:
         """Return the fit with its honest covariance."""
@@ -97,12 +97,16 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> HandFit:
     A turn that the gyroscope missed can lead a search astray: if it does not settle, it begins once more, from a
     perfect sensor.
     """
-    scales = _Scales(recording, flat, gravity)
+    return _fit(_Scales(recording, flat, gravity))
+
+
+def _fit(scales: _Scales, changes: tuple[Explanation, ...] = ()) -> HandFit:
+    """Fit a recording without some changes of the gyroscope's bias, as fit_hand does."""
     begin = scales.rough.problem, scales.rough.flat.b_omega
-    found = _fit_samples(without_changes(_Search(scales, initialise(*begin))))
+    found = _fit_samples(without_changes(_Search(scales, initialise(*begin), changes)))
     if found.fit.converged:
         return found
-    again = _fit_samples(without_changes(_Search(scales, perfect(*begin))))
+    again = _fit_samples(without_changes(_Search(scales, perfect(*begin), changes)))
     return again if again.fit.converged else found
 
 
@@ -248,9 +252,14 @@ class _Search:
 
     def without(self, change: Explanation) -> _Search:
         """Search once more, from where this one ended, in the recording without one more change."""
+        scales, changes = self.left_by(change)
+        return _Search(scales, self.theta, changes)
+
+    def left_by(self, change: Explanation) -> tuple[_Scales, tuple[Explanation, ...]]:
+        """Return the recording without one more change, and all changes that it is without."""
         scales = self.scales
         recording = remove_change(scales.recording, scales.flat, change)
-        return _Search(_Scales(recording, scales.flat, scales.gravity), self.theta, (*self.changes, change))
+        return _Scales(recording, scales.flat, scales.gravity), (*self.changes, change)
 
     def _run(self, theta: Theta) -> tuple[Theta, Noise]:
         """Search with Huber's loss, which converges from afar, then with the redescending one and the best sigma."""
