@@ -60,6 +60,19 @@ def test_samples_at_the_end_of_a_range_are_clipped():
     np.testing.assert_array_equal(with_masks(replace(recording, acc=acc)).acc_clipped, at_the_end)
 
 
+@pytest.mark.parametrize("peak", [1.0, 1.1], ids=["at the range", "beyond it"])
+def test_a_slow_peak_at_a_range_is_clipped_only_if_it_is_cut_off(peak):
+    """Coarse steps repeat the largest reading of a slow peak: that it lies at a chip's range may be chance."""
+    recording = noise()
+    full_scale, step = GYRO_RANGES[0], np.deg2rad(1.0 / 16.4)
+    turn = peak * full_scale * np.sin(0.8 * recording.t)
+    gyr = 1e-3 * recording.gyr
+    gyr[:, 0] = np.minimum(step * np.rint(turn / step), full_scale)
+    at_the_end = gyr[:, 0] == gyr[:, 0].max()
+    assert at_the_end.sum() >= 2
+    np.testing.assert_array_equal(with_masks(replace(recording, gyr=gyr)).gyr_clipped, at_the_end & (peak > 1.0))
+
+
 def test_clipping_at_another_value_must_be_long_and_far_from_rest():
     recording = noise()
     t = recording.t

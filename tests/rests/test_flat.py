@@ -63,6 +63,14 @@ def test_the_flat_segment_is_the_earliest_long_rest_and_ends_with_it(spans, firs
     assert last[0] <= found[1] <= last[1]
 
 
+@pytest.mark.parametrize("taken_up", [0.1, 0.2, 0.3])
+def test_a_short_flat_segment_ends_before_the_board_is_taken_up(taken_up):
+    """A hand that begins to lift the board turns it by so little at first that the window is still."""
+    lifted = (taken_up, 1.025 * UP, np.array([0.03, -0.02, 0.0]))
+    recording = parts((2.5 - taken_up, UP, REST), lifted, BUMP, (4, ASIDE, REST))
+    assert find_flat(recording)[1] <= 250 - 100 * taken_up
+
+
 def test_a_short_recording_has_no_flat_segment():
     assert find_flat(parts((0.1, UP, REST))) is None
     assert find_flat(parts((0.4, UP, REST))) is None
