@@ -40,8 +40,13 @@ class RestFinder:
         self._windows = _windows(recording, self._n)
 
     def typical(self) -> Intervals:
-        """Return the rests in which the rate spreads as little as in most of this recording's."""
-        return self.within(self._learned())
+        """Return the rests in which the rate spreads as little as in most of this recording's.
+
+        That of the flat segment is quiet: in wider limits it would go on while a hand takes the board up.
+        """
+        flat, rests, quiet = self._flat, self.within(self._learned()), self.within(QUIET)
+        at = np.array([[flat.first, flat.last]])
+        return _and_others(quiet[~_apart(quiet, at)], rests[_apart(rests, at)])
 
     def any_hand(self) -> Intervals:
         """Return the typical rests, and in addition those of a hand with any tremor."""
