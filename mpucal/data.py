@@ -203,6 +203,8 @@ class Recording(Samples):
     autopilot : for an IMU of a vehicle, the autopilot that corrected the samples.
     others : further IMUs of that vehicle, turned with it.
     taken : None, or a sentence on how a file's columns and units were read.
+    interrupted : times [s] at which the measurement was interrupted on purpose, or with mpucal's knowledge. In the gap
+        that ends next after each, the board may have been turned, but nothing was lost.
     """
 
     flat: tuple[int, int] | None = None
@@ -213,6 +215,7 @@ class Recording(Samples):
     autopilot: Autopilot | None = None
     others: tuple[Recording, ...] = ()
     taken: str | None = None
+    interrupted: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         # a file may be called anything
@@ -333,13 +336,19 @@ class Recording(Samples):
 
     def without(self, first: int, last: int) -> Self:
         """Return all samples except first..last-1, with a gap in their place; `flat` is kept if it lies before them."""
+        last = min(last, len(self))
         if first >= last:
             return self
         kept = self.at(np.r_[0:first, last : len(self)])
         if first < len(kept):
             kept.gap[first] = True
         flat = self.flat if self.flat is not None and self.flat[1] <= first else None
-        return replace(self, flat=flat, **vars(kept))
+        return replace(self, flat=flat, interrupted=(*self.interrupted, float(self.t[first])), **vars(kept))
+
+    def interrupted_at(self, *times_s: float) -> Self:
+        """Return the recording with further times of interruptions, and so the other IMUs of its vehicle."""
+        others = tuple(other.interrupted_at(*times_s) for other in self.others)
+        return replace(self, interrupted=(*self.interrupted, *times_s), others=others)
 
 
 def clock_of(stamps: Vector, sensor: Sensor) -> Clock:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 # Names of session events. KEY holds the key under its own name; LATE: an answer was late; FORGET: samples
-# first..last-1 are not used; RESUMED: the session was resumed; UTC: the time of day, ns since 1970.
+# first..last-1 are not used; RESUMED: the session was resumed, and had stopped at the time SAMPLED_NS of the samples'
+# clock; UTC: the time of day, ns since 1970.
 KEY, LATE, FORGET, RESUMED, UTC = "key", "late", "forget", "resumed", "utc"
+SAMPLED_NS = "sampled_ns"
 # Of a vehicle: the link was opened; what it sends counts from here on; nothing came until this time.
 OPENED, BEGUN, END = "session", "begun", "end"
 ABORT = "abort"  # the key that ends a session

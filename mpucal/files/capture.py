@@ -20,7 +20,7 @@ import numpy as np
 from ..chip.accesses import Accesses
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
-from ..chip.records import BEGUN, FORGET, OPENED, RESUMED, UTC, SessionEvent
+from ..chip.records import BEGUN, FORGET, OPENED, RESUMED, SAMPLED_NS, UTC, SessionEvent
 from ..data import Recording, Samples
 from ..errors import CaptureError, RecordingError
 from ..mavlink.log import read_log
@@ -50,6 +50,7 @@ def load_capture(*paths: Path) -> Recording:
         recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
     if len(recording) < 2:
         raise RecordingError(f"{session.name} holds {len(recording)} usable samples", "record for longer")
+    recording = recording.interrupted_at(*sorted(session.interrupted))
     return replace(recording, recovered=session.recovered, utc_ns=session.utc_ns)
 
 
@@ -81,13 +82,14 @@ class _SessionRecords:
     Attributes
     ----------
     name : of the first capture. forgotten : first -> last + 1 samples that the session discarded.
-    recovered, utc_ns : see Recording. These and `forgotten` are complete when all records are read.
+    interrupted, recovered, utc_ns : see Recording. These and `forgotten` are complete when all records are read.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = paths
         self.name = paths[0].name
         self.forgotten: dict[int, int] = {}
+        self.interrupted: set[float] = set()
         self.recovered: str | None = None
         self.utc_ns: int | None = None
 
@@ -114,6 +116,9 @@ class _SessionRecords:
                     self.forgotten[first] = last
                 elif record.name in (OPENED, RESUMED, BEGUN):
                     self._counts = record.name == BEGUN
+                    # Sessions of earlier versions did not record the time.
+                    if SAMPLED_NS in record.data:
+                        self.interrupted.add(self._number(record, SAMPLED_NS) * 1e-9)
             self.recovered = reader.recovered or self.recovered
 
     def _number(self, event: SessionEvent, key: str) -> int:

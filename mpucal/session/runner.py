@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ..chip.records import KEY, RESUMED
+from ..chip.records import KEY, RESUMED, SAMPLED_NS
 from ..data import Recording, Sensor
 from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture, SourceError
 from ..result.calibration import Calibration
@@ -58,6 +58,7 @@ class Runner:
         self._machine = Machine(plan, checking)
         self._dialogue = Dialogue(self._machine, operator, listeners, note, source.now_ns, late)
         self._ended, self._recording, self.samples = False, False, 0
+        self._interrupted_ns: list[int] = []
         self.sensor: Sensor | None = None
 
     def measure(self) -> Recording:
@@ -84,7 +85,8 @@ class Runner:
             if self._dialogue.scheduler is not None:
                 self._dialogue.scheduler.close()
         self._stop_source()
-        return self._dialogue.without_forgotten(self._source.recording())
+        recording = self._dialogue.without_forgotten(self._source.recording())
+        return recording.interrupted_at(*(t_ns * 1e-9 for t_ns in self._interrupted_ns))
 
     def record(self, seconds: float | None) -> int:
         """Measure for `seconds`, or until any key or the source's end; return the number of samples.
@@ -188,7 +190,8 @@ class Runner:
         """Continue with the next part of a resumed session; return False if there is none."""
         ended_ns = self._source.now_ns()
         while self._open_next_part():
-            self._note(RESUMED, ended_ns, {})
+            self._note(RESUMED, ended_ns, {SAMPLED_NS: ended_ns})
+            self._interrupted_ns.append(ended_ns)
             try:
                 sensor = self._source.start()
             except EndOfCapture:

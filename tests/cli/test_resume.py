@@ -36,7 +36,7 @@ def joined(write_capture, folder, names):
 
 
 def test_a_resumed_session_has_the_bits_of_an_unbroken_one(mpucal, stopped_at, write_capture, tmp_path):
-    """The session is killed while flat, and stopped with Ctrl-C while rotating."""
+    """The session is killed while flat, and stopped with Ctrl-C while rotating: no reason against its result."""
     folder = tmp_path / "board"
     words = ("--bus", "sim", "--rate", "25", "--target", "quick", "-o", "board", "--name", "Bench 7")
     killed_s = came_to_s(stopped_at(tmp_path, ("flat", 50), signal.SIGKILL, *WORDS, *words).err)
@@ -60,11 +60,14 @@ def test_a_resumed_session_has_the_bits_of_an_unbroken_one(mpucal, stopped_at, w
 
     found = Calibration.load(folder / "calibration.json")
     assert found.extra["name"] == "Bench 7"
+    assert (found.verdict, found.quality["reasons"]) == ("good", [])
     parts, unbroken = (
         load(folder),
         load(joined(write_capture, folder, ("capture.mcap", "capture-2.mcap", "capture-3.mcap"))),
     )
     assert parts.at(slice(None)) == unbroken.at(slice(None))
+    assert parts.interrupted == unbroken.interrupted
+    assert parts.gap.sum() == len(parts.interrupted) == 2
     other = calibrate(unbroken)
     assert np.array_equal(other.D, found.D)
     assert np.array_equal(other.b_a, found.b_a)
@@ -90,10 +93,11 @@ def cut_off(write_capture, tmp_path):
     return call
 
 
-def resume_cut(mpucal, begins):
+def resume_cut(mpucal, begins, gaps=1):
     """Resume the session in the folder `cut`; return its recording, that of the cut part, and its calibration.
 
-    The simulated sensor stands where it was switched on, and its clock begins again.
+    The simulated sensor stands where it was switched on, and its clock begins again. That the session was interrupted
+    is no lost data; each further gap is.
     """
     resumed = mpucal(*WORDS, "--no-write", "--resume", "cut")
     assert resumed.code == 0, resumed.err
@@ -101,14 +105,27 @@ def resume_cut(mpucal, begins):
     prompts = [event["kind"] for event in events(resumed.err) if event["event"] == "prompt"]
     assert (prompts[0], prompts[-1]) == (begins, "rest")
     recording, first = load("cut"), load("cut/capture.mcap")
-    assert recording.gap.sum() == 1
+    assert recording.gap.sum() == gaps
     assert np.array_equal(first.acc, recording.acc[: len(first)])
-    return recording, first, Calibration.load("cut/calibration.json")
+    found = Calibration.load("cut/calibration.json")
+    for quality in (found.quality, *(imu["quality"] for imu in found.extra.get("others", ()))):
+        lost = [reason["message"] for reason in quality["reasons"] if reason["code"] == "data_lost"]
+        assert len(lost) == (gaps > 1)
+        assert all(f" in {gaps - 1} place" in message for message in lost)
+    return recording, first, found
 
 
 def test_a_vehicle_is_resumed_after_a_reboot_while_rotating(mpucal, flown, cut_off):
     cut_off(flown.folder, 25.0)
     resume_cut(mpucal, "rotate")
+
+
+def test_samples_that_a_resumed_session_lost_are_told(mpucal, cut_off, tmp_path):
+    words = ("--bus", "sim:fault=brownout@22", "--rate", "25", "--target", "quick", "--no-write")
+    assert mpucal(*WORDS, *words, "-o", "whole").code == 0
+    cut_off(tmp_path / "whole", 16.0)
+    _, _, found = resume_cut(mpucal, "rotate", gaps=2)
+    assert found.verdict == "usable"
 
 
 def test_a_kernel_device_is_resumed_after_a_reboot(mpucal, cut_off, tmp_path):

@@ -6,7 +6,8 @@
 The hand does what the session's prompts say; where it brings the vehicle goes to the SITL through its JSON interface
 (ArduPilot's libraries/SITL/examples/JSON). What the SITL makes of it, SIM_ACCn_BIAS and SIM_ACCn_SCAL, is what the
 session is to find. The vehicle takes its level before. Words after `--` go to `mpucal session`; with --own, ArduPilot
-calibrates itself in the same hand instead. The line at the end: exit code, verdict, how far the vehicle's parameters
+calibrates itself in the same hand instead. With --killed-at 6, the session is killed at its sixth prompt and resumed.
+The line at the end: exit code, verdict, how far the vehicle's parameters
 were from the truth at worst and how far those of each IMU are now (offset [m/s^2], scale), the rms over D and b_a of
 all IMUs of (estimate - truth) / standard uncertainty, the time that was measured [s], and how far the attitude is off
 that level once the vehicle has been rebooted [deg].
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import socket
 import struct
 import subprocess
@@ -198,6 +200,7 @@ def main(
     seed: Annotated[int, "of the hand"] = 0,
     cross_axis: Annotated[float, "standard deviation, of the accelerometers"] = 0.0,
     own: Annotated[bool, "ArduPilot calibrates itself"] = False,
+    killed_at: Annotated[int, "kill the session at this prompt, counted from 1, and resume it"] = 0,
 ) -> int:
     """Run one session, and print its line; return its exit code."""
     body, document = Body(port, hand, arm, seed, cross_axis), None
@@ -211,7 +214,7 @@ def main(
         else:
             level = own_calibration.set_level(link, body)
     if not own:
-        code, document = session(body, ["--mavlink", mavlink, *words])
+        code, document = session(body, ["--mavlink", mavlink, *words], killed_at)
         took_s = document["fit"]["seconds"] if document else math.nan
     with closing(_locked(mavlink)) as link:
         angle = own_calibration.attitude_error_deg(link, body, level)
@@ -224,18 +227,29 @@ def main(
     return code
 
 
-def session(body: Body, words: list[str]) -> tuple[int, dict[str, Any] | None]:
-    """Run `mpucal session`, pass its prompts to the hand, and print its output; return its exit code and its result."""
+def session(body: Body, words: list[str], killed_at: int) -> tuple[int, dict[str, Any] | None]:
+    """Run `mpucal session`, and resume it if it was killed; return its exit code and its result."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "session"
-        command = [sys.executable, "-m", "mpucal", "session", "--json-events", *words, "-o", str(folder)]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
-            for text in process.stderr or ():
-                event: dict[str, Any] = json.loads(text) if text.startswith("{") else {"event": "error", "text": text}
-                if event["event"] == "prompt":
-                    body.hear(event["kind"], event["down"])
-                said = [str(event[key]).strip() for key in ("text", "why", "what", "do") if event.get(key)]
-                if said and event["event"] in SAID:
-                    print(f"{event['event']}: {' '.join(said)}", file=sys.stderr)
+        code = _guided(body, [*words, "-o", str(folder)], killed_at)
+        if code == -signal.SIGKILL:
+            code = _guided(body, ["--resume", str(folder)])
         file = folder / "calibration.json"
-        return process.returncode, json.loads(file.read_text()) if file.exists() else None
+        return code, json.loads(file.read_text()) if file.exists() else None
+
+
+def _guided(body: Body, words: list[str], killed_at: int = 0) -> int:
+    """Run `mpucal session`, pass its prompts to the hand, and print its output; return its exit code."""
+    command, prompts = [sys.executable, "-m", "mpucal", "session", "--json-events", *words], 0
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
+        for text in process.stderr or ():
+            event: dict[str, Any] = json.loads(text) if text.startswith("{") else {"event": "error", "text": text}
+            if event["event"] == "prompt":
+                body.hear(event["kind"], event["down"])
+                prompts += 1
+                if prompts == killed_at:
+                    process.kill()
+            said = [str(event[key]).strip() for key in ("text", "why", "what", "do") if event.get(key)]
+            if said and event["event"] in SAID:
+                print(f"{event['event']}: {' '.join(said)}", file=sys.stderr)
+    return process.returncode

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
-from ...data import Mask
+from ...data import Mask, Recording
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.windows import noise_variance
@@ -45,8 +45,8 @@ def clipped(code: str, mask: str, e: Evidence) -> Reason | None:
 
 
 def data_lost(e: Evidence) -> Reason | None:
-    """Find gaps; more than half of the time lost refuses, interruptions of the session not counted."""
-    gaps, t = e.recording.gap, e.recording.t
+    """Find gaps that no known interruption explains; more than half of the time lost refuses, long ones not counted."""
+    gaps, t = _unexplained_gaps(e.recording), e.recording.t
     if not gaps.any():
         return None
     places = int(np.count_nonzero(gaps & ~np.append(False, gaps[:-1])))
@@ -60,6 +60,16 @@ def data_lost(e: Evidence) -> Reason | None:
         places=f"{places} place{'s' if places > 1 else ''}",
         seconds=lost,
     )
+
+
+def _unexplained_gaps(recording: Recording) -> Mask:
+    """Return the gaps (n,) without those that known interruptions left: after each, the first one that ends."""
+    gaps, t = recording.gap.copy(), recording.t
+    at = np.flatnonzero(gaps)
+    within = [t_s for t_s in recording.interrupted if t_s >= t[0]]
+    after = np.searchsorted(t[at], within, side="right")
+    gaps[at[after[after < len(at)]]] = False
+    return gaps
 
 
 def vibrating(e: Evidence) -> Reason | None:
