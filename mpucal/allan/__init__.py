@@ -62,7 +62,8 @@ class NoiseMeter:
             if a == b:
                 continue
             follows = not samples.gap[a]
-            values = np.hstack([samples.acc[a:b], samples.gyr[a:b]])
+            # by axis, so that the sums over time run along memory
+            values = np.vstack([samples.acc[a:b].T, samples.gyr[a:b].T])
             if not np.isfinite(values).all():
                 raise RecordingError(
                     "the recording was read without rates",
@@ -70,7 +71,7 @@ class NoiseMeter:
                 )
             self._octaves.add(values, follows)
             self._spectrum.add(values, follows)
-            self._trace.add(np.hstack([values, samples.temperature_c[a:b, None]]))
+            self._trace.add(np.vstack([values, samples.temperature_c[a:b]]))
             self._gaps_s += 0.0 if follows else float(samples.t[a]) - self._last_s
             self._last_s = float(samples.t[b - 1])
 

@@ -24,29 +24,31 @@ class _Level:
         self.distances = distances
         self.sums = np.zeros((len(distances), axes))
         self.counts = np.zeros(len(distances))
-        self._tail, self._odd = np.zeros((0, axes)), np.zeros((0, axes))
+        self._tail, self._odd = np.zeros((axes, 0)), np.zeros((axes, 0))
 
     def interrupt(self) -> None:
         """Reset after a gap."""
-        self._tail, self._odd = self._tail[:0], self._odd[:0]
+        self._tail, self._odd = self._tail[:, :0], self._odd[:, :0]
 
     def add(self, blocks: Vector) -> Vector:
-        """Add block means (n, axes); return the means of pairs."""
-        z = np.concatenate([self._tail, blocks])
-        total = np.concatenate([np.zeros((1, z.shape[1])), np.cumsum(z, axis=0)])
-        for i, n in enumerate(self.distances):
-            new = min(len(blocks), len(z) - 2 * n + 1)
-            if new > 0:
-                end = len(total)
-                later, middle, earlier = (total[end - new - k : end - k] for k in (0, n, 2 * n))
-                d = (later - 2.0 * middle + earlier) / n
-                self.sums[i] += np.einsum("ij,ij->j", d, d)
+        """Add block means (axes, n); return the means of pairs."""
+        sums = z = np.concatenate([self._tail, blocks], axis=1)
+        for n in _FIRST:
+            # sums: of n blocks each, one at every block
+            new = min(blocks.shape[1], z.shape[1] - 2 * n + 1)
+            if new <= 0:
+                break
+            if n in self.distances:
+                d = sums[:, -new:] - sums[:, -new - n : -n]
+                i = self.distances.index(n)
+                self.sums[i] += np.einsum("ij,ij->i", d, d) / n**2
                 self.counts[i] += new
-        self._tail = z[max(len(z) - 2 * self.distances[-1] + 1, 0) :]
-        pairs = np.concatenate([self._odd, blocks])
-        even = len(pairs) // 2 * 2
-        self._odd = pairs[even:]
-        return np.asarray(0.5 * (pairs[:even:2] + pairs[1:even:2]))
+            sums = sums[:, n:] + sums[:, :-n]
+        self._tail = z[:, max(z.shape[1] - 2 * _FIRST[-1] + 1, 0) :]
+        pairs = np.concatenate([self._odd, blocks], axis=1)
+        even = pairs.shape[1] // 2 * 2
+        self._odd = pairs[:, even:]
+        return np.asarray(0.5 * (pairs[:, :even:2] + pairs[:, 1:even:2]))
 
 
 class Octaves:
@@ -58,23 +60,23 @@ class Octaves:
     """
 
     def __init__(self, axes: int) -> None:
-        self._axes, self._middle = axes, np.zeros(axes)
+        self._axes, self._middle = axes, np.zeros((axes, 1))
         self._levels = [_Level(axes, _FIRST)]
         self.samples = 0
 
     def add(self, values: Vector, follows: bool = True) -> None:
-        """Add (n, axes) samples; `follows` is False after a gap."""
-        if not len(values):
+        """Add samples (axes, n); `follows` is False after a gap."""
+        if not values.size:
             return
         if not self.samples:
             # without the mean, which does not matter, no digits are lost
-            self._middle = values.mean(0)
-        self.samples += len(values)
+            self._middle = values.mean(1, keepdims=True)
+        self.samples += values.shape[1]
         if not follows:
             for level in self._levels:
                 level.interrupt()
         blocks, at = np.asarray(values - self._middle), 0
-        while len(blocks):
+        while blocks.size:
             if at == len(self._levels):
                 self._levels.append(_Level(self._axes, _FIRST[-1:]))
             blocks = self._levels[at].add(blocks)

@@ -36,20 +36,21 @@ class Trace:
         self._size = max(round(FIRST_S * rate_hz), 1)
         self._rate_hz = rate_hz
         self._means: list[Vector] = []
-        self._held = np.zeros((0, columns))
+        self._held = np.zeros((columns, 0))
 
     def add(self, values: Vector) -> None:
-        """Add (n, columns) samples."""
-        self._held = np.concatenate([self._held, values])
-        whole = len(self._held) // self._size
+        """Add samples (columns, n)."""
+        self._held = np.concatenate([self._held, values], axis=1)
+        columns, n = self._held.shape
+        whole = n // self._size
         if not whole:
             return
         used = whole * self._size
-        self._means += list(self._held[:used].reshape(whole, self._size, -1).mean(1))
-        self._held = self._held[used:]
+        self._means += list(self._held[:, :used].reshape(columns, whole, self._size).mean(2).T)
+        self._held = self._held[:, used:]
         while len(self._means) >= BLOCKS:
             # an odd last block is dropped
-            pairs = np.array(self._means[: len(self._means) // 2 * 2]).reshape(-1, 2, self._held.shape[1])
+            pairs = np.array(self._means[: len(self._means) // 2 * 2]).reshape(-1, 2, columns)
             self._means = list(pairs.mean(1))
             self._size *= 2
 
@@ -61,7 +62,7 @@ class Trace:
     @property
     def means(self) -> Vector:
         """Return the means (k, columns)."""
-        return np.array(self._means).reshape(-1, self._held.shape[1])
+        return np.array(self._means).reshape(-1, len(self._held))
 
 
 def find_steps(means: Vector) -> list[tuple[int, int, float]]:
@@ -102,17 +103,17 @@ class Spectrum:
 
     def __init__(self, axes: int) -> None:
         self._window = np.hanning(SEGMENT)
-        self._held = np.zeros((0, axes))
-        self._power = np.zeros((SEGMENT // 2 + 1, axes))
+        self._held = np.zeros((axes, 0))
+        self._power = np.zeros((axes, SEGMENT // 2 + 1))
         self._segments = 0
 
     def add(self, values: Vector, follows: bool = True) -> None:
-        """Add (n, axes) samples; `follows` is False after a gap."""
-        self._held = np.concatenate([self._held, values]) if follows else values
-        while len(self._held) >= SEGMENT:
-            part, self._held = self._held[:SEGMENT], self._held[SEGMENT:]
-            windowed = (part - part.mean(0)) * self._window[:, None]
-            self._power += np.abs(np.fft.rfft(windowed, axis=0)) ** 2
+        """Add samples (axes, n); `follows` is False after a gap."""
+        self._held = np.concatenate([self._held, values], axis=1) if follows else values
+        while self._held.shape[1] >= SEGMENT:
+            part, self._held = self._held[:, :SEGMENT], self._held[:, SEGMENT:]
+            lines = np.fft.rfft((part - part.mean(1, keepdims=True)) * self._window)
+            self._power += lines.real**2 + lines.imag**2
             self._segments += 1
 
     def tones(self, rate_hz: float) -> list[Tone]:
@@ -125,9 +126,9 @@ class Spectrum:
         density = 2.0 * self._power / (self._segments * rate_hz * np.sum(self._window**2))
         freedom = 2 * self._segments
         # relative to the median, as the floor is a median of the neighbours
-        most = float(chi2.isf(CHANCE / len(density), freedom) / chi2.median(freedom))
+        most = float(chi2.isf(CHANCE / density.shape[1], freedom) / chi2.median(freedom))
         found: list[Tone] = []
-        for axis, of in enumerate(density.T):
+        for axis, of in enumerate(density):
             # the narrow neighbourhood follows a steep density, such as drift at low frequencies
             floor = np.maximum(*(median_filter(of, 2 * many + 1, mode="reflect") for many in NEIGHBOUR_BINS)) + 1e-300
             above = of / floor

@@ -39,7 +39,7 @@ def of_seed(item: tuple[str, int], *, hours: float = 1.0) -> list[Row]:
     n = round(3600.0 * hours * RATE_HZ)
     samples = noise(np.random.default_rng([seed, *axis.encode()]), n, RATE_HZ, *AXES[axis])
     octaves = Octaves(1)
-    for part in np.array_split(samples[:, None], max(n // 16384, 1)):
+    for part in np.array_split(samples[None], max(n // 16384, 1), axis=1):
         octaves.add(part)
     sizes, variances, _ = octaves.variances()
     found = [fit_coefficients(sizes, variances[:, 0], n, 1.0 / RATE_HZ, confidence) for confidence in CONFIDENCES]
