@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 
 import mpucal
+from mpucal.allan import noise_of
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.likelihood import evaluate, value
 from mpucal.calibration.model_selection import fit_model
@@ -33,12 +34,13 @@ FLAT_S, TURNS = 10.0, 3
 KERNEL_STEPS, TWIN_STEPS = 10_000, 300
 # runs of a millisecond or two: many, so that a burst of other work does not affect the median
 MORE_OF_A_KERNEL = 15
+RESTING = 4_000_000
 GROWTH = (1_000, 10_000, 100_000, 1_000_000)
 
 
-def turned(seconds: float, rate_hz: float) -> Recording:
-    """Simulate ten seconds flat, then one turn about each axis, with a sensor of the paper's simulation."""
-    return paper_scenario(0, rate_hz=rate_hz, turn_s=(seconds - FLAT_S) / TURNS).recording
+def turned(seconds: float, rate_hz: float, turns: int = TURNS) -> Recording:
+    """Simulate ten seconds flat, then turns about the axes, with a sensor of the paper's simulation."""
+    return paper_scenario(0, rate_hz=rate_hz, turn_s=(seconds - FLAT_S) / turns, turns=turns).recording
 
 
 def calibrations(runs: int) -> list[dict[str, Any]]:
@@ -51,6 +53,7 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
         ("three turns", turned(160.0, 100.0), "accel"),
         ("three turns", turned(160.0, 100.0), "auto"),
         ("12 poses by hand", by_hand, "auto"),
+        ("59 turns", turned(600.0, 1000.0, 59), "accel"),
     ):
         found = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
         flat = flat_statistics(recording, recording.flat)
@@ -64,6 +67,8 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
                 "iterations": found.fit["iterations"],
                 "estimation ms": 1e3 * estimation_s,
                 "whole ms": 1e3 * whole_s,
+                "whole / estimation": whole_s / estimation_s,
+                "µs a sample": 1e6 * whole_s / len(recording),
             }
         )
     return rows
@@ -136,11 +141,19 @@ def growth(runs: int) -> list[dict[str, Any]]:
     return rows
 
 
+def noise(runs: int) -> list[dict[str, Any]]:
+    """Time the statistics of a long rest, without its reading."""
+    steps = np.random.default_rng(0).standard_normal((6, RESTING))
+    rest = Recording.from_arrays(np.arange(RESTING) / 200.0, steps[:3].T, steps[3:].T)
+    return [{"samples": RESTING, "million samples/s": 1e-6 * RESTING / median_s(lambda: noise_of(rest), runs)}]
+
+
 def main(*, runs: Annotated[int, "of which the median counts"] = 7) -> None:
     """Measure and print."""
     measured = {
         "mpucal.calibrate": calibrations(runs),
         f"one step of the filter ({_kernel.instruction_set()})": kernel(runs),
         "the fit of `accel`, by the number of samples": growth(min(runs, 3)),
+        "mpucal.noise": noise(min(runs, 3)),
     }
     show(*(plain_table(rows, title) for title, rows in measured.items()))

@@ -136,16 +136,17 @@ def hand_scenario(
 
 
 def paper_scenario(
-    seed: int, *, rate_hz: float = 100.0, turn_s: float = 10.0, sensor: SensorTruth | None = None
+    seed: int, *, rate_hz: float = 100.0, turn_s: float = 10.0, turns: int = 3, sensor: SensorTruth | None = None
 ) -> Simulated:
-    """Simulate the paper's section 4.3: 10 s flat, then one complete turn about each axis, turn_s each.
+    """Simulate the paper's section 4.3: 10 s flat, then complete turns about x, y, z and so on, turn_s each.
 
     sensor : drawn from the seed unless given; one given to many seeds makes section 4.4.
     """
     of_sensor, of_noise = np.random.default_rng(seed).spawn(2)
     sensor, sampling = sensor or paper_sensor(of_sensor, rate_hz), Sampling(rate_hz, fine_hz=rate_hz)
     n_flat, n_turn = round(FLAT_S * rate_hz), round(turn_s * rate_hz)
-    omega = np.concatenate([np.zeros((n_flat, 3)), *(np.tile(e, (n_turn, 1)) for e in 2 * np.pi / turn_s * np.eye(3))])
+    about = 2 * np.pi / turn_s * np.eye(3)[np.arange(turns) % 3]
+    omega = np.concatenate([np.zeros((n_flat, 3)), np.repeat(about, n_turn, axis=0)])
     R = board_from_world(attitudes(omega, 1.0 / rate_hz)[:-1])
     s, (truth, Q) = sensor.gravity * R[..., 2], sensor.symmetric()
     samples = np.arange(len(s)) / rate_hz, *sampling.measured(sensor, s, omega, of_noise)
