@@ -118,7 +118,7 @@ class UncertaintyClaim:
         the true cause need not be in the table, and may be like any of them.
         """
         wide = (self.floored / self.model) ** 2 * self.covariance
-        squares = np.array([each.away for each in self.explanations]) ** 2
+        squares = np.reshape([each.away for each in self.explanations], (-1, len(wide))) ** 2
         mean = np.array([each.weight for each in self.explanations]) @ squares
         held = squares[[each.is_possible for each in self.explanations]].max(axis=0, initial=0.0)
         return np.asarray(wide + np.diag(np.maximum(mean, held)))

@@ -179,6 +179,11 @@ def test_each_cause_of_what_surely_happened_is_held():
         assert not surely or (len(held) > 1 and (expected > mean).any())
 
 
+def test_a_claim_that_nothing_else_explains_is_the_models():
+    _, _, parts = linear_parts()
+    np.testing.assert_allclose(UncertaintyClaim(parts.covariance, 1.0, 2.0).widen(), 4.0 * parts.covariance)
+
+
 def test_a_cause_that_explains_nearly_as_much_is_held_though_odds_exclude_it():
     _, _, parts = linear_parts()
     found = rank(replace(parts, gradient=8.0 * parts.gradient, left=8.0 * parts.left), np.eye(3))
