@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,9 @@ LOST_RAD, SETTLING = 0.2, 5
 
 LINE_TOLERANCE = 1e-6
 
-# A rate may repeat as often as chance makes it with this probability, while the board turns by so much [rad/s].
-BY_CHANCE, TURNING = 1e-6, 0.3
+# A rate may repeat as often as chance makes it with this probability, while the board turns: rates change by so much
+# [rad/s], or accelerations [m/s^2].
+BY_CHANCE, TURNING, SWUNG = 1e-6, 0.3, 3.4
 
 # A board is reset if gravity turns within a step by so much more than the gyroscope says, the neighbouring steps miss
 # by less than this share of it, and gravity is then this near to the flat segment's.
@@ -68,15 +70,15 @@ def with_masks(recording: Recording) -> Recording:
     acc_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
     acc_ranges = ACC_RANGES if acc_g is None else np.array([acc_g]) * STANDARD_GRAVITY_MPS2
     gyro_ranges = GYRO_RANGES if gyro_dps is None else np.deg2rad([gyro_dps])
-    gyr_clipped = recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges))
-    stuck = of_a_chip & _stuck(recording.gyr, gyr_clipped)
-    return replace(
+    marked = replace(
         recording,
-        gyr=_without_spikes(recording),
-        gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t) | stuck,
+        gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t),
         acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
-        gyr_clipped=gyr_clipped,
+        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges)),
     )
+    for run in stuck_rates(marked):
+        marked.gap[run.first : run.last] = True
+    return replace(marked, gyr=_without_spikes(recording))
 
 
 def find_reset(recording: Recording, flat: Flat) -> int | None:
@@ -140,10 +142,20 @@ def _on_a_line(values: Vector, t: Vector) -> Mask:
     return drawn
 
 
-def _stuck(values: Vector, clipped: Mask) -> Mask:
-    """Return (n,) True where a rate within its range repeats while the board turns, longer than its noise lets it."""
-    stuck = np.zeros(len(values), bool)
-    for column in values.T:
+class StuckRate(NamedTuple):
+    """Samples first..last-1, in which the rate about `axis` repeats while the board turns."""
+
+    axis: int
+    first: int
+    last: int
+
+
+def stuck_rates(recording: Recording) -> list[StuckRate]:
+    """Find rates within their range that repeat while the board turns, longer than their noise lets them."""
+    if recording.sensor.origin is Origin.VEHICLE:
+        return []  # its stream is rounded, and repeats
+    values, clipped, stuck = recording.gyr, recording.gyr_clipped, []
+    for axis, column in enumerate(values.T):
         same = np.diff(column) == 0.0
         start = same[: max(len(same) // 20, 50)]
         by_chance = (np.count_nonzero(start) + 1) / (len(start) + 2)
@@ -151,10 +163,12 @@ def _stuck(values: Vector, clipped: Mask) -> Mask:
         if not same.any() or _run_lengths(same)[same].max() < longest:
             continue
         for first, last in true_runs(same).tolist():
-            # The board turns where this rate is far from rest, or where others change.
-            most = np.ptp(values[first : last + 1], axis=0).max()
-            if last - first >= longest and not clipped[first] and max(most, abs(column[first] - column[0])) > TURNING:
-                stuck[first + 1 : last + 2] = True
+            if last - first < longest or clipped[first]:
+                continue
+            # The board turns where this rate is far from rest, or where others or the accelerations change.
+            swung, turned = (np.ptp(each[first : last + 1], axis=0).max() for each in (recording.acc, values))
+            if swung > SWUNG or max(turned, abs(column[first] - column[0])) > TURNING:
+                stuck.append(StuckRate(axis, first + 1, last + 2))
     return stuck
 
 

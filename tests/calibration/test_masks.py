@@ -8,7 +8,7 @@ import pytest
 from mpucal.calibration import calibrate
 from mpucal.calibration.masks import ACC_RANGES, GYRO_RANGES, with_masks
 from mpucal.data import Recording
-from tools.lab.judge import sph_rms
+from tools.lab.judge import judged, sph_rms
 
 
 def noise(n=1000, seed=0, **changes):
@@ -116,15 +116,52 @@ def test_a_line_of_one_axis_a_constant_rate_and_computed_rates_are_no_gap():
         assert not with_masks(recording).gap.any()
 
 
-def test_a_rate_that_repeats_while_the_board_turns_is_lost_data(hand):
-    recording = hand(3, "pose12").recording
+def frozen(simulated, begin, seconds, acc=(), gyr=()):
+    """Return the calibration of a recording in which some axes read the same from a sample on."""
+    recording = simulated.recording
+    spoilt = replace(recording, acc=recording.acc.copy(), gyr=recording.gyr.copy())
+    end = begin + round(seconds * recording.rate_hz)
+    for values, axes in ((spoilt.acc, acc), (spoilt.gyr, gyr)):
+        values[begin:end, list(axes)] = values[begin, list(axes)]
+    return calibrate(spoilt, gravity=simulated.truth.gravity)
+
+
+def turning(recording):
+    """Return the first sample of a fast turn about y."""
     rates = np.abs(recording.gyr[:, 1])
-    turning = int(np.flatnonzero(rates > 0.5 * rates.max())[0])
-    gyr = recording.gyr.copy()
-    gyr[turning : turning + 300, 1] = gyr[turning, 1]
-    spoilt = calibrate(replace(recording, gyr=gyr))
-    assert [reason["code"] for reason in spoilt.quality["reasons"]] == ["data_lost"]
-    assert np.abs(spoilt.D - calibrate(recording).D).max() < 2e-3
+    return int(np.flatnonzero(rates > 0.5 * rates.max())[0])
+
+
+@pytest.mark.parametrize(("axes", "named"), [([1], "y"), ([0, 2], "x and z"), ([0, 1, 2], "x and y and z")])
+def test_a_rate_that_repeats_while_the_board_turns_is_a_frozen_axis(hand, axes, named):
+    simulated = hand(3, "pose12")
+    begin = turning(simulated.recording)
+    spoilt, t_s = frozen(simulated, begin, 3.0, gyr=axes), simulated.recording.t[begin] - simulated.recording.t[0]
+    (reason,) = spoilt.quality["reasons"]
+    assert (spoilt.verdict, reason["code"]) == ("usable", "bits_stuck")
+    assert f"the gyroscope reads the same on {named} from {t_s:.0f} to {t_s + 3.0:.0f} s" in reason["message"]
+    assert judged(spoilt, (simulated.truth.D, simulated.truth.b_a)).farthest < 4.0
+
+
+def test_a_gyroscope_that_freezes_at_rest_is_told_by_the_turns_that_follow(hand):
+    simulated = hand(3, "pose12")
+    middle = len(simulated.recording) // 2
+    at_rest = middle + int(np.abs(simulated.recording.gyr[middle : middle + 500]).max(1).argmin())
+    spoilt = frozen(simulated, at_rest, 10.0, gyr=[0, 1, 2])
+    assert [reason["code"] for reason in spoilt.quality["reasons"]] == ["bits_stuck"]
+
+
+def test_a_rate_that_freezes_for_good_is_named_as_such(hand):
+    spoilt = frozen(hand(3, "pose12"), turning(hand(3, "pose12").recording), 1e3, gyr=[1])
+    assert spoilt.verdict == "refused"
+    codes = {reason["code"]: reason["message"] for reason in spoilt.quality["reasons"]}
+    assert "the gyroscope reads the same on y from" in codes["bits_stuck"]
+    assert "data_lost" not in codes
+
+
+def test_whole_samples_that_repeat_are_lost_data(hand):
+    spoilt = frozen(hand(3, "pose12"), turning(hand(3, "pose12").recording), 3.0, [0, 1, 2], [0, 1, 2])
+    assert "data_lost" in [reason["code"] for reason in spoilt.quality["reasons"]]
 
 
 def test_masks_reduce_the_error_by_a_clipped_gyroscope(hand, monkeypatch):

@@ -1,7 +1,7 @@
 """Table of what may be wrong with a recording or its estimate; each row finds a Reason of mpucal/reasons.py, or None.
 
 unusable     no estimate is possible: wrong units, no rest, no turn, a dead axis
-recording    moved while flat, clipped, lost, warming or vibrating; a gravity not found on Earth
+recording    moved while flat, clipped, lost, frozen, warming or vibrating; a gravity not found on Earth
 bits         low or high bits of an axis that never change, a low byte that was taken for signed
 sensor       wrong range, units, axes, gyroscope or clock, by a trustworthy fit
 estimate     directions not observable, no convergence, contradictions, a change midway
@@ -55,6 +55,7 @@ TABLE = (
     Row(partial(recording.clipped, "gyro_clipped", "gyr_clipped"), of_gyroscope=True),
     Row(partial(recording.clipped, "accel_clipped", "acc_clipped")),
     Row(recording.data_lost, of_gyroscope=True),  # gaps do not spoil rests
+    Row(recording.gyroscope_frozen, of_gyroscope=True),
     Row(sensor.scale_factors, "trustworthy fit"),
     Row(sensor.axes, "trustworthy fit", of_gyroscope=True),
     Row(sensor.gyro_off, "trustworthy fit", of_gyroscope=True),

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
-from ...data import Mask, Recording
+from ...data import Mask
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.windows import noise_variance
-from ..evidence import Evidence
+from ..evidence import Evidence, once
+from ..masks import StuckRate, stuck_rates
 
 WARMER_C = 5.0
-MOST_CLIPPED = 0.2
+MOST_CLIPPED, MOST_LOST = 0.2, 0.5
 # A longer gap is an interruption of the session, which says nothing about the link.
 INTERRUPTED_S = 10.0
 # The accelerometer's noise is vibration where it exceeds this and that of the flat segment for a share of the time, or
@@ -45,8 +46,8 @@ def clipped(code: str, mask: str, e: Evidence) -> Reason | None:
 
 
 def data_lost(e: Evidence) -> Reason | None:
-    """Find gaps that no known interruption explains; more than half of the time lost refuses, long ones not counted."""
-    gaps, t = _unexplained_gaps(e.recording), e.recording.t
+    """Find gaps that nothing else explains; more than half of the time lost refuses, long gaps not counted."""
+    gaps, t = _unexplained_gaps(e), e.recording.t
     if not gaps.any():
         return None
     places = int(np.count_nonzero(gaps & ~np.append(False, gaps[:-1])))
@@ -56,15 +57,44 @@ def data_lost(e: Evidence) -> Reason | None:
     return reason(
         "data_lost",
         {Origin.VEHICLE: "link", Origin.FILE: "file"}.get(e.recording.sensor.origin, "bus"),
-        lost - interrupted > 0.5 * float(t[-1] - t[0] - interrupted),
+        lost - interrupted > MOST_LOST * float(t[-1] - t[0] - interrupted),
         places=f"{places} place{'s' if places > 1 else ''}",
         seconds=lost,
     )
 
 
-def _unexplained_gaps(recording: Recording) -> Mask:
-    """Return the gaps (n,) without those that known interruptions left: after each, the first one that ends."""
+def gyroscope_frozen(e: Evidence) -> Reason | None:
+    """Find an axis of the gyroscope that froze; for more than half of the time refuses."""
+    runs, t = _frozen_rates(e), e.recording.t - e.recording.t[0]
+    if not runs:
+        return None
+    longest, frozen = max(runs, key=lambda run: run.last - run.first), np.zeros(len(t), bool)
+    for run in runs:
+        frozen[run.first : run.last] = True
+    repeats = np.ptp(e.recording.gyr[longest.first - 1 : longest.last - 1], axis=0) == 0.0
+    return reason(
+        "bits_stuck",
+        "rate",
+        float(np.diff(t, prepend=0.0)[frozen].sum()) > MOST_LOST * float(t[-1]),
+        axes=" and ".join(axis for axis, one in zip("xyz", repeats, strict=True) if one),
+        begin=float(t[longest.first - 1]),
+        end=float(t[longest.last - 2]),
+    )
+
+
+@once
+def _frozen_rates(e: Evidence) -> list[StuckRate]:
+    """Return where rates repeat while the accelerometer goes on; otherwise whole samples repeat, and are lost."""
+    acc = e.recording.acc
+    return [run for run in stuck_rates(e.recording) if np.ptp(acc[run.first - 1 : run.last - 1], axis=0).any()]
+
+
+def _unexplained_gaps(e: Evidence) -> Mask:
+    """Return the gaps (n,) without frozen rates, and without the first one that ends after each known interruption."""
+    recording = e.recording
     gaps, t = recording.gap.copy(), recording.t
+    for run in _frozen_rates(e):
+        gaps[run.first : run.last] = False
     at = np.flatnonzero(gaps)
     within = [t_s for t_s in recording.interrupted if t_s >= t[0]]
     after = np.searchsorted(t[at], within, side="right")
