@@ -18,7 +18,7 @@ from .hints import NO_HINTS, Hints
 from .matlab import read_matlab_arrays
 from .npz import DAMAGED, NEEDED
 from .reading import HELD, check_size, first_bytes, import_extra, reading
-from .tables.array_table import table_of_arrays, table_of_labels, tables_of_arrays
+from .tables.array_table import table_of_arrays, table_of_labels, tables_of_arrays, with_clocks
 from .tables.cells import is_number
 from .tables.labelled import pivot
 from .tables.load import recording_from_table
@@ -64,6 +64,7 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
         # NumPy takes unknown bytes for pickled objects, and advises to load these, which would run code
         said = "damaged, or pickled Python objects" if "pickle" in str(error) else error
         raise RecordingError(f"{path} is not a whole file of arrays ({said})", _REMEDY) from error
+    found = with_clocks(found)
     if not hints.columns and is_pair(tables := tables_of_arrays(found)):
         return recording_of_tables(path.name, tables, hints)
     table = table_of_labels(path.name, found) or table_of_arrays(path.name, found)
@@ -112,6 +113,8 @@ def _read_json(path: Path) -> Arrays:
 
 def _json_arrays(name: str, value: Any) -> Arrays:
     """Yield name and array of the numbers in a value of JSON; of a list of objects, a column for each key."""
+    value = [_unpacked(each) for each in value] if isinstance(value, list) else value
+    value = _unpacked(value)
     if isinstance(value, dict) and value and all(map(is_number, value)):
         # a table of pandas, or a column, by its index: small whole numbers count the rows
         if not all(map(str.isdecimal, value)) or float(next(iter(value))) >= UTC_NS[0] / NS:
@@ -137,8 +140,28 @@ def _json_arrays(name: str, value: Any) -> Arrays:
         except (TypeError, ValueError):
             continue
         if array.dtype.kind in "iufM" or kind is str:
-            yield name, array
+            yield name, array.reshape(len(array), -1) if array.ndim > 2 else array
             return
+    if all(isinstance(row, list) for row in value) and (flat := [[*_flat(row)] for row in value]) != value:
+        yield from _json_arrays(name, flat)
+
+
+def _unpacked(value: Any) -> Any:
+    """Return an object for a list of pairs of a key and a value, and numbers for a text of several."""
+    if isinstance(value, list) and value and all(_is_pair(each) for each in value):
+        return dict(value)
+    if isinstance(value, str) and "," in value and all(map(is_number, cells := value.split(","))):
+        return [float(cell) for cell in cells]
+    return value
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and isinstance(value[0], str) and not is_number(value[0])
+
+
+def _flat(row: list[Any]) -> Iterator[Any]:
+    for each in row:
+        yield from _flat(each) if isinstance(each, list) else [each]
 
 
 def _samples(row: dict[str, Any]) -> list[dict[str, Any]]:

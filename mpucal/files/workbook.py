@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO, StringIO
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, iterparse
@@ -17,16 +17,19 @@ from ..data import Recording
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
 from .reading import DAMAGED_ZIP, HELD, check_size, reading
-from .tables.load import is_table_of_sensors, table_of_text
+from .tables.load import find_any_table, is_table_of_sensors, table_of_text
+from .tables.names import ACC, GYR, first_triple
+from .tables.phone import is_pair, recording_of_tables
+from .tables.table import Table
 
 _SHEET = re.compile(r"xl/worksheets/sheet(\d{1,4})\.xml").fullmatch
-_STRINGS = "xl/sharedStrings.xml"
+_STRINGS, _BOOK, _RELATIONS = "xl/sharedStrings.xml", "xl/workbook.xml", "xl/_rels/workbook.xml.rels"
 # columns of a sheet, of which the last is XFD
 MOST_COLUMNS = 16384
 
 
 def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """Return the recording in the first sheet that names an accelerometer and a gyroscope, or else in the first.
+    """Return the recording in the first sheet that names both sensors, or in a sheet for each, or else in the first.
 
     Raises
     ------
@@ -35,25 +38,50 @@ def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
     try:
         with reading(path), zipfile.ZipFile(path) as archive:
             check_size(path, HELD * sum(member.file_size for member in archive.infolist()))
-            sheets = [*_sheets(archive)]
+            sheets = dict(_sheets(archive))
     except (*DAMAGED_ZIP, LookupError, ParseError) as error:
         raise RecordingError(f"{path} is not a whole workbook ({error})", "save its sheet as .csv") from error
     if not sheets:
         raise RecordingError(f"{path} holds no xl/worksheets/sheet1.xml", "save its sheet as .csv")
-    chosen = next((text for text in sheets if is_table_of_sensors(text, path.name)), sheets[0])
-    return table_of_text(chosen, path, hints)
+    texts = [*sheets.values()]
+    chosen = next((text for text in texts if is_table_of_sensors(text, path.name)), None)
+    if chosen is None and not hints.columns and is_pair(tables := _tables(sheets)):
+        return recording_of_tables(path.name, tables, hints)
+    return table_of_text(chosen or texts[0], path, hints)
 
 
-def _sheets(archive: zipfile.ZipFile) -> Iterator[str]:
-    """Yield the text of each sheet, whose cells are separated by commas."""
+def _tables(sheets: Mapping[str, str]) -> dict[str, Table]:
+    """Return the tables of sheets under their names, or under that of the sensor whose columns they name."""
+    found: dict[str, Table] = {}
+    for name, text in sheets.items():
+        if (table := find_any_table(text, name)) is not None:
+            sensors = [of for of in (ACC, GYR) if first_triple(table.columns, of)]
+            found[sensors[0] if len(sensors) == 1 else name] = table
+    return found
+
+
+def _sheets(archive: zipfile.ZipFile) -> Iterator[tuple[str, str]]:
+    """Yield the name and the text of each sheet, whose cells are separated by commas."""
     strings = []
     if _STRINGS in archive.namelist():
         strings = [_text(item) for item in _elements(archive.read(_STRINGS), "si")]
     found = sorted((int(match[1]), name) for name in archive.namelist() if (match := _SHEET(name)))
+    titles = _titles(archive)
     for _, name in found:
         text, rows = StringIO(), (_cells(row, strings) for row in _elements(archive.read(name), "row"))
         csv.writer(text, lineterminator="\n").writerows(rows)
-        yield text.getvalue()
+        yield titles.get(name, name), text.getvalue()
+
+
+def _titles(archive: zipfile.ZipFile) -> dict[str, str]:
+    """Return the path of a sheet -> its name; empty if the workbook does not say it."""
+    if not {_BOOK, _RELATIONS} <= {*archive.namelist()}:
+        return {}
+    paths = {each.get("Id"): f"xl/{each.get('Target')}" for each in _elements(archive.read(_RELATIONS), "Relationship")}
+    of_sheets = [dict(each.attrib) for each in _elements(archive.read(_BOOK), "sheet")]
+    # the attribute `id` has the namespace of relationships
+    ids = [next((value for key, value in of.items() if key.endswith("}id")), "") for of in of_sheets]
+    return {paths.get(at, ""): of.get("name", "") for at, of in zip(ids, of_sheets, strict=True)}
 
 
 def _elements(data: bytes, tag: str) -> Iterator[Element]:

@@ -35,8 +35,20 @@ def frame(walk, **more):
     return pd.DataFrame({**more, **of, **{f"gyr_{axis}": walk.gyr[:, i] for i, axis in enumerate("xyz")}})
 
 
-def rows_of(walk):
-    return zip(walk.t.tolist(), si(walk).tolist(), strict=True)
+def rows_of(walk, sign=1.0):
+    return zip(walk.t.tolist(), (sign * si(walk)).tolist(), strict=True)
+
+
+def of_axes(values):
+    return dict(zip("xyz", values, strict=True))
+
+
+def pairs(values):
+    return [*map(list, of_axes(values).items())]
+
+
+def in_text(values):
+    return ", ".join(map(repr, values))
 
 
 def edge_impulse(walk, **units):
@@ -143,6 +155,58 @@ WRITTEN = {
     "Edge Impulse": ("a.json", in_json(lambda w: edge_impulse(w, acc="m/s2", gyr="rad/s")), "a rate of 100 Hz"),
     "Edge Impulse without units": ("a.json", in_json(edge_impulse), "a rate of 100 Hz"),
     "JSON of Sensor Logger": ("a.json", in_json(of_sensor_logger), "its lines of one time were joined"),
+    "JSON's objects below their times": (
+        "a.json",
+        in_json(
+            lambda w: {
+                "data": [
+                    {"t": t, "values": {"accelerometer": of_axes(r[:3]), "gyroscope": of_axes(r[3:])}}
+                    for t, r in rows_of(w)
+                ]
+            }
+        ),
+        "times in s",
+    ),
+    "JSON of two IMUs": (
+        "a.json",
+        in_json(
+            lambda w: {
+                f"IMU{n}": [{"t": t, "acc": of_axes(r[:3]), "gyro": of_axes(r[3:])} for t, r in rows_of(w, sign)]
+                for n, sign in ((1, 1.0), (2, -1.0))
+            }
+        ),
+        "the accelerometer is IMU1.acc.x",
+    ),
+    "JSON's pairs of names and numbers": (
+        "a.json",
+        in_json(lambda w: [{"t": t, "acc": pairs(r[:3]), "gyro": pairs(r[3:])} for t, r in rows_of(w)]),
+        "times in s",
+    ),
+    "JSON's texts of numbers": (
+        "a.json",
+        in_json(lambda w: [{"t": t, "acc": in_text(r[:3]), "gyro": in_text(r[3:])} for t, r in rows_of(w)]),
+        "times in s",
+    ),
+    "JSON's lists of a time and a list": (
+        "a.json",
+        in_json(
+            lambda w: {
+                "accelerometer": [[t, r[:3]] for t, r in rows_of(w)],
+                "gyroscope": [[t, r[3:]] for t, r in rows_of(w)],
+            }
+        ),
+        "from accelerometer and gyroscope",
+    ),
+    "JSON's lists of lists": ("a.json", in_json(lambda w: [[t, r[:3], r[3:]] for t, r in rows_of(w)]), "guessed from"),
+    "JSON's matrix of both": (
+        *("a.json", in_json(lambda w: [{"time": t, "imu": [r[:3], r[3:]]} for t, r in rows_of(w)])),
+        "guessed from",
+    ),
+    "MATLAB's matrices of times and axes": (
+        "a.mat",
+        lambda p, w, ns: savemat(p, {"acc": np.column_stack([w.t, w.acc]), "gyr": np.column_stack([w.t, w.gyr])}),
+        "from acc and gyr",
+    ),
     "HDF5": ("a.h5", as_hdf5, "times in s"),
     "a rate with all its digits": (
         *("a.npz", lambda p, w, ns: np.savez(p, acc=w.acc, gyr=w.gyr, sampling_rate=100.00000000000001)),

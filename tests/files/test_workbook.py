@@ -11,6 +11,7 @@ from mpucal.errors import RecordingError
 
 HEADER = ("time", "Accel X", "Accel Y", "Accel Z", "Gyro X", "Gyro Y", "Gyro Z")
 NAMESPACE = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+RELATIONS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 STRICT = "http://purl.oclc.org/ooxml/spreadsheetml/main"
 
 
@@ -54,6 +55,43 @@ def test_a_sheet_is_read_as_a_table(sheets, namespace, walk, assert_same, tmp_pa
     found = mpucal.load(tmp_path / "walk.xlsx")
     assert_same(found, walk)
     assert found.taken.endswith("times in s, accelerations in m/s^2 and rates in rad/s.")
+
+
+@pytest.mark.parametrize(
+    ("titles", "acc", "gyr"),
+    [
+        (("Accelerometer", "Gyroscope"), "X,Y,Z", "X,Y,Z"),
+        (("Sheet1", "Sheet2"), "ax,ay,az", "gx,gy,gz"),
+        (("Linear", "Raw"), "Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)", "wx,wy,wz"),
+    ],
+)
+def test_a_sheet_for_each_sensor(titles, acc, gyr, walk, assert_same, tmp_path):
+    """Read both, by the sheets' names or by those of their columns; the files of sheets may be in another order."""
+    sheets = [
+        [("time", *names.split(",")), *np.column_stack([walk.t, values]).tolist()]
+        for names, values in ((acc, walk.acc), (gyr, walk.gyr))
+    ]
+    of = f'<sheets xmlns:r="{RELATIONS}">{{}}</sheets>'
+    entries = "".join(f'<sheet name="{title}" r:id="rId{at}"/>' for at, title in enumerate(titles))
+    targets = "".join(f'<Relationship Id="rId{at}" Target="worksheets/sheet{2 - at}.xml"/>' for at in range(2))
+    with zipfile.ZipFile(tmp_path / "walk.xlsx", "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr("xl/workbook.xml", f'<workbook xmlns="{NAMESPACE}">{of.format(entries)}</workbook>')
+        book.writestr("xl/_rels/workbook.xml.rels", f"<Relationships>{targets}</Relationships>")
+        for at, rows in enumerate(sheets):
+            book.writestr(f"xl/worksheets/sheet{2 - at}.xml", sheet_of(rows))
+    assert_same(mpucal.load(tmp_path / "walk.xlsx"), walk)
+
+
+def sheet_of(rows):
+    """Return a sheet whose texts are in its cells."""
+    cells = [
+        "".join(
+            f'<c t="inlineStr"><is><t>{v}</t></is></c>' if isinstance(v, str) else f"<c><v>{v!r}</v></c>" for v in row
+        )
+        for row in rows
+    ]
+    data = "".join(f"<row>{row}</row>" for row in cells)
+    return f'<worksheet xmlns="{NAMESPACE}"><sheetData>{data}</sheetData></worksheet>'
 
 
 def test_dates_are_days(walk, assert_same, tmp_path):

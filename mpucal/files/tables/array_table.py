@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .guess import is_clock
 from .names import ACC, GYR, axes_of, first_triple, parse_header
 from .several import INSTANCE
 from .table import Table
@@ -67,6 +68,18 @@ def _single_numbers(arrays: Arrays) -> str:
     if numbers.get("interval_ms"):
         numbers["rate"] = 1000.0 / numbers["interval_ms"]
     return "\n".join(f"{name}: {number}" for name, number in numbers.items())
+
+
+def with_clocks(arrays: Arrays) -> dict[str, NDArray[Any]]:
+    """Return arrays with those of a sensor's times, x, y and z (n, 4) as a structure of four."""
+    found: dict[str, NDArray[Any]] = {}
+    for name, array in arrays.items():
+        timed = array.dtype.kind in "iuf" and array.ndim == 2 and array.shape[1] == len(UNNAMED)
+        if timed and axes_of(name) and is_clock(array[:, 0].astype(float)):
+            found |= {f"{name}.{of}": column for of, column in zip(UNNAMED, array.T, strict=True)}
+        else:
+            found[name] = array
+    return found
 
 
 def tables_of_arrays(arrays: Arrays) -> dict[str, Table]:

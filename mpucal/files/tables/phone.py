@@ -130,8 +130,8 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
 
 def is_pair(tables: Mapping[str, Table]) -> bool:
     """Return True if two tables are called as an accelerometer's and a gyroscope's, and have clocks of their own."""
-    timed = any(column.quantity == TIME for table in tables.values() for column in table.columns)
-    return timed and bool(_pairs(f"{name}{OF_FILE}" for name in tables))
+    timed = [f"{name}{OF_FILE}" for name, of in tables.items() if any(c.quantity == TIME for c in of.columns)]
+    return bool(_pairs(timed))
 
 
 def recording_of_tables(name: str, tables: Mapping[str, Table], hints: Hints) -> Recording:
