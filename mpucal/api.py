@@ -26,6 +26,7 @@ def load(
     path: str | PathLike[str],
     *,
     topic: str | None = None,
+    sensor: str | None = None,
     columns: str = "",
     units: str = "",
     accel_range: float | None = None,
@@ -40,7 +41,8 @@ def load(
 
     Parameters
     ----------
-    topic : of a bag. columns : of a table, "t=NAME,ax=NAME,..." or "t,ax,ay,az,gx,gy,gz".
+    topic : of a bag. sensor : of a table of several, what its lines or columns call it.
+    columns : of a table, "t=NAME,ax=NAME,..." or "t,ax,ay,az,gx,gy,gz".
     units : "t=ms,acc=g,gyr=deg/s".
     accel_range : g, gyro_range : deg/s, full scale of counts. rate : Hz, of samples without times.
     span : "FROM:TO", s since the first sample: the part to read.
@@ -52,7 +54,7 @@ def load(
     UsageError : a hint for a file that needs none.
     WrongType : `path` is not a path, or a hint has another type. WrongValue : impossible columns, units, range or rate.
     """
-    for name, value in (("topic", topic), ("columns", columns), ("units", units), ("span", span)):
+    for name, value in (("topic", topic), ("sensor", sensor), ("columns", columns), ("units", units), ("span", span)):
         if not isinstance(value, str | None):
             raise WrongType(f"{name} is {value!r}", "give text; see docs/recordings.md")
     scales = {"accel_range": accel_range, "gyro_range": gyro_range, "rate": rate}
@@ -61,7 +63,7 @@ def load(
     )
     try:
         named = parse_columns(columns) if columns else {}, parse_units(units) if units else {}
-        hints = Hints(topic, *named, full_g, full_dps, hz, parse_span(span) if span else None)
+        hints = Hints(topic, sensor, *named, full_g, full_dps, hz, parse_span(span) if span else None)
     except ValueError as error:
         raise WrongValue(str(error), "see docs/recordings.md") from error
     return _load(check_path(path, "a recording"), hints)

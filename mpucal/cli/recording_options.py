@@ -40,6 +40,11 @@ _MOST = click.option(
 # hint: its option
 _OPTIONS = {
     "topic": click.option("--topic", metavar="NAME", help="Topic of a bag; two, the accelerometer's first: ONE,OTHER."),
+    "sensor": click.option(
+        "--sensor",
+        metavar="ID",
+        help="Sensor to read of a table of several: what its lines or columns call it, such as 0x69 or IMU2.",
+    ),
     "columns": click.option(
         "--columns",
         metavar="COLUMNS",

@@ -16,13 +16,15 @@ from typing import IO
 
 import numpy as np
 
-from ..data import Samples, Vector
+from ..arguments import UNSORTED
+from ..data import Recording, Samples, Vector
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ._text import lines, numbers
 from .hints import ROLES
 from .reading import LONGEST_LINE, reading
 from .rows import Rows, Write, check_runs
+from .tables.load import load_table
 from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
 from .tables.text import decode_text, read_table
 from .tables.times import plausible_utc_ns
@@ -36,6 +38,16 @@ _REMEDY = (
     f"name the columns in the first line, in any order: {','.join(ROLES)} (s, m/s^2, rad/s), or with"
     f" --columns t=NAME,ax=NAME,... or, in their order, --columns {','.join(ROLES)}"
 )
+
+
+def load_csv(path: Path) -> Recording:
+    """Return the recording in a table; see csv_rows. Where its times begin anew, is a gap, as in any other table."""
+    try:
+        return csv_rows(path).recording()
+    except RecordingError as error:
+        if error.remedy != UNSORTED:
+            raise
+        return load_table(path)
 
 
 def csv_rows(path: Path) -> Rows:

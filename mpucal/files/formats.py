@@ -125,6 +125,7 @@ FORMATS = (
     Format(
         ".csv",
         "a table",
+        load=f"{_HERE}.csv:load_csv",
         rows=f"{_HERE}.csv:csv_rows",
         writer=f"{_HERE}.csv:csv_file",
         recognises=f"{_HERE}.tables.load:is_own_table",
@@ -168,7 +169,7 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
             what = found.what if found else "not a recording that mpucal knows"
             raise UsageError(
                 f"{path} is {what}; it needs no options on how to read it",
-                "leave out --topic, --columns, --units, --accel-range, --gyro-range and --rate",
+                "leave out --topic, --sensor, --columns, --units, --accel-range, --gyro-range and --rate",
             )
     others = [row for row in of_suffix if not row.only_recognised and row.suffix in (FOLDER, path.suffix.lower())]
     if found is None and not others:

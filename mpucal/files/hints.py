@@ -1,4 +1,4 @@
-"""Hints of the user on a recording that lacks the information: topic, columns, units, ranges and rate."""
+"""Hints of the user on a recording that lacks the information: topic, sensor, columns, units, ranges and rate."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ class Hints:
     Attributes
     ----------
     topic : in a bag or a log with more than one IMU.
+    sensor : of several in a table, what its lines or columns call it; or its number, where they take turns.
     columns : role (t, ax ... gz) -> a column's name, or its place from 0.
     units : quantity (t, acc, gyr) -> unit, as tables.units names it.
     accel_range_g, gyro_range_dps : full scale of counts. rate_hz : of samples without times.
@@ -26,6 +27,7 @@ class Hints:
     """
 
     topic: str | None = None
+    sensor: str | None = None
     columns: Mapping[str, str | int] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     accel_range_g: float | None = None

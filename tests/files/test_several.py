@@ -1,9 +1,12 @@
 """Tables whose lines are of several sensors: those of the first are read, whatever the column that tells them apart."""
 
+import shlex
+
 import numpy as np
 import pytest
 
 import mpucal
+from mpucal.errors import RecordingError
 from mpucal.files.tables import several
 from mpucal.files.tables.table import Table
 
@@ -101,3 +104,72 @@ def test_columns_of_no_axis_name_no_places(monkeypatch):
     table = Table("wide", [f"mean_of_{number}_value" for number in range(300)], [])
     monkeypatch.setattr(several, "parse_header", lambda _header: pytest.fail("it was searched again"))
     assert several.of_one_place(table) is table
+
+
+def lines_of_two(walk, line):
+    """Return lines of two boards by turns, of which the second is upside down; `line` names the samples' numbers."""
+    both = (np.eye(3), np.diag([1.0, -1.0, -1.0]))
+    return "".join(
+        line(number, [*(R @ a).tolist(), *(R @ w).tolist()], t)
+        for t, a, w in zip(walk.t.tolist(), walk.acc, walk.gyr, strict=True)
+        for number, R in enumerate(both)
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ("0x6{2} accel: {0} gyro: {1}\n", ("0x68", "0x69")),
+        ("[IMU{2}] t={3} acc=({0}) gyr=({1})\n", ("IMU8", "IMU9")),
+        ("IMU{2}: {3!r},{0},{1}\n", ("IMU8", "IMU9")),
+        ("Sensor {2}:\nAccel: {0}\nGyro: {1}\nTime: {3}\n", ("Sensor 8", "Sensor 9")),
+    ],
+)
+def test_lines_that_begin_with_their_sensor(line, names, walk, tmp_path):
+    """Read the first, or the one that --sensor names; a refusal names those that there are."""
+
+    def one(number, values, t):
+        acc, gyr = (", ".join(map(repr, of)) for of in (values[:3], values[3:]))
+        return line.format(acc, gyr, 8 + number, t)
+
+    (tmp_path / "boards.log").write_text("boot\n" + lines_of_two(walk, one))
+    first, second = (mpucal.load(tmp_path / "boards.log", sensor=name) for name in (None, names[1].lower()))
+    np.testing.assert_allclose(first.acc, walk.acc, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(second.acc, walk.acc * [1, -1, -1], rtol=0, atol=1e-9)
+    assert f"({', '.join(names)}), of which the first was read (--sensor chooses)" in first.taken
+    with pytest.raises(RecordingError, match=f"no sensor called 0x70; its sensors are {', '.join(names)}") as refused:
+        mpucal.load(tmp_path / "boards.log", sensor="0x70")
+    assert mpucal.load(tmp_path / "boards.log", sensor=shlex.split(refused.value.options)[1]).taken == first.taken
+
+
+@pytest.mark.parametrize("name", ["t", "time"])
+def test_lines_by_turns_that_nothing_names(name, walk, assert_same, tmp_path):
+    """Refuse them, under our own names of columns, too; the option in the message reads the first."""
+    path = tmp_path / "boards.csv"
+    path.write_text(f"{name},{AXES}\n" + lines_of_two(walk, lambda _, of, t: f"{t!r},{','.join(map(repr, of))}\n"))
+    with pytest.raises(RecordingError, match=r"of 2 sensors by turns, .* choose one with --sensor 1 or 2") as refused:
+        mpucal.load(path)
+    assert refused.value.options == "--sensor 1"
+    assert_same(mpucal.load(path, sensor="1"), walk, 1e-9, 1e-9, 1e-9)
+    np.testing.assert_allclose(mpucal.load(path, sensor="2").acc, walk.acc * [1, -1, -1], rtol=0, atol=1e-9)
+
+
+def test_a_sensor_of_a_table_of_one(walk, table):
+    """Refuse a name where nothing tells sensors apart; a vibration whose direction alternates is of one sensor."""
+    path = table(f"time,{AXES}", walk.t, walk.acc, walk.gyr)
+    with pytest.raises(RecordingError, match="nothing tells several sensors apart: leave out --sensor"):
+        mpucal.load(path, sensor="2")
+    shaken = walk.acc + np.outer((-1.0) ** np.arange(len(walk)), [4.0, 1.0, 3.0])
+    assert len(mpucal.load(table(f"time,{AXES}", walk.t, shaken, walk.gyr))) == len(walk)
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "second"),
+    [("{0}{2}{1}", ("a", "g"), "2"), ("{0}{1}_{2}", ("acc", "gyro"), "2"), ("imu{1}_{0}_{2}", ("acc", "gyr"), "imu2")],
+)
+def test_columns_of_a_numbered_imu(name, words, second, walk, assert_same, table):
+    """Read the columns of the first, or of the one that --sensor names."""
+    header = [name.format(word, number, axis) for number in (1, 2) for word in words for axis in "xyz"]
+    path = table(",".join(["time", *header]), walk.t, walk.acc[:, ::-1], -walk.gyr[:, ::-1], walk.acc, walk.gyr)
+    assert_same(mpucal.load(path, sensor=second), walk, 1e-9, 1e-9, 1e-9)
+    np.testing.assert_allclose(mpucal.load(path).acc, walk.acc[:, ::-1], rtol=0, atol=1e-9)

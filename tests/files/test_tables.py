@@ -504,7 +504,7 @@ def test_unread_columns_of_a_second_imu_are_reported(read, walk, assert_same):
     second = ",".join(f"imu2_{sensor}{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
     found = read(f"time,{AXES.strip()},{second}\n", "t a w field w")
     assert_same(found, walk, 1e-9, 1e-9, 1e-9)
-    assert "columns of another IMU were not read (--columns chooses): imu2_accx, imu2_accy" in found.taken
+    assert "columns of another IMU were not read (--sensor or --columns chooses): imu2_accx, imu2_accy" in found.taken
 
 
 @pytest.mark.parametrize(
@@ -1019,6 +1019,37 @@ def test_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
     np.testing.assert_array_equal(found.acc, walk.acc)
     assert np.flatnonzero(found.gap).tolist() == [half]
     assert np.diff(found.t)[half - 1] == pytest.approx(15.0, abs=0.02)
+
+
+def test_our_own_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
+    """Read a table in our own format in the same way; one in which single times go back stays refused."""
+    half, path = len(walk) // 2, tmp_path / "walk.csv"
+    t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
+    path.write_text(f"t,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
+    found = mpucal.load(path)
+    assert "times in s, which begin anew 1 times," in found.taken
+    np.testing.assert_array_equal(found.acc, walk.acc)
+    assert np.flatnonzero(found.gap).tolist() == [half]
+
+
+def test_rates_called_after_the_turns_of_a_gyroscope(read, walk, assert_same):
+    """Read them as x, y and z, and AltOS's about the axes of its accelerometer: it rolls about the one along it."""
+    assert_same(read("time,acc_x,acc_y,acc_z,gyro_roll,gyro_pitch,gyro_yaw\n", "t a dps"), walk, 0, 1e-12)
+    rocket = "time,accel_along,accel_across,accel_through,gyro_roll,gyro_pitch,gyro_yaw\n"
+    order = [1, 0, 2]
+    found = read(rocket, "t a dps", of=replace(walk, acc=walk.acc[:, order], gyr=walk.gyr[:, order]))
+    assert_same(found, walk, 0, 1e-12)
+
+
+@pytest.mark.parametrize(
+    "names", ["roll,pitch,yaw", "Euler_x,Euler_y,Euler_z", "AngX,AngY,AngZ", "heading,angle1,angle2"]
+)
+def test_angles_are_not_suggested_as_accelerations(names, walk, table):
+    """Name no order of columns that holds angles, even if they are as long as gravity."""
+    angles = np.column_stack([np.sin(walk.t), np.cos(walk.t), 0.1 * np.sin(3 * walk.t)]) * 9.81
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(table(f"time,{names}", walk.t, angles))
+    assert not refused.value.options
 
 
 def test_times_of_day_that_go_back_are_no_counter_that_overflows(read, walk):

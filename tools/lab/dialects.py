@@ -87,7 +87,7 @@ WRITERS = {".npy": "NumPy", ".npz": "NumPy", ".mat": "SciPy", "quet": "pandas, p
 def hints_of(words: dict[str, Any]) -> Hints:
     """Return the hints of words of mpucal.load."""
     scales = (words.get(key) for key in ("accel_range", "gyro_range", "rate"))
-    return Hints(None, parse_columns(words["columns"]) if "columns" in words else {}, {}, *scales)
+    return Hints(None, None, parse_columns(words["columns"]) if "columns" in words else {}, {}, *scales)
 
 
 def written(name: str, folder: Path, w: Walk) -> Path:

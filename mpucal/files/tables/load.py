@@ -35,7 +35,7 @@ from .names import (
     plausible_celsius,
     with_sensor,
 )
-from .several import NAMES_SENSORS, of_one_place, of_one_sensor
+from .several import NAMES_SENSORS, of_one_beginning, of_one_place, of_one_sensor, of_one_turn, turns
 from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts
 from .streams import index_with_gravity, join_streams
 from .table import Table
@@ -65,6 +65,8 @@ def is_own_table(path: Path) -> bool:
     named = {name.strip(' "').lower() for name in first.split(",")}
     table = _begun(path) if set(ROLES) <= named else None
     if table is None or any(map(NAMES_SENSORS, table.header)) or of_one_sensor(table) is not table:
+        return False
+    if turns(_accelerations(table)) > 1:
         return False
     return _may_be_si(table, path) and not _may_be_no_seconds(table, path)
 
@@ -131,7 +133,7 @@ def table_of_text(text: str, path: Path, hints: Hints) -> Recording:
     """Return the recording in the text of a table; see load_table."""
     if not text.strip():
         raise RecordingError(f"{path} is empty", "record it again")
-    table = find_any_table(text, path.name, [*hints.columns.values()])
+    table = find_any_table(text, path.name, [*hints.columns.values()], hints.sensor)
     if table is None:
         raise RecordingError(
             f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
@@ -143,10 +145,14 @@ def table_of_text(text: str, path: Path, hints: Hints) -> Recording:
     return recording_from_table(replace(table, rate_hz=stated_rate_hz(text[:HEAD]), units=units), hints)
 
 
-def find_any_table(text: str, name: str, wanted: Sequence[str | int] = ()) -> Table | None:
-    """Return the table of the `wanted` columns, or of named ones, or else of numbers."""
+def find_any_table(text: str, name: str, wanted: Sequence[str | int] = (), sensor: str | None = None) -> Table | None:
+    """Return the table of the `wanted` columns, or of named ones, or else of numbers; of one `sensor` if of several."""
     if wanted:
         return find_wanted_table(text, name, wanted)
+    return of_one_beginning(text, name, sensor, _find_table) or _find_table(text, name)
+
+
+def _find_table(text: str, name: str) -> Table | None:
     for find in (marked_table, dataflash_text_table, labelled_table, find_named_table):
         if (found := find(text, name)) is not None:
             return found
@@ -180,11 +186,13 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     ------
     RecordingError : it does not say all that is needed; the message names what is missing.
     """
-    table = of_one_sensor(table if hints.columns else of_one_place(table))
+    if not table.chosen:
+        table = of_one_sensor(table if hints.columns else of_one_place(table, hints.sensor), hints.sensor)
     ranges = table.ranges if not (hints.accel_range_g or hints.gyro_range_dps) else None
     if ranges:
         hints = replace(hints, accel_range_g=ranges[0], gyro_range_dps=ranges[1])
     columns, guess_remark = find_columns(table, hints)
+    table = of_one_turn(table, first_triple(columns, ACC), hints.sensor)
     accelerometers, gyroscopes = axis_triples(columns, ACC), axis_triples(columns, GYR)
     warm = [column for column in columns if column.quantity == TEMPERATURE]
     # a rate beside columns without a time says that the times are wrong
@@ -203,7 +211,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
         *table.remarks,
         "the ranges are those that MPU6050::initialize() sets" if ranges else "",
         guess_remark,
-        "" if hints.columns else ignored_sensors(table.header, columns),
+        "" if hints.columns or table.chosen else ignored_sensors(table.header, columns),
     ]
     return join_streams(a, w, hints, table.name, remarks)
 

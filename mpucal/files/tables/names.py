@@ -66,7 +66,11 @@ FLIPPED_STEMS = ("accelerometeracceleration",)
 WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", re.IGNORECASE)
 # what rates turn as they turn gravity: its direction as a program estimates it, and a magnetic field; and attitudes, of
 # which three parts may be as long
-ESTIMATED = re.compile(r"gravity|^mag|magnet|quat|^q[_.]?[wxyz0-3]$", re.IGNORECASE)
+ESTIMATED = re.compile(
+    r"gravity|^mag|magnet|quat|orientation|^q[_.]?[wxyz0-3]$|(?<![a-z])ang[_ ]?[xyz](?![a-z])"
+    r"|^(?!.*(?:rate|speed|vel|gyr|acc|omega)).*(?:roll|pitch|yaw|euler|heading|azimuth|angle|attitude)",
+    re.IGNORECASE,
+)
 # numbers of samples, which are no times where they are whole
 COUNTER = re.compile(r"^(?!.*(?:stamp|time)).*(?:packet|number|index|sequence|frame|sample|counter)", re.IGNORECASE)
 # names that are remembered
@@ -80,7 +84,10 @@ _AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 _CLOCK = re.compile(r"(?<![a-z])(?:time|timestamp|stamp|millis|micros|date)(?![a-z])")
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
-_TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)").fullmatch
+_TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)|gyro?(roll|pitch|yaw)").fullmatch
+# a rocket's axes as AltOS calls them, which rolls about the one along it -> x, y, z
+_OF_ALTOS = {"across": "x", "along": "y", "through": "z", "pitch": "x", "roll": "y", "yaw": "z"}
+_OF_A_ROCKET = re.compile(rf"((?:accel|gyro)_)({'|'.join(_OF_ALTOS)})").fullmatch
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 # the ends of names that are units
 _ENDINGS_OF_TIMES = "ns us ms s sec seconds"
@@ -178,7 +185,7 @@ def _split_axis(word: str, axis: int) -> list[tuple[str, int]]:
     if word[:1] in ("x", "y", "z"):
         found.append((word[1:], "xyz".index(word[0])))
     if turn := _TURN(word):
-        found.append(("rotationrate", ("roll", "pitch", "yaw").index(turn[1])))
+        found.append(("rotationrate", ("roll", "pitch", "yaw").index(turn[1] or turn[2])))
     return found
 
 
@@ -195,7 +202,7 @@ def ignored_sensors(header: Sequence[str], read: Sequence[Column]) -> str:
         and found.quantity in (ACC, GYR)
     )
     names = ", ".join(others)
-    return f"columns of another IMU were not read (--columns chooses): {names}" if names else ""
+    return f"columns of another IMU were not read (--sensor or --columns chooses): {names}" if names else ""
 
 
 def parse_axis_name(name: str) -> tuple[int, str] | None:
@@ -212,6 +219,10 @@ def with_sensor(header: Sequence[str], sensor: str) -> list[str]:
 
 def parse_header(header: list[str]) -> list[Column]:
     """Return the columns of a header whose names are known."""
+    of_rocket = [_OF_A_ROCKET(name.strip().lower()) for name in header]
+    if any(found and found[2] == "along" for found in of_rocket):
+        plain = [found and found[1] + _OF_ALTOS[found[2]] for found in of_rocket]
+        header = [of or name for of, name in zip(plain, header, strict=True)]
     return [column for place, name in enumerate(header) if (column := parse_column_name(name, place)) is not None]
 
 

@@ -1,14 +1,19 @@
-"""Several sensors of one kind in a table, of which the first is read, as of gateways and of people who wear them.
+"""Several sensors of one kind in a table, of which the first is read, or the one that the user names.
 
-A column tells their lines apart, or a word in the names of their columns.
+A column tells their lines apart, or the beginning of the lines, or a word in the names of their columns. Where they
+only take turns, the user has to choose.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+import shlex
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +22,7 @@ from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind
-from .names import ACC, GYR, WITHOUT_GRAVITY, Column, first_triple, parse_column_name, parse_header
+from .names import ACC, GYR, WITHOUT_GRAVITY, Column, axes_of, first_triple, parse_column_name, parse_header
 from .shown_units import BEYOND
 from .table import Table
 
@@ -28,32 +33,88 @@ NAMES_SENSORS = re.compile(
 ).fullmatch
 # ArduPilot's name of it -> one of those
 INSTANCE = {"I": "imu"}
-MOST_SENSORS = 32
-# lines among which a column of any name has to alternate
-BEGUN = 2000
+MOST_SENSORS, MOST_TURNS = 32, 6
+# lines among which a column of any name has to alternate, and characters among which the beginnings of lines do
+BEGUN, LOOKED_AT = 2000, 4096
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
 FEWEST_COLUMNS, FARTHER = 3, 2.0
-# what separates the words of a name, and the most words of a name that is looked at
+# what separates the words of a name, and the most words of a name that is looked at; a digit ends a word of letters
 _BETWEEN, MOST_WORDS = re.compile(r"[_ .\-]+"), 6
+_NUMBERED = re.compile(r"([A-Za-z]+)(\d)").fullmatch
+# the word at the beginning of a line, without a mark that a table has: `IMU1: `, `[0x69] `, `left `
+_BEGINNING = re.compile(
+    r"^[\[(<]?((?:0x[\dA-Fa-f]{2}|[A-Za-z]\w{0,20})(?:[ #-]\d{1,2})?)[\])>]?[ \t]?[:|>-]?(?:[ \t]|\r?$)", re.MULTILINE
+)
+# directions of gravity of two sensors that lie otherwise: they differ by as much of it, while its length stays
+APART, SAME_LENGTH = 0.25, 0.1
+CHOOSES = "--sensor chooses"
 
 
-def of_one_place(table: Table) -> Table:
-    """Return a table without the words by which the names of the first accelerometer and gyroscope say where they are.
+def of_one_place(table: Table, sensor: str | None = None) -> Table:
+    """Return a table without the words by which the names of an accelerometer and gyroscope say where they are.
 
     AccelX_right_leg is AccelX, if there is a whole IMU called so, or a gyroscope without such words. The same table if
     its columns are known as they are, other than of an acceleration without gravity beside no gyroscope.
+
+    Raises
+    ------
+    RecordingError : there are such columns, but not of the `sensor`.
     """
     known = first_triple(table.columns, ACC)
-    if known and (first_triple(table.columns, GYR) or not WITHOUT_GRAVITY.match(known[0].name)):
+    if known and not sensor and (first_triple(table.columns, GYR) or not WITHOUT_GRAVITY.match(known[0].name)):
         return table
-    split = [_BETWEEN.split(name.strip()) for name in table.header]
+    split = [[*_words_of(name)] for name in table.header]
+    found: dict[str, tuple[str, ...]] = {}
     for place in dict.fromkeys(place for words in split for place in _places(words)):
-        short = ["_".join(_without(place, of)) for of in split]
-        names = [of or name for of, name in zip(short, table.header, strict=True)]
-        if first_triple(parse_header(short), ACC) and first_triple(parse_header(names), GYR):
-            said = f"of its columns, those called {' '.join(place)} were read"
-            return replace(table, header=names, remarks=(*table.remarks, said))
-    return table
+        if len(found) < MOST_SENSORS and all(len(place) == len(_BETWEEN.split(other)) for other in found):
+            short = ["_".join(_without(place, of)) for of in split]
+            names = [of or name for of, name in zip(short, table.header, strict=True)]
+            if first_triple(parse_header(short), ACC) and first_triple(parse_header(names), GYR):
+                found[" ".join(place)] = place
+    if not found:
+        return table
+    chosen = _choose([*found], sensor, table.name)
+    own, others = found[chosen], [place for name, place in found.items() if name != chosen]
+    header = [
+        "_".join(_without(own, of)) or ("" if any(_without(other, of) for other in others) else name)
+        for of, name in zip(split, table.header, strict=True)
+    ]
+    more = f" ({CHOOSES} of {', '.join(found)})" if len(found) > 1 else ""
+    said = f"of its columns, those called {chosen} were read{more}"
+    return replace(table, header=header, remarks=(*table.remarks, said), chosen=True)
+
+
+def _choose(sensors: Sequence[str], sensor: str | None, name: str) -> str:
+    """Return the `sensor` that the user names, or the first.
+
+    Raises
+    ------
+    RecordingError : there is none of that name.
+    """
+    known = {_plain(each): each for each in reversed(sensors)}
+    if sensor is None:
+        return sensors[0]
+    if _plain(sensor) not in known:
+        options = f"--sensor {shlex.quote(sensors[0])}"
+        what = f"{name} holds no sensor called {sensor}; its sensors are {', '.join(sensors)}"
+        raise RecordingError(what, f"choose one with {options}", options)
+    return known[_plain(sensor)]
+
+
+def _plain(word: str) -> str:
+    return _BETWEEN.sub(" ", word).strip().lower()
+
+
+def _words_of(name: str) -> Iterator[str]:
+    """Yield the words of a name; ax2 and Acc2_X are of the second sensor."""
+    for word in _BETWEEN.split(name.strip()):
+        numbered = _NUMBERED(word)
+        yield from numbered.groups() if numbered and _measures(numbered[1]) else [word]
+
+
+def _measures(word: str) -> bool:
+    """Return True if a word is that of a sensor's quantity or axis, not of a sensor."""
+    return bool(axes_of(word) or parse_column_name(word, 0))
 
 
 def _places(words: list[str]) -> Iterator[tuple[str, ...]]:
@@ -71,10 +132,58 @@ def _without(place: tuple[str, ...], words: list[str]) -> list[str]:
     return [] if at is None else words[:at] + words[at + len(place) :]
 
 
-def of_one_sensor(table: Table) -> Table:
-    """Return the lines of the first of several sensors; the same table if no column tells lines of sensors apart.
+def lines_of_sensors(text: str) -> Mapping[str, str]:
+    """Return sensor -> the text without the lines of the others, if the beginnings of lines name several; else none.
+
+    A line without such a beginning is of the sensor above it, if all have such lines, or else of all.
+    """
+    begun = text[: text.find("\n", LOOKED_AT) + 1] or text
+    if len({found[1] for found in _BEGINNING.finditer(begun)}) < 2:
+        return {}
+    lines = text.split("\n")
+    words = [found[1] if (found := _BEGINNING.match(line)) else "" for line in lines]
+    of_sensors = {word for word in set(words) if not _measures(word)}
+    names = [word if word in of_sensors else "" for word in words]
+    named = [name for name in names if name]
+    sensors = [name for name, count in Counter(named).items() if count >= FEWEST][:MOST_SENSORS]
+    turns = sum(one != other for one, other in pairwise(named))
+    if len(sensors) < 2 or 2 * turns < len(named):
+        return {}
+    follow = {above for above, name in pairwise(names) if above and not name}
+    of, owners = "", []
+    for name in names:
+        of = name or (of if follow >= {*sensors} else "")
+        owners.append(of)
+    return {
+        sensor: "\n".join(line for line, owner in zip(lines, owners, strict=True) if owner in ("", sensor))
+        for sensor in sensors
+    }
+
+
+def of_one_beginning(
+    text: str, name: str, sensor: str | None, find: Callable[[str, str], Table | None]
+) -> Table | None:
+    """Return the table that `find` finds in the lines of one sensor; None if no beginnings of lines name several."""
+    texts = lines_of_sensors(text)
+    tables = {of: table for of, part in texts.items() if (table := find(part, name)) and _is_whole(table)}
+    if len(tables) < 2:
+        return None
+    chosen = _choose([*tables], sensor, name)
+    said = (
+        f"its lines begin with several sensors' names ({', '.join(tables)}), of which {_which(chosen, tables)} was read"
+    )
+    table = tables[chosen]
+    return replace(table, remarks=(*table.remarks, f"{said} ({CHOOSES})"), chosen=True)
+
+
+def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
+    """Return the lines of one of several sensors; the same table if no column tells lines of sensors apart.
 
     The column is called so, or alternates, and the sensors' numbers lie farther apart than those of one of them.
+
+    Raises
+    ------
+    RecordingError : there are several, but none of the name `sensor`.
     """
     for place, cells in enumerate(table.cells):
         named = bool(NAMES_SENSORS(table.name_of(place)))
@@ -88,10 +197,73 @@ def of_one_sensor(table: Table) -> Table:
         first = sensors == 0
         whole = all(table.has(column)[first].any() for column in table.columns if column.quantity in (ACC, GYR))
         if whole and (named or _lie_apart(_others(table, place), sensors)):
-            called = table.name_of(place) or f"column {place + 1}"
-            said = f"its lines are of several sensors ({called}: {', '.join(of_words)}), of which the first was read"
-            return replace(table.part(first), remarks=(*table.remarks, said))
+            chosen = _choose([*of_words], sensor, table.name)
+            called, which = table.name_of(place) or f"column {place + 1}", _which(chosen, of_words)
+            said = f"its lines are of several sensors ({called}: {', '.join(of_words)}), of which {which} was read"
+            part = table.part(sensors == of_words[chosen])
+            return replace(part, remarks=(*table.remarks, f"{said} ({CHOOSES})"), chosen=True)
     return table
+
+
+def of_one_turn(table: Table, acc: Sequence[Column], sensor: str | None) -> Table:
+    """Return the lines of one sensor, if several take turns that no column tells apart; else the same table.
+
+    Raises
+    ------
+    RecordingError : they take turns, and `sensor` does not say which one is to be read; or it says it of other lines.
+    """
+    count = 1 if table.chosen else turns(table.numbers(acc))
+    if count > 1:
+        numbers = [str(number) for number in range(1, count + 1)]
+        if sensor is None:
+            options = f"--sensor {numbers[0]}"
+            what = f"{table.name}: its lines are of {count} sensors by turns, and nothing names them"
+            raise RecordingError(
+                what, f"choose one with --sensor {' or '.join(numbers)}, by its place among them", options
+            )
+        chosen = int(_choose(numbers, sensor, table.name))
+        said = f"of the {count} sensors that take turns, number {chosen} was read"
+        return replace(
+            table.part(np.arange(len(table)) % count == chosen - 1), remarks=(*table.remarks, said), chosen=True
+        )
+    if sensor is not None and not table.chosen:
+        raise RecordingError(f"{table.name}: nothing tells several sensors apart", "leave out --sensor")
+    return table
+
+
+def turns(acc: Vector) -> int:
+    """Return the number of sensors that take turns in (n, 3) accelerations; 1 if they are of one.
+
+    From line to line gravity then has another direction, and its length stays; it comes back with the same sensor.
+    """
+    acc = np.where((np.abs(acc) < BEYOND).all(axis=1, keepdims=True), acc, np.nan)
+    lengths = np.linalg.norm(acc, axis=1)
+    if np.count_nonzero(np.isfinite(lengths)) < FEWEST:
+        return 1
+
+    def step(lag: int) -> float:
+        return _median(np.linalg.norm(acc[lag:] - acc[:-lag], axis=1))
+
+    size, differ, apart = _median(lengths), _median(np.abs(np.diff(lengths))), step(1)
+    if not (apart > APART * size and differ < SAME_LENGTH * size):
+        return 1
+    return next((lag for lag in range(2, MOST_TURNS + 1) if FARTHER * step(lag) < apart), 1)
+
+
+def _median(values: Vector) -> float:
+    """Return the median of the numbers that are known; NaN if none is."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else math.nan
+
+
+def _is_whole(table: Table) -> bool:
+    """Return True if a table names both sensors, or has as many columns of numbers."""
+    named = all(first_triple(table.columns, quantity) for quantity in (ACC, GYR))
+    return named or (not table.header and len(table.places(Kind.NUMBER)) >= 2 * len("xyz"))
+
+
+def _which(chosen: str, sensors: Iterable[str]) -> str:
+    return "the first" if chosen == next(iter(sensors)) else chosen
 
 
 def _words(cells: Cells) -> list[str]:

@@ -42,6 +42,7 @@ class Table:
     units : quantity -> unit of columns whose names have none, as the program writes them.
     ranges : g and deg/s, of counts, if the program sets them.
     remarks : notes to the user on how the table was read.
+    chosen : True if its lines or columns were chosen among those of several sensors.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict)
     ranges: tuple[float, float] | None = None
     remarks: tuple[str, ...] = ()
+    chosen: bool = False
 
     def __len__(self) -> int:
         return len(self.cells[0]) if self.cells else 0
