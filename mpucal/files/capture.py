@@ -109,16 +109,17 @@ class _SessionRecords:
             for record in reader.blocks():
                 if not isinstance(record, SessionEvent):
                     yield record
-                elif record.name == UTC and self.utc_ns is None:
+                    continue
+                # of PAUSED, and of RESUMED but in sessions of earlier versions
+                if SAMPLED_NS in record.data:
+                    self.interrupted.add(self._number(record, SAMPLED_NS) * 1e-9)
+                if record.name == UTC and self.utc_ns is None:
                     self.utc_ns = plausible_utc_ns(self._number(record, UTC) - record.t_ns)
                 elif record.name == FORGET:
                     first, last = (self._number(record, key) for key in ("first", "last"))
                     self.forgotten[first] = last
                 elif record.name in (OPENED, RESUMED, BEGUN):
                     self._counts = record.name == BEGUN
-                    # Sessions of earlier versions did not record the time.
-                    if SAMPLED_NS in record.data:
-                        self.interrupted.add(self._number(record, SAMPLED_NS) * 1e-9)
             self.recovered = reader.recovered or self.recovered
 
     def _number(self, event: SessionEvent, key: str) -> int:

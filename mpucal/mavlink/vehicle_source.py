@@ -39,6 +39,7 @@ class VehicleSource:
     say : shows the operator a sentence. name : of the recording.
     writes : the result will be written to the vehicle: then its parameters must name its sensors.
     prepare : prepare a PX4; see Preparation. begun : called when the first message is heard that counts.
+    paused : called after a pause of the program or its computer, with the vehicle's time [ns] when it began.
     replayed : see lock_to_vehicle.
     """
 
@@ -52,6 +53,7 @@ class VehicleSource:
         writes: bool = False,
         prepare: bool = False,
         begun: Callable[[], None] = lambda: None,
+        paused: Callable[[int], None] = lambda _t_ns: None,
         replayed: bool = False,
     ) -> None:
         self._link = link
@@ -61,7 +63,7 @@ class VehicleSource:
         self._name = name
         self._writes, self._replayed = writes, replayed
         self._preparation = Preparation(link, say) if prepare else None
-        self._begun = begun
+        self._begun, self._paused = begun, paused
         self._log = Log("")
         self._streams: Streams | None = None
         self._stream: Stream | None = None
@@ -69,6 +71,7 @@ class VehicleSource:
         self._last_us: float | None = None
         self._sampled_ns = 0
         self._pause_ns = 0
+        self._interrupted_ns: list[int] = []
         self._rebooted = False
         self._changes_reported = 0
         self._loss_reported = self._was_armed = False
@@ -116,12 +119,14 @@ class VehicleSource:
             self._say(f"Reading paused for {self._pause_ns / S:.0f} s (process or computer suspended).")
             self._pause_ns = 0
             self._wait_for_return()
-        begun_ns = self._link.now_ns()
+        begun_ns, sampled_ns = self._link.now_ns(), self.now_ns()
         list(self._link.messages(begun_ns + POLL_NS))
         pause_ns = self._link.now_ns() - begun_ns
         if pause_ns > PAUSE_NS:
             # The samples of before are returned first.
             self._pause_ns = pause_ns
+            self._interrupted_ns.append(sampled_ns)
+            self._paused(sampled_ns)
             self._sampled_ns = self._link.now_ns()
             return self._take_samples()
         if self._streams is not None:
@@ -136,7 +141,8 @@ class VehicleSource:
 
     def recording(self) -> Recording:
         """Return all samples so far, late ones in their places; the other IMUs' are in its `others`."""
-        return self._log.recording(self._name)
+        interrupted = (t_ns * 1e-9 for t_ns in self._interrupted_ns)
+        return self._log.recording(self._name).interrupted_at(*interrupted)
 
     def forget(self) -> None:
         """Drop all samples so far: `recording` holds those that come from now on."""

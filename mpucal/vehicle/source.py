@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
-from ..chip.records import BEGUN, END, OPENED
+from ..chip.records import BEGUN, END, OPENED, PAUSED, SAMPLED_NS
 from ..data import Recording, Samples, Sensor
 from ..errors import EndOfCapture, LinkError
 from ..files.mcap import Capture
@@ -145,8 +145,13 @@ class OpenedVehicle(OpenedSource):
             if replayed or not self.replaying:
                 say(sentence)
 
+        def paused(t_ns: int) -> None:
+            note(PAUSED, data={SAMPLED_NS: t_ns})
+
         rate_hz, begun, self.end = self.plan.config.rate_hz, lambda: note(BEGUN), lambda: note(END)
-        source = VehicleSource(link, rate_hz, self.system, say_new, name, self.writes, self.prepare, begun, replayed)
+        source = VehicleSource(
+            link, rate_hz, self.system, say_new, name, self.writes, self.prepare, begun, paused, replayed
+        )
         note(OPENED)
         try:
             yield ActiveSource(source, note)
