@@ -13,8 +13,6 @@ from ..result.session_files import CAPTURE
 from .mcap import Capture, CaptureReader
 from .reading import check_size
 
-TLOG = ".tlog"
-
 
 def load_tlog(path: Path) -> Recording:
     """Return the recording of the vehicle's first IMU in a .tlog, with the other IMUs in its `others`.

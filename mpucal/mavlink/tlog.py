@@ -13,6 +13,7 @@ from ..errors import CaptureError
 from .dialect import BEGINNING, HEADER, LONGEST, packet_length
 from .transport import US
 
+TLOG = ".tlog"
 STAMP = struct.Struct(">Q")
 # No clock is later, and nearly all bytes that are not a time are.
 LATEST_US = 1 << 52

@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import UsageError
 from ..files.mcap import Capture, read_capture
 from ..files.recorders import VEHICLE, recorder_of
-from ..files.tlog import TLOG, read_tlog
+from ..mavlink.tlog import TLOG
 from ..result.session_files import CAPTURE, captures_in
 from ..session.plan import Plan
 from .kind import Request
@@ -75,8 +75,15 @@ def _read(place: Path) -> list[Capture]:
     ------
     CaptureError : not a capture.
     """
-    files = captures_in(place) or [place]
-    return [read_tlog(file) if file.suffix.lower() == TLOG else read_capture(file) for file in files]
+    return [_read_file(file) for file in captures_in(place) or [place]]
+
+
+def _read_file(file: Path) -> Capture:
+    if file.suffix.lower() != TLOG:
+        return read_capture(file)
+    from ..files.tlog import read_tlog  # noqa: PLC0415 - it decodes MAVLink, which a chip's capture does without
+
+    return read_tlog(file)
 
 
 def _last_recovered(captures: Sequence[Capture]) -> str | None:
