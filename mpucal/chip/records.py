@@ -11,7 +11,7 @@ from typing import Any
 # clock; UTC: the time of day, ns since 1970.
 KEY, LATE, FORGET, RESUMED, UTC = "key", "late", "forget", "resumed", "utc"
 SAMPLED_NS = "sampled_ns"
-# Of a vehicle: the link was opened; what it sends counts from here on; reading had paused since SAMPLED_NS; nothing came
+# Of a vehicle: the link was opened; what it sends counts from here on; reading had paused, see SAMPLED_NS; nothing came
 # until this time.
 OPENED, BEGUN, PAUSED, END = "session", "begun", "paused", "end"
 ABORT = "abort"  # the key that ends a session

@@ -42,6 +42,7 @@ class Log:
     Attributes
     ----------
     changed : names of the parameters that were changed while the vehicle streamed.
+    latest : time of the latest reading [us], and when it was received [ns]; zeros before it.
     """
 
     def __init__(self, firmware: str, over_reboots: bool = False) -> None:
@@ -49,6 +50,7 @@ class Log:
         self._over_reboots = over_reboots
         self.segments = [Segment({})]
         self.changed: list[str] = []
+        self.latest = 0.0, 0
         self._changed_ns: int | None = None
         self._now_ns = 0
         self._own_c = math.nan
@@ -96,6 +98,7 @@ class Log:
             self.segments.append(now)
             buffer = now.of(content.stream)
         row, late = Row(t_us, content), jump is Jump.LATE
+        self.latest = float(t_us), received_ns
         buffer.add(row, late)
         return (None if late else self._under_first(row)), jump
 

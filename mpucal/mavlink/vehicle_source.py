@@ -151,7 +151,9 @@ class VehicleSource:
     def now_ns(self) -> int:
         """Return the vehicle's time: the last sample's, counted on by the link's clock."""
         last_us = self._rows[-1].t_us if self._rows else self._last_us
-        return round((last_us or 0.0) * 1e3) + self._link.now_ns() - self._sampled_ns
+        # Samples that came while it started are in the log alone.
+        last_us, since_ns = self._log.latest if last_us is None else (last_us, self._sampled_ns)
+        return round(last_us * 1e3) + self._link.now_ns() - since_ns
 
     def stop(self) -> None:
         """Undo the preparation; the streams stay on for other ground stations and for the write-back."""
