@@ -101,3 +101,11 @@ def test_a_program_that_stood_still_is_told_from_a_vehicle_that_was_silent():
     link = Link(PacketReplay(record, "capture.mcap"), lambda t_ns, data: None)
     again = VehicleSource(link, 100.0, None, lambda text: None, "test")
     assert [again.start(), *(again.poll().t.tolist() for _ in range(59))] == first[:-1]
+
+
+def test_the_time_before_the_first_poll_is_the_vehicles():
+    """A session that is killed as it starts has samples all the same, and its gap begins there."""
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still"))
+    source = VehicleSource(Link(SimulatedTransport(vehicle), lambda t_ns, data: None), 100.0, None, print, "test")
+    source.start()
+    assert 0 <= vehicle.now_us * 1e-6 - source.now_ns() * 1e-9 < 0.1
