@@ -74,7 +74,7 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
             failed[file.name] = error
     if len(read) < 2:
         first_error = next(iter(failed.values()))
-        what = f"{path.name}: {first_error.what}"
+        what = f"{path}: {first_error.what}"
         raise RecordingError(what, first_error.remedy, first_error.options) from first_error
     parts, name = list(read.values()), path.resolve().name
     begins_ns = [(part.utc_ns or 0) + part.t[0] * 1e9 for part in parts]

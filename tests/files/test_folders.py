@@ -207,3 +207,11 @@ def test_pairs_of_tables_of_sides_are_one_recording_at_the_rate_that_they_state(
     np.testing.assert_allclose(read.acc, walk.acc)
     assert np.flatnonzero(read.gap).tolist() == [500]
     assert mpucal.load(tmp_path / "x_up_accel.mat", units="gyr=rad/s").rate_hz == pytest.approx(50.0)
+
+
+def test_an_error_about_the_present_folder_names_it(tmp_path, monkeypatch):
+    for name in ("a.npz", "b.npz"):
+        (tmp_path / name).write_bytes(b"")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RecordingError, match=r"^\.: a\.npz is "):
+        mpucal.load(".")

@@ -1,7 +1,9 @@
 """Tables of text as programs and people write them: each form is a row of data, and gives the walk's samples back."""
 
 import contextlib
+import shutil
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from mpucal.files import load
 from mpucal.files.hints import Hints, parse_columns, parse_units
 from mpucal.files.tables.units import QUANTITIES
 
+CAPTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
 COUNTS = np.r_[[32768 / (4 * G)] * 3, [32750 / np.radians(500)] * 3]
 STAMPS = np.datetime64("2025-10-04T16:35:12")
 
@@ -520,10 +523,13 @@ def test_hints_that_say_nothing(parse, texts):
             parse(text)
 
 
-def test_hints_for_a_file_that_needs_none(tmp_path):
+@pytest.mark.parametrize("name", ["walk.tlog", "session", "session/capture.mcap"])
+def test_hints_for_what_needs_none(tmp_path, name):
     (tmp_path / "walk.tlog").touch()
+    (tmp_path / "session").mkdir()
+    shutil.copy(CAPTURE, tmp_path / "session" / "capture.mcap")
     with pytest.raises(UsageError, match="needs no options"):
-        load(tmp_path / "walk.tlog", Hints(rate_hz=100))
+        load(tmp_path / name, Hints(rate_hz=100))
 
 
 def test_counts_need_a_rate_and_their_ranges_must_fit(read, walk):
