@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..arguments import check_regular
 from ..errors import RecordingError, UsageError
 
 
@@ -68,9 +69,10 @@ def compute_digest(path: Path) -> str:
 
     Raises
     ------
-    RecordingError : it cannot be read.
+    RecordingError : it cannot be read, or is a pipe or device, which may never end.
     """
     digest = hashlib.sha256()
+    check_regular(path)
     try:
         files = [path]
         if path.is_dir():

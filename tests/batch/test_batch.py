@@ -170,6 +170,12 @@ def test_urls_are_read_where_the_worker_is(captures):
     assert "cannot fetch memory://line/none.mcap" in make_row("memory://line/none.mcap", SETTINGS)["error"]
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_among_the_recordings_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "walk.csv")
+    assert "is a pipe or device" in make_row(str(tmp_path / "walk.csv"), SETTINGS)["error"]
+
+
 def test_a_url_that_nothing_can_read_says_what_is_lacking(monkeypatch):
     monkeypatch.setitem(sys.modules, "aiohttp", None)
     monkeypatch.delitem(sys.modules, "fsspec.implementations.http", raising=False)
