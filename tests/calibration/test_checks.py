@@ -133,6 +133,7 @@ REFUSED = {
     "in ms": ("bench", changed(t=lambda r: 1e3 * r.t), "units_suspect", "in milliseconds", "convert them to seconds"),
     "in deg/s": ("bench", changed(gyr=np.rad2deg), "units_suspect", "in deg/s;", "convert it to rad/s", "gyroscope"),
     "noisy deg/s": ("hand", changed(gyr=lambda gyr: noisy(5.0)(np.rad2deg(gyr)), flat=None), "units_suspect", "deg/s;"),
+    "metres converted from g": ("hand", changed(acc=lambda acc: acc * G), "units_suspect", "say --units acc=m/s^2"),
     "rates in counts": ("hand", changed(gyr=lambda gyr: np.rad2deg(gyr) * 131.0), "units_suspect", "in raw counts;"),
     "a factor": ("bench", changed(lambda acc: 3.28 * acc), "units_suspect", "near 3.2", "convert it"),
     "another range": ("half", lambda r: r, "wrong_range", "near 0.5", "give the true range"),

@@ -63,6 +63,9 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
             return reason("not_raw", "no_gravity", magnitude=acc)
         unit, said = f"a unit about {e.gravity / acc:.4g} times as large", "UNIT"
         return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=unit, said=said)
+    if 0.9 * e.gravity < acc / e.gravity < 1.1 * e.gravity:
+        unit, said = "m/s^2, and to have been converted from g all the same", "m/s^2"
+        return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=unit, said=said)
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
     return reason(
         "units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=guess, said=guess.removeprefix("raw ")
