@@ -59,8 +59,9 @@ def _verdict(comparison: Comparison) -> str:
     if not different:
         return "Undecided: a calibration has no uncertainties (a config blob never has)."
     verdict, worst = "Different" if comparison.changed else "Undecided", different[0]
+    count = f"{len(different)} parameter{'s' if len(different) > 1 else ''}"
     return (
-        f"{verdict}: {len(different)} parameters of the accelerometer changed by more than the combined uncertainty,\n"
+        f"{verdict}: {count} of the accelerometer changed by more than the combined uncertainty,\n"
         f"most significantly {worst.name}, by {worst.value:+.3g} {worst.unit}"
         f"{'.' if comparison.changed else ', but the uncertainties may be too small.'}"
     )

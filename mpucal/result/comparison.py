@@ -161,11 +161,13 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
             "The model static determines no rotation against the gyroscope: both are compared in the accelerometer's"
             " own axes."
         )
-    if None not in (a.sensor.who_am_i, b.sensor.who_am_i) and a.sensor.who_am_i != b.sensor.who_am_i:
+    two_chips = None not in (a.sensor.who_am_i, b.sensor.who_am_i) and a.sensor.who_am_i != b.sensor.who_am_i
+    if two_chips:
         remarks.append(
             f"They are of two chips: WHO_AM_I of A is 0x{a.sensor.who_am_i:02x}, of B 0x{b.sensor.who_am_i:02x}."
         )
-    if same_trim(a.sensor, b.sensor) is False:
+    other_trim = same_trim(a.sensor, b.sensor) is False
+    if other_trim:
         remarks.append(
             f"The offset registers held {a.sensor.accel_offsets} for A and {b.sensor.accel_offsets} for B: the biases"
             " differ by that, or these are two chips."
@@ -174,7 +176,7 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
     if warm[0] is not None and warm[1] is not None and abs(warm[1] - warm[0]) >= WARMER_C:
         remarks.append(
             f"A was measured at {warm[0]:.1f} °C and B at {warm[1]:.1f} °C: an MPU-6050's bias changes by about 0.5 mg"
-            " per degree; `mpucal merge` makes b_a(T) from both."
+            f" per degree{'' if two_chips or other_trim else '; `mpucal merge` makes b_a(T) from both'}."
         )
     gravity = [float(c.fit.get("gravity") or math.nan) for c in (a, b)]
     if abs(gravity[1] - gravity[0]) > 1e-6:

@@ -111,6 +111,15 @@ def test_other_differences_are_remarked_on(change, says):
     assert re.search(says, remark)
 
 
+@pytest.mark.parametrize("other", [{"who_am_i": 0x70}, {"accel_offsets": (100, 200, 300)}])
+def test_a_merge_is_advised_only_for_calibrations_of_one_sensor(other):
+    first = replace(TRUTH, sensor=Sensor(who_am_i=0x68, temperature_c=20.0, accel_offsets=(1, 2, 3)))
+    later = replace(first, sensor=replace(first.sensor, temperature_c=40.0, **other))
+    remarks = " ".join(compare(first, later).remarks)
+    assert "B at 40.0 °C" in remarks
+    assert "mpucal merge" not in remarks
+
+
 def test_halves_of_a_real_recording_agree_and_two_real_sensors_differ(shared):
     recording, other = map(mpucal.load, shared("recordings/mpu9150_a.npz", "recordings/mpu9150_b.npz"))
     first, second, of_other = (mpucal.calibrate(part, gravity=9.81) for part in (*halves(recording), other))
