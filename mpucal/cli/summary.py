@@ -19,7 +19,7 @@ from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.error_model import mg_text
 from ..result.keys import ACCELEROMETER_FORMULA
-from ..result.session_files import BLOB, DOCUMENT, REPORT
+from ..result.session_files import BLOB, DOCUMENT, REPORT, is_unfinished
 from ..sources.table import matching_kinds
 from . import amended, typed_words, with_option
 
@@ -88,7 +88,7 @@ def next_steps(
     """Return the list of files that were written to `paths`, and what to do next; see command_again."""
     again = command_again(calibration, paths[0].parent if paths else None, recording, source or {})
     how = f"run\n  {again}" if again else "give the same command again."
-    refused = f"Next: follow the remedy above, and {how}"
+    refused = f"Next: {_follow_the_remedy(again, recording)}, and {how}"
     if not paths:
         return refused if calibration.verdict == REFUSED else ""
     folder = paths[0].parent
@@ -108,6 +108,13 @@ def next_steps(
     return "\n".join(lines)
 
 
+def _follow_the_remedy(again: str, recording: Path | None) -> str:
+    """Return what precedes the command `again`: a command without `recording` names one that is still to be made."""
+    words = shlex.split(again)
+    made = recording is None or words[1:2] == ["session"] or any(Path(word) == recording for word in words)
+    return f"follow the remedy above{'' if made else ' in a new recording'}"
+
+
 def use_in_device(calibration: Calibration, folder: Path) -> str:
     """Return how the calibration in `folder` comes into its device, or why it cannot."""
     autopilot = calibration.extra.get(AUTOPILOT)
@@ -125,8 +132,11 @@ def command_again(
 
     The results get a free name, and so does `recording`, unless a remedy says how to read it. A range at whose end the
     chip was is replaced by the next larger one. A replay and a resumed session cannot be measured again: a new session
-    can, on the same source if that is known by the options `source` (see Request.words).
+    can, on the same source if that is known by the options `source` (see Request.words). An interrupted session is
+    continued.
     """
+    if recording is not None and is_unfinished(recording):
+        return f"mpucal {shlex.join(['session', '--resume', str(recording)])}"
     typed = typed_words()
     words = _session_words(source) if NO_MEASUREMENT.intersection(typed) else list(typed)
     reasons = calibration.quality.get("reasons", ())

@@ -22,20 +22,21 @@ class OutputFolder:
     Parameters
     ----------
     path : of the folder. new : create a new folder, with the first free number behind its name.
+    only : no other folder will do, so that no error suggests one.
 
     Raises
     ------
     OutputError : the folder cannot be created, or another process writes to it.
     """
 
-    def __init__(self, path: Path, new: bool = False) -> None:
+    def __init__(self, path: Path, new: bool = False, only: bool = False) -> None:
         self._path = _create(str(path)) if new else path
         self._created = new or not path.exists()
         try:
             make_folders(self._path)
         except OSError as error:
             raise _creation_error(path, error) from error
-        self._handle = _lock(self._path)
+        self._handle = _lock(self._path, only)
 
     @property
     def path(self) -> Path:
@@ -119,8 +120,8 @@ def _other(path: Path) -> str:
     return f"-o {shlex.quote(str(free_name(path)))}"
 
 
-def _lock(path: Path) -> int | None:
-    """Lock the folder, and return its handle; None if the system cannot open folders."""
+def _lock(path: Path, only: bool) -> int | None:
+    """Lock the folder, and return its handle; None if the system cannot open folders. `only` : see OutputFolder."""
     try:
         import fcntl  # noqa: PLC0415 - not on Windows, which opens no folders either
 
@@ -134,8 +135,8 @@ def _lock(path: Path) -> int | None:
         os.close(handle)
         raise OutputError(
             f"another mpucal{holder} writes to {path}",
-            "wait until it ends, or choose another folder with -o",
-            _other(path),
+            "wait until it ends" + ("" if only else ", or choose another folder with -o"),
+            "" if only else _other(path),
         ) from error
     except OSError:
         # A network disk may not support locks.

@@ -72,7 +72,7 @@ def _check(calibration: Calibration, recording: Recording, days: float | None) -
             f"its offset registers hold {now.accel_offsets}, and the calibrated one's held {then.accel_offsets}:"
             " the factory sets them for each chip"
         )
-        remedy = f"{CALIBRATE_AGAIN}, or give calibration-on-chip.json"
+        remedy = f"{CALIBRATE_AGAIN}, or give calibration-on-chip.json if `mpucal write` left one"
         return CheckResult(ANOTHER_SENSOR, "another sensor", message, remedy)
     ready = make_correction(calibration, now, recording.autopilot).calibration
     observed = observe(recording, ready)

@@ -71,3 +71,8 @@ SESSION_FILES = (CAPTURE, DOCUMENT, BLOB, REPORT, TRUTH, LOG)
 def captures_in(folder: Path) -> list[Path]:
     """Return the captures of a session of a chip and of one of a vehicle."""
     return [*CAPTURE.all_in(folder), *CAPTURE_OF_VEHICLE.all_in(folder)]
+
+
+def is_unfinished(folder: Path) -> bool:
+    """Return True if `folder` holds a session that was interrupted before its result."""
+    return bool(captures_in(folder)) and not (folder / DOCUMENT.name).exists()

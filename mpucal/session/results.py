@@ -102,7 +102,7 @@ class SessionFolder(OutputFolder):
         self._stamp = file_stamp()
         self._given = given is not None
         self._capture_name = capture_name
-        super().__init__(given or Path(f"session-{self._stamp}"), new=given is None)
+        super().__init__(given or Path(f"session-{self._stamp}"), new=given is None, only=again)
         held = [self.capture, self.path / DOCUMENT.name, *([] if again else captures_in(self.path))]
         if there := next((file.name for file in held if file.exists()), None):
             self.close()

@@ -1,6 +1,7 @@
 """`mpucal show` of calibrations, recordings and devices, and the summary of a calibration."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from mpucal.cli import TYPED
 from mpucal.cli.summary import command_again, formula, next_steps, summary
 from mpucal.data import Sensor
 from mpucal.result.calibration import Calibration
+
+FAULTS = Path(__file__).parents[2] / "fixtures" / "faults"
 
 
 def calibration(verdict="good", **changes):
@@ -93,6 +96,22 @@ def test_the_command_for_another_measurement_is_never_the_same_one(tmp_path, mon
         assert command_again(made, Path("seven"), file, source) == (f"mpucal {again}" if again else "")
         steps = next_steps(made, [Path("seven", "report.html")], file, source)
     assert steps.endswith(f"run\n  mpucal {again}" if again else "give the same command again.")
+    assert ("in a new recording" in steps) == (file is not None)
+
+
+def test_a_refused_part_of_a_session_is_to_be_continued(mpucal, tmp_path):
+    (tmp_path / "board 7").mkdir()
+    shutil.copy(FAULTS / "unplugged.mcap", tmp_path / "board 7" / "capture.mcap")
+    refused = mpucal("calibrate", tmp_path / "board 7")
+    assert refused.code == 5
+    assert refused.out.endswith(f"follow the remedy above, and run\n  mpucal session --resume '{tmp_path}/board 7'\n")
+
+
+def test_one_changed_parameter_is_not_in_the_plural(mpucal, tmp_path):
+    made = calibration(b_a_std=np.full(3, 0.01))
+    for name, moved in (("then.json", [0.0, 0.0, 0.0]), ("now.json", [0.0, 0.0, 0.2])):
+        replace(made, b_a=made.b_a + moved).save(tmp_path / name)
+    assert "Different: 1 parameter of the" in mpucal("diff", tmp_path / "then.json", tmp_path / "now.json").out
 
 
 def test_the_folder_of_a_session_is_its_calibration(mpucal, session):

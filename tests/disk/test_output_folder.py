@@ -18,6 +18,14 @@ def test_a_folder_in_use_is_refused_with_the_process_that_uses_it(tmp_path):
         assert again.path == tmp_path / "board"
 
 
+def test_another_folder_is_suggested_only_where_it_will_do(tmp_path):
+    for only, suggests in ((False, f"-o {tmp_path / 'board-2'}"), (True, "")):
+        with OutputFolder(tmp_path / "board"), pytest.raises(OutputError) as refused:
+            OutputFolder(tmp_path / "board", only=only)
+        assert refused.value.options == suggests
+        assert ("-o" in refused.value.remedy) is not only
+
+
 def test_new_ones_have_names_of_their_own(tmp_path):
     folders = [OutputFolder(tmp_path / "board", new=True) for _ in range(3)]
     assert [folder.path.name for folder in folders] == ["board", "board-2", "board-3"]
