@@ -18,7 +18,10 @@ LEAST_ROWS, LARGE_ROWS, AIRY_ROWS = 20, 40, 30
 _PROMPT_ROWS, _LEAST_PICTURE_ROWS = 2, 5
 _BLANK = Text("")
 KNOWLEDGE_ROWS = 3
-_LABEL, _NEEDLE = 19, 20
+_LABEL, _LONGEST_BAR = 19, 20
+# Columns of a label and of the longest text beside a bar: a narrow screen shortens the bar rather than the text.
+_BESIDE_BAR = 53
+_TURN = "turn it "
 # Text is wrapped to at least this width; on narrower screens it is cut.
 NARROWEST = 12
 # Below the first width no bars are shown; from the second on letters are large, and the values are those of all axes.
@@ -119,7 +122,10 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     board_columns, map_columns = min(quarter + 2, 4 * height), min(quarter - 2, 2 * height)
     parts: list[tuple[str, list[Text], int]] = []
     attitudes = (view.meter.attitude, view.meter.wanted) if view.meter is not None else ()
-    for name, style, attitude in zip(("now", "turn it like this"), ("", "yellow"), attitudes, strict=False):
+    wanted = f"{_TURN}like this"
+    if len(wanted) > board_columns:
+        wanted = wanted.removeprefix(_TURN)
+    for name, style, attitude in zip(("now", wanted), ("", "yellow"), attitudes, strict=False):
         if attitude is not None:
             canvas = pictures.draw_board(view.board, attitude, view.eye, board_columns, height)
             parts.append((name, canvas.lines(style, glyphs.unicode), board_columns))
@@ -162,6 +168,11 @@ def _cut(line: Text, columns: int, glyphs: Glyphs) -> Text:
     return line
 
 
+def bar_columns(columns: int) -> int:
+    """Return the length of a bar on a screen of `columns`."""
+    return min(max(columns - _BESIDE_BAR, 0), _LONGEST_BAR)
+
+
 def bar(share: float, columns: int, glyphs: Glyphs) -> str:
     """Return a bar of `columns` characters, the given share of them full."""
     full = round(min(max(share, 0.0), 1.0) * columns)
@@ -173,10 +184,6 @@ def meter(view: View, columns: int, glyphs: Glyphs) -> Text:
     m = view.meter
     if m is None:
         return Text("")
-    # The limit of stillness is in the middle.
-    at = min(int(0.5 * m.level * _NEEDLE), _NEEDLE - 1)
-    cells = [glyphs.full if k <= at else glyphs.empty for k in range(_NEEDLE)]
-    cells[_NEEDLE // 2] = glyphs.mark
     style = "green" if m.still else "yellow"
     waiting = view.waiting
     text = "still" if m.still else m.what or "moving"
@@ -184,6 +191,11 @@ def meter(view: View, columns: int, glyphs: Glyphs) -> Text:
         text = f"{waiting.remaining_s:.0f} s to go{' (paused)' if waiting.paused else ''}, {text}"
     if columns < NARROW:
         return Text(f" {text}", style=style)
+    # The limit of stillness is in the middle.
+    length = bar_columns(columns)
+    at = min(int(0.5 * m.level * length), length - 1)
+    cells = [glyphs.full if k <= at else glyphs.empty for k in range(length)]
+    cells[length // 2] = glyphs.mark
     return Text.assemble(f" {'stillness':<{_LABEL}}", ("".join(cells), style), f"  {text}")
 
 
@@ -196,7 +208,10 @@ def knowledge_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
     elif view.confirming and columns < NARROW:
         rows = [Text(f" {line}") for line in textwrap.wrap(view.confirming, max(columns - 2, NARROWEST))]
     elif kind is PromptKind.REST or view.knowledge is None:
-        rows = [*_progress(view, glyphs), *(Text(f" {note}") for note in view.notes[-2:])]
+        rows = [
+            *_progress(view, columns, glyphs),
+            *(Text(f" {_shortened(note, columns)}") for note in view.notes[-2:]),
+        ]
     else:
         rows = [_group(group, columns, glyphs) for group in groups(view.knowledge)]
     return [*rows, *[Text("")] * KNOWLEDGE_ROWS][:KNOWLEDGE_ROWS]
@@ -213,8 +228,12 @@ def caution_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
         loud = age_s <= SAY_AGAIN_S
         rows = (f"! {sentence(c.what)}{'' if loud else f' ({age_s:.0f} s ago)'}", f"{glyphs.arrow} {sentence(c.do)}")
         style = "bold yellow reverse" if loud else "dim"
-    width = max(columns - 2, NARROWEST)
-    return [Text.assemble(" ", (textwrap.shorten(row, width, placeholder=" ..."), style)) for row in rows]
+    return [Text.assemble(" ", (_shortened(row, columns), style)) for row in rows]
+
+
+def _shortened(text: str, columns: int) -> str:
+    """Return a text of one row of a screen, which ends with dots if it does not fit."""
+    return textwrap.shorten(text, max(columns - 2, NARROWEST), placeholder=" ...")
 
 
 def keys(view: View, columns: int) -> Text:
@@ -222,14 +241,17 @@ def keys(view: View, columns: int) -> Text:
     kind = view.prompt.kind if view.prompt is not None else None
     turning = kind in (PromptKind.ROTATE, PromptKind.VERIFY, PromptKind.AGAIN)
     wide, narrow = (KEYS_REDO, KEYS_REDO_NARROW) if turning else (KEYS, KEYS_NARROW)
-    return Text(f" {narrow if columns < NARROW else wide}", style="dim")
+    return Text(f" {narrow if columns < max(NARROW, len(wide) + 1) else wide}", style="dim")
 
 
-def _progress(view: View, glyphs: Glyphs) -> list[Text]:
+def _progress(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
     p = view.progress
     if p is None or p.of <= 0.0:
         return []
-    return [Text.assemble(f" {'progress':<{_LABEL}}", (bar(p.done / p.of, _NEEDLE, glyphs), "cyan"), f"  {p.text}")]
+    if columns < NARROW:
+        return [Text(f" {p.text}")]
+    done = bar(p.done / p.of, bar_columns(columns), glyphs)
+    return [Text.assemble(f" {'progress':<{_LABEL}}", (done, "cyan"), f"  {p.text}")]
 
 
 def _group(group: Group, columns: int, glyphs: Glyphs) -> Text:
@@ -240,5 +262,5 @@ def _group(group: Group, columns: int, glyphs: Glyphs) -> Text:
         return Text(f" {group.name:<{_LABEL}}{values}")
     least = group.progress[group.worst]
     style = "green" if least >= 1.0 else "cyan"
-    text = Text.assemble(f" {group.name:<{_LABEL}}", (bar(least, _NEEDLE, glyphs), style), f"  {values}")
+    text = Text.assemble(f" {group.name:<{_LABEL}}", (bar(least, bar_columns(columns), glyphs), style), f"  {values}")
     return text.append(f"  (target {group.target:g})", style="dim")

@@ -50,6 +50,17 @@ def test_all_that_a_person_needs_is_there(views, size):
     assert BRAILLE.search(drawn)
 
 
+def test_a_narrow_screen_shortens_bars_and_keys_and_cuts_no_number(views):
+    turned = "\n".join(text_of(views["turned"], 60, 24))
+    for words in ("turning at 30 deg/s about z", "(target 0.05)", " like this ", "q: stop"):
+        assert words in turned
+    before = replace(views["turned"], knowledge=None, progress=Progress(25.0, 1.0, 10.0, "orientation 1 of 10"))
+    for columns in (60, 59, 40, 30):
+        assert any(line.endswith("orientation 1 of 10") for line in text_of(before, columns, 24)), columns
+    noted = before.noted("a sentence that is somewhat longer than what a narrow screen shows of it")
+    assert any(line.endswith(" ...") for line in text_of(noted, 60, 24))
+
+
 def test_replaced_characters_keep_the_styles_in_their_places(views):
     rows = [row for row in lines(views["turned"], 80, 24, ASCII) if "+-" in row.plain]
     assert [row.plain[row.spans[-1].start :][:9] for row in rows] == ["  (target"] * 2
