@@ -37,13 +37,15 @@ from .tilt import fit_tilt
 # The mean ||e||^2 of white noise is 3, and by chance so many standard deviations more at most; a hand, or a
 # gyroscope's scale, makes it tens to thousands.
 WHITE_NIS, MOST_STD = 3.0, 5.0
-HOPELESS_NIS = 10.0  # of means over blocks, which reduce white noise and not a hand's
+# Above this, white noise is not searched for on all samples. It is the value of means over blocks, in which white noise
+# averages out, and a hand's motion does not.
+HOPELESS_NIS = 10.0
 
 
 class Errors(NamedTuple):
     """Model errors beyond the noise at rest: angle random walk and white-noise floor.
 
-    kappa : rad a root of rad, error of a turn (nonlinearity, steps too long for a turn).
+    kappa : rad per square root of a rad, random walk with the angle turned (nonlinearity, steps too long for a turn).
     floor : m/s^2, white noise in addition to the accelerometer's own.
     """
 
@@ -187,8 +189,8 @@ class InPlaceFits:
 
     def _as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
         """Return the fit with the scores of the recording's parts."""
-        known = undetermined(minimum.covariance()) if len(minimum.free) > ACCEL else ()
-        return minimum.as_fit(known, parts_of(_with_errors(self._problem, errors), minimum, self._prior))
+        at_prior = undetermined(minimum.covariance()) if len(minimum.free) > ACCEL else ()
+        return minimum.as_fit(at_prior, parts_of(_with_errors(self._problem, errors), minimum, self._prior))
 
     def _rough(self, parameters: int) -> Minimum:
         """Search on means over blocks, once for each number of parameters."""
@@ -199,7 +201,10 @@ class InPlaceFits:
 
     @cached_property
     def _most_nis(self) -> float:
-        """Largest mean ||e||^2 of white noise, by chance of as many samples and of those that tell its variance."""
+        """Largest mean ||e||^2 that white noise has by chance.
+
+        By chance vary the mean over the samples, and the variance that was estimated from those of the flat segment.
+        """
         variance = 2.0 * WHITE_NIS * (1.0 / len(self._problem.series) + 1.0 / self._flat.n)
         return WHITE_NIS + MOST_STD * float(np.sqrt(variance))
 

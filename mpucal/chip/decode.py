@@ -107,6 +107,7 @@ class Decoder:
         elif register == reg.FIFO_R_W:
             self.fifo.add_bytes(data)
         elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
+            # The driver enabled this interrupt: a chip that shows it disabled was reset, and lost its settings.
             lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
             if host_ns is not None:
                 self.fifo.add_clock_pairs(np.array([t_ns]), np.array([host_ns]))
@@ -195,8 +196,9 @@ def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
     at = np.flatnonzero(whole)
     counts, checks = accesses.begin[at], accesses.begin[at + 2]
     counted = accesses.data[counts].astype(np.int64) << 8 | accesses.data[counts + 1]
-    flags = (accesses.data[checks] & ~accesses.data[checks + 2]) & reg.INT_FIFO_OFLOW
-    at = at[(counted == moved[at + 1]) & (flags > 0)]
+    # The check reads INT_ENABLE to INT_STATUS: the overflow interrupt is enabled still, and there was no overflow.
+    sound = (accesses.data[checks] & ~accesses.data[checks + 2]) & reg.INT_FIFO_OFLOW
+    at = at[(counted == moved[at + 1]) & (sound > 0)]
     cuts = np.flatnonzero(np.diff(at) != ACCESSES_A_POLL) + 1
     return [(int(part[0]), int(part[-1]) + ACCESSES_A_POLL) for part in np.split(at, cuts) if len(part)]
 

@@ -29,7 +29,8 @@ ACCEL, TEMPERATURE, GYRO = slice(0, 3), 3, slice(4, 7)
 MAX_TEMPERATURE_STEP = 400
 # The first frame after a reset may have been cut by it, and the filters are not settled.
 DROPPED_FRAMES = 2
-# Noise moves some of a frame's seven words: so many equal frames, over so long, are one that is repeated.
+# Noise changes some of a frame's seven words from one frame to the next: this many equal frames, over this time, are
+# one that the chip repeats.
 STUCK_FRAMES, STUCK_S = 10, 0.05
 # Step between two times that the regression would put in the wrong order, in sample intervals.
 LEAST_STEP = 0.1
@@ -100,8 +101,8 @@ class FifoDecoder:
     def finish_poll(self, overflow: bool, lost: bool = False) -> Loss | None:
         """Accept what the poll read, or return why not; then only a reset helps.
 
-        Equal frames at the end wait until a different one follows them, and one that may be flipped for the next.
-        `lost`: the chip was reset meanwhile.
+        Equal frames at the end are held back until a different one follows them, and a last frame in which a bit may be
+        flipped until the next one. `lost`: the chip was reset meanwhile.
         """
         data, look = bytes(self._pending), self._look
         self._pending.clear()
@@ -153,7 +154,10 @@ class FifoDecoder:
         return plain
 
     def _accept(self, kept: Counts, equal: int) -> None:
-        """Keep all frames except those at the end, of which `equal` are, that the next poll decides on."""
+        """Keep the frames, except those at the end that wait for the next poll.
+
+        These are the last `equal` ones if they are several, or else a last one in which a bit may be flipped.
+        """
         if len(kept):
             self._temperature = int(kept[-1, TEMPERATURE])
         accepted = len(kept) - (equal if equal > 1 else min(int(self._flips.is_open), len(kept)))
@@ -180,7 +184,7 @@ class FifoDecoder:
         runs, self._taken = self._runs[self._taken :], len(self._runs)
         if not runs:
             return Samples.empty()
-        samples = self._after(self._last_t_s, self._samples(runs, self._provisional_times_s))
+        samples = self._move_after(self._last_t_s, self._samples(runs, self._provisional_times_s))
         self._last_t_s = float(samples.t[-1])
         return samples
 
@@ -194,7 +198,7 @@ class FifoDecoder:
         times_s = self._final_times()
         last_t_s: float | None = None
         for run in runs:
-            samples = self._after(last_t_s, self._samples([run], times_s))
+            samples = self._move_after(last_t_s, self._samples([run], times_s))
             last_t_s = float(samples.t[-1])
             yield samples
 
@@ -245,7 +249,7 @@ class FifoDecoder:
             return np.zeros(len(frames), bool)
         return np.asarray(np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP)
 
-    def _after(self, last_t_s: float | None, samples: Samples) -> Samples:
+    def _move_after(self, last_t_s: float | None, samples: Samples) -> Samples:
         """Move the samples' times, if needed, so that each is later than `last_t_s`."""
         step_s = LEAST_STEP / self._clock.rate_hz
         if last_t_s is None or samples.t[0] - last_t_s >= step_s:

@@ -187,7 +187,7 @@ class PolledClock(SampleClock):
 
     def begin_segment(self) -> None:
         """See SampleClock."""
-        self._past_steps, self._past_ns = self._passed()
+        self._past_steps, self._past_ns = self._steps_and_time()
         super().begin_segment()
 
     def forget(self) -> None:
@@ -198,13 +198,13 @@ class PolledClock(SampleClock):
     def is_late(self, t_ns: int) -> bool:
         """Return True if samples were missed before one that is read at `t_ns`; two samples are needed for the rate."""
         reads_ns = self._segments[-1].looks_ns
-        known = bool(reads_ns and self._passed()[0])
+        known = bool(reads_ns and self._steps_and_time()[0])
         return known and t_ns - reads_ns[-1] > GAP_INTERVALS / self.rate_hz / NS
 
     @property
     def rate_hz(self) -> float:
         """Samples a second, without the gaps; the nominal ones until there are two."""
-        steps, ns = self._passed()
+        steps, ns = self._steps_and_time()
         return steps / (ns * NS) if ns else self._nominal_hz
 
     def times_s(self, segment: Whole, index: Whole) -> Vector:
@@ -216,8 +216,8 @@ class PolledClock(SampleClock):
         """Return `times_s`: later reads do not improve the times."""
         return self.times_s
 
-    def _passed(self) -> tuple[int, int]:
-        """Return the number of steps from one sample to the next, and the time that they took."""
+    def _steps_and_time(self) -> tuple[int, int]:
+        """Return the number of steps from sample to sample so far, and the ns that they took, without the gaps."""
         reads_ns = self._segments[-1].looks_ns if self._segments else ()
         if not reads_ns:
             return self._past_steps, self._past_ns

@@ -178,6 +178,7 @@ def _offsets_and_bits(port: Port, part: Part, patience: int) -> Iterator[tuple[F
         moved = [MOVED] if isinstance(error, BoardMoved) else []
         yield Finding("offset registers", Mark.NOTE, error.what, error.remedy), moved
         return
+    # Stuck bits of one axis or two explain an odd response; without any, or on all axes, the chip itself is odd.
     if odd is not None and axes in (0, 3):
         doubt = "its offset registers are unlike those of any genuine part"
         yield Finding("offset registers", Mark.NOTE, odd.what, odd.remedy), [doubt]

@@ -29,8 +29,9 @@ SEQUENCE = 256
 LATE, SILENCE_NS = 32, S
 # No network has so many vehicles.
 MOST_SENDERS = 64
-# No bad link brings so many datagrams, or lengths of a packet, without a packet in PATIENCE_NS; a serial line of
-# 921,600 Bd that is read at another rate does.
+# Largest number of pieces without a packet in PATIENCE_NS; more are a flood. A piece is a datagram, or as many bytes
+# of a serial line as the longest packet has. A bad link brings fewer; a line of 921,600 Bd that is read at another rate
+# brings more.
 FLOOD = 2000
 # Signatures count 10 us since 2015-01-01.
 SIGNING_EPOCH_NS, SIGNING_UNIT_NS = 1_420_070_400 * S, 10_000

@@ -97,9 +97,9 @@ class Fits:
         self._tried, self._since = evidence, len(recording)
         reasons = find_reasons(evidence)
         # The rests may suffice for an estimate; without a gyroscope nothing can be verified.
-        told = verdict(reasons) if evidence.gyroscope is None and evidence.is_of_now else REFUSED
-        against = _most_specific_reason(reasons, evidence.recording)
-        return Tried(told, against and against.about(recording.sensor.origin))
+        first_verdict = verdict(reasons) if evidence.gyroscope is None and evidence.is_of_now else REFUSED
+        shown = _most_specific_reason(reasons, evidence.recording)
+        return Tried(first_verdict, shown and shown.about(recording.sensor.origin))
 
     def _check(self, of: int) -> Event:
         evidence = self._tried
@@ -111,19 +111,19 @@ class Fits:
             after = remove_change(after, evidence.flat, walk)
         rests = new_orientations(after, evidence.flat, evidence.fit, self._plan.gravity, self._since - first)
         unseen = select_unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
-        contradiction = next((against for against in find_reasons(evidence) if against.code == CONTRADICTION), None)
+        contradiction = next((each for each in find_reasons(evidence) if each.code == CONTRADICTION), None)
         return judge_verification(rests, unseen[:of], of, recording, contradiction)
 
 
 def _most_specific_reason(reasons: list[Reason], recording: Recording) -> Reason | None:
     """Return the reason to show: a fault of the sensor, or clipping, causes contradictions as well and goes first."""
 
-    def rank(against: Reason) -> int:
-        if KINDS[against.code].of_the_sensor:
+    def rank(each: Reason) -> int:
+        if KINDS[each.code].of_the_sensor:
             return 0
-        if against.code == CLIPPED and is_much_clipped(recording):
+        if each.code == CLIPPED and is_much_clipped(recording):
             return 1
-        return 2 if against.code == CONTRADICTION else 3
+        return 2 if each.code == CONTRADICTION else 3
 
     first = min(reasons, key=rank, default=None)
     return explain_contradiction(first, recording) if first is not None and first.code == CONTRADICTION else first

@@ -29,12 +29,14 @@ LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
 # Least interval of the fits and of the progress.
 KNOW_EVERY_S = REPORT_EVERY_S = 1.0
-# Interval of the fits while no new orientation is seen, which tell little that is new.
+# Interval of the fits while no new orientation is seen: such a fit tells little that is new.
 SHOW_EVERY_S = 5.0
-# Least number of orientations that show a pace, and number of those left from which on the information must be known:
-# at least this share of what the target needs.
-LEAST_FOR_PACE, NEAR_THE_END, LEAST_KNOWN = 3, 3, 0.25
-# An orientation that takes so many times as long as the others shows another pace.
+# The time that is left is estimated from the pace of at least this number of orientations.
+LEAST_FOR_PACE = 3
+# When fewer orientations than NEAR_THE_END are left, the estimate also needs the information so far: at least the share
+# LEAST_KNOWN of what the target needs.
+NEAR_THE_END, LEAST_KNOWN = 3, 0.25
+# An orientation that takes longer than this number of times the pace shows that the pace has changed.
 LATE = 2.5
 
 
@@ -57,8 +59,11 @@ class Rotate(PoseStep):
         self._coverage.passed.add(acc)
         self._coverage.rested.add(acc)
         self._knowledge: events.Knowledge | None = None
+        # A fit was requested and has not answered yet.
         self._requested = False
+        # Number of the last pause that was answered with advice, so that it is answered once.
         self._advised_run = -1
+        # Number of orientations at the last fit.
         self._known_number = 0
         self._held: tuple[Pause, events.Use] | None = None
         self._t_s = self._new_s = self._known_s = self._reported_s = 0.0

@@ -109,12 +109,12 @@ class Motion:
     Parameters
     ----------
     hand : decides on the legs. rng : of the hand's tremor, lever and jerks. gravity : m/s^2.
-    mishaps : of the sensor, besides the hand's own. disturbance : its amplitudes; of the tremor's acceleration this
-        person has half to all.
+    mishaps : of the sensor, besides the hand's own. disturbance : amplitudes of the hand's tremor, sway and jerks; a
+        person draws 50 to 100 % of the tremor's acceleration.
 
     Attributes
     ----------
-    mishaps : of both.
+    mishaps : those of the hand and of the sensor.
     """
 
     def __init__(

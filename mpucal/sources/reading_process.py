@@ -88,7 +88,7 @@ class ProcessSource:
             try:
                 self._driver.start()
                 outbox.send()
-                while not self._is_to_stop(session):
+                while not self._should_stop(session):
                     self._driver.read()
                     outbox.send()
                     self._driver.forget()
@@ -98,7 +98,7 @@ class ProcessSource:
                 error.add_note(f"in the reading process:\n{traceback.format_exc()}")
                 outbox.put(error)
 
-    def _is_to_stop(self, session: Connection) -> bool:
+    def _should_stop(self, session: Connection) -> bool:
         """Pass what the session sent to the hands; return True if it wishes to stop, or has ended."""
         with suppress(OSError, EOFError):
             while session.poll():
@@ -144,7 +144,7 @@ def start_reading(read: Callable[[Connection], None]) -> tuple[Connection, int]:
 class Outbox:
     """Queue in the reading process, which never waits for the session; it grows while the session reads nothing.
 
-    What is put into it goes out at the next `send`, at once.
+    Items that were `put` into it go out together, as one parcel, at the next `send`.
     """
 
     def __init__(self, session: Connection) -> None:
@@ -160,7 +160,7 @@ class Outbox:
         return self._queue.qsize()
 
     def send(self) -> None:
-        """Send what was put into it."""
+        """Send the items that were put into it."""
         self._queue.put(self._items[:])
         self._items.clear()
 
