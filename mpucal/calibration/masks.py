@@ -23,7 +23,8 @@ BELOW_A_RANGE, LONGER_BELOW = 0.01, 2.0
 SHORTEST_RUN = 8
 
 CLIPPED_R_SCALE = 1e4
-GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: the turn across a gap is unknown
+GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: the turn across a long gap is unknown
+BRIDGED_S = 0.25  # the longest gap across which a hand's rate is interpolated, and how far beside it this is tried
 CLIPPED_RATE_SD = 0.0015  # of |omega|, in a run of one: a longer run hides more of what lies beyond the range
 
 # After a long gap a linear correction falls short of the turn: the samples that follow correct it again.
@@ -107,13 +108,44 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
         return series
     clipped = gyr[:-1] | gyr[1:]
     rate2 = np.sum((series.omega - flat.b_omega) ** 2, axis=1)
-    q_extra = np.where(gap, GAP_ANGLE_VARIANCE * np.minimum(series.dt, 1e3), 0.0)
+    rates, variance = _bridged(recording)
+    q_extra = variance[last:].copy()
     for i in np.flatnonzero(q_extra > LOST_RAD**2):
         q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
     q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
-    # The measured rates on both sides of a gap do not tell the rate within it.
-    omega = np.where(gap[:, None], flat.b_omega, series.omega)
+    # The measured rates on both sides of a long gap do not tell the rate within it.
+    omega = np.where(gap[:, None], np.where(np.isnan(rates[last:]), flat.b_omega, rates[last:]), series.omega)
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
+
+
+def _bridged(recording: Recording) -> tuple[Vector, Vector]:
+    """Return mean rates (n, 3) and the variance (n,) [rad^2 an axis] of the turn of each step that is in a gap.
+
+    Across a short gap the rates are interpolated. The turn then errs by as much as interpolation errs at most over
+    parts of the same length beside the gap. A longer gap has no rate, NaN; other steps have neither.
+    """
+    t, gyr, gap = recording.t, recording.gyr, recording.gap
+    dt, reach = np.diff(t, prepend=t[0]), round(BRIDGED_S * recording.rate_hz)
+    rates, variance = np.full_like(gyr, np.nan), np.where(gap, GAP_ANGLE_VARIANCE * np.minimum(dt, 1e3), 0.0)
+    turned = np.cumsum(0.5 * dt[:, None] * (gyr + gyr[np.maximum(np.arange(len(t)) - 1, 0)]), axis=0)
+    gaps = np.cumsum(gap)
+    for first, last in true_runs(gap).tolist():
+        before, after = first - 1, last - 1
+        n = max(round((t[after] - t[before]) * recording.rate_hz), 2)
+        if before < 0 or n > reach:
+            continue
+        beside = np.arange(before - n - reach, after + reach)
+        beside = beside[(beside >= 0) & (beside < len(t) - n) & ((beside <= before - n) | (beside >= after))]
+        beside = beside[gaps[beside + n] == gaps[beside]]
+        if not len(beside):
+            continue
+        to = beside + n
+        missed = turned[to] - turned[beside] - 0.5 * (t[to] - t[beside])[:, None] * (gyr[to] + gyr[beside])
+        share = dt[first:last] / (t[after] - t[before])
+        middle = np.cumsum(share) - 0.5 * share
+        rates[first:last] = gyr[before] + middle[:, None] * (gyr[after] - gyr[before])
+        variance[first:last] = share * min(float(np.sum(missed**2, axis=1).max()) / 3.0, variance[first:last].sum())
+    return rates, variance
 
 
 def _run_lengths(mask: Mask) -> Vector:

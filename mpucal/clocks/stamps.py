@@ -147,6 +147,11 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
         clock.begin_segment()
         clock.add(np.rint(stamps[in_time] / NS).astype(np.int64), index[in_time] + 1)
     t, rate_hz = clock.times_s(segment.astype(np.int64), index), clock.rate_hz
+    late, edges = stamps - t, _edges(n, period, several)
+    least = np.minimum.reduceat(late, edges)
+    usual = np.add.reduceat(late, edges) / np.diff(edges, append=n) - least
+    if np.median(np.abs(least - np.median(least))) > max(np.median(usual), MOST_UNEVEN * period):
+        return own  # the clock errs by more than the stamps are late: single samples are missing here and there
     return Clock(make_increasing(t, MOST_UNEVEN / rate_hz), gap | are_gaps(number), rate_hz, float(np.std(stamps - t)))
 
 
@@ -163,9 +168,8 @@ def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> t
     ----------
     least_width : samples of a stretch of the envelope, at least.
     """
-    n = len(stamps)
-    width = min(max(round(STRETCH_S / period), STRETCH_SAMPLES, least_width), n // 2)
-    edges = np.arange(0, n - width // 2, width)
+    n, edges = len(stamps), _edges(len(stamps), period, least_width)
+    width = int(edges[1])
     late = stamps - period * number
     # after four rounds the envelope's slope has settled, here and below
     for _ in range(4):
@@ -193,6 +197,12 @@ def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> t
         gap[begins] = True
         late[begins:] -= moved[at]
     return gap, late
+
+
+def _edges(n: int, period: float, least_width: int) -> Numbers:
+    """Return where the stretches of n samples begin; all have a width but the last, which may be half of it longer."""
+    width = min(max(round(STRETCH_S / period), STRETCH_SAMPLES, least_width), n // 2)
+    return np.arange(0, n - width // 2, width)
 
 
 def _resolution(stamps: Vector) -> float:

@@ -174,3 +174,19 @@ def test_masks_reduce_the_error_by_a_clipped_gyroscope(hand, monkeypatch):
     monkeypatch.setattr("mpucal.calibration.estimation.with_masks", lambda recording: recording)
     blind = calibrate(clipped, "hand", truth.gravity)
     assert sph_rms(truth, saved.D, saved.b_a) < 0.5 * sph_rms(truth, blind.D, blind.b_a)
+
+
+def test_short_gaps_cost_little(hand, pick):
+    """A hand's rate is interpolated across a gap of 40 ms, in which a turn of 0.2 rad would else be unknown."""
+    simulated = hand(3, "pose12")
+    recording, truth = simulated.recording, simulated.truth
+    kept = np.ones(len(recording), bool)
+    places = np.arange(recording.flat[1], len(recording) - 10, 20)
+    for first in np.random.default_rng(2).choice(places, 60, replace=False):
+        kept[first : first + 3] = False
+    lossy = pick(recording, kept)
+    assert with_masks(lossy).gap.sum() == 60
+    whole, found = (calibrate(of, "hand", truth.gravity) for of in (recording, lossy))
+    assert sph_rms(truth, found.D, found.b_a) < 2.0 * sph_rms(truth, whole.D, whole.b_a)
+    off = np.abs(np.append((found.D - truth.D) / found.D_std, (found.b_a - truth.b_a) / found.b_a_std))
+    assert off.max() < 4.0

@@ -79,6 +79,15 @@ def test_lost_samples_are_gaps_at_their_places():
     assert "with 5 gaps" in found.remark
 
 
+@pytest.mark.parametrize("missing", [0.02, 0.05])
+def test_an_even_clock_does_not_replace_stamps_between_which_single_samples_are_missing(missing):
+    """An even clock would ignore them, and err by tens of ms."""
+    rng = np.random.default_rng(6)
+    there = rng.random(N) > missing
+    off = fit_clock(np.maximum.accumulate(TRUE + 1e-3 * rng.standard_normal(N))[there]).t - TRUE[there]
+    assert np.std(off) < 1.5e-3
+
+
 @pytest.mark.parametrize(
     "times",
     [
