@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from operator import attrgetter, itemgetter
@@ -338,21 +338,35 @@ class Recording(Samples):
             flat = (a, b) if b > a else None
         return replace(self, flat=flat, **vars(self.at(slice(first, last))))
 
-    def without(self, first: int, last: int) -> Self:
-        """Return all samples except first..last-1, with a gap in their place; `flat` is kept if it lies before them."""
-        last = min(last, len(self))
-        if first >= last:
-            return self
-        kept = self.at(np.r_[0:first, last : len(self)])
-        if first < len(kept):
-            kept.gap[first] = True
-        flat = self.flat if self.flat is not None and self.flat[1] <= first else None
-        return replace(self, flat=flat, interrupted=(*self.interrupted, float(self.t[first])), **vars(kept))
+    def without(self, spans: Mapping[int, int]) -> Self:
+        """Return all samples except first..last-1 of each span, first -> last, with a gap in its place.
+
+        `flat` is kept if it lies before them.
+        """
+        spans = {max(first, 0): last for first, last in spans.items() if max(first, 0) < min(last, len(self))}
+        kept = Samples.joined([*without([self.at(slice(None))], spans)])
+        flat = self.flat if self.flat is not None and self.flat[1] <= min(spans, default=len(self)) else None
+        interrupted = (*self.interrupted, *self.t[list(spans)].tolist())
+        return replace(self, flat=flat, interrupted=interrupted, **vars(kept))
 
     def interrupted_at(self, *times_s: float) -> Self:
         """Return the recording with further times of interruptions, and so the other IMUs of its vehicle."""
         others = tuple(other.interrupted_at(*times_s) for other in self.others)
         return replace(self, interrupted=(*self.interrupted, *times_s), others=others)
+
+
+def without(runs: Iterable[Samples], spans: Mapping[int, int]) -> Iterator[Samples]:
+    """Yield all samples of runs except first..last-1 of each span, first -> last, with a gap in its place."""
+    at, cut = 0, False
+    for samples in runs:
+        number = np.arange(at, at + len(samples))
+        kept = np.ones(len(samples), bool)
+        for first, last in spans.items():
+            kept &= (number < first) | (number >= last)
+        gap = samples.gap | (kept & ~np.concatenate(([not cut], kept[:-1])))
+        at, cut = at + len(samples), not kept[-1]
+        if kept.any():
+            yield replace(samples, gap=gap).at(kept)
 
 
 def clock_of(stamps: Vector, sensor: Sensor) -> Clock:

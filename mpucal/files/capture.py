@@ -7,7 +7,7 @@ memory, 16 bytes each or 1.4 MB an hour.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +21,7 @@ from ..chip.accesses import Accesses
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
 from ..chip.records import BEGUN, FORGET, OPENED, RESUMED, SAMPLED_NS, UTC, SessionEvent
-from ..data import Recording, Samples
+from ..data import Recording, without
 from ..errors import CaptureError, RecordingError
 from ..mavlink.log import read_log
 from ..mavlink.tlog import RawPacket
@@ -46,8 +46,7 @@ def load_capture(*paths: Path) -> Recording:
         recording = decode(session.accesses(), session.name)
     else:
         recording = decode(one_by_one(session.accesses()), session.name, resolve_name(recorder.decoder))
-    for first, last in sorted(session.forgotten.items(), reverse=True):
-        recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
+    recording = recording.without(session.forgotten)
     if len(recording) < 2:
         raise RecordingError(f"{session.name} holds {len(recording)} usable samples", "record for longer")
     recording = recording.interrupted_at(*sorted(session.interrupted))
@@ -72,7 +71,7 @@ def capture_rows(*paths: Path) -> Rows:
     if decoder.fifo is None or spool.frames < 2:
         raise RecordingError(f"{session.name} holds {spool.frames} samples", "record for longer")
     runs = decoder.fifo.final(spool.runs())
-    runs = _without(runs, session.forgotten) if session.forgotten else runs
+    runs = without(runs, session.forgotten) if session.forgotten else runs
     return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name, utc_ns=session.utc_ns)
 
 
@@ -187,17 +186,3 @@ class Spool:
             return False
         last = self._pieces[-1]
         return (last.head.segment, last.head.first + last.frames) == (run.segment, run.first)
-
-
-def _without(runs: Iterator[Samples], forgotten: Mapping[int, int]) -> Iterator[Samples]:
-    """Yield all samples except first..last-1, for first -> last of `forgotten`, with a gap in their place."""
-    at, cut = 0, False
-    for samples in runs:
-        number = np.arange(at, at + len(samples))
-        kept = np.ones(len(samples), bool)
-        for first, last in forgotten.items():
-            kept &= (number < first) | (number >= last)
-        gap = samples.gap | (kept & ~np.concatenate(([not cut], kept[:-1])))
-        at, cut = at + len(samples), not kept[-1]
-        if kept.any():
-            yield replace(samples, gap=gap).at(kept)

@@ -50,7 +50,7 @@ class Dialogue:
         self.interrupted = False
         # Events that must not reach the machine before an answer that is late.
         self._arrived: deque[Event] = deque()
-        self._forgotten: list[Forget] = []
+        self._forgotten: dict[int, int] = {}
         self.decision = Decision("")
 
     @property
@@ -126,13 +126,11 @@ class Dialogue:
 
     def without_forgotten(self, recording: Recording) -> Recording:
         """Return the recording without the samples that the machine had dropped."""
-        for forget in sorted(self._forgotten, key=lambda f: f.first, reverse=True):
-            recording = recording.without(forget.first, forget.last)
-        return recording
+        return recording.without(self._forgotten)
 
     def _execute(self, command: Command) -> None:
         if isinstance(command, Forget):
-            self._forgotten = [f for f in self._forgotten if f.first != command.first] + [command]
+            self._forgotten[command.first] = command.last
             self._note(FORGET, self._now_ns(), {"first": command.first, "last": command.last})
             if self.scheduler is not None:
                 self.scheduler.forget(command.first)

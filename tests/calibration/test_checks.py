@@ -250,7 +250,7 @@ OF_RESTS = {
 }
 GOOD = {
     "bench": ("bench", lambda r: r),
-    "a part left out on purpose": ("bench", lambda r: r.without(700, 730)),
+    "a part left out on purpose": ("bench", lambda r: r.without({700: 730})),
     "a flat that is found": ("bench", changed(flat=None)),
     "hand": ("hand", lambda r: r),
     "its range mended": ("half", changed(lambda acc: 2.0 * acc)),
