@@ -1058,6 +1058,34 @@ def test_angles_are_not_suggested_as_accelerations(names, walk, table):
     assert not refused.value.options
 
 
+def test_times_behind_the_columns_of_a_file_called_after_a_sensor(read, walk):
+    found = read("", "a t", line=" ", file="accel_data.csv")
+    np.testing.assert_allclose(found.acc, walk.acc, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.t, walk.t, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("names", ["giro_x,giro_y,giro_z", "Drehrate X,Drehrate Y,Drehrate Z"])
+def test_names_of_other_languages(names, read, walk, assert_same):
+    acc = "acel_x,acel_y,acel_z" if "giro" in names else "Beschleunigung X,Beschleunigung Y,Beschleunigung Z"
+    assert_same(read(f"time,{acc},{names}\n", "t a w"), walk)
+
+
+def test_times_that_begin_anew_are_no_part_of_a_sensor(walk, tmp_path):
+    """Suggest the order in which they are the time, of a board that shows nothing else; name lines that are damaged."""
+    t = 1.7e18 + 1e7 * (np.arange(len(walk)) % 800)
+    rates = 5 * np.sin(0.1 * np.arange(len(walk)))[:, None] * [1, -1, 2]
+    rows = np.column_stack([t, np.rint([30, 16, 546] + rates / 5), np.rint(rates)])
+    path = tmp_path / "board.csv"
+    np.savetxt(path, rows, "%.9e", ",")
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(path)
+    assert refused.value.options == f"--columns t,{AXES.strip()}"
+    assert "begin anew 1 times" in mpucal.load(path, columns=refused.value.options.split()[1]).taken
+    path.write_text(path.read_text().replace("e+18,", "e+18,torn", 30))
+    with pytest.raises(RecordingError, match=r"line 1: column 2 is 'torn.*', which is not a number"):
+        mpucal.load(path)
+
+
 def test_times_of_day_that_go_back_are_no_counter_that_overflows(read, walk):
     """Refuse fractions of a second whose first zeros were not written, whichever way the times are named."""
     order = {"columns": "t,ax,ay,az,gx,gy,gz"}

@@ -121,6 +121,9 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
         return RecordingError(what, _GIVE_VALUES)
     roles, unit = likely
+    if not roles:
+        # a damaged line is named before an order that nothing shows
+        table.numbers([Column("", place, "") for place in table.places(Kind.NUMBER)])
     options = f"--columns {_order(roles)}" + (f" --units acc={unit}" if unit else "") if roles else ""
     return RecordingError(
         f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are {names}",

@@ -79,8 +79,8 @@ def likely_columns(of: Columns, clocks: Sequence[int]) -> tuple[dict[str, int], 
 
     They are none if there are no triples. None if no triple may be as long as gravity.
     """
-    increasing = [place for place in of if is_clock(of[place])]
-    clocks = clocks or [place for place in increasing if is_even_clock(of[place])]
+    increasing = [place for place in of if _hardly_decreases(of[place])]
+    clocks = clocks or [place for place in increasing if is_even_clock(of[place]) or _begins_anew(of[place])]
     places = [place for place in of if place not in {*clocks, *increasing}]
     vary = [place for place in places if np.ptp(of[place]) > 0.0]
     # other columns may be before theirs, such as a label that never changes
@@ -154,6 +154,18 @@ def is_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase, and do not only repeat."""
     steps = np.diff(column[np.isfinite(column)])
     return len(steps) > 0 and bool((steps >= 0).all() and (steps > 0).mean() > 0.01)
+
+
+def _hardly_decreases(column: Vector) -> bool:
+    """Return True if (n,) numbers are a clock's, which may begin anew."""
+    steps = np.diff(column)
+    few_back = int(np.count_nonzero(steps < 0)) * FEWEST <= len(steps)
+    return len(steps) > 0 and few_back and bool((steps > 0).mean() > 0.01)
+
+
+def _begins_anew(column: Vector) -> bool:
+    """Return True if (n,) numbers of a clock, by their step, are those of several recordings."""
+    return bool((np.diff(column) < 0).any() and time_unit(sample_period(column)))
 
 
 def is_index(column: Vector) -> bool:

@@ -17,7 +17,7 @@ from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import HELD, MOST_ODD, SNIFFED, check_size, first_bytes, reading
 from .cells import OF_DAY, Kind
 from .columns import find_columns
-from .guess import is_index
+from .guess import is_clock, is_index
 from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
 from .names import (
     ACC,
@@ -174,7 +174,9 @@ def _with_sensor(table: Table) -> Table:
         shown = [of for of in (ACC, GYR) if units & set(QUANTITIES[of])] + [axis[:-1] for axis in of_file[:1]]
         header = with_sensor(header, shown[0]) if shown else header
     elif not header and of_file and len(places := table.places(Kind.NUMBER)) in (3, 4):
-        names = dict(zip(places, ["time", *of_file][-len(places) :], strict=True))
+        first, last = table.numbers([Column("", places[at], "") for at in (0, -1)]).T
+        order = [*of_file, "time"] if len(places) == 4 and is_clock(last) > is_clock(first) else ["time", *of_file]
+        names = dict(zip(places, order[-len(places) :], strict=True))
         header = [names.get(at, "") for at in range(len(table.cells))]
     return replace(table, header=header)
 

@@ -46,12 +46,12 @@ STEMS = {
     ACC: _stems(
         "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
         " acce accelero acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
-        " specificforce"
+        " specificforce acel aceleracao aceleracion acelerometro accelerazione accelerometro beschleunigung"
     ),
     GYR: _stems(
         "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
         " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate angrate gyroadc:deg/s rotationrate"
-        " motionrotationrate rotation angular"
+        " motionrotationrate rotation angular giro giroscopio giroscopo drehrate"
     ),
 }
 UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}
@@ -68,7 +68,7 @@ WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", 
 # which three parts may be as long
 ESTIMATED = re.compile(
     r"gravity|^mag|magnet|quat|orientation|^q[_.]?[wxyz0-3]$|(?<![a-z])ang[_ ]?[xyz](?![a-z])"
-    r"|^(?!.*(?:rate|speed|vel|gyr|acc|omega)).*(?:roll|pitch|yaw|euler|heading|azimuth|angle|attitude)",
+    r"|^(?!.*(?:rate|speed|vel|gyr|acc|omega)).*(?:roll|pitch|yaw|euler|heading|azimuth|angle|attitude|degree|dir_?cos)",
     re.IGNORECASE,
 )
 # numbers of samples, which are no times where they are whole
