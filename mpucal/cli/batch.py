@@ -18,7 +18,7 @@ from ..batch.many import JOURNAL, Progress, local_client, remote_client, run_bat
 from ..batch.row import Settings
 from ..disk.atomic import write_atomically
 from ..disk.output_folder import OutputFolder
-from ..errors import UsageError
+from ..errors import SourceError, UsageError
 from . import amended, typed_words
 from .arguments import PATH, output_option
 from .options import fit_options
@@ -78,19 +78,21 @@ def command(
         closing(RowJournal(folder / JOURNAL, settings.key)) as journal,
     ):
         with remote_client(scheduler) if scheduler else local_client(workers) as client:
-            _follow(run_batch(paths, client, journal, settings))
+            any_read = _follow(run_batch(paths, client, journal, settings))
         _write_results(folder, paths, journal)
         _say_options(folder, journal.rows(paths), settings, by_pattern)
-    return 0
+    return 0 if any_read else SourceError.exit_code
 
 
-def _follow(progress: Iterator[Progress]) -> None:
-    """Print the progress every two seconds and at the end."""
-    said_s = time.monotonic()
+def _follow(progress: Iterator[Progress]) -> bool:
+    """Print the progress every two seconds and at the end; return True if any recording could be read."""
+    said_s, any_read = time.monotonic(), False
     for each in progress:
+        any_read = each.failed < each.done
         if time.monotonic() - said_s > EVERY_S or each.done == each.of:
             said_s = time.monotonic()
             say(_progress_text(each))
+    return any_read
 
 
 def _progress_text(progress: Progress) -> str:

@@ -240,3 +240,10 @@ def test_a_batch_that_is_ended_while_its_workers_start_leaves_no_trace(tmp_path)
 def test_a_spreadsheet_only_shows_a_cell():
     values = ("=1+1.mcap", "@x", "a=1", "a\u202eb", -1.5, None)
     assert [*map(escape_cell, values)] == ["'=1+1.mcap", "'@x", "a=1", "a\\u202eb", -1.5, None]
+
+
+def test_a_batch_of_which_nothing_can_be_read_fails(client, tmp_path, capsys):
+    (junk := tmp_path / "junk.csv").write_text("no recording\n")
+    words = ["batch", str(junk), "-o", str(tmp_path / "fleet"), "--scheduler", client.scheduler.address]
+    assert call(words) == 3
+    assert "1 could not be read" in capsys.readouterr().out
