@@ -180,9 +180,15 @@ def test_pairs_of_tables_are_told_apart_by_their_names(walk, walk_ns, assert_sam
 @pytest.mark.parametrize("said", ["ax,ay,az,t", "t=4,ax=1,ay=2,az=3,gx=1,gy=2,gz=3"])
 def test_two_tables_without_names_are_read_by_given_columns(said, walk, walk_ns, assert_same, tmp_path):
     pair(tmp_path, walk, walk_ns, (1, 2, 3, 0))
+    assert_same(mpucal.load(tmp_path, columns=said), walk)
+
+
+def test_two_tables_without_names_may_have_the_time_last_but_not_between(walk, walk_ns, assert_same, tmp_path):
+    pair(tmp_path, walk, walk_ns, (1, 2, 3, 0))
+    assert_same(mpucal.load(tmp_path), walk)
+    pair(tmp_path, walk, walk_ns, (1, 0, 2, 3))
     with pytest.raises(RecordingError):
         mpucal.load(tmp_path)
-    assert_same(mpucal.load(tmp_path, columns=said), walk)
 
 
 def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_path):
