@@ -17,7 +17,7 @@ from ..errors import MpucalError, OutputError, UsageError
 from ..report import render
 from ..result.calibration import Calibration
 from ..result.clock import file_stamp
-from ..result.session_files import BLOB, DOCUMENT, REPORT, TRUTH, captures_in
+from ..result.session_files import BLOB, DOCUMENT, REPORT, TRUTH, captures_in, is_unfinished
 
 
 def result_files(
@@ -58,7 +58,7 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
 
 
 def check_owner(folder: Path, calibration: Calibration, read: Path | None, *words: str) -> None:
-    """Raise OutputError if the captures or results in `folder` are those of another recording, by its digest.
+    """Raise OutputError if `folder` holds what must stay: another recording, by its digest, or a session to be resumed.
 
     Parameters
     ----------
@@ -68,6 +68,11 @@ def check_owner(folder: Path, calibration: Calibration, read: Path | None, *word
     captures, document = captures_in(folder), folder / DOCUMENT.name
     own = (folder, *(captures if len(captures) == 1 else ()))
     if read is not None and any(read.samefile(each) for each in own if each.exists()):
+        if is_unfinished(folder):
+            raise OutputError(
+                f"{folder} holds a session without results, which could not be resumed with these in it",
+                f"`{shlex.join(['mpucal', *words, '-o', str(free_name(folder))])}` puts them elsewhere",
+            )
         return
     owner = None
     with suppress(MpucalError, ValueError, KeyError):

@@ -48,6 +48,8 @@ def test_a_resumed_session_has_the_bits_of_an_unbroken_one(mpucal, stopped_at, w
     assert stopped_s > 20.0
     assert stopped_s - last_s(folder / "capture-2.mcap") < 1.0
 
+    kept = mpucal("calibrate", folder, "-o", folder)
+    assert (kept.code, "could not be resumed" in kept.err) == (3, True)
     resumed = mpucal(*WORDS, "--resume", folder)
     assert resumed.code == 0, resumed.err
     for err, begins in ((stopped.err, "lay_flat"), (resumed.err, "rotate")):
