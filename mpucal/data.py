@@ -37,10 +37,6 @@ if TYPE_CHECKING:
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 
-# glibc returns freed arrays to the kernel, which clears their pages anew for the next ones, until a block as large as
-# this has been freed once. Nothing is written to it, so that it takes no memory.
-np.empty(31 << 20, np.uint8)
-
 # Counts at full scale, with which mpucal, its exports and its firmware convert to SI units. PS-MPU-6000A r3.4, 6.1 and
 # 6.2, and PS-MPU-9250A r1.0, 3.1 and 3.2, "Sensitivity Scale Factor": 16384 LSB/g at +-2 g and 131 LSB/(deg/s) at +-250
 # deg/s, each half of it at the next range (32.75 and 16.375 are printed as 32.8 and 16.4).
