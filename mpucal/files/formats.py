@@ -6,6 +6,7 @@ recognises, so that its error message says what is wrong.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -175,7 +176,10 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
             )
     others = [row for row in of_suffix if not row.only_recognised and row.suffix in (FOLDER, path.suffix.lower())]
     if found is None and not others:
-        remedy = f"export a table as .csv, or give {_suffixes()}"
+        if of_suffix and path.is_file() and path.stat().st_size == 0:
+            raise RecordingError(f"{path} is empty", "record it again")
+        shows = f"give a recording; `{shlex.join(['mpucal', 'show', str(path)])}` shows a calibration"
+        remedy = shows if of_suffix else f"export a table as .csv, or give {_suffixes()}"
         raise RecordingError(f"{path} is not a recording that mpucal knows", remedy)
     return found or others[-1]
 

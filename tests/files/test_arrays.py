@@ -282,8 +282,14 @@ def test_files_of_arrays_that_are_none(name, content, tmp_path):
 
 def test_a_calibration_is_no_recording(stored_calibration, tmp_path):
     stored_calibration[1].save(tmp_path / "calibration.json")
-    with pytest.raises(RecordingError, match="is not a recording that mpucal knows"):
+    with pytest.raises(RecordingError, match=r"mpucal knows: .* shows a calibration"):
         mpucal.load(tmp_path / "calibration.json")
+
+
+def test_an_empty_file_is_called_empty(tmp_path):
+    (tmp_path / "empty.json").touch()
+    with pytest.raises(RecordingError, match="is empty: record it again"):
+        mpucal.load(tmp_path / "empty.json")
 
 
 @pytest.mark.parametrize("compressed", [False, True])
