@@ -17,7 +17,7 @@ FEWEST = 4  # samples of a window, which is longer than WINDOW_S below 8 Hz
 SHORTEST_FLAT_S = 1.0
 SHORTEST_GIVEN_S = 0.25  # the block means that a fit starts from have no variance in a shorter one
 ENOUGH_FLAT_S = 5.0
-LONG = 4  # windows of a flat segment between its first and its last, from which on it can do without these
+LONG = 6  # windows of a flat segment that can do without its first and its last one
 
 # With less variance at rest than this [steps^2], the readings stay on one step or two, and no mean makes them finer.
 UNVARIED = 0.3
@@ -93,10 +93,10 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     _, first, last = next(run for run, length in zip(runs, lengths, strict=True) if length >= enough)
     # The outermost windows may hold the end of one movement and the beginning of the next: of a short segment, those
     # that spread further than all inner ones.
-    before, *inner, after = detector.shares(windows).level[first // n : last // n].tolist()
-    if len(inner) >= 2:
-        first += n * (len(inner) >= LONG or before > max(inner))
-        last -= n * (len(inner) >= LONG or after > max(inner))
+    level = detector.shares(windows).level[first // n : last // n].tolist()
+    if len(level) >= 4:
+        most = max(level[1:-1]) if len(level) < LONG else -1.0
+        first, last = first + n * (level[0] > most), last - n * (level[-1] > most)
     return first, last
 
 

@@ -76,6 +76,12 @@ def test_a_short_recording_has_no_flat_segment():
     assert find_flat(parts((0.4, UP, REST))) is None
 
 
+def test_at_a_low_rate_one_window_may_be_the_flat_segment():
+    """A window has four samples at least, 1.3 s at 3 Hz."""
+    to_and_fro = [(2 / 3, ASIDE, TURNING), (2 / 3, UP, -TURNING)] * 5
+    assert find_flat(parts((4 / 3, UP, REST), *to_and_fro, rate_hz=3.0)) == (0, 4)
+
+
 def test_a_noisy_sensor_may_lie_still():
     assert find_flat(parts((10, UP, REST), (10, ASIDE, TURNING), noise=(0.3, 0.1)))[1] >= 800
 
