@@ -17,8 +17,6 @@ from .rotation import cross_rows, lengths
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
 RANGE_TOLERANCE, FEWEST_AT_A_RANGE = 2e-3, 2
-# A motion whose peak is at a range by chance is longer within this share below it than there, by this factor and more.
-BELOW_A_RANGE, LONGER_BELOW = 0.01, 2.0
 # Fewer samples in a row that repeat, or follow a line, do so by chance.
 SHORTEST_RUN = 8
 
@@ -207,7 +205,8 @@ def stuck_rates(recording: Recording) -> list[StuckRate]:
 def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
     """Return (n,) True where an axis repeats its largest magnitude: few times at a chip's range, often elsewhere.
 
-    Readings that are cut off come to the range fast; those of a slow peak, which coarse steps repeat, do not.
+    Readings that are cut off are more often at the range than within its tolerance below; those of a slow peak, which
+    coarse steps repeat, are not.
     """
     clipped = np.zeros(len(values), bool)
     for column in values.T:
@@ -216,8 +215,7 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
             if np.count_nonzero(at) < FEWEST_AT_A_RANGE:
                 continue
             known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
-            below = np.count_nonzero(column / rail > 1.0 - BELOW_A_RANGE) - np.count_nonzero(at) if known else 0
-            known &= below < LONGER_BELOW * np.count_nonzero(at)
+            known &= 2 * np.count_nonzero(at) > np.count_nonzero(np.abs(column - rail) <= RANGE_TOLERANCE * abs(rail))
             runs = int(np.count_nonzero(at[1:] & at[:-1]))
             if known or (runs >= SHORTEST_RUN and _is_motion(column, rail)):
                 clipped |= at
