@@ -23,19 +23,17 @@ from ..data import Vector
 from ..rests.flat import QUIETEST_ACC_MPS2, UNVARIED
 from .evidence import Evidence
 from .fit import Fit
-from .parameters import ACCELEROMETER, MODELS, PLACES
-from .preprocessing import smoothed_rates
+from .hypothesis_tests import most_chi2
+from .parameters import ACCELEROMETER, BY_NAME, MODELS, PLACES
+from .preprocessing import HUBER, smoothed_rates
 from .rotation import cross
+from .sampling import STAYS_S
+from .transitions import REWEIGHTED
 from .uncertainty import UncertaintyClaim
 
-WINDOW_S = 0.1  # in which readings are seen to stay on two steps
 APART_S = 0.05  # samples of the first one farther apart than this do not say what was in between
-PRIOR_SD = (0.05, 0.05, 0.05, 0.005)  # of r [m] and tau [s]: two chips on one board, whose filters differ
-ROUNDS = 5  # of the weights, which depend on the residuals
-TAIL = 4.0  # d^2 from which residuals lose weight, as in (14)
 FEWEST = 1000  # samples in common
 COMMON_S = 1.0  # errors of samples nearer than this may have one cause
-DISAGREE = 32.9  # quantile 0.999 of chi-square of twelve degrees of freedom
 
 
 def beside_first(first: Evidence, other: Evidence) -> Evidence:
@@ -52,7 +50,7 @@ def beside_first(first: Evidence, other: Evidence) -> Evidence:
     away = np.append(own.D - compared.D, own.b_a - compared.b_a)
     spread = (own.covariance + compared.covariance)[ACCELEROMETER, ACCELEROMETER]
     known = (beside := replace(other, fit=compared, claim=None)).uncertainty
-    if known is None or away @ np.linalg.solve(spread, away) > DISAGREE:
+    if known is None or away @ np.linalg.solve(spread, away) > most_chi2(len(away)):
         return other
     return replace(beside, claim=UncertaintyClaim(compared.covariance, known.rms_mps2, known.rms_mps2))
 
@@ -80,7 +78,7 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     s, change, rate, alpha, rates = np.hsplit(np.stack([np.interp(t, there.t, c) for c in columns.T], axis=1), 5)
     L = cross(alpha) + cross(rate) @ cross(rate)
     more = own.D @ np.concatenate([L, -change[:, :, None]], axis=2)
-    n = max(round(WINDOW_S * here.rate_hz), 4)
+    n = max(round(STAYS_S * here.rate_hz), 4)
     theta, covariance = _solve([_axis(axis, t, here.acc[near], s, more, here.sensor.steps[0], n) for axis in range(3)])
     D = theta[:9].reshape(3, 3)
     # The errors of the first one's D and b_a are errors of s.
@@ -141,17 +139,17 @@ def _solve(axes: Sequence[_Measurements]) -> tuple[Vector, Vector]:
     The variance of a measurement is that of rounding and noise, and by jitter; both are estimated from the residuals.
     """
     A, y, t, jitter = map(np.concatenate, zip(*axes, strict=True))
-    prior = np.diag(np.concatenate([np.zeros(12), 1.0 / np.square(PRIOR_SD)]))
+    prior = np.diag(np.concatenate([np.zeros(12), 1.0 / np.square([*BY_NAME["r"].sd, *BY_NAME["tau"].sd])]))
     kinds = np.column_stack([np.ones_like(y), jitter])
     variance, weight = np.ones_like(y), np.ones_like(y)
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTED):
         W = (weight / variance)[:, None]
         H = A.T @ (W * A) + prior
         theta = np.linalg.solve(H, A.T @ (W[:, 0] * y))
         e = y - A @ theta
         V = (weight / variance**2)[:, None] * kinds
         variance = kinds @ np.maximum(np.linalg.solve(kinds.T @ V, V.T @ e**2), (QUIETEST_ACC_MPS2**2, 0.0))
-        weight = np.minimum(1.0, TAIL / np.maximum(e**2 / variance, TAIL))
+        weight = np.minimum(1.0, HUBER**2 / np.maximum(e**2 / variance, HUBER**2))  # as in (14)
     # Neighbours' errors have common causes: their gradients add up before they are squared.
     _, together = np.unique(t // COMMON_S, return_inverse=True)
     gradients = np.zeros((together.max() + 1, 16))

@@ -5,40 +5,34 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, wraps
-from itertools import pairwise, permutations, product
+from itertools import pairwise, product
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data import Recording, Vector
+from ..data import GYRO_RANGES_DPS, Recording, Vector
 from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
 from ..rests.intervals import Intervals, RestFinder, statistics
+from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
 from ..rests.windows import WINDOW_S
 from .fit import Fit
 from .hypotheses import Explanation
 from .parameters import ACCELEROMETER
-from .rotation import fibonacci_sphere, lengths, sides_down, turned
+from .rotation import fibonacci_sphere, lengths, sides_down, signed_permutations, turned
 from .tilt import tilted_directions
-from .uncertainty import DIRECTIONS, Uncertainty, UncertaintyClaim, is_usable, propagate
+from .transitions import FEWEST_TRANSITIONS
+from .uncertainty import Uncertainty, UncertaintyClaim, is_usable, propagate
 from .words import Decoded
 
 LEAST_STEP_RAD = np.deg2rad(2.0)  # turn of gravity in half a second that is above noise
-LEAST_TURN_RAD = np.deg2rad(20.0)  # turn of gravity beyond the effect of biases and skew
-OTHER_RANGES = (0.25, 0.5, 2.0, 4.0)
 CLEARLY = 3.0  # ratio of misses above which another unit or range is the right one
-# Ratio of integrated rate to turn of gravity above which deg/s is suspected; turns about the vertical exceed it, too.
-DEGREES_RATIO = 20.0
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
-FEWEST_RESTS = 3  # fewer cannot contradict each other
-BLOCK_S, MOVING_RAD_S = 0.01, 0.3
-SIGNED_PERMUTATIONS = [
-    np.eye(3)[list(order)] * np.array(signs)[:, None]
-    for order in permutations(range(3))
-    for signs in product((1.0, -1.0), repeat=3)
-]
+BLOCK_S = 0.01
+# Ratios of the chip's ranges, by which rates are off that were read at another one; that of the same range first.
+RANGE_RATIOS = sorted({a / b for a, b in product(GYRO_RANGES_DPS, repeat=2)}, key=lambda ratio: abs(np.log(ratio)))
 
 T = TypeVar("T")
 
@@ -101,7 +95,7 @@ class Evidence:
             return None
         directions = None
         if self.model == "tilt" and self.flat is not None:
-            directions = tilted_directions(self.flat.y / np.linalg.norm(self.flat.y), fibonacci_sphere(DIRECTIONS))
+            directions = tilted_directions(self.flat.y / np.linalg.norm(self.flat.y), fibonacci_sphere())
         known = propagate(fit.D, fit.covariance[ACCELEROMETER, ACCELEROMETER], self.gravity, directions)
         return known if known.rms_mps2 > 0.0 else None  # the inverse of a singular H is no covariance
 
@@ -178,10 +172,9 @@ class Evidence:
         sizes = np.diff(r.t, prepend=r.t[0]) * lengths(r.gyr - flat.b_omega)
         rotated = np.append(0.0, np.cumsum(sizes))
         path, angle = (rotated[first + self._half_second] - rotated[first]).sum(), _angles(u[:, 0], u[:, 1]).sum()
-        if not path > DEGREES_RATIO * angle > 0.0:
+        if not path > CLEARLY * angle > 0.0:  # turns about the vertical exceed it, too
             return False
-        turns = self._turns_of_half_seconds(flat)
-        return _miss(turns, np.eye(3)) > CLEARLY * _miss(turns, np.deg2rad(np.eye(3)))
+        return bool(_least_miss(self._turns_of_half_seconds(flat), [np.eye(3), np.deg2rad(np.eye(3))])[0][0, 0] < 1.0)
 
     def _half_seconds(self, flat: Flat) -> tuple[Vector, NDArray[np.int_]]:
         """Return the directions of gravity (k, 2, 3) before and after turns, and the samples (k,) where these begin.
@@ -210,24 +203,24 @@ class Evidence:
 
     @cached_property
     def gyro_factor(self) -> float:
-        """Power of two with which rates explain how gravity turned, from rest to rest or, of few, by half seconds."""
+        """Ratio of ranges with which rates explain how gravity turned from rest to rest, or of few, by half seconds."""
         if self.flat is None:
             return 1.0
         turns = _measured(self._turns_of_rests(self.flat))
-        if len(turns) < FEWEST_RESTS:
+        if len(turns) < FEWEST_TRANSITIONS:
             turns = _measured(self._turns_of_half_seconds(self.flat))
-        if len(turns) < FEWEST_RESTS:
+        if len(turns) < FEWEST_TRANSITIONS:
             return 1.0
-        by, miss = _least_miss(turns, [factor * np.eye(3) for factor in (1.0, *OTHER_RANGES)])
+        by, miss = _least_miss(turns, [ratio * np.eye(3) for ratio in RANGE_RATIOS])
         return float(by[0, 0]) if miss < MOST_MISS_RAD else 1.0
 
     @cached_property
     def gyro_axes(self) -> Vector | None:
         """Rotation (3, 3) by right angles, or -1, with which rates explain how gravity turned between rests."""
         turns = [] if self.flat is None else _measured(self._turns_of_rests(self.flat, np.inf))
-        if len(turns) < FEWEST_RESTS:
+        if len(turns) < FEWEST_TRANSITIONS:
             return None
-        rotations = [M for M in SIGNED_PERMUTATIONS if np.linalg.det(M) > 0.0]
+        rotations = [M for M in signed_permutations() if np.linalg.det(M) > 0.0]
         by, miss = _least_miss(turns, [np.eye(3), -np.eye(3), *rotations])
         return by if miss < MOST_MISS_RAD else None
 
@@ -238,7 +231,9 @@ class Evidence:
         The first is that of the turns within the gyroscope's range, the second that of all turns.
         """
         turns = [] if self.flat is None else self._turns_of_rests(self.flat, np.inf)
-        within, of_all = (_miss(t, np.eye(3)) if len(t) >= FEWEST_RESTS else 0.0 for t in (_measured(turns), turns))
+        within, of_all = (
+            _miss(these, np.eye(3)) if len(these) >= FEWEST_TRANSITIONS else 0.0 for these in (_measured(turns), turns)
+        )
         return within, of_all
 
     def _turn(self, flat: Flat, before: Vector, after: Vector, first: int, last: int) -> _Turn:

@@ -266,7 +266,7 @@ class _Search:
         prepared = self.prepared
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
         sigmas = HAND_MPS2 if prepared.rests_often else WHITE_MPS2
-        first = most_likely_sigma(prepared.white, sigmas, theta, HAND_MPS2[0])
+        first = most_likely_sigma(prepared.white, sigmas, theta, FIRST_MPS2)
         theta = self._roughly(prepared.white(first), theta)
         sigma = most_likely_sigma(prepared.white, sigmas, theta, first)
         if sigma != first:

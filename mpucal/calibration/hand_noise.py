@@ -16,11 +16,11 @@ from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed
 from .problem import Problem
 from .rotation import lengths
 from .theta import Theta
+from .transitions import REWEIGHTED
 
-FIRST_MPS2 = 0.3  # sigma at which a search begins
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
-SOME_MPS2 = WHITE_MPS2[1:]
 HAND_MPS2 = WHITE_MPS2[4:]  # a board that goes from rest to rest is in a hand
+FIRST_MPS2 = HAND_MPS2[0]  # sigma at which a search begins
 CALM_MPS2 = WHITE_MPS2[3:]  # the same over all samples: less noise than a calm hand's is taken for jerks
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
@@ -30,7 +30,6 @@ FARTHER, FARTHER_STILL, SLOWLY_PER_S = 1.5, 0.5, 2.0
 
 # Moving means over 2 TURNS_S, applied TIMES times, keep turns below 2 Hz and nothing of a tremor of 8 to 12 Hz.
 TURNS_S, TIMES = 0.04, 3
-REWEIGHTED = 4  # iterations of the reweighted least squares
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,6 @@ from .rotation import cross
 
 What = Literal["accelerometer", "scale", "mount", "gyroscope"]
 Kind = Literal["change", "time", "side"]
-SIDES = 0
 # stretches of time by shape: a change is looked for in each, and the others have numbers in each
 GROUPS = {"step": 48, "walk": 16, "pulse": 48, "each": 16}
 
@@ -54,9 +53,9 @@ class Hypothesis(NamedTuple):
     prior: float = 1.0
 
     @property
-    def groups(self) -> int:
-        """Number of stretches of time, or SIDES."""
-        return SIDES if self.by_side else GROUPS[self.shape]
+    def groups(self) -> int | None:
+        """Number of stretches of time; None of sides."""
+        return None if self.by_side else GROUPS[self.shape]
 
     @property
     def is_change(self) -> bool:
@@ -243,17 +242,17 @@ class _Groups(NamedTuple):
     end: Vector
 
     @classmethod
-    def of(cls, parts: Parts, groups: int) -> _Groups:
-        """Group the parts by so many stretches of time, or by SIDES."""
+    def of(cls, parts: Parts, groups: int | None) -> _Groups:
+        """Group the parts by so many stretches of time, or by sides."""
         group = _group(parts, groups)
         first = np.unique(group, return_index=True)[1]
         last = len(group) - 1 - np.unique(group[::-1], return_index=True)[1]
         return cls(*parts.grouped(group), parts.start[first], parts.end[last])
 
 
-def _group(parts: Parts, groups: int) -> NDArray[np.intp]:
-    """Return (k,) the group of each part, in so many stretches of time, or by SIDES."""
-    return parts.side if groups == SIDES else parts.by_time(min(groups, len(parts)))
+def _group(parts: Parts, groups: int | None) -> NDArray[np.intp]:
+    """Return (k,) the group of each part, in so many stretches of time, or by sides."""
+    return parts.side if groups is None else parts.by_time(min(groups, len(parts)))
 
 
 class _Likelihood(NamedTuple):

@@ -1,7 +1,8 @@
-"""Statistical tests that extend a model: Wald's of the gyroscope's matrix K, Rao's score test of a lever arm."""
+"""Statistical tests: how far chance goes, Wald's test of the gyroscope's matrix K, Rao's score test of a lever arm."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +17,18 @@ from .problem import Problem
 from .theta import UPPER, Prior
 
 K = BY_NAME["K"]
+MOST_STD = 4.0  # standard deviations of a normal deviate, beyond which chance explains nothing
 WALD_99 = 16.8  # scipy.stats.chi2.ppf(0.99, 6): below it, K is not significantly different from the identity
 KNOWN = 0.5  # the data determine a parameter whose standard deviation they reduce to this share of the prior's
-SCORE = 30.7  # chi^2 of three degrees of freedom, which chance exceeds once in a million
 LEAST_LEVER_M = 1e-3  # the axes of one chip are as far from each other
+
+
+def most_chi2(n: int) -> float:
+    """Return chi^2 of n degrees of freedom that chance exceeds as rarely as a normal deviate exceeds MOST_STD.
+
+    Source: Wilson, Hilferty, PNAS 17 (1931).
+    """
+    return n * (1.0 - 2.0 / (9.0 * n) + MOST_STD * math.sqrt(2.0 / (9.0 * n))) ** 3
 
 
 def wald(minimum: Minimum) -> float:
@@ -59,4 +68,4 @@ def find_lever_arm(problem: Problem, recording: Recording, flat: Flat, minimum: 
     S = at.fisher[np.ix_(r, r)] - at.fisher[np.ix_(r, others)] @ taken
     g = at.gradient[r] - taken.T @ at.gradient[others]
     step = np.linalg.lstsq(S, g, rcond=None)[0]
-    return np.asarray(-step) if g @ step > SCORE and np.linalg.norm(step) > LEAST_LEVER_M else None
+    return np.asarray(-step) if g @ step > most_chi2(len(r)) and np.linalg.norm(step) > LEAST_LEVER_M else None

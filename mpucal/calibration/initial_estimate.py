@@ -9,19 +9,18 @@ import numpy as np
 from ..data import Vector
 from ..kernel import _kernel
 from ..rests.intervals import true_runs
+from .hand_noise import FIRST_MPS2
 from .likelihood import evaluate
 from .masks import GAP_ANGLE_VARIANCE, LOST_RAD
 from .problem import Problem, Series
 from .rotation import fibonacci_sphere, tangents
+from .scores import FEWEST_SAMPLES
 from .theta import Theta
 
-POINTS = 300
 REFINEMENTS = 3
 # The ridge keeps the equations solvable for a board that hardly turned; a second of data outweighs it.
 RIDGE = 1e-9
-# So many of the longest stretches between gaps are tried.
-STRETCHES, FEWEST_OF_A_STRETCH = 4, 50
-ROUGH_MPS2 = 0.5
+STRETCHES = 4  # so many of the longest stretches between gaps are tried
 
 
 def initialise(problem: Problem, b_omega: Vector) -> Theta:
@@ -59,9 +58,9 @@ def _between_gaps(problem: Problem, part: slice, b_omega: Vector) -> Theta:
         np.ascontiguousarray(b_omega), series.y[part], series.omega[part], series.dt[part], r_scale
     )
     sums = _Sums(CC, yC, C.reshape(3, 3), y, n, problem)
-    points = fibonacci_sphere(POINTS)
+    points = fibonacci_sphere()
     u = points[int(np.argmin(sums.cost(points)))]
-    u = _refine(u, sums, step=2.0 / np.sqrt(POINTS))
+    u = _refine(u, sums, step=2.0 / np.sqrt(len(points)))
     D, b_a = sums.solve(u[None])
     sign = 1.0 if np.linalg.det(D[0]) > 0 else -1.0
     return Theta.start(sign * D[0], b_a[0], b_omega, sign * u)
@@ -77,7 +76,7 @@ def _stretches(series: Series) -> list[slice]:
         return []
     starts, ends = [0, *(b for _, b in gaps)], [*(a for a, _ in gaps), len(series)]
     longest = sorted(zip(starts, ends, strict=True), key=lambda part: part[0] - part[1])[:STRETCHES]
-    return [slice(a, b) for a, b in longest if b - a >= FEWEST_OF_A_STRETCH]
+    return [slice(a, b) for a, b in longest if b - a >= FEWEST_SAMPLES]
 
 
 def _from_the_flat_mean(problem: Problem, theta: Theta) -> Theta:
@@ -92,7 +91,7 @@ def _misfit(problem: Problem, theta: Theta) -> float:
     """Return V of the exact filter, with noise enough for a hand and for an error of the gyroscope's scale."""
     of = problem.series
     series = Series(of.y, of.omega, of.dt, of.r_scale, of.q_scale, of.q_extra)
-    flat = replace(problem.flat, Sigma_a=problem.flat.Sigma_a + ROUGH_MPS2**2)
+    flat = replace(problem.flat, Sigma_a=problem.flat.Sigma_a + FIRST_MPS2**2)
     V = evaluate(Problem(series, flat, problem.gravity), theta, 0).V
     return V if np.isfinite(V) else np.inf
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .downsampling import SEARCH_HZ, downsampled
-from .hand_noise import FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, most_likely_sigma
+from .hand_noise import CALM_MPS2, FIRST_MPS2, PIVOT_MPS2, WHITE_MPS2, most_likely_sigma
 from .initial_estimate import initialise
 from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import value
@@ -85,7 +85,7 @@ def interim_estimate(
         sigma = before.sigma
     else:
         theta = _minimum(rough, theta, prior).theta.right_handed()
-        sigma = most_likely_sigma(prepared.white, WHITE_MPS2, theta, HAND_MPS2[0])
+        sigma = most_likely_sigma(prepared.white, WHITE_MPS2, theta, FIRST_MPS2)
     problem = prepared.white(sigma, CORRELATION_S)
     minimum = _minimum(problem, theta, prior)
     H = minimum.H
@@ -96,7 +96,7 @@ def interim_estimate(
         doubt = prepared.pivot(DOUBT * pivot, FLOOR_MPS2)
         H = information(doubt, minimum.theta, prior)
     covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
-    sigma = most_likely_sigma(prepared.white, SOME_MPS2, minimum.theta, max(sigma, SOME_MPS2[0]))
+    sigma = most_likely_sigma(prepared.white, CALM_MPS2, minimum.theta, max(sigma, CALM_MPS2[0]))
     return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged, compared)
 
 

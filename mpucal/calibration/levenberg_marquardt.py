@@ -27,11 +27,8 @@ LAST = 30.0
 MOST_ITERATIONS = 60
 # After so many trials that do not halve the decrement the search has failed, as in a valley without an end: turns so
 # slow that the gyroscope's noise loses gravity. Estimates that converge halve it within 5 trials.
-MOST_IN_VAIN, HALF = 10, 0.5
-# V may rise by so much in a step with frozen gains. If the decrement falls to less than this share, the root is near,
-# and V, whose minimum is elsewhere, may rise by more.
-FROZEN_SLACK, NEAR_A_ROOT, SLACK_NEAR_A_ROOT = 1.0, 0.1, 200.0
-DAMPING, EASIER, HARDER, HOPELESS = 1e-3, 0.1, 8.0, 1e12
+MOST_IN_VAIN = 10
+DAMPING, EASIER, HARDER = 1e-3, 0.1, 8.0
 
 
 @dataclass(frozen=True)
@@ -108,9 +105,9 @@ def minimise(
         free[PLACES[name]] = False
     at, damping, iterations, converged = _At(problem, theta, free, prior, ends), DAMPING, 0, False
     least, in_vain, last = np.inf, 0, np.zeros(parameters)
-    while iterations < most and damping < HOPELESS and in_vain < MOST_IN_VAIN:
+    while iterations < most and in_vain < MOST_IN_VAIN:
         gradient, H, decrement = at.gradient, at.free_H, at.decrement
-        least, in_vain = (decrement, 0) if decrement < HALF * least else (least, in_vain + 1)
+        least, in_vain = (decrement, 0) if 2.0 * decrement < least else (least, in_vain + 1)
         if decrement < until:
             converged = True
             break
@@ -134,9 +131,12 @@ def minimise(
 
 
 def _nearer(trial: _At, at: _At) -> bool:
-    """Return True if a step came nearer to the root of the gradient with frozen gains."""
-    shrunk, risen = trial.decrement / at.decrement, trial.V - at.V
-    return shrunk < 1.0 and risen < (SLACK_NEAR_A_ROOT if shrunk < NEAR_A_ROOT else FROZEN_SLACK)
+    """Return True if a step came nearer to the root of the gradient with frozen gains.
+
+    The nearer the root, the more V, whose minimum is elsewhere, may rise.
+    """
+    shrunk = trial.decrement / at.decrement
+    return shrunk < 1.0 and (trial.V - at.V) * shrunk**2 < 1.0
 
 
 class _At:

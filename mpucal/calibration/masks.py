@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -12,11 +12,13 @@ from ..kernel import _kernel
 from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.intervals import true_runs
+from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
 from .problem import Series
 from .rotation import cross_rows, lengths
+from .words import ODDS
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
-RANGE_TOLERANCE, FEWEST_AT_A_RANGE = 2e-3, 2
+RANGE_TOLERANCE = 2e-3
 # Fewer samples in a row that repeat, or follow a line, do so by chance.
 SHORTEST_RUN = 8
 
@@ -30,14 +32,9 @@ LOST_RAD, SETTLING = 0.2, 5
 
 LINE_TOLERANCE = 1e-6
 
-# A rate may repeat as often as chance makes it with this probability, while the board turns: rates change by so much
-# [rad/s], or accelerations [m/s^2].
-BY_CHANCE, TURNING, SWUNG = 1e-6, 0.3, 3.4
-
-# A board is reset if gravity turns within a step by so much more than the gyroscope says, the neighbouring steps miss
-# by less than this share of it, and gravity is then this near to the flat segment's.
-RESET_RAD, OF_NEIGHBOURS, NEIGHBOURS, BACK = np.deg2rad(5.0), 0.2, 4, 0.02
-AROUND = np.array([step for step in range(-NEIGHBOURS, NEIGHBOURS + 1) if step])
+# A board is reset if gravity turns far within a step, unseen by the gyroscope, and not in the neighbouring steps; it is
+# then as near to the flat segment's as BACK, a share of it.
+NEIGHBOURS, BACK = 4, 0.02
 
 
 def _without_spikes(recording: Recording) -> Vector:
@@ -75,7 +72,7 @@ def with_masks(recording: Recording) -> Recording:
         acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
         gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges)),
     )
-    for run in stuck_rates(marked):
+    for run in stuck_readings(marked, "gyr"):
         marked.gap[run.first : run.last] = True
     return replace(marked, gyr=_without_spikes(recording))
 
@@ -89,11 +86,10 @@ def find_reset(recording: Recording, flat: Flat) -> int | None:
     dt = np.diff(recording.t[flat.last :])[:, None]
     with np.errstate(all="ignore"):
         missed = lengths(np.diff(acc, axis=0) + cross_rows(rate[1:], acc[:-1]) * dt) / np.linalg.norm(flat.y)
-        at = np.flatnonzero((missed > RESET_RAD) & ~recording.gap[flat.last + 1 :])
-        at = at[(at >= NEIGHBOURS) & (at < len(missed) - NEIGHBOURS)]
-        for i in at[(missed[at[:, None] + AROUND] < OF_NEIGHBOURS * missed[at, None]).all(1)]:
-            after = acc[i + 1 : i + 1 + NEIGHBOURS].mean(0)
-            if np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y):
+        for i in np.flatnonzero((missed > LEAST_TURN_RAD) & ~recording.gap[flat.last + 1 :]):
+            around, after = missed[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS + 1], acc[i + 1 : i + 1 + NEIGHBOURS].mean(0)
+            is_back = np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y)
+            if is_back and np.count_nonzero(around > LEAST_TURN_RAD) == 1:
                 return flat.last + int(i) + 1
     return None
 
@@ -172,33 +168,38 @@ def _on_a_line(values: Vector, t: Vector) -> Mask:
     return drawn
 
 
-class StuckRate(NamedTuple):
-    """Samples first..last-1, in which the rate about `axis` repeats while the board turns."""
+class Stuck(NamedTuple):
+    """Samples first..last-1, in which the readings of `axis` repeat while the board turns."""
 
     axis: int
     first: int
     last: int
 
 
-def stuck_rates(recording: Recording) -> list[StuckRate]:
-    """Find rates within their range that repeat while the board turns, longer than their noise lets them."""
+def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[Stuck]:
+    """Find readings within the range that repeat while the board turns, longer than their noise lets them."""
     if recording.sensor.origin is Origin.VEHICLE:
         return []  # its stream is rounded, and repeats
-    values, clipped, stuck = recording.gyr, recording.gyr_clipped, []
+    values, clipped, stuck = getattr(recording, sensor), getattr(recording, f"{sensor}_clipped"), []
+    swings = LEAST_TURN_RAD * STANDARD_GRAVITY_MPS2
     for axis, column in enumerate(values.T):
         same = np.diff(column) == 0.0
-        start = same[: max(len(same) // 20, 50)]
-        by_chance = (np.count_nonzero(start) + 1) / (len(start) + 2)
-        longest = max(np.log(BY_CHANCE / len(values)) / np.log(by_chance), SHORTEST_RUN)
+        # coarse readings repeat most in a long rest, and single axes of them throughout
+        parts = same[: max(len(same) // 20, 50)], same
+        by_chance = max((np.count_nonzero(part) + 1) / (len(part) + 2) for part in parts)
+        longest = max(-np.log(ODDS * len(values)) / np.log(by_chance), SHORTEST_RUN)
         if not same.any() or _run_lengths(same)[same].max() < longest:
             continue
         for first, last in true_runs(same).tolist():
             if last - first < longest or clipped[first]:
                 continue
-            # The board turns where this rate is far from rest, or where others or the accelerations change.
-            swung, turned = (np.ptp(each[first : last + 1], axis=0).max() for each in (recording.acc, values))
-            if swung > SWUNG or max(turned, abs(column[first] - column[0])) > TURNING:
-                stuck.append(StuckRate(axis, first + 1, last + 2))
+            # The board turns where gravity moves, or a rate is far from rest, or others change.
+            is_turning = np.ptp(recording.acc[first : last + 1], axis=0).max() > swings
+            if sensor == "gyr":
+                changed = np.ptp(values[first : last + 1], axis=0).max()
+                is_turning |= max(changed, abs(column[first] - column[0])) > MOVING_RAD_S
+            if is_turning:
+                stuck.append(Stuck(axis, first + 1, last + 2))
     return stuck
 
 
@@ -212,7 +213,7 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
     for column in values.T:
         for rail in (column.max(), column.min()):
             at = column == rail
-            if np.count_nonzero(at) < FEWEST_AT_A_RANGE:
+            if np.count_nonzero(at) == 1:
                 continue
             known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
             known &= 2 * np.count_nonzero(at) > np.count_nonzero(np.abs(column - rail) <= RANGE_TOLERANCE * abs(rail))

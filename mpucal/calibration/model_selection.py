@@ -19,7 +19,7 @@ from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import HandFit, fit_hand
-from .hypothesis_tests import WALD_99, find_lever_arm, undetermined, wald
+from .hypothesis_tests import MOST_STD, WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
 from .likelihood import evaluate
@@ -34,11 +34,9 @@ from .static import fit_static
 from .theta import Prior, Theta
 from .tilt import fit_tilt
 
-# The mean ||e||^2 of white noise is 3, and by chance so many standard deviations more at most; a hand, or a
-# gyroscope's scale, makes it tens to thousands.
-WHITE_NIS, MOST_STD = 3.0, 5.0
-# Above this, white noise is not searched for on all samples. It is the value of means over blocks, in which white noise
-# averages out, and a hand's motion does not.
+# The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands. Above this, white
+# noise is not searched for on all samples. It is the value of means over blocks, in which white noise averages out, and
+# a hand's motion does not.
 HOPELESS_NIS = 10.0
 
 
@@ -205,8 +203,8 @@ class InPlaceFits:
 
         By chance vary the mean over the samples, and the variance that was estimated from those of the flat segment.
         """
-        variance = 2.0 * WHITE_NIS * (1.0 / len(self._problem.series) + 1.0 / self._flat.n)
-        return WHITE_NIS + MOST_STD * float(np.sqrt(variance))
+        variance = 2.0 * 3.0 * (1.0 / len(self._problem.series) + 1.0 / self._flat.n)
+        return 3.0 + MOST_STD * float(np.sqrt(variance))
 
     @cached_property
     def _first(self) -> Theta:

@@ -12,12 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Vector
+from ..rests.limits import MOVING_RAD_S
 from .interim import InterimEstimate
 from .likelihood import evaluate, trace
 from .normal_equations import inverse
 from .parameters import ACCELEROMETER, HAND, PLACES
 from .poses import POSE_MPS2
-from .preprocessing import CORRELATION_S, MOVING_RAD_S, jerk_density
+from .preprocessing import CORRELATION_S, jerk_density
 from .problem import Problem, Series
 from .rotation import cross, shortest_turn
 

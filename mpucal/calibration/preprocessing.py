@@ -12,6 +12,7 @@ from ..kernel import _kernel
 from ..rests.flat import UNAVERAGED, Flat, flat_statistics, left_by_rounding
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder, statistics
+from ..rests.limits import MOVING_RAD_S
 from ..rests.tremor import SWAY_PER_S, without_tremor
 from ..rests.windows import WINDOW_S, noise_ratio, noise_variance
 from .masks import mask
@@ -21,7 +22,6 @@ from .rotation import lengths
 from .theta import Prior
 
 HUBER = 2.0
-MOVING_RAD_S = 0.3  # rate at which a hand's acceleration reaches half of its maximum
 SHAKEN_MPS2 = 0.3  # standard deviation of |y| in a window that does the same, at any rate: walking shakes the board
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest

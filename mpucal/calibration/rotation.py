@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
-
-_EYE = np.eye(3)
 
 
 def lengths(v: Vector) -> NDArray[np.float64]:
@@ -53,7 +52,7 @@ def _rotation(phi: Vector) -> NDArray[np.float64]:
     angle = math.sqrt(x * x + y * y + z * z)
     X = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
     half = _sinc(0.5 * angle)
-    turn: NDArray[np.float64] = _EYE + _sinc(angle) * X + 0.5 * (half * half) * (X @ X)
+    turn: NDArray[np.float64] = np.eye(3) + _sinc(angle) * X + 0.5 * (half * half) * (X @ X)
     return turn
 
 
@@ -93,7 +92,14 @@ def _cross_product(a: Vector, b: Vector) -> Vector:
 
 
 @cache
-def fibonacci_sphere(n: int) -> Vector:
+def signed_permutations() -> list[Vector]:
+    """Return all (3, 3) that map axes to axes, with either sign."""
+    signs, order = product((1.0, -1.0), repeat=3), permutations(range(3))
+    return [np.eye(3)[list(axes)] * np.array(sign)[:, None] for axes, sign in product(order, signs)]
+
+
+@cache
+def fibonacci_sphere(n: int = 400) -> Vector:
     """Return (n, 3) unit vectors spread evenly over the sphere."""
     k = np.arange(n) + 0.5
     z, turn = 1.0 - 2.0 * k / n, np.pi * (1.0 + np.sqrt(5.0)) * k

@@ -20,10 +20,15 @@ from .parameters import PLACES
 from .problem import Series
 from .rotation import lengths
 from .theta import Theta
-from .transitions import DEGREES_OF_FREEDOM, Transition, jacobians, likely_scale
+from .transitions import (
+    DEGREES_OF_FREEDOM,
+    FEWEST_TRANSITIONS,
+    REWEIGHTED,
+    Transition,
+    jacobians,
+    likely_scale,
+)
 
-FEWEST_BESIDE = 3  # transitions before a slip and after it: with fewer, two of a lost gyroscope would look like one
-ITERATIONS = 8
 LEAST_SEEN = 1e-15  # share of the best known direction of x, below which the misses say nothing of one
 
 
@@ -45,14 +50,15 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta) -
     K is estimated anew with it, and without, since a K that was estimated without it hides much of it.
     """
     k = len(transitions)
-    if k < 2 * FEWEST_BESIDE + 1:
+    # With fewer before a slip and after it, two of a lost gyroscope would look like one.
+    if k < 2 * FEWEST_TRANSITIONS + 1:
         return None
     cost = math.log(SURE) + 4.5 * math.log(2 * k) + math.log(k)  # of nine numbers more, and of so many times
     misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
     # No likelihood is above 0, that of no misses at all.
     if not -_log_likelihood(misses, known) > cost:
         return None
-    places = np.arange(FEWEST_BESIDE, k - FEWEST_BESIDE)
+    places = np.arange(FEWEST_TRANSITIONS, k - FEWEST_TRANSITIONS)
     by_slip = _directions(transitions, np.append(places, k))
     by_K = np.broadcast_to(jacobians(transitions, series, theta)[:, :, PLACES["K"]], by_slip.shape)
     likelihood, x, left = _likeliest(misses, known, np.concatenate([by_slip, by_K], axis=3))
@@ -83,7 +89,7 @@ def _likeliest(misses: Vector, known: Vector, A: Vector) -> tuple[Vector, Vector
     of the misses (m, k, 3).
     """
     left = misses
-    for _ in range(ITERATIONS):
+    for _ in range(REWEIGHTED):
         weight = likely_scale(left, known)[1]
         weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, A.shape[3]).swapaxes(1, 2)
         N = weighted @ A.reshape(len(A), -1, A.shape[3])

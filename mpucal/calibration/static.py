@@ -16,16 +16,17 @@ from ..rests.intervals import RestFinder, statistics
 from ..rests.tremor import SWAY_PER_S, mean_variance, without_tremor
 from .fit import Fit
 from .hypothesis_tests import KNOWN
-from .parameters import B_A_NAMES, D_NAMES, Form
+from .levenberg_marquardt import DECREMENT, MOST_ITERATIONS
+from .parameters import B_A_NAMES, BY_NAME, D_NAMES, Form
 from .poses import POSE_MPS2
 from .theta import UPPER, from_elements
+from .transitions import REWEIGHTED
 
-# PS-MPU-6000A r3.4, section 6.2: +-3 % of scale factor, +-2 % across axes, both taken as uniform
-SCALE_FACTOR_SD, CROSS_AXIS_SD, BIAS_SD_MPS2 = 0.02, 0.012, 0.5
-PRIOR_SD = np.append(np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD)[UPPER], np.full(3, BIAS_SD_MPS2))
+BIAS_SD_MPS2 = 0.5
+# The accelerometer's data sheet has the tolerances of the gyroscope's: PS-MPU-6000A r3.4, sections 6.1 and 6.2.
+PRIOR_SD = np.append(BY_NAME["K"].sd, [BIAS_SD_MPS2] * 3)
 # (12, 9) maps the upper triangle of D and b_a to D row-major and b_a.
 ALL_OF_NINE = np.eye(9)[np.append(from_elements(Form.SYMMETRIC, np.arange(6.0)), [6, 7, 8]).astype(int)]
-MOST_ITERATIONS, ROUNDS, SETTLED = 30, 8, 1e-9
 # Errors [m/s^2] that rests may have beside noise and tremor: the least that explains the residuals is taken.
 SPREADS_MPS2 = np.append(0.0, np.geomspace(1e-4, 1.0, 80))
 # Largest factor of the standard deviations, where the residuals hardly show the error of the model.
@@ -50,11 +51,12 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
         left = len(y) - float(np.sum(covariance * information))  # degrees of freedom
         if settled or iterations == MOST_ITERATIONS:
             break
-        step = covariance @ (weighted.T @ e + (start - x) / PRIOR_SD**2)
+        gradient = weighted.T @ e + (start - x) / PRIOR_SD**2
+        step = covariance @ gradient
         x, iterations = x + step, iterations + 1
-        if iterations <= ROUNDS:  # later, the spread would alternate between two steps of its scale
+        if iterations <= REWEIGHTED:  # later, the spread would alternate between two steps of its scale
             extra = _spread(e - J @ step, along, left)
-        settled = iterations > ROUNDS and bool(np.abs(step / PRIOR_SD).max() < SETTLED)
+        settled = iterations > REWEIGHTED and bool(gradient @ step < DECREMENT**2)
     doubt = min(left / (left - 2.0), HONEST**2) if left > 2.0 else HONEST**2
     covariance = np.linalg.inv(information / doubt + np.diag(PRIOR_SD**-2.0))
     unknown = np.sqrt(np.diag(covariance)) > KNOWN * PRIOR_SD

@@ -14,21 +14,20 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .fit import Fit
-from .hand_noise import HAND_MPS2, WHITE_MPS2, most_likely_sigma
+from .hand import PASSES
+from .hand_noise import FIRST_MPS2, WHITE_MPS2, most_likely_sigma
 from .hypothesis_tests import KNOWN, undetermined
 from .levenberg_marquardt import ROUGHLY, Minimum, minimise
 from .parameters import B_A_NAMES, D_NAMES, NAMES
 from .preprocessing import CORRELATION_S, Preprocessed, preprocess
 from .problem import Problem
-from .static import BIAS_SD_MPS2, SCALE_FACTOR_SD
+from .static import BIAS_SD_MPS2
 from .theta import Theta
 
-# A breakout is mounted askew by some degrees, which adds to the data sheet's +-2 % across axes.
-CROSS_AXIS_SD = 0.025
-D_SD = np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD).ravel()
+# Of each element of D: a breakout is mounted askew by some degrees, which adds to the data sheet's +-2 % across axes.
+D_SD = 0.025
 # The largest tilt that is asked for, and a little more.
 CONE_RAD = np.deg2rad(35.0)
-ROUNDS, MOST_ROUNDS = 2, 6
 # So many times the standard deviations of H hold the errors in arms that sway: an rms of 0.5 of them in a steady hand,
 # and of 0.9 in a standing one.
 HONEST = 4.0
@@ -41,10 +40,8 @@ def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
     u = prepared.flat.y / np.linalg.norm(prepared.flat.y)
     theta = Theta.start(np.eye(3), np.zeros(3), prepared.flat.b_omega, u)
     minimum = minimise(_white(prepared, 0.0), theta, len(NAMES), prior, frozen=True)
-    for done in range(MOST_ROUNDS):
-        if done >= ROUNDS and minimum.converged:
-            break
-        sigma = most_likely_sigma(prepared.white, WHITE_MPS2, minimum.theta, HAND_MPS2[0])
+    for _ in range(PASSES):
+        sigma = most_likely_sigma(prepared.white, WHITE_MPS2, minimum.theta, FIRST_MPS2)
         minimum = minimise(_white(prepared, sigma), minimum.theta, len(NAMES), prior, until=ROUGHLY)
     return _as_fit(minimum)
 
@@ -65,5 +62,5 @@ def _as_fit(minimum: Minimum) -> Fit:
     spread = HONEST * max(1.0, minimum.nis / 3.0) ** 0.5
     covariance = spread**2 * minimum.covariance()
     sd = np.sqrt(np.maximum(np.diag(covariance)[:12], 0.0))
-    left = sd > KNOWN * np.append(D_SD, np.full(3, BIAS_SD_MPS2))
+    left = sd > KNOWN * np.repeat([D_SD, BIAS_SD_MPS2], [9, 3])
     return minimum.as_fit((*compress(D_NAMES + B_A_NAMES, left), *undetermined(covariance)), spread=spread)

@@ -19,7 +19,8 @@ from .problem import Series
 from .rotation import cross, cross_rows, lengths, turned
 from .theta import UPPER, Theta
 
-FEWEST_TRANSITIONS = 3
+FEWEST_TRANSITIONS = 3  # fewer cannot contradict each other
+REWEIGHTED = 8  # iterations of a least squares fit whose weights depend on the residuals
 DEGREES_OF_FREEDOM = 4.0
 # A transition of less weight gets a scale of its own; the others differ by chance.
 WORTHLESS = 0.02

@@ -19,7 +19,6 @@ from .hypotheses import Explanation, Kind
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere
 
-DIRECTIONS = 400
 LEAST_DETERMINANT = 1e-6  # a D of less is singular
 # Nothing is known better than this where a change of the gyroscope's bias was removed: it is interpolated linearly.
 FLOOR_MPS2 = 5e-5
@@ -50,7 +49,7 @@ def propagate(D: Vector, covariance: Vector, gravity: float, unit: Vector | None
 
     unit : (n, 3) directions of s; None: all over the sphere.
     """
-    unit = fibonacci_sphere(DIRECTIONS) if unit is None else unit
+    unit = fibonacci_sphere() if unit is None else unit
     s, errors = np.column_stack([gravity * unit, np.ones(len(unit))]), _errors_of(D)
     by_products = (errors @ covariance @ errors.T).reshape(4, 3, 4, 3).swapaxes(1, 2).reshape(16, 9)
     C = ((s[:, :, None] * s[:, None, :]).reshape(-1, 16) @ by_products).reshape(-1, 3, 3)

@@ -19,14 +19,13 @@ from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import RestFinder
 from ..result.calibration import Calibration
 from .fit import Fit
+from .hypothesis_tests import MOST_STD
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import turned
 from .theta import UPPER, from_elements
 
 # Errors in no covariance: a mounting is not perfectly stiff, and the gyroscope's bias wanders during the turning.
 FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02)
-# Larger errors than so many predicted standard deviations are not by chance.
-MOST_STD = 4.0
 LEAST_REST_S, BLOCK_S = 0.75, 0.25
 # In longer intervals of a vehicle, in periods, a sample is missing, or its time is late: their turn is not known.
 LONG = 1.5

@@ -20,6 +20,9 @@ NOISIEST_GYRO_RAD_S, NOISIEST_ACC_MPS2 = 0.15, 0.5
 MOST_BIAS_RAD_S = math.radians(30.0)
 # A window in which gravity turns faster is neither a rest nor a measurement of the gyroscope's bias.
 TURNS_RAD_S = 0.02
+# A hand that turns the board moves it at this rate, and gravity by this angle, which biases and skew do not explain.
+MOVING_RAD_S = 0.3
+LEAST_TURN_RAD = math.radians(20.0)
 
 
 @dataclass(frozen=True)

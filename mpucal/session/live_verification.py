@@ -10,7 +10,8 @@ import numpy as np
 
 from ..calibration.checks.estimate import USABLE_RMS_MPS2
 from ..calibration.evidence import Evidence
-from ..calibration.verification import MOST_STD, NewOrientation
+from ..calibration.hypothesis_tests import MOST_STD
+from ..calibration.verification import NewOrientation
 from ..data import Recording, Vector
 from ..origin import Origin
 from ..reasons import Reason, reason

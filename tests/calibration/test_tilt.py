@@ -7,7 +7,7 @@ import pytest
 
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.calibration.rotation import shortest_turn
-from mpucal.calibration.tilt import BIAS_SD_MPS2, SCALE_FACTOR_SD, fit_tilt
+from mpucal.calibration.tilt import BIAS_SD_MPS2, D_SD, fit_tilt
 from mpucal.rests.flat import flat_statistics
 from tools.lab.scenarios.course import Leg, along
 from tools.lab.scenarios.family import Family, simulate
@@ -51,5 +51,5 @@ def test_parameters_that_tilts_do_not_show_are_named_and_keep_their_prior():
     # Near level, a gain of the vertical has the effect of its bias, and the others' gains are cosines.
     left = {name for name in fit.at_prior if name in D_NAMES + B_A_NAMES}
     assert left == {"D_xx", "D_yy", "D_zz", "b_a_z"}
-    assert fit.std("D_zz")[0] > SCALE_FACTOR_SD
+    assert fit.std("D_zz")[0] > D_SD
     assert fit.std("b_a_x")[0] < 0.15 * BIAS_SD_MPS2

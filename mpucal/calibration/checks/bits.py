@@ -17,21 +17,21 @@ from ...data import Mask, Vector
 from ...kernel import _kernel
 from ...reasons import Reason, reason
 from ..evidence import Evidence
+from ..scores import MOST_PARTS
 from ..words import EXACTLY, ODDS, Counts, Words
+from .estimate import GOOD_RMS_MPS2
 from .unusable import dead_accelerometer, dead_gyroscope
 
 # Share of the changes in which a stuck bit changes, by errors, and most share of a sound one.
 ERRORS, SOUND = 0.1, 0.98
-# Bits may die midway: they are counted in so many pieces.
-PIECES = 64
 # Fewer dead low bits do not matter; so many on all axes are a byte that was not read, and no coarse sensor.
 DEAD_BITS, LOST_BYTE = 3, 7
 BITS = 16
 # Where the counts are not known: so many steps of the other axes make a step that is odd. A smaller one [m/s^2, rad/s]
 # may be that of a float32, which is coarser the larger a value is.
 ODD_STEPS, LEAST_ODD_STEP = 8.0, 1e-3
-# The rounding of an axis refuses a calibration beyond so many claimed uncertainties, or these limits.
-HONEST_STD, MOST_MPS2, USABLE_RAD_S = 2.0, 0.1, np.deg2rad(0.5)
+# Rounding of the rates by more refuses a calibration.
+MOST_RAD_S = np.deg2rad(0.5)
 
 
 class Low(NamedTuple):
@@ -48,9 +48,10 @@ def bits_stuck(e: Evidence) -> Reason | None:
     if e.flat is not None and (dead_accelerometer(e) or dead_gyroscope(e)) is not None:
         return None
     acc, gyr = (None, None) if e.decoded is None else e.decoded.words
-    most = MOST_MPS2 if e.uncertainty is None else min(MOST_MPS2, HONEST_STD * e.uncertainty.rms_mps2)
+    # Rounding by half a step must stay within two standard deviations of what is claimed, or of a good calibration.
+    most = 2.0 * min(GOOD_RMS_MPS2, np.inf if e.uncertainty is None else e.uncertainty.rms_mps2)
     return _stuck(e, acc, e.recording.acc, "accelerometer", "m/s^2", most) or _stuck(
-        e, gyr, e.recording.gyr, "gyroscope", "rad/s", USABLE_RAD_S
+        e, gyr, e.recording.gyr, "gyroscope", "rad/s", MOST_RAD_S
     )
 
 
@@ -92,9 +93,10 @@ def _stuck_bits(counts: Counts, gap: Mask) -> tuple[Mask, Counts]:
 
     Across a gap, as between files of single faces, nothing changes.
     """
-    edges = np.unique(np.linspace(0, len(counts) - 1, PIECES, endpoint=False).astype(np.int64))
+    # Bits may die midway: they are counted in parts.
+    edges = np.unique(np.linspace(0, len(counts) - 1, MOST_PARTS, endpoint=False).astype(np.int64))
     evidence = _kernel.stuck_odds(counts, gap, edges, ERRORS, SOUND)
-    # of all pieces from one on
+    # of all parts from one on
     after = np.cumsum(evidence[:, ::-1], axis=1)[:, ::-1]
     first, stuck = edges[after.argmax(1)], after.max(1) > math.log(ODDS)
     # what swings by whole steps of a bit leaves it unchanged from one sample to the next, and not for long

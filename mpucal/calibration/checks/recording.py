@@ -8,18 +8,18 @@ from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
 from ...data import Mask
 from ...origin import Origin
 from ...reasons import Reason, reason
+from ...rests.limits import NOISIEST_ACC_MPS2, TIMES_NOISE
 from ...rests.windows import noise_variance
 from ..evidence import Evidence, once
-from ..masks import StuckRate, stuck_rates
+from ..masks import Stuck, stuck_readings
 
 WARMER_C = 5.0
 MOST_CLIPPED, MOST_LOST = 0.2, 0.5
 # A longer gap is an interruption of the session, which says nothing about the link.
 INTERRUPTED_S = 10.0
-# The accelerometer's noise is vibration where it exceeds this and that of the flat segment for a share of the time, or
-# where it is at rest more than that of any sensor.
-VIBRATING_MPS2, LOUDER_THAN_FLAT, VIBRATING_SHARE = 0.2, 2.5, 0.2
-SHAKING_MPS2 = 0.5
+# The accelerometer's noise is vibration where it exceeds this and TIMES_NOISE that of the flat segment for such a share
+# of the time, or where it is at rest more than that of any sensor.
+VIBRATING_MPS2, VIBRATING_SHARE = 0.2, 0.2
 # Below this rate, fourth differences do not separate a tremor of up to 12 Hz from noise: only what is larger than the
 # noise of any sensor is vibration.
 SEPARABLE_HZ = 48.0
@@ -83,10 +83,12 @@ def gyroscope_frozen(e: Evidence) -> Reason | None:
 
 
 @once
-def _frozen_rates(e: Evidence) -> list[StuckRate]:
+def _frozen_rates(e: Evidence) -> list[Stuck]:
     """Return where rates repeat while the accelerometer goes on; otherwise whole samples repeat, and are lost."""
     acc = e.recording.acc
-    return [run for run in stuck_rates(e.recording) if np.ptp(acc[run.first - 1 : run.last - 1], axis=0).any()]
+    return [
+        run for run in stuck_readings(e.recording, "gyr") if np.ptp(acc[run.first - 1 : run.last - 1], axis=0).any()
+    ]
 
 
 def _unexplained_gaps(e: Evidence) -> Mask:
@@ -105,13 +107,16 @@ def _unexplained_gaps(e: Evidence) -> Mask:
 def vibrating(e: Evidence) -> Reason | None:
     """Find vibration, as of a motor that runs from the start or from later on."""
     std = np.sqrt(noise_variance(e.recording) @ np.full(3, 1.0 / 3.0))
-    least = SHAKING_MPS2 if e.recording.rate_hz < SEPARABLE_HZ else VIBRATING_MPS2
-    share = float(np.mean(std > np.maximum(least, LOUDER_THAN_FLAT * np.sqrt(e.rest.Sigma_a.mean()))))
+    least = NOISIEST_ACC_MPS2 if e.recording.rate_hz < SEPARABLE_HZ else VIBRATING_MPS2
+    share = float(np.mean(std > np.maximum(least, TIMES_NOISE * np.sqrt(e.rest.Sigma_a.mean()))))
     at_rest = float(np.median(std[e.rest.first : e.rest.last]))
-    if share < VIBRATING_SHARE and at_rest < SHAKING_MPS2:
+    if share < VIBRATING_SHARE and at_rest < NOISIEST_ACC_MPS2:
         return None
     return reason(
-        "vibrating", "noise", std=float(np.median(std[e.rest.last :])), share=max(share, float(at_rest > SHAKING_MPS2))
+        "vibrating",
+        "noise",
+        std=float(np.median(std[e.rest.last :])),
+        share=max(share, float(at_rest > NOISIEST_ACC_MPS2)),
     )
 
 

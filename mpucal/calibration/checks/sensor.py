@@ -11,12 +11,14 @@ from ...data import MOST_CLOCK_PPM, Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
-from ..evidence import MOST_MISS_RAD, SIGNED_PERMUTATIONS, Evidence, once
+from ..evidence import MOST_MISS_RAD, Evidence, once
+from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
+from ..rotation import signed_permutations
+from ..theta import UPPER
 from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent
 
 WORST_AXES_RAD = np.deg2rad(60.0)
-GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
 # Of all three scale factors alike: data sheets say 3 %, and chips that were soldered by hand are within 5 %; beyond
 # MOST_SCALE, or its inverse, the unit is wrong: the paper simulates sensors of 0.5 to 1.5.
 SCALE_OFF, MOST_SCALE = 0.1, 2.5
@@ -24,7 +26,7 @@ ALIKE = 0.05  # largest difference of three scale factors that agree on one
 # These models estimate no scale factor of the gyroscope.
 TRUSTING = ("accel", "paper", "tilt")
 # Filters of one clock leave 10 ms at most; those of an autopilot are set by its owner, and differ.
-LAG_S, LEAST_STDS = 0.02, 5.0
+LAG_S = 0.02
 
 
 @once
@@ -55,7 +57,7 @@ def axes(e: Evidence) -> Reason | None:
     Q = U @ Vt
     if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
         return None
-    return _named_axes(e, max(SIGNED_PERMUTATIONS, key=lambda M: float(abs(np.sum(M * Q)) + 0.01 * np.trace(M))))
+    return _named_axes(e, max(signed_permutations(), key=lambda M: float(abs(np.sum(M * Q)) + 0.01 * np.trace(M))))
 
 
 def _named_axes(e: Evidence, M: Vector) -> Reason:
@@ -117,8 +119,8 @@ def gyro_off(e: Evidence) -> Reason | None:
 
 
 def _is_within_tolerance(K: Vector) -> bool:
-    scale, cross = _gyro_errors(K)
-    return bool(scale.max() <= GYRO_SCALE_OFF and cross <= GYRO_CROSS_OFF)
+    known = BY_NAME["K"]
+    return bool((np.abs(K - np.eye(3))[UPPER] <= MOST_STD * np.array(known.sd)).all())
 
 
 def _gyro_errors(K: Vector) -> tuple[Vector, float]:
@@ -148,6 +150,6 @@ def sensors_lag(e: Evidence) -> Reason | None:
     # The prior draws the estimate towards the filters' delay: remove it, to have what the data alone say.
     data, filters_s = 1.0 - (std / of_prior) ** 2, e.recording.sensor.accel_lag_s
     lag_s = filters_s + (e.estimate.delay_s - filters_s) / data if data > 0.0 else 0.0
-    if not data > 0.0 or abs(lag_s) < max(LAG_S, LEAST_STDS * std / data**0.5):
+    if not data > 0.0 or abs(lag_s) < max(LAG_S, MOST_STD * std / data**0.5):
         return None
     return reason("clock_off", "apart", lag=1e3 * abs(lag_s), how="lags behind" if lag_s > 0 else "runs ahead of")

@@ -8,8 +8,9 @@ from ...data import Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
-from ...rests.intervals import true_runs
-from ..evidence import LEAST_TURN_RAD, Evidence, once
+from ...rests.limits import LEAST_TURN_RAD
+from ..evidence import Evidence, once
+from ..masks import stuck_readings
 from ..rotation import lengths
 
 FEWEST_SAMPLES = 50
@@ -17,16 +18,13 @@ SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
 # Times of a slow logger may be so many seconds apart; those of any sensor in milliseconds are farther apart.
 LONGEST_STEP_S = 2.0
-# Times that are farther apart than this are rather in microseconds, or in nanoseconds.
-STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
+TYPICAL_HZ = 200.0  # the unit of times is that in which the rate is nearest to this
 LEAST_G = 0.5  # magnitude in g below which a recording holds no gravity
 # Half of the magnitudes of gravity are within this share of the median, whatever the sensor's errors; of a hand's own
 # acceleration, or of noise on three axes, half are within 60 %.
 STEADY = 0.2
 # Gains, biases, noise and a hand's acceleration make a magnitude vary by more; rounding to two decimals leaves as much.
 LEAST_SPREAD = 4e-4
-# No sensor repeats a value for so long while it is turned: its noise alone prevents that.
-STUCK_S = 2.0
 FASTEST_GYRO_DPS, SELDOM = 4100.0, 0.01
 
 
@@ -44,8 +42,8 @@ def time_unit(e: Evidence) -> Reason | None:
         # A vehicle's messages carry their unit.
         of_vehicle = e.recording.sensor.origin is Origin.VEHICLE
         return reason("units_suspect", "slow_stream" if of_vehicle else "slow", step=step, rate=1.0 / step)
-    said = "ns" if step > STEP_OF_NANOSECONDS else "us" if step > STEP_OF_MICROSECONDS else "ms"
-    unit = {"ns": "nano", "us": "micro", "ms": "milli"}[said]
+    unit = ("milli", "micro", "nano")[int(np.clip(np.rint(np.log10(TYPICAL_HZ * step) / 3.0), 1, 3)) - 1]
+    said = {"milli": "ms", "micro": "us", "nano": "ns"}[unit]
     return reason("units_suspect", "times", step=step, unit=unit, said=said)
 
 
@@ -133,15 +131,10 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
     axes = _constant_axes(e, e.recording.acc, e.rest.Sigma_a, QUIETEST_ACC_MPS2)
     if axes:
         return reason("bits_stuck", "constant", axes=axes)
-    if np.sqrt(e.rest.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.origin is Origin.VEHICLE:
-        return None  # data that are computed, or rounded on their way, repeat
-    least, t = max(round(STUCK_S * e.recording.rate_hz), FEWEST_SAMPLES), e.recording.t - e.recording.t[0]
-    for axis, column in zip("xyz", e.recording.acc.T, strict=True):
-        runs = true_runs(np.diff(column) == 0.0)
-        for first, last in runs[runs[:, 1] + 1 - runs[:, 0] >= least].tolist():
-            if np.ptp(e.recording.acc[first : last + 1], axis=0).max() > LEAST_TURN_RAD * e.gravity:
-                return reason("bits_stuck", "frozen", axis=axis, begin=float(t[first]), end=float(t[last]))
-    return None
+    if np.sqrt(e.rest.Sigma_a).max() <= QUIETEST_ACC_MPS2 or not (stuck := stuck_readings(e.recording, "acc")):
+        return None  # data that are computed repeat
+    (axis, first, last), t = stuck[0], e.recording.t - e.recording.t[0]
+    return reason("bits_stuck", "frozen", axis="xyz"[axis], begin=float(t[first - 1]), end=float(t[last - 2]))
 
 
 @once
