@@ -7,10 +7,10 @@ The hand does what the session's prompts say; where it brings the vehicle goes t
 (ArduPilot's libraries/SITL/examples/JSON). What the SITL makes of it, SIM_ACCn_BIAS and SIM_ACCn_SCAL, is what the
 session is to find. The vehicle takes its level before. Words after `--` go to `mpucal session`; with --own, ArduPilot
 calibrates itself in the same hand instead. With --killed-at 6, the session is killed at its sixth prompt and resumed.
-The line at the end: exit code, verdict, how far the vehicle's parameters
-were from the truth at worst and how far those of each IMU are now (offset [m/s^2], scale), the rms over D and b_a of
-all IMUs of (estimate - truth) / standard uncertainty, the time that was measured [s], and how far the attitude is off
-that level once the vehicle has been rebooted [deg].
+With --folder, what the session leaves is kept, and beside it `truth.json`: D and b_a of each IMU.
+The line at the end: exit code, verdict, how far the vehicle's parameters were from the truth at worst, and of each IMU
+how far they are now (offset [m/s^2], scale) and the rms over D and b_a of (estimate - truth) / standard uncertainty;
+the time that was measured [s], and how far the attitude is off that level once the vehicle has been rebooted [deg].
 """
 
 from __future__ import annotations
@@ -153,20 +153,24 @@ def needed(held: Mapping[str, float], imu: int) -> Correction:
     return Correction(bias, np.where(scale == 0, 1.0, scale))
 
 
+def imus(held: Mapping[str, float]) -> range:
+    """Return the numbers of the IMUs, from 1."""
+    return range(1, round(held["SIM_IMU_COUNT"]) + 1)
+
+
 def far(held: Mapping[str, float]) -> list[str]:
     """Return how far the parameters of each IMU are from the truth at worst: offset [m/s^2] and scale."""
-    imus = range(1, round(held["SIM_IMU_COUNT"]) + 1)
-    return ["{:.5f} {:.6f}".format(*off(ardupilot_slot(imu), held, needed(held, imu))) for imu in imus]
+    return ["{:.5f} {:.6f}".format(*off(ardupilot_slot(imu), held, needed(held, imu))) for imu in imus(held)]
 
 
-def z(document: Mapping[str, Any], before: Mapping[str, float], skew: Vector) -> tuple[float, ...]:
-    """Return (12,) of D and b_a of one IMU's document, where `before` is what was held while it was measured."""
-    where, true = ardupilot_slot(imu := int(document["autopilot"]["imu"])), needed(before, imu)
-    R, own = mounting(ARDUPILOT, where, before), where.correction(before)
+def truth(held: Mapping[str, float], imu: int, skew: Vector) -> dict[str, Any] | None:
+    """Return D and b_a of the stream of IMU `imu`, counted from 1, while these parameters are held; None: unknown."""
+    where, true = ardupilot_slot(imu), needed(held, imu)
+    R, own = mounting(ARDUPILOT, where, held), where.correction(held)
     if R is None or own is None:
-        return ()
+        return None
     D, b_a = R @ np.diag(own.scale / true.scale) @ skew @ R.T, R @ (own.scale * (true.offset - own.offset))
-    return z_of(document, {"D": D, "b_a": b_a})
+    return {"D": D.tolist(), "b_a": b_a.tolist()}
 
 
 def _locked(url: str) -> Link:
@@ -201,6 +205,7 @@ def main(
     cross_axis: Annotated[float, "standard deviation, of the accelerometers"] = 0.0,
     own: Annotated[bool, "ArduPilot calibrates itself"] = False,
     killed_at: Annotated[int, "kill the session at this prompt, counted from 1, and resume it"] = 0,
+    folder: Annotated[Path | None, "keep what the session leaves"] = None,
 ) -> int:
     """Run one session, and print its line; return its exit code."""
     body, document = Body(port, hand, arm, seed, cross_axis), None
@@ -214,28 +219,34 @@ def main(
         else:
             level = own_calibration.set_level(link, body)
     if not own:
-        code, document = session(body, ["--mavlink", mavlink, *words], killed_at)
+        with tempfile.TemporaryDirectory() as temporary:
+            kept = folder or Path(temporary) / "session"
+            code, document = session(body, ["--mavlink", mavlink, *words], killed_at, kept)
+            truths = {imu: truth(before, imu, body.skew) for imu in imus(before)}
+            (kept / "truth.json").write_text(json.dumps(truths))
         took_s = document["fit"]["seconds"] if document else math.nan
     with closing(_locked(mavlink)) as link:
         angle = own_calibration.attitude_error_deg(link, body, level)
-    imus = [document, *document.get("others", [])] if document else []
-    errors = rms([each for one in imus if "accelerometer" in one for each in z(one, before, body.skew)])
+    now = held(parameters)
+    found = {int(one["autopilot"]["imu"]): one for one in ([document, *document.get("others", [])] if document else [])}
+    ends = []
+    for imu, text in zip(imus(now), far(now), strict=True):
+        true = truth(before, imu, body.skew)
+        z = z_of(found[imu], true) if true and "accelerometer" in found.get(imu, {}) else ()
+        ends.append(f"{text} z {rms(z):.2f}")
     verdict = document["quality"]["verdict"] if document else "none"
-    was, now = max(far(before)), ", ".join(far(held(parameters)))
     end = f"took {took_s:.0f} s, attitude off {angle:.2f} deg"
-    print(f"exit {code} {verdict}: was {was}, is {now}, z {errors:.2f}, {end}")
+    print(f"exit {code} {verdict}: was {max(far(before))}, is {', '.join(ends)}, {end}")
     return code
 
 
-def session(body: Body, words: list[str], killed_at: int) -> tuple[int, dict[str, Any] | None]:
+def session(body: Body, words: list[str], killed_at: int, folder: Path) -> tuple[int, dict[str, Any] | None]:
     """Run `mpucal session`, and resume it if it was killed; return its exit code and its result."""
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary) / "session"
-        code = _guided(body, [*words, "-o", str(folder)], killed_at)
-        if code == -signal.SIGKILL:
-            code = _guided(body, ["--resume", str(folder)])
-        file = folder / "calibration.json"
-        return code, json.loads(file.read_text()) if file.exists() else None
+    code = _guided(body, [*words, "-o", str(folder)], killed_at)
+    if code == -signal.SIGKILL:
+        code = _guided(body, ["--resume", str(folder)])
+    file = folder / "calibration.json"
+    return code, json.loads(file.read_text()) if file.exists() else None
 
 
 def _guided(body: Body, words: list[str], killed_at: int = 0) -> int:
