@@ -52,6 +52,10 @@ def _parse_checked(data: bytes | str, parse: Callable[[bytes | str], Any], check
         raise ValueError(f"{len(data)} bytes are more than {MOST_BYTES}")
     try:
         document = parse(data)
+    except UnicodeDecodeError:
+        raise ValueError("it is not text") from None
+    except json.JSONDecodeError as error:
+        raise ValueError(f"it is not JSON: {error}") from None
     except RecursionError:
         raise _too_deep() from None
     level = [document]

@@ -65,7 +65,8 @@ def from_document(document: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(document, Mapping):
         raise ValueError(f"it is a {type(document).__name__}, not an object")
     if document.get("format") != FORMAT:
-        raise ValueError(f'"format" is {reprlib.repr(document.get("format"))}, not {FORMAT!r}')
+        has = reprlib.repr(document["format"]) if "format" in document else "missing"
+        raise ValueError(f'"format" is {has}, not {FORMAT!r}')
     version = document.get("version", VERSION)
     if isinstance(version, int) and version > VERSION:
         raise ValueError(f"version {version} is newer than {VERSION}")

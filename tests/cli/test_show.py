@@ -17,6 +17,21 @@ from mpucal.result.calibration import Calibration
 FAULTS = Path(__file__).parents[2] / "fixtures" / "faults"
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"\x81\x82\x83\x84", "it is not text"),
+        (b"a = 1\n", "it is not JSON: Expecting value"),
+        (b"{}", '"format" is missing, not'),
+    ],
+)
+def test_a_file_that_is_no_json_is_told_in_words(mpucal, content, said, tmp_path):
+    (tmp_path / "notes.json").write_bytes(content)
+    done = mpucal("show", tmp_path / "notes.json")
+    assert done.code == 3
+    assert f"holds no calibration ({said}" in done.err
+
+
 def calibration(verdict="good", **changes):
     D = np.eye(3) + np.array([[0.02, 0.001, 0.0], [0.0, -0.01, 0.0], [0.0, np.radians(1.0), 0.0]])
     quality = {
