@@ -59,7 +59,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     done = f"calibrated with {calibration.name} of {ready.calibration.created or 'an unknown time'}"
     totals = _Totals()
     with (
-        nullcontext(CsvText(lambda text: sys.stdout.write(text.decode()), rows.utc_ns).write)
+        nullcontext(CsvText(lambda text: sys.stdout.write(text.decode()), rows.utc_ns, calibrated=True).write)
         if target is None
         else open_writer(target, replace(rows, noise=noise), done) as write
     ):
@@ -67,6 +67,8 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
             after = ready.apply(samples)
             totals.add(samples, after, magnitudes=as_json)
             write(after)
+    for note in rows.notes():
+        say(note)
     if as_json:
         click.echo(json.dumps({"file": str(target), "done": done, "utc_ns": rows.utc_ns, **totals.facts()}, indent=2))
     elif target is not None:

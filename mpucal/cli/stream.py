@@ -73,7 +73,7 @@ def command(
     if file is not None:
         check_free(file)
     source = open_source(at_gravity_of(applied, options), until_end=True)
-    text = CsvText(lambda text: sys.stdout.write(text.decode()))
+    text = CsvText(lambda text: sys.stdout.write(text.decode()), calibrated=True)
     on_page = nullcontext() if page is None else live_page(page, source_title(options), choose_board(board, source))
     events = JsonLines(sys.stderr, Keys()) if json_events else None
     tell = say if events is None else events.say

@@ -55,12 +55,14 @@ class Clock:
     ----------
     t : (n,) s. gap : (n,) True where samples before are missing. rate_hz : of the sensor.
     jitter_s : rms of the stamps about the clock; 0 if the stamps are the samples' times.
+    interrupted : times [s] of the last samples before the measurement was interrupted.
     """
 
     t: Vector
     gap: Mask
     rate_hz: float
     jitter_s: float = 0.0
+    interrupted: tuple[float, ...] = ()
 
     @cached_property
     def remark(self) -> str:

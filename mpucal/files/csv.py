@@ -17,6 +17,7 @@ from typing import IO
 import numpy as np
 
 from ..arguments import UNSORTED
+from ..clocks.stamps import FEWEST
 from ..data import Recording, Samples, Vector
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
@@ -27,10 +28,12 @@ from .rows import Rows, Write, check_runs
 from .tables.load import load_table
 from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
 from .tables.text import decode_text, read_table
-from .tables.times import plausible_utc_ns
+from .tables.times import GAP_S, go_on, plausible_utc_ns
 from .tables.units import NS
 
 TEMPERATURE, UTC = "temperature_c", "utc_s"
+# 1 on each line of samples that mpucal calibrated
+CALIBRATED = "calibrated_by_mpucal"
 ALL = (*ROLES, TEMPERATURE)
 # bytes that are parsed at once, some 16000 lines
 BLOCK = 1 << 21
@@ -41,7 +44,7 @@ _REMEDY = (
 
 
 def load_csv(path: Path) -> Recording:
-    """Return the recording in a table; see csv_rows. Where its times begin anew, is a gap, as in any other table."""
+    """Return the recording in a table; see csv_rows. Samples that came late are sorted, as in any other table."""
     try:
         return csv_rows(path).recording()
     except RecordingError as error:
@@ -68,13 +71,29 @@ def csv_rows(path: Path) -> Rows:
     begin = len(begun) - len(text.removeprefix(first).encode())
     table = _Table(path, begin, header, _column_places(header, path))
     others = ignored_sensors(header, [c for c in parse_header(header) if c.name in table.places])
+    interrupted: list[float] = []
     return Rows(
-        check_runs(table.runs(), path.name),
+        check_runs(_go_on(table.runs(), interrupted), path.name),
         name=path.name,
         utc_ns=_utc_ns(header, second),
         taken=f"{path.name}: {others}." if others else None,
+        done=f"as its column {CALIBRATED} says" if CALIBRATED in header else "",
         plain=True,
+        interrupted=interrupted,
     )
+
+
+def _go_on(runs: Iterator[Samples], interrupted: list[float]) -> Iterator[Samples]:
+    """Yield the runs of which the times go on where they begin anew, and note in `interrupted` when they do."""
+    count, last, shift = 0, -np.inf, 0.0
+    for samples in runs:
+        t, anew = go_on(samples.t, last)
+        count, last, t = count + len(t), float(samples.t[-1]), t + shift
+        before = np.append(t[:1] - GAP_S, t[:-1])[anew]
+        interrupted += before.tolist()
+        shift = float(t[-1]) - last
+        # other times are in no order
+        yield replace(samples, t=t, gap=samples.gap | anew) if len(interrupted) * FEWEST <= count else samples
 
 
 def _utc_ns(header: list[str], second: bytes) -> int | None:
@@ -166,24 +185,28 @@ class CsvText:
     Parameters
     ----------
     put : receives the text, a run of samples at a time. utc_ns : the time of day at t = 0, if known.
+    calibrated : the samples are calibrated, which a column says.
     """
 
-    def __init__(self, put: Callable[[bytes], object], utc_ns: int | None = None) -> None:
-        self._put, self.utc_ns = put, utc_ns
+    def __init__(
+        self, put: Callable[[bytes], object], utc_ns: int | None = None, *, calibrated: bool = False
+    ) -> None:
+        self._put, self.utc_ns, self._calibrated = put, utc_ns, 1.0 if calibrated else np.nan
         self._columns: list[int] = []
 
     def write(self, samples: Samples) -> None:
         """Encode a run of samples."""
         utc_s = np.full(len(samples), np.nan) if self.utc_ns is None else samples.t + self.utc_ns / NS
-        table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c, utc_s])
+        calibrated = np.full(len(samples), self._calibrated)
+        table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c, utc_s, calibrated])
         if not self._columns:
             self._columns = np.flatnonzero(~np.isnan(table).all(axis=0)).tolist()
-            self._put(",".join((*ALL, UTC)[column] for column in self._columns).encode() + b"\n")
+            self._put(",".join((*ALL, UTC, CALIBRATED)[column] for column in self._columns).encode() + b"\n")
         self._put(lines(np.ascontiguousarray(table[:, self._columns])))
 
 
 @contextmanager
-def csv_file(path: Path, rows: Rows, _done: str) -> Iterator[Write]:
+def csv_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
     """Open a table; it has no column for the flat part, gaps, clipping and the sensor. See open_writer."""
     with atomic_file(path) as file:
-        yield CsvText(file.write, rows.utc_ns).write
+        yield CsvText(file.write, rows.utc_ns, calibrated=bool(done)).write

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from ..data import Recording, Samples, Vector
+from ..data import Recording, Samples
 from ..errors import RecordingError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
 from . import formats
@@ -81,17 +82,19 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     known = all(part.utc_ns is not None for part in parts)
     if known:
         parts = [parts[at] for at in np.argsort(begins_ns, kind="stable")]
-    t: list[Vector] = []
+    joined: list[Recording] = []
     end = 0.0
     for part in parts:
-        begins = part.t + ((part.utc_ns or 0) - (parts[0].utc_ns or 0)) * 1e-9
+        shift = ((part.utc_ns or 0) - (parts[0].utc_ns or 0)) * 1e-9
         # times of day that overlap cannot be of one sensor's clock
-        follows = known and begins[0] > end
-        t.append(begins if follows else part.t - part.t[0] + end + GAP_S * bool(t))
-        end = float(t[-1][-1])
-    whole = Samples.joined([replace(part, t=at) for part, at in zip(parts, t, strict=True)])
-    starts = np.cumsum([len(part) for part in parts])[:-1]
-    whole.gap[starts] = True
+        if not known or part.t[0] + shift <= end:
+            shift = end + GAP_S * bool(joined) - float(part.t[0])
+        joined.append(replace(part, t=part.t + shift, interrupted=tuple(at + shift for at in part.interrupted)))
+        end = float(joined[-1].t[-1])
+    whole = Samples.joined(joined)
+    whole.gap[np.cumsum([len(part) for part in parts])[:-1]] = True
+    ends = (float(part.t[-1]) for part in joined[:-1])
+    interrupted = (*chain.from_iterable(part.interrupted for part in joined), *ends)
     first = parts[0]
     taken = (
         f"{name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
@@ -99,7 +102,8 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     )
     if failed:
         taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
-    return Recording(**vars(whole), sensor=first.sensor, name=name, utc_ns=first.utc_ns, taken=taken.strip())
+    facts = {"sensor": first.sensor, "name": name, "utc_ns": first.utc_ns, "taken": taken.strip()}
+    return Recording(**vars(whole), **facts, interrupted=interrupted)
 
 
 def _recordings(path: Path) -> list[Path]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
-from .tables.units import QUANTITIES, find_unit
+from .tables.units import PER_SAMPLE, QUANTITIES, find_unit
 
 ROLES = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 SKIPPED = ("-", "_", "")
@@ -76,7 +76,7 @@ def parse_units(text: str) -> Mapping[str, str]:
     for item in text.split(","):
         quantity, _, said = (word.strip() for word in item.partition("="))
         unit = find_unit(said)
-        if quantity not in QUANTITIES or unit not in QUANTITIES[quantity]:
+        if PER_SAMPLE.get(unit, unit) not in QUANTITIES.get(quantity, ()):
             known = "; ".join(f"{name} in {', '.join(units)}" for name, units in QUANTITIES.items())
             raise ValueError(f"{item!r} is not a unit: {known}")
         found[quantity] = unit

@@ -2,14 +2,14 @@
 
 SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers, structures of them, and cells
 of texts. The contents of objects, such as timetables, stand in a form that MathWorks does not describe: they are
-refused. Files of `'-v7.3'` are HDF5, which h5py reads.
+named. Files of `'-v7.3'` are HDF5, which h5py reads.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from math import prod
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import RecordingError
 from .reading import allowed_bytes, check_size, import_extra
 
 HEAD = 128
@@ -33,6 +34,12 @@ DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"
 DTYPES |= {16: "u1", 17: "u2", 18: "u4"}
 CELLS, STRUCTURE, LETTERS, NUMBERS, OBJECT = 1, 2, 4, range(6, 16), 17
 DEEPEST, MOST_DIMENSIONS = 8, 8
+# class of an object that holds columns -> the command of MATLAB that writes it as a table of text
+EXPORTS = {
+    "timetable": "writetimetable({0}, '{0}.csv')",
+    "table": "writetable({0}, '{0}.csv')",
+    "timeseries": "writetimetable(timeseries2timetable({0}), '{0}.csv')",
+}
 
 
 def read_matlab_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -40,31 +47,45 @@ def read_matlab_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArra
 
     Raises
     ------
-    RecordingError : h5py is not installed. ValueError, zlib.error : it is not a whole file.
+    RecordingError : it holds objects alone, or h5py is not installed. ValueError, zlib.error : it is not a whole file.
     """
     if content.startswith(HDF5):
-        yield from _hdf5_arrays(content, path)
+        yield from _without_objects(_hdf5_arrays(content, path), path)
         return
     data = memoryview(content)
     order = ORDERS.get(bytes(data[HEAD - 2 : HEAD]))
     if order is None:
         raise ValueError("it does not begin as a file of MATLAB 5 or later")
-    kinds, found = set(), False
-    for matrix in _matrices(data[HEAD:], order):
-        name, value = _matrix(matrix, order)
+    found = [each for matrix in _matrices(data[HEAD:], order) for each in _arrays(*_matrix(matrix, order))]
+    yield from _without_objects(found, path)
+
+
+def _without_objects(found: Iterable[tuple[str, Any]], path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the arrays among arrays and objects.
+
+    Raises
+    ------
+    RecordingError : there is none of numbers but objects; the message has the commands of MATLAB that export them.
+    """
+    objects: dict[str, str] = {}
+    columns = False
+    for name, value in found:
         if isinstance(value, _Object):
-            kinds.add(value.kind)
-        elif name:
-            found = True
-            yield from _arrays(name, value)
-    if kinds and not found:
-        raise ValueError(
-            f"it holds objects of MATLAB ({', '.join(sorted(kinds))}): save their columns as arrays of numbers, or in"
-            " MATLAB writetimetable(Acceleration, 'Accelerometer.csv') and the like for each table"
+            objects[name] = value.kind
+        else:
+            columns |= value.size > 1 and value.dtype.kind in "iuf"
+            yield name, value
+    exports = [EXPORTS[kind].format(name) for name, kind in objects.items() if name and kind in EXPORTS]
+    if exports and not columns:
+        held = ", ".join(f"{name} is a {kind}" for name, kind in objects.items() if kind in EXPORTS)
+        these = "the folder of these files" if len(exports) > 1 else "that file"
+        raise RecordingError(
+            f"{path.name} holds objects, which only MATLAB can read ({held})",
+            f"in MATLAB, run `load {path.name}; {'; '.join(exports)}`, and give {these}",
         )
 
 
-def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, Any]]:
     h5py = import_extra("h5py", "matlab", path)
     names: list[str] = []
     try:
@@ -72,7 +93,9 @@ def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]
             file.visit(names.append)
             for name in names:
                 item = file[name]
-                if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and item.ndim in (1, 2):
+                if "MATLAB_object_decode" in item.attrs:
+                    yield name.replace("/", "."), _Object(bytes(item.attrs["MATLAB_class"]).decode())
+                elif isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and item.ndim in (1, 2):
                     check_size(path, item.size * item.dtype.itemsize)
                     # MATLAB stores by columns
                     yield name.replace("/", "."), item[()].T
@@ -141,8 +164,9 @@ def _matrix(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
     return name, None
 
 
-def _arrays(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    if isinstance(value, np.ndarray):
+def _arrays(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the arrays and objects in a value, under their names."""
+    if name and isinstance(value, np.ndarray | _Object):
         yield name, value
     elif isinstance(value, list) and value and all(isinstance(each, str) for each in value):
         yield name, np.array(value)

@@ -33,6 +33,7 @@ class Rows:
     done : the processing of samples that are calibrated already; empty if they are not.
     noise : (2, 3) standard deviations of a sample's acc [m/s^2] and gyr [rad/s]; NaN: unknown.
     plain : units are known only by convention.
+    interrupted : as of a Recording; complete when the runs have been read.
     """
 
     runs: Iterator[Samples]
@@ -47,6 +48,7 @@ class Rows:
     utc_ns: int | None = None
     taken: str | None = None
     plain: bool = False
+    interrupted: list[float] = field(default_factory=list)
 
     @classmethod
     def of(cls, recording: Recording, done: str = "") -> Rows:
@@ -66,14 +68,25 @@ class Rows:
 
     def recording(self) -> Recording:
         """Return the whole recording, checked; a plain one has even times and SI units."""
-        samples, remarks = Samples.joined(list(self.runs)), [self.taken]
+        samples, remarks = Samples.joined(list(self.runs)), [self.taken, *self.notes()]
         if self.plain and len(samples):
             found = shown_units([samples], self.sensor)
             samples = to_si(samples, found)
             remarks += [describe(self.name, found)]
         taken = " ".join(filter(None, remarks)) or None
         whole = make_recording(**vars(samples), flat=self.flat, sensor=self.sensor, name=self.name, taken=taken)
-        return replace(whole, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns)
+        known: dict[str, Any] = {"utc_ns": self.utc_ns, "interrupted": tuple(self.interrupted)}
+        return replace(whole, autopilot=self.autopilot, recovered=self.recovered, **known)
+
+    def notes(self) -> list[str]:
+        """Return sentences on the samples, when the runs have been read."""
+        times, said = len(self.interrupted), []
+        if self.done:
+            left = "a new calibration is of the errors that are left"
+            said += [f"{self.name} is calibrated already ({self.done}): {left}."]
+        if times:
+            said += [f"{self.name}: its times begin anew {times} times, and go on there after a gap."]
+        return said
 
 
 Write = Callable[[Samples], None]

@@ -30,7 +30,7 @@ def test_a_stream_is_calibrated(mpucal, made):
     np.testing.assert_allclose([row["a"] for row in rows], a[: len(rows)], atol=1e-12)
     np.testing.assert_allclose([row["w"] for row in rows], w[: len(rows)], atol=1e-12)
     table = mpucal(*words).out.splitlines()
-    assert table[0] == "t,ax,ay,az,gx,gy,gz,temperature_c,utc_s"
+    assert table[0] == "t,ax,ay,az,gx,gy,gz,temperature_c,utc_s,calibrated_by_mpucal"
     assert all(0 <= time.time() - row["utc_ns"] * 1e-9 < 600 for row in rows[:1])
     assert rows[9]["utc_ns"] - rows[0]["utc_ns"] == pytest.approx((rows[9]["t"] - rows[0]["t"]) * 1e9, abs=2)
     np.testing.assert_allclose([float(v) for v in table[1].split(",")[1:4]], rows[0]["a"], atol=1e-12)

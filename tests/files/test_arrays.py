@@ -377,6 +377,10 @@ HEAD_OF_5 = b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM"
 
 
 def test_objects_of_matlab_are_named(tmp_path):
-    (tmp_path / "log.mat").write_bytes(HEAD_OF_5 + thing(b"log", b"table", numbers([1.0, 2.0])))
-    with pytest.raises(RecordingError, match=r"objects of MATLAB \(table\)"):
+    """Name the commands of MATLAB that write them as tables, unless arrays of numbers stand beside them."""
+    tables = b"".join(thing(name, b"timeseries", numbers([1.0, 2.0])) for name in (b"acc", b"gyro"))
+    (tmp_path / "log.mat").write_bytes(HEAD_OF_5 + tables)
+    with pytest.raises(RecordingError, match=r"acc is a timeseries, gyro is a timeseries") as refused:
         mpucal.load(tmp_path / "log.mat")
+    writes = "writetimetable(timeseries2timetable({0}), '{0}.csv')"
+    assert f"`load log.mat; {writes.format('acc')}; {writes.format('gyro')}`, and give the folder" in str(refused.value)

@@ -200,6 +200,8 @@ def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_p
     read = mpucal.load(tmp_path)
     np.testing.assert_allclose(read.acc, walk.acc, atol=1e-9)
     assert np.flatnonzero(read.gap).tolist() == [500]
+    # of which `data_lost` says nothing
+    assert read.interrupted == (read.t[499],)
     assert "how the board turned between them is unknown: a.npy, b.npy." in read.taken
     assert "Left out were results.mat (" in read.taken
 

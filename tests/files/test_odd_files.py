@@ -28,7 +28,7 @@ def test_a_sensor_that_counts_zeros_measures_no_gravity(tmp_path):
         mpucal.load(tmp_path / "dead.txt", rate=100)
 
 
-ONE = "repeats one sample of accelerations at one time: record it again"
+ONE = "repeats one sample at one time: record it again"
 
 
 @pytest.mark.parametrize(

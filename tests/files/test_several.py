@@ -173,3 +173,32 @@ def test_columns_of_a_numbered_imu(name, words, second, walk, assert_same, table
     path = table(",".join(["time", *header]), walk.t, walk.acc[:, ::-1], -walk.gyr[:, ::-1], walk.acc, walk.gyr)
     assert_same(mpucal.load(path, sensor=second), walk, 1e-9, 1e-9, 1e-9)
     np.testing.assert_allclose(mpucal.load(path).acc, walk.acc[:, ::-1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "late"), [("id", 0.0005), ("id", 0.005), ("foot", 0.0), ("foot", 0.0003)])
+def test_lines_of_two_sensors_that_read_alike(name, late, walk, assert_same, tmp_path):
+    """Read one of two that lie alike, by a column of text that may be called so, or as their lines come together."""
+    lines = (
+        f"{word},{t + late * (word == 'right')!r},{','.join(map(repr, [*a.tolist(), *w.tolist()]))}\n"
+        for t, a, w in zip(walk.t.tolist(), walk.acc, walk.gyr, strict=True)
+        for word in ("left", "right")
+    )
+    path = tmp_path / "boards.csv"
+    path.write_text(f"{name},time,{AXES}\n" + "".join(lines))
+    found = mpucal.load(path, sensor="right")
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert f"({name}: left, right), of which right was read" in found.taken
+    assert "of which the first was read" in mpucal.load(path).taken
+
+
+def test_a_word_that_the_user_calls_a_sensor(walk, assert_same, tmp_path):
+    """Read the lines of a word in any column of text, which follow each other."""
+    write(tmp_path / "boards.csv", walk, f"trial,time,{AXES}\n", ("a", "b"), order="board")
+    assert_same(mpucal.load(tmp_path / "boards.csv", sensor="a"), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_a_place_that_is_one_word_with_its_axis(walk, assert_same, table):
+    columns = [f"{place}{axis}" for place in ("Right", "Left") for axis in AXES.split(",")]
+    found = mpucal.load(table(f"time,{','.join(columns)}", walk.t, walk.acc, walk.gyr, -walk.acc, walk.gyr))
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert "--sensor chooses of Right, Left" in found.taken

@@ -1,6 +1,7 @@
 """Tables of text as programs and people write them: each form is a row of data, and gives the walk's samples back."""
 
 import contextlib
+import csv
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -663,6 +664,19 @@ def test_a_magnetic_field_as_long_as_gravity_is_not_guessed_to_be_it(walk, tmp_p
     assert mpucal.load(tmp_path / "walk.txt").taken.endswith(f"{BY_GRAVITY}t,ax,ay,az,gx,gy,gz.")
 
 
+def test_a_field_of_unit_length_is_no_gravity_beside_one_in_si(walk, tmp_path):
+    """Suggest the accelerations of a vehicle, which its rates do not turn, and not the direction that they turn."""
+    rng = np.random.default_rng(15)
+    driven = rng.normal([0.1, -0.2, G], 2.0, walk.acc.shape)
+    direction = walk.acc / np.linalg.norm(walk.acc, axis=1, keepdims=True)
+    path = tmp_path / "drive.csv"
+    np.savetxt(path, np.column_stack([walk.t, walk.gyr, driven, direction]), delimiter=",")
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(path)
+    assert refused.value.options == "--columns t,gx,gy,gz,ax,ay,az"
+    np.testing.assert_allclose(mpucal.load(path, columns="t,gx,gy,gz,ax,ay,az").acc, driven)
+
+
 def test_large_whole_numbers_that_hardly_change_are_no_gravity(table):
     """Do not take a pressure or a place on the earth for an accelerometer, as a power of two is near any number."""
     rng = np.random.default_rng(12)
@@ -1033,9 +1047,10 @@ def test_our_own_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path)
     t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
     path.write_text(f"t,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
     found = mpucal.load(path)
-    assert "times in s, which begin anew 1 times," in found.taken
+    assert "its times begin anew 1 times" in found.taken
     np.testing.assert_array_equal(found.acc, walk.acc)
     assert np.flatnonzero(found.gap).tolist() == [half]
+    assert found.interrupted == (walk.t[half - 1],)
 
 
 def test_rates_called_after_the_turns_of_a_gyroscope(read, walk, assert_same):
@@ -1135,3 +1150,60 @@ def test_recordings_without_rates_serve_all_that_needs_no_rate(stored_calibratio
     assert mpucal.check(calibration, found).verdict == "still good"
     with pytest.raises(RecordingError, match=r"was read without rates: .*--rate HZ"):
         mpucal.noise(path)
+
+
+@pytest.mark.parametrize("names", ["dvx,dvy,dvz,dthetax,dthetay,dthetaz", "delta_velocity[0],[1],[2]", ""])
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+def test_increments_of_velocity_and_angle_are_rates_times_the_period(names, unit, walk, table, assert_same):
+    """Read what an integrating sensor gives for each sample, under its names or as gravity shows it."""
+    if names.startswith("delta"):
+        names = ",".join(f"delta_{of}[{axis}]" for of in ("velocity", "angle") for axis in range(3))
+    angles = (np.degrees(walk.gyr) if unit == "deg" else walk.gyr) / 100
+    path = table(names and f"time,{names}", walk.t, walk.acc / 100, angles)
+    found = mpucal.load(path)
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert "these are increments over a sample, times its rate" in found.taken
+
+
+def test_increments_that_nothing_shows_are_read_as_the_user_says(walk, table, assert_same):
+    """Suggest units that fit the length of gravity, where rates do not turn it."""
+    path = table(f"time,{AXES.strip()}", walk.t, walk.acc / 100, 0.0 * walk.gyr)
+    with pytest.raises(RecordingError, match="gravity is not in it") as refused:
+        mpucal.load(path)
+    assert refused.value.options == "--units acc=m/s/sample,gyr=rad/sample"
+    found = mpucal.load(path, units=refused.value.options.split()[1])
+    np.testing.assert_allclose(found.acc, walk.acc, atol=1e-9)
+
+
+@pytest.mark.parametrize(("per_g", "odd"), [(4096, False), (4300, False), (5420, True), (3000, True)])
+def test_counts_of_an_odd_scale_are_said_to_fit_no_range(per_g, odd, walk, table):
+    counts = np.rint(walk.acc / G * per_g)
+    found = mpucal.load(table(f"time,{AXES.strip()}", walk.t, counts, np.degrees(walk.gyr)))
+    assert "in counts of ±8 g (" in found.taken
+    assert ("which fits no usual range" in found.taken) == odd
+
+
+@pytest.mark.parametrize("lists", ["of axes", "of samples"])
+def test_lists_in_cells(lists, walk, tmp_path, assert_same):
+    """Read lists of JSON: three numbers of a sensor in a cell, or as many samples in each."""
+    if lists == "of axes":
+        header, rows = "time,acc,gyro", zip(walk.t.tolist(), walk.acc.tolist(), walk.gyr.tolist(), strict=True)
+    else:
+        columns = np.column_stack([walk.t, walk.acc, walk.gyr]).T.reshape(7, -1, 50)
+        header, rows = f"window,time,{AXES.strip()}", ([k, *columns[:, k].tolist()] for k in range(columns.shape[1]))
+    with (tmp_path / "walk.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([header.split(","), *rows])
+    assert_same(mpucal.load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_each_part_of_times_that_begin_anew_has_its_own_clock(walk, table):
+    """Estimate the clock behind arrival stamps of a part by its own stamps: one ran 5 % faster."""
+    half, late = len(walk) // 2, np.random.default_rng(3).exponential(0.004, len(walk))
+    period = np.repeat([0.01, 0.0095], half)
+    t = np.concatenate([np.arange(half) * 0.01, np.arange(half) * 0.0095])
+    stamps = np.maximum.accumulate((t + late).reshape(2, -1), 1).ravel()
+    found = mpucal.load(table(f"time,{AXES.strip()}", stamps, walk.acc, walk.gyr))
+    steps = np.diff(found.t)
+    assert np.flatnonzero(found.gap).tolist() == [half]
+    np.testing.assert_allclose(np.delete(steps, half - 1), np.delete(period[1:], half - 1), rtol=0.01)
+    assert found.interrupted == (found.t[half - 1],)

@@ -18,12 +18,12 @@ from .shown_units import (
     ANY_HZ,
     EXPLAINED,
     FASTEST_HZ,
-    LEAST_LIKELY,
-    MOST_LIKELY,
     acceleration_unit,
     are_counts,
+    are_increments,
     counts_per_g,
     gyro_unit,
+    is_gravity,
     mean_acceleration_unit,
     time_unit,
     to_signed,
@@ -58,11 +58,11 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
         pairs = _pairs(of, [place for place in of if place != at])
         turned = {pair: _turned(of, pair, t, any_rate=at is None) for pair in pairs}
         # rates turn a magnetic field, too, which in gauss is about half as long as gravity in g
-        for size in (_is_about_one_g, _has_size, len):
+        for size in (_is_in_si, _is_about_one_g, _has_size, len):
             alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and size(_stacked(of, pair[:3]))]
             best = max((turned[pair] for pair in alike), default=0.0)
             found = next((pair for pair in alike if turned[pair] >= best - ALIKE), None)
-            if found is not None:
+            if found is not None and not _has_rival(of, found):
                 return dict(zip(ROLES[1:], found, strict=True)) | ({} if at is None else {"t": at})
     # a board that hardly turned: the only triple of columns as long as gravity
     found_alone = [
@@ -70,7 +70,8 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
         for triple in _triples([place for place in of if place not in clocks[:1]])
         if _is_one_g(_stacked(of, triple))
     ]
-    alone = dict(zip(ROLES[1:4], found_alone[0], strict=True)) if len(found_alone) == 1 else {}
+    only = len(found_alone) == 1 and not _has_rival(of, found_alone[0])
+    alone = dict(zip(ROLES[1:4], found_alone[0], strict=True)) if only else {}
     return alone | (dict(zip("t", clocks, strict=False)) if alone else {})
 
 
@@ -132,11 +133,21 @@ def _is_one_g(acc: Vector) -> bool:
     return 0.0 < scatter < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
 
 
+def _is_in_si(acc: Vector) -> bool:
+    """Return True if (n, 3) numbers are about 1 g long in m/s^2."""
+    return acceleration_unit(acc) == "m/s^2" and is_gravity(typical_size(acc)[0])
+
+
+def _has_rival(of: Columns, pair: Places) -> bool:
+    """Return True if other columns are gravity in m/s^2: those that turn as the rates may be a field of unit length."""
+    others = [place for place in of if place not in pair]
+    return not _is_in_si(_stacked(of, pair[:3])) and any(_is_in_si(_stacked(of, others[at : at + 3])) for at in range(len(others) - 2))
+
+
 def _is_about_one_g(acc: Vector) -> bool:
     """Return True if (n, 3) numbers are counts, or about 1 g long in the unit that they show."""
     size, unit = typical_size(acc)[0], acceleration_unit(acc)
-    about = unit and LEAST_LIKELY <= size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
-    return are_counts(acc) or bool(about)
+    return are_counts(acc) or (unit != "" and is_gravity(size * QUANTITIES["acc"][unit]))
 
 
 def _has_size(acc: Vector) -> bool:
@@ -200,5 +211,5 @@ def _turned(of: Columns, pair: Sequence[int], t: Vector, *, any_rate: bool) -> f
     """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
     acc, gyr = _stacked(of, pair[:3]), _stacked(of, pair[3:])
     factor, correlation = turning(t, acc, gyr)
-    of_a_unit = any_rate or are_counts(gyr) or gyro_unit(factor)
+    of_a_unit = any_rate or are_counts(gyr) or gyro_unit(factor) or are_increments(t, acc, gyr, 1 / sample_period(t))
     return correlation if factor > 0.0 and of_a_unit else 0.0

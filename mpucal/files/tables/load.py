@@ -173,11 +173,11 @@ def _with_sensor(table: Table) -> Table:
         units = {axis[1] for axis in axes if axis}
         shown = [of for of in (ACC, GYR) if units & set(QUANTITIES[of])] + [axis[:-1] for axis in of_file[:1]]
         header = with_sensor(header, shown[0]) if shown else header
-    elif not header and of_file and len(places := table.places(Kind.NUMBER)) in (3, 4):
+    elif of_file and len(places := table.places(Kind.NUMBER)) in (3, 4) and not table.of_sensors:
         first, last = table.numbers([Column("", places[at], "") for at in (0, -1)]).T
         order = [*of_file, "time"] if len(places) == 4 and is_clock(last) > is_clock(first) else ["time", *of_file]
         names = dict(zip(places, order[-len(places) :], strict=True))
-        header = [names.get(at, "") for at in range(len(table.cells))]
+        header = [names.get(at, table.name_of(at)) for at in range(len(table.cells))]
     return replace(table, header=header)
 
 
@@ -263,6 +263,7 @@ def sensor_stream(
         rate_hz=table.rate_hz,
         # xacc and xgyro of MAVLink are in mg and mrad/s
         whole_unit="" if axes[0].name.strip().lower().startswith("x") else OF_BNO055[axes[0].quantity],
+        of_increments=axes[0].of_increments,
     )
 
 

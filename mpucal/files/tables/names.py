@@ -16,7 +16,7 @@ from itertools import groupby
 import numpy as np
 
 from ...data import Vector
-from .units import QUANTITIES, find_unit
+from .units import PER_SAMPLE, QUANTITIES, find_unit
 
 TIME, NANOSECONDS, ACC, GYR, TEMPERATURE = "t", "nanoseconds", "acc", "gyr", "temperature_c"
 
@@ -26,6 +26,10 @@ def _stems(words: str) -> dict[str, str]:
     return {stem: unit for stem, _, unit in (word.partition(":") for word in words.split())}
 
 
+# increments over a sample
+_OF_VELOCITY = "deltavelocity deltavel deltav delv dvel dv velinc"
+_OF_ANGLE = "deltaangle deltatheta dela dangle dang dtheta dth"
+INCREMENTS = {*_OF_VELOCITY.split(), *_OF_ANGLE.split()}
 # a unit stands only where the program that uses the stem always writes that one
 STEMS = {
     TIME: _stems(
@@ -47,11 +51,13 @@ STEMS = {
         "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
         " acce accelero acc accs accuncal ac a arss:m/s^2 alpha:m/s^2 gf:g gforce:g accsmooth linearacceleration"
         " specificforce acel aceleracao aceleracion acelerometro accelerazione accelerometro beschleunigung"
+        f" {_OF_VELOCITY}"
     ),
     GYR: _stems(
         "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w"
         " angularvelocity:rad/s angvel angveluncal gyrouncal angularrate angrate gyroadc:deg/s rotationrate"
         " motionrotationrate rotation angular giro giroscopio giroscopo drehrate"
+        f" {_OF_ANGLE}"
     ),
 }
 UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}
@@ -110,6 +116,7 @@ class Column:
     rank : order of preference among columns of the same quantity.
     clock_of : ACC or GYR where it is the clock of that sensor alone.
     sign_flipped : accelerations have the opposite sign, as on iOS.
+    of_increments : it holds increments over a sample.
     """
 
     name: str
@@ -120,6 +127,7 @@ class Column:
     rank: int = 0
     clock_of: str = ""
     sign_flipped: bool = False
+    of_increments: bool = False
 
 
 # a log names them on each line
@@ -162,10 +170,14 @@ def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Colum
         for quantity, stems in STEMS.items():
             of_axes = quantity in (ACC, GYR)
             for stem, at in _split_axis(word, axis) if of_axes else [(word, axis)]:
-                if stem in stems and unit in UNITS[quantity] and of_axes == (at >= 0):
+                increments = stem in INCREMENTS
+                unit_of = PER_SAMPLE.get(unit, unit) if increments else unit
+                if stem in stems and unit_of in UNITS[quantity] and of_axes == (at >= 0):
                     rank, clock_of = list(stems).index(stem), SENSOR_CLOCKS.get(stem, "")
-                    unit = unit or stems[stem]
-                    return Column(name, place, quantity, at, unit, rank, clock_of, stem in FLIPPED_STEMS)
+                    flipped = stem in FLIPPED_STEMS
+                    return Column(
+                        name, place, quantity, at, unit_of or stems[stem], rank, clock_of, flipped, increments
+                    )
     return None
 
 

@@ -17,7 +17,7 @@ from .units import COUNTS, OF_BNO055, QUANTITIES, resolve_unit
 # octaves: half way to the next range, which leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
 OF_COUNTS = "in counts of"
-# Largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther), or to tenths or hundredths of deg/s.
+# largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther) or counts, or to tenths or hundredths of deg/s
 NEAR = 0.08
 # remarks on a unit that |a| alone shows
 BY_SIZE, OR_MG = " (by |a|)", " (by |a|; if these are in mg, give --units acc=mg)"
@@ -46,12 +46,15 @@ class Reading:
         return cls(values * scale, said, np.asarray(ends.any(axis=1) & counts))
 
 
-def accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside: str = "") -> Reading:
+def accelerations(
+    values: Vector, said: str, hints: Hints, name: str, *, beside: str = "", rate_hz: float = math.inf
+) -> Reading:
     """Return (n, 3) accelerations, in the unit `said` by the file, in SI units.
 
     Parameters
     ----------
     beside : the unit of the rates that their turning shows, COUNTS if it is none; empty if it shows nothing.
+    rate_hz : of the samples, of which these may be increments.
     """
     said = hints.units.get("acc", said)
     if "acc" not in hints.units and (centre := units.offset(values)) is not None:
@@ -77,11 +80,14 @@ def accelerations(values: Vector, said: str, hints: Hints, name: str, *, beside:
             f"--units acc={near}",
         )
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
+        increments = "--units acc=m/s/sample,gyr=rad/sample" if units.is_gravity(size * rate_hz) else ""
         raise RecordingError(
             f"{name}: the median |a| is only {f'{size:.3g} {said}'.strip()}, so gravity is not in it",
-            "give the accelerometer's own values, not the linear acceleration computed from them",
+            "give the accelerometer's own values, not the linear acceleration computed from them"
+            + f", or {increments} (or deg/sample) if these are increments of velocity and angle" * bool(increments),
+            increments,
         )
-    likely = units.LEAST_LIKELY <= size * QUANTITIES["acc"].get(seen, 0.0) / STANDARD_GRAVITY_MPS2 <= units.MOST_LIKELY
+    likely = units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
     likely = likely or not (values == np.rint(values)).all()
     seen = hints.units.get("acc", (likely_whole or seen if said or likely else "") or said)
     unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
@@ -119,6 +125,8 @@ def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str
             "give the --accel-range that the sensor had, or --units acc=counts if it was this one",
             f"--accel-range {ACCEL_COUNTS / per_g:g}" if hints.accel_range_g else "",
         )
+    if abs(math.log(size / per_g)) > NEAR:
+        by = f" (the nearest by |a|: 1 g is {size:.4g} counts, which fits no usual range)"
     by = "" if hints.accel_range_g else by
     return Reading.of(values, scale, f"{OF_COUNTS} ±{range_g:g} g{by}", counts=True)
 

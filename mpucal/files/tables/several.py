@@ -31,6 +31,8 @@ NAMES_SENSORS = re.compile(
     r"(?:sensor|device|imu|node|board|module|mac)(?:[ _.-]?(?:id|no|nr|num|number|name|index|addr|address|mac))?",
     re.IGNORECASE,
 ).fullmatch
+# names that may be of lines, persons or places, and name sensors where these take turns
+MAY_NAME_SENSORS = re.compile(r"(?:.*[ _.-])?(?:id|addr|address|source|port|channel|name)", re.IGNORECASE).fullmatch
 # ArduPilot's name of it -> one of those
 INSTANCE = {"I": "imu"}
 MOST_SENSORS, MOST_TURNS = 32, 6
@@ -41,6 +43,8 @@ FEWEST_COLUMNS, FARTHER = 3, 2.0
 # what separates the words of a name, and the most words of a name that is looked at; a digit ends a word of letters
 _BETWEEN, MOST_WORDS = re.compile(r"[_ .\-]+"), 6
 _NUMBERED = re.compile(r"([A-Za-z]+)(\d)").fullmatch
+# a place before an axis: Leftax
+_JOINED = re.compile(r"([A-Z][a-z]{2,}?)((?:a|g|[Aa]cc|[Gg]yro?)[xyz])").fullmatch
 # the word at the beginning of a line, without a mark that a table has: `IMU1: `, `[0x69] `, `left `
 _BEGINNING = re.compile(
     r"^[\[(<]?((?:0x[\dA-Fa-f]{2}|[A-Za-z]\w{0,20})(?:[ #-]\d{1,2})?)[\])>]?[ \t]?[:|>-]?(?:[ \t]|\r?$)", re.MULTILINE
@@ -108,8 +112,8 @@ def _plain(word: str) -> str:
 def _words_of(name: str) -> Iterator[str]:
     """Yield the words of a name; ax2 and Acc2_X are of the second sensor."""
     for word in _BETWEEN.split(name.strip()):
-        numbered = _NUMBERED(word)
-        yield from numbered.groups() if numbered and _measures(numbered[1]) else [word]
+        split = (numbered := _NUMBERED(word)) and _measures(numbered[1]) and numbered.groups()
+        yield from split or ((joined := _JOINED(word)) and joined.groups()) or [word]
 
 
 def _measures(word: str) -> bool:
@@ -179,14 +183,16 @@ def of_one_beginning(
 def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
     """Return the lines of one of several sensors; the same table if no column tells lines of sensors apart.
 
-    The column is called so, or alternates, and the sensors' numbers lie farther apart than those of one of them.
+    The column is called so, or holds the name that the user gives, or it alternates: and it may be called so, or the
+    sensors' lines come together, or their numbers lie farther apart than those of one of them.
 
     Raises
     ------
     RecordingError : there are several, but none of the name `sensor`.
     """
     for place, cells in enumerate(table.cells):
-        named = bool(NAMES_SENSORS(table.name_of(place)))
+        name = table.name_of(place)
+        named = bool(NAMES_SENSORS(name))
         if not named and not 1 < len(set(_words(cells[:BEGUN]))) <= MOST_SENSORS:
             continue
         words = _words(cells)
@@ -196,9 +202,11 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
         sensors = np.array([of_words.get(word, -1) for word in words])
         first = sensors == 0
         whole = all(table.has(column)[first].any() for column in table.columns if column.quantity in (ACC, GYR))
-        if whole and (named or _lie_apart(_others(table, place), sensors)):
+        of_text = table.kinds[place] is Kind.WORD
+        named = named or (of_text and sensor is not None and _plain(sensor) in map(_plain, of_words))
+        if whole and (named or _take_turns(table, place, sensors)):
             chosen = _choose([*of_words], sensor, table.name)
-            called, which = table.name_of(place) or f"column {place + 1}", _which(chosen, of_words)
+            called, which = name or f"column {place + 1}", _which(chosen, of_words)
             said = f"its lines are of several sensors ({called}: {', '.join(of_words)}), of which {which} was read"
             part = table.part(sensors == of_words[chosen])
             return replace(part, remarks=(*table.remarks, f"{said} ({CHOOSES})"), chosen=True)
@@ -278,15 +286,32 @@ def _others(table: Table, place: int) -> Vector:
     return np.zeros((len(table), 0))
 
 
-def _lie_apart(values: Vector, sensors: NDArray[np.int_]) -> bool:
-    """Return True if most lines are of another of the `sensors` (n,) than the line before, and their `values` differ.
+def _take_turns(table: Table, place: int, sensors: NDArray[np.int_]) -> bool:
+    """Return True if most lines are of another word than the line before, and the words in a column name sensors."""
+    if not 2 * np.count_nonzero(np.diff(sensors)) >= len(sensors) - 1 >= FEWEST:
+        return False
+    called_so = bool(MAY_NAME_SENSORS(table.name_of(place))) and table.kinds[place] is Kind.WORD
+    return called_so or _come_together(table, sensors) or _lie_apart(_others(table, place), sensors)
 
-    From one sensor to another, (n, k) values then change by more than those of one sensor until its next line, although
-    that comes later.
+
+def _come_together(table: Table, sensors: NDArray[np.int_]) -> bool:
+    """Return True if the lines of all `sensors` (n,) come soon one after the other, and then no line for longer."""
+    for clock in table.clocks(table.columns)[:1]:
+        steps = np.diff(table.times(clock, np.ones(len(table), bool))[0])
+        usual = sorted(float(np.median(steps[sensors[1:] == each])) for each in np.unique(sensors[1:]))
+        return len(usual) > 1 and usual[-1] > FARTHER * usual[-2] >= 0.0
+    return False
+
+
+def _lie_apart(values: Vector, sensors: NDArray[np.int_]) -> bool:
+    """Return True if (n, k) values of several `sensors` (n,) that take turns differ.
+
+    From one sensor to another, they then change by more than those of one sensor until its next line, although that
+    comes later.
     """
     changes, order = sensors[1:] != sensors[:-1], np.argsort(sensors, kind="stable")
     again = sensors[order][1:] == sensors[order][:-1]
-    if 2 * np.count_nonzero(changes) < len(changes) or np.count_nonzero(again) < FEWEST:
+    if np.count_nonzero(again) < FEWEST:
         return False
     apart, alone = (
         np.median(np.abs(np.diff(of, axis=0))[where], axis=0)

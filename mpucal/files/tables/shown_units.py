@@ -189,6 +189,17 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
     return likely[0] if len(likely) == 1 else None
 
 
+def are_increments(t: Vector, acc: Vector, gyr: Vector, rate_hz: float) -> bool:
+    """Return True if (n, 3) numbers are increments of velocity and angle over a sample, which turn those as gravity."""
+    factor = rate_factor(t, acc, gyr)
+    return is_gravity(typical_size(acc)[0] * rate_hz) and bool(gyro_unit(factor and factor / rate_hz))
+
+
+def is_gravity(size_mps2: float) -> bool:
+    """Return True if an acceleration is likely to be gravity, where nothing else shows it."""
+    return LEAST_LIKELY <= size_mps2 / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
+
+
 def gyro_unit(factor: float | None, said: str = "") -> str:
     """Return the unit of rates with this rate_factor, first the one `said` by the file; empty if there is none."""
     units = {unit: QUANTITIES["gyr"][unit] for unit in (*filter(None, [said]), *SHOWN["gyr"])}

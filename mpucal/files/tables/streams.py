@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arguments import check_increasing
 from ...clocks.stamps import are_new
 from ...data import GYRO_COUNTS, Mask, Recording, Sensor, Vector
 from ...errors import RecordingError
 from ..hints import Hints
-from ..rows import make_recording
 from . import shown_units as units
 from . import times
 from .readings import OF_COUNTS, Rates, Reading, accelerations
 from .table import MOST_BAD
 from .times import Stream
-from .units import COUNTS, OF_BNO055
+from .units import COUNTS, OF_BNO055, PER_SAMPLE
 
 
 def index_with_gravity(streams: Sequence[Stream]) -> int:
@@ -43,24 +43,16 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
     ------
     RecordingError : units are not known or do not fit, times do not overlap, or there are too few samples.
     """
-    left_out = "without rates" if gyr is None else ""
+    of_rate, left_out = "", gyr is None
     gyr = replace(acc, values=np.zeros_like(acc.values), unit="rad/s") if gyr is None else gyr
     acc, gyr = _checked(acc, "accelerations", name), _checked(gyr, "rates", name)
-    untimed, alike = acc.ticks is None or gyr.ticks is None, np.array_equal(acc.number, gyr.number)
-    of_rate = ""
-    if untimed:
-        hints = replace(hints, rate_hz=hints.rate_hz or acc.rate_hz)
-    if untimed and hints.rate_hz is None:
-        hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints) if alike else None)
-        of_rate = "this sample rate is that at which its rates turn gravity"
-        if hints.rate_hz is None:
-            of_rate = "this sample rate is assumed, as nothing shows it (--rate HZ)"
-            left_out = left_out or "without rates"
+    if acc.ticks is None or gyr.ticks is None:
+        hints, of_rate = _with_rate(acc, gyr, hints)
+        left_out = left_out or hints.rate_hz is None
     new = _new_samples(acc, gyr)
     acc, gyr = acc.part(new[0]), gyr.part(new[1])
-    for stream, what in ((acc, "accelerations"), (gyr, "rates")):
-        if np.count_nonzero(stream.complete) < 2:
-            raise RecordingError(f"{name} repeats one sample of {what} at one time", "record it again")
+    if min(np.count_nonzero(stream.complete) for stream in (acc, gyr)) < 2:
+        raise RecordingError(f"{name} repeats one sample at one time", "record it again")
     (clock, of_t), (clock_gyr, of_t_gyr) = (times.to_seconds(stream, acc, hints, name) for stream in (acc, gyr))
     complete, joined, gap, kept = acc.complete, "", clock.gap, slice(0, len(clock.t))
     if np.array_equal(clock.t, clock_gyr.t):
@@ -75,9 +67,15 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         kept, gap = slice(int(inside[0]), int(inside[-1]) + 1), gap.copy()
         gap[inside] |= lost_rates
     complete, t, values = complete[kept], clock.t[kept], acc.values[kept][complete[kept]]
+    by_sample = _of_increments(t[complete], (values, rates), (acc, gyr), clock.rate_hz, hints)
+    values, rates = (
+        of * each.rate_hz if increments else of
+        for of, each, increments in zip((values, rates), (clock, clock_gyr), by_sample, strict=True)
+    )
+    hints = replace(hints, units={of: PER_SAMPLE.get(unit, unit) for of, unit in hints.units.items()})
     if left_out:
-        a = accelerations(values, acc.unit, hints, name)
-        w = Reading.of(rates, math.nan, left_out)
+        a = accelerations(values, acc.unit, hints, name, rate_hz=clock.rate_hz)
+        w = Reading.of(rates, math.nan, "without rates")
     else:
         rate_of = Rates(t[complete], values, rates, gyr, hints, name)
         may_be_whole = _are_whole_mg(acc, values) and not hints.units.keys() & OF_BNO055.keys()
@@ -85,13 +83,14 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
             hints = replace(hints, units={**hints.units, **whole[0]})
             rate_of = Rates(t[complete], values, rates, gyr, hints, name)
             remarks = [*remarks, whole[1]]
-        a = accelerations(values, acc.unit, hints, name, beside=rate_of.shown)
+        a = accelerations(values, acc.unit, hints, name, beside=rate_of.shown, rate_hz=clock.rate_hz)
         w = rate_of.read(beside_counts=a.said.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
     repeated, lost = int((~new[0]).sum()), max(acc.lost, gyr.lost)
     said = [
         f"{name} was read with {of_times}, accelerations {a.said} and {w.said}",
         of_rate,
+        "these are increments over a sample, times its rate" if any(by_sample) else "",
         *remarks,
         f"{repeated} repeated samples were left out" if repeated else "",
         f"{lost} lines that lack a number were left out" if lost else "",
@@ -99,19 +98,47 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         f"of the rates {clock_gyr.remark}" if clock_gyr.remark not in ("", clock.remark) else "",
         joined,
     ]
-    recording = make_recording(
-        t=t,
-        acc=_among(complete, a.values, np.nan),
-        gyr=_among(complete, w.values, np.nan),
-        temperature_c=None if acc.temperature_c is None else acc.temperature_c[kept],
-        gap=gap[kept],
-        acc_clipped=_among(complete, a.clipped, False),
-        gyr_clipped=_among(complete, w.clipped, False),
-        sensor=Sensor(accel_range_g=hints.accel_range_g, gyro_range_dps=hints.gyro_range_dps),
+    warm = np.full(len(t), np.nan) if acc.temperature_c is None else acc.temperature_c[kept]
+    known_c = warm[np.isfinite(warm)]
+    return Recording(
+        check_increasing(t, name),
+        _among(complete, a.values, np.nan),
+        _among(complete, w.values, np.nan),
+        warm,
+        gap[kept],
+        _among(complete, a.clipped, False),
+        _among(complete, w.clipped, False),
+        sensor=Sensor(
+            accel_range_g=hints.accel_range_g,
+            gyro_range_dps=hints.gyro_range_dps,
+            temperature_c=float(known_c.mean()) if len(known_c) else None,
+        ),
         name=name,
+        utc_ns=times.utc_ns(acc, of_t),
         taken="; ".join(filter(None, said)) + ".",
+        interrupted=clock.interrupted,
     )
-    return replace(recording, utc_ns=times.utc_ns(acc, of_t))
+
+
+def _with_rate(acc: Stream, gyr: Stream, hints: Hints) -> tuple[Hints, str]:
+    """Return the hints with the rate of samples without times, None if nothing shows it, and a remark on it."""
+    rate_hz = hints.rate_hz or acc.rate_hz
+    if rate_hz is not None:
+        return replace(hints, rate_hz=rate_hz), ""
+    alike = np.array_equal(acc.number, gyr.number)
+    hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints) if alike else None)
+    of = "assumed, as nothing shows it (--rate HZ)" if hints.rate_hz is None else "that at which its rates turn gravity"
+    return hints, f"this sample rate is {of}"
+
+
+def _of_increments(
+    t: Vector, values: tuple[Vector, Vector], streams: tuple[Stream, Stream], rate_hz: float, hints: Hints
+) -> list[bool]:
+    """Return True for accelerations and rates that are increments over a sample, as the user, names or gravity say."""
+    given = [hints.units.get(of, stream.unit) for of, stream in zip(OF_BNO055, streams, strict=True)]
+    found = [unit in PER_SAMPLE or stream.of_increments for unit, stream in zip(given, streams, strict=True)]
+    unknown = not any(given) and not any(found) and not units.acceleration_unit(values[0])
+    return [units.are_increments(t, *values, rate_hz)] * 2 if unknown else found
 
 
 def _checked(stream: Stream, what: str, name: str) -> Stream:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...clocks.stamps import sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from .cells import DAY_NS, Cells, Kind, is_number, kind_of, parse_cell, since_first, since_midnight, with_point
-from .names import COUNTS_OF_XSENS, LONGEST_OF_MTI, NANOSECONDS, TIME, Column, parse_header
+from .names import ACC, COUNTS_OF_XSENS, GYR, LONGEST_OF_MTI, NANOSECONDS, TIME, Column, axes_of, parse_header
 from .units import NS, QUANTITIES, find_unit
 
 # the share of lines that may be damaged
@@ -26,6 +26,9 @@ MOST_BAD = 0.01
 BELOW_A_SECOND = ("ms", "us", "ns")
 # a number and its unit in one cell
 _WITH_UNIT = re.compile(r"[-+.\d][-+.,\deE]*( ?[^-+.,\d\s][^\d]{0,9}\d?)").fullmatch
+
+# a list of JSON or of Python
+IS_LIST = re.compile(r"\s*\[[^\[\]]*\]\s*").fullmatch
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,11 @@ class Table:
     def columns(self) -> list[Column]:
         """Return the columns whose names are known."""
         return parse_header(self.header)
+
+    @property
+    def of_sensors(self) -> list[Column]:
+        """Return the columns that hold accelerations or rates, by their names."""
+        return [column for column in self.columns if column.quantity in (ACC, GYR)]
 
     @cached_property
     def kinds(self) -> list[Kind]:
@@ -192,6 +200,33 @@ class Table:
 def holds_number(cell: str) -> bool:
     """Return True for a number, also with a unit behind it."""
     return is_number(cell) or _WITH_UNIT(cell.strip()) is not None
+
+
+def with_lists_apart(table: Table) -> Table:
+    """Return a table without lists in its cells: three numbers of a sensor are its axes, and others are samples."""
+    lists = {place: [*map(_items, cells)] for place, cells in enumerate(table.cells) if all(map(IS_LIST, cells))}
+    if not lists or not len(table):
+        return table
+    counts = [{*map(len, row)} for row in zip(*lists.values(), strict=True)]
+    header = names_of_lists(table.header, [of[0] for of in table.cells])
+    if all(count == {len("xyz")} for count in counts) and len(header) == len(table.header) + 2 * len(lists):
+        columns = ([*zip(*lists[at], strict=True)] if at in lists else [of] for at, of in enumerate(table.cells))
+        return replace(table, header=header, cells=[*chain(*columns)])
+    if any(len(count) > 1 for count in counts):
+        raise RecordingError(f"{table.name}: its cells hold lists of different lengths", "write a line for each sample")
+    lines, *cells = (np.repeat(of, [*chain(*counts)]).tolist() for of in (table.lines, *table.cells))
+    cells = [[*chain(*lists[at])] if at in lists else of for at, of in enumerate(cells)]
+    return replace(table, cells=cells, lines=lines, remarks=(*table.remarks, "its cells hold lists of samples"))
+
+
+def names_of_lists(header: Sequence[str], cells: Sequence[str]) -> list[str]:
+    """Return a header with the names of the axes in place of a sensor's whose cell is a list."""
+    alone = [axes_of(name) if IS_LIST(cell) else [] for name, cell in zip(header, cells, strict=True)]
+    return [*chain(*(axes or [name] for name, axes in zip(header, alone, strict=True)))]
+
+
+def _items(cell: str) -> list[str]:
+    return [item.strip(" \"'") for item in cell.strip("[] \n").split(",")]
 
 
 def with_units_of_cells(table: Table) -> Table:

@@ -16,7 +16,7 @@ from ...errors import RecordingError
 from ..reading import check_size, is_text
 from .cells import CLOCK, MOMENT, NUMBER, is_number
 from .names import ACC, GYR, axes_of, parse_axis_name, parse_header
-from .table import Table, holds_number, with_units_of_cells
+from .table import IS_LIST, Table, holds_number, names_of_lists, with_lists_apart, with_units_of_cells
 from .units import find_unit
 
 # separator -> its name for messages; None: any blanks
@@ -32,8 +32,8 @@ COMMENT = ("#", "%", "//")
 # Bytes that a line takes at least while it is read, in CPython on 64 bits: a list (56), its reference and line number
 # (16 and 32), a Decimal of its time (104 and 8). A cell takes two references and a float64.
 LINE, CELL = 216, 24
-# names within quotation marks may span lines
-_QUOTED = re.compile(r'"[^"]{0,60}"')
+# names within quotation marks may span lines; longer text between two marks is none
+_QUOTED, LONGEST_NAME = re.compile(r'"[^"]*"'), 60
 # Serial monitors, terminals and loggers write the time before each line: `12:03:04.123 -> `, `[2024-05-01 12:03:04] `,
 # `2024-05-01 12:03:04,123 - INFO - `. A blank alone ends it where the line goes on with numbers and another separator.
 MONITORED = re.compile(
@@ -83,7 +83,7 @@ def decode_text(data: bytes, name: str) -> str:
     if "\n" not in text:
         # objects of JSON may be one after the other
         text = text.replace("\r", "\n").replace("}{", "}\n{")
-    head = _QUOTED.sub(lambda quoted: " ".join(quoted[0].split("\n")), text[:HEAD])
+    head = _QUOTED.sub(lambda q: q[0].replace("\n", " ") if len(q[0]) <= LONGEST_NAME + 2 else q[0], text[:HEAD])
     text = _EXPONENT.sub("E", _MARKS.sub("", head + text[HEAD:]))
     # what was read of the file may end within a line
     begun = text[:HEAD].rpartition("\n")[0] or text
@@ -135,7 +135,8 @@ def _are_numbers(cells: Cells, following: Cells) -> bool:
 
     Among fewer numbers than those of both sensors, other cells are a mark that each line repeats, or name a sensor.
     """
-    alike = [is_number(one) and is_number(other) for one, other in zip(cells, following, strict=False)]
+    measured = [[is_number(cell) or IS_LIST(cell) is not None for cell in of] for of in (cells, following)]
+    alike = [one and other for one, other in zip(*measured, strict=False)]
     words = (two for *two, number in zip(cells, following, alike, strict=False) if not number)
     marked = all(one == other or axes_of(one) or parse_header([one]) for one, other in words)
     return sum(alike) >= len("xyz") * (1 if marked else 2) and len(following) == len(cells)
@@ -156,7 +157,8 @@ def _find(
             if is_header is not None:
                 cells = _with_line_above(_split(above, separator), cells) if separator else cells
                 # a name may hold blanks
-                if (separator or not below or len(below) - len(cells) in (0, 1)) and is_header(cells):
+                names = names_of_lists(cells, below) if len(cells) == len(below) else cells
+                if (separator or not below or len(below) - len(cells) in (0, 1)) and is_header(names):
                     return read_table(text, name, cells, number + 1, separator)
             elif is_row is not None and is_row(cells, below):
                 header = _split(above, separator)
@@ -252,4 +254,4 @@ def read_table(text: str, name: str, header: Cells, first: int, separator: str |
         rows, lines = rows[1:], lines[1:]
     remarks = [] if separator == "," else [f"its cells are separated by {SEPARATORS[separator]}"]
     table = table_of_rows(name, header, rows, lines, *remarks)
-    return with_units_of_cells(table) if table.header and rows else table
+    return with_lists_apart(with_units_of_cells(table)) if table.header and rows else table

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
@@ -40,6 +42,7 @@ class Stream:
     temperature_c : (n,), if the file has it. lost : number of lines that hold no sample and no time.
     rate_hz : the sample rate, if the file states it.
     whole_unit : of whole numbers that seem to be in mg or mrad/s, but may be a BNO055's; empty if they are not.
+    of_increments : the values are increments over a sample.
     """
 
     ticks: Vector | None
@@ -53,6 +56,7 @@ class Stream:
     lost: int = 0
     rate_hz: float | None = None
     whole_unit: str = ""
+    of_increments: bool = False
 
     @cached_property
     def number(self) -> Numbers:
@@ -111,9 +115,9 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
     seen = hints.units.get("t", units.time_unit(step, named or _unit_of_date(stream.origin) or slow))
     unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}")
-    t = ticks * QUANTITIES["t"][unit]
-    anew, said = np.flatnonzero(np.diff(t) < -ANEW_S) + 1, f"times in {unit}"
-    back = np.flatnonzero(np.diff(t) < 0) + 1
+    t, said = ticks * QUANTITIES["t"][unit], f"times in {unit}"
+    back, (on, begins) = np.flatnonzero(np.diff(t) < 0) + 1, go_on(t)
+    anew = np.flatnonzero(begins)
     alike = stream.origin == first.origin and np.array_equal(stream.ticks, first.ticks)
     if len(back) * FEWEST > len(t) or (len(anew) and not alike):
         at = int(back[0])
@@ -121,13 +125,36 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
-    for at in anew.tolist():
-        t[at:] += t[at - 1] + GAP_S - t[at]
     said += f", which begin anew {len(anew)} times" if len(anew) else ""
     said += f", whose counter overflows {wraps} times" if wraps else ""
     # a clock that was set back, or a sample that came late
-    kept = t >= np.maximum.accumulate(t)
-    return fit_clock(np.interp(stream.number, stream.number[kept], t[kept]), stream.number), said
+    kept = on >= np.maximum.accumulate(on)
+    on = np.interp(stream.number, stream.number[kept], on[kept])
+    parts = np.split(np.arange(len(on)), anew)
+    return join_clocks([fit_clock(on[part], stream.number[part]) for part in parts]), said
+
+
+def go_on(t: Vector, last: float = -math.inf) -> tuple[Vector, Mask]:
+    """Return times (n,) that go on after a gap where they begin anew, and True where they do.
+
+    Parameters
+    ----------
+    last : the time before the first of them.
+    """
+    steps = np.diff(t, prepend=last)
+    # after a single damaged time, the next goes on
+    begins = np.asarray((steps < -ANEW_S) & (np.append(t[1:], -math.inf) < t - steps))
+    return t + np.cumsum(np.where(begins, GAP_S - steps, 0.0)), begins
+
+
+def join_clocks(clocks: Sequence[Clock]) -> Clock:
+    """Return the clocks of parts, of which each follows the one before, as one that was interrupted between two."""
+    t, gap = (np.concatenate([getattr(clock, of) for clock in clocks]) for of in ("t", "gap"))
+    counts = [len(clock.t) for clock in clocks]
+    begins = np.cumsum(counts)[:-1]
+    gap[begins] = True
+    jitter_s = math.sqrt(np.average([clock.jitter_s**2 for clock in clocks], weights=counts))
+    return Clock(t, gap, clocks[int(np.argmax(counts))].rate_hz, jitter_s, tuple(t[begins - 1].tolist()))
 
 
 def _unit_of_date(origin: Decimal) -> str:

@@ -37,6 +37,8 @@ QUANTITIES = {
         COUNTS: math.nan,
     },
 }
+# units of what an integrating sensor gives for each sample, increments of velocity and angle -> of these by the time
+PER_SAMPLE = {"m/s/sample": "m/s^2", "rad/sample": "rad/s", "deg/sample": "deg/s"}
 # the counts of a BNO055 (BST-BNO055-DS000, UNIT_SEL 0), which samples hardly tell from mg and mrad/s
 OF_BNO055 = {"acc": "cm/s^2", "gyr": "deg/s/16"}
 _SPELLED = {
@@ -66,6 +68,9 @@ _SPELLED = {
     "deg/s/10": "deg/s/10 0.1deg/s 1/10deg/s",
     "deg/s/100": "deg/s/100 0.01deg/s 1/100deg/s",
     COUNTS: "counts count lsb raw adc",
+    "m/s/sample": "m/s m/s/sample",
+    "rad/sample": "rad/sample",
+    "deg/sample": "deg/sample",
 }
 _NAMES = {spelled: unit for unit, words in _SPELLED.items() for spelled in words.split()}
 _PLAIN = str.maketrans(
