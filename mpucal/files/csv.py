@@ -188,9 +188,7 @@ class CsvText:
     calibrated : the samples are calibrated, which a column says.
     """
 
-    def __init__(
-        self, put: Callable[[bytes], object], utc_ns: int | None = None, *, calibrated: bool = False
-    ) -> None:
+    def __init__(self, put: Callable[[bytes], object], utc_ns: int | None = None, *, calibrated: bool = False) -> None:
         self._put, self.utc_ns, self._calibrated = put, utc_ns, 1.0 if calibrated else np.nan
         self._columns: list[int] = []
 

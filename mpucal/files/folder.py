@@ -10,6 +10,7 @@ import shlex
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -91,7 +92,7 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
             shift = end + GAP_S * bool(joined) - float(part.t[0])
         joined.append(replace(part, t=part.t + shift, interrupted=tuple(at + shift for at in part.interrupted)))
         end = float(joined[-1].t[-1])
-    whole = Samples.joined(joined)
+    whole = Samples.joined([*joined])
     whole.gap[np.cumsum([len(part) for part in parts])[:-1]] = True
     ends = (float(part.t[-1]) for part in joined[:-1])
     interrupted = (*chain.from_iterable(part.interrupted for part in joined), *ends)
@@ -102,7 +103,7 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     )
     if failed:
         taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
-    facts = {"sensor": first.sensor, "name": name, "utc_ns": first.utc_ns, "taken": taken.strip()}
+    facts: dict[str, Any] = {"sensor": first.sensor, "name": name, "utc_ns": first.utc_ns, "taken": taken.strip()}
     return Recording(**vars(whole), **facts, interrupted=interrupted)
 
 

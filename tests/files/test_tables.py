@@ -1207,3 +1207,11 @@ def test_each_part_of_times_that_begin_anew_has_its_own_clock(walk, table):
     assert np.flatnonzero(found.gap).tolist() == [half]
     np.testing.assert_allclose(np.delete(steps, half - 1), np.delete(period[1:], half - 1), rtol=0.01)
     assert found.interrupted == (found.t[half - 1],)
+
+
+def test_lists_beside_the_axes_are_no_samples(walk, tmp_path, assert_same):
+    """Leave the covariances alone that a bag's messages have in a table."""
+    rows = ([*row, [-1.0] * 9, [0.01] * 9] for row in np.column_stack([walk.t, walk.acc, walk.gyr]).tolist())
+    with (tmp_path / "imu.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([["time", *AXES.strip().split(","), "acc_covariance", "gyr_covariance"], *rows])
+    assert_same(mpucal.load(tmp_path / "imu.csv"), walk, 1e-9, 1e-9, 1e-9)

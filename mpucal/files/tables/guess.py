@@ -141,7 +141,8 @@ def _is_in_si(acc: Vector) -> bool:
 def _has_rival(of: Columns, pair: Places) -> bool:
     """Return True if other columns are gravity in m/s^2: those that turn as the rates may be a field of unit length."""
     others = [place for place in of if place not in pair]
-    return not _is_in_si(_stacked(of, pair[:3])) and any(_is_in_si(_stacked(of, others[at : at + 3])) for at in range(len(others) - 2))
+    windows = (others[at : at + 3] for at in range(len(others) - 2))
+    return not _is_in_si(_stacked(of, pair[:3])) and any(_is_in_si(_stacked(of, each)) for each in windows)
 
 
 def _is_about_one_g(acc: Vector) -> bool:

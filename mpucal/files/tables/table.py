@@ -203,15 +203,21 @@ def holds_number(cell: str) -> bool:
 
 
 def with_lists_apart(table: Table) -> Table:
-    """Return a table without lists in its cells: three numbers of a sensor are its axes, and others are samples."""
+    """Return a table without lists of samples in its cells, or of a sensor's three axes; others are left as text."""
+    axes = axes_of_lists(table.header, [of[0] for of in table.cells]) if len(table) else []
     lists = {place: [*map(_items, cells)] for place, cells in enumerate(table.cells) if all(map(IS_LIST, cells))}
-    if not lists or not len(table):
+    if any(axes):
+        header: list[str] = []
+        apart: list[Cells] = []
+        for place, of in enumerate(table.cells):
+            header += axes[place] or [table.name_of(place)]
+            rows = ([*_items(cell), "", "", ""][: len("xyz")] for cell in of)
+            apart += map(list, zip(*rows, strict=True)) if axes[place] else [of]
+        return replace(table, header=header, cells=apart)
+    measured = {column.place for column in table.of_sensors}
+    if not measured <= lists.keys() or len(lists) < 2 * len("xyz"):
         return table
     counts = [{*map(len, row)} for row in zip(*lists.values(), strict=True)]
-    header = names_of_lists(table.header, [of[0] for of in table.cells])
-    if all(count == {len("xyz")} for count in counts) and len(header) == len(table.header) + 2 * len(lists):
-        columns = ([*zip(*lists[at], strict=True)] if at in lists else [of] for at, of in enumerate(table.cells))
-        return replace(table, header=header, cells=[*chain(*columns)])
     if any(len(count) > 1 for count in counts):
         raise RecordingError(f"{table.name}: its cells hold lists of different lengths", "write a line for each sample")
     lines, *cells = (np.repeat(of, [*chain(*counts)]).tolist() for of in (table.lines, *table.cells))
@@ -219,10 +225,12 @@ def with_lists_apart(table: Table) -> Table:
     return replace(table, cells=cells, lines=lines, remarks=(*table.remarks, "its cells hold lists of samples"))
 
 
-def names_of_lists(header: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """Return a header with the names of the axes in place of a sensor's whose cell is a list."""
-    alone = [axes_of(name) if IS_LIST(cell) else [] for name, cell in zip(header, cells, strict=True)]
-    return [*chain(*(axes or [name] for name, axes in zip(header, alone, strict=True)))]
+def axes_of_lists(header: Sequence[str], cells: Sequence[str]) -> list[list[str]]:
+    """Return for each column the names of its axes, if it is a sensor's and its cell lists three numbers; or none."""
+    return [
+        axes_of(name) if IS_LIST(cell) and len(_items(cell)) == len("xyz") else []
+        for name, cell in zip(header, cells, strict=False)
+    ]
 
 
 def _items(cell: str) -> list[str]:

@@ -7,7 +7,7 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Sequence
 from io import StringIO
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from ...errors import RecordingError
 from ..reading import check_size, is_text
 from .cells import CLOCK, MOMENT, NUMBER, is_number
 from .names import ACC, GYR, axes_of, parse_axis_name, parse_header
-from .table import IS_LIST, Table, holds_number, names_of_lists, with_lists_apart, with_units_of_cells
+from .table import IS_LIST, Table, axes_of_lists, holds_number, with_lists_apart, with_units_of_cells
 from .units import find_unit
 
 # separator -> its name for messages; None: any blanks
@@ -157,13 +157,19 @@ def _find(
             if is_header is not None:
                 cells = _with_line_above(_split(above, separator), cells) if separator else cells
                 # a name may hold blanks
-                names = names_of_lists(cells, below) if len(cells) == len(below) else cells
+                names = _with_axes(cells, below)
                 if (separator or not below or len(below) - len(cells) in (0, 1)) and is_header(names):
                     return read_table(text, name, cells, number + 1, separator)
             elif is_row is not None and is_row(cells, below):
                 header = _split(above, separator)
                 return read_table(text, name, header if len(header) == len(cells) else [], number, separator)
     return None
+
+
+def _with_axes(header: Cells, below: Cells) -> Cells:
+    """Return a header with three names in place of a sensor's, if the cell below it lists three numbers."""
+    axes = axes_of_lists(header, below) if len(header) == len(below) else []
+    return [*chain(*(of or [name] for of, name in zip(axes, header, strict=True)))] if any(axes) else header
 
 
 def _with_line_above(sensors: Cells, axes: Cells) -> Cells:
