@@ -14,7 +14,6 @@ from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from .bias_changes import without_changes
 from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
-from .checks.estimate import GOOD_RMS_MPS2
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hand import HandFit
@@ -76,10 +75,9 @@ def _is_known_better(evidence: Evidence, other: Evidence) -> bool:
 def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     """Return the estimate of a part, from rest to rest, that is good by itself; None where there is none, or no need.
 
-    The part after what changed the sensor is of what it is now. The part before is used only where all of the recording
-    tells less than a good calibration. The part before a sensor was at the end of its range needs no reservation, and
-    need not be better than usable where the whole is refused. But a bias that moved may move on: there the uncertainty
-    of the whole holds what it was and what it is.
+    The part after what changed the sensor is of what it is now. Without it, the uncertainty of the whole holds what it
+    was and what it is. The part before useless readings is used, too. That before a sensor was at the end of its range
+    needs no reservation, and need not be better than usable where the whole is refused.
     """
     recording, flat, of_whole = whole.recording, whole.flat, find_reasons(whole)
     changed = next((reason for reason in of_whole if reason.span is not None), None)
@@ -92,8 +90,8 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     first, last = (clipped[0], len(t)) if span is None else np.searchsorted(t, span)
     before = "before", "what follows", 0, int(ends[ends <= first].max(initial=0))
     after = "after", "what precedes", int(starts[starts >= last].min(initial=len(t))), len(t)
-    known = whole.uncertainty is not None and whole.uncertainty.rms_mps2 <= GOOD_RMS_MPS2
-    for when, left_out, begin, end in [before] if changed is None else [after] if known else [after, before]:
+    parts = [before] if changed is None else [after] if whole.fit is not None else [after, before]
+    for when, left_out, begin, end in parts:
         if end - begin <= flat.n:
             continue
         seconds = t[end - 1] if when == "before" else t[begin]

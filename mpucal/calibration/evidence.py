@@ -29,7 +29,6 @@ from .words import Decoded
 LEAST_STEP_RAD = np.deg2rad(2.0)  # turn of gravity in half a second that is above noise
 CLEARLY = 3.0  # ratio of misses above which another unit or range is the right one
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
-LONGEST_TURN_S = 20.0  # over which a gyroscope still carries gravity
 BLOCK_S = 0.01
 # Ratios of the chip's ranges, by which rates are off that were read at another one; that of the same range first.
 RANGE_RATIOS = sorted({a / b for a, b in product(GYRO_RANGES_DPS, repeat=2)}, key=lambda ratio: abs(np.log(ratio)))
@@ -194,11 +193,11 @@ class Evidence:
             for (before, after), first in zip(u, middles.tolist(), strict=True)
         ]
 
-    def _turns_of_rests(self, flat: Flat, longest_s: float = LONGEST_TURN_S) -> list[_Turn]:
-        """Return the turns from rest to rest that move gravity far and take no longer than `longest_s`."""
+    def _turns_of_rests(self, flat: Flat) -> list[_Turn]:
+        """Return the turns from rest to rest that move gravity far."""
         r, runs = self.recording, self.rests
         u, first, last = _units(statistics(r.acc, runs)[0]), runs[1:, 0], runs[:-1, 1]
-        far = (_angles(u[1:], u[:-1]) > LEAST_TURN_RAD) & (r.t[first] - r.t[last - 1] < longest_s)
+        far = _angles(u[1:], u[:-1]) > LEAST_TURN_RAD
         return [self._turn(flat, u[k], u[k + 1], last[k], first[k]) for k in np.flatnonzero(far).tolist()]
 
     @cached_property
@@ -217,7 +216,7 @@ class Evidence:
     @cached_property
     def gyro_axes(self) -> Vector | None:
         """Rotation (3, 3) by right angles, or -1, with which rates explain how gravity turned between rests."""
-        turns = [] if self.flat is None else _measured(self._turns_of_rests(self.flat, np.inf))
+        turns = [] if self.flat is None else _measured(self._turns_of_rests(self.flat))
         if len(turns) < FEWEST_TRANSITIONS:
             return None
         rotations = [M for M in signed_permutations() if np.linalg.det(M) > 0.0]
@@ -230,7 +229,7 @@ class Evidence:
 
         The first is that of the turns within the gyroscope's range, the second that of all turns.
         """
-        turns = [] if self.flat is None else self._turns_of_rests(self.flat, np.inf)
+        turns = [] if self.flat is None else self._turns_of_rests(self.flat)
         within, of_all = (
             _miss(these, np.eye(3)) if len(these) >= FEWEST_TRANSITIONS else 0.0 for these in (_measured(turns), turns)
         )

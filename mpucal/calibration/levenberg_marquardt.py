@@ -28,6 +28,9 @@ MOST_ITERATIONS = 60
 # After so many trials that do not halve the decrement the search has failed, as in a valley without an end: turns so
 # slow that the gyroscope's noise loses gravity. Estimates that converge halve it within 5 trials.
 MOST_IN_VAIN = 10
+# V may rise by so much in a step with frozen gains. If the decrement falls to less than this share, the root is near,
+# and V, whose minimum is elsewhere, may rise by more.
+FROZEN_SLACK, NEAR_A_ROOT, SLACK_NEAR_A_ROOT = 1.0, 0.1, 200.0
 DAMPING, EASIER, HARDER = 1e-3, 0.1, 8.0
 
 
@@ -131,12 +134,9 @@ def minimise(
 
 
 def _nearer(trial: _At, at: _At) -> bool:
-    """Return True if a step came nearer to the root of the gradient with frozen gains.
-
-    The nearer the root, the more V, whose minimum is elsewhere, may rise.
-    """
-    shrunk = trial.decrement / at.decrement
-    return shrunk < 1.0 and (trial.V - at.V) * shrunk**2 < 1.0
+    """Return True if a step came nearer to the root of the gradient with frozen gains."""
+    shrunk, risen = trial.decrement / at.decrement, trial.V - at.V
+    return shrunk < 1.0 and risen < (SLACK_NEAR_A_ROOT if shrunk < NEAR_A_ROOT else FROZEN_SLACK)
 
 
 class _At:

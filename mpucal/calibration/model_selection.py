@@ -18,7 +18,7 @@ from ..data import Recording
 from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
-from .hand import HandFit, fit_hand
+from .hand import PASSES, HandFit, fit_hand
 from .hypothesis_tests import MOST_STD, WALD_99, find_lever_arm, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
@@ -53,7 +53,7 @@ class Errors(NamedTuple):
 
 NO_ERRORS = Errors()
 ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
-ERROR_PASSES, ERRING_NIS = 2, 30.0
+ERRING_NIS = 30.0
 PROMISING = WALD_99 / 3.0  # least decrement for a search with K: twice the decrement estimates the statistic
 
 
@@ -157,7 +157,7 @@ class InPlaceFits:
         """Return the minimum, a rough one where it explains nothing, and the most likely errors."""
         errors = NO_ERRORS
         minimum = self._rough(parameters)
-        for _ in range(ERROR_PASSES if erring else 0):
+        for _ in range(PASSES if erring else 0):
             theta = minimum.theta
             errors = min(ERRORS, key=lambda these: evaluate(_with_errors(self._thin, these), theta, 0).V)
             minimum = minimise(_with_errors(self._thin, errors), theta, parameters, self._prior, until=ROUGHLY)

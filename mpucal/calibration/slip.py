@@ -22,14 +22,11 @@ from .rotation import lengths
 from .theta import Theta
 from .transitions import (
     DEGREES_OF_FREEDOM,
-    FEWEST_TRANSITIONS,
     REWEIGHTED,
     Transition,
     jacobians,
     likely_scale,
 )
-
-LEAST_SEEN = 1e-15  # share of the best known direction of x, below which the misses say nothing of one
 
 
 class Slip(NamedTuple):
@@ -50,15 +47,16 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta) -
     K is estimated anew with it, and without, since a K that was estimated without it hides much of it.
     """
     k = len(transitions)
-    # With fewer before a slip and after it, two of a lost gyroscope would look like one.
-    if k < 2 * FEWEST_TRANSITIONS + 1:
+    n, p = 2 * k, 12  # numbers that the misses show; those of K, and of a rotation before a slip and after it
+    if n <= p:
         return None
-    cost = math.log(SURE) + 4.5 * math.log(2 * k) + math.log(k)  # of nine numbers more, and of so many times
+    # The cost of three numbers more, and of so many times; few misses are explained by anything.
+    cost = (math.log(SURE) + 1.5 * math.log(n) + math.log(k)) * n / (n - p)
     misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
     # No likelihood is above 0, that of no misses at all.
     if not -_log_likelihood(misses, known) > cost:
         return None
-    places = np.arange(FEWEST_TRANSITIONS, k - FEWEST_TRANSITIONS)
+    places = np.arange(2, k - 2)  # a rotation has three numbers, and each transition shows two of them
     by_slip = _directions(transitions, np.append(places, k))
     by_K = np.broadcast_to(jacobians(transitions, series, theta)[:, :, PLACES["K"]], by_slip.shape)
     likelihood, x, left = _likeliest(misses, known, np.concatenate([by_slip, by_K], axis=3))
@@ -93,7 +91,7 @@ def _likeliest(misses: Vector, known: Vector, A: Vector) -> tuple[Vector, Vector
         weight = likely_scale(left, known)[1]
         weighted = (A * (weight / known)[..., None, None]).reshape(len(A), -1, A.shape[3]).swapaxes(1, 2)
         N = weighted @ A.reshape(len(A), -1, A.shape[3])
-        x = -(np.linalg.pinv(N, rcond=LEAST_SEEN, hermitian=True) @ (weighted @ misses.ravel())[..., None])
+        x = -(np.linalg.pinv(N, hermitian=True) @ (weighted @ misses.ravel())[..., None])
         left = misses + (A @ x[:, None])[..., 0]
     return _log_likelihood(left, known), x[..., 0], left
 

@@ -25,7 +25,7 @@ FLOOR_MPS2 = 5e-5
 MOST_NIS = 5.0  # NIS of a model that explains the data; 3 is expected
 # The model's uncertainty is multiplied by this where too few sides were down for a comparison of them.
 UNCOMPARED = 2.0
-FEWEST_SIDES, TINY_MPS2 = 4, 1e-9
+FEWEST_SIDES = 4
 
 
 @dataclass(frozen=True)
@@ -160,4 +160,4 @@ def inflate(fit: Fit, claim: UncertaintyClaim | None) -> Fit:
 def _rms(errors: Vector, covariance: Vector) -> float:
     """Return the error [m/s^2] over all directions by a covariance (p, p) and the errors (12, 12) of a unit each."""
     squares = np.sum((errors @ covariance[ACCELEROMETER, ACCELEROMETER]) * errors)
-    return float(np.sqrt(max(squares, TINY_MPS2**2)))
+    return float(np.sqrt(max(squares, np.finfo(np.float64).tiny)))

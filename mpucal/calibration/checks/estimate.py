@@ -12,10 +12,10 @@ from ..evidence import Evidence
 from ..slip import Slip
 from ..tilt import CONE_RAD
 from ..uncertainty import MOST_NIS
+from .recording import SEPARABLE_HZ
 
 # Claimed uncertainty, 1 sigma, of a good and of a usable calibration: errors above 0.1 m/s^2 are then rare.
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
-SLOW_HZ = 20.0  # at a lower sample rate, a hand turns too much from sample to sample
 # How far |a| strays, in units of its change of course within 10 ms, and this change. In hands, also behind a filter,
 # they are at most 30, or at least 0.013 m/s^2; in a fusion filter's gravity at least 76, and at most 0.005 m/s^2.
 SMOOTH, LEAST_BENT_MPS2 = 40.0, 0.008
@@ -107,7 +107,7 @@ def contradiction(e: Evidence) -> Reason | None:
     if worst is None or (disturbed and not _is_useless(e)) or not rms > GOOD_RMS_MPS2 >= claim.floored:
         return None
     if worst.hypothesis.kind == "side":
-        if e.recording.rate_hz < SLOW_HZ:
+        if e.recording.rate_hz < SEPARABLE_HZ:
             return reason("inconsistent", "slow", _is_useless(e), rms=rms, rate=e.recording.rate_hz)
         return reason("inconsistent", "sides", _is_useless(e), rms=rms)
     begin, end = _since_the_start(e, worst.span)

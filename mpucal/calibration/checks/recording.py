@@ -14,12 +14,12 @@ from ..evidence import Evidence, once
 from ..masks import Stuck, stuck_readings
 
 WARMER_C = 5.0
-MOST_CLIPPED, MOST_LOST = 0.2, 0.5
+MOST_SPOILT, MOST_LOST = 0.2, 0.5
 # A longer gap is an interruption of the session, which says nothing about the link.
 INTERRUPTED_S = 10.0
-# The accelerometer's noise is vibration where it exceeds this and TIMES_NOISE that of the flat segment for such a share
+# The accelerometer's noise is vibration where it exceeds this and TIMES_NOISE that of the flat segment for MOST_SPOILT
 # of the time, or where it is at rest more than that of any sensor.
-VIBRATING_MPS2, VIBRATING_SHARE = 0.2, 0.2
+VIBRATING_MPS2 = 0.2
 # Below this rate, fourth differences do not separate a tremor of up to 12 Hz from noise: only what is larger than the
 # noise of any sensor is vibration.
 SEPARABLE_HZ = 48.0
@@ -42,7 +42,7 @@ def clipped(code: str, mask: str, e: Evidence) -> Reason | None:
     """Find samples at the end of a sensor's range, which a mask of the recording marks."""
     marked: Mask = getattr(e.recording, mask)
     share = float(marked.mean())
-    return reason(code, "samples", share > MOST_CLIPPED, count=int(marked.sum()), share=share) if share else None
+    return reason(code, "samples", share > MOST_SPOILT, count=int(marked.sum()), share=share) if share else None
 
 
 def data_lost(e: Evidence) -> Reason | None:
@@ -110,7 +110,7 @@ def vibrating(e: Evidence) -> Reason | None:
     least = NOISIEST_ACC_MPS2 if e.recording.rate_hz < SEPARABLE_HZ else VIBRATING_MPS2
     share = float(np.mean(std > np.maximum(least, TIMES_NOISE * np.sqrt(e.rest.Sigma_a.mean()))))
     at_rest = float(np.median(std[e.rest.first : e.rest.last]))
-    if share < VIBRATING_SHARE and at_rest < NOISIEST_ACC_MPS2:
+    if share < MOST_SPOILT and at_rest < NOISIEST_ACC_MPS2:
         return None
     return reason(
         "vibrating",

@@ -12,8 +12,8 @@ from ...rests.limits import LEAST_TURN_RAD
 from ..evidence import Evidence, once
 from ..masks import stuck_readings
 from ..rotation import lengths
+from ..scores import FEWEST_SAMPLES
 
-FEWEST_SAMPLES = 50
 SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
 # Times of a slow logger may be so many seconds apart; those of any sensor in milliseconds are farther apart.
