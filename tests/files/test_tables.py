@@ -1166,13 +1166,17 @@ def test_increments_of_velocity_and_angle_are_rates_times_the_period(names, unit
 
 
 def test_increments_that_nothing_shows_are_read_as_the_user_says(walk, table, assert_same):
-    """Suggest units that fit the length of gravity, where rates do not turn it."""
+    """Suggest units that fit the length of gravity, where rates do not turn it, and the order of columns."""
     path = table(f"time,{AXES.strip()}", walk.t, walk.acc / 100, 0.0 * walk.gyr)
     with pytest.raises(RecordingError, match="gravity is not in it") as refused:
         mpucal.load(path)
     assert refused.value.options == "--units acc=m/s/sample,gyr=rad/sample"
     found = mpucal.load(path, units=refused.value.options.split()[1])
     np.testing.assert_allclose(found.acc, walk.acc, atol=1e-9)
+    noise = np.random.default_rng(16).normal(0.0, 1e-5, walk.gyr.shape)
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(table("", walk.t, noise, walk.acc / 100))
+    assert refused.value.options == "--columns t,gx,gy,gz,ax,ay,az --units acc=m/s/sample,gyr=rad/sample"
 
 
 @pytest.mark.parametrize(("per_g", "odd"), [(4096, False), (4300, False), (5420, True), (3000, True)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -30,6 +31,7 @@ from .shown_units import BEYOND
 from .table import Table
 
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
+OF_ARRAY = re.compile(r"(.*)\(\d+\)").fullmatch
 _GIVE_VALUES = "export the accelerometer's own values and the rates of the gyroscope"
 
 
@@ -116,7 +118,9 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
             f"{table.name} holds no columns of an accelerometer; its columns are {names}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
         )
-    likely = likely_columns(_numbers(table), [clock.place for clock in table.clocks(columns)])
+    # name(1), name(2) and so on are of a matrix
+    arrays = {place: found[1] for place, name in enumerate(table.header) if (found := OF_ARRAY(name))}
+    likely = likely_columns(_numbers(table), [clock.place for clock in table.clocks(columns)], arrays)
     if likely is None:
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
         return RecordingError(what, _GIVE_VALUES)

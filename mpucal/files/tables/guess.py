@@ -8,6 +8,7 @@ units. Nothing is guessed that physics does not confirm.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from .shown_units import (
     turning,
     typical_size,
 )
-from .units import QUANTITIES
+from .units import OF_INCREMENTS, QUANTITIES
 
 # place -> (n,)
 Columns = Mapping[int, Vector]
@@ -75,10 +76,14 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
     return alone | (dict(zip("t", clocks, strict=False)) if alone else {})
 
 
-def likely_columns(of: Columns, clocks: Sequence[int]) -> tuple[dict[str, int], str] | None:
+def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]) -> tuple[dict[str, int], str] | None:
     """Return role -> place of triples of columns that are the sensors', and a unit of the accelerations to be named.
 
     They are none if there are no triples. None if no triple may be as long as gravity.
+
+    Parameters
+    ----------
+    arrays : place -> the array of which it is a column; a triple is of one.
     """
     increasing = [place for place in of if _hardly_decreases(of[place])]
     clocks = clocks or [place for place in increasing if is_even_clock(of[place]) or _begins_anew(of[place])]
@@ -86,23 +91,29 @@ def likely_columns(of: Columns, clocks: Sequence[int]) -> tuple[dict[str, int], 
     vary = [place for place in places if np.ptp(of[place]) > 0.0]
     # other columns may be before theirs, such as a label that never changes
     places = places[places.index(vary[0]) :] if vary else places
-    alignments = [_sized_triples(of, some) for some in (places, vary, vary[1:], vary[2:])]
+    alignments = [_sized_triples(of, some, arrays) for some in (places, vary, vary[1:], vary[2:])]
     triples, sized, acc = next((found for found in alignments if found[2]), alignments[0])
-    if not sized:
+    t = _seconds(next((of[at] for at in clocks if at in of), None), len(next(iter(of.values()))), Hints())
+    rate_hz = 1.0 / sample_period(t)
+    increments = () if sized else next((triple for triple, a in triples.items() if _is_in_si(a * rate_hz)), ())
+    if not sized and not increments:
         return None if triples else ({}, "")
-    acc = acc or sized[0]
-    values, t = triples[acc], _seconds(next((of[at] for at in clocks if at in of), None), len(triples[acc]), Hints())
+    acc = acc or increments or sized[0]
+    values = triples[acc]
     # rates turn gravity and are none at times, other than a magnetic field
     others = [triple for triple in triples if triple != acc]
     others.sort(key=lambda triple: _least(triples[triple]) - turning(t, values, triples[triple])[1])
     found = [place for triple in (acc, *others[:1]) for place in triple]
     roles = dict(zip(ROLES[1:], found, strict=False)) | dict(zip("t", clocks, strict=False))
-    return roles, "" if _has_size(values) else mean_acceleration_unit(values)
+    return roles, OF_INCREMENTS if increments else "" if _has_size(values) else mean_acceleration_unit(values)
 
 
-def _sized_triples(of: Columns, places: Sequence[int]) -> tuple[dict[Places, Vector], list[Places], Places]:
+def _sized_triples(
+    of: Columns, places: Sequence[int], arrays: Mapping[int, str]
+) -> tuple[dict[Places, Vector], list[Places], Places]:
     """Return the triples of columns, those that may be as long as gravity, and the first that keeps its length."""
-    triples = {triple: _stacked(of, triple) for triple in _triples(places)}
+    of_arrays = (_triples([*group]) for _, group in groupby(places, arrays.get))
+    triples = {triple: _stacked(of, triple) for group in of_arrays for triple in group}
     sized = [triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)]
     steady = (triple for triple in sized if _keeps_size(triples[triple]) and all(np.ptp(of[at]) > 0.0 for at in triple))
     return triples, sized, next(steady, ())

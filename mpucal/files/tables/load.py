@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...clocks.stamps import FEWEST
+from ...clocks.stamps import FEWEST, sample_period
 from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
 from ..hints import NO_HINTS, ROLES, Hints
@@ -244,7 +244,7 @@ def sensor_stream(
     for clock in sorted(of_sensor, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit)):
         has = kept if others else ~empty | table.has(clock)
         found = table.times(clock, has)
-        weak = clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() == "t")
+        weak = clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() in ("t", "ts"))
         is_time = _increases(found[0]) if weak else True
         # the numbers of samples are no times
         if is_time and (found[2] or not is_index(found[0])):
@@ -277,4 +277,4 @@ def _are_of_others(table: Table, empty: Mask) -> bool:
 def _increases(ticks: Vector) -> bool:
     """Return True if times hardly ever decrease, other than a temperature that is called t."""
     steps = np.diff(ticks)
-    return bool((steps > 0).any() and np.count_nonzero(steps < 0) * FEWEST <= len(steps))
+    return sample_period(ticks) > 0.0 and bool(np.count_nonzero(steps < 0) * FEWEST <= len(steps))

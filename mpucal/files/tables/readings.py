@@ -12,7 +12,7 @@ from ...errors import RecordingError
 from ..hints import Hints
 from . import shown_units as units
 from .times import Stream
-from .units import COUNTS, OF_BNO055, QUANTITIES, resolve_unit
+from .units import COUNTS, OF_BNO055, OF_INCREMENTS, QUANTITIES, resolve_unit
 
 # octaves: half way to the next range, which leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
@@ -80,7 +80,7 @@ def accelerations(
             f"--units acc={near}",
         )
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
-        increments = "--units acc=m/s/sample,gyr=rad/sample" if units.is_gravity(size * rate_hz) else ""
+        increments = f"--units acc={OF_INCREMENTS}" if units.is_gravity(size * rate_hz) else ""
         raise RecordingError(
             f"{name}: the median |a| is only {f'{size:.3g} {said}'.strip()}, so gravity is not in it",
             "give the accelerometer's own values, not the linear acceleration computed from them"
@@ -90,7 +90,8 @@ def accelerations(
     likely = units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
     likely = likely or not (values == np.rint(values)).all()
     seen = hints.units.get("acc", (likely_whole or seen if said or likely else "") or said)
-    unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}")
+    likely = size <= units.LARGEST_OF_SI
+    unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}", likely=likely)
     return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}{OR_MG if likely_whole not in ('', 'mg') else ''}")
 
 

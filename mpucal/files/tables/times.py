@@ -114,7 +114,7 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     # milliseconds are whole numbers: a fraction of them is a slow recording's second
     slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
     seen = hints.units.get("t", units.time_unit(step, named or _unit_of_date(stream.origin) or slow))
-    unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}")
+    unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}", likely=step > 0.0)
     t, said = ticks * QUANTITIES["t"][unit], f"times in {unit}"
     back, (on, begins) = np.flatnonzero(np.diff(t) < 0) + 1, go_on(t)
     anew = np.flatnonzero(begins)

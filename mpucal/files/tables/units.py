@@ -39,6 +39,8 @@ QUANTITIES = {
 }
 # units of what an integrating sensor gives for each sample, increments of velocity and angle -> of these by the time
 PER_SAMPLE = {"m/s/sample": "m/s^2", "rad/sample": "rad/s", "deg/sample": "deg/s"}
+# as `--units acc=` names them, beside angles in the unit that most programs write
+OF_INCREMENTS = "m/s/sample,gyr=rad/sample"
 # the counts of a BNO055 (BST-BNO055-DS000, UNIT_SEL 0), which samples hardly tell from mg and mrad/s
 OF_BNO055 = {"acc": "cm/s^2", "gyr": "deg/s/16"}
 _SPELLED = {
@@ -85,12 +87,13 @@ def find_unit(text: str) -> str:
     return _NAMES.get(text.strip().lower().translate(_PLAIN), "")
 
 
-def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str) -> str:
+def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str, *, likely: bool = True) -> str:
     """Return the unit that was named, or else the one that the samples show.
 
     Parameters
     ----------
     said, seen : these units; empty if unknown. evidence : the observation behind `seen`, for the message.
+    likely : whether the unit that most programs write is one to try.
 
     Raises
     ------
@@ -103,10 +106,12 @@ def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str) 
             f"--units {quantity}={seen}",
         )
     if not said and not seen:
-        known = ", ".join(unit for unit in QUANTITIES[quantity] if unit != LIKELY[quantity])
+        usual, known = LIKELY[quantity], ", ".join(unit for unit in QUANTITIES[quantity] if unit != LIKELY[quantity])
         raise RecordingError(
             f"{name}: the unit of {quantity} is not known, and {evidence} fits none",
-            f"name it with --units {quantity}={LIKELY[quantity]}, or another of {known}",
-            f"--units {quantity}={LIKELY[quantity]}",
+            f"name it with --units {quantity}={usual}, or another of {known}"
+            if likely
+            else f"convert it to {usual}, or name it with --units {quantity}=UNIT, one of {known}",
+            f"--units {quantity}={usual}" if likely else "",
         )
     return said or seen
