@@ -59,31 +59,24 @@ class Port(Protocol):
 
     def now_ns(self) -> int:
         """Return the host's time."""
-        ...
 
     def read(self, until_ns: int) -> Chunk | None:
         """Return received bytes; wait for them until the host's clock shows `until_ns`, then return None."""
-        ...
 
     def write(self, data: bytes) -> None:
         """Write `data`."""
-        ...
 
     def set_baud(self, baud: int) -> None:
         """Change the rate."""
-        ...
 
     def reopen(self, until_ns: int) -> None:
         """Open a port that was gone again, with retries until the host's clock shows `until_ns`."""
-        ...
 
     def revive(self, until_ns: int) -> None:
         """Restart the program behind the port if the port itself started it."""
-        ...
 
     def close(self) -> None:
         """Close the port."""
-        ...
 
 
 class SerialPort:
@@ -181,11 +174,9 @@ class Reader(Protocol):
 
     def get(self, timeout_s: float) -> Chunk | BusError | None:
         """Return the next chunk, or the error that ended the reading; None if there is none within `timeout_s`."""
-        ...
 
     def close(self) -> None:
         """Stop reading."""
-        ...
 
 
 class ThreadReader:

@@ -34,19 +34,15 @@ class Bus(Protocol):
 
         FIFO_R_W does not auto-increment. The time is the read's beginning.
         """
-        ...
 
     def write(self, register: Any, data: bytes) -> int:
         """Write `data` from `register` on, or to a file, and return the time."""
-        ...
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bus's clock shows `t_ns` (a replay and a fast simulation return at once)."""
-        ...
 
     def close(self) -> None:
         """Release the device."""
-        ...
 
 
 class Failure(NamedTuple):

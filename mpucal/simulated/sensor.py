@@ -175,7 +175,6 @@ class Feed(Protocol):
 
     def samples(self, edges_s: Vector, setting: Setting) -> Counts:
         """Return (n, 7) int16 in register order between (n + 1,) times [s]; fewer at the feed's end."""
-        ...
 
 
 class SensorFeed:
