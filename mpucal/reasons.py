@@ -96,8 +96,10 @@ class Kind:
     @classmethod
     def of(cls, rows: Mapping[str, Any]) -> Self:
         """Return the kind of a table of reasons.toml, in which the tables are the sentences."""
-        sentences = {name: Sentence(**row) for name, row in rows.items() if isinstance(row, dict)}
-        return cls(sentences=sentences, **{key: value for key, value in rows.items() if key not in sentences})
+        own, usual = dict(rows), {key: rows[key] for key in Sentence.__match_args__ if key in rows}
+        names = [name for name, row in rows.items() if isinstance(row, dict)]
+        sentences = {name: Sentence(**{**usual, **own.pop(name)}) for name in names}
+        return cls(sentences=sentences, **{key: value for key, value in own.items() if key not in usual})
 
     @property
     def refuses(self) -> str:

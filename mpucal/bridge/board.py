@@ -1,6 +1,7 @@
 """Serial bridge for MicroPython; see firmware_protocol.md. mpucal pastes this program, which runs from RAM.
 
-The last line that is pasted calls `main`. On the host only tests run it.
+The last line that is pasted calls `main`, and the values of what is imported from mpucal stand in place of the imports
+(`micropython.py: minify`). On the host only tests run it.
 """
 
 import binascii
@@ -10,13 +11,13 @@ import struct
 import sys
 import time
 
+from ..chip.registers import FIFO_COUNT_H, FIFO_R_W, INT_FIFO_OFLOW, INT_STATUS
+from ..result.blob import MAX_LENGTH
+from ..sources.host_bus import ADDRESSES
+from .frame import MAX_ENCODED
+from .messages import MAGIC, MAX_BATCH, MAX_BURST, MAX_LOOK, MAX_READ, MAX_WRITE, REPLY_BIT, Feature, Status
+
 NAME = b"mpucal-mpy 1\0\0\0\0"
-STREAM, BLOB, LEAVE = 1, 2, 4
-OK, NO_HELLO, UNKNOWN_TYPE, BAD_PAYLOAD, BAD_VERSION, NO_ANSWER, BUS_FAILED, OVERFLOW = range(8)
-NO_BLOB, BAD_BLOB, BAD_OFFSET, NO_ROOM, NOT_BEGUN, STORAGE_FAILED = range(8, 14)
-ADDRESSES = (0x68, 0x69)
-INT_STATUS, FIFO_COUNT, FIFO_R_W = 0x3A, 0x72, 0x74
-MAX_READ, MAX_WRITE, MAX_BURST, MAX_BATCH, MAX_LOOK, MAX_ENCODED, MAX_BLOB = 56, 32, 4096, 32, 73, 71, 256
 BEAT_US = 100_000
 # A board's clock has fewer bits than the protocol's.
 TICKS = 2**30 - 1
@@ -70,7 +71,7 @@ def unframed(encoded):
 
 def is_valid(blob):
     """Return True if `blob` is valid for a reader."""
-    if not 188 <= len(blob) <= MAX_BLOB or blob[:5] != b"MPUC\1" or struct.unpack("<H", blob[6:8])[0] != len(blob):
+    if not 188 <= len(blob) <= MAX_LENGTH or blob[:5] != b"MPUC\1" or struct.unpack("<H", blob[6:8])[0] != len(blob):
         return False
     if binascii.crc32(blob[:-4]) != struct.unpack("<I", blob[-4:])[0]:
         return False
@@ -93,7 +94,7 @@ class Failed(Exception):
 def check_size(count, most):
     """Refuse a request of no bytes, or of more than `most`."""
     if not 1 <= count <= most:
-        raise Failed(BAD_PAYLOAD)
+        raise Failed(Status.BAD_PAYLOAD)
 
 
 class Chip:
@@ -126,7 +127,7 @@ class Chip:
     def transfer(self, access):
         """Make an access, and convert its error to a status."""
         if not self.address:
-            raise Failed(NO_ANSWER)
+            raise Failed(Status.NO_ANSWER)
         try:
             return access()
         except OSError as error:
@@ -135,12 +136,12 @@ class Chip:
     def status_of(self, error):
         """Return the status of a failed transfer: a missing acknowledge has another number on each board."""
         if error.args[0] in TIMED_OUT:
-            return BUS_FAILED
+            return Status.BUS_FAILED
         try:
             self.i2c.readfrom(self.address, 1)
         except OSError as again:
-            return BUS_FAILED if again.args[0] in TIMED_OUT else NO_ANSWER
-        return BUS_FAILED
+            return Status.BUS_FAILED if again.args[0] in TIMED_OUT else Status.NO_ANSWER
+        return Status.BUS_FAILED
 
 
 class BlobFiles:
@@ -195,9 +196,9 @@ class BlobFiles:
         try:
             self.keep(free, struct.pack("<II", generation, generation ^ 0xFFFFFFFF) + blob)
         except OSError:
-            raise Failed(STORAGE_FAILED)
+            raise Failed(Status.STORAGE_FAILED)
         if self.slot(free) != (generation, blob):
-            raise Failed(STORAGE_FAILED)
+            raise Failed(Status.STORAGE_FAILED)
         return generation
 
 
@@ -207,7 +208,7 @@ class Bridge:
     `left` : True after the host has sent LEAVE. `features`, `window`, `name` : what HELLO_REPLY says of it.
     """
 
-    features, window, name = STREAM | BLOB | LEAVE, 2, NAME
+    features, window, name = Feature.STREAM | Feature.BLOB | Feature.LEAVE, 2, NAME
 
     def __init__(self, buses, ticks_us, folder=""):
         self.chip, self.files = Chip(buses), BlobFiles(folder)
@@ -239,7 +240,7 @@ class Bridge:
                     self.piece.append(byte)
                 continue
             content = unframed(bytes(self.piece)) if len(self.piece) <= MAX_ENCODED else None
-            if content and content[0] < 0x80:
+            if content and content[0] < REPLY_BIT:
                 self.inbox.append(content)
             self.piece = bytearray()
 
@@ -249,7 +250,7 @@ class Bridge:
         while self.inbox:
             content = self.inbox.pop(0)
             for payload in self.answer(content[0], content[1], content[2:]):
-                out += framed(content[0] | 0x80, content[1], payload)
+                out += framed(content[0] | REPLY_BIT, content[1], payload)
         return out + self.push() if self.frame_bytes else out
 
     def clock(self):
@@ -267,13 +268,13 @@ class Bridge:
         """Carry out a request, and return the payloads of its replies."""
         self.began_us = self.clock()
         if not self.greeted and kind != 1:
-            return self.reply(NO_HELLO)
+            return self.reply(Status.NO_HELLO)
         if kind not in self.requests:
-            return self.reply(UNKNOWN_TYPE)
+            return self.reply(Status.UNKNOWN_TYPE)
         form, act = self.requests[kind]
         size = struct.calcsize(form)
         if len(payload) < size:
-            return self.reply(BAD_PAYLOAD)
+            return self.reply(Status.BAD_PAYLOAD)
         values = struct.unpack(form, payload[:size])
         if kind in (1, 4, 19):
             values += (payload[size:],)
@@ -286,24 +287,24 @@ class Bridge:
 
     def hello(self, magic, major, _minor, rest):
         """Answer HELLO with the bridge's description."""
-        if magic != b"MPUB" or (major == 1 and not b"" < rest[:1] < b"\x80"):
-            return self.reply(BAD_PAYLOAD)
+        if magic != MAGIC or (major == 1 and not b"" < rest[:1] < b"\x80"):
+            return self.reply(Status.BAD_PAYLOAD)
         if major == 1:
             address = rest[0]
             self.greeted, self.frame_bytes, self.drops, self.files.begun = True, 0, 0, None
             self.chip.find((address,) if address else ADDRESSES)
-        here = struct.pack("<BBBBBH", 1, 0, self.chip.address, self.features, self.window, MAX_BLOB)
-        return self.reply(OK if major == 1 else BAD_VERSION, b"MPUB" + here + self.name)
+        here = struct.pack("<BBBBBH", 1, 0, self.chip.address, self.features, self.window, MAX_LENGTH)
+        return self.reply(Status.OK if major == 1 else Status.BAD_VERSION, MAGIC + here + self.name)
 
     def leave(self):
         """Note that the program is to end."""
         self.left, self.frame_bytes = True, 0
-        return self.reply(OK)
+        return self.reply(Status.OK)
 
     def read(self, register, count):
         """Read registers."""
         check_size(count, MAX_READ)
-        return self.reply(OK, self.chip.read(register, count))
+        return self.reply(Status.OK, self.chip.read(register, count))
 
     def burst(self, register, count):
         """Read a register that does not auto-increment, in several replies."""
@@ -312,7 +313,8 @@ class Bridge:
         for at in range(0, count, MAX_READ):
             self.began_us = self.clock()
             try:
-                made += self.reply(OK, struct.pack("<H", at) + self.chip.read(register, min(MAX_READ, count - at)))
+                data = self.chip.read(register, min(MAX_READ, count - at))
+                made += self.reply(Status.OK, struct.pack("<H", at) + data)
             except Failed as error:
                 return made + self.reply(error.args[0])
         return made
@@ -321,16 +323,16 @@ class Bridge:
         """Write registers."""
         check_size(len(data), MAX_WRITE)
         self.chip.write(register, data)
-        return self.reply(OK)
+        return self.reply(Status.OK)
 
     def stream(self, frame_bytes, batch, seq):
         """Start or stop pushing the FIFO's content."""
         if frame_bytes > MAX_READ or (frame_bytes and not 1 <= batch <= MAX_BATCH):
-            raise Failed(BAD_PAYLOAD)
+            raise Failed(Status.BAD_PAYLOAD)
         self.frame_bytes, self.batch, self.seq = frame_bytes, batch, seq
         self.index = self.status = 0
         self.pushed_us = self.began_us
-        return self.reply(OK)
+        return self.reply(Status.OK)
 
     def push(self):
         """Return the frames to push, if any are due."""
@@ -351,9 +353,9 @@ class Bridge:
     def drain(self, made, now, late):
         """Read a running FIFO if it has enough frames, or the last message is old; append the messages to `made`."""
         size = self.frame_bytes
-        left = struct.unpack(">H", self.chip.read(FIFO_COUNT, 2))[0] // size
+        left = struct.unpack(">H", self.chip.read(FIFO_COUNT_H, 2))[0] // size
         if left > MAX_LOOK:
-            raise Failed(OVERFLOW)
+            raise Failed(Status.OVERFLOW)
         if left < self.batch and not late:
             return
         while True:
@@ -363,8 +365,8 @@ class Bridge:
             if not left:
                 break
             made.append(self.frames(now, data, left))
-        if self.chip.read(INT_STATUS, 1)[0] & 0x10:
-            raise Failed(OVERFLOW)
+        if self.chip.read(INT_STATUS, 1)[0] & INT_FIFO_OFLOW:
+            raise Failed(Status.OVERFLOW)
         made.append(self.frames(now, data))
 
     def halt(self, status, now):
@@ -383,38 +385,38 @@ class Bridge:
         """Describe the stored blob."""
         _, generation, blob = self.files.stored()
         if blob is None:
-            return self.reply(NO_BLOB, bytes(10))
-        return self.reply(OK, struct.pack("<IH", generation, len(blob)) + blob[-4:])
+            return self.reply(Status.NO_BLOB, bytes(10))
+        return self.reply(Status.OK, struct.pack("<IH", generation, len(blob)) + blob[-4:])
 
     def blob_read(self, offset, count):
         """Read a part of the stored blob."""
         check_size(count, MAX_READ)
         blob = self.files.stored()[2]
         if blob is None:
-            raise Failed(NO_BLOB)
+            raise Failed(Status.NO_BLOB)
         if offset + count > len(blob):
-            raise Failed(BAD_OFFSET)
-        return self.reply(OK, blob[offset : offset + count])
+            raise Failed(Status.BAD_OFFSET)
+        return self.reply(Status.OK, blob[offset : offset + count])
 
     def blob_begin(self, length):
         """Prepare for a blob of `length` bytes."""
-        if length > MAX_BLOB:
-            raise Failed(NO_ROOM)
+        if length > MAX_LENGTH:
+            raise Failed(Status.NO_ROOM)
         self.frame_bytes, self.length = 0, length
         self.files.remove(1 - self.files.stored()[0])
         self.files.begun = bytearray()
-        return self.reply(OK)
+        return self.reply(Status.OK)
 
     def blob_data(self, offset, data):
         """Receive a part of the blob."""
         check_size(len(data), MAX_WRITE)
         begun = self.files.begun
         if begun is None:
-            raise Failed(NOT_BEGUN)
+            raise Failed(Status.NOT_BEGUN)
         if offset > len(begun) or offset + len(data) > self.length:
-            raise Failed(BAD_OFFSET)
+            raise Failed(Status.BAD_OFFSET)
         self.files.begun = begun[:offset] + data + begun[offset + len(data) :]
-        return self.reply(OK)
+        return self.reply(Status.OK)
 
     def blob_commit(self, length, crc):
         """Check and store the received blob."""
@@ -422,14 +424,14 @@ class Bridge:
         begun = self.files.begun
         if begun is None:
             if blob is None or (len(blob), blob[-4:]) != (length, struct.pack("<I", crc)):
-                raise Failed(NOT_BEGUN)
+                raise Failed(Status.NOT_BEGUN)
         elif len(begun) != self.length or length != self.length:
-            raise Failed(BAD_OFFSET)
+            raise Failed(Status.BAD_OFFSET)
         elif not is_valid(bytes(begun)) or begun[-4:] != struct.pack("<I", crc):
-            raise Failed(BAD_BLOB)
+            raise Failed(Status.BAD_BLOB)
         else:
             generation = self.files.commit()
-        return self.reply(OK, struct.pack("<I", generation))
+        return self.reply(Status.OK, struct.pack("<I", generation))
 
     def blob_erase(self):
         """Erase the stored blob."""
@@ -437,7 +439,7 @@ class Bridge:
         self.files.begun = None
         self.files.remove(1 - used)
         self.files.remove(used)
-        return self.reply(OK if self.files.stored()[2] is None else STORAGE_FAILED)
+        return self.reply(Status.OK if self.files.stored()[2] is None else Status.STORAGE_FAILED)
 
 
 def buses(machine, pins):

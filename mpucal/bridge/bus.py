@@ -16,21 +16,9 @@ from ..chip.access import Reply
 from ..chip.driver import STATUS_BYTES
 from ..clocks.sample_clock import poll_phase
 from ..errors import BusError, NoAnswer
+from . import messages as wire
 from .chip_state import CONTROLS, ChipState
 from .link import MS, Link, LinkLost
-from .messages import (
-    MAX_READ,
-    Burst,
-    BurstReply,
-    Feature,
-    Frames,
-    Message,
-    Read,
-    ReadReply,
-    Status,
-    Stream,
-    Write,
-)
 from .port import Port
 from .port_errors import WIRES, no_reply, request_failed
 from .read_ahead import ReadAhead
@@ -101,14 +89,14 @@ class BridgeBus:
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time."""
-        requests: list[Message] = []
+        requests: list[wire.Message] = []
         controls = register in CONTROLS
         if controls and self._ahead is not None:
             self._ahead = None
-            requests.append(Stream(0, 0))
-        requests.append(Write(register, data))
+            requests.append(wire.Stream(0, 0))
+        requests.append(wire.Write(register, data))
         self._chip.on_write(register, data)
-        has_stream = bool(self.link.bridge.features & Feature.STREAM)
+        has_stream = bool(self.link.bridge.features & wire.Feature.STREAM)
         if controls and has_stream and self._chip.fills_with_frames:
             return self._start_stream(*requests)
         return self._not_after_looks(self._ask(*requests)[-1][-1].t_ns)
@@ -165,7 +153,7 @@ class BridgeBus:
     def _not_after_looks(self, t_ns: int) -> int:
         return t_ns if self._ahead is None else self._ahead.not_after_looks(t_ns)
 
-    def _start_stream(self, *before: Message) -> int:
+    def _start_stream(self, *before: wire.Message) -> int:
         """Send the requests `before` and start the stream; return the time of the last of `before`.
 
         All are sent at once, since the FIFO must not fill while the host waits for a reply.
@@ -175,7 +163,7 @@ class BridgeBus:
         # Prepared before the request: the first frames may come together with its reply.
         self._ahead = ReadAhead(self.link.seq_of(len(before)))
         try:
-            answers = self._ask(*before, Stream(reg.FRAME_BYTES, BATCH))
+            answers = self._ask(*before, wire.Stream(reg.FRAME_BYTES, BATCH))
         except BusError:
             if self._ahead is not None:
                 self._ahead = None
@@ -185,7 +173,7 @@ class BridgeBus:
 
     def _stop_stream(self) -> None:
         with suppress(BusError):
-            self.link.ask(Stream(0, 0))
+            self.link.ask(wire.Stream(0, 0))
 
     def _wait_for_count(self, ahead: ReadAhead) -> tuple[int, int, int]:
         give_up_ns = self._port.now_ns() + GONE_NS + self.link.latency.most_ns
@@ -201,11 +189,11 @@ class BridgeBus:
                 raise
         return ahead.count()
 
-    def _on_frames(self, seq: int, frames: Frames, t_ns: int, host_ns: int) -> None:
+    def _on_frames(self, seq: int, frames: wire.Frames, t_ns: int, host_ns: int) -> None:
         if self._ahead is not None and seq == self._ahead.seq:
             self._ahead.push(frames, t_ns, host_ns)
 
-    def _ask(self, *requests: Message) -> list[list[Answer]]:
+    def _ask(self, *requests: wire.Message) -> list[list[Answer]]:
         """Send the requests and return their answers, none of which is a failure.
 
         Raises
@@ -221,9 +209,9 @@ class BridgeBus:
             raise
         for several in answers:
             status = several[-1].reply.status
-            if status != Status.OK:
+            if status != wire.Status.OK:
                 # A burst is several transfers, and the first ones may have taken bytes.
-                kind = NoAnswer if status == Status.NO_ANSWER and len(several) == 1 else BusError
+                kind = NoAnswer if status == wire.Status.NO_ANSWER and len(several) == 1 else BusError
                 raise kind(*request_failed(self._port.name, status))
         return answers
 
@@ -247,16 +235,16 @@ class BridgeBus:
             raise error from still
 
 
-def _reads(register: int, count: int) -> Iterator[Message]:
+def _reads(register: int, count: int) -> Iterator[wire.Message]:
     """Yield the requests for `count` bytes from `register` on."""
     if register == reg.FIFO_R_W:
-        yield Burst(register, count) if count > MAX_READ else Read(register, count)
+        yield wire.Burst(register, count) if count > wire.MAX_READ else wire.Read(register, count)
         return
-    for at in range(0, count, MAX_READ):
-        yield Read(register + at, min(MAX_READ, count - at))
+    for at in range(0, count, wire.MAX_READ):
+        yield wire.Read(register + at, min(wire.MAX_READ, count - at))
 
 
 def _data(answers: Iterable[Answer]) -> Iterator[bytes]:
     for answer in answers:
-        if isinstance(answer.reply, ReadReply | BurstReply):
+        if isinstance(answer.reply, wire.ReadReply | wire.BurstReply):
             yield answer.reply.data

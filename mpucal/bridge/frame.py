@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 DELIMITER = b"\0"
 DELIMITERS = re.compile(rb"\0+")
-MAX_PAYLOAD = 66
-MAX_CONTENT = 70
-MAX_ENCODED = 71
-
 HEADER = struct.Struct("<B B")
 CHECKSUM = struct.Struct("<H")
+
+MAX_PAYLOAD = 66
+MAX_CONTENT = HEADER.size + MAX_PAYLOAD + CHECKSUM.size
+MAX_ENCODED = MAX_CONTENT + 1
 CRC_INITIAL = 0xFFFF
 
 

@@ -12,23 +12,8 @@ from itertools import cycle
 
 from ..clocks.device_clocks import BridgeClock
 from ..errors import BusError, LinkError
+from . import messages as wire
 from .frame import DELIMITER, Deframer, Frame
-from .messages import (
-    MAJOR,
-    MIN_WINDOW,
-    BlobBegin,
-    BlobCommit,
-    BlobData,
-    BlobErase,
-    Frames,
-    Hello,
-    HelloReply,
-    Message,
-    MessageError,
-    Reply,
-    Status,
-    answer_of,
-)
 from .port import Chunk, Port
 from .port_errors import PortDiagnosis, flooded, no_reply
 from .requests import Answer, Latency, PendingRequest
@@ -47,9 +32,9 @@ FLOODS = 2
 # Ctrl-B leaves the raw mode of a REPL, which the bytes of a HELLO enter.
 NORMAL_REPL = b"\x02"
 
-STORING = (BlobBegin, BlobData, BlobCommit, BlobErase)
+STORING = (wire.BlobBegin, wire.BlobData, wire.BlobCommit, wire.BlobErase)
 
-OnFrames = Callable[[int, Frames, int, int], None]
+OnFrames = Callable[[int, wire.Frames, int, int], None]
 
 
 class LinkLost(LinkError):  # noqa: N818 - reads as the sentence it is
@@ -72,14 +57,14 @@ class Link:
         self.port = port
         self.clock = BridgeClock()
         self.latency = Latency()
-        self.bridge: HelloReply
+        self.bridge: wire.HelloReply
         self._on_frames = on_frames
         self._deframer = Deframer()
         self._seq = 0
-        self._window = MIN_WINDOW
+        self._window = wire.MIN_WINDOW
         self._posted: list[PendingRequest] = []
 
-    def greet(self, address: int = 0, within_ns: int = GREET_NS) -> HelloReply:
+    def greet(self, address: int = 0, within_ns: int = GREET_NS) -> wire.HelloReply:
         """Send HELLO until the bridge answers: an Arduino's boot loader takes two seconds.
 
         Parameters
@@ -101,13 +86,13 @@ class Link:
                 self.port.set_baud(baud)
             reply = self._hello(address, diagnosis, greetings, baud)
             if reply is not None:
-                self.bridge, self._window = reply, max(MIN_WINDOW, reply.window)
+                self.bridge, self._window = reply, max(wire.MIN_WINDOW, reply.window)
                 return reply
         if diagnosis.is_repl:
             self.port.write(NORMAL_REPL)
         raise diagnosis.error(self.port.name, self.port.bauds)
 
-    def ask(self, *requests: Message) -> list[list[Answer]]:
+    def ask(self, *requests: wire.Message) -> list[list[Answer]]:
         """Send requests, several at once, and return the answers to each; the last of these may be a failure.
 
         Raises
@@ -141,7 +126,7 @@ class Link:
             flying = [each for each in flying if not each.done]
         return [each.answers for each in asked]
 
-    def post(self, request: Message) -> PendingRequest:
+    def post(self, request: wire.Message) -> PendingRequest:
         """Send a request that may be carried out twice, without waiting; its answer comes later."""
         (posted,) = self._numbered([request])
         self._send(posted)
@@ -174,7 +159,7 @@ class Link:
         """Close the port."""
         self.port.close()
 
-    def _numbered(self, requests: Sequence[Message]) -> Iterator[PendingRequest]:
+    def _numbered(self, requests: Sequence[wire.Message]) -> Iterator[PendingRequest]:
         for request in requests:
             self._seq = (self._seq + 1) % 256
             yield PendingRequest(self._seq, request)
@@ -186,9 +171,9 @@ class Link:
 
     def _hello(
         self, address: int, diagnosis: PortDiagnosis, greetings: list[PendingRequest], baud: int
-    ) -> HelloReply | None:
+    ) -> wire.HelloReply | None:
         """Send HELLO again; return the answer to any of the `greetings`, since a line may be slower than the next."""
-        greetings += self._numbered([Hello(address=address)])
+        greetings += self._numbered([wire.Hello(address=address)])
         self._send(greetings[-1], again=True)
         until_ns, budget = self.port.now_ns() + HELLO_NS, FLOOD_BYTES
         while (chunk := self.port.read(until_ns)) is not None:
@@ -197,12 +182,11 @@ class Link:
                 asked = next((each for each in greetings if each.is_answered_by(frame, reply)), None)
                 if asked is None:
                     continue
-                if not isinstance(reply, HelloReply) or reply.major != MAJOR:
-                    theirs = reply.major if isinstance(reply, HelloReply) else 0
-                    raise BusError(
-                        f"the bridge on {self.port.name} speaks version {theirs} of the protocol, and mpucal {MAJOR}",
-                        f"put a newer {'mpucal on this machine' if theirs > MAJOR else 'firmware on the bridge'}",
-                    )
+                if not isinstance(reply, wire.HelloReply) or reply.major != wire.MAJOR:
+                    theirs = reply.major if isinstance(reply, wire.HelloReply) else 0
+                    newer = "mpucal on this machine" if theirs > wire.MAJOR else "firmware on the bridge"
+                    speaks = f"the bridge on {self.port.name} speaks version {theirs} of the protocol"
+                    raise BusError(f"{speaks}, and mpucal {wire.MAJOR}", f"put a newer {newer}")
                 self.clock.on_greeting(reply.t_us, chunk.t_ns)
                 self.latency.add(chunk.t_ns - asked.sent_ns)
                 return reply
@@ -216,12 +200,12 @@ class Link:
         """Pass each message to its receiver; return True if one of the `flying` requests was answered."""
         answered = False
         for frame, reply in self._messages(chunk):
-            if isinstance(reply, Frames):
+            if isinstance(reply, wire.Frames):
                 self._on_frames(frame.seq, reply, self.clock.bus_time(reply.t_us, chunk.t_ns), chunk.t_ns)
                 continue
             for each in (*flying, *self._posted):
                 if each.is_answered_by(frame, reply):
-                    if reply.status == Status.NO_HELLO:
+                    if reply.status == wire.Status.NO_HELLO:
                         # The bridge's clock began anew, and this time does not belong to it.
                         raise LinkLost(f"the bridge on {self.port.name} was reset", "check its cable and supply")
                     if each.sent == 1 and not each.answers and not isinstance(each.request, STORING):
@@ -230,7 +214,7 @@ class Link:
                     answered = answered or each in flying
         return answered
 
-    def _messages(self, chunk: Chunk) -> Iterator[tuple[Frame, Reply]]:
+    def _messages(self, chunk: Chunk) -> Iterator[tuple[Frame, wire.Reply]]:
         for frame in self._deframer.feed(chunk.data):
-            with suppress(MessageError):
-                yield frame, answer_of(frame.type, frame.payload)
+            with suppress(wire.MessageError):
+                yield frame, wire.answer_of(frame.type, frame.payload)

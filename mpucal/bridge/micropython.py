@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 from ..errors import BusError
@@ -62,12 +63,26 @@ class MicroPythonPort:
 
 
 def minify(text: str) -> str:
-    """Remove a program's comments and docstrings, which take a board's memory."""
+    """Return a program for a board: without docstrings and comments, which take memory, and imports from mpucal."""
     tree = ast.parse(text)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
             node.body = node.body[1:] or [ast.Pass()]
+    tree.body = [line for node in tree.body for line in _inlined(node)]
     return ast.unparse(tree)
+
+
+def _inlined(node: ast.stmt) -> list[ast.stmt]:
+    """Return a statement; in place of an import from mpucal, the numbers, or enumerations of them, that it imports."""
+    if not isinstance(node, ast.ImportFrom) or not node.level:
+        return [node]
+    module = vars(import_module("." * node.level + str(node.module), __package__))
+    lines = []
+    for name, value in ((each.name, module[each.name]) for each in node.names):
+        members = getattr(value, "__members__", None)
+        lines += [f"{name} = {value!r}"] if members is None else [f"class {name}:"]
+        lines += [f"    {member} = {number:d}" for member, number in (members or {}).items()]
+    return ast.parse("\n".join(lines)).body
 
 
 def _leave_bytes() -> bytes:

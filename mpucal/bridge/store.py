@@ -7,28 +7,11 @@ from typing import NamedTuple, TypeVar
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError, NoStorage
 from ..result.blob import Blob, BlobError
+from . import messages as wire
 from .link import Link
-from .messages import (
-    MAX_CHUNK,
-    MAX_READ,
-    BlobBegin,
-    BlobCommit,
-    BlobData,
-    BlobErase,
-    BlobRead,
-    BlobReadReply,
-    BlobState,
-    BlobStateReply,
-    Feature,
-    Message,
-    Read,
-    ReadReply,
-    Reply,
-    Status,
-)
 from .port_errors import request_failed
 
-R = TypeVar("R", bound=Reply)
+R = TypeVar("R", bound=wire.Reply)
 CRC_BYTES = 4
 
 
@@ -61,7 +44,7 @@ class BlobStore:
     @property
     def occupied(self) -> bool:
         """True if the memory holds other data, which `erase` gives up; until then a write is refused."""
-        return bool(self._link.bridge.features & Feature.OCCUPIED)
+        return bool(self._link.bridge.features & wire.Feature.OCCUPIED)
 
     def greet(self) -> None:
         """Greet the bridge again after it was lost; a write that was in progress is abandoned."""
@@ -71,18 +54,19 @@ class BlobStore:
         """Return the answer of the bridge's chip to WHO_AM_I; None without a chip."""
         if not self._link.bridge.address:
             return None
-        (reply,) = self._ask(ReadReply, Read(WHO_AM_I, 1))
+        (reply,) = self._ask(wire.ReadReply, wire.Read(WHO_AM_I, 1))
         return reply.data[0]
 
     def read(self) -> StoredBlob | None:
         """Read the valid blob; None without one."""
         self._check_feature()
-        reply = self._link.ask(BlobState())[0][-1].reply
-        if reply.status == Status.NO_BLOB:
+        reply = self._link.ask(wire.BlobState())[0][-1].reply
+        if reply.status == wire.Status.NO_BLOB:
             return None
-        state = self._expect(reply, BlobStateReply)
-        requests = [BlobRead(at, min(MAX_READ, state.length - at)) for at in range(0, state.length, MAX_READ)]
-        parts = self._ask(BlobReadReply, *requests)
+        state = self._expect(reply, wire.BlobStateReply)
+        length, step = state.length, wire.MAX_READ
+        requests = [wire.BlobRead(at, min(step, length - at)) for at in range(0, length, step)]
+        parts = self._ask(wire.BlobReadReply, *requests)
         return StoredBlob(state.generation, b"".join(part.data for part in parts))
 
     def take(self) -> StoredBlob:
@@ -94,7 +78,7 @@ class BlobStore:
         """
         stored = self.read()
         if stored is None:
-            raise BusError(*request_failed(self.name, Status.NO_BLOB))
+            raise BusError(*request_failed(self.name, wire.Status.NO_BLOB))
         try:
             Blob.decode(stored.data)
         except BlobError as error:
@@ -105,28 +89,28 @@ class BlobStore:
     def write(self, blob: bytes) -> None:
         """Replace the stored blob, which stays valid until the bridge has checked the new one, or change nothing."""
         self._check_feature()
-        self._ask(Reply, BlobBegin(len(blob)))
-        for at in range(0, len(blob), MAX_CHUNK):
-            self._ask(Reply, BlobData(at, blob[at : at + MAX_CHUNK]))
-        self._ask(Reply, BlobCommit(len(blob), _crc(blob)))
+        self._ask(wire.Reply, wire.BlobBegin(len(blob)))
+        for at in range(0, len(blob), wire.MAX_CHUNK):
+            self._ask(wire.Reply, wire.BlobData(at, blob[at : at + wire.MAX_CHUNK]))
+        self._ask(wire.Reply, wire.BlobCommit(len(blob), _crc(blob)))
 
     def erase(self) -> None:
         """Erase the stored blob, and other data in its place."""
         self._check_feature()
-        self._ask(Reply, BlobErase())
+        self._ask(wire.Reply, wire.BlobErase())
 
     def _check_feature(self) -> None:
-        if not self._link.bridge.features & Feature.BLOB:
+        if not self._link.bridge.features & wire.Feature.BLOB:
             raise NoStorage(
                 f"the bridge on {self.name} cannot store a calibration",
                 "keep calibration.bin where its firmware reads it",
             )
 
-    def _ask(self, kind: type[R], *requests: Message) -> list[R]:
+    def _ask(self, kind: type[R], *requests: wire.Message) -> list[R]:
         return [self._expect(answers[-1].reply, kind) for answers in self._link.ask(*requests)]
 
-    def _expect(self, reply: Reply, kind: type[R]) -> R:
-        if reply.status != Status.OK or not isinstance(reply, kind):
+    def _expect(self, reply: wire.Reply, kind: type[R]) -> R:
+        if reply.status != wire.Status.OK or not isinstance(reply, kind):
             raise BusError(*request_failed(self.name, reply.status))
         return reply
 
