@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from itertools import cycle
 
+from ..chip.port import TRIES
 from ..clocks.device_clocks import BridgeClock
 from ..errors import BusError, LinkError
 from . import messages as wire
@@ -22,7 +23,6 @@ MS = 1_000_000
 # Two and a half times what a bridge needs at most; the line's own latency is added.
 REPLY_NS = 250 * MS
 STORE_NS = 2500 * MS
-TRIES = 3
 HELLO_NS = 300 * MS
 GREET_NS = 5000 * MS
 # A bridge sends a tenth of this while one reply is on its way; a line with more is flooded.

@@ -32,7 +32,7 @@ def chip_contents(bus: Bus) -> dict[str, Any]:
     asleep = bool(port.read(reg.PWR_MGMT_1, 1)[0] & reg.PWR_MGMT_1_SLEEP)
     part = PARTS.get(who_am_i)
     shift = reg.FULL_SCALE_SHIFT if part is None else part.family.gyro_range_shift
-    scale = (accel & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT
+    scale = accel >> reg.FULL_SCALE_SHIFT & reg.FULL_SCALE_CODES
     facts: dict[str, Any] = {
         "who_am_i": who_am_i,
         "chip": None if part is None else part.chip,

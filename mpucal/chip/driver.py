@@ -32,10 +32,9 @@ DRIVER_VERSION = 6
 
 # The driver gives up after so long without a valid sample.
 DEAD_NS = 2_000_000_000
-# A longer poll counts as this long: a host that slept says nothing about the chip.
+# A longer poll counts as this long: a host that slept says nothing about the chip. It is also the time-out of an
+# adapter on a bus that is held: no reply brings the time that it took.
 LONGEST_POLL_NS = 500_000_000
-# Time-out of an adapter on a bus that is held: no reply brings the time that it took.
-BUS_HELD_NS = 500_000_000
 
 # Longer than the chip takes to write a frame, and no whole number of sample intervals.
 FRAME_WRITTEN_NS = 300_000
@@ -300,7 +299,7 @@ class Driver:
 
     def _spent_ns(self, begun_ns: int, trouble: BusError | ChipError | None) -> int:
         """Return the time this poll took, as far as it counts against the chip."""
-        held_ns = BUS_HELD_NS if isinstance(trouble, BusHeld) else 0
+        held_ns = LONGEST_POLL_NS if isinstance(trouble, BusHeld) else 0
         return min(self._port.now_ns - begun_ns, LONGEST_POLL_NS) + held_ns
 
     def _diagnose_silence(self) -> ChipError:

@@ -21,7 +21,7 @@ from .bit_flips import BitFlipFilter, Counts
 from .losses import Loss
 from .settings import Settings
 
-FULL_SCALE_COUNT = 32767
+FULL_SCALE_COUNT = np.iinfo(np.int16).max
 # columns of a frame
 ACCEL, TEMPERATURE, GYRO = slice(0, 3), 3, slice(4, 7)
 

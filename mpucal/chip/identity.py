@@ -20,9 +20,8 @@ from ..errors import ChipError
 from . import registers as reg
 from .families import FIFO_SLACK_BYTES, PARTS, Family, Part, families_with_fifo, part_of
 
-# A board in a hand shows a median magnitude [g] in this range if its sensitivity is half of the data sheet's.
+# A board at rest or in a hand shows a magnitude [g] in this range if its sensitivity is half of the data sheet's.
 MIN_HALF_G, MAX_HALF_G = 0.35, 0.65
-HALF_SENSITIVITY = 0.5
 
 
 class Behaviour:
@@ -67,9 +66,8 @@ class Behaviour:
             return part_of(who_am_i)
         part = replace(self._part_by_behaviour(who_am_i, fifo_bytes), wide_fifo_bytes=self._wide_bytes(fifo_bytes))
         revision = part.family.half_range_revision
-        if revision and self._magnitudes_g and MIN_HALF_G < np.median(self._magnitudes_g) < MAX_HALF_G:
-            return replace(part, chip=f"{part.chip}{revision}", accel_sensitivity=HALF_SENSITIVITY)
-        return part
+        sensitivity = accel_sensitivity(float(np.median(self._magnitudes_g or 1.0))) if revision else 1.0
+        return part if sensitivity == 1.0 else replace(part, chip=part.chip + revision, accel_sensitivity=sensitivity)
 
     def _wide_bytes(self, fifo_bytes: int) -> int | None:
         """Return the size of the FIFO with FIFO_SIZE set if it is larger, else None."""
@@ -108,6 +106,11 @@ class Behaviour:
             self._asleep == family.asleep,
         )
         return sum(signs), -abs(family.fifo_bytes - fifo_bytes)
+
+
+def accel_sensitivity(magnitude_g: float) -> float:
+    """Return the accelerometer's sensitivity relative to the data sheet's, from the median magnitude that it shows."""
+    return 0.5 if MIN_HALF_G < magnitude_g < MAX_HALF_G else 1.0
 
 
 def _with_fifo(part: Part, fifo_bytes: int) -> Part:

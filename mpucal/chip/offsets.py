@@ -28,7 +28,7 @@ Words = tuple[int, int, int]
 PLACES: tuple[Place, ...] = tuple(dict.fromkeys(family.accel_offset_h for family in reversed(FAMILIES)))
 
 RESERVED_BIT = 1
-WORD_MIN, WORD_MAX = -32768, 32767
+WORD = np.iinfo(np.int16)
 
 # A wire that was touched makes contact again within seconds.
 RESTORE_WAITS_NS = tuple(1_000_000 * 4**i for i in range(7))
@@ -86,7 +86,7 @@ def shift_words(words: Words, counts: Iterable[float]) -> Words:
         (old & ~RESERVED_BIT) + 2 * round(count / 2) | (old & RESERVED_BIT)
         for old, count in zip(words, counts, strict=True)
     )
-    if not all(WORD_MIN <= word <= WORD_MAX for word in (x, y, z)):
+    if not all(WORD.min <= word <= WORD.max for word in (x, y, z)):
         raise ChipError(
             f"the offset registers cannot hold {x}, {y}, {z}",
             "use the calibration's files: so large a bias does not fit into the registers with the factory trim",

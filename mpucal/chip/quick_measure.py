@@ -14,10 +14,11 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import BoardMoved, BusError, ChipReset
 from ..rests.stillness import is_untouched
 from . import registers as reg
+from .identity import accel_sensitivity
 from .losses import Loss
 from .port import Port
+from .setup import STARTUP_NS
 
-SETTLE_NS = 100_000_000
 READ_NS, READS = 5_000_000, 100
 
 AFS_SEL, DLPF_CFG, SMPLRT_DIV = 1, 3, 4
@@ -31,7 +32,6 @@ SETTING = {
 }
 # Tries until the board must lie still, 0.6 s each: a person needs some time to put it down.
 PATIENCE = 40
-HALF_SENSITIVITY_G = 0.75
 
 
 @contextmanager
@@ -45,10 +45,10 @@ def temporary_measurement(port: Port, patience: int = PATIENCE) -> Iterator[Temp
     old = {register: port.read(register, 1)[0] for register in SETTING}
     try:
         port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
-        port.sleep(SETTLE_NS)
+        port.sleep(STARTUP_NS)
         for register, value in SETTING.items():
             port.write(register, value)
-        port.sleep(SETTLE_NS)
+        port.sleep(STARTUP_NS)
         yield TemporaryMeasurement(port, patience)
     finally:
         # In reverse order: the chip falls asleep last.
@@ -72,11 +72,11 @@ class TemporaryMeasurement:
         BusError : a transfer failed three times. ChipReset : the chip was reset. ChipError : the board does not rest.
         """
         for _ in range(self._patience):
-            self._port.sleep(SETTLE_NS)
+            self._port.sleep(STARTUP_NS)
             acc_g = read_counts(self._port, reg.ACCEL_WORDS) / reg.ACCEL_LSB_PER_G[AFS_SEL]
             check_registers(self._port, reg.ACCEL_CONFIG, bytes([SETTING[reg.ACCEL_CONFIG]]))
             # Revision C of the 6050 shows half of gravity. It is measured once, since offsets may shift the reading.
-            sensitivity = self._sensitivity or (0.5 if np.linalg.norm(acc_g.mean(0)) < HALF_SENSITIVITY_G else 1.0)
+            sensitivity = self._sensitivity or accel_sensitivity(float(np.linalg.norm(acc_g.mean(0))))
             acc_g /= sensitivity
             if is_untouched(acc_g * STANDARD_GRAVITY_MPS2):
                 self._sensitivity = self._sensitivity or sensitivity

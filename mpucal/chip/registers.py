@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
+from ..data import ACCEL_COUNTS, ACCEL_RANGES_G, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
 # The factory's self-test codes: three bytes each on a 6500, four packed bytes on a 6050.
@@ -32,7 +32,6 @@ USER_CTRL: Final = 0x6A
 PWR_MGMT_1: Final = 0x6B
 PWR_MGMT_2: Final = 0x6C
 FIFO_COUNT_H: Final = 0x72
-FIFO_COUNT_L: Final = 0x73
 FIFO_R_W: Final = 0x74
 WHO_AM_I: Final = 0x75
 
@@ -43,7 +42,6 @@ CONFIG_DLPF_CFG: Final = 0x07
 # GYRO_CONFIG and ACCEL_CONFIG: self test of x, y, z in [7:5], full scale in [4:3]
 SELF_TEST: Final = 0xE0
 FULL_SCALE_SHIFT: Final = 3
-FULL_SCALE: Final = 0x18
 FULL_SCALE_CODES: Final = 0x03
 
 # ACCEL_CONFIG2 (6500 only)
@@ -80,8 +78,7 @@ ACCEL_WORDS: Final = 3
 FRAME_WORDS: Final = 7
 FRAME_BYTES: Final = 2 * FRAME_WORDS
 
-# Full scales by FS_SEL and AFS_SEL.
-ACCEL_RANGES_G: Final = (2, 4, 8, 16)
+# Full scales by FS_SEL; those by AFS_SEL are ACCEL_RANGES_G.
 GYRO_RANGES_DPS: Final = (250, 500, 1000, 2000)
 ACCEL_LSB_PER_G: Final = tuple(ACCEL_COUNTS / full_scale for full_scale in ACCEL_RANGES_G)
 GYRO_LSB_PER_DPS: Final = tuple(GYRO_COUNTS / full_scale for full_scale in GYRO_RANGES_DPS)

@@ -9,12 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import Vector
 from . import registers as reg
 from .families import Part
 from .port import Port
 from .quick_measure import check_registers, read_counts
+
+Codes = NDArray[np.int64]
 
 SETTLE_NS = 250_000_000
 
@@ -77,9 +80,11 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
         check_registers(port, register, value)
     accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
     gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[FS_SEL]
-    accel_g, gyro_dps = _factory_response(port, family.packed_self_test)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(accel_g == 0, np.nan, accel / accel_g), np.where(gyro_dps == 0, np.nan, gyro / gyro_dps)
+    codes = _factory_codes(port, family.packed_self_test)
+    accel_g, gyro_dps = factory_response(family.packed_self_test, *codes)
+    shares = [
+        np.where(code, share, np.nan) for code, share in zip(codes, (accel / accel_g, gyro / gyro_dps), strict=True)
+    ]
     limits = (PACKED_SHARES, PACKED_SHARES) if family.packed_self_test else (ACCEL_SHARES, GYRO_SHARES)
     passed = all(((low < share) & (share < high)).all() for share, (low, high) in zip(shares, limits, strict=True))
     return SelfTest(*shares, passed, moved)
@@ -93,15 +98,19 @@ def _mean_counts(port: Port, test: int, afs_sel: int) -> Vector:
     return np.asarray(read_counts(port, reg.FRAME_WORDS).mean(0))
 
 
-def _factory_response(port: Port, packed: bool) -> tuple[Vector, Vector]:
-    """Read the responses (3,) [g] and (3,) [deg/s] that the factory measured; 0 without a code."""
+def _factory_codes(port: Port, packed: bool) -> tuple[Codes, Codes]:
+    """Read the factory's codes (3,) of the accelerometer and of the gyroscope; 0: there is none."""
     if not packed:
-        gyro, accel = (np.array(list(port.read(start, 3))) for start in (reg.SELF_TEST_GYRO, reg.SELF_TEST_ACCEL))
-        counts = [np.where(codes == 0, 0.0, 2620.0 * 1.01 ** (codes - 1.0)) for codes in (accel, gyro)]
-        return counts[0] / reg.ACCEL_LSB_PER_G[AFS_SEL], counts[1] / reg.GYRO_LSB_PER_DPS[FS_SEL]
+        gyro, accel = (port.read(start, 3) for start in (reg.SELF_TEST_GYRO, reg.SELF_TEST_ACCEL))
+        return np.array([*accel]), np.array([*gyro])
     *axes, low = port.read(reg.SELF_TEST_ACCEL, 4)
-    accel = np.array([(axis >> 5) << 2 | low >> shift & 3 for axis, shift in zip(axes, (4, 2, 0), strict=True)])
-    gyro = np.array([axis & 0x1F for axis in axes])
-    accel_g = np.where(accel == 0, 0.0, 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30))
-    gyro_dps = np.where(gyro == 0, 0.0, 25 * 1.046 ** (gyro - 1.0)) * np.array([1, -1, 1])
-    return accel_g, gyro_dps
+    accel_codes = [(axis >> 5) << 2 | low >> shift & 3 for axis, shift in zip(axes, (4, 2, 0), strict=True)]
+    return np.array(accel_codes), np.array([axis & 0x1F for axis in axes])
+
+
+def factory_response(packed: bool, accel: Codes, gyro: Codes) -> tuple[Vector, Vector]:
+    """Return the responses (3,) [g] and (3,) [deg/s] that the factory measured, by its codes; of 0 they mean nothing."""
+    if packed:
+        return 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30), 25 * 1.046 ** (gyro - 1.0) * np.array([1, -1, 1])
+    counts = [2620.0 * 1.01 ** (codes - 1.0) for codes in (accel, gyro)]
+    return counts[0] / reg.ACCEL_LSB_PER_G[AFS_SEL], counts[1] / reg.GYRO_LSB_PER_DPS[FS_SEL]

@@ -12,18 +12,19 @@ from datetime import datetime
 
 from ..errors import ChipError
 from . import registers as reg
-from .families import PARTS, families_with_fifo, known_parts
+from .families import FAMILIES, PARTS, families_with_fifo, known_parts
 from .port import Port
 from .settings import Settings
 
 # Awake after a reset a chip takes 8000 samples a second, and 293 frames fill the largest FIFO; clones may be slower.
 COUNT_NS, COUNTS = 15_000_000, 45
-IDENTITY_TRIES = 5
+# Reads of WHO_AM_I until two agree, and attempts to wake the chip.
+TRIES = 5
 PROBED_SAMPLES, PROBE_INTERVAL_NS = 8, 10_000_000
 
 # In every part this bit reads 0, and the count stays below this.
 POWER_UNUSED = reg.PWR_MGMT_1_DEVICE_RESET
-FIFO_COUNT_MAX = 4096
+FIFO_COUNT_MAX = max(family.widest_fifo_bytes or family.fifo_bytes for family in FAMILIES)
 
 
 def read_identity(port: Port) -> int:
@@ -61,7 +62,7 @@ def read_identity(port: Port) -> int:
 def _read_stable_identity(port: Port) -> int:
     """Read WHO_AM_I until two consecutive reads agree (bit-flip guard)."""
     before = None
-    for _ in range(IDENTITY_TRIES):
+    for _ in range(TRIES):
         who_am_i = port.read(reg.WHO_AM_I, 1)[0]
         if who_am_i == before:
             return who_am_i
@@ -128,7 +129,6 @@ def _is_clock_time(head: bytes) -> bool:
 
 
 STARTUP_NS = 100_000_000
-WAKE_TRIES = 5
 
 
 def reset(port: Port) -> None:
@@ -148,7 +148,7 @@ def wake(port: Port) -> None:
     ------
     ChipError : the chip does not wake up.
     """
-    for _ in range(WAKE_TRIES):
+    for _ in range(TRIES):
         port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
         port.sleep(STARTUP_NS)
         held = port.read(reg.PWR_MGMT_1, 1)[0]

@@ -16,6 +16,7 @@ import numpy as np
 from ..chip.access import Bus
 from ..chip.families import PARTS, part_named
 from ..chip.offsets import (
+    MOTION_G,
     PLACES,
     OffsetRegisters,
     OffsetResponse,
@@ -48,8 +49,8 @@ FORMAT, REGISTERS = "mpucal.chip_offsets", "registers"
 GRAVITY_MPS2 = 0.2
 # half a step of 1 mg, rms over three axes
 STEP_MPS2 = 0.001 * STANDARD_GRAVITY_MPS2 * 0.5
-# tolerances of a measured step, absolute and relative: the accelerometer's scale is known to 3 %
-SHIFT_G, SHIFT_SHARE = 0.006, 0.1
+# relative tolerance of a measured step, besides MOTION_G: the accelerometer's scale is known to 3 %
+SHIFT_SHARE = 0.1
 
 VOLATILE = (
     "these registers are volatile: after a power cycle or reset the factory trim returns,"
@@ -255,7 +256,7 @@ def saved_blocks(path: Path) -> list[OffsetRegisters]:
 
 def check_shift(shift: Vector, expected: Vector, remedy: str) -> None:
     """Raise ChipError if samples at rest changed by (3,) m/s^2, other than `expected` of what was written."""
-    limit = SHIFT_G * STANDARD_GRAVITY_MPS2 + SHIFT_SHARE * np.abs(expected)
+    limit = MOTION_G * STANDARD_GRAVITY_MPS2 + SHIFT_SHARE * np.abs(expected)
     if (np.abs(shift - expected) > limit).any():
         raise ChipError(
             f"the samples changed by ({mg_text(shift)}) mg, but ({mg_text(expected)}) mg were written", remedy

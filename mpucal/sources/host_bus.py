@@ -11,6 +11,7 @@ from ..chip.access import Reply
 from ..chip.driver import TIMED_READS
 from ..chip.families import PARTS
 from ..chip.losses import Loss
+from ..chip.port import TRIES
 from ..chip.registers import FIFO_R_W
 from ..errors import BusError, LateRead, NoAnswer
 from .i2c_errors import no_answer_error
@@ -19,7 +20,6 @@ from .i2c_errors import no_answer_error
 ADDRESSES = (0x68, 0x69)
 
 
-TRIES = 3
 # Excess over the shortest read: two samples at 1 kHz, and more than a transfer varies by.
 LATE_NS = 2_000_000
 

@@ -98,7 +98,7 @@ def test_a_known_part_whose_fifo_never_fills_is_refused():
     counts, read = itertools.count(1), foreign.read
 
     def restless(register, count):
-        foreign.registers[reg.FIFO_COUNT_L] = next(counts)
+        foreign.registers[reg.FIFO_COUNT_H + 1] = next(counts)
         return read(register, count)
 
     foreign.read = restless

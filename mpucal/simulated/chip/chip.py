@@ -172,8 +172,7 @@ class Chip:
         self._collect()
         if self._ended and not len(self._fifo):
             raise EndOfCapture
-        count = len(self._fifo).to_bytes(2, "big")
-        self._registers[reg.FIFO_COUNT_H : reg.FIFO_COUNT_L + 1] = count
+        self._registers[reg.FIFO_COUNT_H : reg.FIFO_R_W] = len(self._fifo).to_bytes(2, "big")
 
     # Faults.
 

@@ -10,13 +10,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...chip import registers as reg
 from ...chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6880, MPU6886, Family
-from ...data import Vector
+from ...chip.self_test import factory_response
 
-Whole = NDArray[np.int64]
 Three = tuple[float, ...]
 Codes = tuple[int, ...]
 
@@ -49,7 +47,7 @@ class FactoryTrim:
         low, high = ((10, 25), (8, 25)) if family.packed_self_test else ((85, 125), (130, 170))
         accel_codes, gyro_codes = of_test.integers(*low, 3), of_test.integers(*high, 3)
         spread = 1 + of_test.uniform(-SELF_TEST_SPREAD, SELF_TEST_SPREAD, (2, 3))
-        accel_g, gyro_dps = _responses(family, accel_codes, gyro_codes) * spread
+        accel_g, gyro_dps = np.array(factory_response(family.packed_self_test, accel_codes, gyro_codes)) * spread
         return cls(
             accel_trim=tuple(trim.tolist()),
             accel_codes=tuple(accel_codes.tolist()),
@@ -76,15 +74,6 @@ class FactoryTrim:
         bytes_ = [(a >> 2) << 5 | g for a, g in zip(self.accel_codes, self.gyro_codes, strict=True)]
         x, y, z = (a & 3 for a in self.accel_codes)
         return [*bytes_, x << 4 | y << 2 | z]
-
-
-def _responses(family: Family, accel_codes: Whole, gyro_codes: Whole) -> Vector:
-    """Return (2, 3) the responses of the codes: g, then deg/s."""
-    if family.packed_self_test:
-        accel_g = 0.34 * (0.92 / 0.34) ** ((accel_codes - 1) / 30)
-        return np.array([accel_g, 25 * 1.046 ** (gyro_codes - 1) * np.array([1, -1, 1])])
-    counts = 2620 * 1.01 ** (np.array([accel_codes, gyro_codes]) - 1)
-    return np.asarray(counts / np.array([[reg.ACCEL_LSB_PER_G[0]], [reg.GYRO_LSB_PER_DPS[0]]]))
 
 
 @dataclass(frozen=True)
