@@ -81,10 +81,8 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
     accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
     gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[FS_SEL]
     codes = _factory_codes(port, family.packed_self_test)
-    accel_g, gyro_dps = factory_response(family.packed_self_test, *codes)
-    shares = [
-        np.where(code, share, np.nan) for code, share in zip(codes, (accel / accel_g, gyro / gyro_dps), strict=True)
-    ]
+    expected = factory_response(family.packed_self_test, *codes)
+    shares = [np.where(code, each / of, np.nan) for code, each, of in zip(codes, (accel, gyro), expected, strict=True)]
     limits = (PACKED_SHARES, PACKED_SHARES) if family.packed_self_test else (ACCEL_SHARES, GYRO_SHARES)
     passed = all(((low < share) & (share < high)).all() for share, (low, high) in zip(shares, limits, strict=True))
     return SelfTest(*shares, passed, moved)
@@ -109,7 +107,7 @@ def _factory_codes(port: Port, packed: bool) -> tuple[Codes, Codes]:
 
 
 def factory_response(packed: bool, accel: Codes, gyro: Codes) -> tuple[Vector, Vector]:
-    """Return the responses (3,) [g] and (3,) [deg/s] that the factory measured, by its codes; of 0 they mean nothing."""
+    """Return the factory's responses (3,) [g] and (3,) [deg/s] by its codes; those of 0 mean nothing."""
     if packed:
         return 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30), 25 * 1.046 ** (gyro - 1.0) * np.array([1, -1, 1])
     counts = [2620.0 * 1.01 ** (codes - 1.0) for codes in (accel, gyro)]
