@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,8 @@ from ..terminal.console import Console
 from ..terminal.keys import Keys
 from .address import Address, qr_code
 from .feed import Feed
+from .server import ASK_EVERY_S
 from .state import Result
-
-ASK_EVERY_S = 0.1
-
 
 # Function that shows a result, and its files, on the page.
 ResultCallback = Callable[[Result, Sequence[Path]], None]
@@ -36,6 +34,7 @@ class TeeConsole:
 
     def __init__(self, console: Console, feed: Feed, paced: bool) -> None:
         self._console, self._feed, self._paced = console, feed, paced
+        self.listening, self.hung_up = console.listening, console.hung_up
         self._ahead_s: float | None = None
 
     def hear(self, output: Output) -> None:
@@ -53,14 +52,6 @@ class TeeConsole:
     def pressed(self) -> Sequence[Key]:
         """Return the keys of both that were pressed since the last call."""
         return [*self._console.pressed(), *self._feed.pressed()]
-
-    def listening(self) -> AbstractContextManager[None]:
-        """Listen to the terminal's keys."""
-        return self._console.listening()
-
-    def hung_up(self, stop: bool) -> None:
-        """Stop showing the session in the terminal, which was closed; the page stays."""
-        self._console.hung_up(stop)
 
     def _wait_until(self, t_s: float) -> None:
         if self._ahead_s is None:

@@ -28,15 +28,15 @@ from .requests import PAGE_FILES, Allowed, RequestFilter
 
 CLIENTS = 4
 CONNECTIONS = 24
-# Limits of a request's head: its size, and the time for it to arrive.
-HEAD_BYTES, HEAD_S = 16384, 5.0
+# Limit of the time for a request's head to arrive.
+HEAD_S = 5.0
 # A client that takes nothing for this time is disconnected.
 PATIENCE_S = 10.0
-# Send buffer of a client.
+# Limit of a request's head, and of what waits to be sent to a client.
 WAITING_BYTES = 32768
 # Interval of the heartbeats, during the session and after its end.
 BEAT_S, LAST_BEAT_S = 2.0, 0.2
-# Interval at which the end is looked for.
+# Interval at which the end, a key or a visitor is looked for.
 ASK_EVERY_S = 0.05
 HEADERS = {
     "Cache-Control": "no-store",
@@ -197,7 +197,7 @@ class Handler(BaseHTTPRequestHandler):
         """Return the request's head; None if it does not arrive, or is too long."""
         head, until_s = b"", time.monotonic() + HEAD_S
         while b"\r\n\r\n" not in head:
-            if len(head) >= HEAD_BYTES:
+            if len(head) >= WAITING_BYTES:
                 return None
             self.connection.settimeout(max(until_s - time.monotonic(), 0.001))
             piece = self.connection.recv(4096)

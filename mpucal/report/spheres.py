@@ -12,7 +12,7 @@ from .track import Track
 _VIEWPOINT = (0.302, -0.830, -0.469)
 _ENLARGEMENTS, _MOST_DEVIATION = (20, 10, 5, 2, 1), 0.5
 _FEWEST_RESTS, _MOST_LINES = 3, 60
-_MOST_POINTS, _MOVING_DOTS = 300, 500
+_MOVING_DOTS = 500
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 121)
 _UNIT_CIRCLE = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
 _HEIGHT, _COVERAGE_HEIGHT = 340.0, 230.0
@@ -88,7 +88,7 @@ def coverage(track: Track) -> str:
 def _points(track: Track, acc: Vector) -> Vector:
     """Return (k, 3) m/s^2: the means of rests, or single samples if there are hardly any rests."""
     rests = track.at_rest(acc)
-    return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // _MOST_POINTS, 1)]
+    return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // _MOVING_DOTS, 1)]
 
 
 def _view() -> Vector:

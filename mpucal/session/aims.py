@@ -11,17 +11,21 @@ import numpy as np
 
 from ..data import Sensor, Vector
 from ..origin import Origin
+from .coverage import DISTINCT_RAD
 from .events import Direction, Target
 
 _corners = np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)])
 # (26, 3) unit vectors: the faces, edges and corners of a cube, which a person can name and find
 ALL_AROUND: Vector = _corners / np.linalg.norm(_corners, axis=1, keepdims=True)
 TILT_RAD = math.radians(30.0)
-# An orientation verifies if it is this far from all that the fit has seen. Small tilts leave less room.
-UNSEEN_RAD, UNSEEN_TILT_RAD = math.radians(20.0), math.radians(10.0)
+# An orientation verifies if it is DISTINCT_RAD from all that the fit has seen. Small tilts leave less room.
+UNSEEN_TILT_RAD = math.radians(10.0)
 
 
-FLAT_S = 10.0  # of rest, after which noise and gyroscope bias are known
+# Rest after which noise and gyroscope bias are known, and the least one after which a person may go on. The second is
+# enough for a vehicle: an autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows
+# what is left of it.
+FLAT_S, SHORTEST_FLAT_S = 10.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -52,14 +56,12 @@ AIMS: Mapping[str, Aim] = {
     "best": Aim(Target(0.04, 0.02, 0.4), least=14, least_of_vehicle=14, longest_s=240.0, verify=3),
 }
 NORMAL = "normal"
-# An autopilot has estimated the gyroscope's bias when it started, and each rest on a side shows what is left of it.
-FLAT_OF_VEHICLE_S = 2.0
 # Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
 # quarter turn from the last, about another axis. One that rests on things needs one more, tilted, which with the
 # gyroscope gives the angles between the axes, and one new orientation for its verification: no hand moves it.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
-PLACED, VERIFY_PLACED = len(SIDES), 1
+VERIFY_PLACED = 1
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
@@ -67,12 +69,12 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     aim = AIMS[target]
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
-    return replace(aim, least=aim.least_of_vehicle, least_placed=PLACED, flat_s=FLAT_OF_VEHICLE_S)
+    return replace(aim, least=aim.least_of_vehicle, least_placed=len(SIDES), flat_s=SHORTEST_FLAT_S)
 
 
 def unseen_rad(tilt_only: bool) -> float:
     """Return the least angle [rad] from all orientations seen at which one counts for the verification."""
-    return UNSEEN_TILT_RAD if tilt_only else UNSEEN_RAD
+    return UNSEEN_TILT_RAD if tilt_only else DISTINCT_RAD
 
 
 def directions(flat_down: Direction, tilt_only: bool) -> Vector:

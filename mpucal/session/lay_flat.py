@@ -8,13 +8,11 @@ from ..data import Samples
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import WINDOW_S, Windows
-from .aims import FLAT_S
+from .aims import FLAT_S, SHORTEST_FLAT_S
 from .boards import BOARD, KINDS
 from .events import Caution, Countdown, Output, Outputs, Progress, Prompt, PromptKind, Rested, Stopped, triple
 from .step import PATIENCE_S, SAY_AGAIN_S, Step
 
-# Least rest after which Enter goes on, and whose end is worth a caution.
-SHORTEST_S = 2.0
 # Least rest in a recording without a session, whose person knew of no countdown.
 RECORDED_S = 5.0
 # Remedy for missing samples, for every source.
@@ -85,7 +83,7 @@ class LayFlat(Step):
 
     def enough(self) -> Outputs:
         """Return the stillness so far, unless it is too short to go on with."""
-        return [self._rested(self._still)] if self._still is not None and self._still.seconds >= SHORTEST_S else []
+        return [self._rested(self._still)] if self._still is not None and self._still.seconds >= SHORTEST_FLAT_S else []
 
     def _rested(self, still: Still) -> Rested:
         return Rested(still.seconds, triple(still.acc), triple(still.gyr))
@@ -94,7 +92,7 @@ class LayFlat(Step):
         """Return the countdown, after a caution if the board was moved since it was still last."""
         outputs: list[Output] = []
         before, self._still = self._still, still
-        if before is not None and still.run != before.run and before.seconds >= SHORTEST_S:
+        if before is not None and still.run != before.run and before.seconds >= SHORTEST_FLAT_S:
             self._cautioned_s = t_s
             what, remedy = f"the board was moved: {self._motion}", "let go of it; the countdown starts again"
             outputs.append(Caution(t_s, "moved", what, remedy))
@@ -103,7 +101,7 @@ class LayFlat(Step):
     def _moved(self, moved: Moved, t_s: float) -> list[Output]:
         self._motion = moved.what
         outputs = self._countdown(t_s, "waiting for the board to be still", paused=True)
-        if moved.after_s >= SHORTEST_S or t_s - self._cautioned_s >= SAY_AGAIN_S:
+        if moved.after_s >= SHORTEST_FLAT_S or t_s - self._cautioned_s >= SAY_AGAIN_S:
             self._cautioned_s = t_s
             remedy = LOST if moved.lost else "put it on a firm surface and let go of it"
             outputs.append(Caution(t_s, "trembling", f"not still: {moved.what}", remedy))

@@ -55,7 +55,7 @@ class MotionWatch:
         sight = self._stillness.add(window)
         moving = isinstance(sight, Moved)
         self._still = not moving
-        turn = None if wanted is None else self._guide.turn_to(wanted, self._attitude.now)
+        turn = NO_TURN if wanted is None else self._guide.turn_to(wanted, self._attitude.now)
         # The mean of the last stillness is the gyroscope's bias.
         turning = float(np.linalg.norm(window.gyr - self._stillness.rest_rad_s))
         return Meter(
@@ -68,9 +68,7 @@ class MotionWatch:
             window.count / (window.end_s - window.start_s),
             self._temperature_c,
             canonical(self._attitude.now),
-            turn.missing_deg if turn else None,
-            turn.words if turn else "",
-            canonical(turn.attitude) if turn else None,
+            *turn,
         )
 
     def _cautions(self, samples: Samples, t_s: float) -> list[Caution]:
@@ -122,9 +120,12 @@ SLEW_RAD = math.radians(15.0)
 class Turn(NamedTuple):
     """Turn to a wanted orientation: its angle, its words, and the attitude that it leads to."""
 
-    missing_deg: float
-    words: str
-    attitude: Quaternion
+    missing_deg: float | None = None
+    words: str = ""
+    attitude: Quaternion | None = None
+
+
+NO_TURN = Turn()
 
 
 class TurnGuide:
@@ -157,7 +158,7 @@ class TurnGuide:
         self._to, self._wanted = down, wanted
         rounded = ROUND_DEG * round(math.degrees(missing) / ROUND_DEG)
         words = f"{rounded:.0f} deg more, {TURN_WORDS[self._word_index]}" if rounded else ""
-        return Turn(math.degrees(missing), words, wanted)
+        return Turn(math.degrees(missing), words, canonical(wanted))
 
     def _update_heading(self, shortest: float, missing: float, new: bool) -> None:
         """Change the heading no more than is needed to end within KEPT_RAD of the wanted orientation."""

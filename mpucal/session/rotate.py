@@ -14,14 +14,12 @@ from . import events
 from .aims import SIDES, VERIFY_PLACED, Aim
 from .coverage import Coverage
 from .plan import Plan
-from .step import ENOUGH, HOLD_S, PATIENCE_S, WAIT_S, Pause, PoseStep
+from .step import ENOUGH, HAND_WINDOW_S, HOLD_S, PATIENCE_S, WAIT_S, Pause, PoseStep
 
 PASS_WINDOW_S = 0.1
-# Least length of a pause. A fit uses shorter rests, too.
-PAUSE_S = 1.0
-REST_S = 0.5
-# A vehicle that nobody touches has been put down, and stays there until a person has heard of the next side.
-PUT_DOWN_S, PUT_DOWN_WAIT_S = 0.5, 0.25
+# Least length of a pause. A fit uses shorter rests, too. A vehicle that nobody touches in a rest has been put down,
+# and stays there until a person has heard of the next side.
+PAUSE_S, REST_S = 1.0, 0.5
 # Nine tilts may be asked for; a sloppy hand makes this many different ones of them.
 TILTS = 6
 # Beyond these the hand's own acceleration hides the direction of gravity [m/s^2].
@@ -154,7 +152,7 @@ class Rotate(PoseStep):
         if pause.seconds >= REST_S - 1e-6:
             self._coverage.rested.add(pause.acc)
         lies = self._takes_sides and not pause.touched and (self._coverage.placed or self._advised_run < 0)
-        least_s = PUT_DOWN_S if lies else HOLD_S - WAIT_S
+        least_s = REST_S if lies else HOLD_S - WAIT_S
         ends = not (self._plan.until_end or advised) and pause.seconds >= least_s - 1e-6
         if ends:
             self._coverage.placed = lies
@@ -168,7 +166,7 @@ class Rotate(PoseStep):
             outputs += [pause.held(self._held[1]), self.prompt]
         elif ends and not self._requested:
             self._advised_run = pause.run
-            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s, PUT_DOWN_WAIT_S if lies else WAIT_S))
+            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s, HAND_WINDOW_S if lies else WAIT_S))
         return outputs
 
     def _request(self, kind: events.FitKind, t_s: float, wait_s: float = WAIT_S) -> events.RequestFit:

@@ -10,7 +10,7 @@ from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
 from . import events
-from .aims import VERIFY_PLACED, Aim, unseen_rad
+from .aims import AIMS, NORMAL, VERIFY_PLACED, Aim, unseen_rad
 from .coverage import SAME_RAD, Coverage, Directions
 from .plan import Plan
 from .rotate import PAUSE_S
@@ -206,7 +206,6 @@ class Verify(NewPoses):
         return self._ask_for(events.PromptKind.VERIFY, self._farthest(self._seen), text)
 
 
-ORIENTATIONS = 3
 # A check has few samples: a longer hold averages the hand's tremor.
 CHECK_HOLD_S = 2.0
 # Weight that prefers, of both directions along an axis, the one that is farther from all others.
@@ -219,7 +218,7 @@ class CheckPoses(NewPoses):
     def __init__(self, flat: events.Rested, plan: Plan) -> None:
         seen = Directions(SAME_RAD)
         seen.add(np.array(flat.acc))
-        super().__init__(flat, plan, ORIENTATIONS, seen, unseen_rad(plan.tilt_only), CHECK_HOLD_S)
+        super().__init__(flat, plan, AIMS[NORMAL].verify, seen, unseen_rad(plan.tilt_only), CHECK_HOLD_S)
 
     def add(self, samples: Samples) -> events.Outputs:
         """Return the outputs for `samples`; Finished comes last and ends the step."""

@@ -16,6 +16,7 @@ from ..result.document import plain
 from ..session.boards import BOARD
 from ..session.events import Caution, Decision, Direction, Key, Knowledge, Output, Progress, Prompt, Verification
 from ..session.ports import Operator
+from ..session.rotate import REPORT_EVERY_S
 from .keys import Keys
 from .view import HEADLINES
 
@@ -61,8 +62,6 @@ def console(
     return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False, title=title, board=board)
 
 
-# Least time between two lines of progress.
-PROGRESS_EVERY_S = 1.0
 KEYS = "(Enter: skip ahead; r and Enter: restart the turning; q and Enter, or Ctrl-C: stop.)"
 BELL = "\a"
 
@@ -89,7 +88,7 @@ class Lines:
             case Prompt():
                 self._say_prompt(output)
             case Progress(t_s, _, _, text) if text != self._last and t_s >= self._due_s - 1e-6:
-                self._last, self._due_s = text, t_s + PROGRESS_EVERY_S
+                self._last, self._due_s = text, t_s + REPORT_EVERY_S
                 self.say(f"  {text}")
             case Knowledge():
                 self.say(f"  {known(output)}")

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from ..session import events
 from ..session.attitude import rotate
 from ..session.boards import BOARD, flat_description
+from ..session.step import HAND_WINDOW_S, WANTED_RAD
 
 # Time for which the headline shows the use of the last orientation before the next turn. A word is read in 0.25 s (240
 # words a minute); "taken" also has a tone, and a mark that stays.
@@ -21,9 +22,11 @@ USE_HEADLINES = {
     events.Use.SEEN: "SEEN ALREADY",
 }
 # The headline asks to hold still within NEAR_DEG of the wanted orientation, or within NEAR_HELD_DEG if the board turns
-# more slowly than RESTS_DPS: in the 0.25 s between two meters it then moves by no more than the difference of the two
-# angles. A board that turns faster than PASSES_DPS passes by the orientation.
-NEAR_DEG, NEAR_HELD_DEG, RESTS_DPS, PASSES_DPS = 15.0, 20.0, 20.0, 70.0
+# more slowly than RESTS_DPS: between two meters it then moves by no more than the difference of the two angles. A board
+# that turns faster than PASSES_DPS passes by the orientation.
+RESTS_DPS, PASSES_DPS = 20.0, 70.0
+NEAR_DEG = math.degrees(WANTED_RAD)
+NEAR_HELD_DEG = NEAR_DEG + RESTS_DPS * HAND_WINDOW_S
 # A countdown that is not renewed for this time has ended; for the second one, if the board moves.
 COUNTDOWN_HOLDS_S, BUMP_S = 1.0, 0.4
 # Time for which a useful orientation is held before the headline asks to hold it instead of the wanted one.

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from ..session.events import Caution, Held, Prompt, PromptKind, Use
+from ..session.step import SAY_AGAIN_S
 from .view import HEADLINES, USE_HEADLINES, Moment, View
 
 CONNECTING = "Connecting"
 HOLD = "Hold still"
 # Time for which a change of the moment must last before the voice says something that contradicts its last words.
 SETTLED_S = 1.0
-# Interval at which the instruction to turn is repeated; older cautions are not said.
-REPEAT_S = 5.0
 
 
 class Tone(StrEnum):
@@ -84,7 +83,7 @@ class Voice:
                 return
         if view.caution is not self._caution and self._may_caution(view):
             self._caution = view.caution
-            if view.caution is not None and self._t_s - view.caution.t_s < REPEAT_S:
+            if view.caution is not None and self._t_s - view.caution.t_s < SAY_AGAIN_S:
                 self._say(f"{view.caution.what}. {view.caution.do}", Tone.WRONG)
                 return
         self._instruct(view)
@@ -114,7 +113,7 @@ class Voice:
             ):
                 self._say(view.confirming or in_words(view), Tone.HOLD)
             case Moment.TURN if view.meter is not None and view.meter.turn and view.waiting is None:
-                due = self._told is not Moment.TURN or view.prompt is not self._prompt or self._quiet_s >= REPEAT_S
+                due = self._told is not Moment.TURN or view.prompt is not self._prompt or self._quiet_s >= SAY_AGAIN_S
                 # The words on the last orientation are not interrupted.
                 first = self._told is Moment.DECIDED and self._quiet_s >= SETTLED_S
                 first = first or self._told in (Moment.CONNECTING, Moment.STEP)

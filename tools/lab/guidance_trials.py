@@ -35,7 +35,7 @@ from mpucal.simulated.hand import IN_THE_HAND, MISS_RAD, ON_THE_TABLE, REACTION_
 from mpucal.simulated.hands import HANDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
-from mpucal.terminal.voice import HOLD, REPEAT_S, SETTLED_S, Announcement, Tone, Voice
+from mpucal.terminal.voice import HOLD, SAY_AGAIN_S, SETTLED_S, Announcement, Tone, Voice
 
 from .runner import Trial, each_seed
 from .sessions import session
@@ -121,7 +121,7 @@ class Transcript:
         opposite = senses in ((STAY, GO), (GO, STAY)) and bool(last.words and now.words)
         self.wrong["contradicted within a second"] += opposite and after_s < SETTLED_S
         self.wrong["wrong before taken"] += last.tone is Tone.WRONG and now.tone is Tone.TAKEN
-        self.wrong["said twice"] += last.words == now.words and after_s < REPEAT_S
+        self.wrong["said twice"] += last.words == now.words and after_s < SAY_AGAIN_S
         turning = view.prompt is not None and view.prompt.kind is not PromptKind.LAY_FLAT
         holding = turning and moment is view.moment is Moment.COUNTING
         self.wrong["said while holding"] += holding and view.held is None
