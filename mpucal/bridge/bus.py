@@ -29,7 +29,7 @@ BATCH = 4
 # Time without a message, besides the line's latency, after which the bridge is lost; one that was reset says so sooner.
 GONE_NS = 1000 * MS
 REPEAT_NS = 100 * MS
-# Time for plugging a cable in again, and for a boot loader's two seconds.
+# Time for plugging a cable in again, for a boot loader's two seconds, and for a REPL to answer.
 RECOVER_NS = 10_000 * MS
 # An FTDI adapter delivers its bytes every 16 ms. Requests in step with that would get equally late replies, or later
 # and later ones, as if the bridge's clock were off by 100 ppm.

@@ -8,15 +8,13 @@ from importlib import import_module
 from pathlib import Path
 
 from ..errors import BusError
+from .bus import RECOVER_NS
 from .frame import DELIMITER, Frame
 from .messages import Hello, Leave
-from .port import Port, SerialPort
+from .port import BAUDS, Port, SerialPort
 from .repl import RawRepl
 
 PROGRAM = Path(__file__).with_name("board.py")
-# Rate of a REPL on a UART; on USB it has no effect.
-BAUDS = (115_200,)
-ENTER_NS = 10_000_000_000
 
 
 class MicroPythonPort:
@@ -32,13 +30,14 @@ class MicroPythonPort:
     """
 
     def __init__(self, text: str | Port, pins: tuple[int | str, ...] = ()) -> None:
-        self._port: Port = SerialPort(text, BAUDS) if isinstance(text, str) else text
+        # The slower one is that of a REPL on a UART; on USB it has no effect.
+        self._port: Port = SerialPort(text, BAUDS[1:]) if isinstance(text, str) else text
         self.name, self.bauds = self._port.name, self._port.bauds[:1]
         self._pins = tuple(pins)
         self.now_ns, self.read, self.write = self._port.now_ns, self._port.read, self._port.write
         self.set_baud = self._port.set_baud
         try:
-            self.revive(self.now_ns() + ENTER_NS)
+            self.revive(self.now_ns() + RECOVER_NS)
         except BaseException:
             self._port.close()
             raise

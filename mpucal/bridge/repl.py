@@ -8,6 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from ..errors import BusError
+from .link import MS
 from .port import Port
 
 CTRL_A, CTRL_B, CTRL_C, CTRL_D = b"\x01", b"\x02", b"\x03", b"\x04"
@@ -16,8 +17,8 @@ REBOOT = b"soft reboot\r\n"
 RAW_PASTE, PASTE_ACCEPTED = b"\x05A\x01", b"R\x01"
 WINDOW_FREED = 0x01
 
-S = 1_000_000_000
-ASK_NS, ANSWER_NS, BOOT_NS, COMPILE_NS = S, 2 * S, 15 * S, 10 * S
+# The last one is for a boot, and for a program to be compiled.
+ASK_NS, ANSWER_NS, BOOT_NS = 1000 * MS, 2000 * MS, 15_000 * MS
 
 
 class NoRepl(BusError):  # noqa: N818 - reads as the sentence it is
@@ -69,7 +70,7 @@ class RawRepl:
         if self._read(2) != PASTE_ACCEPTED:
             raise self._does_not_run("it knows no raw-paste mode")
         self._paste(program.encode())
-        until_ns = self._port.now_ns() + COMPILE_NS
+        until_ns = self._port.now_ns() + BOOT_NS
         while b"\0" not in self._received:
             ended = self._received.count(CTRL_D) >= 2
             if ended or not self._receive(until_ns):
@@ -110,7 +111,7 @@ class RawRepl:
             at += room
             room = 0
         self._port.write(CTRL_D)
-        self._expect(CTRL_D, COMPILE_NS)
+        self._expect(CTRL_D, BOOT_NS)
 
     def _expect(self, words: bytes, within_ns: int) -> None:
         """Wait for `words`, and drop everything up to their end."""

@@ -6,13 +6,12 @@ from typing import NamedTuple, TypeVar
 
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError, NoStorage
-from ..result.blob import Blob, BlobError
+from ..result.blob import CHECKSUM, Blob, BlobError
 from . import messages as wire
 from .link import Link
 from .port_errors import request_failed
 
 R = TypeVar("R", bound=wire.Reply)
-CRC_BYTES = 4
 
 
 class StoredBlob(NamedTuple):
@@ -116,4 +115,4 @@ class BlobStore:
 
 
 def _crc(blob: bytes) -> int:
-    return int.from_bytes(blob[-CRC_BYTES:], "little")
+    return int.from_bytes(blob[-CHECKSUM.size :], "little")

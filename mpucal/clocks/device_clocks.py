@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import Enum, auto
 
+from .sample_clock import RATE_TOLERANCE
+
 WRAP = 1 << 32
 US, S_US = 1_000, 1_000_000
 # A packet up to this late was overtaken by others; a clock further back was set back.
@@ -71,8 +73,6 @@ class VehicleClock:
         return t_us, jump
 
 
-# A ceramic resonator is within 0.5 %; twice that lets an estimate that fell behind come back.
-DRIFT = 0.01
 # No message is delayed for longer: the bridge itself lags, as an emulated one does on a busy machine.
 LATE_NS = 250_000_000
 # A clock that is off by more was reset; taking it for reset by mistake does no harm.
@@ -83,7 +83,8 @@ class BridgeClock:
     """Bus time: the bridge's clock in ns without wraps, which continues after a reset of the bridge.
 
     The present time is known from the message with the shortest way to the host, which has the least `host - stamp`.
-    Between two messages the clocks may drift apart by DRIFT; a bridge that lags by LATE_NS is followed.
+    Between two messages the clocks may drift apart by RATE_TOLERANCE, twice what a resonator
+    does, which lets an estimate that fell behind come back; a bridge that lags by LATE_NS is followed.
     """
 
     def __init__(self) -> None:
@@ -102,7 +103,7 @@ class BridgeClock:
         else:
             expected_us = (self.now(host_ns) - self._base_ns) // US
             t_ns = self._base_ns + (expected_us + _nearest(t_us - expected_us)) * US
-            ahead_ns, drifted_ns = host_ns - t_ns, self._ahead_ns + round(DRIFT * (host_ns - self._seen_at_ns))
+            ahead_ns, drifted_ns = host_ns - t_ns, self._ahead_ns + round(RATE_TOLERANCE * (host_ns - self._seen_at_ns))
             ahead_ns = min(ahead_ns, max(drifted_ns, ahead_ns - LATE_NS))
         self._ahead_ns, self._seen_at_ns, self._latest_ns = ahead_ns, host_ns, max(self._latest_ns, t_ns)
         return t_ns

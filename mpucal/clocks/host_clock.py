@@ -25,10 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Vector
-from .sample_clock import NS, Whole
+from .sample_clock import NS, RATE_TOLERANCE, Whole
 
-# A ceramic resonator is within 0.5 %, and RC oscillators within 1 %; warming moves either by some 50 ppm a minute.
-RATE_STD, DRIFT_STD_PER_S = 0.01, 100e-6 / 60
+# Warming moves a ceramic resonator, and an RC oscillator, by some 50 ppm a minute.
+DRIFT_STD_PER_S = 100e-6 / 60
 GROUPS, LEAST_IN_GROUP, ITERATIONS = 6, 3, 6
 # No working clock is off by more. An emulated bridge runs in a time of its own, which pairs cannot correct.
 MAX_RATE_ERROR = 0.03
@@ -126,7 +126,7 @@ def fit_pairs(t_ns: Whole, host_ns: Whole) -> ClockFit:
     """Fit the parabola under the times (n,) of the bus and the host."""
     first_s, last_s = int(t_ns[0]) * NS, int(t_ns[-1]) * NS
     mid_ns = (int(t_ns[0]) + int(t_ns[-1])) // 2
-    unknown = ClockFit(0.0, 0.0, RATE_STD, first_s, mid_ns * NS, last_s)
+    unknown = ClockFit(0.0, 0.0, RATE_TOLERANCE, first_s, mid_ns * NS, last_s)
     ahead_ns = host_ns - t_ns
     groups = [
         (_grouped((t_ns[run] - mid_ns) * NS), _grouped((ahead_ns[run] - ahead_ns[run][0]) * NS))
@@ -145,7 +145,7 @@ def _runs(t_ns: Whole, ahead_ns: Whole) -> Iterator[slice]:
     """Yield the runs that are long enough, between silences and leaps of one of the clocks."""
     passed, moved = np.diff(t_ns) * NS, np.abs(np.diff(ahead_ns)) * NS
     silent_s = max(SILENCE_S, SILENCE_INTERVALS * float(np.median(passed))) if len(passed) else SILENCE_S
-    cuts = np.flatnonzero((passed > silent_s) | (moved > LEAP_S + 2.0 * RATE_STD * passed)) + 1
+    cuts = np.flatnonzero((passed > silent_s) | (moved > LEAP_S + 2.0 * RATE_TOLERANCE * passed)) + 1
     for first, last in pairwise((0, *cuts.tolist(), len(t_ns))):
         if last - first >= GROUPS * LEAST_IN_GROUP:
             yield slice(first, last)
@@ -174,7 +174,7 @@ def _least_delayed(t: Vector, ahead: Vector, x: Vector) -> tuple[Vector, Vector,
 
 def _parabola(least: list[tuple[Vector, Vector, float]], x: Vector) -> tuple[Vector, Vector]:
     """Solve for (b, c) and their information (2, 2); each run's offset is eliminated by its means."""
-    H: Vector = np.diag([RATE_STD**-2, (0.5 * DRIFT_STD_PER_S) ** -2])
+    H: Vector = np.diag([RATE_TOLERANCE**-2, (0.5 * DRIFT_STD_PER_S) ** -2])
     g = np.zeros(2)
     for at, seen, spacing in least:
         A = np.stack((at, at * at), axis=1)

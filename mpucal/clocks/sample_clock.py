@@ -30,7 +30,8 @@ NS = 1e-9
 GAP_INTERVALS = 2.5
 Whole = NDArray[np.int64]
 
-# PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %.
+# PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %. So is an RC oscillator; a ceramic resonator is
+# within 0.5 %.
 RATE_TOLERANCE = 0.01
 # (n,) s of samples number (n,) of segments (n,)
 Times = Callable[[Whole, Whole], Vector]

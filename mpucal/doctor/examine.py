@@ -20,7 +20,7 @@ from ..chip.families import PARTS, Family, Part
 from ..chip.identity import describe_mismatch
 from ..chip.losses import Loss, TransferStats, remedy_of
 from ..chip.offsets import PLACES, OffsetRegisters, OffsetResponse, measure_offset_response, restore
-from ..chip.port import Port
+from ..chip.port import TRIES, Port
 from ..chip.quick_measure import PATIENCE, temporary_measurement
 from ..chip.self_test import run_self_test
 from ..chip.setup import read_identity
@@ -37,8 +37,6 @@ MANY_FAILED, MOST_FAILED = 0.05, 0.5
 # Share of the factory's response to the self test below which an axis is dead.
 LEAST_RESPONSE = 0.05
 MOVED = "the board moved"
-# Attempts to measure at rest, after a board that was not put down in the first wait.
-SHORT_PATIENCE = 3
 
 
 def examine(
@@ -52,7 +50,8 @@ def examine(
     """
     stats = TransferStats()
     port = Port(bus, stats=stats)
-    patience = SHORT_PATIENCE
+    # Fewer attempts to measure at rest follow, if a board is not put down in the first wait.
+    patience = TRIES
     try:
         # Nothing is written to a chip that is not known.
         read_identity(port)

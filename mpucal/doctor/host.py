@@ -15,11 +15,10 @@ from typing import Any
 from ..sources.host_bus import ADDRESSES
 from ..sources.i2c import found_chips
 from ..sources.i2c_errors import transfer_error
-from ..sources.usb_i2c import adapters
+from ..sources.usb_i2c import I2C_HZ, adapters
 from .finding import Finding, Mark
 
 SYS = Path("/sys")
-FAST_HZ = 400_000
 FIRST, LAST = 0x08, 0x77
 # These addresses are EEPROMs', which a quick write could upset; a read could upset devices at the others.
 READ_ONLY = (*range(0x30, 0x38), *range(0x50, 0x60))
@@ -99,7 +98,7 @@ def _adapter(number: str) -> Iterator[Finding]:
         return
     hz = int.from_bytes(speed, "big")
     what, data = f"{name}, configured for {hz / 1000:g} kHz", {"name": name, "configured_hz": hz}
-    yield Finding.check("adapter", hz >= FAST_HZ, what, DTPARAM, data)
+    yield Finding.check("adapter", hz >= I2C_HZ, what, DTPARAM, data)
 
 
 def _kernel_drivers(number: str) -> Iterator[Finding]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..chip.config import Config
 from ..chip.families import MPU6050, family_of
 from ..chip.registers import ACCEL_RANGES_G, FULL_SCALE_SHIFT, GYRO_RANGES_DPS
 from ..data import ACCEL_COUNTS, GYRO_COUNTS
@@ -15,14 +16,13 @@ from .templates import fill
 # values of the registers by the range
 ACCEL_CONFIG = {float(g): code << FULL_SCALE_SHIFT for code, g in enumerate(ACCEL_RANGES_G)}
 GYRO_CONFIG = {float(dps): code << FULL_SCALE_SHIFT for code, dps in enumerate(GYRO_RANGES_DPS)}
-DEFAULT_RANGE_G, DEFAULT_RANGE_DPS = 4.0, 500.0
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """Return the sketch's text, with `notes` in its heading."""
     sensor = calibration.sensor
-    range_g = sensor.accel_range_g if sensor.accel_range_g in ACCEL_CONFIG else DEFAULT_RANGE_G
-    range_dps = sensor.gyro_range_dps if sensor.gyro_range_dps in GYRO_CONFIG else DEFAULT_RANGE_DPS
+    range_g = sensor.accel_range_g if sensor.accel_range_g in ACCEL_CONFIG else Config.accel_range_g
+    range_dps = sensor.gyro_range_dps if sensor.gyro_range_dps in GYRO_CONFIG else Config.gyro_range_dps
     family = family_of(sensor.chip) or MPU6050
     return fill(
         "sketch.ino",
@@ -43,9 +43,9 @@ def losses(calibration: Calibration) -> tuple[str, ...]:
     """Return notes on assumptions of the sketch."""
     sensor, notes = calibration.sensor, ["It reads the chip at address 0x68: if AD0 is high, change CHIP to 0x69."]
     if sensor.accel_range_g not in ACCEL_CONFIG:
-        notes.append(f"It sets +-{DEFAULT_RANGE_G:g} g, but the calibration is of another or unknown range.")
+        notes.append(f"It sets +-{Config.accel_range_g:g} g, but the calibration is of another or unknown range.")
     if sensor.gyro_range_dps not in GYRO_CONFIG:
-        notes.append(f"It sets +-{DEFAULT_RANGE_DPS:g} deg/s, but the calibration is of another or unknown range.")
+        notes.append(f"It sets +-{Config.gyro_range_dps:g} deg/s, but the calibration is of another or unknown range.")
     if family_of(sensor.chip) is None and calibration.follows_temperature:
         notes.append("It assumes the thermometer of an MPU-6050; `mpucal doctor` shows which chip it is.")
     return tuple(notes)

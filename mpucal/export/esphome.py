@@ -15,8 +15,7 @@ from ..result.calibration import Calibration
 from .losses import heading, temperature_range
 
 RANGE_G, RANGE_DPS = 2.0, 2000.0
-G_PER_COUNT, NOMINAL_G = 0.000061, RANGE_G / ACCEL_COUNTS
-DPS_PER_COUNT, NOMINAL_DPS = 0.060975, RANGE_DPS / GYRO_COUNTS
+G_PER_COUNT, DPS_PER_COUNT = 0.000061, 0.060975
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -24,7 +23,7 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     lines = [*heading(calibration, notes, "# "), "sensor:", "  - platform: mpu6050", "    update_interval: 1s"]
     for name in (*(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz"), "temperature"):
         lines += [f"    {name}:", f"      id: measured_{name}", "      internal: true"]
-    g, dps = NOMINAL_G / G_PER_COUNT, NOMINAL_DPS / DPS_PER_COUNT
+    g, dps = RANGE_G / ACCEL_COUNTS / G_PER_COUNT, RANGE_DPS / GYRO_COUNTS / DPS_PER_COUNT
     b_a, b_omega = calibration.b_a_to_subtract / g, np.degrees(np.nan_to_num(calibration.b_omega)) / dps
     follows = _away(calibration), calibration.b_a_slope / g
     lines += _axes("Acceleration", "m/s²", "accel", calibration.inverse * g, b_a, *follows)

@@ -24,7 +24,7 @@ from ..result.calibration import Calibration
 from ..result.error_model import AXES
 from .losses import format_xyz, heading
 
-LSB_PER_G = 2048.0
+LSB_PER_G = MPU6050.accel_offset_lsb_per_g
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:

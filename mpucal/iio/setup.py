@@ -8,13 +8,11 @@ from contextlib import nullcontext, suppress
 from ..chip.config import Config
 from ..chip.port import Port
 from ..errors import BusError, ChipError, NoAnswer
-from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, bits_of, full_scale, parse_available
+from .attributes import ACCEL, AXES, GYRO, KINDS, SCALE_TOLERANCE, TEMP, TIMESTAMP, bits_of, full_scale, parse_available
 from .decode import ENABLE, FREQUENCY, IioDecoder
 
-# Most bytes of one attribute, and of a list of names.
+# Most bytes of one attribute; and of a list of names, or of one read from a buffer.
 TEXT_BYTES, LIST_BYTES = 4096, 65536
-# Most bytes of one read from a buffer.
-FRAMES_BYTES = 65536
 TRIGGER, CLOCK, LENGTH, WATERMARK = (
     "trigger/current_trigger",
     "current_timestamp_clock",
@@ -40,8 +38,6 @@ READ_SUFFIXES = (
     "_index",
     "_en",
 )
-# Drivers round their scales.
-RANGE_TOLERANCE = 1.01
 
 
 class DeviceSetup:
@@ -87,7 +83,7 @@ class DeviceSetup:
 
     def read_frames(self) -> None:
         """Read what the buffer holds, up to FRAMES_BYTES."""
-        self._files.read(self.device, FRAMES_BYTES)
+        self._files.read(self.device, LIST_BYTES)
 
     def set(self, name: str, text: str) -> str:
         """Write an attribute if its value differs, and return its value afterwards."""
@@ -161,7 +157,7 @@ class DeviceSetup:
                 continue
             texts = self.read(f"{name}_available").split()
             ranges = {text: full_scale(kind, scale, bits) for text in texts for scale in parse_available(text)}
-            enough = {text: value for text, value in ranges.items() if value * RANGE_TOLERANCE >= wanted[kind]}
+            enough = {text: value for text, value in ranges.items() if value * (1.0 + SCALE_TOLERANCE) >= wanted[kind]}
             if ranges:
                 self.set(name, min(enough, key=enough.__getitem__) if enough else max(ranges, key=ranges.__getitem__))
 

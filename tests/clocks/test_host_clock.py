@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpucal.clocks.host_clock import RATE_STD, HostClock, fit_pairs
+from mpucal.clocks.host_clock import RATE_TOLERANCE, HostClock, fit_pairs
 
 
 def pairs(rng, seconds, ppm, drift_ppm_a_minute=0.0, burst_s=0.0, a_second=10):
@@ -49,7 +49,7 @@ def test_times_are_those_of_the_host():
 def test_a_bridge_in_a_time_of_its_own_is_not_corrected(share):
     t_ns, host_ns = pairs(np.random.default_rng(3), 60, 0)
     fit = fit_pairs(t_ns, host_ns[0] + ((host_ns - host_ns[0]) * share).astype(np.int64))
-    assert (fit.b, fit.b_std) == (0.0, RATE_STD)
+    assert (fit.b, fit.b_std) == (0.0, RATE_TOLERANCE)
 
 
 def test_a_host_clock_that_leaps_keeps_the_rate():

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...chip.access import Reply
 from ...mavlink.texts import Prompt
+from ...sources.host_bus import ADDRESSES
 from ...sources.i2c_errors import transfer_error
 from ..faults import Fault, FaultKind, Schedule
 from ..motion import Motion
@@ -133,7 +134,6 @@ class FaultInjector:
 
 
 KHZ = 400
-NAME, ADDRESS = "the simulated bus", 0x68
 
 
 class SimulatedBus:
@@ -214,7 +214,7 @@ class SimulatedBus:
             try:
                 self._faults.before_transfer()
             except OSError as error:
-                raise transfer_error(error, NAME, ADDRESS) from error
+                raise transfer_error(error, "the simulated bus", ADDRESSES[0]) from error
         return self._clock.now()
 
     def _transmitted(self, data: bytes) -> bytes:

@@ -17,7 +17,6 @@ from ...mavlink.requests import SYS_STATUS
 from ...vehicle.sink import SAVE_IDS
 from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
 from .options import VehicleOptions
-from .store import INT8, INT16
 
 Three = tuple[float, float, float]
 PASSES: Three = (1.0, 0.0, 0.0)
@@ -79,20 +78,21 @@ class ArduPilot(Firmware):
     def __init__(self, options: VehicleOptions) -> None:
         super().__init__(options)
         self._saved_ids: list[int] = []
-        store = self.store
-        store.add("SYSID_THISMAV", options.system, INT16)
-        store.add("MAV_OPTIONS", 0, INT16)
-        store.add("MAV_GCS_SYSID", 255, INT16)
-        store.add(ORIENTATION, options.rotation, INT8)
+        store, m = self.store, dialect()
+        int8, int16 = m.MAV_PARAM_TYPE_INT8, m.MAV_PARAM_TYPE_INT16
+        store.add("SYSID_THISMAV", options.system, int16)
+        store.add("MAV_OPTIONS", 0, int16)
+        store.add("MAV_GCS_SYSID", 255, int16)
+        store.add(ORIENTATION, options.rotation, int8)
         store.add_all(chain(*CUSTOM_ANGLES.values(), (f"AHRS_TRIM_{axis}" for axis in AXES)), 0.0)
         for name, cutoff_hz in zip(FILTERS, (10, 4) if options.type == "rover" else (20, 20), strict=True):
-            store.add(name, cutoff_hz, INT16)
+            store.add(name, cutoff_hz, int16)
         for imu, slot in enumerate(SLOTS):
             exists = imu < options.imus
             store.add_all(slot.offset, OFFSET if exists else 0.0)
             store.add_all(slot.scale, SCALE if exists else 1.0)
             store.add(slot.sensor_id, DEVICE_IDS[imu] if exists else 0, INT32)
-            store.add("INS_USE" + (str(imu + 1) if imu else ""), 1, INT8)
+            store.add("INS_USE" + (str(imu + 1) if imu else ""), 1, int8)
 
     def start(self) -> None:
         """Restart the filters; each sensor shows its own id, whichever was saved."""

@@ -28,7 +28,6 @@ from .store import ParameterStore
 LSB = np.array([[ACC_LSB_MPS2], [GYRO_LSB_RAD_S]])
 SCALED_IMUS = tuple(MESSAGE_ID[name] for name in SCALED)
 RAW_IMU, HIGHRES_IMU = MESSAGE_ID[RAW], MESSAGE_ID[HIGHRES]
-ACCELEROMETER = 2
 # 4.7.0, a development version
 VERSION, COMMIT = 0x04_07_00_00, b"5117ed00"
 # An estimator learns nothing of a sensor that reads less than LEAST_MPS2, as without a scale.
@@ -178,8 +177,9 @@ class Firmware(ABC):
 
     def sys_status(self) -> Message:
         """Return SYS_STATUS, whose health holds the result of the pre-arm check."""
-        sensors = ACCELEROMETER | (PREARM_CHECK if self.check_is_present else 0)
-        health = ACCELEROMETER | (0 if self.complaints() else PREARM_CHECK)
+        accelerometer = dialect().MAV_SYS_STATUS_SENSOR_3D_ACCEL
+        sensors = accelerometer | (PREARM_CHECK if self.check_is_present else 0)
+        health = accelerometer | (0 if self.complaints() else PREARM_CHECK)
         return dialect().MAVLink_sys_status_message(sensors, sensors, health, 100, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...chip.families import MPU6500
+from ...chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
 from ...data import Vector
 from ...mavlink.texts import Direction, Prompt, ReceivedPrompt
 from ..disturbance import ARMS
@@ -18,8 +20,6 @@ from .options import VehicleOptions
 
 # The hand's axes have z up, a vehicle's have z down.
 FROM_HAND = np.diag([1.0, -1.0, -1.0])
-# Ranges to which autopilots set their IMUs
-ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 2000.0
 BLOCK = 40
 # Autopilots estimate the gyroscope's bias at each start; this share, up to 0.6 deg/s, is left by warming.
 GYRO_BIAS_LEFT = 0.12
@@ -40,7 +40,9 @@ class Imus:
         self._motion = Motion(hand, of_motion, gravity, mishaps, ARMS[options.arm])
         self._rotation, self._rate_hz = rotation, rate_hz
         self.truths = tuple(_truth(options.seed, number, gravity) for number in range(options.imus))
-        self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)
+        # Autopilots set the largest ranges.
+        ranges = float(max(ACCEL_RANGES_G)), float(max(GYRO_RANGES_DPS))
+        self._setting = Setting(rate_hz, *ranges, MPU6500.lsb_per_c, MPU6500.zero_c)
         self._responses = [truth.response(self._setting) for truth in self.truths]
         self._sample, self._warmer_c = 0, 0.0
 

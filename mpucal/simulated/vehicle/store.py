@@ -10,8 +10,6 @@ import numpy as np
 from ...data import Vector
 from ...mavlink.parameters.encoding import REAL32, Number, as_float32
 
-INT8, INT16 = 2, 4
-
 
 class ParameterStore(UserDict[str, Number]):
     """Values by name, with types; floats are kept as float32."""

@@ -55,10 +55,9 @@ class StreamTimes:
 FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
 
 COMPONENT = 1
-HEARTBEAT = 0
 SLOWER_WHILE_BUSY = 4
-# MAV_TYPE
-TYPES = {"plane": 1, "copter": 2, "rover": 10}
+# Names of MAV_TYPE.
+TYPES = {"plane": "FIXED_WING", "copter": "QUADROTOR", "rover": "GROUND_ROVER"}
 REBOOT_US = 2 * S_US
 SECOND_STATION, SECOND_STATION_HZ = 255, 4
 
@@ -138,7 +137,7 @@ class SimulatedVehicle:
     def _boot(self) -> None:
         self._booted_us = self._now_us
         self._streams = StreamTimes()
-        self._set_intervals(((HEARTBEAT, S_US), *self.firmware.streams))
+        self._set_intervals(((dialect().MAVLINK_MSG_ID_HEARTBEAT, S_US), *self.firmware.streams))
         self._list: deque[str] = deque()
         self.firmware.start()
 
@@ -167,7 +166,8 @@ class SimulatedVehicle:
         if self._now_us < self._silent_until_us:
             return
         for message_id in self._streams.due(self._now_us, SLOWER_WHILE_BUSY if self._list else 1):
-            message = self._heartbeat() if message_id == HEARTBEAT else self._message(message_id)
+            is_beat = message_id == dialect().MAVLINK_MSG_ID_HEARTBEAT
+            message = self._heartbeat() if is_beat else self._message(message_id)
             if message is not None:
                 self._send(message)
         if self._list:
@@ -177,11 +177,10 @@ class SimulatedVehicle:
         return self.firmware.message(message_id, self._now_us - self._booted_us)
 
     def _heartbeat(self) -> Message:
-        mode = ARMED if self.firmware.armed else 0
-        state = dialect().MAV_STATE_ACTIVE if self.firmware.armed else dialect().MAV_STATE_STANDBY
-        return dialect().MAVLink_heartbeat_message(
-            TYPES[self.options.type], self.firmware.autopilot, 81 | mode, 0, state, 3
-        )
+        m = dialect()
+        kind = getattr(m, f"MAV_TYPE_{TYPES[self.options.type]}")
+        mode, state = (ARMED, m.MAV_STATE_ACTIVE) if self.firmware.armed else (0, m.MAV_STATE_STANDBY)
+        return m.MAVLink_heartbeat_message(kind, self.firmware.autopilot, 81 | mode, 0, state, 3)
 
     def _send(self, message: Message) -> None:
         data = bytes(message.pack(self._mav))
