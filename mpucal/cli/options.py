@@ -13,8 +13,9 @@ from click.core import ParameterSource
 from ..arguments import LEAST_GRAVITY_MPS2, LEAST_ON_EARTH_MPS2, MOST_GRAVITY_MPS2, MOST_ON_EARTH_MPS2
 from ..calibration import MODELS
 from ..data import STANDARD_GRAVITY_MPS2
+from ..sources.kind import Option
 from . import typed_words, with_option
-from .arguments import together
+from .arguments import Decorator, together
 
 
 class Parsed(click.ParamType[Any]):
@@ -47,6 +48,23 @@ class Finite(click.FloatRange):
 
 
 ABOVE_ZERO = Finite(min=0.0, min_open=True)
+
+
+def option_of(option: Option, hidden: bool = False) -> Decorator:
+    """Return the click option for a row of a table."""
+    bare: dict[str, Any] = {} if option.bare is None else {"is_flag": False, "flag_value": option.bare}
+    parsed = option.parse if isinstance(option.parse, click.ParamType) else Parsed(option.parse)
+    return click.option(
+        option.flag,
+        option.name,
+        metavar=option.metavar,
+        type=click.Choice(option.choices) if option.choices else parsed,
+        default=option.default,
+        show_default=option.default is not None,
+        help=option.help,
+        hidden=hidden,
+        **bare,
+    )
 
 
 def parse_gravity(text: str) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,8 +17,9 @@ from ..errors import UsageError
 from ..files.hints import Hints, parse_columns, parse_span, parse_units
 from ..files.reading import MOST_MB, VARIABLE, allowed_bytes
 from ..files.rows import Rows
+from ..sources.kind import Option
 from .arguments import Decorator, together
-from .options import ABOVE_ZERO, Parsed, given_options
+from .options import ABOVE_ZERO, given_options, option_of
 from .person import say
 
 MOST_BYTES = 1 << 20
@@ -39,44 +39,34 @@ _MOST = click.option(
 )
 # hint: its option
 _OPTIONS = {
-    "topic": click.option("--topic", metavar="NAME", help="Topic of a bag; two, the accelerometer's first: ONE,OTHER."),
-    "sensor": click.option(
-        "--sensor",
-        metavar="ID",
-        help="Sensor to read of a table of several: what its lines or columns call it, such as 0x69 or IMU2.",
+    "topic": Option("topic", "Topic of a bag; two, the accelerometer's first: ONE,OTHER.", "NAME"),
+    "sensor": Option(
+        "sensor", "Sensor to read of a table of several: what its lines or columns call it, such as 0x69 or IMU2.", "ID"
     ),
-    "columns": click.option(
-        "--columns",
-        metavar="COLUMNS",
-        type=Parsed(parse_columns),
-        help="Columns of a table: t=NAME,ax=NAME,..., or their order: t,ax,ay,az,gx,gy,gz.",
+    "columns": Option(
+        "columns",
+        "Columns of a table: t=NAME,ax=NAME,..., or their order: t,ax,ay,az,gx,gy,gz.",
+        "COLUMNS",
+        parse_columns,
     ),
-    "units": click.option(
-        "--units",
-        metavar="UNITS",
-        type=Parsed(parse_units),
-        help="Units of a table or a bag: t=ms,acc=g,gyr=deg/s.",
-    ),
-    "accel_range_g": click.option("--accel-range", metavar="G", type=ABOVE_ZERO, help="Full scale of counts [g]."),
-    "gyro_range_dps": click.option(
-        "--gyro-range", metavar="DPS", type=ABOVE_ZERO, help="Full scale of counts [deg/s]."
-    ),
-    "rate_hz": click.option("--rate", metavar="HZ", type=ABOVE_ZERO, help="Rate of samples without times [Hz]."),
-    "span": click.option(
-        "--span",
-        metavar="FROM:TO",
-        type=Parsed(parse_span),
-        help="Read this part of a recording alone: s since its first sample; one may be left out.",
+    "units": Option("units", "Units of a table or a bag: t=ms,acc=g,gyr=deg/s.", "UNITS", parse_units),
+    "accel_range_g": Option("accel_range", "Full scale of counts [g].", "G", ABOVE_ZERO),
+    "gyro_range_dps": Option("gyro_range", "Full scale of counts [deg/s].", "DPS", ABOVE_ZERO),
+    "rate_hz": Option("rate", "Rate of samples without times [Hz].", "HZ", ABOVE_ZERO),
+    "span": Option(
+        "span",
+        "Read this part of a recording alone: s since its first sample; one may be left out.",
+        "FROM:TO",
+        parse_span,
     ),
 }
-_UNIT = re.compile("_(g|dps|hz)$")
 # name of an option in a command: hint
-NAMES = {_UNIT.sub("", hint): hint for hint in _OPTIONS}
+NAMES = {option.name: hint for hint, option in _OPTIONS.items()}
 
 
 def hint_options(*left_out: str) -> Decorator:
     """Return the options for all of NAMES but those `left_out`, which the command has already, and --most-mb."""
-    return together(_MOST, *(_OPTIONS[hint] for name, hint in NAMES.items() if name not in left_out))
+    return together(_MOST, *(option_of(each) for each in _OPTIONS.values() if each.name not in left_out))
 
 
 def make_hints(options: Mapping[str, Any]) -> Hints:
@@ -99,7 +89,7 @@ def given_hints(options: Mapping[str, Any]) -> Hints:
 def hint_words(hints: Hints) -> list[str]:
     """Return the words of a command line that give these hints."""
     words = []
-    for name, hint in NAMES.items():
+    for hint, option in _OPTIONS.items():
         if value := getattr(hints, hint):
             if isinstance(value, Mapping):
                 # the places of columns count from 1
@@ -107,7 +97,7 @@ def hint_words(hints: Hints) -> list[str]:
                 value = ",".join(f"{of}={at}" for of, at in items)
             if isinstance(value, tuple):
                 value = ":".join(f"{at:g}" for at in value if at < math.inf) + ":" * (value[1] == math.inf)
-            words += [f"--{name.replace('_', '-')}", str(value)]
+            words += option.words(value)
     return words
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,11 @@ import click
 
 from ..errors import UsageError
 from ..sources import opening
-from ..sources.kind import Option, SourceKind
+from ..sources.kind import SourceKind
 from ..sources.table import SOURCES, kinds_for, matching_kinds, unique
 from . import typed_words
 from .arguments import Decorator, together
-from .options import Parsed, given_options
+from .options import given_options, option_of
 
 
 def source_options(name: str, settings: bool = True) -> Decorator:
@@ -34,24 +35,9 @@ def source_options(name: str, settings: bool = True) -> Decorator:
     declared = []
     for option in unique(kind.option for kind in SOURCES):
         forms = [kind.forms for kind in taken if kind.option is option]
-        declared.append(_click_option(option, _sentence(", or ".join(forms)), hidden=not forms))
-    declared += [_click_option(option, option.help) for option in unique(belonging)]
+        declared.append(option_of(replace(option, help=_sentence(", or ".join(forms))), hidden=not forms))
+    declared += map(option_of, unique(belonging))
     return together(*declared)
-
-
-def _click_option(option: Option, text: str, hidden: bool = False) -> Decorator:
-    bare: dict[str, Any] = {} if option.bare is None else {"is_flag": False, "flag_value": option.bare}
-    return click.option(
-        option.flag,
-        option.name,
-        metavar=option.metavar,
-        type=click.Choice(option.choices) if option.choices else Parsed(option.parse),
-        default=option.default,
-        show_default=option.default is not None,
-        help=text,
-        hidden=hidden,
-        **bare,
-    )
 
 
 def _sentence(words: str) -> str:

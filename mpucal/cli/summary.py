@@ -161,7 +161,7 @@ def _session_words(source: Mapping[str, Any]) -> list[str]:
     words = ["session"]
     for option in (each for kind in matching_kinds(source) for each in (kind.option, *kind.options)):
         if (value := source.get(option.name)) is not None:
-            words += [option.flag] if value == option.bare else [option.flag, str(value)]
+            words += option.words(value)
     return words
 
 

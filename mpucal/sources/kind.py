@@ -40,6 +40,10 @@ class Option:
         """Spelling on the command line."""
         return f"--{self.name.replace('_', '-')}"
 
+    def words(self, value: Any) -> list[str]:
+        """Return the words of a command line that give the option this value."""
+        return [self.flag] if value == self.bare else [self.flag, str(value)]
+
 
 @dataclass(frozen=True)
 class SourceKind:
