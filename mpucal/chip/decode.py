@@ -13,11 +13,11 @@ from ..errors import RecordingError
 from . import registers as reg
 from .access import Transaction
 from .accesses import Accesses
+from .config import Settings
 from .families import Part
 from .fifo import FifoDecoder
 from .identity import Behaviour
 from .losses import Loss
-from .settings import Settings
 
 Words = tuple[int, int, int]
 

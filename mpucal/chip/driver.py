@@ -18,14 +18,13 @@ from ..data import Recording, Samples, Sensor
 from ..errors import BusError, BusHeld, ChipError, EndOfCapture
 from . import registers as reg
 from .access import Bus
-from .config import MOST_FILLED, Config
+from .config import MOST_FILLED, Config, Settings
 from .decode import Decoder
 from .fifo import FifoDecoder
 from .identity import describe_mismatch
 from .losses import Loss, TransferStats, remedy_of
 from .offsets import PLACES
 from .port import Port
-from .settings import Settings
 from .setup import configure, is_configured, probe, read_identity, reset, restart_fifo, stop_fifo, wake
 
 DRIVER_VERSION = 6

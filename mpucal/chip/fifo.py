@@ -18,8 +18,8 @@ from ..clocks.sample_clock import NS, PolledClock, SampleClock, Times, Whole, ma
 from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
 from .bit_flips import BitFlipFilter, Counts
+from .config import Settings
 from .losses import Loss
-from .settings import Settings
 
 FULL_SCALE_COUNT = np.iinfo(np.int16).max
 # columns of a frame

@@ -1,23 +1,31 @@
 """Measurement of the accelerometer at rest from the data registers, after which the chip is as it was before.
 
-The chip is not reset, which would reload its trim, and the FIFO is not touched.
+The chip is not reset, which would reload its trim, and the FIFO is not touched. The factory's self test is such a
+measurement, too: a built-in force pushes each axis, and the response is compared with the factory's code. Source of the
+self test: RM-MPU-6000A r4.2, registers 13 to 16, 27 and 28, and PS-MPU-6000A r3.4, sections 6.1 and 6.2 (within 14 %);
+for the 6500 RM-MPU-9250A r1.4, registers 0 to 15, with the limits of Linux' drivers/iio/imu/inv_mpu6050.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import BoardMoved, BusError, ChipReset
 from ..rests.stillness import is_untouched
 from . import registers as reg
+from .families import Part
 from .identity import accel_sensitivity
 from .losses import Loss
 from .port import Port
 from .setup import STARTUP_NS
+
+Codes = NDArray[np.int64]
 
 READ_NS, READS = 5_000_000, 100
 
@@ -98,3 +106,98 @@ def check_registers(port: Port, register: int, value: bytes) -> None:
     """Raise ChipReset if two reads from `register` on do not give `value`: a single one may have a bit error."""
     if all(port.read(register, len(value)) != value for _ in range(2)):
         raise ChipReset("the chip lost its settings during the measurement: it was reset", Loss.RESET.remedy)
+
+
+SETTLE_NS = 250_000_000
+
+# 6050: +-8 g and +-250 deg/s; 6500: +-2 g and +-250 deg/s.
+PACKED_AFS_SEL, SMALLEST = 2, 0
+PACKED_SHARES, ACCEL_SHARES, GYRO_SHARES = (0.86, 1.14), (0.5, 1.5), (0.5, np.inf)
+
+# Number of attempts on a board that moves, and differences between the readings before and after that show it.
+ATTEMPTS = 2
+MOVED_G, MOVED_DPS = 0.02, 2.0
+
+
+@dataclass(frozen=True)
+class SelfTest:
+    """Responses of the axes x, y, z.
+
+    Attributes
+    ----------
+    accel_shares, gyro_shares : (3,) response divided by that of the factory's code; NaN without a code.
+    passed : True if all are within the limits of the register map; False without codes.
+    moved : the board was moved meanwhile, in each attempt: the shares mean nothing.
+    """
+
+    accel_shares: Vector
+    gyro_shares: Vector
+    passed: bool
+    moved: bool
+
+    @property
+    def has_codes(self) -> bool:
+        """True if the chip has all codes, as every genuine part has."""
+        return bool(np.isfinite([self.accel_shares, self.gyro_shares]).all())
+
+
+def run_self_test(port: Port, part: Part) -> SelfTest:
+    """Test a chip that is awake and at rest, and restore its ranges.
+
+    Raises
+    ------
+    BusError : a transfer failed three times. ChipReset : the chip was reset meanwhile.
+    """
+    ranges, family = port.read(reg.GYRO_CONFIG, 2), part.family
+    # A reset clears the first two, or puts the chip to sleep.
+    kept = [(register, port.read(register, 1)) for register in (reg.CONFIG, reg.SMPLRT_DIV, reg.PWR_MGMT_1)]
+    afs_sel = PACKED_AFS_SEL if family.packed_self_test else SMALLEST
+    try:
+        for _ in range(ATTEMPTS):
+            off, on, after = (_mean_counts(port, test, afs_sel) for test in (0, reg.SELF_TEST, 0))
+            change = np.abs(after - off)
+            moved = bool(
+                (change[:3] > MOVED_G * reg.ACCEL_LSB_PER_G[afs_sel]).any()
+                or (change[4:] > MOVED_DPS * reg.GYRO_LSB_PER_DPS[SMALLEST]).any()
+            )
+            if not moved:
+                break
+    finally:
+        port.write_block(reg.GYRO_CONFIG, ranges)
+        port.sleep(SETTLE_NS)
+    for register, value in kept:
+        check_registers(port, register, value)
+    accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
+    gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[SMALLEST]
+    codes = _factory_codes(port, family.packed_self_test)
+    expected = factory_response(family.packed_self_test, *codes)
+    shares = [np.where(code, each / of, np.nan) for code, each, of in zip(codes, (accel, gyro), expected, strict=True)]
+    limits = (PACKED_SHARES, PACKED_SHARES) if family.packed_self_test else (ACCEL_SHARES, GYRO_SHARES)
+    passed = all(((low < share) & (share < high)).all() for share, (low, high) in zip(shares, limits, strict=True))
+    return SelfTest(*shares, passed, moved)
+
+
+def _mean_counts(port: Port, test: int, afs_sel: int) -> Vector:
+    """Measure the mean counts (7,) of a sample with these settings."""
+    gyro, accel = SMALLEST << reg.FULL_SCALE_SHIFT, afs_sel << reg.FULL_SCALE_SHIFT
+    port.write_block(reg.GYRO_CONFIG, bytes([gyro | test, accel | test]))
+    port.sleep(SETTLE_NS)
+    return np.asarray(read_counts(port, reg.FRAME_WORDS).mean(0))
+
+
+def _factory_codes(port: Port, packed: bool) -> tuple[Codes, Codes]:
+    """Read the factory's codes (3,) of the accelerometer and of the gyroscope; 0: there is none."""
+    if not packed:
+        gyro, accel = (port.read(start, 3) for start in (reg.SELF_TEST_GYRO, reg.SELF_TEST_ACCEL))
+        return np.array([*accel]), np.array([*gyro])
+    *axes, low = port.read(reg.SELF_TEST_ACCEL, 4)
+    accel_codes = [(axis >> 5) << 2 | low >> shift & 3 for axis, shift in zip(axes, (4, 2, 0), strict=True)]
+    return np.array(accel_codes), np.array([axis & 0x1F for axis in axes])
+
+
+def factory_response(packed: bool, accel: Codes, gyro: Codes) -> tuple[Vector, Vector]:
+    """Return the factory's responses (3,) [g] and (3,) [deg/s] by its codes; those of 0 mean nothing."""
+    if packed:
+        return 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30), 25 * 1.046 ** (gyro - 1.0) * np.array([1, -1, 1])
+    counts = [2620.0 * 1.01 ** (codes - 1.0) for codes in (accel, gyro)]
+    return counts[0] / reg.ACCEL_LSB_PER_G[SMALLEST], counts[1] / reg.GYRO_LSB_PER_DPS[SMALLEST]

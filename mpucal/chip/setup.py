@@ -12,9 +12,9 @@ from datetime import datetime
 
 from ..errors import ChipError
 from . import registers as reg
+from .config import Settings
 from .families import FAMILIES, PARTS, families_with_fifo, known_parts
 from .port import Port
-from .settings import Settings
 
 # Awake after a reset a chip takes 8000 samples a second, and 293 frames fill the largest FIFO; clones may be slower.
 COUNT_NS, COUNTS = 15_000_000, 45

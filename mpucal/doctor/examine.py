@@ -21,8 +21,7 @@ from ..chip.identity import describe_mismatch
 from ..chip.losses import Loss, TransferStats, remedy_of
 from ..chip.offsets import PLACES, OffsetRegisters, OffsetResponse, measure_offset_response, restore
 from ..chip.port import TRIES, Port
-from ..chip.quick_measure import PATIENCE, temporary_measurement
-from ..chip.self_test import run_self_test
+from ..chip.quick_measure import PATIENCE, run_self_test, temporary_measurement
 from ..chip.setup import read_identity
 from ..data import Sensor
 from ..errors import BoardMoved, ChipError, ChipReset, SourceError, UnknownOffsets

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from mpucal.chip.config import Settings
 from mpucal.chip.families import part_of
 from mpucal.chip.fifo import DROPPED_FRAMES, FifoDecoder
 from mpucal.chip.losses import Loss
-from mpucal.chip.settings import Settings
 
 SETTINGS = Settings(part_of(0x68), smplrt_div=4, dlpf_cfg=3, fs_sel=1, afs_sel=1)
 PERIOD_NS = 5_000_000

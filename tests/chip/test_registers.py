@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.chip import registers as reg
-from mpucal.chip.config import Config
+from mpucal.chip.config import Config, Settings
 from mpucal.chip.families import MPU6050, MPU6500, PARTS, part_of
-from mpucal.chip.settings import Settings
 from mpucal.errors import ChipError, RecordingError, UsageError
 
 settings = st.builds(

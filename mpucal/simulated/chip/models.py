@@ -13,7 +13,7 @@ import numpy as np
 
 from ...chip import registers as reg
 from ...chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6880, MPU6886, Family
-from ...chip.self_test import factory_response
+from ...chip.quick_measure import factory_response
 
 Three = tuple[float, ...]
 Codes = tuple[int, ...]
