@@ -1,14 +1,19 @@
-"""Arguments and options that mean the same in every command."""
+"""Arguments and options that mean the same in every command, and loading of the calibration that they name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ..data import STANDARD_GRAVITY_MPS2
+from ..errors import WriteBackError
+from ..result.calibration import Calibration
 from ..result.session_files import DOCUMENT
+from .person import say
 
 Decorator = Callable[[Any], Any]
 
@@ -50,3 +55,38 @@ def output_option(name: str, metavar: str, text: str, required: bool = False) ->
 def json_option(text: str) -> Decorator:
     """Return the option --json, which the command takes as `as_json`."""
     return click.option("--json", "as_json", is_flag=True, help=text)
+
+
+force_option = click.option("--force", is_flag=True, help="Accept a calibration whose digest is missing or wrong.")
+
+
+def load_calibration(path: Path) -> Calibration:
+    """Load a calibration; warn if its numbers may have changed since it was saved.
+
+    Raises
+    ------
+    RecordingError : see Calibration.load.
+    """
+    calibration = Calibration.load(path)
+    if calibration.doubt:
+        say(f"{path}: {calibration.doubt}.")
+    return calibration
+
+
+def load_trusted(path: Path, force: bool) -> Calibration:
+    """Load a calibration that is to be written somewhere.
+
+    Raises
+    ------
+    WriteBackError : its digest or CRC does not match, and `force` is not given.
+    RecordingError : see Calibration.load.
+    """
+    calibration = load_calibration(path)
+    if calibration.doubt and not force:
+        raise WriteBackError(f"nothing was written: {path}: {calibration.doubt}", "look at it, then give --force")
+    return replace(calibration, doubt="")
+
+
+def at_gravity_of(calibration: Calibration | None, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a source's options with the gravity of a calibration: a simulated chip is examined where it was made."""
+    return {**options, "gravity": STANDARD_GRAVITY_MPS2 if calibration is None else calibration.gravity}

@@ -17,7 +17,7 @@ from ..disk.output_folder import OutputFolder
 from ..errors import UsageError
 from ..files import load
 from ..page.address import Address
-from ..page.state import Result
+from ..page.feed import Result
 from ..recheck import check
 from ..recheck.outcome import CheckResult
 from ..recheck.update import update_biases
@@ -31,13 +31,21 @@ from ..sinks.write_back import file_recorder
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import open_source
 from ..terminal.console import Console
-from .arguments import PATH, calibration_argument, json_option, output_option, yes_option
+from .arguments import (
+    PATH,
+    at_gravity_of,
+    calibration_argument,
+    force_option,
+    json_option,
+    load_calibration,
+    load_trusted,
+    output_option,
+    yes_option,
+)
 from .destination import write_back
-from .loading import at_gravity_of, force_option, load_calibration, load_trusted
 from .options import given_options
-from .page import BOARD_KIND, page_options, show_session
+from .page import BOARD_KIND, open_runner, page_options, show_session
 from .recording_options import given_hints, hint_options, say_interpretation
-from .running import open_runner
 from .source_options import check_input, check_source, source_options
 
 EXAMPLE = (

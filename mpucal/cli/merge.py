@@ -11,8 +11,7 @@ from ..disk.output_folder import OutputFolder
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import check_owner, save
-from .arguments import CALIBRATION_PATH, json_option, output_option
-from .loading import force_option, load_trusted
+from .arguments import CALIBRATION_PATH, force_option, json_option, load_trusted, output_option
 from .person import say
 from .summary import slope, summary
 

@@ -23,8 +23,7 @@ from ..result.error_model import mg_text
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
-from .arguments import PATH, json_option
-from .loading import load_calibration
+from .arguments import PATH, json_option, load_calibration
 from .options import given_options
 from .person import say
 from .recording_options import NAMES, hint_options, make_hints, say_interpretation

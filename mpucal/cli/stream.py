@@ -20,7 +20,7 @@ from ..errors import EndOfCapture
 from ..files.csv import CsvText
 from ..files.tables.units import NS
 from ..page.address import Address
-from ..page.live import live_page
+from ..page.console import live_page
 from ..recheck import days_since
 from ..recheck.watch import Contradiction, DriftMonitor
 from ..result.clock import iso_utc
@@ -31,8 +31,7 @@ from ..sources.opening import open_source
 from ..sources.table import source_title
 from ..terminal.console import JsonLines
 from ..terminal.keys import Keys
-from .arguments import CALIBRATION_PATH, json_option, output_option
-from .loading import at_gravity_of, load_calibration
+from .arguments import CALIBRATION_PATH, at_gravity_of, json_option, load_calibration, output_option
 from .options import ABOVE_ZERO
 from .page import choose_board, page_options
 from .person import say

@@ -11,9 +11,16 @@ from ..disk.output_folder import OutputFolder
 from ..sinks.choose import check_has_sink
 from ..sinks.table import SINKS
 from ..sinks.write_back import file_recorder, is_calibration, put_back, write_objection, write_to
-from .arguments import calibration_argument, json_option, output_option, yes_option
+from .arguments import (
+    at_gravity_of,
+    calibration_argument,
+    force_option,
+    json_option,
+    load_trusted,
+    output_option,
+    yes_option,
+)
 from .destination import make_device
-from .loading import at_gravity_of, force_option, load_trusted
 from .person import ask, say, say_done
 from .source_options import check_source, source_options
 

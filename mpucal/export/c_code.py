@@ -1,4 +1,7 @@
-"""C header, and C functions that apply a calibration: to m/s^2 and rad/s, with b_a(T), and to the chip's counts."""
+"""C functions that apply a calibration, to m/s^2 and rad/s, with b_a(T): as a header, and in an Arduino sketch.
+
+The header has functions for the chip's counts, too. The sketch reads the chip over Wire, and prints what it calibrates.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
+from ..chip.config import Config
+from ..chip.families import MPU6050, family_of
+from ..chip.registers import ACCEL_RANGES_G, FULL_SCALE_SHIFT, GYRO_RANGES_DPS
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
 from ..result.calibration import Calibration
 from .losses import heading, temperature_range
-from .templates import fill
+from .templates import fill, row, rows
+
+FLOAT = "{:.8e}f"
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -17,7 +25,7 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     return fill(
         "header.h",
         heading="\n".join(heading(calibration, notes, " * ")),
-        D=_matrix(calibration.D),
+        D=rows(calibration.D, FLOAT, "{}"),
         functions=c_functions(calibration),
         counts=_count_functions(calibration),
     )
@@ -29,16 +37,16 @@ def c_functions(c: Calibration) -> str:
     Their names differ from those of mpucal_apply.h, so that a file can include both. The function of temperature tests
     for NaN by its bits, since -ffast-math has no NaN.
     """
-    at, start, end = map(_number, temperature_range(c))
+    at, start, end = map(FLOAT.format, temperature_range(c))
     return fill(
         "functions.c",
-        inv_D=_matrix(c.inverse),
-        b_a=_row(c.b_a_to_subtract),
-        K=_matrix(c.K),
-        b_omega=_row(np.nan_to_num(c.b_omega)),
+        inv_D=rows(c.inverse, FLOAT, "{}"),
+        b_a=row(c.b_a_to_subtract, FLOAT),
+        K=rows(c.K, FLOAT, "{}"),
+        b_omega=row(np.nan_to_num(c.b_omega), FLOAT),
         about_a=_about("a", "m/s^2", c.sensor.accel_range_g, "g", STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS),
         about_w=_about("w", "rad/s", c.sensor.gyro_range_dps, "deg/s", np.radians(1) / GYRO_COUNTS),
-        slope=_row(c.b_a_slope),
+        slope=row(c.b_a_slope, FLOAT),
         at=at,
         start=start,
         end=end,
@@ -51,8 +59,8 @@ def _count_functions(c: Calibration) -> str:
     return fill(
         "counts.c",
         checks=_check("MPUCAL_USED_RANGE_G", accel_g, "g") + _check("MPUCAL_USED_RANGE_DPS", gyro_dps, "deg/s"),
-        range_g=_number(accel_g),
-        range_dps=_number(gyro_dps),
+        range_g=FLOAT.format(accel_g),
+        range_dps=FLOAT.format(gyro_dps),
         accel_counts=ACCEL_COUNTS,
         gyro_counts=GYRO_COUNTS,
     )
@@ -71,14 +79,38 @@ def _about(result: str, unit: str, full_scale: float | None, of: str, per_count:
     return f"{line}\n/* At +-{full_scale:g} {of} one count of the chip is {full_scale * per_count:.9g} {unit}. */"
 
 
-def _matrix(matrix: Vector) -> str:
-    """Return the rows of a C initialiser, in float."""
-    return ",\n".join(f"    {{{_row(row)}}}" for row in matrix)
+ACCEL_CONFIG = {float(g): code << FULL_SCALE_SHIFT for code, g in enumerate(ACCEL_RANGES_G)}
+GYRO_CONFIG = {float(dps): code << FULL_SCALE_SHIFT for code, dps in enumerate(GYRO_RANGES_DPS)}
 
 
-def _row(values: Vector) -> str:
-    return ", ".join(map(_number, values))
+def sketch(calibration: Calibration, notes: Sequence[str]) -> str:
+    """Return the sketch's text, with `notes` in its heading."""
+    sensor = calibration.sensor
+    range_g = sensor.accel_range_g if sensor.accel_range_g in ACCEL_CONFIG else Config.accel_range_g
+    range_dps = sensor.gyro_range_dps if sensor.gyro_range_dps in GYRO_CONFIG else Config.gyro_range_dps
+    family = family_of(sensor.chip) or MPU6050
+    return fill(
+        "sketch.ino",
+        heading="\n".join(heading(calibration, notes, "// ", "m/s^2, rad/s")),
+        functions=c_functions(calibration),
+        accel_config=f"0x{ACCEL_CONFIG[range_g]:02x}",
+        gyro_config=f"0x{GYRO_CONFIG[range_dps]:02x}",
+        range_g=f"{range_g:g}",
+        range_dps=f"{range_dps:g}",
+        accel_counts=f"{ACCEL_COUNTS:.0f}",
+        gyro_counts=f"{GYRO_COUNTS:.0f}",
+        lsb_per_c=f"{family.lsb_per_c:g}",
+        zero_c=f"{family.zero_c:g}",
+    )
 
 
-def _number(value: float) -> str:
-    return f"{value:.8e}f"
+def sketch_losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on assumptions of the sketch."""
+    sensor, notes = calibration.sensor, ["It reads the chip at address 0x68: if AD0 is high, change CHIP to 0x69."]
+    if sensor.accel_range_g not in ACCEL_CONFIG:
+        notes.append(f"It sets +-{Config.accel_range_g:g} g, but the calibration is of another or unknown range.")
+    if sensor.gyro_range_dps not in GYRO_CONFIG:
+        notes.append(f"It sets +-{Config.gyro_range_dps:g} deg/s, but the calibration is of another or unknown range.")
+    if family_of(sensor.chip) is None and calibration.follows_temperature:
+        notes.append("It assumes the thermometer of an MPU-6050; `mpucal doctor` shows which chip it is.")
+    return tuple(notes)

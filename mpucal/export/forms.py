@@ -8,7 +8,7 @@ from functools import partial
 
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..result.calibration import Calibration
-from . import arduino, c_code, esphome, i2cdevlib, linux_iio, python_modules, ros, vehicles, vio
+from . import c_code, esphome, offset_words, python_modules, ros, vehicles
 from .losses import (
     LossNotes,
     check_usable,
@@ -71,8 +71,8 @@ FORMS = (
         ".ino",
         "the Arduino IDE",
         "a sketch that reads the chip over Wire and prints accelerations and rates",
-        arduino.text,
-        (float_rounding, arduino.losses, hardware_offsets),
+        c_code.sketch,
+        (float_rounding, c_code.sketch_losses, hardware_offsets),
     ),
     Form(
         "python",
@@ -87,8 +87,8 @@ FORMS = (
         ".yaml",
         "imu_calib's apply node",
         "`SM raw - bias`: its bias is inv(D) b_a; with covariances for filters",
-        ros.text,
-        (ros.losses, without_temperature, hardware_offsets),
+        ros.imu_calib,
+        (ros.imu_calib_losses, without_temperature, hardware_offsets),
     ),
     Form(
         "linux-iio",
@@ -96,8 +96,8 @@ FORMS = (
         "`sh FILE /sys/bus/iio/devices/iio:deviceN`",
         "calibbias (only of an MPU-6050: the kernel's driver uses wrong addresses of an MPU-6500's offset registers), "
         "calibscale; it prints the line for udev's ACCEL_MOUNT_MATRIX",
-        linux_iio.text,
-        (linux_iio.losses, without_gyroscope, without_temperature),
+        offset_words.linux_iio,
+        (offset_words.linux_iio_losses, without_gyroscope, without_temperature),
     ),
     Form(
         "ardupilot",
@@ -122,24 +122,24 @@ FORMS = (
         ".yaml",
         "Kalibr",
         "imu.yaml: noise densities; correct the samples before",
-        vio.kalibr,
-        (vio.kalibr_losses,),
+        ros.kalibr,
+        (ros.kalibr_losses,),
     ),
     Form(
         "openvins",
         ".yaml",
         "OpenVINS",
         "kalibr_imu_chain.yaml: `Ta`, `R_IMUtoACC` of inv(D), `Tw`, `R_IMUtoGYRO` of K; it estimates the biases",
-        vio.openvins,
-        (vio.openvins_losses,),
+        ros.openvins,
+        (ros.openvins_losses,),
     ),
     Form(
         "i2cdevlib",
         ".h",
         "sketches with i2cdevlib's MPU6050",
         "`setOffsets(mpu)`: setXAccelOffset and the like, only biases",
-        i2cdevlib.text,
-        (i2cdevlib.losses, without_temperature),
+        offset_words.i2cdevlib,
+        (offset_words.i2cdevlib_losses, without_temperature),
     ),
     Form(
         "micropython",

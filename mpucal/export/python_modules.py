@@ -18,7 +18,7 @@ from .templates import fill, row, rows
 def numpy_text(calibration: Calibration, notes: Sequence[str]) -> str:
     """Return the text of the module for NumPy, with `notes` in its docstring."""
     head = "\n\n".join(heading(calibration, notes, "", "m/s^2, rad/s"))
-    return _text("module.py", calibration, head, ".12g", "[]", ".6g")
+    return _text("module.py", calibration, head, "{:.12g}", "[]", "{:.6g}")
 
 
 def micropython_text(calibration: Calibration, notes: Sequence[str]) -> str:
@@ -27,9 +27,9 @@ def micropython_text(calibration: Calibration, notes: Sequence[str]) -> str:
         "micropython.py",
         calibration,
         "\n".join(heading(calibration, notes, "# ", "m/s^2, rad/s")),
-        ".9g",
+        "{:.9g}",
         "()",
-        ".9g",
+        "{:.9g}",
         ranges=f"{calibration.sensor.accel_range_g}, {calibration.sensor.gyro_range_dps}",
         mps2_per_g_count=f"{STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS:.9g}",
         rad_s_per_dps_count=f"{np.radians(1) / GYRO_COUNTS:.9g}",

@@ -24,7 +24,7 @@ from ..chip.port import Port
 from ..data import Vector
 from ..disk.atomic import write_atomically
 from ..errors import ChipError, OutputError
-from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
+from ..export.offset_words import LSB_PER_G, matrix_text, offset_words
 from ..iio.attributes import ACCEL, AXES, mount_matrix, read_scale
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver

@@ -1,4 +1,4 @@
-"""Console that shows a session in the terminal and on a page, and accepts keys from both."""
+"""A session in the terminal and on a page, with keys from both; and the page of `mpucal stream`."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..data import Samples, Sensor, Vector
 from ..errors import MpucalError
-from ..session.events import Command, Decision, Key, Output, Prompt
+from ..session.events import Command, Decision, Key, Meter, Output, Prompt
+from ..session.meter import MotionWatch
 from ..terminal.console import Console
 from ..terminal.keys import Keys
 from .address import Address, qr_code
-from .feed import Feed
+from .feed import Feed, Result
 from .server import ASK_EVERY_S
-from .state import Result
 
 # Function that shows a result, and its files, on the page.
 ResultCallback = Callable[[Result, Sequence[Path]], None]
@@ -116,3 +119,42 @@ def _wait(what_for: str, enough: Callable[[], bool]) -> None:
     keys = Keys(sys.stdin)
     while keys.has_keyboard and not enough() and not keys.pressed():
         time.sleep(ASK_EVERY_S)
+
+
+class LivePage:
+    """Page that shows samples four times a second."""
+
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
+        self.say = feed.say
+        self._watch: MotionWatch | None = None
+
+    def add(self, raw: Samples, calibrated: Samples, sensor: Sensor) -> None:
+        """Show samples, as measured and as calibrated."""
+        self._watch = self._watch or MotionWatch(sensor)
+        meters = [output for output in self._watch.add(raw) if isinstance(output, Meter)]
+        if meters:
+            self._feed.hear(meters[-1])
+            acc, gyr = calibrated.acc.mean(axis=0), calibrated.gyr.mean(axis=0)
+            self._feed.show(live={"acc": acc.tolist(), "magnitude": float(np.linalg.norm(acc)), "gyr": _known(gyr)})
+
+
+@contextmanager
+def live_page(where: Address, title: str, board: str) -> Iterator[LivePage]:
+    """Yield a page at `where`.
+
+    Raises
+    ------
+    OutputError : the page cannot be served there.
+    """
+    feed = Feed(where, {"title": title, "board": board})
+    try:
+        code = qr_code(feed.url) if sys.stderr.isatty() else ""
+        print(f"{code}mpucal: page: {feed.url}", file=sys.stderr, flush=True)
+        yield LivePage(feed)
+    finally:
+        feed.end()
+
+
+def _known(values: Vector) -> list[float] | None:
+    return values.tolist() if bool(np.isfinite(values).all()) else None

@@ -1,4 +1,7 @@
-"""Feed of the page: the session's state for the page's server, which runs beside the session in threads."""
+"""Feed of the page: the session's state for the page's server, which runs beside the session in threads.
+
+The state is JSON: the terminal's view of the session, each event as in `--json-events`, and the result.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,75 @@ import secrets
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import OutputError
-from ..session.boards import BOARD
-from ..session.events import Key, Output
+from ..result.document import plain
+from ..session.boards import BOARD, KINDS
+from ..session.events import Key, Knowledge, Output
+from ..terminal.console import count, groups
 from ..terminal.view import View
-from ..terminal.voice import Voice
+from ..terminal.voice import Announcement, Voice, in_words
 from .address import Address
 from .server import Server
-from .state import changes, state
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result of a session or a check, as the page shows it.
+
+    Attributes
+    ----------
+    verdict : one word or two. estimated_error : a sentence. reasons : as calibration.json has them.
+    values : name of each row of the table, and its cells for x, y and z. summary : further text.
+    """
+
+    verdict: str
+    estimated_error: str = ""
+    reasons: Sequence[Mapping[str, object]] = ()
+    values: Sequence[tuple[str, Sequence[str]]] = ()
+    summary: str = ""
+
+
+def state(view: View, said: Announcement | None = None) -> dict[str, Any]:
+    """Return the view's values and what was `said` last by name, not yet as JSON; see `changes`."""
+    return {
+        **vars(view),
+        "moment": view.moment,
+        "headline": in_words(view),
+        "said": said,
+        "confirming": view.confirming,
+        "flat": KINDS[view.board].picture,
+        "eye": view.eye._asdict(),
+        "countdown": view.waiting,
+        "count": None if view.progress is None else count(view.progress),
+        "line": view.line,
+        "known": None if view.knowledge is None else known(view.knowledge),
+    }
+
+
+def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
+    """Return each kind of parameter with its target and its standard uncertainties of x, y and z."""
+    return tuple(
+        {
+            "name": group.name,
+            "target": f"{group.target:g} {group.unit}",
+            "worst": group.worst,
+            "axes": [
+                {"times": std / group.target, "text": group.text(axis), "reached": progress >= 1.0}
+                for axis, (std, progress) in enumerate(zip(group.std, group.progress, strict=True))
+            ],
+        }
+        for group in groups(knowledge)
+    )
+
+
+def changes(new: Mapping[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that are new or changed, in JSON's own types."""
+    return {name: plain(value) for name, value in new.items() if name not in old or value != old[name]}
+
 
 # Least time between two updates of the page.
 LEAST_INTERVAL_S = 0.03

@@ -12,9 +12,8 @@ import numpy as np
 
 from ..data import Samples
 from . import events
-from .aims import select_aim
+from .aims import Coverage, select_aim
 from .boards import speak_of, usual_board
-from .coverage import Coverage
 from .lay_flat import LayFlat
 from .meter import MotionWatch
 from .plan import Plan

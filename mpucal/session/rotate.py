@@ -11,8 +11,7 @@ import numpy as np
 from ..data import Samples, Vector
 from ..rests.windows import Windows
 from . import events
-from .aims import SIDES, VERIFY_PLACED, Aim
-from .coverage import Coverage
+from .aims import SIDES, VERIFY_PLACED, Aim, Coverage
 from .plan import Plan
 from .step import ENOUGH, HAND_WINDOW_S, HOLD_S, PATIENCE_S, WAIT_S, Pause, PoseStep
 

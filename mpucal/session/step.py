@@ -14,9 +14,8 @@ from ..rests.limits import HAND, UNTOUCHED
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
 from . import events
-from .aims import directions
+from .aims import DISTINCT_RAD, Directions, directions
 from .boards import describe, describe_tilt
-from .coverage import DISTINCT_RAD, Directions
 from .plan import Plan
 
 ENOUGH = "you chose to go on"

@@ -10,8 +10,7 @@ from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import REFUSED
 from . import events
-from .aims import AIMS, NORMAL, VERIFY_PLACED, Aim, unseen_rad
-from .coverage import SAME_RAD, Coverage, Directions
+from .aims import AIMS, NORMAL, SAME_RAD, VERIFY_PLACED, Aim, Coverage, Directions, unseen_rad
 from .plan import Plan
 from .rotate import PAUSE_S
 from .step import ENOUGH, HOLD_S, MEANT_RAD, PATIENCE_S, USE_TEXTS, VERIFY_PATIENCE_S, WAIT_S, Pause, PoseStep

@@ -1,4 +1,7 @@
-"""Open chip on a bus: its driver measures, and every access is recorded."""
+"""Open chip on a bus: its driver measures, and every access is recorded; or its registers are read as they are.
+
+Source: RM-MPU-6000A r4.2, registers 27, 28, 59 to 66, 107 and 117.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,6 @@ from contextlib import closing, contextmanager
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..chip.access import Bus
-from ..chip.contents import chip_contents
 from ..chip.driver import Driver
 from ..files.messages import BUS
 from ..origin import Origin
@@ -18,6 +19,14 @@ from .replay import Tap
 
 if TYPE_CHECKING:
     from .reading_process import BusDriver
+import numpy as np
+
+from ..chip import registers as reg
+from ..chip.access import Bus
+from ..chip.families import PARTS
+from ..chip.offsets import PLACES, OffsetRegisters
+from ..chip.port import Port
+from ..data import STANDARD_GRAVITY_MPS2
 
 CAN_FORK = sys.platform == "linux"
 
@@ -76,3 +85,38 @@ class OpenedChip(OpenedSource):
         with closing(ProcessSource(driver, tap, self.parts, self.hands)) as source:
             self.hands = (source.hear,)
             yield ActiveSource(source, event)
+
+
+def chip_contents(bus: Bus) -> dict[str, Any]:
+    """Read identity, ranges, offset registers and, if the chip is known and awake, one sample (m/s^2, deg C).
+
+    The values are of JSON's types.
+
+    Raises
+    ------
+    BusError : a transfer failed.
+    """
+    port = Port(bus)
+    who_am_i = port.read(reg.WHO_AM_I, 1)[0]
+    gyro, accel = port.read(reg.GYRO_CONFIG, 2)
+    asleep = bool(port.read(reg.PWR_MGMT_1, 1)[0] & reg.PWR_MGMT_1_SLEEP)
+    part = PARTS.get(who_am_i)
+    shift = reg.FULL_SCALE_SHIFT if part is None else part.family.gyro_range_shift
+    scale = accel >> reg.FULL_SCALE_SHIFT & reg.FULL_SCALE_CODES
+    facts: dict[str, Any] = {
+        "who_am_i": who_am_i,
+        "chip": None if part is None else part.chip,
+        "asleep": asleep,
+        "accel_range_g": reg.ACCEL_RANGES_G[scale],
+        "gyro_range_dps": reg.GYRO_RANGES_DPS[gyro >> shift & reg.FULL_SCALE_CODES],
+        "accel_offsets": {f"0x{place[0]:02x}": list(OffsetRegisters.read(port, place).words) for place in PLACES},
+    }
+    if asleep or part is None:
+        return facts
+    # The accelerometer's six bytes, then two of the temperature.
+    data = np.frombuffer(port.read(reg.ACCEL_XOUT_H, 8), ">i2").astype(float)
+    acc = data[:3] / reg.ACCEL_LSB_PER_G[scale] * STANDARD_GRAVITY_MPS2 / part.accel_sensitivity
+    return facts | {
+        "acc_mps2": acc.tolist(),
+        "temperature_c": float(data[3] / part.family.lsb_per_c + part.family.zero_c),
+    }

@@ -8,8 +8,7 @@ import pytest
 
 from mpucal import bridge
 from mpucal.bridge.bus import BridgeBus
-from mpucal.bridge.conformance import talks
-from mpucal.bridge.doctor import examine_bridge_and_chip
+from mpucal.bridge.doctor import examine_bridge_and_chip, talks
 from mpucal.chip.config import Config
 from mpucal.doctor.finding import Mark
 from mpucal.errors import BusError, OutputError

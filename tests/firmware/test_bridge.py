@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from mpucal.bridge import board
 from mpucal.bridge import messages as wire
-from mpucal.bridge.conformance import find_difference, talks
-from mpucal.bridge.doctor import examine_conformance
+from mpucal.bridge.doctor import examine_conformance, find_difference, talks
 from mpucal.bridge.frame import Deframer, Frame
 from mpucal.bridge.messages import Status
 from mpucal.bridge.store import BlobStore

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.page.state import changes, state
+from mpucal.page.feed import changes, state
 from mpucal.reasons import Reason
 from mpucal.terminal.view import View
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 
 import pytest
 
-from mpucal.page.state import changes, state
+from mpucal.page.feed import changes, state
 from mpucal.terminal.view import View
 
 # Chromium shows the same phases and the same lost connection in test_browser.py

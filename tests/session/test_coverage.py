@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.session.aims import ALL_AROUND
-from mpucal.session.coverage import DISTINCT_RAD, SPREAD, Coverage, Directions
+from mpucal.session.aims import ALL_AROUND, DISTINCT_RAD, SPREAD, Coverage, Directions
 
 FACES = np.vstack([np.eye(3), -np.eye(3)])
 DEGENERATE = {

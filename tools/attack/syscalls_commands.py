@@ -21,7 +21,7 @@ from mpucal.chip.offsets import PLACES
 from mpucal.files import load
 from mpucal.result.journal import Journal
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.vehicle.store import ParameterStore
+from mpucal.simulated.vehicle.firmware import ParameterStore
 from tools.processes import Child, Ended, lasting_folder, quick, ready
 
 SIM, VEHICLE = "sim:seed=3,chip=mpu6500,temperature_c=", "sim:seed=7,imus=1"

@@ -25,7 +25,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from mpucal.data import Vector
-from mpucal.page.state import state
+from mpucal.page.feed import state
 from mpucal.result.calibration import GOOD
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind, Use
 from mpucal.session.meter import TURN_WORDS

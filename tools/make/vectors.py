@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from mpucal.bridge import messages as wire
-from mpucal.bridge.conformance import TALKS as TALKS_FILE
+from mpucal.bridge.doctor import TALKS as TALKS_FILE
 from mpucal.bridge.frame import Frame, stuff
 from mpucal.data import GYRO_COUNTS
 from mpucal.result.blob import Blob

@@ -21,8 +21,8 @@ def fill(name: str, **values: object) -> str:
 
 
 def row(values: Iterable[float], form: str) -> str:
-    """Return numbers in a `form` such as ".9g", with commas between them."""
-    return ", ".join(f"{value:{form}}" for value in values)
+    """Return numbers in a `form` such as "{:.9g}", with commas between them."""
+    return ", ".join(map(form.format, values))
 
 
 def rows(matrix: Iterable[Iterable[float]], form: str, brackets: str) -> str:

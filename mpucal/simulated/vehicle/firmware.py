@@ -1,16 +1,18 @@
-"""Base of the simulated firmwares: parameters that correct IMUs, and messages of the corrected IMUs."""
+"""Base of the simulated firmwares: their parameters, which correct IMUs, and messages of the corrected IMUs."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import UserDict
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, HIGHRES, MESSAGE_ID, RAW, SCALED
-from ...mavlink.parameters.encoding import Parameter
+from ...mavlink.parameters.encoding import REAL32, Number, Parameter, as_float32
 from ...mavlink.parameters.mounting import (
     CUSTOM_ANGLES,
     attitude_deg,
@@ -23,7 +25,40 @@ from ...mavlink.requests import PREARM_CHECK, SYS_STATUS
 from ...mavlink.rest import ATTITUDE
 from .imus import Imus
 from .options import VehicleOptions
-from .store import ParameterStore
+
+
+class ParameterStore(UserDict[str, Number]):
+    """Values by name, with types; floats are kept as float32."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._types: dict[str, int] = {}
+
+    def add(self, name: str, value: Number, kind: int = REAL32) -> None:
+        """Add a parameter of the firmware, with its default."""
+        self._types[name] = kind
+        self[name] = value
+
+    def add_all(self, names: Iterable[str], value: float) -> None:
+        """Add several floats with one default."""
+        for name in names:
+            self.add(name, value)
+
+    def __setitem__(self, name: str, value: Number) -> None:
+        super().__setitem__(name, as_float32(value) if self._types[name] == REAL32 else round(value))
+
+    def type(self, name: str) -> int:
+        """Return the MAV_PARAM_TYPE."""
+        return self._types[name]
+
+    def vector(self, names: Sequence[str]) -> Vector:
+        """Return the values of several parameters."""
+        return np.array([float(self[name]) for name in names])
+
+    def set_vector(self, names: Sequence[str], values: Vector) -> None:
+        """Set several parameters."""
+        self.update(dict(zip(names, values.tolist(), strict=True)))
+
 
 LSB = np.array([[ACC_LSB_MPS2], [GYRO_LSB_RAD_S]])
 SCALED_IMUS = tuple(MESSAGE_ID[name] for name in SCALED)

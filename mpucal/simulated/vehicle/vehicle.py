@@ -17,11 +17,10 @@ from ...mavlink.parameters.encoding import from_wire, name_bytes, to_wire
 from ...mavlink.texts import ReceivedPrompt, decode_prompt
 from ..faults import Schedule
 from .ardupilot import ArduPilot
-from .firmware import Firmware
+from .firmware import Firmware, ParameterStore
 from .imus import Imus
 from .options import VehicleOptions
 from .px4 import Px4
-from .store import ParameterStore
 
 
 class StreamTimes:

@@ -11,15 +11,14 @@ import pytest
 from mpucal.__main__ import run
 from mpucal.bridge import micropython as pasting
 from mpucal.bridge.bus import BridgeBus
-from mpucal.bridge.conformance import talks
-from mpucal.bridge.doctor import examine_conformance
+from mpucal.bridge.doctor import examine_conformance, talks
 from mpucal.bridge.link import Link
 from mpucal.bridge.micropython import PROGRAM, MicroPythonPort, minify
 from mpucal.bridge.store import BlobStore
 from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.cli.running import open_runner
+from mpucal.cli.page import open_runner
 from mpucal.doctor.finding import Mark
 from mpucal.errors import BusError
 from mpucal.session.plan import Plan

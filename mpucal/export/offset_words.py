@@ -1,11 +1,16 @@
-"""A calibration as sysfs commands for Linux's IIO, calibbias and calibscale, and the accelerometer's matrix for udev.
+"""A calibration as words for a chip's offset registers: with Linux's IIO, and of i2cdevlib's MPU6050.
 
-iio-sensor-proxy shows M diag(calibscale) (y + offset of calibbias), with M of udev's ACCEL_MOUNT_MATRIX, so that
-M diag(calibscale) = inv(D) scale / printed; M has columns of length 1 if there is a calibscale. The driver inv_mpu6050
-prints a scale that is 0.07 to 0.09 % less than the data sheet's, to which D refers. It writes calibbias to the
-accelerometer's offset registers and has no calibscale. Its mount matrix, of the device tree, is for all channels
-(inv_mpu_core.c, inv_ext_info): inv(D) there would distort the gyroscope's rates. For a chip with the MPU-6500's
-registers the driver writes calibbias to wrong addresses, those of the MPU-6050, so it must not be used.
+For IIO it is sysfs commands, calibbias and calibscale, and the accelerometer's matrix for udev. iio-sensor-proxy
+shows M diag(calibscale) (y + offset of calibbias), with M of udev's ACCEL_MOUNT_MATRIX, so that M diag(calibscale) =
+inv(D) scale / printed; M has columns of length 1 if there is a calibscale. The driver inv_mpu6050 prints a scale that
+is 0.07 to 0.09 % less than the data sheet's, to which D refers. It writes calibbias to the accelerometer's offset
+registers and has no calibscale. Its mount matrix, of the device tree, is for all channels (inv_mpu_core.c,
+inv_ext_info): inv(D) there would distort the gyroscope's rates. For a chip with the MPU-6500's registers the driver
+writes calibbias to wrong addresses, those of the MPU-6050, so it must not be used.
+
+For i2cdevlib it is six words, setXAccelOffset and the like. The accelerometer's registers add 1/2048 g per count to the
+factory trim, with bit 0 reserved; the gyroscope's add 4/131 deg/s per count at any range (register map of the MPU-6500,
+revision 2.1, XG_OFFS_USR; MPU-6050: the same).
 """
 
 from __future__ import annotations
@@ -16,9 +21,9 @@ import numpy as np
 
 from ..chip.families import MPU6050, PARTS, part_named
 from ..chip.offsets import Words, shift_words
-from ..chip.registers import ACCEL_RANGES_G
+from ..chip.registers import ACCEL_RANGES_G, GYRO_OFFSET_LSB_PER_DPS
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..errors import ChipError
+from ..errors import ChipError, WriteBackError
 from ..iio.attributes import ACCEL, MPU_SCALES, PRINTED_SCALES
 from ..result.calibration import Calibration
 from ..result.error_model import AXES
@@ -27,7 +32,7 @@ from .losses import format_xyz, heading
 LSB_PER_G = MPU6050.accel_offset_lsb_per_g
 
 
-def text(calibration: Calibration, notes: Sequence[str]) -> str:
+def linux_iio(calibration: Calibration, notes: Sequence[str]) -> str:
     """Return a script for /bin/sh, whose argument is the device's folder, with `notes` in its heading."""
     words, _ = offset_words(calibration)
     data_sheet, printed = _scales(calibration)
@@ -77,7 +82,7 @@ def _scales(calibration: Calibration) -> tuple[float, float]:
     return MPU_SCALES[ACCEL][code], PRINTED_SCALES[ACCEL][code]
 
 
-def losses(calibration: Calibration) -> tuple[str, ...]:
+def linux_iio_losses(calibration: Calibration) -> tuple[str, ...]:
     """Return notes on the errors that remain."""
     _, why = offset_words(calibration)
     data_sheet, printed = _scales(calibration)
@@ -112,3 +117,54 @@ _MATRIX = 'echo "udev: ACCEL_MOUNT_MATRIX=$MATRIX"'
 def matrix_text(values: Vector) -> str:
     """Return a matrix (3, 3) as text for udev and sysfs."""
     return "; ".join(", ".join(f"{value:.9f}" for value in row) for row in values)
+
+
+def i2cdevlib(calibration: Calibration, notes: Sequence[str]) -> str:
+    """Return a function for a sketch, with `notes` in its heading.
+
+    Raises
+    ------
+    WriteBackError : the factory trim is not known, or an offset does not fit into a word.
+    """
+    a, w = _words(calibration)
+    calls = [
+        f"    mpu.set{axis}{kind}Offset({word});"
+        for kind, words in (("Accel", a), ("Gyro", w))
+        for axis, word in zip("XYZ", words, strict=True)
+    ]
+    head = [*heading(calibration, notes, "// "), '#include "MPU6050.h"', "", "void setOffsets(MPU6050 &mpu)", "{"]
+    return "\n".join([*head, *calls, "}", ""])
+
+
+def i2cdevlib_losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on the errors that remain with offsets only."""
+    scale = 100.0 * float(np.abs(calibration.D - np.eye(3)).max())
+    return (
+        f"It holds only offsets: scale factor errors and misalignments of up to {scale:.2f} % of |a| remain.",
+        "Call setOffsets(mpu) after each mpu.initialize() and after a reset of the chip, as its registers are volatile;"
+        " the rounding to steps of 1 mg and 0.03 deg/s leaves half a step.",
+        "It assumes that 2048 counts of the accelerometer's offset registers are 1 g: where it is 4096, as in some"
+        " MPU-6050, half of b_a remains. `mpucal doctor` measures this, and `mpucal write CALIBRATION chip` takes it"
+        " into account.",
+        f"The words contain all of b_a, ({format_xyz(calibration.b_a)}) m/s^2: the accelerometer's registers held"
+        f" {calibration.sensor.accel_offsets}, and the gyroscope's are assumed to have held 0.",
+    )
+
+
+def _words(calibration: Calibration) -> tuple[Words, tuple[int, ...]]:
+    trim = calibration.sensor.accel_offsets
+    if trim is None:
+        raise WriteBackError(
+            "nothing was exported: the calibration lacks the content of the accelerometer's offset registers",
+            "calibrate from a capture of the chip",
+        )
+    try:
+        a = words_without_bias(trim, calibration.b_a)
+    except ChipError as error:
+        raise WriteBackError(f"nothing was exported: {error.what}", error.remedy) from error
+    w = np.rint(-np.degrees(np.nan_to_num(calibration.b_omega)) * GYRO_OFFSET_LSB_PER_DPS)
+    if np.abs(w).max() > np.iinfo(np.int16).max:
+        raise WriteBackError(
+            "nothing was exported: the gyroscope's bias does not fit into a word", "check the gyroscope"
+        )
+    return a, tuple(w.astype(int).tolist())
