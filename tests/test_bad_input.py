@@ -17,7 +17,7 @@ from mpucal.files.mcap import read_capture
 from mpucal.session import results as sink
 from mpucal.session.lay_flat import LayFlat
 from mpucal.session.rotate import Rotate
-from mpucal.sources import i2c_errors
+from mpucal.sources import host_bus
 
 INSTALLED = Path(sys.executable).parent / "mpucal"
 
@@ -63,7 +63,7 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
     monkeypatch.setattr(smbus2.SMBus, "open", open_)
     monkeypatch.setattr(smbus2.SMBus, "read_byte_data", failing(number))
     # an adapter that is there, on a machine without one
-    monkeypatch.setattr(i2c_errors, "Path", lambda _: Path(os.devnull))
+    monkeypatch.setattr(host_bus, "Path", lambda _: Path(os.devnull))
     code, said = mpucal("session", "--bus", "/dev/i2c-1")
     assert code == 3
     assert said.startswith(f"mpucal: {sentence}")

@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 import mpucal
 from mpucal.calibration import MODELS
 from mpucal.cli import commands
-from mpucal.simulated.chip.options import ChipOptions
+from mpucal.simulated.chip import ChipOptions
 
 PROJECT = Path(__file__).parents[1]
 DECLARED = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]

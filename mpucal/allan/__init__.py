@@ -13,8 +13,7 @@ from ..errors import RecordingError
 from ..origin import name_thing
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
 from .model import fit_coefficients
-from .octaves import Octaves
-from .trace import Spectrum, Trace, find_steps, find_turn
+from .trace import Octaves, Spectrum, Trace, find_steps, find_turn
 
 __all__ = ["NoiseMeter", "noise_of"]
 

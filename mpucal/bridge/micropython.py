@@ -1,4 +1,7 @@
-"""Port to a board with MicroPython: the bridge is pasted into its raw REPL, and runs until the port is closed."""
+"""Port to a board with MicroPython: the bridge is pasted into its raw REPL, and runs until the port is closed.
+
+Source: MicroPython's documentation, "The MicroPython Interactive Interpreter Mode", raw mode and raw-paste mode.
+"""
 
 from __future__ import annotations
 

@@ -156,9 +156,7 @@ class SerialPort:
             self._serial.set_low_latency_mode(True)
         self._failure = None
         handle = _handle(self._serial) if CAN_FORK else None
-        self._reader: Reader = (
-            ThreadReader(self._serial, self.name) if handle is None else ProcessReader(handle, self.name)
-        )
+        self._reader = ThreadReader(self._serial, self.name) if handle is None else ProcessReader(handle, self.name)
 
 
 def split_port(text: str, bauds: tuple[int, ...] = BAUDS) -> tuple[str, tuple[int, ...]]:
@@ -167,16 +165,6 @@ def split_port(text: str, bauds: tuple[int, ...] = BAUDS) -> tuple[str, tuple[in
     if colon and "://" not in text and baud.isdecimal() and int(baud) > 0:
         return name, (int(baud),)
     return text, bauds[:1] if "://" in text else bauds
-
-
-class Reader(Protocol):
-    """Reads the bytes that a serial port receives, from when it is made until it is closed."""
-
-    def get(self, timeout_s: float) -> Chunk | BusError | None:
-        """Return the next chunk, or the error that ended the reading; None if there is none within `timeout_s`."""
-
-    def close(self) -> None:
-        """Stop reading."""
 
 
 class ThreadReader:

@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from ..errors import BusError, LinkError
-from ..sources.i2c_errors import device_error
+from ..sources.host_bus import device_error
 from .messages import Status
 
 AUTOPILOT = re.compile("ardupilot|px4", re.IGNORECASE)

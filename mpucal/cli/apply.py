@@ -21,8 +21,7 @@ from ..files.formats import writable_formats
 from ..files.rows import Rows
 from ..result.correction import make_correction
 from ..result.session_files import captures_in
-from .arguments import PATH, calibration_argument, json_option, load_calibration, output_option
-from .person import say
+from .common import PATH, calibration_argument, json_option, load_calibration, output_option, say
 from .recording_options import hint_options, make_hints, say_interpretation
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"

@@ -20,9 +20,8 @@ from ..disk.atomic import write_atomically
 from ..disk.output_folder import OutputFolder
 from ..errors import SourceError, UsageError
 from . import amended, typed_words
-from .arguments import PATH, output_option
+from .common import PATH, duration, output_option, say
 from .options import fit_options
-from .person import duration, say
 from .recording_options import hint_options, hint_words, make_hints, read_hints_file
 
 EXAMPLE = "Example: `mpucal batch 'line3/*.mcap' -o fleet --workers 1`"

@@ -17,9 +17,8 @@ from ..result.calibration import REFUSED
 from ..result.noise import Noise, with_noise
 from ..result.session_files import BLOB
 from ..session.results import check_owner, result_files, save
-from .arguments import PATH, json_option, noise_option, output_option
+from .common import PATH, json_option, noise_option, output_option, say
 from .options import fit_options
-from .person import say
 from .recording_options import hint_options, make_hints, say_interpretation
 from .summary import next_steps, summary
 

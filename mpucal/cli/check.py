@@ -31,7 +31,7 @@ from ..sinks.write_back import file_recorder
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import open_source
 from ..terminal.console import Console
-from .arguments import (
+from .common import (
     PATH,
     at_gravity_of,
     calibration_argument,

@@ -16,8 +16,7 @@ from ..sinks.table import SINKS
 from ..sinks.write_back import Recorder, write_to_all
 from ..sources.opening import open_source
 from ..sources.table import matching_kinds
-from .arguments import together
-from .person import ask, ask_in_doubt, confirm, say, say_done
+from .common import ask, ask_in_doubt, confirm, say, say_done, together
 
 session_sink_options = together(
     click.option(

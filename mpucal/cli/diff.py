@@ -12,7 +12,7 @@ import click
 from ..result.comparison import CONFIDENCE, Comparison, compare
 from ..result.document import plain
 from ..result.error_model import with_std
-from .arguments import CALIBRATION_PATH, json_option, load_calibration
+from .common import CALIBRATION_PATH, json_option, load_calibration
 
 EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibration.json`"
 

@@ -16,8 +16,8 @@ from ..session.lay_flat import PUT_DOWN, STAND, put_down
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
+from .common import say
 from .options import Finite
-from .person import say
 from .source_options import check_source, source_options
 
 EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus sim:chip=clone98,who_am_i=0x68`"

@@ -12,8 +12,7 @@ from ..errors import UsageError
 from ..export.forms import FORMS, form
 from ..result.noise import Noise, with_noise
 from ..result.session_files import DOCUMENT
-from .arguments import calibration_argument, json_option, load_calibration, noise_option, output_option
-from .person import say
+from .common import calibration_argument, json_option, load_calibration, noise_option, output_option, say
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
 # Not a form of a calibration, but of a vehicle's capture.

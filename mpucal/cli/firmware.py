@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from ..errors import OutputError, SourceError, UsageError, WriteBackError
-from .arguments import output_option
+from .common import output_option
 
 EXAMPLE = "Example: `mpucal firmware -o libraries/mpucal` writes the library into a sketchbook."
 PACKAGE = Path(__file__).parents[1]

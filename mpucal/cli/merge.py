@@ -11,8 +11,7 @@ from ..disk.output_folder import OutputFolder
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import check_owner, save
-from .arguments import CALIBRATION_PATH, force_option, json_option, load_trusted, output_option
-from .person import say
+from .common import CALIBRATION_PATH, force_option, json_option, load_trusted, output_option, say
 from .summary import slope, summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"

@@ -27,9 +27,8 @@ from ..session.lay_flat import PUT_DOWN, put_down
 from ..session.ports import Source, polled
 from ..session.results import save
 from ..sources.opening import open_source
-from .arguments import PATH, json_option, output_option
+from .common import PATH, duration, json_option, output_option, say
 from .options import ABOVE_ZERO, given_options
-from .person import duration, say
 from .recording_options import given_hints, hint_options, say_interpretation
 from .source_options import check_input, check_source, source_options
 

@@ -15,7 +15,7 @@ from ..calibration import MODELS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..sources.kind import Option
 from . import typed_words, with_option
-from .arguments import Decorator, together
+from .common import Decorator, together
 
 
 class Parsed(click.ParamType[Any]):

@@ -17,7 +17,7 @@ from ..session.boards import BOARD, BOARDS, usual_board
 from ..sources.opened_source import OpenedSource
 from ..sources.table import source_title
 from ..terminal.console import Console, console
-from .arguments import together
+from .common import together
 from .options import Parsed
 from .summary import describe_fit
 

@@ -14,7 +14,7 @@ from ..result.clock import file_stamp
 from ..sources.opening import open_source
 from ..terminal.console import console
 from ..terminal.hangup import logging_after_hangup
-from .arguments import output_option
+from .common import output_option
 from .options import ABOVE_ZERO, fit_options, given_options
 from .page import open_runner
 from .source_options import check_source, source_options

@@ -18,9 +18,8 @@ from ..files.hints import Hints, parse_columns, parse_span, parse_units
 from ..files.reading import MOST_MB, VARIABLE, allowed_bytes
 from ..files.rows import Rows
 from ..sources.kind import Option
-from .arguments import Decorator, together
+from .common import Decorator, say, together
 from .options import ABOVE_ZERO, given_options, option_of
-from .person import say
 
 MOST_BYTES = 1 << 20
 

@@ -28,11 +28,10 @@ from ..sources.opening import check_resume_options, open_source
 from ..sources.table import matching_kinds
 from ..terminal.console import Console
 from ..terminal.hangup import logging_after_hangup
-from .arguments import PATH, json_option, output_option, yes_option
+from .common import PATH, json_option, output_option, say, yes_option
 from .destination import session_sink_options, write_back
 from .options import check_gravity, fit_options, given_options
 from .page import BOARD_KIND, open_runner, page_options, page_result, show_session
-from .person import say
 from .source_options import check_source, source_options
 from .summary import next_steps, summary
 

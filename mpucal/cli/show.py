@@ -23,9 +23,8 @@ from ..result.error_model import mg_text
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
-from .arguments import PATH, json_option, load_calibration
+from .common import PATH, json_option, load_calibration, say
 from .options import given_options
-from .person import say
 from .recording_options import NAMES, hint_options, make_hints, say_interpretation
 from .source_options import check_input, check_source, source_options
 from .summary import formula, slope, summary

@@ -15,7 +15,7 @@ from ..sources import opening
 from ..sources.kind import SourceKind
 from ..sources.table import SOURCES, kinds_for, matching_kinds, unique
 from . import typed_words
-from .arguments import Decorator, together
+from .common import Decorator, together
 from .options import given_options, option_of
 
 

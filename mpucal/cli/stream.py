@@ -31,10 +31,9 @@ from ..sources.opening import open_source
 from ..sources.table import source_title
 from ..terminal.console import JsonLines
 from ..terminal.keys import Keys
-from .arguments import CALIBRATION_PATH, at_gravity_of, json_option, load_calibration, output_option
+from .common import CALIBRATION_PATH, at_gravity_of, json_option, load_calibration, output_option, say
 from .options import ABOVE_ZERO
 from .page import choose_board, page_options
-from .person import say
 from .source_options import check_source, source_options
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"

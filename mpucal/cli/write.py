@@ -11,17 +11,19 @@ from ..disk.output_folder import OutputFolder
 from ..sinks.choose import check_has_sink
 from ..sinks.table import SINKS
 from ..sinks.write_back import file_recorder, is_calibration, put_back, write_objection, write_to
-from .arguments import (
+from .common import (
+    ask,
     at_gravity_of,
     calibration_argument,
     force_option,
     json_option,
     load_trusted,
     output_option,
+    say,
+    say_done,
     yes_option,
 )
 from .destination import make_device
-from .person import ask, say, say_done
 from .source_options import check_source, source_options
 
 EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`"

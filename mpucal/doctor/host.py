@@ -12,9 +12,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from ..sources.host_bus import ADDRESSES
+from ..sources.host_bus import ADDRESSES, transfer_error
 from ..sources.i2c import found_chips
-from ..sources.i2c_errors import transfer_error
 from ..sources.usb_i2c import I2C_HZ, adapters
 from .finding import Finding, Mark
 

@@ -17,6 +17,8 @@ from .attributes import (
     GYRO,
     TEMP,
     TIMESTAMP,
+    FrameLayout,
+    ScanElement,
     SensorScale,
     chip_name,
     mount_matrix,
@@ -26,7 +28,6 @@ from .attributes import (
     read_scale,
 )
 from .sample_run import ROW, SampleRun
-from .scan_elements import FrameLayout, ScanElement
 
 # A buffer with another clock than the host's monotonic one is off by more.
 OTHER_CLOCK_NS = 5_000_000_000

@@ -3,6 +3,9 @@
 The digest is "sha256:" and the hexadecimal SHA-256 of the document without `digest` and `created`, as JSON with sorted
 keys, without blanks, in ASCII, and with every number as Python's repr of the double: the shortest decimal digits that
 give it again. Without `created`, a replayed session has the digest of the original.
+
+The validator knows the keywords of calibration.schema.json: type, const, enum, pattern, required, properties,
+additionalProperties, items, minItems and maxItems of JSON Schema 2020-12; unknown keys of a document are accepted.
 """
 
 from __future__ import annotations

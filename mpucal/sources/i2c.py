@@ -18,8 +18,18 @@ from ..chip.families import PARTS
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, RegisterBus, converting, find_chip, lock_device
-from .i2c_errors import DEVICES, device_error, no_answer_error, other_buses, transfer_error
+from .host_bus import (
+    ADDRESSES,
+    DEVICES,
+    RegisterBus,
+    converting,
+    device_error,
+    find_chip,
+    lock_device,
+    no_answer_error,
+    other_buses,
+    transfer_error,
+)
 from .kind import Request
 
 # Longest message of i2c-dev.

@@ -15,8 +15,7 @@ from ..chip.access import Reply
 from ..chip.families import PARTS
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
-from .host_bus import RegisterBus, converting, lock_device
-from .i2c_errors import device_error
+from .host_bus import RegisterBus, converting, device_error, lock_device
 from .kind import Request
 
 READ, MODE = 0x80, 3

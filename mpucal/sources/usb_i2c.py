@@ -15,8 +15,7 @@ from typing import Any
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, RegisterBus, find_chip
-from .i2c_errors import no_answer_error
+from .host_bus import ADDRESSES, RegisterBus, find_chip, no_answer_error
 from .kind import Request
 
 I2C_HZ = 400_000

@@ -9,7 +9,7 @@ import pytest
 import mpucal
 from mpucal.allan import NoiseMeter, noise_of
 from mpucal.allan.model import fit_coefficients
-from mpucal.allan.octaves import Octaves
+from mpucal.allan.trace import Octaves
 from mpucal.data import Recording, Sensor
 from mpucal.export.forms import form
 from mpucal.result.noise import Noise, with_noise

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.cli import person
+from mpucal.cli import common
 from mpucal.errors import WriteBackError
 from mpucal.files import load
 from mpucal.result.calibration import Calibration
@@ -56,10 +56,10 @@ def test_a_question_is_asked_on_a_terminal_only(monkeypatch, answer):
     monkeypatch.setattr("click.confirm", lambda question, err: asked.append(question) or answer == "y\n")
     if answer == "n\n":
         with pytest.raises(WriteBackError, match="you declined"):
-            person.ask("Write?", yes=False)
+            common.ask("Write?", yes=False)
     else:
-        person.ask("Write?", yes=False)
-    person.ask("Write?", yes=True)
+        common.ask("Write?", yes=False)
+    common.ask("Write?", yes=True)
     assert len(asked) == (answer is not None)
 
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-import scipy
 
-from mpucal.doctor.measure import is_trembling, noise_density, periodogram
+from mpucal.doctor.measure import is_trembling, noise_density
 
 RATE_HZ = 200.0
 
@@ -13,16 +12,6 @@ def white(seed, unit_rthz=0.004, seconds=20):
     """Draw white noise of one density, (n, 3)."""
     rng = np.random.default_rng(seed)
     return rng.normal(scale=unit_rthz * np.sqrt(RATE_HZ / 2), size=(int(seconds * RATE_HZ), 3))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("n", [400, 401], ids=["even", "odd"])
-def test_the_spectrum_is_that_of_scipy(n):
-    values = white(0)[:n] + 9.81
-    hz, power = scipy.signal.periodogram(values, RATE_HZ, window="hann", axis=0)
-    found_hz, found = periodogram(values, RATE_HZ)
-    np.testing.assert_allclose(found_hz, hz)
-    np.testing.assert_allclose(found[1:], power[1:], rtol=1e-9)
 
 
 def test_the_density_of_white_noise_is_found():

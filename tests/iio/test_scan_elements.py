@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.errors import ChipError
+from mpucal.iio.attributes import FrameLayout, ScanElement
 from mpucal.iio.sample_run import StreamAligner
-from mpucal.iio.scan_elements import FrameLayout, ScanElement
 
 
 def element(name, index, text):

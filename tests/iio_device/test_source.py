@@ -23,7 +23,7 @@ from mpucal.iio_device.source import IioFiles, file_error
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.iio import SimulatedFiles
-from mpucal.sources import i2c_errors
+from mpucal.sources import host_bus
 from mpucal.sources.opening import open_source
 
 BOTH = Devices("iio:device0", "iio:device0")
@@ -311,8 +311,8 @@ def test_a_session_that_is_to_write_is_refused_where_it_may_not(tree, tmp_path, 
 
 
 def test_a_chip_that_the_kernel_holds_is_pointed_to_by_its_other_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(i2c_errors, "SYSFS_DEVICES", tmp_path)
+    monkeypatch.setattr(host_bus, "SYSFS_DEVICES", tmp_path)
     (tmp_path / "1-0068" / "iio:device2").mkdir(parents=True)
     error = OSError(errno.EBUSY, "busy")
-    assert "use --iio iio:device2 instead of --bus; or" in str(i2c_errors.transfer_error(error, "/dev/i2c-1", 0x68))
-    assert "--iio" not in str(i2c_errors.transfer_error(error, "/dev/i2c-1", 0x69))
+    assert "use --iio iio:device2 instead of --bus; or" in str(host_bus.transfer_error(error, "/dev/i2c-1", 0x68))
+    assert "--iio" not in str(host_bus.transfer_error(error, "/dev/i2c-1", 0x69))

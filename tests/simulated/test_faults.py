@@ -6,8 +6,7 @@ import pytest
 from mpucal.chip.config import Config
 from mpucal.errors import UsageError
 from mpucal.session.events import PromptKind
-from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.options import ChipOptions
+from mpucal.simulated.chip import ChipOptions, open_simulated
 from mpucal.simulated.faults import FAULTS, OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, fault_kinds
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from tools.lab.sessions import recorded

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.cli.person import ask_in_doubt
+from mpucal.cli.common import ask_in_doubt
 from mpucal.errors import BusError, NoStorage, OutputError, WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.sinks.kind import Applied, Device, Effect, Sink, SinkKind

@@ -8,14 +8,13 @@ import sys
 import pytest
 from smbus2 import smbus2
 
-import mpucal.sources.i2c_errors
+import mpucal.sources.host_bus
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, BusHeld, NoAnswer
-from mpucal.sources.host_bus import lock_device
+from mpucal.sources.host_bus import lock_device, no_answer_error
 from mpucal.sources.i2c import I2cBus, found_chips
-from mpucal.sources.i2c_errors import no_answer_error
 
 
 def measured(bus, config=None, seconds=3):
@@ -107,7 +106,7 @@ def test_a_failed_transfer_is_a_sentence_and_not_repeated(adapter, number, kind,
 
 
 def test_no_such_bus_names_those_there_are(tmp_path, monkeypatch):
-    monkeypatch.setattr(mpucal.sources.i2c_errors, "DEVICES", tmp_path)
+    monkeypatch.setattr(mpucal.sources.host_bus, "DEVICES", tmp_path)
     with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: enable I2C"):
         I2cBus(str(tmp_path / "i2c-7"))
     (tmp_path / "i2c-1").touch()

@@ -37,7 +37,7 @@ from mpucal.result.blob import Blob
 from mpucal.result.journal import Journal
 from mpucal.result.noise import Noise
 from mpucal.session.plan import Plan
-from mpucal.simulated.chip.options import ChipOptions
+from mpucal.simulated.chip import ChipOptions
 from mpucal.simulated.vehicle.options import VehicleOptions
 from mpucal.sinks.chip import FORMAT as KEPT
 from mpucal.sinks.chip import REGISTERS, saved_blocks

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from mpucal.allan.model import fit_coefficients
-from mpucal.allan.octaves import Octaves
+from mpucal.allan.trace import Octaves
 from mpucal.result.noise import INSTABILITY, WALK, WHITE
 
 from .runner import Trial, each_seed

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...chip.access import Reply
 from ...mavlink.texts import Prompt
-from ...sources.host_bus import ADDRESSES
-from ...sources.i2c_errors import transfer_error
+from ...sources.host_bus import ADDRESSES, transfer_error
 from ..faults import Fault, FaultKind, Schedule
 from ..motion import Motion
 from ..sensor import SensorTruth
