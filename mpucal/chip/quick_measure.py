@@ -174,7 +174,7 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
     shares = [np.where(code, each / of, np.nan) for code, each, of in zip(codes, (accel, gyro), expected, strict=True)]
     limits = (PACKED_SHARES, PACKED_SHARES) if family.packed_self_test else (ACCEL_SHARES, GYRO_SHARES)
     passed = all(((low < share) & (share < high)).all() for share, (low, high) in zip(shares, limits, strict=True))
-    return SelfTest(*shares, passed, moved)
+    return SelfTest(shares[0], shares[1], passed, moved)
 
 
 def _mean_counts(port: Port, test: int, afs_sel: int) -> Vector:
@@ -197,7 +197,7 @@ def _factory_codes(port: Port, packed: bool) -> tuple[Codes, Codes]:
 
 def factory_response(packed: bool, accel: Codes, gyro: Codes) -> tuple[Vector, Vector]:
     """Return the factory's responses (3,) [g] and (3,) [deg/s] by its codes; those of 0 mean nothing."""
+    a, w = (codes.astype(np.float64) - 1.0 for codes in (accel, gyro))
     if packed:
-        return 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30), 25 * 1.046 ** (gyro - 1.0) * np.array([1, -1, 1])
-    counts = [2620.0 * 1.01 ** (codes - 1.0) for codes in (accel, gyro)]
-    return counts[0] / reg.ACCEL_LSB_PER_G[SMALLEST], counts[1] / reg.GYRO_LSB_PER_DPS[SMALLEST]
+        return 0.34 * (0.92 / 0.34) ** (a / 30), 25.0 * 1.046**w * np.array([1.0, -1.0, 1.0])
+    return 2620.0 * 1.01**a / reg.ACCEL_LSB_PER_G[SMALLEST], 2620.0 * 1.01**w / reg.GYRO_LSB_PER_DPS[SMALLEST]

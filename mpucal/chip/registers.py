@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ..data import ACCEL_COUNTS, ACCEL_RANGES_G, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
+from .. import data
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
 # The factory's self-test codes: three bytes each on a 6500, four packed bytes on a 6050.
@@ -78,7 +79,8 @@ ACCEL_WORDS: Final = 3
 FRAME_WORDS: Final = 7
 FRAME_BYTES: Final = 2 * FRAME_WORDS
 
-# Full scales by FS_SEL; those by AFS_SEL are ACCEL_RANGES_G.
+# Full scales by AFS_SEL and FS_SEL.
+ACCEL_RANGES_G: Final = data.ACCEL_RANGES_G
 GYRO_RANGES_DPS: Final = (250, 500, 1000, 2000)
 ACCEL_LSB_PER_G: Final = tuple(ACCEL_COUNTS / full_scale for full_scale in ACCEL_RANGES_G)
 GYRO_LSB_PER_DPS: Final = tuple(GYRO_COUNTS / full_scale for full_scale in GYRO_RANGES_DPS)
