@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, wraps
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -31,7 +31,7 @@ CLEARLY = 3.0  # ratio of misses above which another unit or range is the right 
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 BLOCK_S = 0.01
 # Ratios of the chip's ranges, by which rates are off that were read at another one; that of the same range first.
-RANGE_RATIOS = sorted({a / b for a, b in product(GYRO_RANGES_DPS, repeat=2)}, key=lambda ratio: abs(np.log(ratio)))
+RANGE_RATIOS = sorted({a / b for a in GYRO_RANGES_DPS for b in GYRO_RANGES_DPS}, key=lambda ratio: abs(np.log(ratio)))
 
 T = TypeVar("T")
 

@@ -74,6 +74,10 @@ def with_masks(recording: Recording) -> Recording:
     )
     for run in stuck_readings(marked, "gyr"):
         marked.gap[run.first : run.last] = True
+    for axis, first, last in stuck_readings(marked, "acc"):
+        column, value = recording.acc[:, axis], recording.acc[first, axis]
+        if value in (column.min(), column.max()):  # at the end of a range that is not known
+            marked.acc_clipped[first - 1 : last - 1] = True
     return replace(marked, gyr=_without_spikes(recording))
 
 

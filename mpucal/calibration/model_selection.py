@@ -53,7 +53,6 @@ class Errors(NamedTuple):
 
 NO_ERRORS = Errors()
 ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
-ERRING_NIS = 30.0
 PROMISING = WALD_99 / 3.0  # least decrement for a search with K: twice the decrement estimates the statistic
 
 
@@ -147,7 +146,7 @@ class InPlaceFits:
     def _errors_may_explain(self) -> bool:
         """Return True if errors of the largest size could explain the data."""
         squares = evaluate(_with_errors(self._thin, ERRORS[-1]), self._rough(IMU).theta, 0).squares
-        return squares < ERRING_NIS * (self._thin.flat.last + len(self._thin.series))
+        return squares < HOPELESS_NIS * (self._thin.flat.last + len(self._thin.series))
 
     def fit(self, parameters: int) -> Fit:
         """Fit with white noise alone, whether or not it explains the data."""

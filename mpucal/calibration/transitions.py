@@ -24,8 +24,6 @@ REWEIGHTED = 8  # iterations of a least squares fit whose weights depend on the 
 DEGREES_OF_FREEDOM = 4.0
 # A transition of less weight gets a scale of its own; the others differ by chance.
 WORTHLESS = 0.02
-# Least number of degrees of freedom that an estimate leaves in all transitions together.
-LEAST_LEFT = 1.0
 
 
 class Transition(NamedTuple):
@@ -102,7 +100,7 @@ def likely_scale(miss: Vector, known: Vector, leverage: Vector | float = 0.0) ->
     It is the mean of z = |miss|^2 / (2 variance) by Student's t. The second value (..., k) are the weights of misses.
     """
     z = 0.5 * np.sum(miss * miss, axis=-1) / known
-    left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(known)))), LEAST_LEFT)
+    left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(known)))), 1.0)
     nu, c = DEGREES_OF_FREEDOM, np.ones((*z.shape[:-1], 1))
     for _ in range(50):
         # Newton's method: this falls with c and is convex, so that steps from below do not pass the root.

@@ -1,7 +1,7 @@
 """Words of the readings: the counts that a logger made of the chip's bytes, and a low byte that it took for signed.
 
 The counts are recovered where the range is known, or where all values are whole counts of one of the chip's ranges (16
-bits, as the MPU-6050 and its successors have).
+bits, as the MPU-6050 and its successors have), or of the smallest step between them.
 
 A logger that takes the low byte for a signed number makes a word 256 too low wherever bit 7 is set. Nothing is lost by
 it: the low byte is the true one. Whether it did so shows wherever bit 7 changes from one sample to the next: either the
@@ -76,6 +76,9 @@ def _words_of(recording: Recording) -> tuple[Words | None, Words | None]:
 
 
 def _words(values: Vector, lsbs: Iterable[float]) -> Words | None:
+    steps = np.abs(np.diff(values, axis=0))
+    finest = float(np.min(steps, where=steps > 0.0, initial=np.inf))
+    lsbs = (*lsbs, finest) if np.finfo(np.float64).tiny < finest < np.inf else lsbs
     return next((Words(counts, lsb) for lsb in lsbs if (counts := _counts(values, lsb)) is not None), None)
 
 

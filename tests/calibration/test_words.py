@@ -76,11 +76,12 @@ def test_a_bit_that_died_midway_is_named_across_gaps_and_errors(hand):
     assert against(recording).startswith("bit 12 of the accelerometer's y never moves")
 
 
-def test_an_axis_is_judged_beside_axes_as_fine_as_a_float(counted):
+def test_an_axis_is_judged_beside_the_others_where_no_range_is_known(counted):
     recording = counted(UNKNOWN, dead(0, 0xFF))
     acc = 1.001 * recording.acc
-    acc[:2, 1:] = [[0.0, 0.0], [5e-324, 5e-324]]
-    assert against(replace(recording, acc=acc)).startswith("the low 15 bits of the accelerometer's x")
+    assert against(replace(recording, acc=acc)).startswith("the low 8 bits of the accelerometer's x")
+    acc[:2, 1:] = [[0.0, 0.0], [5e-324, 5e-324]]  # computed values have no counts
+    assert against(replace(recording, acc=acc)) is None
 
 
 @pytest.mark.parametrize("sensor", [KNOWN, UNKNOWN], ids=["known", "unknown"])

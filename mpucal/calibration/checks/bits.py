@@ -1,9 +1,8 @@
 """Check of the bits of the readings: an axis whose low or high bits never change.
 
 From one sample to the next a bit may change where a higher one does: a sound bit then changes as often as the size of
-the step says, always in a small one, and a stuck bit but for errors of the bus. The odds between the two decide. Where
-the counts are not known, the steps of an axis are compared with those of the others. A sensor that is coarse on all
-axes is no fault.
+the step says, always in a small one, and a stuck bit but for errors of the bus. The odds between the two decide. A
+sensor that is coarse on all axes is no fault.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...data import Mask, Vector
+from ...data import Mask
 from ...kernel import _kernel
 from ...reasons import Reason, reason
 from ..evidence import Evidence
 from ..scores import MOST_PARTS
-from ..words import EXACTLY, ODDS, Counts, Words
+from ..words import ODDS, Counts, Words
 from .estimate import GOOD_RMS_MPS2
 from .unusable import dead_accelerometer, dead_gyroscope
 
@@ -26,10 +25,6 @@ from .unusable import dead_accelerometer, dead_gyroscope
 ERRORS, SOUND = 0.1, 0.98
 # Fewer dead low bits do not matter; so many on all axes are a byte that was not read, and no coarse sensor.
 DEAD_BITS, LOST_BYTE = 3, 7
-BITS = 16
-# Where the counts are not known: so many steps of the other axes make a step that is odd. A smaller one [m/s^2, rad/s]
-# may be that of a float32, which is coarser the larger a value is.
-ODD_STEPS, LEAST_ODD_STEP = 8.0, 1e-3
 # Rounding of the rates by more refuses a calibration.
 MOST_RAD_S = np.deg2rad(0.5)
 
@@ -50,22 +45,19 @@ def bits_stuck(e: Evidence) -> Reason | None:
     acc, gyr = (None, None) if e.decoded is None else e.decoded.words
     # Rounding by half a step must stay within two standard deviations of what is claimed, or of a good calibration.
     most = 2.0 * min(GOOD_RMS_MPS2, np.inf if e.uncertainty is None else e.uncertainty.rms_mps2)
-    return _stuck(e, acc, e.recording.acc, "accelerometer", "m/s^2", most) or _stuck(
-        e, gyr, e.recording.gyr, "gyroscope", "rad/s", MOST_RAD_S
-    )
+    return _stuck(e, acc, "accelerometer", "m/s^2", most) or _stuck(e, gyr, "gyroscope", "rad/s", MOST_RAD_S)
 
 
-def _stuck(e: Evidence, words: Words | None, values: Vector, sensor: str, unit: str, most: float) -> Reason | None:
+def _stuck(e: Evidence, words: Words | None, sensor: str, unit: str, most: float) -> Reason | None:
     if words is None:
-        low = _odd_steps(values)
-    else:
-        stuck, first = _stuck_bits(words.counts, e.recording.gap)
-        low = _low_bits(stuck, first, words.lsb)
-        # a single bit is told from one that lacks, among the low ones, all below it
-        one = np.argwhere(stuck & ~np.logical_and.accumulate(stuck, axis=0))
-        if low is None and len(one):
-            bit, axis = map(int, one[-1])
-            return reason("bits_stuck", "high", sensor=sensor, axis="xyz"[axis], bit=bit)
+        return None
+    stuck, first = _stuck_bits(words.counts, e.recording.gap)
+    low = _low_bits(stuck, first, words.lsb)
+    # a single bit is told from one that lacks, among the low ones, all below it
+    one = np.argwhere(stuck & ~np.logical_and.accumulate(stuck, axis=0))
+    if low is None and len(one):
+        bit, axis = map(int, one[-1])
+        return reason("bits_stuck", "high", sensor=sensor, axis="xyz"[axis], bit=bit)
     if low is None:
         return None
     seconds = float(e.recording.t[low.first] - e.recording.t[0])
@@ -114,18 +106,3 @@ def _low_bits(stuck: Mask, first: Counts, lsb: float) -> Low | None:
     if bits < DEAD_BITS + (0 if common >= LOST_BYTE else common):
         return None
     return Low(axis, bits, int(first[:bits, axis].max()), lsb * 2.0**bits)
-
-
-def _odd_steps(values: Vector) -> Low | None:
-    """Return the axis that changes in multiples of a step that is many times the step of the other axes."""
-    changes = np.abs(np.diff(values.T))
-    steps = np.array([np.min(each[each > 0.0], initial=np.inf) for each in changes])
-    axis, finest = int(steps.argmax()), float(np.median(steps))
-    step = float(steps[axis])
-    if not max(ODD_STEPS * finest, LEAST_ODD_STEP) <= step < np.inf:
-        return None
-    places = changes[axis] / step
-    if np.abs(places - np.rint(places)).max() > EXACTLY:
-        return None
-    # Other axes may be as fine as a float, but a word has 16 bits.
-    return Low(axis, min(round(math.log2(step) - math.log2(finest)), BITS - 1), 0, step)

@@ -14,7 +14,7 @@ from ..evidence import Evidence, once
 from ..masks import Stuck, stuck_readings
 
 WARMER_C = 5.0
-MOST_SPOILT, MOST_LOST = 0.2, 0.5
+MOST_SPOILT = 0.2
 # A longer gap is an interruption of the session, which says nothing about the link.
 INTERRUPTED_S = 10.0
 # The accelerometer's noise is vibration where it exceeds this and TIMES_NOISE that of the flat segment for MOST_SPOILT
@@ -57,7 +57,7 @@ def data_lost(e: Evidence) -> Reason | None:
     return reason(
         "data_lost",
         {Origin.VEHICLE: "link", Origin.FILE: "file"}.get(e.recording.sensor.origin, "bus"),
-        lost - interrupted > MOST_LOST * float(t[-1] - t[0] - interrupted),
+        2.0 * (lost - interrupted) > float(t[-1] - t[0] - interrupted),
         places=f"{places} place{'s' if places > 1 else ''}",
         seconds=lost,
     )
@@ -75,7 +75,7 @@ def gyroscope_frozen(e: Evidence) -> Reason | None:
     return reason(
         "bits_stuck",
         "rate",
-        float(np.diff(t, prepend=0.0)[frozen].sum()) > MOST_LOST * float(t[-1]),
+        2.0 * float(np.diff(t, prepend=0.0)[frozen].sum()) > float(t[-1]),
         axes=" and ".join(axis for axis, one in zip("xyz", repeats, strict=True) if one),
         begin=float(t[longest.first - 1]),
         end=float(t[longest.last - 2]),

@@ -22,7 +22,7 @@ WORST_AXES_RAD = np.deg2rad(60.0)
 # Of all three scale factors alike: data sheets say 3 %, and chips that were soldered by hand are within 5 %; beyond
 # MOST_SCALE, or its inverse, the unit is wrong: the paper simulates sensors of 0.5 to 1.5.
 SCALE_OFF, MOST_SCALE = 0.1, 2.5
-ALIKE = 0.05  # largest difference of three scale factors that agree on one
+ALIKE = MOST_STD * BY_NAME["K"].sd[0]  # largest difference of three scale factors that agree on one
 # These models estimate no scale factor of the gyroscope.
 TRUSTING = ("accel", "paper", "tilt")
 # Filters of one clock leave 10 ms at most; those of an autopilot are set by its owner, and differ.
