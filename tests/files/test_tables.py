@@ -1219,3 +1219,9 @@ def test_lists_beside_the_axes_are_no_samples(walk, tmp_path, assert_same):
     with (tmp_path / "imu.csv").open("w", newline="") as file:
         csv.writer(file).writerows([["time", *AXES.strip().split(","), "acc_covariance", "gyr_covariance"], *rows])
     assert_same(mpucal.load(tmp_path / "imu.csv"), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_a_clock_that_stands_still_is_no_time_to_guess_by(walk, table):
+    """Refuse a table whose only times never change, and whose numbers are no sensor's."""
+    with pytest.raises(RecordingError, match="holds no"):
+        mpucal.load(table("time,pa,pb,pc", 0.0 * walk.t, 1e-3 * walk.gyr))

@@ -7,6 +7,7 @@ units. Nothing is guessed that physics does not confirm.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 
@@ -93,11 +94,13 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     places = places[places.index(vary[0]) :] if vary else places
     alignments = [_sized_triples(of, some, arrays) for some in (places, vary, vary[1:], vary[2:])]
     triples, sized, acc = next((found for found in alignments if found[2]), alignments[0])
+    if not triples:
+        return {}, ""
     t = _seconds(next((of[at] for at in clocks if at in of), None), len(next(iter(of.values()))), Hints())
-    rate_hz = 1.0 / sample_period(t)
+    rate_hz = 1.0 / (sample_period(t) or math.inf)
     increments = () if sized else next((triple for triple, a in triples.items() if _is_in_si(a * rate_hz)), ())
     if not sized and not increments:
-        return None if triples else ({}, "")
+        return None
     acc = acc or increments or sized[0]
     values = triples[acc]
     # rates turn gravity and are none at times, other than a magnetic field
@@ -205,9 +208,10 @@ def is_even_clock(column: Vector) -> bool:
 
 
 def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
-    if clock is None:
+    step = 0.0 if clock is None else sample_period(clock)
+    # a clock may stand still
+    if clock is None or not step:
         return np.arange(n) / (hints.rate_hz or ANY_HZ)
-    step = sample_period(clock)
     si = next((si for si in QUANTITIES["t"].values() if 1 / FASTEST_HZ <= step * si <= 1.0), 1.0 / ANY_HZ / step)
     return np.asarray((clock - clock[0]) * si)
 
@@ -223,5 +227,10 @@ def _turned(of: Columns, pair: Sequence[int], t: Vector, *, any_rate: bool) -> f
     """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
     acc, gyr = _stacked(of, pair[:3]), _stacked(of, pair[3:])
     factor, correlation = turning(t, acc, gyr)
-    of_a_unit = any_rate or are_counts(gyr) or gyro_unit(factor) or are_increments(t, acc, gyr, 1 / sample_period(t))
+    of_a_unit = (
+        any_rate
+        or are_counts(gyr)
+        or gyro_unit(factor)
+        or are_increments(t, acc, gyr, 1 / (sample_period(t) or math.inf))
+    )
     return correlation if factor > 0.0 and of_a_unit else 0.0
