@@ -223,3 +223,17 @@ def test_an_error_about_the_present_folder_names_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(RecordingError, match=r"^\.: a\.npz is "):
         mpucal.load(".")
+
+
+def test_two_tables_whose_columns_are_numbered_are_those_of_their_files_names(walk, assert_same, tmp_path):
+    """Read the tables that `writetimetable` makes of MATLAB's timeseries, as the message on such objects advises."""
+    for name, values in (("acc", walk.acc), ("gyro", walk.gyr)):
+        put(
+            tmp_path,
+            f"{name}.csv",
+            [f"{t!r} sec" for t in walk.t.tolist()],
+            values,
+            [f"Data_{i}" for i in (1, 2, 3)],
+            "Time",
+        )
+    assert_same(mpucal.load(tmp_path), walk, 1e-9, 1e-9, 1e-9)
