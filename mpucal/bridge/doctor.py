@@ -14,12 +14,14 @@ from ..sources.chip import OpenedChip
 from . import BridgeBus
 from .frame import Deframer, Frame
 from .link import MS, REPLY_NS, STORE_NS, Link
-from .messages import MAGIC, REPLY_BIT, BlobErase, BlobState, Feature, Frames, Hello, Read, Status
+from .messages import MAGIC, REPLY_BIT, BlobErase, BlobState, Feature, Frames, Hello, Read, Reply, Status
 from .port import Port
 
 TALKS = Path(__file__).with_name("talks.json")
 # A reply's payload begins with status and t_us; HELLO_REPLY continues with magic, major, minor and address.
-BODY_AT, MAJOR_AT, ADDRESS_AT = 5, 9, 11
+BODY_AT = Reply.FORMAT.size
+MAJOR_AT = BODY_AT + len(MAGIC)
+ADDRESS_AT = MAJOR_AT + 2
 # Silence after which nothing more is on its way.
 QUIET_NS = 100 * MS
 

@@ -137,7 +137,7 @@ def restore(port: Port, old: OffsetRegisters) -> None:
 # A different step on each axis shows axes that are swapped.
 STEPS = (256, 320, 384)
 # Words beyond this take the step in the other direction, so that it fits.
-LARGEST_TO_STEP_UP = 30_000
+LARGEST_TO_STEP_UP = WORD.max - max(STEPS)
 
 SCALES_LSB_PER_G = (2048.0, 4096.0)
 # The accelerometer's own scale is within 3 %.
@@ -170,7 +170,7 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
     """
     for place in sorted(PLACES, key=lambda place: place != likely):
         old = OffsetRegisters.read(port, place)
-        steps = [step if word < LARGEST_TO_STEP_UP else -step for step, word in zip(STEPS, old.words, strict=True)]
+        steps = [step if word <= LARGEST_TO_STEP_UP else -step for step, word in zip(STEPS, old.words, strict=True)]
         probe = old.with_words(shift_words(old.words, steps))
         before = measurement.rest()
         with restoring(port, old):

@@ -28,11 +28,9 @@ LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 KNOW_EVERY_S = REPORT_EVERY_S = 1.0
 # Interval of the fits while no new orientation is seen: such a fit tells little that is new.
 SHOW_EVERY_S = 5.0
-# The time that is left is estimated from the pace of at least this number of orientations.
-LEAST_FOR_PACE = 3
-# When fewer orientations than NEAR_THE_END are left, the estimate also needs the information so far: at least the share
-# LEAST_KNOWN of what the target needs.
-NEAR_THE_END, LEAST_KNOWN = 3, 0.25
+# The time that is left is estimated from the pace of at least this number of orientations. When fewer than this number
+# are left, the estimate also needs the information so far: at least the share LEAST_KNOWN of what the target needs.
+FEW, LEAST_KNOWN = 3, 0.25
 # An orientation that takes longer than this number of times the pace shows that the pace has changed.
 LATE = 2.5
 
@@ -203,9 +201,9 @@ class Rotate(PoseStep):
         is the inverse of the variance, and grows by about as much with each orientation as so far.
         """
         taken, left = self._coverage.number - 1, max(self._least - self._coverage.number, 0)
-        if taken < LEAST_FOR_PACE or self._plan.until_end or self._begun_s is None:
+        if taken < FEW or self._plan.until_end or self._begun_s is None:
             return None
-        if not self._plan.tilt_only and left < NEAR_THE_END:
+        if not self._plan.tilt_only and left < FEW:
             known = self._knowledge.overall**2 if self._knowledge else 0.0
             if known < LEAST_KNOWN or not self._coverage.varied:
                 return None
