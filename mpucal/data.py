@@ -70,6 +70,7 @@ class Sensor:
     clock_ppm: Annotated[float | None, "rate error of the bus's own clock, which was corrected"] = None
     clock_std: Annotated[float | None, "remaining relative standard deviation of the scale of times"] = None
     accel_lag_s: Annotated[float, "delay of the accelerometer after the gyroscope by the filters"] = 0.0
+    time_std: Annotated[float, "standard deviation of a sample's time, in common for tenths of a second, s"] = 0.0
 
     @property
     def origin(self) -> Origin:

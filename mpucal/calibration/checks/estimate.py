@@ -104,6 +104,7 @@ def contradiction(e: Evidence) -> Reason | None:
             return reason("inconsistent", "change", claim.error("change") > CHANGED_MPS2, begin=begin, end=end)
         size = 1e3 * change.size / STANDARD_GRAVITY_MPS2
         return reason("zero_moved", "walk", _is_useless(e), size=size, begin=begin, end=end)
+    disturbed |= not e.estimate.converged
     if worst is None or (disturbed and not _is_useless(e)) or not rms > GOOD_RMS_MPS2 >= claim.floored:
         return None
     if worst.hypothesis.kind == "side":
@@ -128,9 +129,9 @@ def _is_useless(e: Evidence) -> bool:
 
 
 def _is_disturbed(e: Evidence) -> bool:
-    """Return True if samples are lost or clipped, or nothing settled: parts disagree then, too."""
+    """Return True if samples are lost or clipped: parts disagree then, too."""
     r = e.recording
-    return bool(not e.estimate.converged or r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any())
+    return bool(r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any())
 
 
 def _since_the_start(e: Evidence, span: tuple[float, float]) -> tuple[float, float]:
