@@ -47,16 +47,17 @@ def without_tremor(recording: Recording, flat: Flat, runs: Intervals, noise_fact
     window /= window.sum()
     tremor = tremor_variance(statistics(acc, runs)[1], noise)
     samples = np.asarray(runs[:, 1] - runs[:, 0], np.float64)
-    # What goes on from the flat segment is not in a hand, and the low pass would leave nothing of a short rest.
-    trembles, is_long = (runs[:, 0] > flat.last) & (tremor > 0.0), samples >= SHORTEST * n
-    for k in np.flatnonzero(trembles & is_long):
+    # What goes on from the flat segment is not in a hand, and the low pass would leave nothing of a short rest. A table
+    # that hums is low-passed, too: a skewed wave would move the robust mean of a rest.
+    is_held, is_long = runs[:, 0] > flat.last, samples >= SHORTEST * n
+    for k in np.flatnonzero(is_held & is_long):
         first, last = runs[k]
         begin, end = max(first - n // 2, 0), min(last + n // 2, len(acc))  # a rest lacks its ends
         low = [np.convolve(axis, window, "valid") for axis in recording.acc[begin:end].T]
         acc[begin + n // 2 : end - n // 2] = np.stack(low, axis=1)
         noise[k] *= window @ window
     sway = tremor_variance(statistics(level_rests(acc, recording, flat, runs), runs)[1], noise)
-    is_raw = trembles & ~is_long
+    is_raw = is_held & (tremor > 0.0) & ~is_long
     jitter = sway * mean_variance(TREMOR_PER_S * samples / recording.rate_hz)
     return RestingHand(acc, np.where(is_raw, 0.0, sway), np.where(is_raw, jitter, 0.0))
 
