@@ -75,9 +75,10 @@ def _is_known_better(evidence: Evidence, other: Evidence) -> bool:
 def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     """Return the estimate of a part, from rest to rest, that is good by itself; None where there is none, or no need.
 
-    The part after what changed the sensor is of what it is now. Without it, the uncertainty of the whole holds what it
-    was and what it is. The part before useless readings is used, too. That before a sensor was at the end of its range
-    needs no reservation, and need not be better than usable where the whole is refused.
+    The part after what changed the sensor is of what it is now. Where that part is not good, the uncertainty of the
+    whole holds what the sensor was and what it is. Where the whole has no fit, as after an axis froze, the part before
+    is used, too. The part before a sensor was at the end of its range needs no reservation, and need not be better than
+    usable where the whole is refused.
     """
     recording, flat, of_whole = whole.recording, whole.flat, find_reasons(whole)
     changed = next((reason for reason in of_whole if reason.span is not None), None)

@@ -22,13 +22,12 @@ from .hypotheses import Explanation
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere, lengths, sides_down, signed_permutations, turned
 from .tilt import tilted_directions
-from .transitions import FEWEST_TRANSITIONS
+from .transitions import FEWEST_TRANSITIONS, MOST_MISS_RAD
 from .uncertainty import Uncertainty, UncertaintyClaim, is_usable, propagate
 from .words import Decoded
 
 LEAST_STEP_RAD = np.deg2rad(2.0)  # turn of gravity in half a second that is above noise
 CLEARLY = 3.0  # ratio of misses above which another unit or range is the right one
-MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 BLOCK_S = 0.01
 # Ratios of the chip's ranges, by which rates are off that were read at another one; that of the same range first.
 RANGE_RATIOS = sorted({a / b for a in GYRO_RANGES_DPS for b in GYRO_RANGES_DPS}, key=lambda ratio: abs(np.log(ratio)))

@@ -76,7 +76,8 @@ def with_masks(recording: Recording) -> Recording:
         marked.gap[run.first : run.last] = True
     for axis, first, last in stuck_readings(marked, "acc"):
         column, value = recording.acc[:, axis], recording.acc[first, axis]
-        if value in (column.min(), column.max()):  # at the end of a range that is not known
+        # the end of a range that is not known is reached more than once
+        if value in (column.min(), column.max()) and np.count_nonzero(column == value) > last - first:
             marked.acc_clipped[first - 1 : last - 1] = True
     return replace(marked, gyr=_without_spikes(recording))
 
@@ -188,8 +189,8 @@ def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[
     swings = LEAST_TURN_RAD * STANDARD_GRAVITY_MPS2
     for axis, column in enumerate(values.T):
         same = np.diff(column) == 0.0
-        # coarse readings repeat most in a long rest, and single axes of them throughout
-        parts = same[: max(len(same) // 20, 50)], same
+        # coarse readings repeat throughout, and rates most in a long rest
+        parts = (same,) if sensor == "acc" else (same[: max(len(same) // 20, 50)], same)
         by_chance = max((np.count_nonzero(part) + 1) / (len(part) + 2) for part in parts)
         longest = max(-np.log(ODDS * len(values)) / np.log(by_chance), SHORTEST_RUN)
         if not same.any() or _run_lengths(same)[same].max() < longest:

@@ -22,6 +22,7 @@ from .rotation import lengths
 from .theta import Theta
 from .transitions import (
     DEGREES_OF_FREEDOM,
+    MOST_MISS_RAD,
     REWEIGHTED,
     WORTHLESS,
     Transition,
@@ -35,11 +36,13 @@ class Slip(NamedTuple):
 
     span : (2,) s after the flat segment, between which it happened. delta : (3,) rad, rotation of the accelerometer.
     transitions : all of them, with the misses that remain after the slip.
+    near_end : True in the first or last two transitions, where no hypothesis sees what the sensor was or is.
     """
 
     span: tuple[float, float]
     delta: Vector
     transitions: Sequence[Transition]
+    near_end: bool = False
 
 
 def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta, spoilt: Mask) -> Slip | None:
@@ -63,9 +66,10 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta, s
     weight = likely_scale(misses, known)[1]
     at = [i for i in (0, 1, k - 2, k - 1) if not spoilt[transitions[i].span].any()]
     lost = min(at, key=lambda i: weight[i], default=0)
-    if at and weight[lost] < WORTHLESS:
+    # A mount slips by less: then the gyroscope did not see the turn.
+    if at and weight[lost] < WORTHLESS and np.linalg.norm(misses[lost]) < MOST_MISS_RAD:
         without = [each if i != lost else each._replace(miss=np.zeros(3)) for i, each in enumerate(transitions)]
-        return Slip(_times(t, transitions[lost]), misses[lost], without)
+        return Slip(_times(t, transitions[lost]), misses[lost], without, near_end=True)
     places = np.arange(2, k - 2)  # a rotation has three numbers, and each transition shows two of them
     by_slip = _directions(transitions, np.append(places, k))
     by_K = np.broadcast_to(jacobians(transitions, series, theta)[:, :, PLACES["K"]], by_slip.shape)

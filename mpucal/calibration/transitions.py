@@ -19,6 +19,7 @@ from .problem import Series
 from .rotation import cross, cross_rows, lengths, turned
 from .theta import UPPER, Theta
 
+MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 FEWEST_TRANSITIONS = 3  # fewer cannot contradict each other
 REWEIGHTED = 8  # iterations of a least squares fit whose weights depend on the residuals
 DEGREES_OF_FREEDOM = 4.0

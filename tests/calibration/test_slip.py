@@ -64,3 +64,12 @@ def test_a_turn_that_the_gyroscope_lost_is_no_slip(hand):
     lost = abs(recording.t - recording.t[0] - 27.0) < 1.0
     gyr = np.where(lost[:, None], 0.0, recording.gyr)
     assert estimate(replace(recording, gyr=gyr), "auto", G)[0].fit.slip is None
+
+
+@pytest.mark.parametrize("seed", [6, 7])
+def test_a_slip_in_the_last_turn_is_no_turn_that_the_gyroscope_lost(hand, seed):
+    made = hand(seed, "pose12")
+    calibration = calibrate(slipped(made.recording, 47.2), gravity=made.truth.gravity)
+    assert [reason["code"] for reason in calibration.quality["reasons"]] == ["inconsistent"]
+    begin, end = map(float, re.findall(r"[\d.]+", calibration.quality["reasons"][0]["message"])[:2])
+    assert begin - 1.0 < 47.2 < end + 1.0

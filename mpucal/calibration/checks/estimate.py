@@ -119,7 +119,7 @@ def _slip(e: Evidence) -> Slip | None:
     """Return the slip of the mount, if the mount explains most, and a calibration would not be good with it."""
     slip, explanations = e.estimate.slip, () if e.claim is None else e.claim.explanations
     likeliest = next((each.hypothesis.what for each in explanations if each.hypothesis.what != "gyroscope"), None)
-    if slip is None or likeliest != "mount":
+    if slip is None or not (slip.near_end or likeliest == "mount"):
         return None
     return slip if e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
 

@@ -102,7 +102,11 @@ def offset(values: Vector) -> Vector | None:
     and the centre has to explain why the lengths vary about zero: those of a flight, or of a rest with shocks, do
     about any point.
     """
-    x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), (values**2).sum(axis=1), rcond=None)
+    with np.errstate(over="ignore"):
+        squares = (values**2).sum(axis=1)
+    if not np.isfinite(squares).all():  # LAPACK might never return
+        return None
+    x, *_ = np.linalg.lstsq(np.column_stack([2.0 * values, np.ones(len(values))]), squares, rcond=None)
     centre, means = x[:3], averaged(values)
     radius, scatter = typical_size(values - centre)
     cover, without_shocks = (float(np.ptp(of, axis=0).min()) for of in (values, means))
