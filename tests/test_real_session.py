@@ -12,7 +12,7 @@ import pytest
 from mpucal.__main__ import run
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
-from mpucal.cli.page import open_runner
+from mpucal.cli.running import open_runner
 from mpucal.files import load
 from mpucal.result.calibration import Calibration
 from mpucal.session.plan import Plan

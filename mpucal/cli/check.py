@@ -44,8 +44,9 @@ from .common import (
 )
 from .destination import write_back
 from .options import given_options
-from .page import BOARD_KIND, open_runner, page_options, show_session
+from .page import BOARD_KIND, page_options, show_session
 from .recording_options import given_hints, hint_options, say_interpretation
+from .running import open_runner
 from .source_options import check_input, check_source, source_options
 
 EXAMPLE = (

@@ -1,4 +1,4 @@
-"""Runner of a session or a check, and the page in a browser beside it or a stream: its options, and its start."""
+"""Page in a browser beside a session, a check or a stream: its options, and its start."""
 
 from __future__ import annotations
 
@@ -23,38 +23,6 @@ from .summary import describe_fit
 
 if TYPE_CHECKING:
     from ..page.console import ResultCallback
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
-from ..result.clock import iso_utc
-from ..session.live_scheduler import InlineWorker, ProcessWorker
-from ..session.runner import Runner
-
-
-@contextmanager
-def open_runner(source: OpenedSource, capture: Path, person: Console, checking: bool = False) -> Iterator[Runner]:
-    """Yield a runner on `source` that records into `capture`, and close both; checking : see Runner.
-
-    Raises
-    ------
-    CaptureError : a replay ended before its capture did.
-    """
-    with source.measuring(capture, person.say, iso_utc()) as measuring, person.listening():
-        if source.recovered is not None:
-            person.say(f"  {source.recovered}")
-        yield Runner(
-            measuring.source,
-            source.operator(person),
-            measuring.note,
-            source.plan,
-            source.listeners,
-            source.open_next_part,
-            source.is_late,
-            ProcessWorker if source.real_time else InlineWorker,
-            checking,
-        )
-
 
 UNPACED = "pace=fast"
 # Key of --board among the options of a source.

@@ -16,7 +16,7 @@ from ..terminal.console import console
 from ..terminal.hangup import logging_after_hangup
 from .common import output_option
 from .options import ABOVE_ZERO, fit_options, given_options
-from .page import open_runner
+from .running import open_runner
 from .source_options import check_source, source_options
 
 MCAP = ".mcap"

@@ -31,7 +31,8 @@ from ..terminal.hangup import logging_after_hangup
 from .common import PATH, json_option, output_option, say, yes_option
 from .destination import session_sink_options, write_back
 from .options import check_gravity, fit_options, given_options
-from .page import BOARD_KIND, open_runner, page_options, page_result, show_session
+from .page import BOARD_KIND, page_options, page_result, show_session
+from .running import open_runner
 from .source_options import check_source, source_options
 from .summary import next_steps, summary
 

@@ -15,7 +15,7 @@ from mpucal.bridge.store import BlobStore
 from mpucal.calibration import calibrate
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
-from mpucal.cli.page import open_runner
+from mpucal.cli.running import open_runner
 from mpucal.errors import BusError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration

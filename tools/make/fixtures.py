@@ -22,7 +22,7 @@ from mpucal.chip.access import Bus
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.chip.records import SessionEvent
-from mpucal.cli.page import open_runner
+from mpucal.cli.running import open_runner
 from mpucal.data import Recording
 from mpucal.errors import EndOfCapture, SourceError
 from mpucal.files.capture_writer import CaptureWriter

@@ -18,7 +18,7 @@ from mpucal.bridge.store import BlobStore
 from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.cli.page import open_runner
+from mpucal.cli.running import open_runner
 from mpucal.doctor.finding import Mark
 from mpucal.errors import BusError
 from mpucal.session.plan import Plan
