@@ -72,7 +72,8 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
         return None
     inverse = np.linalg.inv(by.D)
     felt = (there.acc - by.b_a) @ inverse.T
-    rate, alpha = smoothed_rates(there, replace(first.flat, last=0, b_omega=by.b_omega))
+    measured = smoothed_rates(there, replace(first.flat, last=0, b_omega=by.b_omega))
+    rate, alpha = (values @ by.K.T for values in measured)
     columns = np.hstack([felt, np.gradient(felt, there.t, axis=0), rate, alpha, there.gyr])
     t = here.t[near]
     s, change, rate, alpha, rates = np.hsplit(np.stack([np.interp(t, there.t, c) for c in columns.T], axis=1), 5)

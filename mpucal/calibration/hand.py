@@ -138,6 +138,7 @@ def _fit_samples(search: _Search) -> HandFit:
     fine, theta, noise = search.scales.fine, search.theta, search.noise
     if search.trembles:
         fine = remove_tremor(fine)
+    fine = fine.with_rates_by(theta.K)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
         noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _with_transition_noise(noise.problem(fine), fine, theta)

@@ -76,6 +76,12 @@ class Preprocessed:
         white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
         return replace(self._with(jerk=jerk, r_extra=self.pose + white), lam=lam)
 
+    def with_rates_by(self, K: Vector) -> Preprocessed:
+        """Return the recording with the rates and angular accelerations of the lever arm corrected by K (3, 3)."""
+        series = self.problem.series
+        assert series.rate is not None and series.alpha is not None
+        return replace(self, problem=self._with(rate=series.rate @ K.T, alpha=series.alpha @ K.T))
+
     @cached_property
     def poses(self) -> Poses:
         """Poses of the rests that end after the flat segment."""
