@@ -16,19 +16,17 @@ from typing import IO
 
 import numpy as np
 
-from ..arguments import UNSORTED
 from ..clocks.stamps import FEWEST
-from ..data import Recording, Samples, Vector
+from ..data import Samples, Vector
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ._text import lines, numbers
 from .hints import ROLES
 from .reading import LONGEST_LINE, reading
 from .rows import Rows, Write, check_runs
-from .tables.load import load_table
 from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
 from .tables.text import decode_text, read_table
-from .tables.times import GAP_S, go_on, plausible_utc_ns
+from .tables.times import GAP_S, go_on, in_order, plausible_utc_ns
 from .tables.units import NS
 
 TEMPERATURE, UTC = "temperature_c", "utc_s"
@@ -41,16 +39,6 @@ _REMEDY = (
     f"name the columns in the first line, in any order: {','.join(ROLES)} (s, m/s^2, rad/s), or with"
     f" --columns t=NAME,ax=NAME,... or, in their order, --columns {','.join(ROLES)}"
 )
-
-
-def load_csv(path: Path) -> Recording:
-    """Return the recording in a table; see csv_rows. Samples that came late are sorted, as in any other table."""
-    try:
-        return csv_rows(path).recording()
-    except RecordingError as error:
-        if error.remedy != UNSORTED:
-            raise
-        return load_table(path)
 
 
 def csv_rows(path: Path) -> Rows:
@@ -84,16 +72,22 @@ def csv_rows(path: Path) -> Rows:
 
 
 def _go_on(runs: Iterator[Samples], interrupted: list[float]) -> Iterator[Samples]:
-    """Yield the runs of which the times go on where they begin anew, and note in `interrupted` when they do."""
-    count, last, shift = 0, -np.inf, 0.0
+    """Yield the runs of which the times go on where they begin anew, and note in `interrupted` when they do.
+
+    Of samples that came late, the times become those between their neighbours'.
+    """
+    count, back, last, end, shift = 0, 0, -np.inf, -np.inf, 0.0
     for samples in runs:
+        back += int(np.count_nonzero(np.diff(samples.t, prepend=last) < 0.0))
         t, anew = go_on(samples.t, last)
         count, last, t = count + len(t), float(samples.t[-1]), t + shift
+        shift = float(t[-1]) - last
+        t = in_order(t, np.arange(len(t)), end) if back and np.isfinite(t).all() else t
+        end = float(t[-1])
         before = np.append(t[:1] - GAP_S, t[:-1])[anew]
         interrupted += before.tolist()
-        shift = float(t[-1]) - last
         # other times are in no order
-        yield replace(samples, t=t, gap=samples.gap | anew) if len(interrupted) * FEWEST <= count else samples
+        yield replace(samples, t=t, gap=samples.gap | anew) if back * FEWEST <= count else samples
 
 
 def _utc_ns(header: list[str], second: bytes) -> int | None:

@@ -126,7 +126,6 @@ FORMATS = (
     Format(
         ".csv",
         "a table",
-        load=f"{_HERE}.csv:load_csv",
         rows=f"{_HERE}.csv:csv_rows",
         writer=f"{_HERE}.csv:csv_file",
         recognises=f"{_HERE}.tables.load:is_own_table",

@@ -11,7 +11,6 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from io import BytesIO
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -89,7 +88,8 @@ def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, Any]]:
     h5py = import_extra("h5py", "matlab", path)
     names: list[str] = []
     try:
-        with h5py.File(BytesIO(content), "r") as file:
+        # with a file object of Python, HDF5 calls it again when the interpreter has ended, if the file was damaged
+        with h5py.File(h5py.h5f.open_file_image(content)) as file:
             file.visit(names.append)
             for name in names:
                 item = file[name]

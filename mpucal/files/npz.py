@@ -1,8 +1,8 @@
 """NumPy archives: `t` [s] (n,), `acc` [m/s^2] (n, 3), `gyr` [rad/s] (n, 3), and optional arrays.
 
 Optional are `flat`, (first, last + 1) samples that lie flat, or `flat_samples`, the number of them at the start;
-`temperature_c` or `temperature`, (n,); `gap`, `acc_clipped`, `gyr_clipped`, (n,); `sensor`, a JSON object; `done`, the
-processing of calibrated samples. Other keys are ignored.
+`temperature_c` or `temperature`, (n,); `gap`, `acc_clipped`, `gyr_clipped`, (n,); `interrupted`, times [s] as of a
+Recording; `sensor`, a JSON object; `done`, the processing of calibrated samples. Other keys are ignored.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from .tables.times import plausible_utc_ns
 NEEDED = ("t", "acc", "gyr")
 TEMPERATURES = ("temperature_c", "temperature")
 MASKS = ("gap", "acc_clipped", "gyr_clipped")
-DONE, UTC = "done", "utc_ns"
-READ = (*NEEDED, *TEMPERATURES, *MASKS, "flat", "flat_samples", "sensor", DONE, UTC)
+DONE, UTC, INTERRUPTED = "done", "utc_ns", "interrupted"
+READ = (*NEEDED, *TEMPERATURES, *MASKS, "flat", "flat_samples", "sensor", DONE, UTC, INTERRUPTED)
 # also errors of numpy: damaged, encrypted, longer than memory
 DAMAGED = (
     *(*DAMAGED_ZIP, TypeError, AttributeError, ArithmeticError, LookupError, MemoryError, SyntaxError),
@@ -54,6 +54,7 @@ def npz_rows(path: Path) -> Rows:
             raise RecordingError(f"{path} has no {', '.join(missing)}; it has {has}", _REMEDY)
         check_size(path, sum(each.file_size for each in archive.zip.infolist() if each.filename[:-4] in READ))
         arrays = {key: archive[key] for key in READ if key in archive.files}
+        interrupted = np.ravel(arrays.get(INTERRUPTED, [])).astype(float).tolist()
     columns = {key: arrays[key] for key in (*NEEDED, *MASKS) if key in arrays}
     columns |= {key: _with_nan(columns[key]) for key in ("acc", "gyr")}
     warm = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
@@ -65,6 +66,7 @@ def npz_rows(path: Path) -> Rows:
         rows,
         runs=check_runs(rows.runs, path.name),
         taken=" ".join(filter(None, (whole.taken, describe(path.name, units)))) or None,
+        interrupted=interrupted,
         utc_ns=plausible_utc_ns(int(utc_ns)) if utc_ns.shape == () and utc_ns.dtype.kind in "iu" else None,
     )
 
@@ -127,7 +129,7 @@ def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
     with atomic_file(path) as file:
         runs: list[Samples] = []
         yield runs.append
-        known: dict[str, Any] = {"flat": rows.flat, UTC: rows.utc_ns}
+        known: dict[str, Any] = {"flat": rows.flat, UTC: rows.utc_ns, INTERRUPTED: rows.interrupted or None}
         small = {key: value for key, value in known.items() if value is not None}
         sensor = json.dumps(asdict(rows.sensor))
         np.savez(file, **vars(Samples.joined(runs)), **small, sensor=sensor, done=done)

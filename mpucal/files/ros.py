@@ -18,12 +18,12 @@ from mcap.reader import make_reader
 from mcap.records import Metadata
 
 from ..data import Recording
-from ..errors import CaptureError, MpucalError, RecordingError
+from ..errors import MpucalError, RecordingError
 from .hints import NO_HINTS, Hints
 from .imu import NOT_MEASURED
 from .mcap import CALIBRATED, IMU, ROS1, profile
 from .reading import first_bytes, import_extra
-from .rows import Rows
+from .rows import Rows, describe_done
 from .tables.cells import since_first
 from .tables.shown_units import acceleration_unit
 from .tables.streams import join_streams
@@ -43,18 +43,8 @@ def is_folder_of_ros(path: Path) -> bool:
 
 
 def bag_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
-    """Return the samples of a bag that is to be calibrated.
-
-    Raises
-    ------
-    CaptureError : they are calibrated already. RecordingError : see load_bag.
-    """
-    done = _read_done(path)
-    if done:
-        raise CaptureError(
-            f"{path} holds samples that are calibrated already ({done})", "give the recording from which it was made"
-        )
-    return Rows.of(load_bag(path, hints))
+    """Return the samples of a bag; see load_bag."""
+    return Rows.of(load_bag(path, hints), _read_done(path))
 
 
 def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -104,7 +94,7 @@ def _recording(path: Path, topics: list[str], found: dict[str, _Messages], hints
     remarks = [
         f"from {' and '.join(dict.fromkeys(topics))}",
         "" if acc.is_stamped else "times are those of receipt, as the headers hold none",
-        f"its samples are {done} already" if done else "",
+        describe_done("it", done) if done else "",
     ]
     return join_streams(acc.stream("acc", path.name), gyr.stream("gyr", path.name), hints, path.name, remarks=remarks)
 

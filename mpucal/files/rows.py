@@ -13,6 +13,7 @@ from ..clocks.stamps import FEWEST, Clock, are_gaps
 from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector, clock_of
 from ..errors import RecordingError
 from .tables.shown_units import acceleration_unit, gyro_unit, rate_factor
+from .tables.times import how_often
 from .tables.units import QUANTITIES
 
 # 16 Ki samples take 1 MB, which fits a cache; for larger products BLAS starts threads, which takes longer
@@ -64,6 +65,7 @@ class Rows:
             done,
             utc_ns=recording.utc_ns,
             taken=recording.taken,
+            interrupted=[*recording.interrupted],
         )
 
     def recording(self) -> Recording:
@@ -80,12 +82,11 @@ class Rows:
 
     def notes(self) -> list[str]:
         """Return sentences on the samples, when the runs have been read."""
-        times, said = len(self.interrupted), []
-        if self.done:
-            left = "a new calibration is of the errors that are left"
-            said += [f"{self.name} is calibrated already ({self.done}): {left}."]
-        if times:
-            said += [f"{self.name}: its times begin anew {times} times, and go on there after a gap."]
+        said = [f"{describe_done(self.name, self.done)}."] if self.done else []
+        if self.plain and self.interrupted:
+            said += [
+                f"{self.name}: its times begin anew {how_often(len(self.interrupted))}, and go on there after a gap."
+            ]
         return said
 
 
@@ -96,6 +97,11 @@ def make_recording(*, acc: Any, gyr: Any, **others: Any) -> Recording:
     """Return Recording.from_arrays of arrays in which numbers may be missing (NaN)."""
     recording = Recording.from_arrays(acc=np.nan_to_num(acc), gyr=np.nan_to_num(gyr), **others)
     return replace(recording, acc=np.asarray(acc, float), gyr=np.asarray(gyr, float))
+
+
+def describe_done(name: str, done: str) -> str:
+    """Return a clause on samples that are calibrated already."""
+    return f"{name} is calibrated already ({done}): a new calibration is of the errors that are left"
 
 
 def describe(name: str, units: Mapping[str, str]) -> str:

@@ -121,15 +121,14 @@ def test_b_a_follows_the_temperature(mpucal, session, calibration):
     np.testing.assert_allclose(load("out.npz").acc, (recording.acc - b_a) @ np.linalg.inv(D).T, atol=1e-12)
 
 
-@pytest.mark.parametrize(("ending", "code"), [(".npz", 2), (".csv", 2), (".mcap", 3)])
-def test_calibrated_recordings_are_refused(mpucal, session, calibration, ending, code):
+@pytest.mark.parametrize("ending", [".npz", ".csv", ".mcap"])
+def test_calibrated_recordings_are_refused(mpucal, session, calibration, ending):
     mpucal("apply", "c.json", session.folder, "-o", f"out{ending}")
     again = mpucal("apply", "c.json", f"out{ending}", "-o", "twice.npz")
-    assert again.code == code
+    assert again.code == 2
     why = "as its column calibrated_by_mpucal says" if ending == ".csv" else "calibrated with c.json of"
     assert f"calibrated already ({why}" in again.err
-    if ending != ".mcap":
-        assert "a new calibration is of the errors that are left" in mpucal("show", f"out{ending}").err
+    assert "a new calibration is of the errors that are left" in mpucal("show", f"out{ending}").err
 
 
 def test_a_table_whose_times_begin_anew_is_applied_to(mpucal, save, session, calibration):
@@ -139,7 +138,7 @@ def test_a_table_whose_times_begin_anew_is_applied_to(mpucal, save, session, cal
     t = recording.t - np.where(np.arange(len(recording)) < half, recording.t[0], recording.t[half])
     save(replace(recording, t=t, utc_ns=None), "in.csv")
     done = mpucal("apply", "c.json", "in.csv", "-o", "out.csv")
-    assert (done.code, "its times begin anew 1 times" in done.err) == (0, True), done.err
+    assert (done.code, "its times begin anew once" in done.err) == (0, True), done.err
     read, out = load("in.csv"), load("out.csv")
     np.testing.assert_array_equal(read.t, out.t)
     np.testing.assert_allclose(out.acc, formula(recording)[0], atol=1e-12)

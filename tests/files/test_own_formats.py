@@ -205,14 +205,14 @@ def test_real_and_simulated_recordings_of_others_are_read(shared):
 def test_a_bad_time_is_named_from_run_to_run_and_leaves_no_file(kind, at, value, said, tmp_path):
     made = recording()
     t = made.t.copy()
-    t[at] = value
+    t[at::2] = value
     source = tmp_path / f"in{kind}"
     if kind == ".npz":
         np.savez(source, t=t, acc=made.acc, gyr=made.gyr)
     else:
         source.write_bytes(HEADER.encode() + lines(np.column_stack([t, made.acc, made.gyr])))
-    # an archive is checked whole, and does not name the sample that lacks a time
-    named = "t is not a finite number" if kind == ".npz" and np.isnan(value) else f"{said} {at}"
+    # an archive is checked whole, and does not name the sample that lacks a time; a few late times of a table are read
+    named = said.partition(" in sample")[0] if (kind == ".npz") == np.isnan(value) else f"{said} {at}"
     with pytest.raises(RecordingError, match=named) as raised:
         through(source, tmp_path / "out.csv")
     assert ("another recording begins there" in str(raised.value)) == (not np.isnan(value))

@@ -12,8 +12,9 @@ import pytest
 import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError, UsageError
-from mpucal.files import load
+from mpucal.files import load, open_rows, open_writer
 from mpucal.files.hints import Hints, parse_columns, parse_units
+from mpucal.files.rows import Rows
 from mpucal.files.tables.units import QUANTITIES
 
 CAPTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
@@ -349,7 +350,7 @@ FORMS = {
         "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n", "i ticks a w", says="times in 0.1ms"
     ),
     "a counter that overflows": Form(
-        f"micros,{AXES}", "overflow a w", says="times in us, whose counter overflows 1 times"
+        f"micros,{AXES}", "overflow a w", says="times in us, whose counter overflows once"
     ),
     "a date in digits": Form(f"Time,{AXES}", "digits a w", says="times in ns"),
     "Movella DOT": Form(
@@ -535,7 +536,8 @@ def test_hints_for_what_needs_none(tmp_path, name):
 
 def test_counts_need_a_rate_and_their_ranges_must_fit(read, walk):
     alone = read(AXES, "counts")
-    assert "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|) and without rates; this sample" in alone.taken
+    assert "a rate of 100 Hz, accelerations in counts of ±4 g (by |a|) and rates left out" in alone.taken
+    assert "nothing shows their times (--rate HZ)" in alone.taken
     assert np.isnan(alone.gyr).all()
     given = read(AXES, "counts", rate=100, accel_range=4, gyro_range=500)
     assert (given.sensor.accel_range_g, given.sensor.gyro_range_dps) == (4, 500)
@@ -1035,22 +1037,53 @@ def test_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
     t[half + 200] -= 0.02
     (tmp_path / "walk.csv").write_text(f"time,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
     found = mpucal.load(tmp_path / "walk.csv", units="acc=m/s^2,gyr=rad/s")
-    assert "times in s, which begin anew 1 times," in found.taken
+    assert "times in s, which begin anew once," in found.taken
     np.testing.assert_array_equal(found.acc, walk.acc)
     assert np.flatnonzero(found.gap).tolist() == [half]
     assert np.diff(found.t)[half - 1] == pytest.approx(15.0, abs=0.02)
 
 
 def test_our_own_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
-    """Read a table in our own format in the same way; one in which single times go back stays refused."""
+    """Read a table in our own format in the same way, and keep the interruption in an archive."""
     half, path = len(walk) // 2, tmp_path / "walk.csv"
     t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
     path.write_text(f"t,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
     found = mpucal.load(path)
-    assert "its times begin anew 1 times" in found.taken
+    assert "its times begin anew once" in found.taken
     np.testing.assert_array_equal(found.acc, walk.acc)
     assert np.flatnonzero(found.gap).tolist() == [half]
     assert found.interrupted == (walk.t[half - 1],)
+    with open_writer(tmp_path / "walk.npz", Rows.of(found), "") as write:
+        write(found)
+    assert mpucal.load(tmp_path / "walk.npz").interrupted == found.interrupted
+
+
+@pytest.mark.parametrize("name", ["t", "time"])
+def test_lines_of_which_the_newest_is_the_first(name, walk, walk_ns, tmp_path, assert_same):
+    """Read them from the last to the first, also a run at a time, in our own names and in another program's."""
+    path = tmp_path / "walk.csv"
+    path.write_text(f"{name},{AXES}" + "\n".join(lines(",", "t a w", walk, walk_ns).splitlines()[::-1]) + "\n")
+    for found in (mpucal.load(path), open_rows(path).recording()):
+        assert_same(found, walk)
+        assert "the newest first" in found.taken
+
+
+def test_times_that_are_not_read_are_named(walk, table):
+    """Say so of times that no unit fits, which the turning of gravity replaces."""
+    t = np.arange(len(walk)) % 7
+    found = mpucal.load(table(f"t,{AXES.strip()}", t, walk.acc, walk.gyr))
+    assert "its column t was not read as the time" in found.taken
+
+
+def test_our_own_times_that_came_late_lie_between_their_neighbours(walk, walk_ns, tmp_path):
+    """Read them a run at a time, as `mpucal apply` does, as in any other table."""
+    t = walk.t.copy()
+    t[[100, 900]] -= 0.02
+    path = tmp_path / "walk.csv"
+    path.write_text(f"t,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
+    for found in (mpucal.load(path), open_rows(path).recording()):
+        np.testing.assert_allclose(found.t, walk.t, rtol=0, atol=1e-9)
+        assert not found.gap.any()
 
 
 def test_rates_called_after_the_turns_of_a_gyroscope(read, walk, assert_same):
@@ -1095,7 +1128,7 @@ def test_times_that_begin_anew_are_no_part_of_a_sensor(walk, tmp_path):
     with pytest.raises(RecordingError) as refused:
         mpucal.load(path)
     assert refused.value.options == f"--columns t,{AXES.strip()}"
-    assert "begin anew 1 times" in mpucal.load(path, columns=refused.value.options.split()[1]).taken
+    assert "begin anew once" in mpucal.load(path, columns=refused.value.options.split()[1]).taken
     path.write_text(path.read_text().replace("e+18,", "e+18,torn", 30))
     with pytest.raises(RecordingError, match=r"line 1: column 2 is 'torn.*', which is not a number"):
         mpucal.load(path)
@@ -1163,6 +1196,24 @@ def test_increments_of_velocity_and_angle_are_rates_times_the_period(names, unit
     found = mpucal.load(path)
     assert_same(found, walk, 1e-9, 1e-9, 1e-9)
     assert "these are increments over a sample, times its rate" in found.taken
+
+
+@pytest.mark.parametrize(
+    ("stems", "intervals", "per_s"),
+    [
+        (("delta_velocity[{}]", "delta_angle[{}]"), "delta_velocity_dt,delta_angle_dt", 1e6),
+        (("DelV{}", "DelA{}"), "DelvT,DelaT", 1),
+    ],
+)
+def test_increments_over_times_of_their_own(stems, intervals, per_s, walk, table, assert_same):
+    """Divide them by these, as PX4 and ArduPilot write them, and not by the period of the lines."""
+    axes = "012" if per_s > 1 else "XYZ"
+    names = ",".join(stem.format(axis) for stem in stems for axis in axes)
+    dt = np.random.default_rng(17).integers(4000, 6000, len(walk)) * 1e-6
+    columns = [walk.acc * dt[:, None], 2 * walk.gyr * dt[:, None], dt * per_s, 2 * dt * per_s]
+    found = mpucal.load(table(f"time,{names},{intervals}", walk.t, *columns))
+    assert_same(found, walk, 1e-9, 1e-9, 1e-9)
+    assert "increments over a sample, by their own times" in found.taken
 
 
 def test_increments_that_nothing_shows_are_read_as_the_user_says(walk, table, assert_same):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
@@ -15,7 +16,7 @@ from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
 from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import HELD, MOST_ODD, SNIFFED, check_size, first_bytes, reading
-from .cells import OF_DAY, Kind
+from .cells import LOOKED_AT, OF_DAY, Kind
 from .columns import find_columns
 from .guess import is_clock, is_index
 from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
@@ -36,7 +37,7 @@ from .names import (
     with_sensor,
 )
 from .several import NAMES_SENSORS, of_one_beginning, of_one_place, of_one_sensor, of_one_turn, turns
-from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts
+from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts, time_unit
 from .streams import index_with_gravity, join_streams
 from .table import Table
 from .text import HEAD, PREAMBLE, decode_text, find_bare_table, find_named_table, find_wanted_table, stated_rate_hz
@@ -93,14 +94,17 @@ def _accelerations(table: Table) -> Vector:
 
 
 def _may_be_no_seconds(table: Table, path: Path) -> bool:
-    """Return True if the column t may hold times of day in digits, or counts the samples, as the whole file shows."""
+    """Return True if the column t may hold times of day in digits, or decreases.
+
+    So it may if it counts the samples, as the whole file shows.
+    """
     place = [name.strip().lower() for name in table.header].index("t")
     if len(table) and OF_DAY(str(table.cells[place][0])):
         return True
     # what was read of the file may end within a number
     t = table.numbers([Column("t", place, TIME)])[:-1, 0]
     if len(t) < FEWEST or not is_index(t):
-        return False
+        return len(t) >= FEWEST and not _increases(t)
     whole = find_any_table(_read_text(path), path.name)
     acc, gyr = (whole.numbers(first_triple(whole.columns, of)) if whole else np.zeros((0, 3)) for of in (ACC, GYR))
     complete = np.isfinite(np.hstack([acc, gyr])).all(axis=1)
@@ -188,6 +192,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     ------
     RecordingError : it does not say all that is needed; the message names what is missing.
     """
+    table = _oldest_first(table)
     if not table.chosen:
         table = of_one_sensor(table if hints.columns else of_one_place(table, hints.sensor), hints.sensor)
     ranges = table.ranges if not (hints.accel_range_g or hints.gyro_range_dps) else None
@@ -214,8 +219,27 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
         "the ranges are those that MPU6050::initialize() sets" if ranges else "",
         guess_remark,
         "" if hints.columns or table.chosen else ignored_sensors(table.header, columns),
+        "accelerations are increments over a sample, by their own times" if interval_column(table, acc[0]) else "",
+        *(f"its column {c.name.strip()} was not read as the time" for c in at[:1] if a.ticks is None),
     ]
     return join_streams(a, w, hints, table.name, remarks)
+
+
+def _oldest_first(table: Table) -> Table:
+    """Return a table whose lines are the newest first, as databases export them, in the order of their times."""
+    if len(table) < FEWEST:
+        return table
+    # what was read of the file may end within its last line
+    some = np.isin(np.arange(len(table)), np.linspace(0, len(table) - 2, LOOKED_AT).astype(int))
+    # damaged times are told where all are read
+    with suppress(RecordingError):
+        for clock in table.clocks(table.columns)[:1]:
+            times = table.part(some).times(clock, np.ones(LOOKED_AT, bool))[0]
+            if (np.diff(times) < 0.0).all():
+                said = "its lines are the newest first, and were read from the last to the first"
+                cells = [of[::-1] for of in table.cells]
+                return replace(table, cells=cells, lines=table.lines[::-1], remarks=(*table.remarks, said))
+    return table
 
 
 def _undo_ios_sign(stream: Stream, name: str) -> tuple[Stream, str]:
@@ -235,6 +259,10 @@ def sensor_stream(
     """
     values = table.numbers(axes)
     values = -values if axes[0].sign_flipped else values
+    interval = interval_column(table, axes[0])
+    if interval is not None:
+        dt = table.numbers([interval])
+        values = values / np.where(dt > 0.0, dt * QUANTITIES[TIME][interval.unit], np.nan)
     values[~np.isfinite(values)] = np.nan
     empty = np.asarray(np.isnan(values).all(axis=1))
     others = int(np.count_nonzero(empty)) > MOST_ODD * len(values) or _are_of_others(table, empty)
@@ -263,8 +291,23 @@ def sensor_stream(
         rate_hz=table.rate_hz,
         # xacc and xgyro of MAVLink are in mg and mrad/s
         whole_unit="" if axes[0].name.strip().lower().startswith("x") else OF_BNO055[axes[0].quantity],
-        of_increments=axes[0].of_increments,
+        of_increments=axes[0].of_increments and interval is None,
     )
+
+
+def interval_column(table: Table, axis: Column) -> Column | None:
+    """Return the column of the times that a sensor's increments are of, as PX4 and ArduPilot write it; None if none is.
+
+    It is called after them (delta_angle_dt beside delta_angle[0], DelaT beside DelAX), and its size shows its unit.
+    """
+    plain = [re.sub(r"[\W_]", "", name.lower()) for name in (axis.name, *table.header)]
+    place = next((plain.index(of) - 1 for of in (f"{plain[0][:-1]}dt", f"{plain[0][:-1]}t") if of in plain), None)
+    if place is None or not axis.of_increments:
+        return None
+    column = Column(table.header[place], place, TIME)
+    known = table.numbers([column])
+    unit = time_unit(float(np.median(known[np.isfinite(known)]))) if np.isfinite(known).any() else ""
+    return replace(column, unit=unit) if unit else None
 
 
 def _are_of_others(table: Table, empty: Mask) -> bool:

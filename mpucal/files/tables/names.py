@@ -88,8 +88,12 @@ BY_A_WORD = len(STEMS[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
 _AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
-_CLOCK = re.compile(r"(?<![a-z])(?:time|timestamp|stamp|millis|micros|date)(?![a-z])")
-_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
+# a word of its own, also by its capitals: packetTime, MATLABtime
+_WORDS_OF_TIME = "time|timestamp|stamp|millis|micros|date"
+_CLOCK = re.compile(
+    rf"(?:(?<![A-Za-z])(?i:{_WORDS_OF_TIME})|(?<=[A-Z])(?:{_WORDS_OF_TIME})|(?<=[A-Za-z])(?:{_WORDS_OF_TIME.title()}))"
+    r"(?![a-z])"
+)
 _TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)|gyro?(roll|pitch|yaw)").fullmatch
 # a rocket's axes as AltOS calls them, which rolls about the one along it -> x, y, z
 _OF_ALTOS = {"across": "x", "along": "y", "through": "z", "pitch": "x", "roll": "y", "yaw": "z"}
@@ -150,8 +154,7 @@ def parse_column_name(name: str, place: int) -> Column | None:
     if found is None and not unit and (tail := _WITH_ENDING.fullmatch(text)):
         text, unit = tail[1], find_unit(tail[2])
         found = _match_stem(name, place, text, axis, unit)
-    words = _CAMEL.sub("_", name).lower()
-    if found is None and axis < 0 and unit in UNITS[TIME] and (unit or _CLOCK.search(words)):
+    if found is None and axis < 0 and unit in UNITS[TIME] and (unit or _CLOCK.search(name)):
         return Column(name, place, TIME, unit=unit, rank=BY_A_WORD)
     return found
 

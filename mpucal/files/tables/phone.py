@@ -36,7 +36,7 @@ from .shown_units import acceleration_unit, seem_counts
 from .streams import join_streams
 from .table import Table
 from .text import decode_text, find_named_table
-from .times import Stream
+from .times import Stream, how_often
 from .units import NS
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
@@ -223,7 +223,7 @@ def _read_app_metadata(files: Iterable[tuple[str, bytes]]) -> tuple[bool, int | 
             rows = [{(key or "").lower(): cell or "" for key, cell in row.items()} for row in read]
             starts = [row for row in rows if row.get("event", "").upper() == "START"]
             if len(starts) > 1:
-                remark = f"it was paused {len(starts) - 1} times, and its times do not count the pauses"
+                remark = f"it was paused {how_often(len(starts) - 1)}, and its times do not count the pauses"
             elif starts:
                 with suppress(KeyError, ArithmeticError, ValueError):
                     of_day, at = (Decimal(starts[0][of].replace(",", ".")) for of in ("system time", "experiment time"))

@@ -43,7 +43,8 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
     ------
     RecordingError : units are not known or do not fit, times do not overlap, or there are too few samples.
     """
-    of_rate, left_out = "", gyr is None
+    of_rate, measured = "", gyr is not None
+    left_out = not measured
     gyr = replace(acc, values=np.zeros_like(acc.values), unit="rad/s") if gyr is None else gyr
     acc, gyr = _checked(acc, "accelerations", name), _checked(gyr, "rates", name)
     if acc.ticks is None or gyr.ticks is None:
@@ -75,7 +76,8 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
     hints = replace(hints, units={of: PER_SAMPLE.get(unit, unit) for of, unit in hints.units.items()})
     if left_out:
         a = accelerations(values, acc.unit, hints, name, rate_hz=clock.rate_hz)
-        w = Reading.of(rates, math.nan, "without rates")
+        unknown = "rates left out, because nothing shows their times (--rate HZ)"
+        w = Reading.of(rates, math.nan, unknown if measured else "without rates")
     else:
         rate_of = Rates(t[complete], values, rates, gyr, hints, name)
         may_be_whole = _are_whole_mg(acc, values) and not hints.units.keys() & OF_BNO055.keys()

@@ -125,11 +125,9 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
-    said += f", which begin anew {len(anew)} times" if len(anew) else ""
-    said += f", whose counter overflows {wraps} times" if wraps else ""
-    # a clock that was set back, or a sample that came late
-    kept = on >= np.maximum.accumulate(on)
-    on = np.interp(stream.number, stream.number[kept], on[kept])
+    said += f", which begin anew {how_often(len(anew))}" if len(anew) else ""
+    said += f", whose counter overflows {how_often(wraps)}" if wraps else ""
+    on = in_order(on, stream.number)
     parts = np.split(np.arange(len(on)), anew)
     return join_clocks([fit_clock(on[part], stream.number[part]) for part in parts]), said
 
@@ -145,6 +143,20 @@ def go_on(t: Vector, last: float = -math.inf) -> tuple[Vector, Mask]:
     # after a single damaged time, the next goes on
     begins = np.asarray((steps < -ANEW_S) & (np.append(t[1:], -math.inf) < t - steps))
     return t + np.cumsum(np.where(begins, GAP_S - steps, 0.0)), begins
+
+
+def in_order(t: Vector, number: Numbers, last: float = -math.inf) -> Vector:
+    """Return times (n,) of samples with these numbers, of which those that came late lie between their neighbours'.
+
+    The same holds where a clock was set back a little. `last` is the time before the first of them.
+    """
+    kept = t >= np.maximum.accumulate(np.maximum(t, last))
+    return np.interp(number, number[kept], t[kept]) if kept.any() else np.full(len(t), last)
+
+
+def how_often(count: int) -> str:
+    """Return a count as an adverb."""
+    return "once" if count == 1 else f"{count} times"
 
 
 def join_clocks(clocks: Sequence[Clock]) -> Clock:
