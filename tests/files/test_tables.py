@@ -1068,6 +1068,17 @@ def test_lines_of_which_the_newest_is_the_first(name, walk, walk_ns, tmp_path, a
         assert "the newest first" in found.taken
 
 
+@pytest.mark.parametrize(("name", "per_s", "even"), [("dt", 1, True), ("time", 1e3, False), ("delta_us", 1e6, False)])
+def test_steps_between_samples_are_summed(name, per_s, even, walk, table):
+    """Read times since the sample before, of which even ones are called so, and in a column that is called the time."""
+    dt = np.random.default_rng(18).uniform(0.008, 0.012, len(walk))
+    dt = np.full(len(walk), 0.01) if even else dt / dt.mean() / 100
+    found = mpucal.load(table(f"{name},{AXES.strip()}", per_s * dt, walk.acc, walk.gyr))
+    assert "summed from the steps between samples" in found.taken
+    np.testing.assert_allclose(found.t - found.t[0], np.cumsum(dt) - dt[0], atol=1e-6 if even else 0.05)
+    np.testing.assert_array_equal(found.acc, walk.acc)
+
+
 def test_times_that_are_not_read_are_named(walk, table):
     """Say so of times that no unit fits, which the turning of gravity replaces."""
     t = np.arange(len(walk)) % 7

@@ -6,24 +6,21 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 
-from ...clocks.stamps import FEWEST, sample_period
-from ...data import Mask, Recording, Vector
+from ...clocks.stamps import FEWEST
+from ...data import Recording, Vector
 from ...errors import RecordingError
 from ..hints import NO_HINTS, ROLES, Hints
-from ..reading import HELD, MOST_ODD, SNIFFED, check_size, first_bytes, reading
+from ..reading import HELD, SNIFFED, check_size, first_bytes, reading
 from .cells import LOOKED_AT, OF_DAY, Kind
 from .columns import find_columns
 from .guess import is_clock, is_index
 from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
 from .names import (
     ACC,
-    BY_A_WORD,
-    CHOSEN,
     GYR,
     TEMPERATURE,
     TIME,
@@ -33,16 +30,16 @@ from .names import (
     first_triple,
     ignored_sensors,
     parse_axis_name,
-    plausible_celsius,
     with_sensor,
 )
+from .sensor import increases, interval_column, sensor_stream
 from .several import NAMES_SENSORS, of_one_beginning, of_one_place, of_one_sensor, of_one_turn, turns
-from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts, time_unit
+from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts
 from .streams import index_with_gravity, join_streams
 from .table import Table
 from .text import HEAD, PREAMBLE, decode_text, find_bare_table, find_named_table, find_wanted_table, stated_rate_hz
 from .times import Stream
-from .units import OF_BNO055, QUANTITIES
+from .units import QUANTITIES
 
 # words of a program's preamble -> units that its names of columns do not say
 PROGRAMS = {"MT Manager version": {"t": "0.1ms", "acc": "m/s^2", "gyr": "rad/s"}}
@@ -104,7 +101,7 @@ def _may_be_no_seconds(table: Table, path: Path) -> bool:
     # what was read of the file may end within a number
     t = table.numbers([Column("t", place, TIME)])[:-1, 0]
     if len(t) < FEWEST or not is_index(t):
-        return len(t) >= FEWEST and not _increases(t)
+        return len(t) >= FEWEST and not increases(t)
     whole = find_any_table(_read_text(path), path.name)
     acc, gyr = (whole.numbers(first_triple(whole.columns, of)) if whole else np.zeros((0, 3)) for of in (ACC, GYR))
     complete = np.isfinite(np.hstack([acc, gyr])).all(axis=1)
@@ -192,7 +189,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     ------
     RecordingError : it does not say all that is needed; the message names what is missing.
     """
-    table = _oldest_first(table)
+    table = _oldest_first(table if table.of_sensors or hints.columns else _with_sensor(table))
     if not table.chosen:
         table = of_one_sensor(table if hints.columns else of_one_place(table, hints.sensor), hints.sensor)
     ranges = table.ranges if not (hints.accel_range_g or hints.gyro_range_dps) else None
@@ -248,76 +245,3 @@ def _undo_ios_sign(stream: Stream, name: str) -> tuple[Stream, str]:
         return replace(stream, values=-stream.values), FLIPPED
     unknown = "the sign of the accelerations was kept; if an iPhone recorded them, it is the opposite one, also of b_a"
     return stream, unknown if name.startswith(EITHER_SIGN) else ""
-
-
-def sensor_stream(
-    table: Table, clocks: Sequence[Column], axes: Sequence[Column], warm: Sequence[Column] = ()
-) -> Stream:
-    """Return the samples in one sensor's three columns, and the temperatures beside them; see Stream.
-
-    Lines without any number are those of another sensor if they are many, or hold cells that the others lack.
-    """
-    values = table.numbers(axes)
-    values = -values if axes[0].sign_flipped else values
-    interval = interval_column(table, axes[0])
-    if interval is not None:
-        dt = table.numbers([interval])
-        values = values / np.where(dt > 0.0, dt * QUANTITIES[TIME][interval.unit], np.nan)
-    values[~np.isfinite(values)] = np.nan
-    empty = np.asarray(np.isnan(values).all(axis=1))
-    others = int(np.count_nonzero(empty)) > MOST_ODD * len(values) or _are_of_others(table, empty)
-    units = {column.unit for column in axes}
-    kept, timed = np.asarray(~empty | (not others)), None
-    of_sensor = [clock for clock in clocks if clock.clock_of in ("", axes[0].quantity)]
-    for clock in sorted(of_sensor, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit)):
-        has = kept if others else ~empty | table.has(clock)
-        found = table.times(clock, has)
-        weak = clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() in ("t", "ts"))
-        is_time = _increases(found[0]) if weak else True
-        # the numbers of samples are no times
-        if is_time and (found[2] or not is_index(found[0])):
-            kept, timed = has, found
-            break
-    ticks, origin, time_unit = timed or (None, Decimal(0), "")
-    return Stream(
-        ticks,
-        values[kept],
-        origin,
-        time_unit,
-        (units.pop() if len(units) == 1 else "") or table.units.get(axes[0].quantity, ""),
-        places=None if others and timed else np.flatnonzero(kept),
-        temperature_c=plausible_celsius(table.numbers(warm[:1])[kept, 0]) if warm else None,
-        lost=0 if others else int((~kept).sum()),
-        rate_hz=table.rate_hz,
-        # xacc and xgyro of MAVLink are in mg and mrad/s
-        whole_unit="" if axes[0].name.strip().lower().startswith("x") else OF_BNO055[axes[0].quantity],
-        of_increments=axes[0].of_increments and interval is None,
-    )
-
-
-def interval_column(table: Table, axis: Column) -> Column | None:
-    """Return the column of the times that a sensor's increments are of, as PX4 and ArduPilot write it; None if none is.
-
-    It is called after them (delta_angle_dt beside delta_angle[0], DelaT beside DelAX), and its size shows its unit.
-    """
-    plain = [re.sub(r"[\W_]", "", name.lower()) for name in (axis.name, *table.header)]
-    place = next((plain.index(of) - 1 for of in (f"{plain[0][:-1]}dt", f"{plain[0][:-1]}t") if of in plain), None)
-    if place is None or not axis.of_increments:
-        return None
-    column = Column(table.header[place], place, TIME)
-    known = table.numbers([column])
-    unit = time_unit(float(np.median(known[np.isfinite(known)]))) if np.isfinite(known).any() else ""
-    return replace(column, unit=unit) if unit else None
-
-
-def _are_of_others(table: Table, empty: Mask) -> bool:
-    """Return True if there is a column that holds cells only in lines where this sensor has none."""
-    has = (table.has(Column("", at, "")) for at in range(len(table.cells)))
-    some = 0 < int(np.count_nonzero(empty)) < len(empty)
-    return some and any(bool(of[empty].mean() > 0.5 > of[~empty].mean()) for of in has)
-
-
-def _increases(ticks: Vector) -> bool:
-    """Return True if times hardly ever decrease, other than a temperature that is called t."""
-    steps = np.diff(ticks)
-    return sample_period(ticks) > 0.0 and bool(np.count_nonzero(steps < 0) * FEWEST <= len(steps))

@@ -30,13 +30,15 @@ def _stems(words: str) -> dict[str, str]:
 _OF_VELOCITY = "deltavelocity deltavel deltav delv dvel dv velinc"
 _OF_ANGLE = "deltaangle deltatheta dela dangle dang dtheta dth"
 INCREMENTS = {*_OF_VELOCITY.split(), *_OF_ANGLE.split()}
+# times since the sample before
+INTERVALS = "dt deltat deltatime deltams deltaus timedelta timediff interval"
 # a unit stands only where the program that uses the stem always writes that one
 STEMS = {
     TIME: _stems(
         "headerstamp:ns stamp epoch timestampsample:us timestamp timestamps time times t ts timesincestart"
         " timesincestartin secondselapsed:s elapsed elapsedtime seconds:s sec:s millis:ms micros:us rtctime datetime"
         " date secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s timestampsec:s sampletimefine"
-        " accelerometertimestampsincereboot:s gyrotimestampsincereboot:s"
+        f" accelerometertimestampsincereboot:s gyrotimestampsincereboot:s {INTERVALS}"
     ),
     # the part below a second, in a column beside whole seconds: builtin_interfaces/Time, and ROS 1's time
     NANOSECONDS: _stems(
@@ -79,8 +81,10 @@ ESTIMATED = re.compile(
 )
 # numbers of samples, which are no times where they are whole
 COUNTER = re.compile(r"^(?!.*(?:stamp|time)).*(?:packet|number|index|sequence|frame|sample|counter)", re.IGNORECASE)
-# names that are remembered
-MOST_NAMES = 1024
+# in a name of MATLAB
+HYPHEN = "0x2[dD]"
+# names that are remembered, and letters of one; longer text is none
+MOST_NAMES, LONGEST_NAME = 1024, 100
 # the rank of a column that the user or physics chose
 CHOSEN = -1
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
@@ -139,6 +143,8 @@ class Column:
 def parse_column_name(name: str, place: int) -> Column | None:
     """Return the column of that name at `place`; None if it holds nothing that is read."""
     text, axis, unit = name.strip().lstrip("#%").strip(), -1, ""
+    if len(text) > LONGEST_NAME:
+        return None
     while match := _BRACKETS.fullmatch(text):
         text, inside = match.groups()
         if (at := "012xyz".find(inside.lower())) >= 0 and len(inside) == 1:
@@ -244,7 +250,7 @@ def parse_header(header: list[str]) -> list[Column]:
 @lru_cache(MOST_NAMES)
 def axes_of(name: str) -> list[str]:
     """Return names for the columns x, y, z of a matrix or file that is called after a sensor; else an empty list."""
-    last = name.rpartition(".")[2]
+    last = re.sub(HYPHEN, "-", name.rpartition(".")[2])
     words = [last, *re.split(r"[^A-Za-z]+", last)]
     # MobileAccData, acceldata
     words += [word for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", last) if len(word) > len("ac")]

@@ -30,8 +30,9 @@ from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import DAMAGED_ZIP, HELD, check_size, first_bytes, reading
 from .array_table import table_of_arrays
 from .columns import columns_by_hint
-from .load import FLIPPED, find_any_table, sensor_stream
-from .names import ACC, GYR, TIME, first_triple, parse_header, with_sensor
+from .load import FLIPPED, find_any_table
+from .names import ACC, GYR, HYPHEN, TIME, first_triple, parse_header, with_sensor
+from .sensor import sensor_stream
 from .shown_units import acceleration_unit, seem_counts
 from .streams import join_streams
 from .table import Table
@@ -51,8 +52,6 @@ METADATA, TIMES_OF_DAY = "metadata.csv", "meta/time.csv"
 # of a table within a file
 OF_FILE = ".table"
 SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|face|side)(?![a-z])")
-# MATLAB's spelling of a hyphen in a name
-HYPHEN = "0x2d"
 
 
 def is_folder_of_tables(path: Path) -> bool:
@@ -159,7 +158,7 @@ def _parse(name: str) -> _Member | None:
     path = Path(name)
     if path.suffix.lower() not in (*SUFFIXES, OF_FILE) or "meta" in path.parts[:-1] or path.name.startswith("."):
         return None
-    stem = path.stem.lower().replace(HYPHEN, "-")
+    stem = re.sub(HYPHEN, "-", path.stem).lower()
     words = [word for word in re.split(r"[^a-z]+", stem) if word]
     for quantity, known in NAMES.items():
         for word in ("".join(words), *words):

@@ -190,10 +190,11 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
     ------
     RecordingError : there are several, but none of the name `sensor`.
     """
+    known = {column.place for column in table.columns}
     for place, cells in enumerate(table.cells):
         name = table.name_of(place)
         named = bool(NAMES_SENSORS(name))
-        if not named and not 1 < len(set(_words(cells[:BEGUN]))) <= MOST_SENSORS:
+        if not named and (place in known or not 1 < len(set(_words(cells[:BEGUN]))) <= MOST_SENSORS):
             continue
         words = _words(cells)
         of_words = {word: number for number, word in enumerate(dict.fromkeys(filter(str.strip, words)))}

@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import RecordingError
 from ..reading import check_size, is_text
 from .cells import CLOCK, MOMENT, NUMBER, is_number
-from .names import ACC, GYR, axes_of, parse_axis_name, parse_header
+from .names import ACC, GYR, LONGEST_NAME, axes_of, parse_axis_name, parse_header
 from .table import IS_LIST, Table, axes_of_lists, holds_number, with_lists_apart, with_units_of_cells
 from .units import find_unit
 
@@ -32,8 +32,8 @@ COMMENT = ("#", "%", "//")
 # Bytes that a line takes at least while it is read, in CPython on 64 bits: a list (56), its reference and line number
 # (16 and 32), a Decimal of its time (104 and 8). A cell takes two references and a float64.
 LINE, CELL = 216, 24
-# names within quotation marks may span lines; longer text between two marks is none
-_QUOTED, LONGEST_NAME = re.compile(r'"[^"]*"'), 60
+# names within quotation marks may span lines
+_QUOTED = re.compile(r'"[^"]*"')
 # Serial monitors, terminals and loggers write the time before each line: `12:03:04.123 -> `, `[2024-05-01 12:03:04] `,
 # `2024-05-01 12:03:04,123 - INFO - `. A blank alone ends it where the line goes on with numbers and another separator.
 MONITORED = re.compile(

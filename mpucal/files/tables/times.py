@@ -42,7 +42,7 @@ class Stream:
     temperature_c : (n,), if the file has it. lost : number of lines that hold no sample and no time.
     rate_hz : the sample rate, if the file states it.
     whole_unit : of whole numbers that seem to be in mg or mrad/s, but may be a BNO055's; empty if they are not.
-    of_increments : the values are increments over a sample.
+    of_increments : the values are increments over a sample. summed : the file has the steps between times.
     """
 
     ticks: Vector | None
@@ -57,6 +57,7 @@ class Stream:
     rate_hz: float | None = None
     whole_unit: str = ""
     of_increments: bool = False
+    summed: bool = False
 
     @cached_property
     def number(self) -> Numbers:
@@ -125,6 +126,7 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
+    said += ", summed from the steps between samples" if stream.summed else ""
     said += f", which begin anew {how_often(len(anew))}" if len(anew) else ""
     said += f", whose counter overflows {how_often(wraps)}" if wraps else ""
     on = in_order(on, stream.number)
