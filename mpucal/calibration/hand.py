@@ -22,6 +22,7 @@ from .downsampling import SEARCH_HZ, blocks, downsampled, means
 from .fit import Fit
 from .hand_noise import (
     CALM_MPS2,
+    FARTHER,
     FIRST_MPS2,
     HAND_MPS2,
     PIVOT_MPS2,
@@ -29,7 +30,6 @@ from .hand_noise import (
     WHITE_MPS2,
     Noise,
     most_likely_sigma,
-    pivot_sigma,
     remove_tremor,
 )
 from .hypotheses import CHANGES, Explanation, gyroscope_change, rank, remove_change
@@ -40,8 +40,9 @@ from .likelihood import evaluate, value
 from .parameters import HAND
 from .preprocessing import Preprocessed, find_rests, prepare
 from .problem import Problem
+from .rotation import cross
 from .scores import ends_of, parts_of
-from .slip import find_slip
+from .slip import end_slips, find_slip
 from .theta import Prior, Theta
 from .transitions import (
     Transition,
@@ -155,7 +156,10 @@ def _fit_samples(search: _Search) -> HandFit:
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
-    return HandFit(replace(fit, slip=slip), minimum, noise, search, fine)
+    turns = [fit.D @ cross(each.miss) for each in transitions]
+    changes = [np.append(turn, turn @ each.coming) for turn, each in zip(turns, transitions, strict=True)]
+    slipped = end_slips(transitions, spoilt) @ np.reshape(changes, (-1, 12)) ** 2
+    return HandFit(replace(fit, slip=slip, slipped=slipped), minimum, noise, search, fine)
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
@@ -301,7 +305,7 @@ class _Search:
         pivot = self.prepared.pivot
         sigma = most_likely_sigma(pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
         theta = self._roughly(pivot(sigma), theta)
-        return theta, Noise("pivot", pivot_sigma(most_likely_sigma(pivot, PIVOT_MPS2, theta, sigma)))
+        return theta, Noise("pivot", FARTHER * most_likely_sigma(pivot, PIVOT_MPS2, theta, sigma))
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
         minimum = _roughly(problem, theta, self._prior)

@@ -9,8 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..data import Vector
-from ..kernel import _kernel
+from ..rests.tremor import low_pass
 from .likelihood import value
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed
 from .problem import Problem
@@ -19,17 +18,14 @@ from .theta import Theta
 from .transitions import REWEIGHTED
 
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
-HAND_MPS2 = WHITE_MPS2[4:]  # a board that goes from rest to rest is in a hand
-FIRST_MPS2 = HAND_MPS2[0]  # sigma at which a search begins
+FIRST_MPS2 = WHITE_MPS2[4]  # sigma at which a search begins: a board that goes from rest to rest is in a hand
+HAND_MPS2 = tuple(sigma for sigma in WHITE_MPS2 if sigma >= FIRST_MPS2)
 CALM_MPS2 = WHITE_MPS2[3:]  # the same over all samples: less noise than a calm hand's is taken for jerks
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
-# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma). The
-# covariance admits that it comes back more slowly [1/s], since a sway as slow as the turns looks like gravity.
-FARTHER, FARTHER_STILL, SLOWLY_PER_S = 1.5, 0.5, 2.0
-
-# Moving means over 2 TURNS_S, applied TIMES times, keep turns below 2 Hz and nothing of a tremor of 8 to 12 Hz.
-TURNS_S, TIMES = 0.04, 3
+# A pivot travels farther than a bounded position of one lambda. The covariance admits that it comes back more slowly
+# [1/s], since a sway as slow as the turns looks like gravity.
+FARTHER, SLOWLY_PER_S = 2.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -68,11 +64,6 @@ def most_likely_sigma(
     return sigmas[at]
 
 
-def pivot_sigma(sigma: float) -> float:
-    """Return the sigma of a pivot whose most likely bounded position has this one."""
-    return (FARTHER + FARTHER_STILL * sigma) * sigma
-
-
 def remove_tremor(prepared: Preprocessed) -> Preprocessed:
     """Remove the acceleration of the tremor, and keep the angular acceleration of the turns alone.
 
@@ -82,8 +73,8 @@ def remove_tremor(prepared: Preprocessed) -> Preprocessed:
     series, rate_hz = prepared.problem.series, prepared.recording.rate_hz
     if series.alpha is None or not series.alpha.any():
         return prepared
-    turns = _low_pass(series.alpha, rate_hz)
-    alpha, y = series.alpha - turns, series.y - _low_pass(series.y, rate_hz)
+    turns = low_pass(series.alpha, rate_hz)
+    alpha, y = series.alpha - turns, series.y - low_pass(series.y, rate_hz)
     moving = np.any(series.alpha != 0.0, axis=1) / (1.0 if series.r_scale is None else series.r_scale)
     weight = moving
     for _ in range(REWEIGHTED):
@@ -95,10 +86,3 @@ def remove_tremor(prepared: Preprocessed) -> Preprocessed:
         weight = moving / (1.0 + (away / (2.0 * np.median(away[moving > 0.0]) + 1e-9)) ** 2)
     series = replace(series, y=series.y - np.cross(alpha, r_t), alpha=turns)
     return replace(prepared, problem=replace(prepared.problem, series=series))
-
-
-def _low_pass(values: Vector, rate_hz: float) -> Vector:
-    """Return the part of values (n, 3) below the frequencies of a tremor."""
-    for _ in range(TIMES):
-        values = _kernel.moving_mean(values, int(TURNS_S * rate_hz))
-    return values

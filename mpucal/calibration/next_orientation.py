@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Vector
-from ..rests.limits import MOVING_RAD_S
+from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
 from .interim import InterimEstimate
 from .likelihood import evaluate, trace
 from .normal_equations import inverse
@@ -27,8 +27,6 @@ MOVE_S, REST_S = 1.6, 2.0
 FAST_RAD_S = math.radians(130.0) / MOVE_S
 SWAY_MPS2 = 0.02  # what a low pass leaves of a seated hand's acceleration
 
-NEAR_RAD = math.radians(25.0)  # a direction nearer than this is the present one
-
 
 def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector) -> int:
     """Return the index of the direction that, pointing down at rest, would reduce the uncertainty fastest.
@@ -42,7 +40,7 @@ def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector)
     """
     s = trace(known.problem, known.theta).s[-1]
     angle = np.arccos(np.clip(directions @ (-s / np.linalg.norm(s)), -1.0, 1.0))
-    there = np.flatnonzero(angle >= NEAR_RAD)
+    there = np.flatnonzero(angle >= LEAST_TURN_RAD)
     if not len(there):  # an estimate that diverged knows no directions
         return 0
     seconds = np.maximum(MOVE_S, angle[there] / FAST_RAD_S)

@@ -22,9 +22,7 @@ from .rotation import lengths
 from .theta import Theta
 from .transitions import (
     DEGREES_OF_FREEDOM,
-    MOST_MISS_RAD,
     REWEIGHTED,
-    WORTHLESS,
     Transition,
     jacobians,
     likely_scale,
@@ -49,27 +47,22 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta, s
     """Return the slip that explains the misses of transitions between rests under theta, or None.
 
     K is estimated anew with it, and without, since a K that was estimated without it hides much of it. Near the ends,
-    where a slip looks like a turn that the gyroscope lost, a miss that is not by chance is taken for one, unless rates
-    are lost or clipped there, which `spoilt` (n,) marks.
+    a miss that is not by chance is taken for one. spoilt : see end_slips.
     """
-    k = len(transitions)
-    n, p = 2 * k, 12  # numbers that the misses show; those of K, and of a rotation before a slip and after it
+    k, (n, p) = len(transitions), _numbers(transitions)
     if n <= p:
         return None
+    t = np.concatenate([[0.0], np.cumsum(series.dt)])
+    probability = end_slips(transitions, spoilt)
+    if probability[lost := int(probability.argmax())] > 0.5:
+        without = [each if i != lost else each._replace(miss=np.zeros(3)) for i, each in enumerate(transitions)]
+        return Slip(_times(t, transitions[lost]), transitions[lost].miss, without, near_end=True)
     # The cost of three numbers more, and of so many times; few misses are explained by anything.
     cost = (math.log(SURE) + 1.5 * math.log(n) + math.log(k)) * n / (n - p)
     misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
     # No likelihood is above 0, that of no misses at all.
     if not -_log_likelihood(misses, known) > cost:
         return None
-    t = np.concatenate([[0.0], np.cumsum(series.dt)])
-    weight = likely_scale(misses, known)[1]
-    at = [i for i in (0, 1, k - 2, k - 1) if not spoilt[transitions[i].span].any()]
-    lost = min(at, key=lambda i: weight[i], default=0)
-    # A mount slips by less: then the gyroscope did not see the turn.
-    if at and weight[lost] < WORTHLESS and np.linalg.norm(misses[lost]) < MOST_MISS_RAD:
-        without = [each if i != lost else each._replace(miss=np.zeros(3)) for i, each in enumerate(transitions)]
-        return Slip(_times(t, transitions[lost]), misses[lost], without, near_end=True)
     places = np.arange(2, k - 2)  # a rotation has three numbers, and each transition shows two of them
     by_slip = _directions(transitions, np.append(places, k))
     by_K = np.broadcast_to(jacobians(transitions, series, theta)[:, :, PLACES["K"]], by_slip.shape)
@@ -79,6 +72,30 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta, s
         return None
     without = [each._replace(miss=miss) for each, miss in zip(transitions, left[best], strict=True)]
     return Slip(_times(t, transitions[places[best]]), x[best, 3:6] - x[best, :3], without)
+
+
+def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
+    """Return probabilities (k,) of a slip in each transition; 0 but for the first and last two.
+
+    There a slip looks like a turn that the gyroscope lost, and leaves no pattern. In one of SURE recordings there is
+    one, and as seldom as Student's t says, the largest of the misses is as large by chance.
+
+    spoilt : (n,) True for samples whose rates are lost or clipped; the transitions that have some are left out.
+    """
+    k, probability = len(transitions), np.zeros(len(transitions))
+    n, p = _numbers(transitions)
+    ends = [i for i in (0, 1, k - 2, k - 1) if n > p and not spoilt[transitions[i].span].any()]
+    if ends:
+        misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
+        nu = DEGREES_OF_FREEDOM
+        chance = (likely_scale(misses, known)[1][ends] * nu / (nu + 2.0)) ** (0.5 * nu)
+        probability[ends] = 1.0 / (1.0 + SURE * len(ends) * chance)
+    return probability
+
+
+def _numbers(transitions: Sequence[Transition]) -> tuple[int, int]:
+    """Return how many numbers the misses show; and those of K, and of a rotation before a slip and after it."""
+    return 2 * len(transitions), 12
 
 
 def _times(t: Vector, transition: Transition) -> tuple[float, float]:

@@ -16,8 +16,8 @@ import numpy as np
 from ..data import Vector
 from .fit import Fit
 from .hypotheses import Explanation, Kind
-from .parameters import ACCELEROMETER, PLACES
-from .rotation import cross, fibonacci_sphere
+from .parameters import ACCELEROMETER
+from .rotation import fibonacci_sphere
 
 LEAST_DETERMINANT = 1e-6  # a D of less is singular
 # Nothing is known better than this where a change of the gyroscope's bias was removed: it is interpolated linearly.
@@ -81,7 +81,7 @@ class UncertaintyClaim:
     floored : m/s^2, `model` enlarged by changes of the gyroscope's bias that were removed, and where too few sides were
         down for a comparison of them.
     explanations : what may have happened besides, the likeliest first. errors : (n,) m/s^2, what each adds.
-    slipped : (9,) changes of D by a slip of the mount near an end, which no explanation holds.
+    slipped : (12,) variances of D and b_a by slips of the mount near the ends, which no explanation holds.
     """
 
     covariance: Vector
@@ -123,7 +123,7 @@ class UncertaintyClaim:
         mean = np.array([each.weight for each in self.explanations]) @ squares
         held = squares[[each.is_possible for each in self.explanations]].max(axis=0, initial=0.0)
         if self.slipped is not None:
-            held[PLACES["D"]] = np.maximum(held[PLACES["D"]], self.slipped**2)
+            held[ACCELEROMETER] = np.maximum(held[ACCELEROMETER], self.slipped)
         return np.asarray(wide + np.diag(np.maximum(mean, held)))
 
 
@@ -146,8 +146,7 @@ def claim_uncertainty(
     if len(np.unique(fit.parts.side)) < FEWEST_SIDES:
         floored *= UNCOMPARED
     errors = [each.weight**0.5 * rms(np.diag(each.away**2)) for each in explanations]
-    slipped = (fit.D @ cross(fit.slip.delta)).ravel() if fit.slip is not None and fit.slip.near_end else None
-    return UncertaintyClaim(fit.covariance, model, floored, explanations, errors, slipped)
+    return UncertaintyClaim(fit.covariance, model, floored, explanations, errors, fit.slipped)
 
 
 def is_usable(fit: Fit) -> bool:

@@ -80,7 +80,12 @@ class RestFinder:
         # Of a run in which gravity turns, keep the samples in which the gyroscope hardly turns.
         slow = np.asarray(np.all(np.abs(self._windows.gyr - flat.b_omega) < TURNS_RAD_S, axis=1))
         still[self._n // 2 : self._n // 2 + len(slow)] &= slow
-        return _and_others(rests, self._trimmed(true_runs(still)))
+        slow_runs = true_runs(still)
+        rests = _and_others(rests, self._trimmed(slow_runs))
+        # Where gravity turns and the gyroscope does not, the sensor changed: keep the halves in which gravity rests.
+        while len(slow_runs := _halves(slow_runs, self._n)):
+            rests = _and_others(rests, self._trimmed(slow_runs))
+        return rests
 
     def _trimmed(self, runs: Intervals) -> Intervals:
         """Return the runs without their ends, if they are long enough and gravity does not turn in them."""
@@ -105,6 +110,13 @@ def _and_others(runs: Intervals, others: Intervals) -> Intervals:
     both = np.concatenate([runs, others[_apart(others, runs)]])
     # Two sorted runs are merged. NumPy's default for AVX2 crashed in QEMU's emulation of it.
     return np.asarray(both[np.argsort(both[:, 0], kind="stable")])
+
+
+def _halves(runs: Intervals, n: int) -> Intervals:
+    """Return the halves of runs that have n samples or more."""
+    (first, last), middle = runs.T, runs.sum(axis=1) // 2
+    halves = np.stack([first, middle, middle, last], axis=1).reshape(-1, 2)
+    return np.asarray(halves[halves[:, 1] - halves[:, 0] >= n])
 
 
 def _apart(runs: Intervals, others: Intervals) -> Mask:

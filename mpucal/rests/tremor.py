@@ -42,9 +42,8 @@ def without_tremor(recording: Recording, flat: Flat, runs: Intervals, noise_fact
     runs : (k, 2) rests. noise_factor : (k,) noise of the accelerometer in each, as a factor of Sigma_a.
     """
     acc, noise = recording.acc.copy(), noise_factor[:, None] * flat.Sigma_a
-    n = round(LOW_PASS_S * recording.rate_hz) | 1
-    window = np.hanning(n + 2)[1:-1]
-    window /= window.sum()
+    window = _window(recording.rate_hz)
+    n = len(window)
     tremor = tremor_variance(statistics(acc, runs)[1], noise)
     samples = np.asarray(runs[:, 1] - runs[:, 0], np.float64)
     # What goes on from the flat segment is not in a hand, and the low pass would leave nothing of a short rest. A table
@@ -52,14 +51,28 @@ def without_tremor(recording: Recording, flat: Flat, runs: Intervals, noise_fact
     is_held, is_long = runs[:, 0] > flat.last, samples >= SHORTEST * n
     for k in np.flatnonzero(is_held & is_long):
         first, last = runs[k]
-        begin, end = max(first - n // 2, 0), min(last + n // 2, len(acc))  # a rest lacks its ends
-        low = [np.convolve(axis, window, "valid") for axis in recording.acc[begin:end].T]
-        acc[begin + n // 2 : end - n // 2] = np.stack(low, axis=1)
+        begin = max(first - n // 2, 0)  # a rest lacks its ends
+        acc[first:last] = low_pass(recording.acc[begin : last + n // 2], recording.rate_hz)[first - begin :][
+            : last - first
+        ]
         noise[k] *= window @ window
     sway = tremor_variance(statistics(level_rests(acc, recording, flat, runs), runs)[1], noise)
     is_raw = is_held & (tremor > 0.0) & ~is_long
     jitter = sway * mean_variance(TREMOR_PER_S * samples / recording.rate_hz)
     return RestingHand(acc, np.where(is_raw, 0.0, sway), np.where(is_raw, jitter, 0.0))
+
+
+def low_pass(values: Vector, rate_hz: float) -> Vector:
+    """Return the part of values (n, 3) below the frequencies of a tremor."""
+    window = _window(rate_hz)
+    longer = np.pad(values, ((len(window) // 2,), (0,)), "edge")
+    return np.stack([np.convolve(axis, window, "valid") for axis in longer.T], axis=1)
+
+
+def _window(rate_hz: float) -> Vector:
+    """Return the Hann window of the low pass, of an odd length."""
+    window = np.hanning((round(LOW_PASS_S * rate_hz) | 1) + 2)[1:-1]
+    return np.asarray(window / window.sum())
 
 
 def tremor_variance(variance: Vector, noise: Vector) -> Vector:

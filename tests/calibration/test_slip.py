@@ -1,4 +1,4 @@
-"""Slip of the mount between two rests: found and reported as such; a lost turn is not taken for one."""
+"""Slip of the mount: found and reported as such; a lost turn is not taken for one, but near the end."""
 
 import re
 from dataclasses import replace
@@ -66,10 +66,22 @@ def test_a_turn_that_the_gyroscope_lost_is_no_slip(hand):
     assert estimate(replace(recording, gyr=gyr), "auto", G)[0].fit.slip is None
 
 
-@pytest.mark.parametrize("seed", [6, 7])
-def test_a_slip_in_the_last_turn_is_no_turn_that_the_gyroscope_lost(hand, seed):
+@pytest.mark.parametrize(("seed", "degrees"), [(6, 3.0), (7, 3.0), (6, 12.0), (7, 25.0)])
+def test_a_slip_in_the_last_turn_is_no_turn_that_the_gyroscope_lost(hand, seed, degrees):
     made = hand(seed, "pose12")
-    calibration = calibrate(slipped(made.recording, 47.2), gravity=made.truth.gravity)
+    calibration = calibrate(slipped(made.recording, 47.2, degrees), gravity=made.truth.gravity)
     assert [reason["code"] for reason in calibration.quality["reasons"]] == ["inconsistent"]
     begin, end = map(float, re.findall(r"[\d.]+", calibration.quality["reasons"][0]["message"])[:2])
     assert begin - 1.0 < 47.2 < end + 1.0
+
+
+@pytest.mark.parametrize("seed", [6, 7, 8])
+def test_a_slip_in_the_last_rest_divides_it(hand, seed):
+    """A second before the end, 4 deg, while the hand holds the board: gravity turns, and the gyroscope does not."""
+    made = hand(seed, "pose12")
+    recording = made.recording
+    calibration = calibrate(slipped(recording, recording.t[-1] - recording.t[0] - 1.0, 4.0), gravity=made.truth.gravity)
+    assert (calibration.verdict, [reason["code"] for reason in calibration.quality["reasons"]]) == (
+        "refused",
+        ["inconsistent"],
+    )

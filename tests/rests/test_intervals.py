@@ -81,6 +81,24 @@ def test_drift_is_removed_and_a_bias_that_stays_is_left_nearly_alone(in_hand, dr
     assert np.sqrt((after**2).mean()) < 0.15 * np.sqrt((before**2).mean()) + one_rest
 
 
+def test_a_sensitivity_to_acceleration_is_removed_where_the_rests_show_it(in_hand):
+    """Add 0.1 deg/s per g to the rates of a board on a table, which turns from side to side, and to those of a hand."""
+    hand, rng = in_hand.recording, np.random.default_rng(0)
+    sides = np.repeat(np.concatenate([np.eye(3), -np.eye(3)] * 2)[[2, 0, 1, 5, 3, 4] * 2], 200, axis=0)
+    table = Recording.from_arrays(
+        0.01 * np.arange(2400), 9.8 * sides + rng.normal(0.0, 0.03, sides.shape), rng.normal(0.01, 1e-3, sides.shape)
+    )
+    sensitivity = np.radians(0.1) / 9.8 * rng.standard_normal((3, 3))
+    for recording, flat, runs, left in (
+        (table, (0, 200), 200 * np.stack([np.arange(12), np.arange(1, 13)], axis=1), 0.1),
+        (hand, hand.flat, RestFinder(hand, flat_statistics(hand, hand.flat)).typical(), 1.2),
+    ):
+        sensitive = replace(recording, gyr=recording.gyr + recording.acc @ sensitivity.T)
+        one, other = (remove_drift(each, flat_statistics(each, flat), runs).gyr for each in (recording, sensitive))
+        away, added = (values - values[slice(*flat)].mean(0) for values in (other - one, sensitive.gyr - recording.gyr))
+        assert np.sqrt(np.mean(away**2)) < left * np.sqrt(np.mean(added**2))
+
+
 def test_a_slow_turn_about_gravity_is_no_bias(in_hand):
     """Turn the board about gravity at 2 deg/s for 0.8 s between two turns: only its shortness excludes it."""
     recording = in_hand.recording
