@@ -28,7 +28,8 @@ class Fit:
     parts : scores of the parts of the recording at the estimate; None where they are not known.
     delay_s : delay of the accelerometer behind the gyroscope; 0 where the model does not estimate it.
     spread_mps2 : error of a rest's |a| beside noise and tremor, of an estimate from the rests alone.
-    slip : slip of the mount that the rests show, or None. slipped : (12,) variances of D and b_a by slips near the ends.
+    slip : slip of the mount that the rests show, or None.
+    slipped : (12,) variances of D and b_a by slips that may have happened near the ends.
     """
 
     D: Vector
