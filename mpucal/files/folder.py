@@ -113,6 +113,4 @@ def _recordings(path: Path) -> list[Path]:
         return []
     sides = tables_of_sides(file.name for file in files)
     found = [file for file in files if file.name in sides or (not sides and file.suffix.lower() in SUFFIXES)]
-    return [
-        file for file in found if (of := formats.recognise(file)) is not None and (of.hinted or file.suffix == ".npz")
-    ]
+    return [file for file in found if formats.recognise(file) is not None]

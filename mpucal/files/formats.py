@@ -133,6 +133,7 @@ FORMATS = (
     ),
     *_others(_TEXTS, *_TABLE, only=False),
     *_others(".zip", *_ARCHIVE),
+    *_others(".zip .gz", "an archive of recordings", "archive:load_archive", "archive:is_archive"),
     Format(".mcap", "sensor_msgs/Imu for ROS 2 and Foxglove", writer=f"{_HERE}.imu:imu_file"),
     *_others(FOLDER, "the folder of a bag", _BAG, "ros:is_folder_of_ros", _BAG_ROWS, only=False),
     *_others(FOLDER, *_PHONE, only=False),
@@ -178,7 +179,8 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
         if of_suffix and path.is_file() and path.stat().st_size == 0:
             raise RecordingError(f"{path} is empty", "record it again")
         shows = f"give a recording; `{shlex.join(['mpucal', 'show', str(path)])}` shows a calibration"
-        remedy = shows if of_suffix else f"export a table as .csv, or give {_suffixes()}"
+        holds_none = of_suffix and path.suffix.lower() not in (".zip", ".gz")
+        remedy = shows if holds_none else f"export a table as .csv, or give {_suffixes()}"
         raise RecordingError(f"{path} is not a recording that mpucal knows", remedy)
     return found or others[-1]
 
@@ -188,7 +190,7 @@ def _suffix(path: Path) -> str:
     if path.is_dir():
         return FOLDER
     suffix = path.suffix.lower()
-    return suffix if any(row.suffix == suffix for row in FORMATS) or not is_text(first_bytes(path)) else ANY_TEXT
+    return suffix if is_suffix(suffix) or not is_text(first_bytes(path)) else ANY_TEXT
 
 
 def written_format(path: Path) -> Format:
@@ -202,6 +204,11 @@ def written_format(path: Path) -> Format:
     if path.suffix.lower() not in written:
         raise OutputError(f"mpucal cannot write a file like {path}", f"end its name with {', '.join(written)}")
     return written[path.suffix.lower()]
+
+
+def is_suffix(suffix: str) -> bool:
+    """Return True if a format that can be read has this suffix."""
+    return any(row.is_read and row.suffix == suffix.lower() for row in FORMATS)
 
 
 def is_of_session(name: str) -> bool:

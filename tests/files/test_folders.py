@@ -1,5 +1,6 @@
 """Tables of one sensor each in a folder, beside each other or in an archive, and folders of recordings."""
 
+import gzip
 import json
 import zipfile
 
@@ -204,6 +205,28 @@ def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_p
     assert read.interrupted == (read.t[499],)
     assert "how the board turned between them is unknown: a.npy, b.npy." in read.taken
     assert "Left out were results.mat (" in read.taken
+
+
+def test_packed_recordings_are_read_as_what_is_in_them(walk, table, assert_same, tmp_path):
+    """Read a file, and a folder of our own tables, beside what macOS adds; name the file that cannot be read."""
+    content = table("t,ax,ay,az,gx,gy,gz", walk.t, walk.acc, walk.gyr).read_bytes()
+    (tmp_path / "walk.csv.gz").write_bytes(gzip.compress(content))
+    (tmp_path / "cut.csv.gz").write_bytes(gzip.compress(content)[:-9])
+    for name, members in (("one.zip", ["walk.csv"]), ("two.zip", ["both/a.csv", "both/b.csv"])):
+        with zipfile.ZipFile(tmp_path / name, "w") as archive:
+            for member in members:
+                archive.writestr(member, content)
+            archive.writestr("__MACOSX/._walk.csv", b"\0\5\26\7")
+    for name in ("walk.csv.gz", "one.zip"):
+        assert_same(mpucal.load(tmp_path / name), walk)
+    both = mpucal.load(tmp_path / "two.zip")
+    assert (len(both), "one recording of 2 files" in both.taken) == (2 * len(walk), True)
+    with pytest.raises(RecordingError, match="is not a whole archive"):
+        mpucal.load(tmp_path / "cut.csv.gz")
+    with zipfile.ZipFile(tmp_path / "one.zip", "w") as archive:
+        archive.writestr("walk.csv", "time,ax\n")
+    with pytest.raises(RecordingError, match="walk"):
+        mpucal.load(tmp_path / "one.zip")
 
 
 def test_pairs_of_tables_of_sides_are_one_recording_at_the_rate_that_they_state(walk, tmp_path):

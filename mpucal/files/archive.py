@@ -1,0 +1,70 @@
+"""Recordings that are packed: a .gz file, and a .zip archive of one recording, of a folder, or of several of one sensor."""
+
+from __future__ import annotations
+
+import gzip
+import zipfile
+import zlib
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..data import Recording
+from ..errors import RecordingError
+from . import formats
+from .hints import NO_HINTS, Hints
+from .reading import DAMAGED_ZIP, LONGEST_LINE, check_size, reading
+
+
+def is_archive(path: Path) -> bool:
+    """Return True if a packed file has the name of a recording."""
+    try:
+        return any(formats.is_suffix(Path(name).suffix) for name in _members(path))
+    except (OSError, *DAMAGED_ZIP):
+        return False
+
+
+def load_archive(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """Return the recording in an archive.
+
+    Raises
+    ------
+    RecordingError : it cannot be unpacked, or holds no recording.
+    """
+    with TemporaryDirectory() as folder:
+        into = Path(folder) / path.name
+        try:
+            with reading(path):
+                _unpack(path, into)
+        except (*DAMAGED_ZIP, zlib.error) as error:
+            raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
+        found = into
+        while found.is_dir() and len(inside := [*found.iterdir()]) == 1:
+            found = inside[0]
+        try:
+            return formats.find_format(found, hints).read(found, hints=hints)
+        except RecordingError as error:
+            what, remedy = (text.replace(f"{folder}/", "") for text in (error.what, error.remedy))
+            raise RecordingError(what, remedy, error.options) from error
+
+
+def _members(path: Path) -> list[str]:
+    """Return the names of an archive's files, without those of the computer that made it."""
+    if path.suffix.lower() == ".gz":
+        return [path.stem]
+    with zipfile.ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if not name.endswith("/")]
+    return [name for name in names if not any(part.startswith((".", "__")) for part in Path(name).parts)]
+
+
+def _unpack(path: Path, into: Path) -> None:
+    into.mkdir()
+    members = _members(path)
+    if path.suffix.lower() == ".gz":
+        with gzip.open(path) as packed, (into / members[0]).open("wb") as file:
+            while data := packed.read(LONGEST_LINE):
+                check_size(path, file.tell() + file.write(data))
+        return
+    with zipfile.ZipFile(path) as archive:
+        check_size(path, sum(archive.getinfo(name).file_size for name in members))
+        for name in members:
+            archive.extract(name, into)
