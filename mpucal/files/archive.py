@@ -1,4 +1,4 @@
-"""Recordings that are packed: a .gz file, and a .zip archive of one recording, of a folder, or of several of one sensor."""
+"""Packed recordings: a .gz file, and a .zip archive of one recording, of a folder, or of several of one sensor."""
 
 from __future__ import annotations
 
