@@ -94,6 +94,17 @@ def test_an_honest_sensor_and_a_stream_in_coarse_units_are_not_accused(counted, 
         assert against(coarse) is None
 
 
+def test_hammering_that_swings_by_whole_steps_is_no_stuck_bit(counted):
+    """Shake y by 560 counts in every other sample, and by 816 in one of twelve: bit 8 changes in a sixth of the steps."""
+    at = np.arange(1500)
+    shaken = 560 * (at % 2) + 256 * (at % 12 == 1) + np.random.default_rng(0).integers(-20, 20, len(at))
+
+    def hammering(acc, gyr):
+        acc[-len(at) :, 1] = 2176 + shaken
+
+    assert against(counted(spoil=hammering)) is None
+
+
 @pytest.mark.parametrize(("bits", "verdict"), [(3, "usable"), (8, "refused")])
 def test_an_axis_coarser_than_the_calibrations_uncertainty_is_refused(counted, bits, verdict):
     quality = calibrate(counted(spoil=dead(0, (1 << bits) - 1)), "hand", G).quality

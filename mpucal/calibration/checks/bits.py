@@ -91,10 +91,11 @@ def _stuck_bits(counts: Counts, gap: Mask) -> tuple[Mask, Counts]:
     # of all parts from one on
     after = np.cumsum(evidence[:, ::-1], axis=1)[:, ::-1]
     first, stuck = edges[after.argmax(1)], after.max(1) > math.log(ODDS)
-    # what swings by whole steps of a bit leaves it unchanged from one sample to the next, and not for long
+    # What swings by whole steps of a bit leaves it unchanged from one sample to the next, and not for long. An error
+    # changes it twice.
     for bit, axis in np.argwhere(stuck):
         ones = float(np.mean(counts[first[bit, axis] + 1 :, axis] >> bit & 1))
-        stuck[bit, axis] = min(ones, 1.0 - ones) < ERRORS
+        stuck[bit, axis] = min(ones, 1.0 - ones) < 0.5 * ERRORS
     return stuck, first
 
 
