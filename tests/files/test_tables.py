@@ -57,6 +57,7 @@ COLUMNS = {
     "am": lambda w, ns: [f"{date.item():%m/%d/%Y %I:%M:%S.%f %p}" for date in dates(w)],
     "german": lambda w, ns: [f"{date.item():%d.%m.%Y %H:%M:%S,%f}" for date in dates(w)],
     "matlab": lambda w, ns: [f"{date.item():%d-%b-%Y %H:%M:%S.%f}" for date in dates(w)],
+    "points": lambda w, ns: [f"{date.item():%H.%M.%S.%f}" for date in dates(w)],
     "colon": lambda w, ns: [f"{date.item():%H:%M:%S:%f}" for date in dates(w)],
     "zone": lambda w, ns: [f"{date.item():%Y-%m-%d %H:%M:%S.%f} UTC" for date in dates(w)],
     "days": lambda w, ns: [f"0 days 00:00:{t:09.6f}" for t in w.t],
@@ -217,6 +218,7 @@ FORMS = {
         *("board.log", "counts of ±4 g (by |a|)", AT_100_HZ, IN_COUNTS),
     ),
     "times of day in digits": Form(f"time,{AXES}", "hhmmss a w"),
+    "times of day with points": Form(f"time,{AXES}", "points a w"),
     "times of day in whole digits": Form(f"time,{AXES}", "hhmmssmmm a w"),
     "times of day in digits under our own names": Form(f"t,{AXES}", "hhmmss a w", says="times in s"),
     "a BNO055": Form(f"time,{AXES}", "ms bno055", says="cm/s^2 and rates in deg/s/16", atol=6e-3),
@@ -1178,6 +1180,35 @@ def test_a_temperature_is_kept_everywhere(walk, table, tmp_path):
         assert mpucal.load(tmp_path / name).sensor.temperature_c == pytest.approx(31.0)
     assert mpucal.calibrate(tmp_path / "own.csv").sensor.temperature_c == pytest.approx(31.0)
     assert mpucal.load(tmp_path / "counts.csv").sensor.temperature_c is None
+
+
+@pytest.fixture(scope="module")
+def coarse(stored_calibration):
+    """Every second sample of the stored session, and the calibration of these."""
+    whole = stored_calibration[0]
+    made = mpucal.Recording.from_arrays(*(of[::2] for of in (whole.t - whole.t[0], whole.acc, whole.gyr)))
+    return made, mpucal.calibrate(made)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("EuRoC", "SensorLog", "poses in TUM's style", "counts without a sign", "zeros and a second header"),
+        *("WitMotion", "a spreadsheet's own names", "lines of JSON", "times of day with points", "late"),
+    ],
+)
+def test_one_recording_in_ten_forms_gives_one_calibration(name, coarse, tmp_path):
+    """Round counts of 8192 for 1 g, and stamps that arrive 3 ms late on average, too."""
+    made, calibration = coarse
+    form = FORMS.get(name) or Form(f"time,{AXES}", "t a w", says="its times are arrival stamps")
+    late = np.random.default_rng(19).exponential(0.003, len(made)) * (name == "late")
+    form.write(tmp_path / form.file, replace(made, t=made.t + late), np.rint(made.t * 1e9).astype(np.int64) + 10**18)
+    read = mpucal.load(tmp_path / form.file)
+    assert form.says in read.taken
+    found = mpucal.calibrate(read)
+    np.testing.assert_allclose(found.D, calibration.D, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(found.b_a, calibration.b_a, rtol=0, atol=2e-2)
+    assert found.verdict == calibration.verdict
 
 
 def test_recordings_without_rates_serve_all_that_needs_no_rate(stored_calibration, table):
