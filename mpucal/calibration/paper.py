@@ -14,11 +14,10 @@ from .levenberg_marquardt import DECREMENT
 from .parameters import B_A_NAMES, D_NAMES
 
 MAX_ITERATIONS = 10
-EPSILON_2 = 0.01  # least length of a step, in units of the first
 WOLFE_1, WOLFE_2 = 1e-4, 0.9  # sufficient decrease and curvature, as Nocedal and Wright set them
 
 H_DIFFERENCE = 1e-5
-STEPS = 2.0 ** np.arange(2, -9, -1)
+STEPS = 2.0 ** np.arange(2, -7, -1)  # down to the least length, epsilon_2, in units of the first
 
 
 def fit_paper(recording: Recording, flat: Flat, gravity: float) -> Fit:
@@ -107,7 +106,7 @@ def _minimise(ekf: Ekf, here: Expansion) -> tuple[Expansion, int, bool]:
         following = expand(ekf, here.theta + direction)  # 4:, 5:
         if not _wolfe(here, direction, 1.0, following.V, float(following.gradient @ direction)):
             step = _line_search(ekf, here, direction)
-            if step < EPSILON_2:
+            if step == 0.0:
                 return here, i, False
             following = expand(ekf, here.theta + step * direction)
         here = following

@@ -15,7 +15,7 @@ from ..rests.flat import Flat
 from ..rests.intervals import RestFinder, statistics
 from ..rests.tremor import SWAY_PER_S, mean_variance, without_tremor
 from .fit import Fit
-from .hypothesis_tests import KNOWN
+from .hypothesis_tests import KNOWN, MOST_STD
 from .levenberg_marquardt import DECREMENT, MOST_ITERATIONS
 from .parameters import B_A_NAMES, BY_NAME, D_NAMES, Form
 from .poses import POSE_MPS2
@@ -29,8 +29,6 @@ PRIOR_SD = np.append(BY_NAME["K"].sd, [BIAS_SD_MPS2] * 3)
 ALL_OF_NINE = np.eye(9)[np.append(from_elements(Form.SYMMETRIC, np.arange(6.0)), [6, 7, 8]).astype(int)]
 # Errors [m/s^2] that rests may have beside noise and tremor: the least that explains the residuals is taken.
 SPREADS_MPS2 = np.append(0.0, np.geomspace(1e-4, 1.0, 80))
-# Largest factor of the standard deviations, where the residuals hardly show the error of the model.
-HONEST = 2.5
 
 
 def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
@@ -57,7 +55,8 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
         if iterations <= REWEIGHTED:  # later, the spread would alternate between two steps of its scale
             extra = _spread(e - J @ step, along, left)
         settled = iterations > REWEIGHTED and bool(gradient @ step < DECREMENT**2)
-    doubt = min(left / (left - 2.0), HONEST**2) if left > 2.0 else HONEST**2
+    # The residuals of few rests hardly show the error of the model.
+    doubt = min(left / (left - 2.0), MOST_STD**2) if left > 2.0 else MOST_STD**2
     covariance = np.linalg.inv(information / doubt + np.diag(PRIOR_SD**-2.0))
     unknown = np.sqrt(np.diag(covariance)) > KNOWN * PRIOR_SD
     return Fit(

@@ -95,7 +95,7 @@ def test_an_honest_sensor_and_a_stream_in_coarse_units_are_not_accused(counted, 
 
 
 def test_hammering_that_swings_by_whole_steps_is_no_stuck_bit(counted):
-    """Shake y by 560 counts in every other sample, and by 816 in one of twelve: bit 8 changes in a sixth of the steps."""
+    """Shake y by 560 counts in every other sample, by 816 in one of twelve: bit 8 changes in a sixth of the steps."""
     at = np.arange(1500)
     shaken = 560 * (at % 2) + 256 * (at % 12 == 1) + np.random.default_rng(0).integers(-20, 20, len(at))
 
