@@ -6,6 +6,8 @@ limits from the recording, since hands tremble by 0.5 to 7 deg/s as they rest.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,7 +46,7 @@ class RestFinder:
 
         That of the flat segment is quiet: in wider limits it would go on while a hand takes the board up.
         """
-        flat, rests, quiet = self._flat, self.within(self._learned()), self.within(QUIET)
+        flat, rests, quiet = self._flat, self.within(self._learned()), self._quiet
         at = np.array([[flat.first, flat.last]])
         return _and_others(quiet[~_apart(quiet, at)], rests[_apart(rests, at)])
 
@@ -54,7 +56,7 @@ class RestFinder:
 
     def bias_runs(self, rests: Intervals) -> Intervals:
         """Return the runs whose mean rate is the gyroscope's bias: the quiet part of a rest if it is long, or all."""
-        quiet = self.within(QUIET)
+        quiet = self._quiet
         quiet = quiet[quiet[:, 1] - quiet[:, 0] >= BIAS_RUN_S * self._recording.rate_hz]
         return _and_others(quiet[~_apart(quiet, rests)], rests)
 
@@ -86,6 +88,10 @@ class RestFinder:
         while len(slow_runs := _halves(slow_runs, self._n)):
             rests = _and_others(rests, self._trimmed(slow_runs))
         return rests
+
+    @cached_property
+    def _quiet(self) -> Intervals:
+        return self.within(QUIET)
 
     def _trimmed(self, runs: Intervals) -> Intervals:
         """Return the runs without their ends, if they are long enough and gravity does not turn in them."""
