@@ -21,7 +21,6 @@ from ..terminal.console import count, groups
 from ..terminal.view import View
 from ..terminal.voice import Announcement, Voice, in_words
 from .address import Address
-from .server import Server
 
 
 @dataclass(frozen=True)
@@ -105,6 +104,8 @@ class Feed:
     """
 
     def __init__(self, where: Address, about: Mapping[str, Any], keys: bool = False) -> None:
+        from .server import Server  # noqa: PLC0415 - slow to import, and most sessions have no page
+
         token = secrets.token_urlsafe(TOKEN_BYTES)
         self._pressed: deque[Key] = deque()
         try:
