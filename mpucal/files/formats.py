@@ -96,7 +96,6 @@ def _others(
 _TEXTS = ".csv .txt .log .tsv"
 _TABLE = ("another program's table", "tables.load:load_table", "tables.load:is_table")
 _TWO = ("a phone's tables", "tables.phone:load_two_tables", "tables.phone:is_one_of_two_tables")
-_ARCHIVE = ("a phone's tables", "tables.phone:load_archive_of_tables", "tables.phone:is_archive_of_tables")
 _PHONE = ("the folder of a phone's tables", "tables.phone:load_folder_of_tables", "tables.phone:is_folder_of_tables")
 _FOLDER = "folder:load_folder_of_recordings", "folder:is_folder_of_recordings"
 _BAG, _BAG_ROWS = "ros:load_bag", "ros:bag_rows"
@@ -132,7 +131,6 @@ FORMATS = (
         only_recognised=True,
     ),
     *_others(_TEXTS, *_TABLE, only=False),
-    *_others(".zip", *_ARCHIVE),
     *_others(".zip .gz", "an archive of recordings", "archive:load_archive", "archive:is_archive"),
     Format(".mcap", "sensor_msgs/Imu for ROS 2 and Foxglove", writer=f"{_HERE}.imu:imu_file"),
     *_others(FOLDER, "the folder of a bag", _BAG, "ros:is_folder_of_ros", _BAG_ROWS, only=False),

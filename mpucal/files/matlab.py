@@ -32,7 +32,7 @@ DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"
 # of letters in UTF-8, UTF-16 and UTF-32
 DTYPES |= {16: "u1", 17: "u2", 18: "u4"}
 CELLS, STRUCTURE, LETTERS, NUMBERS, OBJECT = 1, 2, 4, range(6, 16), 17
-DEEPEST, MOST_DIMENSIONS = 8, 8
+DEEPEST = 8
 # class of an object that holds columns -> the command of MATLAB that writes it as a table of text
 EXPORTS = {
     "timetable": "writetimetable({0}, '{0}.csv')",
@@ -144,7 +144,7 @@ def _matrix(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
     if of == OBJECT:
         return _text(parts[1][1]), _Object(_text(parts[3][1])) if len(parts) > 3 else None
     name, shape = _text(parts[2][1]), _numbers(*parts[1], order).tolist()
-    if not 0 < len(shape) <= MOST_DIMENSIONS or min(shape) < 0:
+    if not 0 < len(shape) <= DEEPEST or min(shape) < 0:
         raise ValueError("an array has no shape")
     if of in NUMBERS and len(parts) > 3:
         found = _numbers(*parts[3], order)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .guess import is_clock
-from .names import ACC, GYR, axes_of, first_triple, parse_header
+from .names import axes_of, names_both, parse_header
 from .several import INSTANCE
 from .table import Table
 from .text import stated_rate_hz
@@ -35,7 +35,7 @@ def table_of_labels(name: str, arrays: Arrays) -> Table | None:
         matrix = arrays.get(of.removesuffix("_label"), labels)
         if labels.dtype.kind == "U" and matrix.ndim > 1 and matrix.shape[1] == labels.size:
             table = Table(name, [INSTANCE.get(label, label) for label in labels.ravel().tolist()], [*matrix.T])
-            if all(first_triple(table.columns, quantity) for quantity in (ACC, GYR)):
+            if names_both(table.columns):
                 return table
     return None
 

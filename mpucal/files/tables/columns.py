@@ -25,6 +25,7 @@ from .names import (
     WITHOUT_GRAVITY,
     Column,
     first_triple,
+    names_both,
     parse_column_name,
 )
 from .shown_units import BEYOND
@@ -45,7 +46,7 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
     if hints.columns:
         return columns_by_hint(table.header, hints.columns), ""
     columns, remark = table.columns, ""
-    named, clocks = bool(first_triple(columns, ACC) and first_triple(columns, GYR)), table.clocks(columns)
+    named, clocks = names_both(columns), table.clocks(columns)
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if not (named and (clocks or hints.rate_hz)):
         of = _numbers(table)

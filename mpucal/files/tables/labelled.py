@@ -16,12 +16,12 @@ from .names import (
     WITHOUT_GRAVITY,
     Column,
     axes_of,
-    first_triple,
+    names_both,
     parse_axis_name,
     parse_column_name,
     parse_header,
 )
-from .several import INSTANCE
+from .several import BEGUN, INSTANCE, MOST_SENSORS
 from .table import Table
 from .text import read_table, table_of_rows
 from .units import find_unit
@@ -49,12 +49,8 @@ _THREE = re.compile(
 )
 # unit -> how a name ends that has it: the first of those that are read
 _ENDINGS = {find_unit(ending): f"_{ending}" for ending in reversed(ENDINGS_OF_SENSORS.split())}
-# lines of which one names numbers: the log of a board that starts comes before
-BEGUN = 2000
 # as `rostopic echo` and `ros2 topic echo` print messages
 _BETWEEN_RECORDS = "\n---\n"
-# different words in a column that names the sensor of each line
-MOST_WORDS = 40
 VALUE = "value"
 
 
@@ -112,8 +108,8 @@ def labelled_table(text: str, name: str) -> Table | None:
     """
     begun = [list(_numbers(line)) for line in _label("\n".join(text.split("\n", BEGUN)[:BEGUN]))]
     together = list(dict.fromkeys(name for names in begun for name in names))
-    header = next((names for names in begun if _names_both(names)), together)
-    if not _names_both(header):
+    header = next((names for names in begun if names_both(parse_header(names))), together)
+    if not names_both(parse_header(header)):
         return None
     columns = parse_header(header)
     measured = [header[c.place] for c in columns if c.quantity in (ACC, GYR)]
@@ -133,11 +129,6 @@ def labelled_table(text: str, name: str) -> Table | None:
             named |= there
     rows = [[found.get(of, "") for of in header] if needed <= found.keys() else [] for found in records]
     return table_of_rows(name, header, rows, lines)
-
-
-def _names_both(names: list[str]) -> bool:
-    columns = parse_header(names)
-    return bool(first_triple(columns, ACC) and first_triple(columns, GYR))
 
 
 def _label(text: str) -> list[str]:
@@ -183,11 +174,11 @@ def pivot(table: Table) -> Table | None:
     Lines of one time are a sample.
     """
     for place in table.places(Kind.WORD):
-        words = [word for word in dict.fromkeys(table.cells[place]) if word][:MOST_WORDS]
+        words = [word for word in dict.fromkeys(table.cells[place]) if word][:MOST_SENSORS]
         # linear_acceleration.x is ROS's, which contains gravity
         names = {word: [word] for word in words if parse_header([word])}
         names |= {word: axes_of(word) for word in words if word not in names and not WITHOUT_GRAVITY.match(word)}
-        if _names_both(list(chain(*names.values()))):
+        if names_both(parse_header([*chain(*names.values())])):
             break
     else:
         return None

@@ -29,6 +29,7 @@ from .names import (
     axis_triples,
     first_triple,
     ignored_sensors,
+    names_both,
     parse_axis_name,
     with_sensor,
 )
@@ -127,7 +128,7 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
 def is_table_of_sensors(text: str, name: str) -> bool:
     """Return True if a text names the columns of an accelerometer and a gyroscope."""
     table = find_named_table(text, name)
-    return table is not None and all(first_triple(table.columns, quantity) for quantity in (ACC, GYR))
+    return table is not None and names_both(table.columns)
 
 
 def table_of_text(text: str, path: Path, hints: Hints) -> Recording:

@@ -284,6 +284,11 @@ def first_triple(columns: Sequence[Column], quantity: str) -> tuple[Column, ...]
     return next(iter(axis_triples(columns, quantity)), ())
 
 
+def names_both(columns: Sequence[Column]) -> bool:
+    """Return True if there are those of an accelerometer and of a gyroscope."""
+    return all(first_triple(columns, quantity) for quantity in (ACC, GYR))
+
+
 def plausible_celsius(values: Vector) -> Vector | None:
     """Return temperatures (n,); None if no sensor has them, such as counts or Kelvin."""
     known = values[np.isfinite(values)]

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import csv
 import re
-import zipfile
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -27,11 +26,11 @@ from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..hints import NO_HINTS, Hints
 from ..matlab import MATLAB, read_matlab_arrays
-from ..reading import DAMAGED_ZIP, HELD, check_size, first_bytes, reading
+from ..reading import HELD, check_size, first_bytes, reading
 from .array_table import table_of_arrays
 from .columns import columns_by_hint
 from .load import FLIPPED, find_any_table
-from .names import ACC, GYR, HYPHEN, TIME, first_triple, parse_header, with_sensor
+from .names import ACC, GYR, HYPHEN, TIME, first_triple, names_both, parse_header, with_sensor
 from .sensor import sensor_stream
 from .shown_units import acceleration_unit, seem_counts
 from .streams import join_streams
@@ -67,15 +66,6 @@ def tables_of_sides(names: Iterable[str]) -> list[str]:
     return [member.name for member in found] if of_sides else []
 
 
-def is_archive_of_tables(path: Path) -> bool:
-    """Return True if an archive holds a table of an accelerometer and one of a gyroscope."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return bool(_pairs(archive.namelist()))
-    except (OSError, *DAMAGED_ZIP):
-        return False
-
-
 def is_one_of_two_tables(path: Path) -> bool:
     """Return True if a file is a table of one sensor, beside that of the other."""
     try:
@@ -87,7 +77,7 @@ def is_one_of_two_tables(path: Path) -> bool:
         table = None if begun.startswith(MATLAB) else find_named_table(decode_text(begun, path.name), path.name)
     except (OSError, RecordingError):
         return False
-    return table is None or not all(first_triple(table.columns, quantity) for quantity in NAMES)
+    return table is None or not names_both(table.columns)
 
 
 def load_two_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -109,22 +99,12 @@ def _from_folder(path: Path, wanted: str, hints: Hints) -> Recording:
     with reading(path):
         files = sorted(child for child in (*path.iterdir(), *path.glob("meta/time.csv")) if child.is_file())
         names = [child.relative_to(path).as_posix() for child in files]
-        return _recording(wanted or path.name, names, lambda name: (path / name).read_bytes(), wanted, hints)
 
+        def read(name: str) -> bytes:
+            check_size(path, HELD * (path / name).stat().st_size)
+            return (path / name).read_bytes()
 
-def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """Return the recording in an archive's tables; see load_folder_of_tables."""
-    try:
-        with reading(path), zipfile.ZipFile(path) as archive:
-            sizes = {member.filename: member.file_size for member in archive.infolist()}
-
-            def read(name: str) -> bytes:
-                check_size(path, HELD * sizes[name])
-                return archive.read(name)
-
-            return _recording(path.name, list(sizes), read, "", hints)
-    except DAMAGED_ZIP as error:
-        raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
+        return _recording(wanted or path.name, names, read, wanted, hints)
 
 
 def is_pair(tables: Mapping[str, Table]) -> bool:

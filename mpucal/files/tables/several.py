@@ -22,9 +22,10 @@ from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind
-from .names import ACC, GYR, WITHOUT_GRAVITY, Column, axes_of, first_triple, parse_column_name, parse_header
+from .names import ACC, GYR, WITHOUT_GRAVITY, Column, axes_of, first_triple, names_both, parse_column_name, parse_header
 from .shown_units import BEYOND
 from .table import Table
+from .text import HEAD
 
 # names of such a column, whose words may come one after the other
 NAMES_SENSORS = re.compile(
@@ -35,9 +36,9 @@ NAMES_SENSORS = re.compile(
 MAY_NAME_SENSORS = re.compile(r"(?:.*[ _.-])?(?:id|addr|address|source|port|channel|name)", re.IGNORECASE).fullmatch
 # ArduPilot's name of it -> one of those
 INSTANCE = {"I": "imu"}
-MOST_SENSORS, MOST_TURNS = 32, 6
-# lines among which a column of any name has to alternate, and characters among which the beginnings of lines do
-BEGUN, LOOKED_AT = 2000, 4096
+MOST_SENSORS, MOST_TURNS = 40, 6
+# lines among which a column of any name has to alternate, or one names numbers: the log of a board that starts is first
+BEGUN = 2000
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
 FEWEST_COLUMNS, FARTHER = 3, 2.0
 # what separates the words of a name, and the most words of a name that is looked at; a digit ends a word of letters
@@ -141,7 +142,7 @@ def lines_of_sensors(text: str) -> Mapping[str, str]:
 
     A line without such a beginning is of the sensor above it, if all have such lines, or else of all.
     """
-    begun = text[: text.find("\n", LOOKED_AT) + 1] or text
+    begun = text[: text.find("\n", HEAD) + 1] or text
     if len({found[1] for found in _BEGINNING.finditer(begun)}) < 2:
         return {}
     lines = text.split("\n")
@@ -267,8 +268,7 @@ def _median(values: Vector) -> float:
 
 def _is_whole(table: Table) -> bool:
     """Return True if a table names both sensors, or has as many columns of numbers."""
-    named = all(first_triple(table.columns, quantity) for quantity in (ACC, GYR))
-    return named or (not table.header and len(table.places(Kind.NUMBER)) >= 2 * len("xyz"))
+    return names_both(table.columns) or (not table.header and len(table.places(Kind.NUMBER)) >= 2 * len("xyz"))
 
 
 def _which(chosen: str, sensors: Iterable[str]) -> str:

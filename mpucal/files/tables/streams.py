@@ -18,7 +18,7 @@ from ..hints import Hints
 from . import shown_units as units
 from . import times
 from .readings import OF_COUNTS, Rates, Reading, accelerations
-from .table import MOST_BAD
+from .table import are_many
 from .times import Stream
 from .units import COUNTS, OF_BNO055, PER_SAMPLE
 
@@ -148,7 +148,7 @@ def _checked(stream: Stream, what: str, name: str) -> Stream:
     if np.count_nonzero(stream.complete) < 2:
         raise RecordingError(f"{name} holds {np.count_nonzero(stream.complete)} {what}", "record for longer")
     beyond = np.asarray((np.abs(stream.values) >= units.BEYOND).any(axis=1))
-    if np.count_nonzero(beyond) > MOST_BAD * len(beyond):
+    if are_many(int(np.count_nonzero(beyond)), beyond):
         raise RecordingError(
             f"{name}: the {what} of sample {int(beyond.argmax())} are not a sensor's", "leave that sample out"
         )

@@ -13,15 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clocks.stamps import sample_period
+from ...clocks.stamps import FEWEST, sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from .cells import DAY_NS, Cells, Kind, is_number, kind_of, parse_cell, since_first, since_midnight, with_point
 from .names import ACC, COUNTS_OF_XSENS, GYR, LONGEST_OF_MTI, NANOSECONDS, TIME, Column, axes_of, parse_header
 from .units import NS, QUANTITIES, find_unit
 
-# the share of lines that may be damaged
-MOST_BAD = 0.01
 # units of a column beside whole seconds
 BELOW_A_SECOND = ("ms", "us", "ns")
 # a number and its unit in one cell
@@ -132,7 +130,7 @@ class Table:
                 found[i] = float(with_point(text)) if text.strip() else np.nan
             except ValueError:
                 bad.append(i)
-        if len(bad) > MOST_BAD * len(cells):
+        if are_many(len(bad), cells):
             raise self._not_a_number(bad[0], column)
         return found
 
@@ -182,7 +180,7 @@ class Table:
             except ValueError as error:
                 bad.append(len(found))
                 found.append(found[-1] if found else Decimal(0))
-                if len(bad) > MOST_BAD * len(cells) or bad[0] == 0:
+                if are_many(len(bad), cells) or bad[0] == 0:
                     raise self._not_a_number(i, column) from error
         # a spreadsheet writes some times otherwise
         for i in bad:
@@ -195,6 +193,11 @@ class Table:
             f"{self.name}: line {self.lines[i]}: {name} is {self.cells[column.place][i]!r}, which is not a number",
             "correct that line or leave it out",
         )
+
+
+def are_many(bad: int, of: Sequence[Any] | NDArray[Any]) -> bool:
+    """Return True if more are damaged, or in no order, than a few."""
+    return bad * FEWEST > len(of)
 
 
 def holds_number(cell: str) -> bool:
