@@ -13,7 +13,7 @@ from ..errors import WrongValue
 from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from .bias_changes import without_changes
-from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
+from .checks import NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hand import HandFit
@@ -54,8 +54,7 @@ def estimate(
     at_fault = find_gyroscope_fault(whole[0])
     if at_fault is None:
         return _of_a_part(whole[0]) or whole
-    foreign = at_fault.code == "gyro_off" and at_fault == CONTRADICTED.reason(whole[0])
-    of_rests = _of_rests(before, at_fault, foreign)
+    of_rests = _of_rests(before, at_fault)
     if refusing := tuple(reason for reason in find_reasons(of_rests) if reason.refuse):
         if NO_GYROSCOPE.reason(before) is not None:
             return replace(whole[0], against_rests=refusing), whole[1]
@@ -108,14 +107,12 @@ def _of_a_part(whole: Evidence) -> tuple[Evidence, Mapping[str, str]] | None:
     return None
 
 
-def _of_rests(before: Evidence, at_fault: Reason, foreign: bool) -> Evidence:
+def _of_rests(before: Evidence, at_fault: Reason) -> Evidence:
     """Return the estimate from the rests alone; without a fit where the recording does not begin with a rest.
 
-    foreign : the rates are not of this board's turns, and show no rests either.
+    The rates may be another board's, and show no rests either.
     """
-    recording = before.recording
-    if foreign:
-        recording = replace(recording, gyr=np.full_like(recording.gyr, np.nan))
+    recording = replace(before.recording, gyr=np.full_like(before.recording.gyr, np.nan))
     segment = recording.flat or find_flat(recording)
     usable = replace(at_fault, what=at_fault.what + OF_RESTS, refuse=False)
     flat = flat_statistics(recording, segment) if segment is not None and is_long_enough(recording, segment) else None

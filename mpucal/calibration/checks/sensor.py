@@ -144,7 +144,8 @@ def clock_off(e: Evidence) -> Reason | None:
 
 def sensors_lag(e: Evidence) -> Reason | None:
     """Find an accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters explain."""
-    if e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
+    # A sensor that changed, or was exchanged for another one, looks late.
+    if e.claim is None or e.claim.change is not None or e.recording.sensor.origin is Origin.VEHICLE:
         return None
     (of_prior,) = BY_NAME["tau"].sd
     std = float(replace(e.estimate, covariance=e.claim.covariance).std("tau")[0])
