@@ -143,6 +143,14 @@ def test_lines_that_begin_with_their_sensor(line, names, walk, tmp_path):
     assert mpucal.load(tmp_path / "boards.log", sensor=shlex.split(refused.value.options)[1]).taken == first.taken
 
 
+def test_a_coarse_field_that_alternates_names_no_sensor(walk, table, assert_same):
+    """Do not take few values of another quantity, such as a magnetic field, for the names of sensors."""
+    field = np.array([0.25, -0.5, 0.75])[np.arange(len(walk)) % 3]
+    shift = np.where(np.arange(len(walk)) % 3, 0.0, 1.0)
+    found = mpucal.load(table(f"time,{AXES},mag,p,q,r", walk.t, walk.acc, walk.gyr, field, shift, shift, shift))
+    assert_same(found, walk)
+
+
 @pytest.mark.parametrize("name", ["t", "time"])
 def test_lines_by_turns_that_nothing_names(name, walk, assert_same, tmp_path):
     """Refuse them, under our own names of columns, too; the option in the message reads the first."""

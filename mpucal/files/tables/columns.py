@@ -122,7 +122,7 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
     # name(1), name(2) and so on are of a matrix
     arrays = {place: found[1] for place, name in enumerate(table.header) if (found := OF_ARRAY(name))}
     likely = likely_columns(_numbers(table), [clock.place for clock in table.clocks(columns)], arrays)
-    if likely is None:
+    if likely is None or len(table.places(Kind.NUMBER)) < len("xyz"):
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
         return RecordingError(what, _GIVE_VALUES)
     roles, unit = likely

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
-from .cells import Cells, Kind
+from .cells import Cells, Kind, is_number, parse_cell
 from .names import ACC, GYR, WITHOUT_GRAVITY, Column, axes_of, first_triple, names_both, parse_column_name, parse_header
 from .shown_units import BEYOND
 from .table import Table
@@ -36,7 +36,7 @@ NAMES_SENSORS = re.compile(
 MAY_NAME_SENSORS = re.compile(r"(?:.*[ _.-])?(?:id|addr|address|source|port|channel|name)", re.IGNORECASE).fullmatch
 # ArduPilot's name of it -> one of those
 INSTANCE = {"I": "imu"}
-MOST_SENSORS, MOST_TURNS = 40, 6
+MOST_SENSORS, MOST_TURNS = 32, 6
 # lines among which a column of any name has to alternate, or one names numbers: the log of a board that starts is first
 BEGUN = 2000
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
@@ -199,7 +199,8 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
             continue
         words = _words(cells)
         of_words = {word: number for number, word in enumerate(dict.fromkeys(filter(str.strip, words)))}
-        if not 1 < len(of_words) <= MOST_SENSORS:
+        # numbers of sensors are whole
+        if not 1 < len(of_words) <= MOST_SENSORS or any(is_number(w, False) and parse_cell(w) % 1 for w in of_words):
             continue
         sensors = np.array([of_words.get(word, -1) for word in words])
         first = sensors == 0
