@@ -1060,6 +1060,12 @@ def test_our_own_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path)
     assert mpucal.load(tmp_path / "walk.npz").interrupted == found.interrupted
 
 
+def test_more_columns_than_a_table_without_names_has_are_refused(walk, table):
+    """Name the last column that there is."""
+    with pytest.raises(RecordingError, match="there is no column 8 for gz: name one of its 7 columns by their number"):
+        mpucal.load(table("", walk.t, walk.acc, walk.gyr), columns="t,-,ax,ay,az,gx,gy,gz")
+
+
 @pytest.mark.parametrize("name", ["t", "time"])
 def test_lines_of_which_the_newest_is_the_first(name, walk, walk_ns, tmp_path, assert_same):
     """Read them from the last to the first, also a run at a time, in our own names and in another program's."""

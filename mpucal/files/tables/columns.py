@@ -44,7 +44,7 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
     RecordingError : it has no column that the user names, or none of them is known to be an accelerometer.
     """
     if hints.columns:
-        return columns_by_hint(table.header, hints.columns), ""
+        return columns_by_hint(table, hints.columns), ""
     columns, remark = table.columns, ""
     named, clocks = names_both(columns), table.clocks(columns)
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
@@ -61,29 +61,30 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
             order = _order(found | ({"t": clocks[0].place} if clocks else {}))
             by = "how gravity turns" if "gx" in found else "the length of gravity"
             kept = [c for c in columns if c.quantity == TEMPERATURE or (c.quantity == GYR and "gx" not in found)]
-            columns = [*columns_by_hint(table.header, found), *clocks, *kept]
+            columns = [*columns_by_hint(table, found), *clocks, *kept]
             remark = f"its columns were guessed from {by}: --columns {order}"
     if not first_triple(columns, ACC):
         raise _missing_sensors(table, columns)
     return columns, remark
 
 
-def columns_by_hint(header: Sequence[str], roles: Mapping[str, str | int]) -> list[Column]:
+def columns_by_hint(table: Table, roles: Mapping[str, str | int]) -> list[Column]:
     """Return the columns that the user names.
 
     Raises
     ------
     RecordingError : the table has no such column.
     """
+    header, count = table.header, len(table.cells)
     named = {name.strip(): place for place, name in enumerate(header)}
     without_unit = {name.partition("(")[0].strip(): place for name, place in named.items()}
     found = []
     for role, where in roles.items():
         place = where if isinstance(where, int) else named.get(where, without_unit.get(where, -1))
-        if place < 0 or (header and place >= len(header)):
+        if not 0 <= place < count:
             raise RecordingError(
                 f"there is no column {where + 1 if isinstance(where, int) else where} for {role}",
-                f"name one of {', '.join(named) or 'its columns by their number from 1'} with --columns",
+                f"name one of {', '.join(named) or f'its {count} columns by their number from 1'} with --columns",
             )
         name = header[place] if header else role
         known = parse_column_name(name, place)

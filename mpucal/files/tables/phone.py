@@ -232,7 +232,7 @@ def _stream(name: str, data: bytes | Table, quantity: str, hints: Hints) -> Stre
             f"{name} names no columns x, y and z",
             "name its columns in its first line (time, x, y, z), or give their order with --columns t,ax,ay,az",
         )
-    columns = columns_by_hint(table.header, hinted) if hinted else table.columns
+    columns = columns_by_hint(table, hinted) if hinted else table.columns
     of = first_triple(columns, quantity) or first_triple(parse_header(with_sensor(table.header, quantity)), quantity)
     if not of:
         raise RecordingError(
