@@ -77,8 +77,8 @@ def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta, s
 def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
     """Return probabilities (k,) of a slip in each transition; 0 but for the first and last two.
 
-    There a slip looks like a turn that the gyroscope lost, and leaves no pattern. In one of SURE recordings there is
-    one, and as seldom as Student's t says, the largest of the misses is as large by chance.
+    There a slip looks like a turn that the gyroscope lost, and leaves no pattern. One of SURE recordings has one there.
+    Without one, a miss as large has the chance that Student's t gives, in each of these transitions.
 
     spoilt : (n,) True for samples whose rates are lost or clipped; the transitions that have some are left out.
     """

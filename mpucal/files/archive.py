@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import zipfile
-import zlib
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,11 +34,13 @@ def load_archive(path: Path, hints: Hints = NO_HINTS) -> Recording:
         try:
             with reading(path):
                 _unpack(path, into)
-        except (*DAMAGED_ZIP, zlib.error) as error:
+        except DAMAGED_ZIP as error:
             raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
         found = into
         while found.is_dir() and len(inside := [*found.iterdir()]) == 1:
             found = inside[0]
+        if found.is_file() and found.suffix.lower() in (".zip", ".gz"):
+            raise RecordingError(f"{path} holds another archive, {found.name}", "unpack it, and give what it holds")
         try:
             return formats.find_format(found, hints).read(found, hints=hints)
         except RecordingError as error:
@@ -60,9 +61,12 @@ def _unpack(path: Path, into: Path) -> None:
     into.mkdir()
     members = _members(path)
     if path.suffix.lower() == ".gz":
-        with gzip.open(path) as packed, (into / members[0]).open("wb") as file:
-            while data := packed.read(LONGEST_LINE):
-                check_size(path, file.tell() + file.write(data))
+        try:
+            with gzip.open(path) as packed, (into / members[0]).open("wb") as file:
+                while data := packed.read(LONGEST_LINE):
+                    check_size(path, file.tell() + file.write(data))
+        except gzip.BadGzipFile as error:  # an error of the file's content, and not of its path
+            raise EOFError(str(error)) from error
         return
     with zipfile.ZipFile(path) as archive:
         check_size(path, sum(archive.getinfo(name).file_size for name in members))

@@ -17,7 +17,7 @@ TREMOR_S = 0.05  # correlation time of a hand's tremor
 RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # densities, (rad/s)^2 a second; the first is none
 # Twice the gain of the log likelihood by walks on three axes; by chance 5 % gain as much, since a density is not
 # negative: the mixture 1/8 chi2(0) + 3/8 chi2(1) + 3/8 chi2(2) + 1/8 chi2(3). A marginal likelihood, in which the
-# sensitivity is averaged out, gains as much in no more than exp(-2.7), 7 %.
+# sensitivity is averaged out, gains as much in about exp(-2.7), 7 %, at most.
 DRIFTS_95 = 5.4
 # Sensitivity of a rate to acceleration: 0.1 deg/s per g (PS-MPU-6000A r3.4, section 6.1), of each axis to each.
 SENSITIVITY_SD = np.deg2rad(0.1) / STANDARD_GRAVITY_MPS2

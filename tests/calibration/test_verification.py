@@ -58,7 +58,7 @@ def test_a_leap_is_carried_less_well_than_a_hands_turn(turn_s, missing_deg, agre
 
 
 def test_an_arm_that_sways_as_it_rests_is_followed():
-    """The mean of the rest is half a degree from where the turn ended."""
+    """The mean of the rest is half a degree from where the turn ended; its rate passes in part for a sensitivity."""
     rest = turned(1.5, 0.0, sway_deg=1.0)
     assert np.degrees([rest.direction, rest.direction_std]) == pytest.approx([0.05, 0.07], abs=0.05)
     assert rest.agrees

@@ -260,3 +260,16 @@ def test_two_tables_whose_columns_are_numbered_are_those_of_their_files_names(wa
             "Time",
         )
     assert_same(mpucal.load(tmp_path), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_an_archive_in_an_archive_and_a_damaged_gz_file_are_refused(tmp_path):
+    """Levels of archives could fill the disk; the error of a .gz file is of its content, and not of its path."""
+    inner, outer, damaged = tmp_path / "walk.zip", tmp_path / "all.zip", tmp_path / "walk.csv.gz"
+    for path, name in ((inner, "walk.csv"), (outer, "walk.zip")):
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr(name, inner.read_bytes() if path is outer else "ax,ay,az\n")
+    with pytest.raises(RecordingError, match=r"holds another archive, walk\.zip: unpack it"):
+        mpucal.load(outer)
+    damaged.write_bytes(gzip.compress(b"ax,ay,az\n" * 1000)[:-8] + bytes(8))
+    with pytest.raises(RecordingError, match="is not a whole archive"):
+        mpucal.load(damaged)

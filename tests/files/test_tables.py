@@ -1076,14 +1076,30 @@ def test_lines_of_which_the_newest_is_the_first(name, walk, walk_ns, tmp_path, a
         assert "the newest first" in found.taken
 
 
-@pytest.mark.parametrize(("name", "per_s", "even"), [("dt", 1, True), ("time", 1e3, False), ("delta_us", 1e6, False)])
+@pytest.mark.parametrize(("name", "per_s", "even"), [("dt", 1, True), ("dt", 1e3, False), ("delta_us", 1e6, False)])
 def test_steps_between_samples_are_summed(name, per_s, even, walk, table):
-    """Read times since the sample before, of which even ones are called so, and in a column that is called the time."""
+    """Read times since the sample before, in a column that is called so; the first of them may be 0."""
     dt = np.random.default_rng(18).uniform(0.008, 0.012, len(walk))
     dt = np.full(len(walk), 0.01) if even else dt / dt.mean() / 100
-    found = mpucal.load(table(f"{name},{AXES.strip()}", per_s * dt, walk.acc, walk.gyr))
+    found = mpucal.load(table(f"{name},{AXES.strip()}", per_s * dt * (np.arange(len(dt)) > 0), walk.acc, walk.gyr))
     assert "summed from the steps between samples" in found.taken
     np.testing.assert_allclose(found.t - found.t[0], np.cumsum(dt) - dt[0], atol=1e-6 if even else 0.05)
+    np.testing.assert_array_equal(found.acc, walk.acc)
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        ("millis,t", lambda n: [10.0 * np.arange(n), 36.0 - 0.001 * (np.arange(n) // 10)]),
+        ("time_left,time", lambda n: [0.01 * np.arange(n)[::-1], 0.01 * np.arange(n)]),
+        ("dt", lambda n: [0.01 * np.arange(n)]),
+        ("millis,flag", lambda n: [10.0 * np.arange(n), np.where(np.arange(n) % 9, 0.0, 3.4028235e38)]),
+    ],
+    ids=["a temperature that falls", "a countdown", "times called steps", "the largest float"],
+)
+def test_a_column_beside_the_times_does_not_change_them(names, columns, walk, table):
+    found = mpucal.load(table(f"{names},{AXES.strip()}", *columns(len(walk)), walk.acc, walk.gyr))
+    np.testing.assert_allclose(np.diff(found.t), 0.01, atol=1e-6)
     np.testing.assert_array_equal(found.acc, walk.acc)
 
 

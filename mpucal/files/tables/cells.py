@@ -31,8 +31,8 @@ MOMENT = rf"(?:\d{{4}}-\d\d-\d\d[ T])?{CLOCK}(?:Z|[+-]\d\d:?\d\d)?"
 _TIME_OF_DAY = re.compile(
     r"(?:(\d{1,6}) days? )?(?:(\d\d?):)?(\d\d):(\d\d)((?:\.|(?<=\d:\d\d:\d\d):)\d+)?(?: ?([AaPp])\.?[Mm]\.?)?"
 ).fullmatch
-# the same with other marks between its parts: 12.03.04.123, 12-03-04
-_MARKED_OF_DAY = re.compile(r"([01]?\d|2[0-3])([.\-_])([0-5]\d)\2([0-5]\d)(?:[.,:\-_](\d{1,9}))?").fullmatch
+# the same with other marks between its parts: 12.03.04.123; without the last it may be a date
+_MARKED_OF_DAY = re.compile(r"([01]?\d|2[0-3])([.\-_])([0-5]\d)\2([0-5]\d)[.,:\-_](\d{1,9})").fullmatch
 # a date that does not begin with the year, or not as ISO 8601 has it, and a time of day
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2}|[A-Za-z]{3})\2(\d{1,4}),?[ T]+(\S.*)").fullmatch
 # a date and time of day in digits alone
@@ -94,7 +94,7 @@ def parse_cell(text: str) -> Decimal:
     except InvalidOperation:
         date, of_day = (None, text) if _ISO(text) or not (split := _DATE(text)) else (split, split[5])
         if marked := _MARKED_OF_DAY(of_day):
-            of_day = f"{marked[1]}:{marked[3]}:{marked[4]}.{marked[5] or 0}"
+            of_day = f"{marked[1]}:{marked[3]}:{marked[4]}.{marked[5]}"
         if found := _TIME_OF_DAY(with_point(of_day)):
             days, hours, minutes, seconds, below, half = found.groups()
             hour = int(hours or 0) if half is None else int(hours or 0) % 12 + 12 * (half in "Pp")

@@ -33,7 +33,7 @@ from .names import (
     parse_axis_name,
     with_sensor,
 )
-from .sensor import increases, interval_column, sensor_stream
+from .sensor import increases, interval_column, is_weak, sensor_stream
 from .several import NAMES_SENSORS, of_one_beginning, of_one_place, of_one_sensor, of_one_turn, turns
 from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts
 from .streams import index_with_gravity, join_streams
@@ -231,12 +231,16 @@ def _oldest_first(table: Table) -> Table:
     some = np.isin(np.arange(len(table)), np.linspace(0, len(table) - 2, LOOKED_AT).astype(int))
     # damaged times are told where all are read
     with suppress(RecordingError):
-        for clock in table.clocks(table.columns)[:1]:
-            times = table.part(some).times(clock, np.ones(LOOKED_AT, bool))[0]
-            if (np.diff(times) < 0.0).all():
-                said = "its lines are the newest first, and were read from the last to the first"
-                cells = [of[::-1] for of in table.cells]
-                return replace(table, cells=cells, lines=table.lines[::-1], remarks=(*table.remarks, said))
+        clocks, whole = table.clocks(table.columns), np.ones(len(table), bool)
+        steps = [np.diff(table.part(some).times(clock, whole[some])[0]) for clock in clocks]
+        fall = [clock for clock, of in zip(clocks, steps, strict=True) if (of <= 0.0).all() and of.any()]
+        rises = any((of >= 0.0).all() and of.any() for of in steps)
+        # a temperature that falls stays for many lines
+        sure = (not is_weak(clock) or (np.diff(table.times(clock, whole)[0]) < 0.0).all() for clock in fall)
+        if not rises and any(sure):
+            said = "its lines are the newest first, and were read from the last to the first"
+            cells = [of[::-1] for of in table.cells]
+            return replace(table, cells=cells, lines=table.lines[::-1], remarks=(*table.remarks, said))
     return table
 
 

@@ -83,7 +83,7 @@ ESTIMATED = re.compile(
 COUNTER = re.compile(r"^(?!.*(?:stamp|time)).*(?:packet|number|index|sequence|frame|sample|counter)", re.IGNORECASE)
 # in a name of MATLAB
 HYPHEN = "0x2[dD]"
-# names that are remembered, and letters of one; longer text is none
+# how many names are remembered, and how long a name is at most
 MOST_NAMES, LONGEST_NAME = 1024, 100
 # the rank of a column that the user or physics chose
 CHOSEN = -1

@@ -15,7 +15,7 @@ from ..reading import MOST_ODD
 from .guess import is_index
 from .names import BY_A_WORD, CHOSEN, INTERVALS, STEMS, TIME, Column, plausible_celsius
 from .shown_units import time_unit
-from .table import Table
+from .table import Table, are_many
 from .times import Stream
 from .units import OF_BNO055, QUANTITIES
 
@@ -45,8 +45,7 @@ def sensor_stream(
         steps = _intervals(found[0], float(found[1]), clock)
         if steps is not None:
             found = np.cumsum(steps), Decimal(0), found[2]
-        weak = clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() in ("t", "ts"))
-        is_time = increases(found[0]) if weak else True
+        is_time = increases(found[0]) if is_weak(clock) else True
         # the numbers of samples are no times
         if is_time and (found[2] or not is_index(found[0])):
             kept, timed = has, found
@@ -92,18 +91,22 @@ def _are_of_others(table: Table, empty: Mask) -> bool:
 
 
 def _intervals(since: Vector, first: float, clock: Column) -> Vector | None:
-    """Return times (n,), of which these are those since the `first`, if they are the steps between samples.
+    """Return the steps between samples (n,) in a column that is called so, given as times since the `first`.
 
-    They then do not increase, and are much alike, or are called so.
+    Its numbers then do not grow, as times under such a name do. The usual step stands for the few that are damaged.
     """
-    if not len(since) or not np.isfinite(since).all() or not np.isfinite(first):
+    named = 0 <= clock.rank < BY_A_WORD and [*STEMS[TIME]][clock.rank] in INTERVALS.split()
+    if not named or not len(since) or not np.isfinite(first):
         return None
     steps = since + first
-    low, usual, high = np.percentile(steps, [25, 50, 75])
-    if steps.min() <= 0.0 or increases(steps) or not time_unit(float(usual), clock.unit):
-        return None
-    named = 0 <= clock.rank < BY_A_WORD and [*STEMS[TIME]][clock.rank] in INTERVALS.split()
-    return steps if named or 0.0 < high - low < usual else None
+    usual, bad = float(np.nanmedian(steps)), ~(steps > 0.0)
+    grow = not are_many(int(np.count_nonzero(~(np.diff(steps) > 0.0))), steps)
+    return None if grow or are_many(int(bad.sum()), steps) else np.where(bad, usual, steps)
+
+
+def is_weak(clock: Column) -> bool:
+    """Return True for a column that may be no clock: `t` may be a temperature."""
+    return clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() in ("t", "ts"))
 
 
 def increases(ticks: Vector) -> bool:

@@ -37,7 +37,7 @@ MAY_NAME_SENSORS = re.compile(r"(?:.*[ _.-])?(?:id|addr|address|source|port|chan
 # ArduPilot's name of it -> one of those
 INSTANCE = {"I": "imu"}
 MOST_SENSORS, MOST_TURNS = 32, 6
-# lines among which a column of any name has to alternate, or one names numbers: the log of a board that starts is first
+# lines in which the sensors of a column of any name, or of numbers, take turns; a board's log may come before them
 BEGUN = 2000
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
 FEWEST_COLUMNS, FARTHER = 3, 2.0
@@ -200,7 +200,7 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
         words = _words(cells)
         of_words = {word: number for number, word in enumerate(dict.fromkeys(filter(str.strip, words)))}
         # numbers of sensors are whole
-        if not 1 < len(of_words) <= MOST_SENSORS or any(is_number(w, False) and parse_cell(w) % 1 for w in of_words):
+        if not 1 < len(of_words) <= MOST_SENSORS or any(is_number(w, False) and _has_fraction(w) for w in of_words):
             continue
         sensors = np.array([of_words.get(word, -1) for word in words])
         first = sensors == 0
@@ -324,3 +324,8 @@ def _lie_apart(values: Vector, sensors: NDArray[np.int_]) -> bool:
         for of, where in ((values, changes), (values[order], again))
     )
     return int(np.count_nonzero(apart > FARTHER * alone)) >= FEWEST_COLUMNS
+
+
+def _has_fraction(cell: str) -> bool:
+    number = parse_cell(cell)
+    return number != number.to_integral_value()

@@ -196,7 +196,7 @@ class Table:
 
 
 def are_many(bad: int, of: Sequence[Any] | NDArray[Any]) -> bool:
-    """Return True if more are damaged, or in no order, than a few."""
+    """Return True if more than one of FEWEST is damaged, or in no order."""
     return bad * FEWEST > len(of)
 
 
