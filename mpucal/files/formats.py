@@ -82,6 +82,7 @@ class Format:
 
 
 _HERE = "mpucal.files"
+PACKED = ".zip", ".gz"
 
 
 def _others(
@@ -131,7 +132,7 @@ FORMATS = (
         only_recognised=True,
     ),
     *_others(_TEXTS, *_TABLE, only=False),
-    *_others(".zip .gz", "an archive of recordings", "archive:load_archive", "archive:is_archive"),
+    *_others(" ".join(PACKED), "an archive of recordings", "archive:load_archive", "archive:is_archive"),
     Format(".mcap", "sensor_msgs/Imu for ROS 2 and Foxglove", writer=f"{_HERE}.imu:imu_file"),
     *_others(FOLDER, "the folder of a bag", _BAG, "ros:is_folder_of_ros", _BAG_ROWS, only=False),
     *_others(FOLDER, *_PHONE, only=False),
@@ -177,7 +178,7 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
         if of_suffix and path.is_file() and path.stat().st_size == 0:
             raise RecordingError(f"{path} is empty", "record it again")
         shows = f"give a recording; `{shlex.join(['mpucal', 'show', str(path)])}` shows a calibration"
-        holds_none = of_suffix and path.suffix.lower() not in (".zip", ".gz")
+        holds_none = of_suffix and path.suffix.lower() not in PACKED
         remedy = shows if holds_none else f"export a table as .csv, or give {_suffixes()}"
         raise RecordingError(f"{path} is not a recording that mpucal knows", remedy)
     return found or others[-1]
