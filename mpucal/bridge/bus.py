@@ -14,11 +14,12 @@ from contextlib import suppress
 from ..chip import registers as reg
 from ..chip.access import Reply
 from ..chip.driver import STATUS_BYTES
+from ..clocks import MS
 from ..clocks.sample_clock import poll_phase
 from ..errors import BusError, NoAnswer
 from . import messages as wire
 from .chip_state import CONTROLS, ChipState
-from .link import MS, Link, LinkLost
+from .link import Link, LinkLost
 from .port import Port
 from .port_errors import WIRES, no_reply, request_failed
 from .read_ahead import ReadAhead

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..clocks import MS
 from ..doctor.examine import examine_chip
 from ..doctor.finding import Finding, Mark
 from ..doctor.measure import LONG_BYTES, median_ms
 from ..sources.chip import OpenedChip
 from . import BridgeBus
 from .frame import Deframer, Frame
-from .link import MS, REPLY_NS, STORE_NS, Link
+from .link import REPLY_NS, STORE_NS, Link
 from .messages import MAGIC, REPLY_BIT, BlobErase, BlobState, Feature, Frames, Hello, Read, Reply, Status
 from .port import Port
 

@@ -11,6 +11,7 @@ from contextlib import suppress
 from itertools import cycle
 
 from ..chip.port import TRIES
+from ..clocks import MS
 from ..clocks.device_clocks import BridgeClock
 from ..errors import BusError, LinkError
 from . import messages as wire
@@ -19,7 +20,6 @@ from .port import Chunk, Port
 from .port_errors import PortDiagnosis, flooded, no_reply
 from .requests import Answer, Latency, PendingRequest
 
-MS = 1_000_000
 # Two and a half times what a bridge needs at most; the line's own latency is added.
 REPLY_NS = 250 * MS
 STORE_NS = 2500 * MS

@@ -10,10 +10,10 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
+from ..clocks import MS
 from ..errors import BusError
 from .bus import RECOVER_NS
 from .frame import DELIMITER, Frame
-from .link import MS
 from .messages import Hello, Leave
 from .port import BAUDS, Port, SerialPort
 

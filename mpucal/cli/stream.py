@@ -14,11 +14,11 @@ from typing import Any
 
 import click
 
+from ..clocks import S
 from ..data import Samples
 from ..disk.atomic import check_free
 from ..errors import EndOfCapture
 from ..files.csv import CsvText
-from ..files.tables.units import NS
 from ..page.address import Address
 from ..page.console import live_page
 from ..recheck import days_since
@@ -82,7 +82,7 @@ def command(
         for samples in _poll(measuring.source, seconds):
             if ready is None:
                 # The newest sample was read just now.
-                text.utc_ns = time.time_ns() - round(float(samples.t[-1]) * NS)
+                text.utc_ns = time.time_ns() - round(float(samples.t[-1]) * S)
                 recording = measuring.source.recording()
                 ready = make_correction(applied, recording.sensor, recording.autopilot)
                 for remark in ready.remarks:
@@ -127,4 +127,4 @@ def _print_json(samples: Samples, utc_ns: int) -> None:
     for t, a, w, celsius in zip(*(column.tolist() for column in columns), strict=True):
         # JSON has no NaN.
         known = {"w": None if math.isnan(w[0]) else w, "temperature_c": None if math.isnan(celsius) else celsius}
-        print(json.dumps({"t": t, "a": a, **known, "utc_ns": utc_ns + round(t * NS)}))
+        print(json.dumps({"t": t, "a": a, **known, "utc_ns": utc_ns + round(t * S)}))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from enum import Enum, auto
 
+from . import US, S
 from .sample_clock import RATE_TOLERANCE
 
 WRAP = 1 << 32
-US, S_US = 1_000, 1_000_000
+S_US = S // US
 # A packet up to this late was overtaken by others; a clock further back was set back.
 LATE_US = S_US
 # The clock may run ahead of the times of receipt by this much more than before: packets pile up on a link.

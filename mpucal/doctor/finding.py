@@ -12,7 +12,6 @@ from typing import Any, Self
 
 from ..errors import SourceError
 
-FORMAT, VERSION = "mpucal.doctor", 1
 TOPIC, WIDTH = 24, 100
 
 
@@ -79,8 +78,8 @@ def text(source: str, version: str, findings: Sequence[Finding]) -> str:
 def document(source: str, version: str, findings: Sequence[Finding]) -> str:
     """Return the findings as JSON."""
     fields = {
-        "format": FORMAT,
-        "version": VERSION,
+        "format": "mpucal.doctor",
+        "version": 1,
         "mpucal": version,
         "source": source,
         "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clocks import S
 from ..data import Recording
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
@@ -24,7 +25,6 @@ from .tables.labelled import pivot
 from .tables.load import recording_from_table
 from .tables.phone import is_pair, recording_of_tables
 from .tables.times import UTC_NS
-from .tables.units import NS
 
 _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is what with --columns t=NAME,ax=NAME,..."
 Arrays = Iterator[tuple[str, NDArray[Any]]]
@@ -117,7 +117,7 @@ def _json_arrays(name: str, value: Any) -> Arrays:
     value = _unpacked(value)
     if isinstance(value, dict) and value and all(map(is_number, value)):
         # a table of pandas, or a column, by its index: small whole numbers count the rows
-        if not all(map(str.isdecimal, value)) or float(next(iter(value))) >= UTC_NS[0] / NS:
+        if not all(map(str.isdecimal, value)) or float(next(iter(value))) >= UTC_NS[0] / S:
             yield from _json_arrays(INDEX, [*value])
         value = list(value.values())
     if isinstance(value, list) and any(isinstance(row, dict) for row in value):

@@ -16,6 +16,7 @@ from typing import IO
 
 import numpy as np
 
+from ..clocks import S
 from ..clocks.stamps import FEWEST
 from ..data import Samples, Vector
 from ..disk.atomic import atomic_file
@@ -27,7 +28,6 @@ from .rows import Rows, Write, check_runs
 from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
 from .tables.text import decode_text, read_table
 from .tables.times import GAP_S, go_on, in_order, plausible_utc_ns
-from .tables.units import NS
 
 TEMPERATURE, UTC = "temperature_c", "utc_s"
 # 1 on each line of samples that mpucal calibrated
@@ -97,7 +97,7 @@ def _utc_ns(header: list[str], second: bytes) -> int | None:
         return None
     try:
         utc_s, t = (Decimal(cells[header.index(name)].strip()) for name in (UTC, "t"))
-        return plausible_utc_ns(round((utc_s - t) * NS))
+        return plausible_utc_ns(round((utc_s - t) * S))
     except (ArithmeticError, ValueError):
         return None
 
@@ -188,7 +188,7 @@ class CsvText:
 
     def write(self, samples: Samples) -> None:
         """Encode a run of samples."""
-        utc_s = np.full(len(samples), np.nan) if self.utc_ns is None else samples.t + self.utc_ns / NS
+        utc_s = np.full(len(samples), np.nan) if self.utc_ns is None else samples.t + self.utc_ns / S
         calibrated = np.full(len(samples), self._calibrated)
         table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c, utc_s, calibrated])
         if not self._columns:

@@ -17,12 +17,12 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
+from ..clocks import S
 from ..data import Samples, Vector
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from .mcap import CALIBRATED
 from .rows import Rows, Write
-from .tables.units import NS
 
 TOPIC, FRAME_ID = "/imu/data", "imu"
 # sensor_msgs/Imu: a first covariance of -1 means no such measurement
@@ -80,12 +80,12 @@ def encode_messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[N
     ------
     RecordingError : a time that a message cannot hold.
     """
-    if not (np.isfinite(samples.t) & (samples.t >= 0.0) & (samples.t + utc_ns / NS < 2.0**31 - 1)).all():
+    if not (np.isfinite(samples.t) & (samples.t >= 0.0) & (samples.t + utc_ns / S < 2.0**31 - 1)).all():
         raise RecordingError("a message of ROS can only hold times from 0 to 2^31 s", "write a .csv or .npz")
-    t_ns = np.rint(samples.t * NS).astype(np.int64) + utc_ns
+    t_ns = np.rint(samples.t * S).astype(np.int64) + utc_ns
     rows = np.zeros(len(samples), MESSAGE)
     rows["cdr"] = np.void(b"\0\1\0\0")
-    rows["sec"], rows["nanosec"] = t_ns // NS, t_ns % NS
+    rows["sec"], rows["nanosec"] = t_ns // S, t_ns % S
     rows["frame_id"], rows["frame_id_size"] = FRAME_ID.encode(), len(FRAME_ID) + 1
     rows["orientation"][:, 3] = 1.0
     rows["orientation_covariance"][:, 0] = NOT_MEASURED

@@ -17,6 +17,7 @@ from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.records import Metadata
 
+from ..clocks import S
 from ..data import Recording
 from ..errors import MpucalError, RecordingError
 from .hints import NO_HINTS, Hints
@@ -28,7 +29,7 @@ from .tables.cells import since_first
 from .tables.shown_units import acceleration_unit
 from .tables.streams import join_streams
 from .tables.times import Stream
-from .tables.units import COUNTS, NS
+from .tables.units import COUNTS
 
 IMU_OF_ROS1 = "sensor_msgs/Imu"
 REMEDY = "give a bag with sensor_msgs/Imu"
@@ -136,7 +137,7 @@ class _Messages:
 
     def add(self, message: Any, t_ns: int) -> None:
         stamp, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
-        self.stamps.append(stamp.sec * NS + stamp.nanosec)
+        self.stamps.append(stamp.sec * S + stamp.nanosec)
         self.received.append(t_ns)
         self.acc.append((a.x, a.y, a.z))
         self.gyr.append((w.x, w.y, w.z))

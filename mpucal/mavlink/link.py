@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple
 
+from ..clocks import S
 from ..errors import BusError, LinkError, NoAnswer
 from .dialect import LONGEST, MAGIC, SIGNED, Message, Packet, Parser, dialect
 from .firmwares import Vehicle, vehicle_of
@@ -20,7 +21,6 @@ from .transport import PAUSE_NS, ReceivedBytes, Transport
 # Our ids: a system other than the usual ground station's 255, and the component that autopilots expect of one.
 OWN_SYSTEM, OWN_COMPONENT = 254, 190
 
-S = 1_000_000_000
 LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
 HEARTBEAT_NS, ARMED = S, 128
 SEQUENCE = 256

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..clocks import US
 from ..clocks.device_clocks import Jump
 from ..data import Recording
 from ..errors import RecordingError
@@ -24,7 +25,6 @@ from .parameters.encoding import decode_parameter
 from .segments import ALTERING, SETTLED_US, find_recorrection, join_segments
 from .stream_buffers import Row, Segment
 from .tlog import RawPacket
-from .transport import US
 
 # Firmwares make names of these characters; none has so many parameters.
 NAME, MOST_PARAMETERS = re.compile(r"\w{1,16}", re.ASCII), 4096

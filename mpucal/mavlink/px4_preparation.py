@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from ..clocks import S
 from ..errors import LinkError
 from .dialect import dialect
 from .firmwares import PX4
 from .imu import HIGHRES, MESSAGE_ID, decode_reading
-from .link import Link, S
+from .link import Link
 from .parameters.client import read_parameters, set_parameter
 from .parameters.encoding import INT32
 from .parameters.slots import all_slots

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
+from ..clocks import S
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .firmwares import PX4
-from .link import Link, S
+from .link import Link
 
 T = TypeVar("T")
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.rotation import rotation
+from ..clocks import S
 from ..data import Vector
 from ..errors import LinkError
 from ..rests.limits import QUIET
@@ -16,7 +17,7 @@ from ..rests.stillness import Detector, Still
 from ..rests.windows import of_rows
 from .dialect import Message, dialect
 from .imu import MESSAGE_ID, Reading, Stream, decode_reading
-from .link import Link, S
+from .link import Link
 from .parameters.mounting import attitude_deg
 from .requests import send_command
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping
 
+from ..clocks import S
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .firmwares import PX4, preferred_messages
 from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, decode_reading
-from .link import Link, S
+from .link import Link
 from .requests import encode_command, send_command
 
 # ArduPilot's rates at a loop of 400 Hz: the next lower one is requested after one that it denies.

@@ -10,12 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..clocks import MS, US
 from ..clocks.device_clocks import VehicleClock
 from ..data import Autopilot, Recording, Samples, Sensor, Vector
 from .firmwares import ARDUPILOT, accel_lag_s, preferred_messages
 from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream
 
-MS_US = 1000
+MS_US = MS // US
 
 # Single lost packets only lower the rate; a longer time without one is a gap.
 GAP_S, GAP_INTERVALS = 0.08, 6.0

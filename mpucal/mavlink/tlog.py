@@ -9,9 +9,9 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import NamedTuple
 
+from ..clocks import US
 from ..errors import CaptureError
 from .dialect import BEGINNING, HEADER, LONGEST, packet_length
-from .transport import US
 
 TLOG = ".tlog"
 STAMP = struct.Struct(">Q")

@@ -8,9 +8,10 @@ from __future__ import annotations
 import time
 from typing import NamedTuple, Protocol
 
-US = 1_000
+from ..clocks import US, S
+
 # A receive that ends so long after its deadline was interrupted: SIGSTOP, or a suspended computer.
-PAUSE_NS = 3_000_000_000
+PAUSE_NS = 3 * S
 
 
 class ReceivedBytes(NamedTuple):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from ..clocks import S
 from ..clocks.device_clocks import Jump
 from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError, WriteBackError
 from .dialect import Message
 from .firmwares import PX4, Vehicle
 from .imu import Stream
-from .link import Link, S
+from .link import Link
 from .log import Log
 from .parameters.client import read_stream_parameters
 from .parameters.slots import find_slot

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
-from ..result.correlation import standard_deviations
-from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, UPPER, E, G
+from ..result.correlation import UPPER, standard_deviations
+from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, E, G
 
 MG = 1e-3 * STANDARD_GRAVITY_MPS2
 DEG = math.pi / 180.0

@@ -30,12 +30,13 @@ from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.gyro_drift import remove_drift
 from ..rests.intervals import Intervals, RestFinder
+from ..rests.limits import LEAST_TURN_RAD
 from ..result.calibration import Calibration
+from ..result.correlation import UPPER
 
 E, BETA, G, DELTA, NOISE = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21), slice(21, 23)
 # A calibration states a covariance of the first 21.
 CALIBRATED, PARAMETERS = DELTA.stop, NOISE.stop
-UPPER = np.triu_indices(3)
 # Standard deviation of a turn, relative to its angle, by the gyroscope's nonlinearity (PS-MPU-6000A r3.4, section 6.1:
 # 0.2 % of full scale).
 TURN_NONLINEARITY = 0.001
@@ -47,8 +48,6 @@ POOLED_FREEDOM = 6.0
 SHAKEN_S, MOST_SHAKEN_RATIO = 0.1, 4.0
 # Samples of a filtered stream are worth at least this share of independent ones.
 LEAST_INDEPENDENT = 0.2
-# Orientations nearer to one another count as one.
-APART_RAD = math.radians(20.0)
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class Observations:
         """Number of orientations that differ by 20 deg from each other."""
         apart: list[Vector] = []
         for down in self.down:
-            if all(float(down @ other) <= math.cos(APART_RAD) for other in apart):
+            if all(float(down @ other) <= math.cos(LEAST_TURN_RAD) for other in apart):
                 apart.append(down)
         return len(apart)
 

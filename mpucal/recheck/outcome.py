@@ -10,10 +10,10 @@ import numpy as np
 
 from ..data import Vector
 from ..result.calibration import Calibration
+from ..result.correlation import UPPER
 from ..result.error_model import AXES, MG_PER_MPS2, with_std
-from .observed import BETA, DELTA, UPPER, E, G
+from .observed import BETA, DELTA, E, G
 
-FORMAT, VERSION = "mpucal.check", 1
 Verdict = Literal["still good", "drifted", "remounted", "another sensor", "cannot be told"]
 STILL_GOOD: Verdict = "still good"
 DRIFTED: Verdict = "drifted"
@@ -100,7 +100,7 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
         left_out = ("theta", "covariance", "changes")
         values = {key: value for key, value in vars(self).items() if key not in left_out}
         changes = {name: asdict(change) for name, change in (self.changes or {}).items()}
-        return {"format": FORMAT, "version": VERSION, **values, "or_also": list(self.or_also), "changes": changes}
+        return {"format": "mpucal.check", "version": 1, **values, "or_also": list(self.or_also), "changes": changes}
 
     def page(self) -> str:
         """Return the text that `mpucal check` prints."""

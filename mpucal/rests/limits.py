@@ -21,6 +21,7 @@ MOST_BIAS_RAD_S = math.radians(30.0)
 # A window in which gravity turns faster is neither a rest nor a measurement of the gyroscope's bias.
 TURNS_RAD_S = 0.02
 # A hand that turns the board moves it at this rate, and gravity by this angle, which biases and skew do not explain.
+# Orientations so far apart count as different: 12 of them are far from parallel, and a sphere holds some seventy.
 MOVING_RAD_S = 0.3
 LEAST_TURN_RAD = math.radians(20.0)
 

@@ -21,7 +21,7 @@ NAMES = (
     *(f"b_omega_{i}" for i in _AXES),
 )
 KEY, LOWER = "correlation", np.tril_indices(len(NAMES), -1)
-_UPPER = np.triu_indices(3)
+UPPER = np.triu_indices(3)
 # further digits differ between processors
 DIGITS = 5
 # also the value if the correlation is not known
@@ -54,5 +54,5 @@ def from_lower(values: Vector) -> Vector:
 
 def standard_deviations(values: Mapping[str, Any]) -> Vector:
     """Return the standard deviations (21,) of a Calibration's fields, in the order of NAMES."""
-    K_std = np.asarray(values["K_std"])[_UPPER]
+    K_std = np.asarray(values["K_std"])[UPPER]
     return np.concatenate([np.ravel(values["D_std"]), values["b_a_std"], K_std, values["b_omega_std"]])

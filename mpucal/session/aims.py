@@ -15,10 +15,9 @@ import numpy as np
 
 from ..data import Sensor, Vector
 from ..origin import Origin
+from ..rests.limits import LEAST_TURN_RAD
 from .events import Direction, Target
 
-# Orientations this far apart count as different: 12 of them are far from parallel, and a sphere holds some seventy.
-DISTINCT_RAD = math.radians(20.0)
 # A direction that was only passed is disturbed by the hand's accelerations: so many count as one pause.
 PASSES_OF_A_PAUSE = 4
 # Rests nearer to one another count as one.
@@ -32,7 +31,7 @@ SPREAD = 0.05
 class Directions:
     """Directions of accelerations, `apart_rad` or more from one another: unit vectors `units` (n, 3)."""
 
-    def __init__(self, apart_rad: float = DISTINCT_RAD) -> None:
+    def __init__(self, apart_rad: float = LEAST_TURN_RAD) -> None:
         self.units = np.zeros((0, 3))
         self._apart_rad = apart_rad
 
@@ -107,7 +106,7 @@ _corners = np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)])
 # (26, 3) unit vectors: the faces, edges and corners of a cube, which a person can name and find
 ALL_AROUND: Vector = _corners / np.linalg.norm(_corners, axis=1, keepdims=True)
 TILT_RAD = math.radians(30.0)
-# An orientation verifies if it is DISTINCT_RAD from all that the fit has seen. Small tilts leave less room.
+# An orientation verifies if it is LEAST_TURN_RAD from all that the fit has seen. Small tilts leave less room.
 UNSEEN_TILT_RAD = math.radians(10.0)
 
 
@@ -163,7 +162,7 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
 
 def unseen_rad(tilt_only: bool) -> float:
     """Return the least angle [rad] from all orientations seen at which one counts for the verification."""
-    return UNSEEN_TILT_RAD if tilt_only else DISTINCT_RAD
+    return UNSEEN_TILT_RAD if tilt_only else LEAST_TURN_RAD
 
 
 def directions(flat_down: Direction, tilt_only: bool) -> Vector:

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Samples, Vector
-from ..rests.limits import HAND, UNTOUCHED
+from ..rests.limits import HAND, LEAST_TURN_RAD, UNTOUCHED
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
 from . import events
-from .aims import DISTINCT_RAD, Directions, directions
+from .aims import Directions, directions
 from .boards import describe, describe_tilt
 from .plan import Plan
 
@@ -143,10 +143,10 @@ class PoseStep(Step):
         return super().resumed()
 
     def _farthest(self, seen: Directions) -> Vector:
-        """Return the direction farthest from all `seen`, at least DISTINCT_RAD from the one that is asked for."""
+        """Return the direction farthest from all `seen`, at least LEAST_TURN_RAD from the one that is asked for."""
         others = self._directions
         if self.prompt.down is not None:
-            others = others[others @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)]
+            others = others[others @ np.array(self.prompt.down) < math.cos(LEAST_TURN_RAD)]
         return seen.farthest_down(others)
 
     def _ask_for(self, kind: events.PromptKind, down: Vector, text: str) -> events.Prompt:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..clocks import US
 from ..clocks.device_clocks import Jump
 from ..clocks.host_clock import HostClock
 from ..data import Recording
@@ -21,7 +22,6 @@ from ..mavlink.parameters.mounting import BOARD_ROTATION, ORIENTATION, mounting,
 from ..mavlink.parameters.slots import Slot, Values, find_slot
 from ..mavlink.requests import ask, check_prearm, encode_command, is_armed
 from ..mavlink.stream import MOST, Streams
-from ..mavlink.transport import US
 from ..mavlink.vehicle_source import LOSS_SHARE
 from ..rests.flat import flat_statistics
 from ..result.error_model import MG_PER_MPS2

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..clocks import S
 from ..data import Vector
 from ..disk.atomic import write_atomically
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
-from ..mavlink.link import Link, S
+from ..mavlink.link import Link
 from ..mavlink.parameters import document
 from ..mavlink.parameters.client import read_parameters, read_stream_parameters, require_parameters
 from ..mavlink.parameters.encoding import parameters_text, read_parameters_file

@@ -7,7 +7,6 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from mpucal import result
-from mpucal.recheck.outcome import FORMAT
 from mpucal.result.calibration import Calibration
 
 
@@ -20,7 +19,7 @@ def test_check_of_a_recording(mpucal, session, calibration):
     told = mpucal("check", calibration, session.folder)
     assert (told.code, told.out.split(":")[0]) == (0, "Still good")
     document = json.loads(mpucal("check", calibration, session.folder, "--json").out)
-    assert (document["format"], document["verdict"], document["what"]) == (FORMAT, "still good", "nothing")
+    assert (document["format"], document["verdict"], document["what"]) == ("mpucal.check", "still good", "nothing")
 
 
 def test_check_of_a_sensor_takes_half_a_minute_and_updates_its_biases(mpucal, calibration, tmp_path):

@@ -2,8 +2,9 @@
 
 import pytest
 
+from mpucal.clocks import S
 from mpucal.errors import BusError, LinkError, NoAnswer, UsageError
-from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S
+from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link
 from mpucal.mavlink.requests import send_command
 from mpucal.mavlink.vehicle_source import choose_vehicle
 

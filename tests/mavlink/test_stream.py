@@ -2,13 +2,13 @@
 
 import pytest
 
+from mpucal.clocks import US, S
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.imu import MESSAGE_ID, Stream
-from mpucal.mavlink.link import S
 from mpucal.mavlink.stream import Streams
 from mpucal.simulated.vehicle import SimulatedVehicle
-from mpucal.simulated.vehicle.transport import US, SimulatedTransport
+from mpucal.simulated.vehicle.transport import SimulatedTransport
 
 
 @pytest.fixture

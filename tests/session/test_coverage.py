@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.session.aims import ALL_AROUND, DISTINCT_RAD, SPREAD, Coverage, Directions
+from mpucal.rests.limits import LEAST_TURN_RAD
+from mpucal.session.aims import ALL_AROUND, SPREAD, Coverage, Directions
 
 FACES = np.vstack([np.eye(3), -np.eye(3)])
 DEGENERATE = {
@@ -43,7 +44,7 @@ def test_kept_directions_are_distinct_and_turning_all_changes_nothing(seed, n):
     directions = Directions()
     kept = np.array([unit for unit in units if directions.add(unit)])
     angles = np.arccos(np.clip(kept @ kept.T, -1.0, 1.0))[np.triu_indices(len(kept), 1)]
-    assert (angles >= DISTINCT_RAD - 1e-9).all()
+    assert (angles >= LEAST_TURN_RAD - 1e-9).all()
     assert len(directions) == len(kept)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     assert directions_of(units @ turn.T).spread() == pytest.approx(directions.spread(), abs=1e-9)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mpucal.clocks import S
 from mpucal.data import Vector
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Message, dialect
-from mpucal.mavlink.link import Link, S
+from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.mounting import tilt_deg
 from mpucal.mavlink.requests import send_command
 from mpucal.mavlink.rest import Horizon

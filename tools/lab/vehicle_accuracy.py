@@ -18,9 +18,10 @@ from typing import Annotated
 
 import numpy as np
 
+from mpucal.clocks import S
 from mpucal.data import Vector
 from mpucal.mavlink.dialect import dialect
-from mpucal.mavlink.link import Link, S
+from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.slots import slot_of
 from mpucal.mavlink.requests import send_command
 from mpucal.mavlink.rest import ATTITUDE

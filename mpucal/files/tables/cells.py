@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clocks import S
 from ...clocks.sample_clock import GAP_INTERVALS
 from ...data import Vector
 from ..reading import MOST_ODD
-from .units import NS
 
 # exponents of numbers beyond this would take all memory as integers
 MOST_DIGITS = 40
 # cells by which a column's kind is known
 LOOKED_AT = 50
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-DAY_NS = 86400 * NS
+DAY_NS = 86400 * S
 CLOCK = r"\d\d?:\d\d:\d\d(?:[.,]\d{1,9})?"
 # among other text; lengths are bounded: the search takes linear time
 NUMBER = r"[-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?"
@@ -100,10 +100,10 @@ def parse_cell(text: str) -> Decimal:
             hour = int(hours or 0) if half is None else int(hours or 0) % 12 + 12 * (half in "Pp")
             at = ((24 * int(days or 0) + hour) * 60 + int(minutes)) * 60 + int(seconds)
             before = _days(*date.groups()[:4]) if date else 0
-            return before * DAY_NS + (at + Decimal(f"0.{(below or '.0')[1:]}")) * NS
+            return before * DAY_NS + (at + Decimal(f"0.{(below or '.0')[1:]}")) * S
         moment = datetime.fromisoformat(re.sub(" (?:UTC|GMT)$", "Z", text))
         since = moment - (EPOCH if moment.tzinfo else datetime.min)
-        return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
+        return Decimal((since.days * 86400 + since.seconds) * S + since.microseconds * 1000)
     raise ValueError(text)
 
 

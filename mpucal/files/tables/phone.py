@@ -21,6 +21,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
+from ...clocks import S
 from ...data import Recording
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
@@ -37,7 +38,6 @@ from .streams import join_streams
 from .table import Table
 from .text import decode_text, find_named_table
 from .times import Stream, how_often
-from .units import NS
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
@@ -206,7 +206,7 @@ def _read_app_metadata(files: Iterable[tuple[str, bytes]]) -> tuple[bool, int | 
             elif starts:
                 with suppress(KeyError, ArithmeticError, ValueError):
                     of_day, at = (Decimal(starts[0][of].replace(",", ".")) for of in ("system time", "experiment time"))
-                    zero_ns = int((of_day - at) * NS)
+                    zero_ns = int((of_day - at) * S)
             elif [row.get("platform", "").lower() for row in rows[:1]] == ["ios"]:
                 flipped = rows[0].get("standardisation", "").lower() != "true"
                 remark = FLIPPED if flipped else remark

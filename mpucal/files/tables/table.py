@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clocks import S
 from ...clocks.stamps import FEWEST, sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from .cells import DAY_NS, Cells, Kind, is_number, kind_of, parse_cell, since_first, since_midnight, with_point
 from .names import ACC, COUNTS_OF_XSENS, GYR, LONGEST_OF_MTI, NANOSECONDS, TIME, Column, axes_of, parse_header
-from .units import NS, QUANTITIES, find_unit
+from .units import QUANTITIES, find_unit
 
 # units of a column beside whole seconds
 BELOW_A_SECOND = ("ms", "us", "ns")
@@ -147,14 +148,14 @@ class Table:
         parts = [c for c in self.columns if c.quantity == NANOSECONDS and unit == "s"]
         if self.kinds[column.place] is Kind.MOMENT:
             below = [c for c in self.columns if c.quantity == TIME and c.unit in BELOW_A_SECOND and c != column]
-            parts, unit = [] if any(found % NS) else below, "ns"
+            parts, unit = [] if any(found % S) else below, "ns"
         elif unit in ("", "s") and (of_day := since_midnight(found)) is not None:
             found, unit = of_day, "s"
         if parts:
-            ticks = round(QUANTITIES[TIME][parts[0].unit or "ns"] * NS)
+            ticks = round(QUANTITIES[TIME][parts[0].unit or "ns"] * S)
             more = self._exact(parts[0], kept) * ticks
-            if len(more) and max(more) < NS:
-                found, unit = found * (1 if unit == "ns" else NS) + more, "ns"
+            if len(more) and max(more) < S:
+                found, unit = found * (1 if unit == "ns" else S) + more, "ns"
         since, first = since_first(found)
         if not unit and column.name.strip().lower() == COUNTS_OF_XSENS and sample_period(since) <= LONGEST_OF_MTI:
             unit = "0.1ms"

@@ -10,12 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
+from ...clocks import S
 from ...clocks.stamps import FEWEST, Clock, Numbers, are_gaps, fit_clock, sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import shown_units as units
-from .units import DAYS, NS, QUANTITIES, resolve_unit
+from .units import DAYS, QUANTITIES, resolve_unit
 
 # s between two files, or parts of one, without a common clock: longer than the gaps that a bus leaves
 GAP_S = 15.0
@@ -25,7 +26,7 @@ ANEW_S = 1.0
 COUNTER_BITS, OVERFLOW_STEPS = (16, 32), 100.0
 # ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
 UTC_NS = (10**18, 41 * 10**17)
-_NS_OF = {unit: round(s * NS) for unit, s in QUANTITIES["t"].items()}
+_NS_OF = {unit: round(s * S) for unit, s in QUANTITIES["t"].items()}
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def utc_ns(stream: Stream, of_t: str) -> int | None:
     unit = of_t.removeprefix("times in ").partition(",")[0]
     if stream.ticks is None or unit not in QUANTITIES["t"] or unit == DAYS:
         return None
-    return plausible_utc_ns(round(stream.origin * round(QUANTITIES["t"][unit] * NS)) + (stream.zero_ns or 0))
+    return plausible_utc_ns(round(stream.origin * round(QUANTITIES["t"][unit] * S)) + (stream.zero_ns or 0))
 
 
 def plausible_utc_ns(ns: int) -> int | None:

@@ -7,7 +7,6 @@ import math
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import RecordingError
 
-NS = 1_000_000_000
 COUNTS, DAYS = "counts", "days"
 # quantity -> unit -> SI
 QUANTITIES = {

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
+from ...clocks import S
 from ...errors import LinkError
 from ..dialect import Message
 from ..firmwares import EKF2_IMU_CTRL, FILTERS, PX4
-from ..link import Link, S
+from ..link import Link
 from ..requests import ask
 from .encoding import REAL32, as_float32, decode_parameter, error_name, name_bytes, to_wire
 from .mounting import BOARD_ANGLES, BOARD_ROTATION, CUSTOM_ANGLES, ORIENTATION

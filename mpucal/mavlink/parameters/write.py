@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...clocks import S
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...errors import EndOfCapture, MpucalError, WriteBackError
 from ...result.journal import Journal
-from ..link import Link, S
+from ..link import Link
 from ..requests import is_armed
 from ..rest import RestMeans
 from .client import read_agreed, require_parameters, set_parameter

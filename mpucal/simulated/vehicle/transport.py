@@ -7,7 +7,8 @@ from collections import deque
 from collections.abc import Sequence
 from random import Random
 
-from ...mavlink.transport import US, ReceivedBytes
+from ...clocks import US
+from ...mavlink.transport import ReceivedBytes
 from ..faults import FAULTS, Fault, Where
 from .vehicle import SimulatedVehicle
 

@@ -8,7 +8,8 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Any
 
-from ...clocks.device_clocks import S_US, US
+from ...clocks import US
+from ...clocks.device_clocks import S_US
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect

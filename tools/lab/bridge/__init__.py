@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 from mpucal.bridge import board
 from mpucal.bridge.messages import Feature, Status
 from mpucal.chip.access import Bus
-from mpucal.clocks.device_clocks import US, WRAP
+from mpucal.clocks import US
+from mpucal.clocks.device_clocks import WRAP
 from mpucal.errors import BusError, NoAnswer
 from mpucal.result.blob import MAGIC
 
