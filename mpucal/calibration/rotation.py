@@ -67,6 +67,16 @@ def turned(phi: Vector) -> Vector:
     return _kernel.turn(np.ascontiguousarray(phi))[0]
 
 
+def turn_by_matrix(steps: Vector, K: Vector) -> Vector:
+    """Return derivatives (3, 6) [rad] of a turn by the upper triangle of the gyroscope's symmetric matrix K.
+
+    They are rotation vectors in the axes of the turn's end. steps : (n, 3) rad, of the gyroscope without K.
+    """
+    arrived = _kernel.turn(-steps @ K.T, np.ascontiguousarray(steps))[1]
+    by_K = -arrived - np.swapaxes(arrived, 1, 2) * (1.0 - np.eye(3))
+    return by_K[:, *np.triu_indices(3)]
+
+
 def sides_down(s: Vector) -> NDArray[np.intp]:
     """Return (n,) 0 to 5, the axis nearest to each specific force s (n, 3), with its sign."""
     axis = np.abs(s).argmax(axis=1)

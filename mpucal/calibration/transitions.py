@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Vector
-from ..kernel import _kernel
 from .parameters import NAMES, PLACES
 from .preprocessing import Preprocessed
 from .problem import Series
-from .rotation import cross, cross_rows, lengths, turned
-from .theta import UPPER, Theta
+from .rotation import cross, cross_rows, lengths, turn_by_matrix, turned
+from .theta import Theta
 
 MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 FEWEST_TRANSITIONS = 3  # fewer cannot contradict each other
@@ -142,22 +141,26 @@ def leverages(
 
 
 def jacobians(transitions: Sequence[Transition], series: Series, theta: Theta) -> Vector:
-    """Return derivatives (k, 3, p) of the misses u x v in the order of NAMES, with u and v near each other."""
-    # phi is the error of the turn in the axes of its end; that of a step is -dt dK (omega - b_omega), as the rests
-    # determine b_omega.
+    """Return derivatives (k, 3, p) of the misses in the order of NAMES, as the rests determine b_omega."""
     steps = [series.dt[of.span, None] * (series.omega[of.span] - theta.b_omega) for of in transitions]
-    arrived = np.array([_kernel.turn(-step @ theta.K.T, step)[1] for step in steps])
-    by_K = -arrived - np.swapaxes(arrived, 2, 3) * (1.0 - np.eye(3))
-    phi = np.zeros((len(transitions), 3, len(NAMES)))
-    phi[:, :, PLACES["K"]] = by_K[:, :, *UPPER]
-    F, leaving, v = (np.array([getattr(of, name) for of in transitions]) for name in ("F", "leaving", "coming"))
+    phi = np.array([turn_by_matrix(step, theta.K) for step in steps])
+    F, leaving, coming = (np.array([getattr(of, name) for of in transitions]) for name in ("F", "leaving", "coming"))
+    return miss_jacobians(F, leaving, coming, theta.inverse, phi)
+
+
+def miss_jacobians(F: Vector, leaving: Vector, coming: Vector, inverse: Vector, phi: Vector) -> Vector:
+    """Return derivatives (k, 3, p) of the misses u x v in the order of NAMES, with u and v near each other.
+
+    inverse : (3, 3), that of D. phi : (k, 3, 6), see turn_by_matrix.
+    """
     u = np.einsum("kij,kj->ki", F, leaving)
-    du = F @ _by_accelerometer(theta.inverse, leaving) - cross(u) @ phi
-    J = cross(u) @ _by_accelerometer(theta.inverse, v) - cross(v) @ du
-    return np.asarray(J / (lengths(u) * lengths(v))[:, None, None])
+    du = F @ by_accelerometer(inverse, leaving)
+    du[:, :, PLACES["K"]] -= cross(u) @ phi
+    J = cross(u) @ by_accelerometer(inverse, coming) - cross(coming) @ du
+    return np.asarray(J / (lengths(u) * lengths(coming))[:, None, None])
 
 
-def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
+def by_accelerometer(inverse: Vector, s: Vector) -> Vector:
     """Return derivatives (k, 3, p) of gravities s = inv(D) (y - b_a) (k, 3): ds = -inv(D) (dD s + db_a)."""
     ds = np.zeros((len(s), 3, len(NAMES)))
     ds[:, :, PLACES["D"]] = -np.einsum("ai,kj->kaij", inverse, s).reshape(-1, 3, 9)

@@ -7,7 +7,6 @@ Both errors are compared with their predicted standard deviations (1 sigma).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,18 +19,15 @@ from ..rests.intervals import RestFinder
 from ..result.calibration import Calibration
 from .fit import Fit
 from .hypothesis_tests import MOST_STD
-from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
-from .rotation import turned
-from .theta import UPPER, from_elements
+from .parameters import NAMES
+from .rotation import turn_by_matrix, turned
+from .transitions import by_accelerometer, miss_jacobians
 
 # Errors in no covariance: a mounting is not perfectly stiff, and the gyroscope's bias wanders during the turning.
 FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02)
 LEAST_REST_S, BLOCK_S = 0.75, 0.25
 # In longer intervals of a vehicle, in periods, a sample is missing, or its time is late: their turn is not known.
 LONG = 1.5
-# Only an autopilot's simulator turns so fast and so suddenly; the last number is the error of its rates, low-passed and
-# at 200 samples/s.
-LEAP_RAD_S, LEAP_RAD_S2, LEAP_RAD = np.radians([200.0, 10_000.0, 0.5]).tolist()
 
 
 @dataclass(frozen=True)
@@ -95,26 +91,20 @@ def _verify(
     rates = 0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega
     steps = dt[:, None] * rates
     noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
-    gyro_var = 2.0 * noise + (LEAP_RAD**2 if _leaps(r.gyr[between], dt) else 0.0)
+    # The mean of two rates is not the rate between them: the error of the trapezoidal rule.
+    bends = np.diff(rates, axis=0) * dt[1:, None] / 12.0
+    gyro_var = 2.0 * noise + float(np.sum(bends * bends))
 
-    def length_of(theta: Vector) -> Vector:
-        return np.array([np.linalg.norm(_calibrated(theta, y))])
-
-    def miss_of(theta: Vector) -> Vector:
-        # the sine (3,) of the angle from gravity as carried to gravity here, along its axis
-        F = turned(-(steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
-        return np.cross(_unit(F @ _calibrated(theta, z)), _unit(_calibrated(theta, y)))
-
-    theta, covariance = _theta(fit)
-    s, miss, of_length, of_miss = (
-        _calibrated(theta, y),
-        miss_of(theta),
-        _slope(length_of, theta),
-        _slope(miss_of, theta),
-    )
-    along = _unit(s) @ np.linalg.inv(fit.D)
-    length_var = float((of_length @ covariance @ of_length.T).item() + along**2 @ y_var)
-    miss_var = float(np.trace(of_miss @ covariance @ of_miss.T)) + gyro_var
+    inverse, at = np.asarray(np.linalg.inv(fit.D), np.float64), [NAMES.index(name) for name in fit.names]
+    leaving, s = (z - fit.b_a) @ inverse.T, (y - fit.b_a) @ inverse.T
+    F, gravities = turned(-(steps @ fit.K.T)), float(np.linalg.norm(leaving) * np.linalg.norm(s))
+    miss = np.cross(F @ leaving, s) / gravities
+    phi = turn_by_matrix(steps, fit.K)
+    of_miss = miss_jacobians(F[None], leaving[None], s[None], inverse, phi[None])[0][:, at]
+    up = s / np.linalg.norm(s)
+    of_length = up @ by_accelerometer(inverse, s[None])[0][:, at]
+    length_var = float(of_length @ fit.covariance @ of_length + (up @ inverse) ** 2 @ y_var)
+    miss_var = float(np.trace(of_miss @ fit.covariance @ of_miss.T)) + gyro_var
     miss_var += float(y_var.sum() + z_var.sum()) / gravity**2
     direction = math.asin(min(float(np.linalg.norm(miss)), 1.0))
     direction_std = math.hypot(math.sqrt(miss_var), FLOOR_RAD)
@@ -122,7 +112,7 @@ def _verify(
     unsure_rad = float(late @ np.linalg.norm(rates, axis=1)) if r.sensor.origin is Origin.VEHICLE else 0.0
     clipped = bool(r.gyr_clipped[between].any() or r.gap[b : c + 1].any())
     return NewOrientation(
-        down=-_unit(s),
+        down=-up,
         magnitude=float(np.linalg.norm(s) - gravity),
         magnitude_std=math.hypot(math.sqrt(length_var), FLOOR_MPS2),
         direction=direction,
@@ -145,40 +135,8 @@ def carried(recording: Recording, flat: Flat, known: Fit | Calibration, rest: sl
     return np.asarray(acc + np.cross(path - path[to], s) @ known.D.T)
 
 
-def _leaps(gyr: Vector, dt: Vector) -> bool:
-    """Return True if rates (n, 3) change faster than any hand's over the intervals dt (n - 1,) [s]."""
-    fast = bool((np.abs(gyr) > LEAP_RAD_S).any())
-    return fast and bool((np.abs(np.diff(gyr, axis=0)) > LEAP_RAD_S2 * dt[:, None]).any())
-
-
-def _calibrated(theta: Vector, y: Vector) -> Vector:
-    return np.asarray(np.linalg.solve(theta[:9].reshape(3, 3), y - theta[9:12]))
-
-
-def _theta(fit: Fit) -> tuple[Vector, Vector]:
-    """Return D, b_a and K's six (18,), and their covariance, zero for those that were not estimated."""
-    names = (*D_NAMES, *B_A_NAMES, *K_NAMES)
-    place = {name: i for i, name in enumerate(fit.names)}
-    covariance = np.zeros((18, 18))
-    known = [i for i, name in enumerate(names) if name in place]
-    at = [place[names[i]] for i in known]
-    covariance[np.ix_(known, known)] = fit.covariance[np.ix_(at, at)]
-    return np.concatenate([fit.D.ravel(), fit.b_a, fit.K[UPPER]]), covariance
-
-
-def _slope(function: Callable[[Vector], Vector], theta: Vector) -> Vector:
-    """Return derivatives (m, 18) by central differences, exact enough for a prediction."""
-    h = 1e-5
-    steps = h * np.eye(len(theta))
-    return np.stack([(function(theta + step) - function(theta - step)) / (2.0 * h) for step in steps], axis=1)
-
-
 def _mean(part: Vector, rate_hz: float) -> tuple[Vector, Vector]:
     """Return the mean (3,) of a rest, and its variance by the spread of shorter means, as a tremor is not white."""
     n = max(round(BLOCK_S * rate_hz), 1)
     blocks = part[: len(part) // n * n].reshape(-1, n, 3).mean(1)
     return part.mean(0), blocks.var(0, ddof=1) / len(blocks)
-
-
-def _unit(v: Vector) -> Vector:
-    return np.asarray(v / max(float(np.linalg.norm(v)), 1e-9))

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..calibration.masks import with_masks
-from ..calibration.rotation import cross, turned
+from ..calibration.rotation import cross, turn_by_matrix, turned
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S, carried
 from ..calibration.words import decode
 from ..data import Recording, Vector
@@ -200,7 +200,7 @@ def _direction(rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _
         of_unit = (np.eye(3) - np.outer(unit, unit)) / rests.norm[at]
         J_rests[:, 3 * at : 3 * at + 3] = across @ matrix @ of_unit
     J_theta = np.zeros((2, PARAMETERS))
-    J_theta[:, G] = -across @ _gyroscope_jacobian(steps, rests.unit[k - 1], here)
+    J_theta[:, G] = -across @ cross(here) @ cross(here) @ turn_by_matrix(steps, np.eye(3))
     noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
     noise += FLOOR_RAD**2 + (TURN_NONLINEARITY * float(np.linalg.norm(steps, axis=1).sum())) ** 2
     return _Residuals(across @ np.cross(there, here), J_rests, J_theta, np.full(2, noise))
@@ -237,14 +237,3 @@ def _is_shaken(values: Vector, rate_hz: float) -> bool:
 def accelerometer_jacobian(a: Vector) -> Vector:
     """Return the derivatives (3, 12) of E s + beta by E, row-major, and beta, at s = a."""
     return np.hstack([np.kron(np.eye(3), a), np.eye(3)])
-
-
-def _gyroscope_jacobian(steps: Vector, before: Vector, here: Vector) -> Vector:
-    """Return the derivatives (3, 6) of the direction error by G, by central differences."""
-    columns, h = [], 1e-4
-    for i, j in zip(*UPPER, strict=True):
-        change = np.zeros((3, 3))
-        change[i, j] = change[j, i] = h
-        plus, minus = (np.cross(turned(-(steps @ (np.eye(3) + sign * change))) @ before, here) for sign in (1.0, -1.0))
-        columns.append((plus - minus) / (2.0 * h))
-    return np.stack(columns, axis=1)
