@@ -6,7 +6,6 @@ correction that had been written there would be lost.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
 from typing import Any
@@ -25,7 +24,7 @@ from ..chip.quick_measure import PATIENCE, run_self_test, temporary_measurement
 from ..chip.setup import read_identity
 from ..data import Sensor
 from ..errors import BoardMoved, ChipError, ChipReset, SourceError, UnknownOffsets
-from ..session.ports import polled
+from ..session.ports import measured
 from ..sources.chip import OpenedChip
 from .dead_axes import DEAD_AXIS, REPLACE, STUCK_BITS, examine_bits
 from .finding import Finding, Mark
@@ -99,8 +98,7 @@ def _examine_chip(
     if not part.fifo_bytes:
         yield Finding("FIFO", Mark.NOTE, NO_FIFO, f"take --rate {MOST_POLLED_HZ} or less, and a bus of 400 kHz")
     yield _factory_trim(port, family, olds)
-    deque(polled(driver, seconds), maxlen=0)
-    recording = driver.recording()
+    recording = measured(driver, seconds)
     if len(recording) > config.rate_hz:
         yield from examine_stream(recording, config.rate_hz, seconds, family, remedy_of(driver.faults))
     else:

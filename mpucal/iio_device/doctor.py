@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -15,7 +14,7 @@ from ..errors import SourceError
 from ..iio.attributes import ACCEL, GYRO
 from ..iio.decode import ENABLE
 from ..iio.setup import POLLED, TRIGGER
-from ..session.ports import polled
+from ..session.ports import measured
 from .source import OpenedIio
 
 # Time until a buffer runs steadily, and the board is put down.
@@ -37,15 +36,14 @@ def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
         ranges = f"±{sensor.accel_range_g or 0:g} g, ±{sensor.gyro_range_dps or 0:g} deg/s"
         yield Finding("ranges", Mark.OK, ranges if sensor.accel_range_g else "unknown: the driver does not state them")
         try:
-            deque(polled(driver, SETTLED_S), maxlen=0)
+            measured(driver, SETTLED_S)
             driver.forget()
-            deque(polled(driver, seconds), maxlen=0)
+            recording = measured(driver, seconds)
         except SourceError as error:
             yield Finding.failed("stream", error)
             return
         finally:
             driver.stop()
-    recording = driver.recording()
     rate_hz = sensor.rate_hz or source.plan.config.rate_hz
     if len(recording) > rate_hz / 2:
         part = PARTS.get(sensor.who_am_i or 0)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import replace
@@ -34,7 +33,7 @@ from ..result.calibration import Calibration
 from ..result.error_model import mg_text
 from ..result.journal import Journal
 from ..session.lay_flat import put_down
-from ..session.ports import polled
+from ..session.ports import measured
 from ..sinks.chip import check_shift, subtraction
 from ..sinks.kind import Applied, Device, Sink
 from ..sinks.old_state import check_accepted, load_state, not_a_state, nothing_written, restore_on_failure, save_state
@@ -157,8 +156,7 @@ class KernelSink(Sink):
         try:
             for _ in range(TRIES):
                 driver.forget()
-                deque(polled(driver, REST_S), maxlen=0)
-                acc = driver.recording().acc
+                acc = measured(driver, REST_S).acc
                 if len(acc) > FEWEST and is_untouched(acc):
                     return np.asarray(acc.mean(axis=0), np.float64)
         finally:

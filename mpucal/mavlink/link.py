@@ -212,6 +212,14 @@ class Link:
         self._vehicle, self._seeking, self.armed = None, False, None
         self._now_ns = self._next_heartbeat_ns = max(self._now_ns, self._transport.now_ns())
 
+    def succeeds(self, attempt: Callable[[], bool], within_ns: int) -> bool:
+        """Repeat an attempt, which listens, until it returns True; return False if none did that began in time."""
+        end_ns = self._now_ns + within_ns
+        while not attempt():
+            if self._now_ns >= end_ns:
+                return False
+        return True
+
     def close(self) -> None:
         """Close the transport."""
         self._transport.close()

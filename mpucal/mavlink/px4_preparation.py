@@ -71,14 +71,12 @@ class Preparation:
         self._say(f"Lay {vehicle} level, top up: it assigns ids to its accelerometers then, and offsets as it lies.")
         self._link.send(encode_prompt(ReceivedPrompt("lay_flat", None)))
         send_command(self._link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[HIGHRES], INTERVAL_US)
-        end_ns = self._link.now_ns() + LEVEL_NS
-        while not self._is_level():
-            if self._link.now_ns() >= end_ns:
-                self._say(
-                    f"{vehicle} did not lie level within {LEVEL_DEG} degrees, so it assigns no accelerometer ids:"
-                    " start again with it on a level table."
-                )
-                return
+        if not self._link.succeeds(self._is_level, LEVEL_NS):
+            self._say(
+                f"{vehicle} did not lie level within {LEVEL_DEG} degrees, so it assigns no accelerometer ids:"
+                " start again with it on a level table."
+            )
+            return
         self._say(
             "It assigns accelerometer ids now: do not touch it. If this session writes nothing, it keeps these offsets."
         )

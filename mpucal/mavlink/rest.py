@@ -169,15 +169,17 @@ class Horizon:
         if answer not in (None, m.MAV_RESULT_ACCEPTED):
             return False
         self._link.seek()
-        end_ns = self._link.now_ns() + BACK_NS
-        while self._link.now_ns() < end_ns:
+
+        def is_back() -> bool:
             self._boot_ms = None
             self._request()
             self._listen(S)
-            if self._boot_ms is not None and self._boot_ms < before_ms:
-                self._heard.clear()
-                return True
-        raise LinkError(f"{self._link.vehicle} did not come back after its reboot", "check its power and the link")
+            return self._boot_ms is not None and self._boot_ms < before_ms
+
+        if not self._link.succeeds(is_back, BACK_NS):
+            raise LinkError(f"{self._link.vehicle} did not come back after its reboot", "check its power and the link")
+        self._heard.clear()
+        return True
 
     def error_deg(self, stream: Stream, trim_deg: Vector) -> Vector | None:
         """Return roll and pitch (2,) by which the settled attitude differs from gravity; None if it does not rest.

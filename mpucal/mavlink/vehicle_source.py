@@ -219,15 +219,13 @@ class VehicleSource:
 
     def _wait_for_return(self) -> None:
         """Have the vehicle stream again after a reboot, a silence or a pause, and read its parameters again."""
-        end_ns = self._link.now_ns() + BACK_NS
         if not self._rebooted:
             self._link.seek()
-        while not self._request_samples():
-            if self._link.now_ns() >= end_ns:
-                raise LinkError(
-                    f"{self._link.vehicle} {self._fault()}",
-                    "check its power and the link, and that no other ground station stops its IMU messages",
-                )
+        if not self._link.succeeds(self._request_samples, BACK_NS):
+            raise LinkError(
+                f"{self._link.vehicle} {self._fault()}",
+                "check its power and the link, and that no other ground station stops its IMU messages",
+            )
         read_stream_parameters(self._link)
         self._rebooted = False
         self._say(f"{self._link.vehicle} is back, its parameters are read again: go on.")

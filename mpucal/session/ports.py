@@ -45,6 +45,13 @@ def polled(source: Source, seconds: float | None = None) -> Iterator[Samples]:
         yield source.poll()
 
 
+def measured(source: Source, seconds: float) -> Recording:
+    """Poll a started source for `seconds` of its time; return the samples since the last `forget`; see `polled`."""
+    for _ in polled(source, seconds):
+        pass
+    return source.recording()
+
+
 class Operator(Protocol):
     """The person who follows the prompts and presses keys."""
 
