@@ -149,6 +149,7 @@ REFUSED = {
     "stuck for 4 s": ("hand", changed(put(slice(1900, 2300), 2, None)), "bits_stuck", "on z from 19 to 23 s, though"),
     "gravity alone": ("hand", changed(only_gravity), "not_raw", "stays within", "raw accelerometer"),
     "gravity that is followed": ("pose12", followed, "not_raw", "no hand moves so smoothly", "raw accelerometer"),
+    "two sensors": ("hand", changed(plus(slice(None, None, 2), 0.1)), "not_raw", "every other reading", "--sensor"),
     "no gravity": ("hand", changed(lambda acc: 0.3 * (acc - only_gravity(acc))), "not_raw", "no gravity in it"),
     "few rests at a half": ("turns", changed(gyr=lambda gyr: 0.25 * gyr), "gyro_off", "4 times as", "--gyro-range"),
     "mirrored": ("bench", changed(lambda acc: acc * [1.0, -1.0, 1.0]), "left_handed", "change the sign of its y axis"),

@@ -47,6 +47,7 @@ TABLE = (
     Row(unusable.gyroscope_unit, unusable=True, of_gyroscope=True),
     Row(unusable.never_still, unusable=True),
     Row(unusable.hardly_turned, "flat", unusable=True),
+    Row(unusable.two_sensors, "flat", unusable=True),
     Row(unusable.dead_accelerometer, "flat", unusable=True),
     Row(unusable.dead_gyroscope, "flat", unusable=True, of_gyroscope=True),
     Row(recording.moved_while_still, "flat"),

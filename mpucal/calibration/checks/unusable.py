@@ -10,6 +10,7 @@ from ...reasons import Reason, reason
 from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 from ...rests.limits import LEAST_TURN_RAD
 from ..evidence import Evidence, once
+from ..hypothesis_tests import MOST_STD
 from ..masks import stuck_readings
 from ..rotation import lengths
 from ..scores import FEWEST_SAMPLES
@@ -77,6 +78,21 @@ def same_magnitude(e: Evidence) -> Reason | None:
         return None
     degrees = np.rad2deg(e.gravity_moved)
     return reason("not_raw", "same_magnitude", spread=np.std(size), magnitude=np.mean(size), degrees=degrees)
+
+
+def two_sensors(e: Evidence) -> Reason | None:
+    """Find readings of two sensors by turns: every other one differs by the same amount all along the rest."""
+    readings = np.hstack([e.recording.acc, e.recording.gyr])[e.rest.first : e.rest.last]
+    size = len(readings) // (2 * FEWEST_SAMPLES)
+    if not size:
+        return None
+    pairs = readings[: 2 * FEWEST_SAMPLES * size].reshape(FEWEST_SAMPLES, size, 2, 6)
+    differences = np.diff(pairs, axis=2)[:, :, 0].mean(axis=1)
+    apart = np.abs(differences.mean(axis=0))
+    # a vibration, even of half the sample rate, changes its phase
+    if not (apart > MOST_STD * differences.std(axis=0)).any():
+        return None
+    return reason("not_raw", "two_sensors", apart=apart[:3].max(), rates=np.rad2deg(np.nan_to_num(apart[3:]).max()))
 
 
 def gyroscope_unit(e: Evidence) -> Reason | None:
