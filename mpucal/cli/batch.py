@@ -20,12 +20,11 @@ from ..disk.atomic import write_atomically
 from ..disk.output_folder import OutputFolder
 from ..errors import SourceError, UsageError
 from . import amended, typed_words
-from .common import PATH, duration, output_option, say
+from .common import PATH, PROGRESS_S, duration, output_option, say
 from .options import fit_options
 from .recording_options import hint_options, hint_words, make_hints, read_hints_file
 
 EXAMPLE = "Example: `mpucal batch 'line3/*.mcap' -o fleet --workers 1`"
-EVERY_S = 2.0
 REPORTS, HINTS = "reports", "hints.txt"
 
 
@@ -88,7 +87,7 @@ def _follow(progress: Iterator[Progress]) -> bool:
     said_s, any_read = time.monotonic(), False
     for each in progress:
         any_read = each.failed < each.done
-        if time.monotonic() - said_s > EVERY_S or each.done == each.of:
+        if time.monotonic() - said_s > PROGRESS_S or each.done == each.of:
             said_s = time.monotonic()
             say(_progress_text(each))
     return any_read

@@ -24,7 +24,7 @@ from ..recheck.update import update_biases
 from ..result.calibration import Calibration
 from ..result.clock import iso_utc
 from ..result.session_files import BLOB, DOCUMENT
-from ..session.results import SessionFolder, check_owner, save
+from ..session.results import SessionFolder, calibration_files, check_owner, save
 from ..sinks.choose import choose_sinks
 from ..sinks.table import SINKS
 from ..sinks.write_back import file_recorder
@@ -131,7 +131,7 @@ def _check(
     files = {CHECK_FILE: (json.dumps(result.document(), indent=2) + "\n").encode()}
     if result.only_biases:
         new = update_biases(old, result, recording, iso_utc())
-        files |= {BLOB.name: new.blob().encode(), DOCUMENT.name: new.json().encode()}
+        files |= calibration_files(new)
     save(folder.path, files)
     click.echo(f"\nWritten to {folder.path}:\n  {', '.join(files)}", err=as_json)
     return result, [folder.path / name for name in files]

@@ -27,6 +27,10 @@ def say_done(clauses: Sequence[str], err: bool = False) -> None:
     click.echo(f"Done: {told}.", err=err)
 
 
+# Interval of the progress on a terminal.
+PROGRESS_S = 2.0
+
+
 def duration(seconds: float) -> str:
     """Return a time in s, min or h."""
     if seconds < 100.0:

@@ -10,7 +10,7 @@ from ..disk.atomic import check_not_input
 from ..disk.output_folder import OutputFolder
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
-from ..session.results import check_owner, save
+from ..session.results import calibration_files, check_owner, save
 from .common import CALIBRATION_PATH, force_option, json_option, load_trusted, output_option, say
 from .summary import slope, summary
 
@@ -35,8 +35,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as
     if folder is not None:
         check_owner(folder, made.calibration, None, "merge", *map(str, calibrations))
         with OutputFolder(folder) as into:
-            document, blob = made.calibration.json().encode(), made.calibration.blob().encode()
-            save(into.path, {BLOB.name: blob, DOCUMENT.name: document})
+            save(into.path, calibration_files(made.calibration))
     for sentence in (made.why, *made.remarks):
         say(sentence)
     if as_json:

@@ -27,7 +27,7 @@ from ..session.lay_flat import PUT_DOWN, put_down
 from ..session.ports import Source, polled
 from ..session.results import save
 from ..sources.opening import open_source
-from .common import PATH, duration, json_option, output_option, say
+from .common import PATH, PROGRESS_S, duration, json_option, output_option, say
 from .options import ABOVE_ZERO, given_options
 from .recording_options import given_hints, hint_options, say_interpretation
 from .source_options import check_input, check_source, source_options
@@ -36,8 +36,8 @@ EXAMPLE = "Example: `mpucal noise walk.npz -o noise`, or `mpucal noise --bus sim
 DOCUMENT, PAGE = "noise.json", "noise.html"
 # Wanted relative standard uncertainty of the bias instability.
 WANTED_STD = 0.1
-# Interval of the progress [s], on a terminal or not.
-PROGRESS_S = {True: 2.0, False: 60.0}
+# Interval of the progress [s] in a log.
+LOGGED_S = 60.0
 # Runs of a second in which a person puts the board down.
 PUT_DOWN_RUNS = 5
 
@@ -131,7 +131,7 @@ def _progress() -> Iterator[Any]:
 
     def show(meter: NoiseMeter, seconds: float | None) -> None:
         nonlocal shown_s
-        if monotonic() - shown_s < PROGRESS_S[on_a_terminal]:
+        if monotonic() - shown_s < (PROGRESS_S if on_a_terminal else LOGGED_S):
             return
         shown_s = monotonic()
         of = "" if seconds is None else f" of {duration(seconds)}"

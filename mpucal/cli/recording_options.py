@@ -18,10 +18,9 @@ from ..files.hints import Hints, parse_columns, parse_span, parse_units
 from ..files.reading import MOST_MB, VARIABLE, allowed_bytes
 from ..files.rows import Rows
 from ..sources.kind import Option
+from ..strict_json import MOST_BYTES
 from .common import Decorator, say, together
 from .options import ABOVE_ZERO, given_options, option_of
-
-MOST_BYTES = 1 << 20
 
 
 def _allow(_context: click.Context, _option: click.Parameter, megabytes: int | None) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
+from ..strict_json import DEEPEST
 from .reading import allowed_bytes, check_size, import_extra
 
 HEAD = 128
@@ -32,7 +33,6 @@ DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"
 # of letters in UTF-8, UTF-16 and UTF-32
 DTYPES |= {16: "u1", 17: "u2", 18: "u4"}
 CELLS, STRUCTURE, LETTERS, NUMBERS, OBJECT = 1, 2, 4, range(6, 16), 17
-DEEPEST = 8
 # class of an object that holds columns -> the command of MATLAB that writes it as a table of text
 EXPORTS = {
     "timetable": "writetimetable({0}, '{0}.csv')",

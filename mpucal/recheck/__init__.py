@@ -12,7 +12,7 @@ from ..origin import name_thing
 from ..result.calibration import Calibration
 from ..result.correction import make_correction, other_who_am_i, same_trim
 from . import drift
-from .hypotheses import NOTHING, Comparison, compare_hypotheses, estimate, p_value
+from .hypotheses import FALSE_ALARMS, NOTHING, Comparison, compare_hypotheses, estimate, p_value
 from .observed import NOISE, Observations, apply_errors, observe
 from .outcome import (
     ANOTHER_SENSOR,
@@ -35,8 +35,6 @@ MOST_BIAS_STD_MG = 2.5
 NEAR_LOG_ODDS = 3.0
 # Below this p-value under any hypothesis the rests contradict each other: the board was not at rest.
 LEAST_P_VALUE = 1e-6
-# Above this p-value the change of temperature explains the observations.
-EXPLAINED_P_VALUE = 0.01
 VERDICTS = {"mount": REMOUNTED, "another sensor": ANOTHER_SENSOR}
 REPEAT = "lay the board flat for 10 s, then hold it for 2 s in three orientations 20 deg or more apart"
 CALIBRATE_AGAIN = "calibrate it anew, with `mpucal session`"
@@ -94,7 +92,7 @@ def _assess(calibration: Calibration, recording: Recording, observed: Observatio
     explains = None
     if likeliest != NOTHING:
         if drift.TEMPERATURE in hypotheses:
-            explains = p_value(observed, nothing + hypotheses[drift.TEMPERATURE][1]) > EXPLAINED_P_VALUE
+            explains = p_value(observed, nothing + hypotheses[drift.TEMPERATURE][1]) > FALSE_ALARMS
         P = nothing + hypotheses[likeliest][1]
         theta, covariance = estimate(_relinearise(observed, recording, calibration, P), P)
     else:

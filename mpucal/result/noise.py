@@ -19,7 +19,7 @@ from ..strict_json import MOST_BYTES, parse_json
 from .calibration import Calibration
 from .document import plain
 
-FORMAT, VERSION = "mpucal.noise", 1
+FORMAT = "mpucal.noise"
 # its key in calibration.json
 KEY = "noise"
 ACCELEROMETER, GYROSCOPE = "accelerometer", "gyroscope"
@@ -95,7 +95,7 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
 
         document = {
             "format": FORMAT,
-            "version": VERSION,
+            "version": 1,
             "created": self.created,
             "sensor": {key: value for key, value in vars(self.sensor).items() if value is not None},
             "rate_hz": self.rate_hz,

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 from ..origin import Origin, name_thing
+from ..rests.limits import LEAST_TURN_RAD
 from ..result.orientation import AXES, named_axes
 from .events import Direction, Output
 
@@ -18,7 +19,7 @@ T = TypeVar("T", bound=Output)
 
 BOARD, PLAIN, VEHICLE = "gy-521", "plain", "vehicle"
 # A board lies flat if at least this share of gravity is along its z axis.
-LIES = math.cos(math.radians(20.0))
+LIES = math.cos(LEAST_TURN_RAD)
 # Share of gravity along an axis from which a tilt is named after it.
 TILTED = 0.15
 

@@ -35,6 +35,11 @@ def result_files(
         yield TRUTH.name, (json.dumps(truth, indent=2) + "\n").encode()
 
 
+def calibration_files(calibration: Calibration, name: str = DOCUMENT.name) -> dict[str, bytes]:
+    """Return the blob and the document `name` of a calibration, by name."""
+    return {Path(name).with_suffix(".bin").name: calibration.blob().encode(), name: calibration.json().encode()}
+
+
 def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     """Write files by name, all or none, with calibration.json last; then the report, whose failure keeps the others.
 

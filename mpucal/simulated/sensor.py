@@ -14,7 +14,7 @@ from .motion import Motion
 
 Counts = NDArray[np.int16]
 
-FULL_SCALE = 32768
+FULL_SCALE = int(ACCEL_COUNTS)
 TEMPERATURE_NOISE_C = 0.02
 
 

@@ -15,7 +15,7 @@ from ..result.calibration import REFUSED, Calibration
 from ..result.clock import iso_utc
 from ..result.keys import FORMAT
 from ..result.session_files import DOCUMENT
-from ..session.results import result_files, save
+from ..session.results import calibration_files, result_files, save
 from ..strict_json import MOST_BYTES, parse_json
 from .kind import Applied, Device, Effect, Say, Sink, SinkKind
 from .old_state import interrupting
@@ -167,7 +167,7 @@ def file_recorder(path: Path) -> Recorder:
     """Return the recorder for the file `path` (.json) and a config blob (.bin) beside it."""
 
     def record(_kind: SinkKind, now: Calibration) -> Calibration:
-        save(path.parent, {path.with_suffix(".bin").name: now.blob().encode(), path.name: now.json().encode()})
+        save(path.parent, calibration_files(now, path.name))
         return now
 
     return record

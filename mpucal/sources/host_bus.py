@@ -184,8 +184,10 @@ class RegisterBus(HostBus, ABC):
         """Read up to `count` bytes, as many as fit into one message."""
 
 
-def find_chip(path: str, addresses: Sequence[int], who_am_i: Callable[[int], int]) -> int:
+def find_chip(path: str, only: int | None, who_am_i: Callable[[int], int]) -> int:
     """Return the first address at which a known part answers `who_am_i`, else the first at which anything answers.
+
+    `only` : the one address to ask; None: ADDRESSES.
 
     Each is asked again if it is silent: one acknowledge in a hundred may be lost.
 
@@ -193,6 +195,7 @@ def find_chip(path: str, addresses: Sequence[int], who_am_i: Callable[[int], int
     ------
     BusError : the first failure of a transfer if nothing answers. NoAnswer : nothing acknowledges.
     """
+    addresses = ADDRESSES if only is None else (only,)
     failures: list[BusError] = []
     others: list[int] = []
     for address in addresses:

@@ -105,7 +105,7 @@ class I2cBus(RegisterBus):
                 raise BusError(f"the adapter {self._path} transfers single bytes only", "use another adapter")
             self._longest = SMBUS_BLOCK_BYTES if self._blocks else MAX_MESSAGE_BYTES
             self._repeated_start = True
-            self.address = find_chip(self._path, ADDRESSES if address is None else (address,), self._who_am_i)
+            self.address = find_chip(self._path, address, self._who_am_i)
             chip = f"the chip at 0x{self.address:02x} on {self._path}"
             lock_device(self._smbus.fd, chip, "end it, or use the other chip with --address", self.address)
         except BaseException:

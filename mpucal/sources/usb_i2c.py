@@ -15,7 +15,7 @@ from typing import Any
 from ..chip.registers import WHO_AM_I
 from ..errors import BusError
 from .chip import OpenedChip
-from .host_bus import ADDRESSES, RegisterBus, find_chip, no_answer_error
+from .host_bus import RegisterBus, find_chip, no_answer_error
 from .kind import Request
 
 I2C_HZ = 400_000
@@ -53,8 +53,7 @@ class UsbBus(RegisterBus):
                 "plug it in, end other programs that use it, and see docs/boards.md for permissions and drivers",
             ) from error
         try:
-            addresses = ADDRESSES if address is None else (address,)
-            self.address = find_chip(name, addresses, lambda each: self._exchange(each, WHO_AM_I, 1)[0])
+            self.address = find_chip(name, address, lambda each: self._exchange(each, WHO_AM_I, 1)[0])
         except BaseException:
             self.close()
             raise

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from ...clocks import S
 from ...clocks.sample_clock import GAP_INTERVALS
 from ...data import Vector
+from ...strict_json import MOST_DIGITS
 from ..reading import MOST_ODD
 
-# exponents of numbers beyond this would take all memory as integers
-MOST_DIGITS = 40
 # cells by which a column's kind is known
 LOOKED_AT = 50
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -89,6 +88,7 @@ def parse_cell(text: str) -> Decimal:
         text = "{}-{:0>2}-{:0>2}T{:0>2}:{:0>2}:{:0>2}.{:0<6}{}".format(*found.groups(""))
     try:
         number = Decimal(with_point(text))
+        # other exponents would take all memory as integers
         if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
             return number
     except InvalidOperation:
