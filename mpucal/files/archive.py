@@ -49,12 +49,14 @@ def load_archive(path: Path, hints: Hints = NO_HINTS) -> Recording:
 
 
 def _members(path: Path) -> list[str]:
-    """Return the names of an archive's files, without those of the computer that made it."""
+    """Return the name of an archive's recording, or of all files, without those of the computer that made it."""
     if path.suffix.lower() == ".gz":
         return [path.stem]
     with zipfile.ZipFile(path) as archive:
         names = [name for name in archive.namelist() if not name.endswith("/")]
-    return [name for name in names if not any(part.startswith((".", "__")) for part in Path(name).parts)]
+    names = [name for name in names if not any(part.startswith((".", "__")) for part in Path(name).parts)]
+    recordings = [name for name in names if formats.is_suffix(Path(name).suffix)]
+    return recordings if len(recordings) == 1 else names
 
 
 def _unpack(path: Path, into: Path) -> None:
