@@ -208,7 +208,7 @@ def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_p
 
 
 def test_packed_recordings_are_read_as_what_is_in_them(walk, table, assert_same, tmp_path):
-    """Read a file, and a folder of our own tables, beside what people and macOS add; name the file that cannot be read."""
+    """Read a file, and a folder of our own tables, beside what others add; name the file that cannot be read."""
     content = table("t,ax,ay,az,gx,gy,gz", walk.t, walk.acc, walk.gyr).read_bytes()
     (tmp_path / "walk.csv.gz").write_bytes(gzip.compress(content))
     (tmp_path / "cut.csv.gz").write_bytes(gzip.compress(content)[:-9])
