@@ -9,12 +9,13 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
+from ..result.correlation import UPPER
 from .levenberg_marquardt import Minimum
 from .likelihood import evaluate
 from .parameters import BY_NAME, HAND, PLACES
 from .preprocessing import smoothed_rates
 from .problem import Problem
-from .theta import UPPER, Prior
+from .theta import Prior
 
 K = BY_NAME["K"]
 MOST_STD = 4.0  # standard deviations of a normal deviate, beyond which chance explains nothing

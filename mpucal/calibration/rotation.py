@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
+from ..result.correlation import UPPER
 
 
 def lengths(v: Vector) -> NDArray[np.float64]:
@@ -74,7 +75,7 @@ def turn_by_matrix(steps: Vector, K: Vector) -> Vector:
     """
     arrived = _kernel.turn(-steps @ K.T, np.ascontiguousarray(steps))[1]
     by_K = -arrived - np.swapaxes(arrived, 1, 2) * (1.0 - np.eye(3))
-    return by_K[:, *np.triu_indices(3)]
+    return by_K[:, *UPPER]
 
 
 def sides_down(s: Vector) -> NDArray[np.intp]:

@@ -14,12 +14,13 @@ from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..rests.intervals import RestFinder, statistics
 from ..rests.tremor import SWAY_PER_S, mean_variance, without_tremor
+from ..result.correlation import UPPER
 from .fit import Fit
 from .hypothesis_tests import KNOWN, MOST_STD
 from .levenberg_marquardt import DECREMENT, MOST_ITERATIONS
 from .parameters import B_A_NAMES, BY_NAME, D_NAMES, Form
 from .poses import POSE_MPS2
-from .theta import UPPER, from_elements
+from .theta import from_elements
 from .transitions import REWEIGHTED
 
 BIAS_SD_MPS2 = 0.5

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..data import Sensor, Vector
 from ..rests.flat import Flat
+from ..result.correlation import UPPER
 from .parameters import BY_NAME, NAMES, PLACES, TABLE, Form, Parameter, estimated
 from .rotation import tangents
 
-UPPER = np.triu_indices(3)
 EXACT = estimated("imu")  # parameters of the exact filter
 
 

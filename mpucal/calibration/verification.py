@@ -91,10 +91,9 @@ def _verify(
     rates = 0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega
     steps = dt[:, None] * rates
     noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
-    # The mean of two rates is not the rate between them: the error of the trapezoidal rule.
-    bends = np.diff(rates, axis=0) * dt[1:, None] / 12.0
+    # The mean of two rates is not the rate between them: the trapezoidal rule errs by their second difference.
+    bends = np.diff(r.gyr[between], n=2, axis=0) * dt[1:, None] / 12.0
     gyro_var = 2.0 * noise + float(np.sum(bends * bends))
-
     inverse, at = np.asarray(np.linalg.inv(fit.D), np.float64), [NAMES.index(name) for name in fit.names]
     leaving, s = (z - fit.b_a) @ inverse.T, (y - fit.b_a) @ inverse.T
     F, gravities = turned(-(steps @ fit.K.T)), float(np.linalg.norm(leaving) * np.linalg.norm(s))

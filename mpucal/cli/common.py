@@ -15,6 +15,9 @@ from ..errors import WriteBackError
 from ..result.calibration import Calibration
 from ..result.session_files import DOCUMENT
 
+# Interval of the progress on a terminal.
+PROGRESS_S = 2.0
+
 
 def say(text: str) -> None:
     """Print a sentence on stderr."""
@@ -25,10 +28,6 @@ def say_done(clauses: Sequence[str], err: bool = False) -> None:
     """Print what was done, a line for each clause, on stdout or on stderr."""
     told = ";\n  ".join(clauses)
     click.echo(f"Done: {told}.", err=err)
-
-
-# Interval of the progress on a terminal.
-PROGRESS_S = 2.0
 
 
 def duration(seconds: float) -> str:

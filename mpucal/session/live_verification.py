@@ -23,7 +23,7 @@ from .events import Checked, Verification, triple
 from .rotate import REST_S
 
 # A shorter turn shows too little of a scale factor error to blame one.
-LEAST_TURN_RAD = np.deg2rad(40.0)
+LONG_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
 MUCH_CLIPPED = 0.002
 _IN_DOCUMENT = "down", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "agrees"
@@ -141,7 +141,7 @@ def _find_scale_error(rests: Sequence[NewOrientation]) -> tuple[str, float] | No
 
     The share minimises |miss - share * turn|^2 along the axis about which the board was turned most.
     """
-    long = [rest for rest in rests if np.linalg.norm(rest.turn) > LEAST_TURN_RAD]
+    long = [rest for rest in rests if np.linalg.norm(rest.turn) > LONG_TURN_RAD]
     if len(long) < 2:
         return None
     turn, miss = np.array([rest.turn for rest in long]), np.array([rest.miss for rest in long])

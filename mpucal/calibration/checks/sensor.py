@@ -10,12 +10,12 @@ import numpy as np
 from ...data import MOST_CLOCK_PPM, Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
+from ...result.correlation import UPPER
 from ...result.error_model import sensor_axes
 from ..evidence import Evidence, once
 from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
 from ..rotation import signed_permutations
-from ..theta import UPPER
 from ..transitions import MOST_MISS_RAD
 from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent
 
