@@ -47,9 +47,10 @@ GYRO_COUNTS = 32750.0
 MOST_CLOCK_PPM = 500.0
 # full-scale ranges of sensors in recordings, [g] and [deg/s]; those of a chip are in its registers
 ACCEL_RANGES_G, GYRO_RANGES_DPS = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000)
+# samples that are treated at once: 1 MB fits a cache; for larger products BLAS starts threads, which takes longer
+RUN = 1 << 14
 # names are exported to scripts and source code: these characters cannot end a string or comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
-BYTE = 0xFF
 MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")
 
 
@@ -104,7 +105,7 @@ def _parse_field(key: str, value: Any) -> Any:
         valid = isinstance(value, list | tuple) and len(value) == count and all(_is(kind, item) for item in value)
         value = tuple(value) if valid else value
     elif key == "who_am_i":
-        valid = _is(int, value) and 0 <= value <= BYTE
+        valid = _is(int, value) and 0 <= value <= 0xFF
     else:
         valid = _is(int | float, value) and (value >= 0 or key in MAY_BE_NEGATIVE)
     if not valid:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..chip.families import part_named
-from ..data import STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
+from ..data import RUN, STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from ..origin import name_thing
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
@@ -20,8 +20,6 @@ __all__ = ["NoiseMeter", "noise_of"]
 AXES = tuple(f"{sensor} {axis}" for sensor in (ACCELEROMETER, GYROSCOPE) for axis in "xyz")
 UNITS = tuple(unit for unit in ("m/s²", "rad/s") for _ in "xyz")
 LEAST_SAMPLES = 256
-# samples that are added at once, as their sums take a dozen times their memory
-RUN = 16384
 # degrees Celsius of a change that is reported; correlation of an axis with it that is reported
 WARMED_C, CORRELATED = 2.0, 0.7
 # rms over the white noise of a sample: a weaker tone is hidden

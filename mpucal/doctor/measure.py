@@ -8,7 +8,7 @@ import numpy as np
 
 from ..chip import registers as reg
 from ..chip.access import Bus
-from ..chip.families import Family
+from ..chip.families import MPU6050, Family
 from ..chip.losses import Loss
 from ..clocks.sample_clock import RATE_TOLERANCE
 from ..data import MOST_CLOCK_PPM, STANDARD_GRAVITY_MPS2, Recording, Vector
@@ -20,8 +20,6 @@ from .finding import Finding, Mark
 NOISY_RATIO, BROKEN_RATIO = 1.5, 3.0
 # Relative change of the sample clock's rate that warming of the chip does not explain.
 LEAST_RATE_CHANGE = 0.002
-# Scale factor within 3 %, and zero-g level within 80 mg.
-MOST_ERROR_G = 0.11
 # The samples may be shorter than asked for by the first and the last poll.
 MOST_MISSING_S = 0.1
 USUAL_C = (-10.0, 70.0)
@@ -129,8 +127,9 @@ def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str
 def examine_gravity(topic: str, mean: Vector, more: str = "") -> Finding:
     """Examine the mean (3,) [m/s^2] of an accelerometer at rest; `more` is said after it."""
     g = float(np.linalg.norm(mean)) / STANDARD_GRAVITY_MPS2
+    most_g = 0.01 * MPU6050.scale_percent + 1e-3 * max(MPU6050.zero_g_mg)
     remedy = "outside the data sheet's scale factor and bias; a calibration corrects it if it is constant"
-    return Finding.check(topic, abs(g - 1) <= MOST_ERROR_G, f"|a| is {g:.3f} g{more}", remedy, {"g": g})
+    return Finding.check(topic, abs(g - 1) <= most_g, f"|a| is {g:.3f} g{more}", remedy, {"g": g})
 
 
 def _zero_rate(dps: list[float], limit_dps: float) -> Finding:

@@ -21,13 +21,13 @@ from ..chip.accesses import Accesses
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
 from ..chip.records import BEGUN, FORGET, OPENED, RESUMED, SAMPLED_NS, UTC, SessionEvent
-from ..data import Recording, without
+from ..data import RUN, Recording, without
 from ..errors import CaptureError, RecordingError
 from ..mavlink.log import read_log
 from ..mavlink.tlog import RawPacket
 from .mcap import CaptureReader, one_by_one
 from .recorders import CHIP, VEHICLE, Recorder, recorder_of
-from .rows import ROWS, Rows
+from .rows import Rows
 from .tables.times import plausible_utc_ns
 
 
@@ -172,12 +172,12 @@ class Spool:
             self._pieces[-1].frames += len(run.frames)
 
     def runs(self) -> Iterator[Run]:
-        """Yield all frames, in runs of at most ROWS."""
+        """Yield all frames, in runs of at most RUN."""
         self._file.seek(0)
         for piece in self._pieces:
             words, first = piece.head.frames.shape[1], piece.head.first
-            for at in range(0, piece.frames, ROWS):
-                count = min(ROWS, piece.frames - at)
+            for at in range(0, piece.frames, RUN):
+                count = min(RUN, piece.frames - at)
                 frames = np.frombuffer(self._file.read(2 * words * count), np.int16).reshape(count, words)
                 yield Run(piece.head.segment, first + at, frames, gap=piece.head.gap and at == 0)
 

@@ -10,14 +10,12 @@ import numpy as np
 
 from ..arguments import UNSORTED, is_plausible
 from ..clocks.stamps import FEWEST, Clock, are_gaps
-from ..data import Autopilot, Mask, Recording, Samples, Sensor, Vector, clock_of
+from ..data import RUN, Autopilot, Mask, Recording, Samples, Sensor, Vector, clock_of
 from ..errors import RecordingError
 from .tables.shown_units import acceleration_unit, gyro_unit, rate_factor
 from .tables.times import how_often
 from .tables.units import QUANTITIES
 
-# 16 Ki samples take 1 MB, which fits a cache; for larger products BLAS starts threads, which takes longer
-ROWS = 1 << 14
 SI = {"acc": "m/s^2", "gyr": "rad/s"}
 S = TypeVar("S", bound=Samples)
 
@@ -28,7 +26,7 @@ class Rows:
 
     Attributes
     ----------
-    runs : of some ROWS samples each at most; can be iterated once.
+    runs : of some RUN samples each at most; can be iterated once.
     sensor, flat, autopilot, recovered, name, utc_ns, taken : as of a Recording.
     others : number of further IMUs in the file.
     done : the processing of samples that are calibrated already; empty if they are not.
@@ -55,7 +53,7 @@ class Rows:
     def of(cls, recording: Recording, done: str = "") -> Rows:
         """Return the rows of a recording in memory."""
         return cls(
-            (recording.part(first, first + ROWS) for first in range(0, len(recording), ROWS)),
+            (recording.part(first, first + RUN) for first in range(0, len(recording), RUN)),
             recording.sensor,
             recording.flat,
             recording.autopilot,

@@ -10,9 +10,10 @@ import numpy as np
 from ..data import Recording, Vector
 from ..origin import name_thing
 from ..result.calibration import Calibration
+from ..result.comparison import CONFIDENCE
 from ..result.correction import make_correction, other_who_am_i, same_trim
 from . import drift
-from .hypotheses import FALSE_ALARMS, NOTHING, Comparison, compare_hypotheses, estimate, p_value
+from .hypotheses import NOTHING, Comparison, compare_hypotheses, estimate, p_value
 from .observed import NOISE, Observations, apply_errors, observe
 from .outcome import (
     ANOTHER_SENSOR,
@@ -92,7 +93,7 @@ def _assess(calibration: Calibration, recording: Recording, observed: Observatio
     explains = None
     if likeliest != NOTHING:
         if drift.TEMPERATURE in hypotheses:
-            explains = p_value(observed, nothing + hypotheses[drift.TEMPERATURE][1]) > FALSE_ALARMS
+            explains = p_value(observed, nothing + hypotheses[drift.TEMPERATURE][1]) > 1.0 - CONFIDENCE
         P = nothing + hypotheses[likeliest][1]
         theta, covariance = estimate(_relinearise(observed, recording, calibration, P), P)
     else:

@@ -14,13 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import Vector
 from ..result.calibration import Calibration
 from ..result.correlation import UPPER, standard_deviations
+from ..result.error_model import MG_PER_MPS2
 from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, E, G
-
-MG = 1e-3 * STANDARD_GRAVITY_MPS2
-DEG = math.pi / 180.0
 
 
 @dataclass(frozen=True)
@@ -57,31 +55,34 @@ class Spread:
 
 
 # Repeatability over a power cycle and the first hours.
-REPEATED = Spread(0.7 * MG, 3e-4, 2e-4, 0.02 * DEG, 0.3 * DEG, 5e-4, 3e-4, noise=0.15)
+REPEATED = Spread(0.7 / MG_PER_MPS2, 3e-4, 2e-4, math.radians(0.02), math.radians(0.3), 5e-4, 3e-4, noise=0.15)
 # Random walk of the bias: m/s^2 in the root of a day, and its limit.
-WALK_MPS2, WALK_MOST_MPS2 = 0.1 * MG, 2.0 * MG
+WALK_MPS2, WALK_MOST_MPS2 = 0.1 / MG_PER_MPS2, 2.0 / MG_PER_MPS2
 # Standard deviation of a change of temperature that is not known.
 UNKNOWN_C = 3.0
 # A smaller change of temperature is within the thermometer's error, or that of a chip that warms unevenly.
 LEAST_C = 2.0
 # Change in one degree Celsius, by kind of chip.
 BY_TEMPERATURE: Mapping[str, Spread] = {
-    "MPU-6050": Spread(0.5 * MG, 2e-4, gyro_bias=0.16 * DEG, gyro_scale=2e-4),
-    "MPU-6500": Spread(1.0 * MG, 2.6e-4, gyro_bias=0.24 * DEG, gyro_scale=4e-4),
+    "MPU-6050": Spread(0.5 / MG_PER_MPS2, 2e-4, gyro_bias=math.radians(0.16), gyro_scale=2e-4),
+    "MPU-6500": Spread(1.0 / MG_PER_MPS2, 2.6e-4, gyro_bias=math.radians(0.24), gyro_scale=4e-4),
 }
 # Factory tolerances, for parameters whose uncertainty the calibration does not state.
-TOLERANCE = Spread(80.0 * MG, 0.03, 0.02, 2.0 * DEG, 20.0 * DEG, 0.02, 0.01)
+TOLERANCE = Spread(80.0 / MG_PER_MPS2, 0.03, 0.02, math.radians(2.0), math.radians(20.0), 0.02, 0.01)
 # Standard deviation of G where the fit found no difference from the identity.
 PERFECT_GYRO = 0.003
 
 # Hypotheses of a change: the prior probability of each, given that something changed, and the size of the change.
 HYPOTHESES: Mapping[str, tuple[float, Spread]] = {
-    "bias": (0.4, Spread(bias=20.0 * MG)),
+    "bias": (0.4, Spread(bias=20.0 / MG_PER_MPS2)),
     "scale": (0.1, Spread(scale=0.01)),
-    "mount": (0.15, Spread(turn=2.0 * DEG)),
-    "gyroscope's bias": (0.1, Spread(gyro_bias=5.0 * DEG)),
+    "mount": (0.15, Spread(turn=math.radians(2.0))),
+    "gyroscope's bias": (0.1, Spread(gyro_bias=math.radians(5.0))),
     "gyroscope's scale": (0.05, Spread(gyro_scale=0.02, gyro_skew=0.01)),
-    "another sensor": (0.2, Spread(100.0 * MG, 0.02, 0.01, 1.5 * DEG, 10.0 * DEG, 0.015, 0.012)),
+    "another sensor": (
+        0.2,
+        Spread(100.0 / MG_PER_MPS2, 0.02, 0.01, math.radians(1.5), math.radians(10.0), 0.015, 0.012),
+    ),
     "noise": (0.1, Spread(noise=1.0)),
 }
 TEMPERATURE, TEMPERATURE_PRIOR = "temperature", 0.5

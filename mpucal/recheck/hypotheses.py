@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
+from ..result.comparison import CONFIDENCE
 from .observed import Observations
 
-FALSE_ALARMS = 0.01
 DRAWS, SEED = 20_000, 1
 NOTHING = "nothing"
 
@@ -56,7 +56,7 @@ def compare_hypotheses(
     odds = {name: _log_odds(rows, W, prior, added) for name, (prior, added) in hypotheses.items()}
     largest = np.max(list(odds.values()), axis=0)
     probability = float((1 + np.sum(largest[1:] >= largest[0])) / (1 + DRAWS))
-    likeliest = max(odds, key=lambda name: odds[name][0]) if probability < FALSE_ALARMS else NOTHING
+    likeliest = max(odds, key=lambda name: odds[name][0]) if probability < 1.0 - CONFIDENCE else NOTHING
     return Comparison(likeliest, probability, {name: float(of[0]) for name, of in odds.items()})
 
 

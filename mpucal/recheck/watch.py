@@ -17,20 +17,19 @@ from ..calibration.verification import BIAS_RAD_S, FLOOR_MPS2
 from ..data import Samples, Vector
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Still
-from ..rests.windows import Window, Windows
+from ..rests.windows import WINDOW_S, Window, Windows
 from ..result.calibration import Calibration
+from ..result.error_model import MG_PER_MPS2
 from . import drift
 from .hypotheses import NOTHING, compare_hypotheses
 from .observed import BETA, DELTA, PARAMETERS, Observations, accelerometer_jacobian
 
-BLOCK_S = 0.5
 # Blocks of a rest, at least and at most: a board that lies for hours gives many rests.
 LEAST_BLOCKS, MOST_BLOCKS = 5, 21
 # Number of the last rests that are compared, and the least number that is needed.
 RESTS, LEAST_RESTS = 16, 4
 # Days of rests are compared one by one: each comparison must give fewer false alarms than a check.
 FALSE_ALARMS = 2e-4
-DAY_S = 86400.0
 TO_DO = "see what `mpucal check` says"
 
 
@@ -71,7 +70,7 @@ class DriftMonitor:
         self._gravity = calibration.gravity
         self._first_s: float | None = None
         self._t_s, self._temperature_c = 0.0, math.nan
-        self._windows, self._stillness, self._run = Windows(BLOCK_S), Detector(QUIET), 0
+        self._windows, self._stillness, self._run = Windows(WINDOW_S), Detector(QUIET), 0
         self._blocks: list[Vector] = []
         self._rests: deque[_Rest] = deque(maxlen=RESTS)
         self._reported: set[str] = set()
@@ -113,7 +112,7 @@ class DriftMonitor:
             return []
         T, T_0 = rests[-1].temperature_c, self._calibration.sensor.temperature_c
         change_c = None if T_0 is None or math.isnan(T) else T - T_0
-        days = self._days + (self._t_s - (self._first_s or 0.0)) / DAY_S
+        days = self._days + (self._t_s - (self._first_s or 0.0)) / 86400.0
         nothing = drift.own_uncertainty(self._calibration) + drift.ageing(self._calibration, days, change_c)
         hypotheses = drift.hypotheses(self._calibration, change_c)
         comparison = compare_hypotheses(self._observe(rests), nothing, hypotheses)
@@ -135,7 +134,7 @@ class DriftMonitor:
             rate = math.degrees(max(float(np.linalg.norm(rest.w)) for rest in rests))
             return f"the rate is up to {rate:.2g} deg/s"
         off = max((float(np.linalg.norm(rest.a)) - self._gravity for rest in rests), key=abs)
-        return f"|a| is wrong by up to {off / drift.MG:+.2g} mg"
+        return f"|a| is wrong by up to {off * MG_PER_MPS2:+.2g} mg"
 
     def _observe(self, rests: list[_Rest]) -> Observations:
         k, gyro = len(rests), bool(np.isfinite([rest.w for rest in rests]).all())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Recording, Samples, Vector
+from ..data import RUN, Recording, Samples, Vector
 from ..kernel import _kernel
 from .limits import OF_NORMAL
 
@@ -19,7 +19,6 @@ UNKNOWN = np.full(3, np.nan)
 ORDER, SQUARES = 4, 70.0
 # Ratio of variances up to which a window may be as noisy as the flat segment, but for chance and a hand.
 LOUDER = 2.0
-PART = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,8 @@ class Spreads:
 
     def parts(self) -> Iterator[Spreads]:
         """Yield the windows in parts of which each takes little memory."""
-        for first in range(0, len(self.gyr), PART):
-            yield Spreads(*(each[first : first + PART] for each in vars(self).values()))
+        for first in range(0, len(self.gyr), RUN):
+            yield Spreads(*(each[first : first + RUN] for each in vars(self).values()))
 
 
 @dataclass(frozen=True)

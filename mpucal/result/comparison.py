@@ -14,7 +14,7 @@ from .calibration import GOOD, Calibration
 from .correction import same_trim
 from .error_model import AXES
 
-# Of pairs of calibrations of an unchanged linear sensor, 1 in 100 are called different.
+# Of pairs of calibrations of an unchanged linear sensor, and of checks of an unchanged sensor, 1 in 100 find a change.
 CONFIDENCE = 0.99
 # Degrees of freedom of the standard uncertainties of the model `hand`, which come from a few turns between rests.
 FREEDOM_OF_A_HAND = 12.0
@@ -128,13 +128,12 @@ def limit_of(count: int, freedom: float = math.inf) -> float:
 
 
 def in_body_frame(c: Calibration) -> Calibration:
-    """Return the calibration in the frame where K is symmetric: K = U S V^T, Q = V U^T, K -> Q K, D -> D Q^T."""
+    """Return the calibration in the frame where K is symmetric."""
     if not np.isfinite(c.K).all():
         return c
-    U, _, Vt = np.linalg.svd(c.K)
-    Q = Vt.T @ U.T
+    D, K, _ = error_model.to_body_frame(c.D, c.K)
     # the standard deviations are kept, since the frames are a degree apart at most
-    return replace(c, D=c.D @ Q.T, K=Q @ c.K)
+    return replace(c, D=D, K=K)
 
 
 def _row(name: str, unit: str, value: Vector, std: Vector) -> list[Difference]:

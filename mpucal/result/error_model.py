@@ -16,15 +16,15 @@ propagated to first order without correlations.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 
 AXES = "xyz"
 MG_PER_MPS2 = 1000.0 / STANDARD_GRAVITY_MPS2
-# 0, and NaN on the diagonal: no axis is misaligned to itself
-OFF_DIAGONAL = np.where(np.eye(3, dtype=bool), np.nan, 0.0)
 
 
 def scale_factor_error(M: Vector) -> Vector:
@@ -39,7 +39,7 @@ def scale_factor_error_std(M_std: Vector) -> Vector:
 
 def misalignment(M: Vector) -> Vector:
     """Return (..., 3, 3) deg, where [i, j] is misalignment i->j; NaN on the diagonal."""
-    return np.asarray(np.degrees(np.arctan2(M, _diagonal(M)[..., None])) + OFF_DIAGONAL)
+    return _off_diagonal(np.degrees(np.arctan2(M, _diagonal(M)[..., None])))
 
 
 def misalignment_std(M: Vector, M_std: Vector) -> Vector:
@@ -47,7 +47,12 @@ def misalignment_std(M: Vector, M_std: Vector) -> Vector:
     along, along_std = _diagonal(M)[..., None], _diagonal(M_std)[..., None]
     with np.errstate(divide="ignore", invalid="ignore"):
         std = np.degrees(np.hypot(along * M_std, M * along_std) / (M**2 + along**2))
-    return np.asarray(std + OFF_DIAGONAL)
+    return _off_diagonal(std)
+
+
+def _off_diagonal(angle: Vector) -> Vector:
+    """Return angles with NaN on the diagonal: no axis is misaligned to itself."""
+    return np.where(np.eye(3, dtype=bool), np.nan, angle)
 
 
 def _diagonal(M: Vector) -> Vector:
@@ -80,6 +85,13 @@ def error_before(D: Vector, b: Vector, gravity: float) -> float:
     The mean of |(D - I) s + b|^2 over the sphere |s| = g is g^2 / 3 |D - I|_F^2 + |b|^2.
     """
     return float(np.sqrt(gravity**2 / 3.0 * np.sum((D - np.eye(3)) ** 2) + np.sum(b**2)))
+
+
+def to_body_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector, Vector]:
+    """Return D Q^T, the symmetric Q K, and Q, where K = U S V^T and Q = V U^T."""
+    U, S, Vt = np.linalg.svd(K)
+    Q, symmetric = Vt.T @ U.T, Vt.T @ np.diag(S) @ Vt
+    return np.asarray(D @ Q.T), np.asarray((symmetric + symmetric.T) / 2), np.asarray(Q)
 
 
 def sensor_axes(M: Vector) -> Vector:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..data import Vector
 from ..result.error_model import MG_PER_MPS2
@@ -14,8 +15,8 @@ from .legs import minimum_jerk
 from .rotation import cross_rows
 
 SWAY_HZ, TREMOR_HZ = (0.5, 4.0), (2.0, 10.0)
-# Sway and physiological tremor of an arm that holds a pose, and the distance of the wrist, about which it trembles
-HELD_HZ, ARM_HZ, WRIST_M = (0.05, 1.0), (8.0, 12.0), 0.1
+# Sway and physiological tremor of an arm that holds a pose
+HELD_HZ, ARM_HZ = (0.05, 1.0), (8.0, 12.0)
 # Peak and duration of a jerk, half a sine
 JERK_MPS2, JERK_S = (2.0, 6.0), (0.06, 0.12)
 
@@ -49,7 +50,8 @@ def _arm(held_mm: float, held_mrad: float, tremor_mrad: float) -> HandDisturbanc
     pulsation = np.pi * sum(ARM_HZ)
     rate = 1e-3 * tremor_mrad * pulsation
     return HandDisturbance(
-        tremor_mps2=WRIST_M * pulsation * rate,
+        # it trembles about the wrist, 0.1 m away
+        tremor_mps2=0.1 * pulsation * rate,
         tremor_rad_s=rate,
         tremor_hz=ARM_HZ,
         held_m=1e-3 * held_mm,
@@ -78,50 +80,40 @@ def point_acceleration(alpha: Vector, omega: Vector, r: Vector, v: Vector | floa
     return np.asarray(cross_rows(alpha, r) + cross_rows(omega, cross_rows(omega, r) + 2.0 * v))
 
 
-SLIP_RAD = np.radians([5.0, -4.0, 5.0])
-SLIP_S = 0.3
-KNOCK_MPS2, KNOCK_S = 120.0, 0.02
-# A shock may shift a sensor's zero.
-ZERO_SHIFT_MPS2 = np.array([0.25, -0.3, 0.2])
-ZERO_STEP_MPS2 = np.array([10.0 / MG_PER_MPS2, 0.0, 0.0])
-WARMER_C, WARMING_S = 15.0, 40.0
-# PS-MPU-6000A r3.4, sections 6.1 and 6.2, in round numbers.
-ACC_MPS2_A_C, GYRO_RAD_S_A_C = 0.005, math.radians(0.1)
-
-
 # A change of a sensor: from the seconds since its begin (n,), negative before it, and from specific force [m/s^2] and
 # rate [rad/s] without it, both (n, 3), to those that it feels.
 Change = Callable[[Vector, Vector, Vector], tuple[Vector, Vector]]
 
 
 def slip(since_s: Vector, force: Vector, rate: Vector) -> tuple[Vector, Vector]:
-    """Turn the accelerometer on its mount, too slowly for the operator to notice; the gyroscope stays."""
-    turn = _share(since_s, SLIP_S) * SLIP_RAD
+    """Turn the accelerometer by 8 deg on its mount, too slowly for the operator to notice; the gyroscope stays."""
+    turn = _share(since_s, 0.3) * np.radians([5.0, -4.0, 5.0])
     # The angle is small: a first-order rotation is exact enough.
     return force - np.cross(turn, force), rate
 
 
 def knock(since_s: Vector, force: Vector, rate: Vector) -> tuple[Vector, Vector]:
-    """Add a blow, which shifts the accelerometer's zero."""
-    share = _share(since_s, KNOCK_S)
-    return force + share * ZERO_SHIFT_MPS2 + 4.0 * share * (1.0 - share) * KNOCK_MPS2, rate
+    """Add a blow of 20 ms and 120 m/s^2, which shifts the accelerometer's zero by 0.4 m/s^2."""
+    share = _share(since_s, 0.02)
+    return force + share * np.array([0.25, -0.3, 0.2]) + 4.0 * share * (1.0 - share) * 120.0, rate
 
 
 def zero_step(
-    since_s: Vector, force: Vector, rate: Vector, step_mps2: Vector = ZERO_STEP_MPS2
+    since_s: Vector, force: Vector, rate: Vector, step_mps2: ArrayLike = (10.0 / MG_PER_MPS2, 0.0, 0.0)
 ) -> tuple[Vector, Vector]:
     """Step the accelerometer's bias from one sample to the next, which the operator does not notice."""
-    return force + (since_s >= 0.0)[:, None] * step_mps2, rate
+    return force + (since_s >= 0.0)[:, None] * np.asarray(step_mps2), rate
 
 
 def warming(since_s: Vector, force: Vector, rate: Vector) -> tuple[Vector, Vector]:
-    """Add biases by the data sheet's temperature coefficients, as in sunshine."""
+    """Add biases by temperature, as in sunshine: 0.5 mg and 0.1 deg/s a degree, as in the data sheets' 6.1 and 6.2."""
     warmer = _warmer_c(since_s)
-    return force + ACC_MPS2_A_C * warmer, rate + GYRO_RAD_S_A_C * warmer
+    return force + 0.005 * warmer, rate + math.radians(0.1) * warmer
 
 
 def _warmer_c(since_s: Vector) -> Vector:
-    return WARMER_C * _share(since_s, WARMING_S)
+    """Return (n, 1) degrees Celsius by which it is warmer: 15 within 40 s."""
+    return 15.0 * _share(since_s, 40.0)
 
 
 def _share(since_s: Vector, seconds: float) -> Vector:

@@ -13,6 +13,7 @@ from errno import EREMOTEIO, ETIMEDOUT
 from functools import partial
 from typing import Self
 
+from ..chip.fifo import ACCEL, GYRO, TEMPERATURE
 from ..chip.registers import FIFO_COUNT_H, FIFO_R_W
 from .disturbance import Change, Mishap, knock, slip, warming, zero_step
 
@@ -48,8 +49,8 @@ class FaultKind:
     share : of the packets or bytes that it affects.
     spoils : makes bytes of a byte on a serial line and a number from 1 to 255, which varies the damage.
     mishap : change of the sensor.
-    pins : words of a sample, by number, and the count at which they stay. alters : makes another reply of a register
-        and its data.
+    pins : a word of a sample by number, or a slice of them, and the count at which they stay.
+    alters : makes another reply of a register and its data.
     """
 
     name: str
@@ -66,18 +67,13 @@ class FaultKind:
     share: float = 0.0
     spoils: Callable[[int, int], bytes] | None = None
     mishap: Change | None = None
-    pins: tuple[tuple[int, ...], int] | None = None
+    pins: tuple[int | slice, int] | None = None
     alters: Callable[[int, bytes], bytes] | None = None
 
 
-ACC, GYR, TEMPERATURE = (0, 1, 2), (4, 5, 6), (3,)
-# 12:00:07 on a Saturday in the registers of a DS3231
-TIME = bytes([0x07, 0x00, 0x12, 0x07, 0x21, 0x11, 0x26])
-
-
 def _of_a_clock(register: int, data: bytes) -> bytes:
-    """Return the reply of a DS3231, which repeats its 19 registers."""
-    held = TIME + bytes(12)
+    """Return the reply of a DS3231 at 12:00:07 on a Saturday, which repeats its 19 registers."""
+    held = bytes([0x07, 0x00, 0x12, 0x07, 0x21, 0x11, 0x26]) + bytes(12)
     return bytes(held[(register + i) % len(held)] for i in range(len(data)))
 
 
@@ -122,14 +118,14 @@ _ROWS = (
     ALWAYS("zeros", DEFECT, "every byte that is read is 0", alters=lambda _, data: bytes(len(data))),
     ALWAYS("rtc", DEFECT, "a DS3231 clock answers in its place", alters=_of_a_clock),
     ALWAYS("no_fifo", DEFECT, "the FIFO stays empty", alters=_without_fifo),
-    ALWAYS("low_x", DEFECT, "accelerometer x stays at -32768", pins=((0,), -32768)),
-    ALWAYS("zero_z", DEFECT, "accelerometer z stays at 0", pins=((2,), 0)),
-    ALWAYS("zero_acc", DEFECT, "the accelerometer stays at 0", pins=(ACC, 0)),
-    ALWAYS("full_acc", DEFECT, "the accelerometer stays at 32767", pins=(ACC, 32767)),
-    ALWAYS("zero_gyro", DEFECT, "the gyroscope stays at 0", pins=(GYR, 0)),
-    ALWAYS("stuck_ax", DEFECT, "accelerometer x stays at 1234", pins=((0,), 1234)),
-    ALWAYS("zero_gz", DEFECT, "gyroscope z stays at 0", pins=((6,), 0)),
-    ALWAYS("stuck_gy", DEFECT, "gyroscope y stays at -15", pins=((5,), -15)),
+    ALWAYS("low_x", DEFECT, "accelerometer x stays at -32768", pins=(0, -32768)),
+    ALWAYS("zero_z", DEFECT, "accelerometer z stays at 0", pins=(2, 0)),
+    ALWAYS("zero_acc", DEFECT, "the accelerometer stays at 0", pins=(ACCEL, 0)),
+    ALWAYS("full_acc", DEFECT, "the accelerometer stays at 32767", pins=(ACCEL, 32767)),
+    ALWAYS("zero_gyro", DEFECT, "the gyroscope stays at 0", pins=(GYRO, 0)),
+    ALWAYS("stuck_ax", DEFECT, "accelerometer x stays at 1234", pins=(0, 1234)),
+    ALWAYS("zero_gz", DEFECT, "gyroscope z stays at 0", pins=(6, 0)),
+    ALWAYS("stuck_gy", DEFECT, "gyroscope y stays at -15", pins=(5, -15)),
     ALWAYS("stuck_temp", DEFECT, "the thermometer stays at 0", pins=(TEMPERATURE, 0)),
     FaultKind("loose", HAND, "the accelerometer turns by 8 deg on its mount", mishap=slip),
     FaultKind("knock", HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=knock),

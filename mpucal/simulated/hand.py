@@ -20,11 +20,8 @@ REACTION_S = (0.5, 1.5)
 MISS_RAD = math.radians(8.0)
 MOVE_S = 1.6
 PAUSE_S = 2.0
-FLAT_DOWN = (0.0, 0.0, -1.0)
 TURN_RAD = (math.radians(50.0), math.radians(130.0))
 ON_THE_TABLE, IN_THE_HAND = 0.0, 1.0
-# Halfway through the rotation.
-MISHAP_AFTER_S = 18.0
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,8 @@ class Hand:
             return
         self._last = received
         if prompt.kind == "rotate" and self.mishap is not None:
-            self.mishap.begin(t_s + MISHAP_AFTER_S)
+            # halfway through the rotation
+            self.mishap.begin(t_s + 18.0)
         obeyed = math.ceil((t_s + self._reaction_rng.uniform(*REACTION_S)) * STEP_HZ)
         if self._prompts:
             obeyed = max(obeyed, self._prompts[-1][0])
@@ -124,7 +122,7 @@ class Hand:
         if self._moved or (now.grip == ON_THE_TABLE and self._task == "rest"):
             return self.pause(now, PAUSE_S)
         self._moved = True
-        down = np.array(FLAT_DOWN) if self._down is None else self._down
+        down = np.array([0.0, 0.0, -1.0]) if self._down is None else self._down
         return self.move(now, self.turn_to(now, down), ON_THE_TABLE)
 
     def hold_still(self, now: Stance) -> Leg:

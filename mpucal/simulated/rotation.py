@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
 from ..data import Vector
-
-# In place of an angle of zero, by which nothing can be divided.
-LEAST = 1e-300
 
 
 def product(p: Vector, q: Vector) -> Vector:
@@ -28,7 +27,7 @@ def product(p: Vector, q: Vector) -> Vector:
 def exp(turn_rad: Vector) -> Vector:
     """Return the quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
     half = 0.5 * np.asarray(turn_rad)
-    angle = np.maximum(_norm(half), LEAST)
+    angle = np.maximum(_norm(half), sys.float_info.min)  # not 0, by which nothing can be divided
     q = np.empty((*half.shape[:-1], 4))
     q[..., 0] = np.cos(angle)
     q[..., 1:] = half * (np.sin(angle) / angle)[..., None]
@@ -38,7 +37,7 @@ def exp(turn_rad: Vector) -> Vector:
 def log(q: Vector) -> Vector:
     """Return the shortest rotation vectors (..., 3) [rad] of quaternions (..., 4)."""
     w, v = q[..., 0], q[..., 1:]
-    sine = np.maximum(_norm(v), LEAST)
+    sine = np.maximum(_norm(v), sys.float_info.min)
     return np.asarray(v * (np.copysign(2.0, w) * np.arctan2(sine, np.abs(w)) / sine)[..., None])
 
 

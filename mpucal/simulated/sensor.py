@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..chip.families import MPU6050, MPU6500
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
+from ..result.error_model import to_body_frame
 from .motion import Motion
 
 Counts = NDArray[np.int16]
@@ -115,7 +116,7 @@ class SensorTruth:
         D *= 1.0 + gains[:, None]
         gyro = rng.uniform(-cross, cross, (3, 3))
         np.fill_diagonal(gyro, rng.uniform(1.0 - scale, 1.0 + scale, 3))
-        D, K, _ = to_symmetric_frame(D, np.linalg.inv((gyro + gyro.T) / 2))
+        D, K, _ = to_body_frame(D, np.linalg.inv((gyro + gyro.T) / 2))
         return cls(
             D=D,
             b_a=rng.uniform(-1e-3, 1e-3, 3) * family.zero_g_mg * STANDARD_GRAVITY_MPS2,
@@ -154,15 +155,8 @@ class SensorTruth:
 
     def symmetric(self) -> tuple[Self, Vector]:
         """Return this sensor in the body frame in which K is symmetric, and Q, the rotation to that frame."""
-        D, K, Q = to_symmetric_frame(self.D, self.K)
+        D, K, Q = to_body_frame(self.D, self.K)
         return replace(self, D=D, K=K), Q
-
-
-def to_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector, Vector]:
-    """Return D Q^T, the symmetric Q K, and Q, where K = U S V^T and Q = V U^T."""
-    U, S, Vt = np.linalg.svd(K)
-    Q, symmetric = Vt.T @ U.T, Vt.T @ np.diag(S) @ Vt
-    return D @ Q.T, (symmetric + symmetric.T) / 2, Q
 
 
 def density(std: Vector, rate_hz: float) -> Vector:

@@ -340,7 +340,7 @@ def test_forgotten_polls_are_left_out(forgotten, lost, tmp_path):
 
 def test_the_frames_of_a_long_capture_wait_in_a_file(monkeypatch):
     """Keep no byte of a sample in memory; the 16 bytes for each read of the FIFO's count are not measured here."""
-    monkeypatch.setattr(capture_module, "ROWS", 500)
+    monkeypatch.setattr(capture_module, "RUN", 500)
     spool, frames = Spool(), np.arange(7000, dtype=np.int16).reshape(1000, 7)
     tracemalloc.start()
     for number in range(100):

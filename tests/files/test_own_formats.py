@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.data import Recording, Sensor
+from mpucal.data import RUN, Recording, Sensor
 from mpucal.errors import RecordingError
 from mpucal.files import csv as csv_module
 from mpucal.files import load, open_rows, open_writer
 from mpucal.files._text import lines, numbers
-from mpucal.files.rows import ROWS, Rows
+from mpucal.files.rows import Rows
 
-N = ROWS + 1000
+N = RUN + 1000
 HEADER = "t,ax,ay,az,gx,gy,gz\n"
 
 
@@ -54,7 +54,7 @@ def archive(tmp_path_factory, save):
 
 
 def test_an_archive_comes_out_as_it_went_in(archive, tmp_path):
-    assert through(archive, tmp_path / "out.npz", "nothing was done") == [ROWS, 1000]
+    assert through(archive, tmp_path / "out.npz", "nothing was done") == [RUN, 1000]
     before, after = load(archive), load(tmp_path / "out.npz")
     assert after.at(slice(None)) == before.at(slice(None))
     assert (after.flat, after.sensor) == (before.flat, before.sensor)
@@ -198,8 +198,8 @@ def test_real_and_simulated_recordings_of_others_are_read(shared):
 @pytest.mark.parametrize(
     ("at", "value", "said"),
     [
-        (ROWS + 100, np.nan, "t is not a finite number in sample"),
-        (ROWS, 0.0, "time does not increase at sample"),
+        (RUN + 100, np.nan, "t is not a finite number in sample"),
+        (RUN, 0.0, "time does not increase at sample"),
     ],
 )
 def test_a_bad_time_is_named_from_run_to_run_and_leaves_no_file(kind, at, value, said, tmp_path):
@@ -223,13 +223,13 @@ def test_a_bad_time_is_named_from_run_to_run_and_leaves_no_file(kind, at, value,
 def test_a_sample_that_lacks_a_number_passes_through_and_is_no_part_of_a_recording(kind, key, value, tmp_path):
     before = recording()
     arrays = {name: getattr(before, name).copy() for name in ("t", "acc", "gyr")}
-    arrays[key][ROWS + 100, 1] = value
+    arrays[key][RUN + 100, 1] = value
     np.savez(tmp_path / "in.npz", **arrays)
     through(tmp_path / "in.npz", tmp_path / "in.csv")
     through(tmp_path / f"in{kind}", tmp_path / "out.npz")
     with np.load(tmp_path / "out.npz") as out:
-        assert np.argwhere(np.isnan(out[key])).tolist() == [[ROWS + 100, 1]]
-    read, kept = load(tmp_path / f"in{kind}"), np.arange(N) != ROWS + 100
+        assert np.argwhere(np.isnan(out[key])).tolist() == [[RUN + 100, 1]]
+    read, kept = load(tmp_path / f"in{kind}"), np.arange(N) != RUN + 100
     np.testing.assert_array_equal(getattr(read, key), getattr(before, key)[kept])
     # one step of two intervals is no gap
     assert not read.gap.any()
@@ -277,11 +277,11 @@ def test_a_failure_leaves_the_old_file_and_no_other(ending, archive, tmp_path):
 @pytest.mark.parametrize("target", [".csv", ".mcap"])
 def test_memory_is_that_of_one_run_at_any_length(target, tmp_path):
     def peak(runs):
-        whole = recording(runs * ROWS)
+        whole = recording(runs * RUN)
         path = tmp_path / f"{runs}.csv"
         with open_writer(path, Rows(iter(())), "") as write:
-            for first in range(0, len(whole), ROWS):
-                write(whole.part(first, first + ROWS))
+            for first in range(0, len(whole), RUN):
+                write(whole.part(first, first + RUN))
         del whole
         tracemalloc.start()
         through(path, tmp_path / f"out{target}")

@@ -17,6 +17,7 @@ from mpucal.recheck.outcome import Change
 from mpucal.recheck.update import update_biases
 from mpucal.recheck.watch import LEAST_RESTS, RESTS, DriftMonitor
 from mpucal.result.correlation import NAMES
+from mpucal.result.error_model import MG_PER_MPS2
 from tools.lab.scenarios.recordings import hand_scenario
 from tools.lab.scenarios.sensors import GRAVITY_MPS2, hand_sensor
 
@@ -34,7 +35,7 @@ CALIBRATION = mpucal.Calibration(
     quality={"verdict": "good"},
     sensor=Sensor(chip="MPU-6050", temperature_c=25.0),
 )
-TEN_MG = np.array([0.0, 10.0, 0.0]) * drift.MG
+TEN_MG = np.array([0.0, 10.0, 0.0]) / MG_PER_MPS2
 
 
 def shown(truth, seed=7, temperature_c=25.0):
@@ -220,7 +221,7 @@ def test_a_monitor_is_silent_about_a_right_calibration():
 
 
 def test_a_monitor_reports_once_a_bias_that_moved():
-    said, _ = monitored(replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 12.0, 0.0]) * drift.MG))
+    said, _ = monitored(replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 12.0, 0.0]) / MG_PER_MPS2))
     assert len(said) == 1
     assert abs(float(said[0].what.split("up to ")[1].split(" mg")[0])) == pytest.approx(12.0, abs=4.0)
     said, _ = monitored(replace(TRUTH, b_omega=TRUTH.b_omega + np.radians([0.0, 3.0, 0.0])))

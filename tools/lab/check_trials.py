@@ -25,6 +25,7 @@ from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
 from mpucal.recheck.observed import BETA, NOISE, TURN_NONLINEARITY, apply_errors
 from mpucal.result.calibration import REFUSED
+from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.simulated.sensor import SensorTruth
 
 from .judge import rms
@@ -53,7 +54,7 @@ def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[
     towards = direction(rng)
     match event.split():
         case ["bias", mg, "mg"]:
-            return replace(truth, b_a=truth.b_a + float(mg) * drift.MG * towards), TEMPERATURE_C
+            return replace(truth, b_a=truth.b_a + float(mg) / MG_PER_MPS2 * towards), TEMPERATURE_C
         case ["scale", percent, "%"]:
             axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
             return replace(truth, D=truth.D @ np.diag(1.0 + 0.01 * float(percent) * axis)), TEMPERATURE_C
@@ -135,7 +136,7 @@ def of_pair(
     row = Row(name=event, seed=seed, verdict=found.verdict, what=found.what, probability=found.probability)
     if found.theta is not None:
         off = calibration.D @ found.theta[BETA] + calibration.b_a - after.b_a
-        row.error_mg = float(np.abs(off).max()) / drift.MG
+        row.error_mg = float(np.abs(off).max()) * MG_PER_MPS2
     return row
 
 

@@ -12,13 +12,14 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...session.plan import Plan
 from ...sources.chip import OpenedChip
 from ...sources.kind import Request
+from ...sources.usb_i2c import I2C_HZ
 from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_CHIP, Fault, Where, begin_mishaps
 from ..hands import HANDS
 from ..motion import Motion
 from ..option_text import SimulationOptions, at_least, faults, number, one_of, whole
 from ..sensor import Feed, SensorFeed, SensorTruth
-from .bus import CLOCKS, KHZ, FaultInjector, SimulatedBus, SimulatedClock
+from .bus import CLOCKS, FaultInjector, SimulatedBus, SimulatedClock
 from .chip import Chip
 from .models import MODELS, OFFSETS, FactoryTrim
 
@@ -147,4 +148,4 @@ class ChipOptions(SimulationOptions):
     b_omega: Annotated[Vector | None, (_vector, "three numbers with / between them, in rad/s")] = None
     noise: Annotated[float, at_least(0)] = 1.0
     temperature_c: Annotated[float | None, (number, "a number of degrees Celsius")] = None
-    khz: Annotated[float, (_positive, "a number above 0")] = KHZ
+    khz: Annotated[float, (_positive, "a number above 0")] = I2C_HZ / 1000

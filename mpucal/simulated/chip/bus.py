@@ -13,6 +13,7 @@ import numpy as np
 from ...chip.access import Reply
 from ...mavlink.texts import Prompt
 from ...sources.host_bus import ADDRESSES, transfer_error
+from ...sources.usb_i2c import I2C_HZ
 from ..faults import Fault, FaultKind, Schedule
 from ..motion import Motion
 from ..sensor import SensorTruth
@@ -132,9 +133,6 @@ class FaultInjector:
         return [fault.kind for fault in faults if fault.begin_ns <= now_ns < fault.end_ns]
 
 
-KHZ = 400
-
-
 class SimulatedBus:
     """Bus with one chip; its clock starts at 0.
 
@@ -152,7 +150,7 @@ class SimulatedBus:
         motion: Motion | None = None,
         truth: SensorTruth | None = None,
         faults: FaultInjector | None = None,
-        khz: float = KHZ,
+        khz: float = I2C_HZ / 1000,
     ) -> None:
         self._chip, self._clock, self._motion, self._truth, self._faults = chip, clock, motion, truth, faults
         self._bit_ns = round(1e6 / khz)

@@ -84,7 +84,7 @@ class Chip:
         self._frozen_until_ns = 0
         self._frozen: Counts | None = None
         self._cleared: list[tuple[int, int]] = []
-        self._held: list[tuple[tuple[int, ...], int]] = []
+        self._held: list[tuple[int | slice, int]] = []
         self.reset(0)
 
     def read(self, register: int, count: int, t_ns: int) -> bytes:
@@ -193,7 +193,7 @@ class Chip:
         self._collect()
         self._cleared.append((word, bits))
 
-    def hold_words(self, words: tuple[int, ...], count: int) -> None:
+    def hold_words(self, words: int | slice, count: int) -> None:
         """Keep these words of each sample at `count`."""
         self._held.append((words, count))
 

@@ -18,9 +18,6 @@ from ...chip.quick_measure import factory_response
 Three = tuple[float, ...]
 Codes = tuple[int, ...]
 
-# A self-test response is within this share of the code's; data sheets allow 14 %.
-SELF_TEST_SPREAD = 0.05
-
 
 @dataclass(frozen=True)
 class FactoryTrim:
@@ -46,7 +43,8 @@ class FactoryTrim:
         of_test = rng.spawn(1)[0]
         low, high = ((10, 25), (8, 25)) if family.packed_self_test else ((85, 125), (130, 170))
         accel_codes, gyro_codes = of_test.integers(*low, 3), of_test.integers(*high, 3)
-        spread = 1 + of_test.uniform(-SELF_TEST_SPREAD, SELF_TEST_SPREAD, (2, 3))
+        # the responses are within 5 % of the codes'; data sheets allow 14 %
+        spread = 1 + of_test.uniform(-0.05, 0.05, (2, 3))
         accel_g, gyro_dps = np.array(factory_response(family.packed_self_test, accel_codes, gyro_codes)) * spread
         return cls(
             accel_trim=tuple(trim.tolist()),

@@ -26,7 +26,6 @@ from ...iio.setup import TRIGGERS
 from ...iio_device.source import file_error
 from ..chip import SimulatedBus
 
-RATES_HZ = (10, 20, 50, 100, 200, 500)
 RANGES = {ACCEL: ACCEL_RANGES_G, GYRO: GYRO_RANGES_DPS}
 SETTINGS = ("buffer/enable", "sampling_frequency", *(f"{kind}_scale" for kind in RANGES))
 CHANNELS = [f"{kind}_{axis}" for kind in (ACCEL, GYRO) for axis in AXES]
@@ -160,7 +159,7 @@ class _Device:
         self._temp_scale, self._temp_offset = 1000 / part.family.lsb_per_c, part.family.zero_c * part.family.lsb_per_c
         self.frames = b""
         self.texts = {"name": part.chip.replace("-", "").lower(), "in_mount_matrix": IDENTITY}
-        self.texts |= {"sampling_frequency": "50", "sampling_frequency_available": " ".join(map(str, RATES_HZ))}
+        self.texts |= {"sampling_frequency": "50", "sampling_frequency_available": "10 20 50 100 200 500"}
         for kind in kinds:
             scales = [f"{scale:.9f}" for scale in PRINTED_SCALES[kind]]
             self.texts |= {f"{kind}_scale": scales[0], f"{kind}_scale_available": " ".join(scales)}
