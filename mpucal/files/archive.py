@@ -37,8 +37,8 @@ def load_archive(path: Path, hints: Hints = NO_HINTS) -> Recording:
         except DAMAGED_ZIP as error:
             raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
         found = into
-        while found.is_dir() and len(inside := [*found.iterdir()]) == 1:
-            found = inside[0]
+        while found.is_dir() and (only := _only_one_in(found)):
+            found = only
         if found.is_file() and found.suffix.lower() in formats.PACKED:
             raise RecordingError(f"{path} holds another archive, {found.name}", "unpack it, and give what it holds")
         try:
@@ -48,15 +48,20 @@ def load_archive(path: Path, hints: Hints = NO_HINTS) -> Recording:
             raise RecordingError(what, remedy, error.options) from error
 
 
+def _only_one_in(folder: Path) -> Path | None:
+    """Return the only file or folder in a folder, or the only recording beside texts about it; None of several."""
+    inside = [*folder.iterdir()]
+    found = inside if len(inside) == 1 else [*filter(formats.recognise, inside)]
+    return found[0] if len(found) == 1 else None
+
+
 def _members(path: Path) -> list[str]:
-    """Return the name of an archive's recording, or of all files, without those of the computer that made it."""
+    """Return the names of an archive's files, without those of the computer that made it."""
     if path.suffix.lower() == ".gz":
         return [path.stem]
     with zipfile.ZipFile(path) as archive:
         names = [name for name in archive.namelist() if not name.endswith("/")]
-    names = [name for name in names if not any(part.startswith((".", "__")) for part in Path(name).parts)]
-    recordings = [name for name in names if formats.is_suffix(Path(name).suffix)]
-    return recordings if len(recordings) == 1 else names
+    return [name for name in names if not any(part.startswith((".", "__")) for part in Path(name).parts)]
 
 
 def _unpack(path: Path, into: Path) -> None:

@@ -46,16 +46,16 @@ def _find_session(folder: Path) -> tuple[formats.Format, list[Path]]:
     for capture, row in captured.items():
         if captures := capture.all_in(folder):
             return row, captures
-    none = " and ".join(f"no {capture.name}" for capture in captured)
-    remedy, calibration = "give the folder of a session, or a recording in it", folder / DOCUMENT.name
+    none = ", ".join(f"no {capture.name}" for capture in captured)
+    remedy, calibration = "give the folder of a session, or a recording", folder / DOCUMENT.name
     if calibration.exists():
         remedy += f"; `{shlex.join(['mpucal', 'show', str(calibration)])}` shows the calibration in it"
-    raise RecordingError(f"the folder {folder} holds {none}", remedy)
+    raise RecordingError(f"the folder {folder} holds {none} and no other recording", remedy)
 
 
 def is_folder_of_recordings(path: Path) -> bool:
-    """Return True if a folder holds several recordings, and no session."""
-    return len(_recordings(path)) >= 2
+    """Return True if a folder holds recordings, and no session."""
+    return len(_recordings(path)) > 0
 
 
 def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -63,10 +63,12 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
 
     Raises
     ------
-    RecordingError : fewer than two of them can be read.
+    RecordingError : fewer than two of several can be read, or the only one cannot.
     """
     with reading(path):
         files = _recordings(path)
+    if len(files) == 1:
+        return formats.find_format(files[0], hints).read(files[0], hints=hints)
     read: dict[str, Recording] = {}
     failed: dict[str, RecordingError] = {}
     for file in files:

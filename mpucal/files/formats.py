@@ -114,7 +114,7 @@ FORMATS = (
     *_others(".ulg", "a log of PX4", "ulog:load_ulog", only=False),
     *_others(".db3", "a bag of ROS 2", _BAG, rows=_BAG_ROWS, only=False),
     *_others(".bag", "a bag of ROS 1", _BAG, rows=_BAG_ROWS, only=False),
-    *_others(f"{_TEXTS} .mat", *_TWO),
+    *_others(f"{_TEXTS} .mat .npy .json .parquet", *_TWO),
     *_others(".npz", "another program's archive of NumPy", _ARRAYS, "arrays:is_of_others"),
     *_others(".npy", "an array of NumPy", _ARRAYS),
     *_others(".mat", "a file of MATLAB", _ARRAYS),

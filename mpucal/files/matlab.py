@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..strict_json import DEEPEST
-from .reading import allowed_bytes, check_size, import_extra
+from .reading import allowed_bytes, check_size, first_bytes, import_extra
 
 HEAD = 128
 MATLAB = b"MATLAB"
@@ -41,17 +41,22 @@ EXPORTS = {
 }
 
 
-def read_matlab_arrays(content: bytes, path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+def is_matlab(path: Path) -> bool:
+    """Return True if a file begins as one of MATLAB."""
+    return first_bytes(path, HEAD).startswith((MATLAB, *HDF5))
+
+
+def read_matlab_arrays(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
     """Yield name and array; an array in a structure is `name.field`.
 
     Raises
     ------
     RecordingError : it holds objects alone, or h5py is not installed. ValueError, zlib.error : it is not a whole file.
     """
-    if content.startswith(HDF5):
-        yield from _without_objects(_hdf5_arrays(content, path), path)
+    if first_bytes(path, HEAD).startswith(HDF5):
+        yield from _without_objects(_hdf5_arrays(path), path)
         return
-    data = memoryview(content)
+    data = memoryview(path.read_bytes())
     order = ORDERS.get(bytes(data[HEAD - 2 : HEAD]))
     if order is None:
         raise ValueError("it does not begin as a file of MATLAB 5 or later")
@@ -84,12 +89,12 @@ def _without_objects(found: Iterable[tuple[str, Any]], path: Path) -> Iterator[t
         )
 
 
-def _hdf5_arrays(content: bytes, path: Path) -> Iterator[tuple[str, Any]]:
+def _hdf5_arrays(path: Path) -> Iterator[tuple[str, Any]]:
     h5py = import_extra("h5py", "matlab", path)
     names: list[str] = []
     try:
-        # with a file object of Python, HDF5 calls it again when the interpreter has ended, if the file was damaged
-        with h5py.File(h5py.h5f.open_file_image(content)) as file:
+        # of a file object of Python, HDF5 would call it again after the interpreter's end, if the file is damaged
+        with h5py.File(path, "r", locking=False) as file:
             file.visit(names.append)
             for name in names:
                 item = file[name]

@@ -59,6 +59,13 @@ def pair(folder, walk, ns, order=(0, 1, 2, 3)):
         table.to_csv(folder / name, sep=" ", header=False, index=False)
 
 
+def of_arrays(folder, walk, ns):
+    """Write an object of JSON for each sensor, whose columns have other names."""
+    for name, values, letter in (("ArsAccel", walk.acc, "f"), ("ArsGyro", walk.gyr, "w")):
+        columns = {"t": walk.t.tolist()} | {f"{letter}{k}": values[:, k].tolist() for k in range(3)}
+        (folder / f"{name}.json").write_text(json.dumps({"header": "of MATLAB", "data": columns}))
+
+
 def marked(folder, walk, ns):
     """Begin each line with the sensor's name, and name no units."""
     for name, values in (("acceleration", walk.acc / G), ("gyroscope", np.degrees(walk.gyr))):
@@ -72,6 +79,7 @@ WRITTEN = {
     "Sensor Logger, a folder": (sensor_logger, "from AccelerometerUncalibrated.csv and GyroscopeUncalibrated.csv"),
     "MetaWear, a folder": (metawear, "accelerations in g and rates in deg/s"),
     "two tables without names": (pair, "from acce.txt and gyro.txt"),
+    "two files of JSON": (of_arrays, "from ArsAccel.json and ArsGyro.json"),
     "two tables of marked lines": (marked, "accelerations in g and rates in deg/s"),
 }
 
@@ -212,12 +220,15 @@ def test_packed_recordings_are_read_as_what_is_in_them(walk, table, assert_same,
     content = table("t,ax,ay,az,gx,gy,gz", walk.t, walk.acc, walk.gyr).read_bytes()
     (tmp_path / "walk.csv.gz").write_bytes(gzip.compress(content))
     (tmp_path / "cut.csv.gz").write_bytes(gzip.compress(content)[:-9])
-    for name, members in (("one.zip", ["walk.csv", "README.md"]), ("two.zip", ["both/a.csv", "both/b.csv"])):
+    for name, members in (("one.zip", ["a/walk.csv", "README.md"]), ("two.zip", ["both/a.csv", "both/b.csv"])):
         with zipfile.ZipFile(tmp_path / name, "w") as archive:
             for member in members:
-                archive.writestr(member, content)
+                archive.writestr(member, content if member.endswith(".csv") else "a walk\n")
+            archive.writestr("README.txt", "Turned by hand, twice.\nNo gloves.\n")
             archive.writestr("__MACOSX/._walk.csv", b"\0\5\26\7")
-    for name in ("walk.csv.gz", "one.zip"):
+    with zipfile.ZipFile(tmp_path / "one.zip") as archive:
+        archive.extractall(tmp_path / "unpacked")
+    for name in ("walk.csv.gz", "one.zip", "unpacked/a"):
         assert_same(mpucal.load(tmp_path / name), walk)
     both = mpucal.load(tmp_path / "two.zip")
     assert (len(both), "one recording of 2 files" in both.taken) == (2 * len(walk), True)

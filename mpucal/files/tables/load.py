@@ -159,10 +159,10 @@ def _find_table(text: str, name: str) -> Table | None:
         if (found := find(text, name)) is not None:
             return found
     found = find_bare_table(text, name)
-    return found and (pivot(found) or _with_sensor(found))
+    return found and (pivot(found) or with_sensor_of_file(found))
 
 
-def _with_sensor(table: Table) -> Table:
+def with_sensor_of_file(table: Table) -> Table:
     """Return a table of one sensor, whose columns are x, y, z, or [time and] three without names, under its name.
 
     The sensor is that of their unit, or of the file's name.
@@ -190,7 +190,7 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     ------
     RecordingError : it does not say all that is needed; the message names what is missing.
     """
-    table = _oldest_first(table if table.of_sensors or hints.columns else _with_sensor(table))
+    table = _oldest_first(table if table.of_sensors or hints.columns else with_sensor_of_file(table))
     if not table.chosen:
         table = of_one_sensor(table if hints.columns else of_one_place(table, hints.sensor), hints.sensor)
     ranges = table.ranges if not (hints.accel_range_g or hints.gyro_range_dps) else None

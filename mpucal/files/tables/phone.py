@@ -25,13 +25,13 @@ from ...clocks import S
 from ...data import Recording
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
+from ..array_files import holds_arrays, read_arrays
 from ..hints import NO_HINTS, Hints
-from ..matlab import MATLAB, read_matlab_arrays
 from ..reading import HELD, check_size, first_bytes, reading
 from .array_table import table_of_arrays
 from .columns import columns_by_hint
-from .load import FLIPPED, find_any_table
-from .names import ACC, GYR, HYPHEN, TIME, first_triple, names_both, parse_header, with_sensor
+from .load import FLIPPED, find_any_table, with_sensor_of_file
+from .names import ACC, GYR, HYPHEN, TIME, first_triple, names_both, with_sensor
 from .sensor import sensor_stream
 from .shown_units import acceleration_unit, seem_counts
 from .streams import join_streams
@@ -43,8 +43,7 @@ from .times import Stream, how_often
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
 _OF_GYR = "gyroscopeuncalibrated gyroscope gyro gyr gyrm rotationrate angularvelocity omega"
 NAMES = {ACC: _OF_ACC.split(), GYR: _OF_GYR.split()}
-# imu_tk names tables of text .mat, too
-SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat")
+SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat", ".npy", ".json", ".parquet")
 # letters of the longest of the words that are no app's
 SHORT = len("accel")
 METADATA, TIMES_OF_DAY = "metadata.csv", "meta/time.csv"
@@ -73,8 +72,8 @@ def is_one_of_two_tables(path: Path) -> bool:
         beside = map(_parse, [child.name for child in path.parent.iterdir()] if found else [])
         if found is None or {of.quantity for of in beside if of and of.rest == found.rest} != {ACC, GYR}:
             return False
-        begun = first_bytes(path)
-        table = None if begun.startswith(MATLAB) else find_named_table(decode_text(begun, path.name), path.name)
+        text = "" if holds_arrays(path) else decode_text(first_bytes(path), path.name)
+        table = find_named_table(text, path.name)
     except (OSError, RecordingError):
         return False
     return table is None or not names_both(table.columns)
@@ -100,9 +99,12 @@ def _from_folder(path: Path, wanted: str, hints: Hints) -> Recording:
         files = sorted(child for child in (*path.iterdir(), *path.glob("meta/time.csv")) if child.is_file())
         names = [child.relative_to(path).as_posix() for child in files]
 
-        def read(name: str) -> bytes:
-            check_size(path, HELD * (path / name).stat().st_size)
-            return (path / name).read_bytes()
+        def read(name: str) -> bytes | Table | None:
+            file = path / name
+            if holds_arrays(file):
+                return table_of_arrays(name, read_arrays(file))
+            check_size(path, HELD * file.stat().st_size)
+            return file.read_bytes()
 
         return _recording(wanted or path.name, names, read, wanted, hints)
 
@@ -138,8 +140,9 @@ def _parse(name: str) -> _Member | None:
     path = Path(name)
     if path.suffix.lower() not in (*SUFFIXES, OF_FILE) or "meta" in path.parts[:-1] or path.name.startswith("."):
         return None
-    stem = re.sub(HYPHEN, "-", path.stem).lower()
-    words = [word for word in re.split(r"[^a-z]+", stem) if word]
+    stem = re.sub(HYPHEN, "-", path.stem)
+    words = re.findall("[a-z]+", re.sub("(?<=[a-z])(?=[A-Z])", " ", stem).lower())
+    stem = stem.lower()
     for quantity, known in NAMES.items():
         for word in ("".join(words), *words):
             if word in known and not {"linear", "user"} & set(words):
@@ -158,7 +161,7 @@ def _pairs(names: Iterable[str]) -> list[list[_Member]]:
 
 
 def _recording(
-    name: str, names: Iterable[str], read: Callable[[str], bytes | Table], wanted: str, hints: Hints
+    name: str, names: Iterable[str], read: Callable[[str], bytes | Table | None], wanted: str, hints: Hints
 ) -> Recording:
     """Return the recording in the pair of tables that holds `wanted`, or in the first."""
     pairs = _pairs(names)
@@ -218,22 +221,20 @@ def _holds_gravity(stream: Stream) -> bool:
     return seem_counts(values) or (len(values) > 0 and bool(acceleration_unit(values)))
 
 
-def _stream(name: str, data: bytes | Table, quantity: str, hints: Hints) -> Stream:
+def _stream(name: str, data: bytes | Table | None, quantity: str, hints: Hints) -> Stream:
     hinted = _hinted_columns(hints, quantity)
-    table: Table | None
-    if isinstance(data, Table):
-        table = data
-    elif data.startswith(MATLAB):
-        table = table_of_arrays(name, dict(read_matlab_arrays(data, Path(name))))
-    else:
-        table = find_any_table(decode_text(data, name), name, list(hinted.values()))
+    if isinstance(data, bytes):
+        data = find_any_table(decode_text(data, name), name, list(hinted.values()))
+    table = data
     if table is None or not len(table):
         raise RecordingError(
             f"{name} names no columns x, y and z",
             "name its columns in its first line (time, x, y, z), or give their order with --columns t,ax,ay,az",
         )
+    called = [table, replace(table, header=with_sensor(table.header, quantity)), with_sensor_of_file(table)]
+    table = next((of for of in called if first_triple(of.columns, quantity)), table)
     columns = columns_by_hint(table, hinted) if hinted else table.columns
-    of = first_triple(columns, quantity) or first_triple(parse_header(with_sensor(table.header, quantity)), quantity)
+    of = first_triple(columns, quantity)
     if not of:
         raise RecordingError(
             f"{name} holds the columns {', '.join(table.header)}, but no {quantity}", "record both sensors"
