@@ -8,8 +8,6 @@ from io import StringIO
 
 LOOPBACK, LAN = "127.0.0.1", "lan"
 _ALL_INTERFACES = ("0.0.0.0", "::")
-# An address for documentation (RFC 5737): a datagram socket chooses its interface for it, and sends nothing.
-_ROUTED_ADDRESS = ("192.0.2.1", 9)
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,8 @@ def lan_host() -> str:
     """Return this computer's address in its network; the loopback address if it is in none."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(_ROUTED_ADDRESS)
+            # An address for documentation (RFC 5737): the socket chooses its interface for it, and sends nothing.
+            probe.connect(("192.0.2.1", 9))
         except OSError:
             return LOOPBACK
         return str(probe.getsockname()[0])

@@ -80,7 +80,6 @@ def changes(new: Mapping[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
 
 # Least time between two updates of the page.
 LEAST_INTERVAL_S = 0.03
-TOKEN_BYTES = 16
 # Time that clients have after the end to fetch the results.
 LINGER_S = 5.0
 
@@ -106,7 +105,7 @@ class Feed:
     def __init__(self, where: Address, about: Mapping[str, Any], keys: bool = False) -> None:
         from .server import Server  # noqa: PLC0415 - slow to import, and most sessions have no page
 
-        token = secrets.token_urlsafe(TOKEN_BYTES)
+        token = secrets.token_urlsafe(16)
         self._pressed: deque[Key] = deque()
         try:
             self._server = Server((where.host, where.port), where.name, token, keys, self._press)

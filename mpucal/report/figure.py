@@ -13,8 +13,6 @@ from .elements import escape
 # px, of axes; the page scales a picture to its column
 WIDTH, HEIGHT = 420.0, 210.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 48.0, 6.0, 24.0, 32.0
-# steps between ticks, times a power of ten
-_STEPS, _FEWEST_TICKS = (10.0, 5.0, 2.0, 1.0), 4
 # the page's colours, which differ in light and dark mode
 INK, BEFORE, AFTER, FAINT, LINE, X, Y, Z = (
     f"var(--{name})" for name in ("ink", "before", "after", "faint", "line", "x", "y", "z")
@@ -113,13 +111,13 @@ class Axes:
 
 
 def ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Return round numbers within (low, high) with their text."""
+    """Return at least four round numbers within (low, high) with their text."""
     power = math.floor(math.log10(high - low))
     step = next(
         step
         for exponent in (power, power - 1)
-        for step in (k * 10.0**exponent for k in _STEPS)
-        if (high - low) / step >= _FEWEST_TICKS
+        for step in (k * 10.0**exponent for k in (10.0, 5.0, 2.0, 1.0))
+        if (high - low) / step >= 4
     )
     digits = max(0, -math.floor(math.log10(step)))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)

@@ -8,26 +8,25 @@ from collections.abc import Iterator
 import numpy as np
 
 from .. import __version__
-from ..data import STANDARD_GRAVITY_MPS2
+from ..result.error_model import MG_PER_MPS2
 from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise, axes_of
 from .elements import document, figure, paragraph, section, table
 from .figure import INK, XYZ, Axes
 
 SENSORS = (ACCELEROMETER, GYROSCOPE)
-_UG, _DPS = 1e6 / STANDARD_GRAVITY_MPS2, math.degrees(1.0)
 # sensor -> coefficient -> (factor, unit) of the text
 UNITS = {
     ACCELEROMETER: {
-        WHITE: (_UG, "ug/√Hz"),
-        INSTABILITY: (_UG, "ug"),
-        WALK: (_UG, "ug/√s"),
-        QUANTISATION: (_UG, "ug s"),
+        WHITE: (1e3 * MG_PER_MPS2, "ug/√Hz"),
+        INSTABILITY: (1e3 * MG_PER_MPS2, "ug"),
+        WALK: (1e3 * MG_PER_MPS2, "ug/√s"),
+        QUANTISATION: (1e3 * MG_PER_MPS2, "ug s"),
     },
     GYROSCOPE: {
-        WHITE: (_DPS, "deg/s/√Hz"),
-        INSTABILITY: (3600.0 * _DPS, "deg/h"),
-        WALK: (3600.0 * _DPS, "deg/h/√s"),
-        QUANTISATION: (3600.0 * _DPS, "deg/h s"),
+        WHITE: (math.degrees(1.0), "deg/s/√Hz"),
+        INSTABILITY: (math.degrees(3600.0), "deg/h"),
+        WALK: (math.degrees(3600.0), "deg/h/√s"),
+        QUANTISATION: (math.degrees(3600.0), "deg/h s"),
     },
 }
 

@@ -16,7 +16,8 @@ from .elements import figure
 from .figure import AFTER, BEFORE, FAINT, INK, LINE, WIDTH, XYZ, Axes, dots, legend, line, svg, text
 from .track import Track
 
-BINS = 500
+# stretches of a curve, and dots of a moving board
+POINTS = 500
 _TIME = "time [s]"
 RESIDUALS = "|a| of each rest minus gravity. After calibration all should lie at zero, apart from hand tremor."
 MAGNITUDE = "|a| over time. At rest it should equal gravity in every orientation; while the board moves it does not."
@@ -133,10 +134,10 @@ def temperature(track: Track) -> str:
 
 
 def envelope(t: Vector, values: Vector) -> tuple[Vector, Vector]:
-    """Return the least and greatest values of BINS stretches: few points that keep every spike."""
-    if len(t) <= 2 * BINS:
+    """Return the least and greatest values of POINTS stretches: few points that keep every spike."""
+    if len(t) <= 2 * POINTS:
         return t, values
-    edges = np.linspace(0, len(t), BINS + 1).astype(int)[:-1]
+    edges = np.linspace(0, len(t), POINTS + 1).astype(int)[:-1]
     low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
     return np.repeat(t[edges], 2), np.column_stack([low, high]).ravel()
 
@@ -156,7 +157,6 @@ def _span(values: Vector) -> tuple[float, float]:
 _VIEWPOINT = (0.302, -0.830, -0.469)
 _ENLARGEMENTS, _MOST_DEVIATION = (20, 10, 5, 2, 1), 0.5
 _FEWEST_RESTS, _MOST_LINES = 3, 60
-_MOVING_DOTS = 500
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 121)
 _UNIT_CIRCLE = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
 _HEIGHT, _COVERAGE_HEIGHT = 340.0, 230.0
@@ -213,7 +213,7 @@ def sphere(track: Track) -> str:
 
 def coverage(track: Track) -> str:
     """Draw the directions that pointed down in the board's axes, on both halves of the sphere, in equal areas."""
-    moving = -_units(track.calibrated[:: max(len(track.calibrated) // _MOVING_DOTS, 1)])
+    moving = -_units(track.calibrated[:: max(len(track.calibrated) // POINTS, 1)])
     rests = -_units(track.at_rest(track.calibrated))
     marks = []
     for centre, sign, name in ((0.25, -1.0, "+Z up"), (0.75, 1.0, "−Z up")):
@@ -232,7 +232,7 @@ def coverage(track: Track) -> str:
 def _points(track: Track, acc: Vector) -> Vector:
     """Return (k, 3) m/s^2: the means of rests, or single samples if there are hardly any rests."""
     rests = track.at_rest(acc)
-    return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // _MOVING_DOTS, 1)]
+    return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // POINTS, 1)]
 
 
 def _view() -> Vector:

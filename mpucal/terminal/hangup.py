@@ -11,8 +11,6 @@ from types import FrameType
 
 from ..result.clock import iso_utc
 
-_DESCRIPTORS = (0, 1, 2)
-
 
 @contextmanager
 def logging_after_hangup(log: Callable[[], Path], hung_up: Callable[[], None]) -> Iterator[None]:
@@ -28,8 +26,8 @@ def logging_after_hangup(log: Callable[[], Path], hung_up: Callable[[], None]) -
         yield
         return
 
-    # After the terminal was closed, isatty would return False.
-    on_terminal = [number for number in _DESCRIPTORS if os.isatty(number)]
+    # Of standard input, output and errors; after the terminal was closed, isatty would return False.
+    on_terminal = [number for number in range(3) if os.isatty(number)]
 
     def handle(_number: int, _frame: FrameType | None) -> None:
         # The shell and the kernel may both send the signal.

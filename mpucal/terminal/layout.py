@@ -14,13 +14,11 @@ from .letters import Glyphs
 from .view import View
 
 # Smaller screens show text only.
-LEAST_ROWS, LARGE_ROWS, AIRY_ROWS = 20, 40, 30
-_PROMPT_ROWS, _LEAST_PICTURE_ROWS = 2, 5
+LEAST_ROWS = 20
+_LEAST_PICTURE_ROWS = 5
 _BLANK = Text("")
 KNOWLEDGE_ROWS = 3
-_LABEL, _LONGEST_BAR = 19, 20
-# Columns of a label and of the longest text beside a bar: a narrow screen shortens the bar rather than the text.
-_BESIDE_BAR = 53
+_LABEL = 19
 _TURN = "turn it "
 # Text is wrapped to at least this width; on narrower screens it is cut.
 NARROWEST = 12
@@ -34,10 +32,10 @@ KEYS_REDO = "Enter: skip ahead    r: restart the turning    q or Ctrl-C: stop"
 def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     """Return exactly `rows` lines of at most `columns` characters."""
     roomy = columns >= NARROW and rows >= LEAST_ROWS
-    air = [_BLANK] if rows >= AIRY_ROWS else []
+    air = [_BLANK] if rows >= 30 else []
     headline = _headline(view, columns, rows, glyphs)
-    # A headline of two lines leaves one row less.
-    prompt = _prompt(view, columns, _PROMPT_ROWS - (len(headline) == letters.TWO_ROWS))
+    # A prompt has two rows; a headline of two lines leaves it one.
+    prompt = _prompt(view, columns, 2 - (len(headline) == letters.TWO_ROWS))
     above = [_status(view, columns, glyphs), *air, *headline, *prompt]
     below = [
         meter(view, columns, glyphs),
@@ -78,7 +76,7 @@ def _status(view: View, columns: int, glyphs: Glyphs) -> Text:
 def _headline(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     text = view.headline
     style = _headline_style(view)
-    large = columns >= LARGE_COLUMNS and rows >= LARGE_ROWS
+    large = columns >= LARGE_COLUMNS and rows >= 40
     for scale in (2, 1) if large else (1,):
         if letters.width(text, scale) + 2 <= columns and rows >= LEAST_ROWS:
             return [Text(f" {row}", style=style) for row in letters.large(text, glyphs.block, scale)]
@@ -169,8 +167,9 @@ def _cut(line: Text, columns: int, glyphs: Glyphs) -> Text:
 
 
 def bar_columns(columns: int) -> int:
-    """Return the length of a bar on a screen of `columns`."""
-    return min(max(columns - _BESIDE_BAR, 0), _LONGEST_BAR)
+    """Return the length of a bar on a screen of `columns`, 20 at most."""
+    # A label and the longest text beside a bar take 53: a narrow screen shortens the bar rather than the text.
+    return min(max(columns - 53, 0), 20)
 
 
 def bar(share: float, columns: int, glyphs: Glyphs) -> str:

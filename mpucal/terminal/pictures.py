@@ -20,7 +20,6 @@ Point = tuple[float, float]
 # Bits of the dots of one character cell in Unicode's braille: _DOTS[row][column].
 COLUMNS, ROWS = 2, 4
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-_BRAILLE = 0x2800
 _ROW_MASKS = tuple(left | right for left, right in _DOTS)
 _LEFT, _RIGHT = (sum(row[k] for row in _DOTS) for k in range(COLUMNS))
 
@@ -74,7 +73,8 @@ class Canvas:
 
 @cache
 def _braille(dots: int) -> str:
-    return chr(_BRAILLE + dots) if dots else " "
+    # Unicode's braille begins at U+2800.
+    return chr(0x2800 + dots) if dots else " "
 
 
 @cache
@@ -92,16 +92,12 @@ def _ascii(dots: int) -> str:
     return "|" if top_left == bottom_left else "\\" if top_left else "/"
 
 
-_AXES: tuple[tuple[str, Direction, str], ...] = (
-    ("X", (1.0, 0.0, 0.0), "bold red"),
-    ("Y", (0.0, 1.0, 0.0), "bold green"),
-    ("Z", (0.0, 0.0, 1.0), "bold blue"),
+# Letter, style and direction of each axis, and the distances from the middle to its end and to the letter.
+_AXES: tuple[tuple[str, str, Direction, float, float], ...] = (
+    ("X", "bold red", (1.0, 0.0, 0.0), 1.35, 1.62),
+    ("Y", "bold green", (0.0, 1.0, 0.0), 1.1, 1.38),
+    ("Z", "bold blue", (0.0, 0.0, 1.0), 0.75, 1.05),
 )
-# Distances from the middle to the ends of the axes, and to their letters.
-_TIPS, _LETTERS = (1.35, 1.1, 0.75), (1.62, 1.38, 1.05)
-_REACH = 1.75
-# On fewer rows the lines of a plate's edge would merge.
-_LARGE = 14
 
 
 def draw_board(kind: str, attitude: Quaternion, eye: Eye, columns: int, rows: int) -> Canvas:
@@ -109,16 +105,18 @@ def draw_board(kind: str, attitude: Quaternion, eye: Eye, columns: int, rows: in
     canvas, model = Canvas(columns, rows), MODELS[kind]
     face = rotate(attitude, (0.0, 0.0, model.up))
     across, up, toward = eye.axes
-    scale = min(canvas.centre[0], canvas.centre[1] * 1.15) / _REACH
+    # The farthest letter is at 1.62.
+    scale = min(canvas.centre[0], canvas.centre[1] * 1.15) / 1.75
 
     def seen(point: Direction) -> Point:
         room = rotate(attitude, point)
         return (canvas.centre[0] + scale * dot(across, room), canvas.centre[1] - scale * dot(up, room))
 
-    for stroke in model.strokes(dot(toward, face) > 0.0, rows >= _LARGE):
+    # On fewer than 14 rows the lines of a plate's edge would merge.
+    for stroke in model.strokes(dot(toward, face) > 0.0, rows >= 14):
         for a, b in pairwise(stroke):
             canvas.line(seen(a), seen(b))
-    for (letter, axis, style), tip, end in zip(_AXES, _TIPS, _LETTERS, strict=True):
+    for letter, style, axis, tip, end in _AXES:
         canvas.line(seen((0.0, 0.0, 0.0)), seen(_scaled(axis, tip)))
         canvas.letter(seen(_scaled(axis, end)), letter, style)
     return canvas
@@ -195,7 +193,6 @@ def _vehicle() -> Model:
 MODELS = dict(zip(BOARDS, (_breakout(*_pins()), _breakout(), _vehicle()), strict=True))
 
 
-_CIRCLE = [(math.cos(math.pi * k / 20), math.sin(math.pi * k / 20)) for k in range(41)]
 MARKS_UNICODE = {"held": "●", "passed": "∙", "wanted": "◎", "now": "+"}
 MARKS_ASCII = {"held": "o", "passed": ".", "wanted": "X", "now": "+"}
 _STYLES = {"held": "bold green", "passed": "green", "wanted": "bold yellow reverse", "now": "bold"}
@@ -211,7 +208,7 @@ def draw_half(upper: bool, marks: Iterable[tuple[str, Direction]], columns: int,
     """
     canvas = Canvas(columns, rows)
     radius = min(canvas.centre) - 0.5
-    rim = [_at(canvas, radius, x, y) for x, y in _CIRCLE]
+    rim = [_at(canvas, radius, math.cos(math.pi * k / 20), math.sin(math.pi * k / 20)) for k in range(41)]
     for before, after in pairwise(rim):
         canvas.line(before, after)
     glyphs = MARKS_UNICODE if unicode else MARKS_ASCII

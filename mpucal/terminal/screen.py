@@ -130,7 +130,6 @@ class Screen:
 # The alternate screen leaves the terminal's contents as they were; its cursor is hidden.
 _SHOW, _GIVE_BACK = "\x1b[?1049h\x1b[?25l\x1b[2J", "\x1b[0m\x1b[?25h\x1b[?1049l"
 _ROW, _TO_THE_END = "\x1b[{};1H", "\x1b[0m\x1b[K"
-_USUAL = (80, 24)
 
 
 class Painter:
@@ -162,8 +161,9 @@ class Painter:
         try:
             columns, rows = os.get_terminal_size(self._out.fileno())
         except (OSError, ValueError):
-            return _USUAL
-        return columns or _USUAL[0], rows or _USUAL[1]
+            columns = rows = 0
+        # A terminal that does not tell has the usual size.
+        return columns or 80, rows or 24
 
     def paint(self, lines: Sequence[Text], size: tuple[int, int], bell: bool = False) -> int:
         """Show `lines` from the top; return the number of characters sent."""
