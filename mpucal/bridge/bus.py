@@ -25,8 +25,6 @@ from .port_errors import WIRES, no_reply, request_failed
 from .read_ahead import ReadAhead
 from .requests import Answer
 
-# Four frames of 14 bytes fill one message.
-BATCH = 4
 # Time without a message, besides the line's latency, after which the bridge is lost; one that was reset says so sooner.
 GONE_NS = 1000 * MS
 REPEAT_NS = 100 * MS
@@ -164,7 +162,9 @@ class BridgeBus:
         # Prepared before the request: the first frames may come together with its reply.
         self._ahead = ReadAhead(self.link.seq_of(len(before)))
         try:
-            answers = self._ask(*before, wire.Stream(reg.FRAME_BYTES, BATCH))
+            # So many frames fill one message.
+            batch = wire.MAX_READ // reg.FRAME_BYTES
+            answers = self._ask(*before, wire.Stream(reg.FRAME_BYTES, batch))
         except BusError:
             if self._ahead is not None:
                 self._ahead = None

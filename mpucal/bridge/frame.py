@@ -19,7 +19,6 @@ CHECKSUM = struct.Struct("<H")
 MAX_PAYLOAD = 66
 MAX_CONTENT = HEADER.size + MAX_PAYLOAD + CHECKSUM.size
 MAX_ENCODED = MAX_CONTENT + 1
-CRC_INITIAL = 0xFFFF
 
 
 class FrameError(ValueError):
@@ -99,8 +98,8 @@ class Deframer:
 
 
 def crc16(data: bytes) -> int:
-    """Return the CRC-16/CCITT-FALSE."""
-    return binascii.crc_hqx(data, CRC_INITIAL)
+    """Return the CRC-16/CCITT-FALSE, which begins with 0xFFFF."""
+    return binascii.crc_hqx(data, 0xFFFF)
 
 
 def stuff(content: bytes) -> bytes:

@@ -20,8 +20,7 @@ from .port import BAUDS, Port, SerialPort
 CTRL_A, CTRL_B, CTRL_C, CTRL_D = b"\x01", b"\x02", b"\x03", b"\x04"
 BANNER = b"raw REPL; CTRL-B to exit\r\n>"
 REBOOT = b"soft reboot\r\n"
-RAW_PASTE, PASTE_ACCEPTED = b"\x05A\x01", b"R\x01"
-WINDOW_FREED = 0x01
+RAW_PASTE, PASTE_ACCEPTED, WINDOW_FREED = b"\x05A\x01", b"R\x01", b"\x01"
 
 # The last one is for a boot, and for a program to be compiled.
 ASK_NS, ANSWER_NS, BOOT_NS = 1000 * MS, 2000 * MS, 15_000 * MS
@@ -108,7 +107,7 @@ class RawRepl:
         at = 0
         while at < len(text):
             while self._received or not room:
-                if self._read(1)[0] != WINDOW_FREED:
+                if self._read(1) != WINDOW_FREED:
                     # The board rejects the program; the error follows.
                     self._port.write(CTRL_D)
                     return

@@ -14,8 +14,6 @@ from .messages import Status
 AUTOPILOT = re.compile("ardupilot|px4", re.IGNORECASE)
 WIRES = "check the chip's supply, SDA, SCL and AD0"
 
-KEPT_BYTES = 400
-WORDS = 40
 # Text at the right rate is all printable; at a wrong rate hardly more than a third of the bytes are.
 PRINTABLE = 0.9
 # MicroPython's replies to a HELLO, some bytes of which enter its raw REPL.
@@ -130,9 +128,9 @@ class PortDiagnosis:
         self._bytes: defaultdict[int, bytearray] = defaultdict(bytearray)
 
     def add(self, data: bytes, baud: int) -> None:
-        """Add bytes received at `baud`."""
+        """Add bytes received at `baud`; the first 400 are kept."""
         kept = self._bytes[baud]
-        kept += data[: KEPT_BYTES - len(kept)]
+        kept += data[: 400 - len(kept)]
 
     @property
     def is_repl(self) -> bool:
@@ -176,8 +174,8 @@ class PortDiagnosis:
 
 
 def _text(data: bytearray) -> str:
-    """Return the longest line of `data` if it is text, else an empty string."""
+    """Return 40 letters of the longest line of `data` if it is text, else an empty string."""
     printable = sum(byte in b"\t\r\n" or 0x20 <= byte < 0x7F for byte in data)
     if printable < PRINTABLE * len(data):
         return ""
-    return max((line.strip() for line in data.decode("ascii", "replace").splitlines()), key=len, default="")[:WORDS]
+    return max((line.strip() for line in data.decode("ascii", "replace").splitlines()), key=len, default="")[:40]

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from ..chip.registers import FRAME_BYTES
 from .messages import MAX_BATCH, Frames, Status
 
-INDEX_WRAP = 2**16
-
 
 @dataclass(frozen=True)
 class Look:
@@ -55,7 +53,7 @@ class ReadAhead:
             self.lose(t_ns, host_ns)
             return
         self._drops = frames.drops
-        self._next_index = (frames.index + len(frames.frames) // FRAME_BYTES) % INDEX_WRAP
+        self._next_index = (frames.index + len(frames.frames) // FRAME_BYTES) % 2**16
         self._begun.append(frames)
         self._begun_t_ns = t_ns
         if frames.left == 0:

@@ -9,8 +9,6 @@ from ..chip.registers import FIFO_R_W, INT_STATUS
 from .frame import Frame
 from .messages import REPLY_BIT, BlobRead, BlobReadReply, Burst, BurstReply, Message, Read, ReadReply, Reply, Status
 
-# RFC 6298, 2.3: gains of the smoothed time and its mean deviation, and the number of deviations in a time-out.
-GAIN, DEVIATION_GAIN, DEVIATIONS = 1 / 8, 1 / 4, 4
 # A line with a larger latency cannot carry a session.
 LONGEST_NS = 3_000_000_000
 
@@ -75,7 +73,7 @@ class PendingRequest:
 
 
 class Latency:
-    """Smoothed round-trip time of requests: radio, networks and busy hosts delay replies."""
+    """Smoothed round-trip time of requests (RFC 6298, 2.3): radio, networks and busy hosts delay replies."""
 
     def __init__(self) -> None:
         self._mean_ns: float | None = None
@@ -86,10 +84,10 @@ class Latency:
         if self._mean_ns is None:
             self._mean_ns, self._deviation_ns = ns, ns / 2
             return
-        self._deviation_ns += DEVIATION_GAIN * (abs(ns - self._mean_ns) - self._deviation_ns)
-        self._mean_ns += GAIN * (ns - self._mean_ns)
+        self._deviation_ns += (abs(ns - self._mean_ns) - self._deviation_ns) / 4
+        self._mean_ns += (ns - self._mean_ns) / 8
 
     @property
     def most_ns(self) -> int:
         """Longest round-trip time to expect; 0 before the first reply."""
-        return min(LONGEST_NS, round((self._mean_ns or 0.0) + DEVIATIONS * self._deviation_ns))
+        return min(LONGEST_NS, round((self._mean_ns or 0.0) + 4 * self._deviation_ns))

@@ -102,8 +102,6 @@ class Settings:
 # polls less often: it may fill this share of its FIFO, or queue this number of frames of a FIFO of 1024 bytes.
 MOST_FILLED, MAX_FRAMES_A_POLL = 0.75, 54
 MIN_POLL_S = 0.001
-SLOW_POLL_S = 0.040
-FAST_POLL_S, FAST_HZ = 0.020, 400
 # Samples read one by one take half of the bus's time at this rate and 400 kHz, and all of it at 100 kHz.
 MOST_POLLED_HZ = 250
 
@@ -147,7 +145,7 @@ class Config:
         """Time between two polls of the FIFO: the longest that a FIFO of 512 bytes and a host 10 ms late allow."""
         if self.poll_s is not None:
             return self.poll_s
-        return FAST_POLL_S if self.rate_hz > FAST_HZ else SLOW_POLL_S
+        return 0.020 if self.rate_hz > 400 else 0.040
 
     def settings(self, part: Part) -> Settings:
         """Return the settings for one part; one with less sensitivity gets the smallest range that is large enough.

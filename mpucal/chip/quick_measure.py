@@ -19,6 +19,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import BoardMoved, BusError, ChipReset
 from ..rests.stillness import is_untouched
 from . import registers as reg
+from .config import Config
 from .families import Part
 from .identity import accel_sensitivity
 from .losses import Loss
@@ -27,15 +28,15 @@ from .setup import STARTUP_NS
 
 Codes = NDArray[np.int64]
 
-READ_NS, READS = 5_000_000, 100
+READS = 100
 
-AFS_SEL, DLPF_CFG, SMPLRT_DIV = 1, 3, 4
-# In the order of writing: the chip must be awake first.
+# The settings are those of a session, in the order of writing: the chip must be awake first.
+AFS_SEL = reg.ACCEL_RANGES_G.index(Config.accel_range_g)
 SETTING = {
     reg.PWR_MGMT_1: reg.CLKSEL_PLL,
     reg.PWR_MGMT_2: 0,
-    reg.SMPLRT_DIV: SMPLRT_DIV,
-    reg.CONFIG: DLPF_CFG,
+    reg.SMPLRT_DIV: reg.sample_rate_divider(Config.rate_hz, Config.dlpf),
+    reg.CONFIG: Config.dlpf,
     reg.ACCEL_CONFIG: AFS_SEL << reg.FULL_SCALE_SHIFT,
 }
 # Tries until the board must lie still, 0.6 s each: a person needs some time to put it down.
@@ -81,7 +82,7 @@ class TemporaryMeasurement:
         """
         for _ in range(self._patience):
             self._port.sleep(STARTUP_NS)
-            acc_g = read_counts(self._port, reg.ACCEL_WORDS) / reg.ACCEL_LSB_PER_G[AFS_SEL]
+            acc_g = read_counts(self._port, words=3) / reg.ACCEL_LSB_PER_G[AFS_SEL]
             check_registers(self._port, reg.ACCEL_CONFIG, bytes([SETTING[reg.ACCEL_CONFIG]]))
             # Revision C of the 6050 shows half of gravity. It is measured once, since offsets may shift the reading.
             sensitivity = self._sensitivity or accel_sensitivity(float(np.linalg.norm(acc_g.mean(0))))
@@ -97,7 +98,7 @@ def read_counts(port: Port, words: int) -> Vector:
     """Read the first `words` words of a sample, the accelerometer's first; return (READS, words) counts."""
     counts = np.empty((READS, words))
     for row in counts:
-        port.sleep(READ_NS)
+        port.sleep(round(1e9 / Config.rate_hz))
         row[:] = np.frombuffer(port.read(reg.ACCEL_XOUT_H, 2 * words), ">i2")
     return counts
 
@@ -110,8 +111,6 @@ def check_registers(port: Port, register: int, value: bytes) -> None:
 
 SETTLE_NS = 250_000_000
 
-# 6050: +-8 g and +-250 deg/s; 6500: +-2 g and +-250 deg/s.
-PACKED_AFS_SEL, SMALLEST = 2, 0
 PACKED_SHARES, ACCEL_SHARES, GYRO_SHARES = (0.86, 1.14), (0.5, 1.5), (0.5, np.inf)
 
 # Number of attempts on a board that moves, and differences between the readings before and after that show it.
@@ -151,14 +150,15 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
     ranges, family = port.read(reg.GYRO_CONFIG, 2), part.family
     # A reset clears the first two, or puts the chip to sleep.
     kept = [(register, port.read(register, 1)) for register in (reg.CONFIG, reg.SMPLRT_DIV, reg.PWR_MGMT_1)]
-    afs_sel = PACKED_AFS_SEL if family.packed_self_test else SMALLEST
+    # A 6050 is tested at +-8 g, a 6500 at +-2 g, and both at +-250 deg/s.
+    afs_sel = reg.ACCEL_RANGES_G.index(8 if family.packed_self_test else 2)
     try:
         for _ in range(ATTEMPTS):
             off, on, after = (_mean_counts(port, test, afs_sel) for test in (0, reg.SELF_TEST, 0))
             change = np.abs(after - off)
             moved = bool(
                 (change[:3] > MOVED_G * reg.ACCEL_LSB_PER_G[afs_sel]).any()
-                or (change[4:] > MOVED_DPS * reg.GYRO_LSB_PER_DPS[SMALLEST]).any()
+                or (change[4:] > MOVED_DPS * reg.GYRO_LSB_PER_DPS[0]).any()
             )
             if not moved:
                 break
@@ -168,7 +168,7 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
     for register, value in kept:
         check_registers(port, register, value)
     accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
-    gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[SMALLEST]
+    gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[0]
     codes = _factory_codes(port, family.packed_self_test)
     expected = factory_response(family.packed_self_test, *codes)
     shares = [np.where(code, each / of, np.nan) for code, each, of in zip(codes, (accel, gyro), expected, strict=True)]
@@ -178,9 +178,8 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
 
 
 def _mean_counts(port: Port, test: int, afs_sel: int) -> Vector:
-    """Measure the mean counts (7,) of a sample with these settings."""
-    gyro, accel = SMALLEST << reg.FULL_SCALE_SHIFT, afs_sel << reg.FULL_SCALE_SHIFT
-    port.write_block(reg.GYRO_CONFIG, bytes([gyro | test, accel | test]))
+    """Measure the mean counts (7,) of a sample with these settings, at the gyroscope's smallest range."""
+    port.write_block(reg.GYRO_CONFIG, bytes([test, afs_sel << reg.FULL_SCALE_SHIFT | test]))
     port.sleep(SETTLE_NS)
     return np.asarray(read_counts(port, reg.FRAME_WORDS).mean(0))
 
@@ -200,4 +199,4 @@ def factory_response(packed: bool, accel: Codes, gyro: Codes) -> tuple[Vector, V
     a, w = (codes.astype(np.float64) - 1.0 for codes in (accel, gyro))
     if packed:
         return 0.34 * (0.92 / 0.34) ** (a / 30), 25.0 * 1.046**w * np.array([1.0, -1.0, 1.0])
-    return 2620.0 * 1.01**a / reg.ACCEL_LSB_PER_G[SMALLEST], 2620.0 * 1.01**w / reg.GYRO_LSB_PER_DPS[SMALLEST]
+    return 2620.0 * 1.01**a / reg.ACCEL_LSB_PER_G[0], 2620.0 * 1.01**w / reg.GYRO_LSB_PER_DPS[0]

@@ -75,7 +75,6 @@ PWR_MGMT_1_SLEEP: Final = 0x40
 CLKSEL_PLL: Final = 0x01
 
 # One FIFO frame, in register order: accelerometer x, y, z, temperature, gyroscope x, y, z, big-endian int16.
-ACCEL_WORDS: Final = 3
 FRAME_WORDS: Final = 7
 FRAME_BYTES: Final = 2 * FRAME_WORDS
 

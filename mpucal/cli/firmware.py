@@ -14,8 +14,7 @@ from ..errors import OutputError, SourceError, UsageError, WriteBackError
 from .common import output_option
 
 EXAMPLE = "Example: `mpucal firmware -o libraries/mpucal` writes the library into a sketchbook."
-PACKAGE = Path(__file__).parents[1]
-FOLDER = PACKAGE / "firmware"
+FOLDER = Path(__file__).parent.parent / "firmware"
 LIBRARY = ("src", "examples", "library.properties", "library.json", "keywords.txt", "README.md")
 HEX = "mpucal_bridge.hex"
 LICENCE = "LICENSE"

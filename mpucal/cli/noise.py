@@ -36,10 +36,6 @@ EXAMPLE = "Example: `mpucal noise walk.npz -o noise`, or `mpucal noise --bus sim
 DOCUMENT, PAGE = "noise.json", "noise.html"
 # Wanted relative standard uncertainty of the bias instability.
 WANTED_STD = 0.1
-# Interval of the progress [s] in a log.
-LOGGED_S = 60.0
-# Runs of a second in which a person puts the board down.
-PUT_DOWN_RUNS = 5
 
 
 @click.command("noise", epilog=EXAMPLE)
@@ -91,7 +87,8 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noi
         # The result so far is kept, whatever ends the measurement.
         try:
             sensor = measuring.source.start()
-            skipped = 0 if options["replay"] else PUT_DOWN_RUNS
+            # In five runs of a second a person puts the board down.
+            skipped = 0 if options["replay"] else 5
             if skipped:
                 put_down(source.listeners, say, speak_of(PUT_DOWN, usual_board(source.origin)))
             for samples in islice(_runs(measuring.source), skipped, None):
@@ -131,7 +128,7 @@ def _progress() -> Iterator[Any]:
 
     def show(meter: NoiseMeter, seconds: float | None) -> None:
         nonlocal shown_s
-        if monotonic() - shown_s < (PROGRESS_S if on_a_terminal else LOGGED_S):
+        if monotonic() - shown_s < (PROGRESS_S if on_a_terminal else 60.0):
             return
         shown_s = monotonic()
         of = "" if seconds is None else f" of {duration(seconds)}"

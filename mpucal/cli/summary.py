@@ -34,7 +34,7 @@ RANGES = {
 REMEDY_OPTION = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
 
 # For a terminal of 80 columns.
-WIDTH, LABEL, COLUMN = 79, 23, 17
+WIDTH = 79
 SENTENCES = {
     GOOD: "{} is good.",
     USABLE: "{} is usable, with reservations:",
@@ -54,7 +54,7 @@ def summary(calibration: Calibration) -> str:
         (f"{_imu(calibration.extra)}, value ± 1 sigma" if others else "value ± 1 sigma", AXES),
         *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration)),
     ]
-    lines += [(f"{name:<{LABEL}}" + "".join(f" {cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
+    lines += [(f"{name:<23}" + "".join(f" {cell:>17}" for cell in cells)).rstrip() for name, cells in rows]
     if error := estimated_error(calibration):
         lines += ["", textwrap.fill(error, WIDTH)]
     for other in others:

@@ -12,8 +12,6 @@ from typing import Any, Self
 
 from ..errors import SourceError
 
-TOPIC, WIDTH = 24, 100
-
 
 class Mark(StrEnum):
     """Severity of a finding."""
@@ -89,8 +87,7 @@ def document(source: str, version: str, findings: Sequence[Finding]) -> str:
 
 
 def _wrapped(topic: str, words: str) -> list[str]:
-    indent = " " * TOPIC
-    return textwrap.wrap(words, WIDTH, initial_indent=topic.ljust(TOPIC), subsequent_indent=indent) or [topic]
+    return textwrap.wrap(words, 100, initial_indent=f"{topic:<24}", subsequent_indent=f"{'':<24}") or [topic]
 
 
 def _many(number: int, noun: str) -> str:

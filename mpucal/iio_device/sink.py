@@ -41,7 +41,7 @@ from ..sinks.table import IIO_STATE, KERNEL
 from .source import OpenedIio
 
 FORMAT, WORDS, RULE = "mpucal.iio_state", "calibbias", "rule"
-REST_S, TRIES, FEWEST = 1.0, 20, 10
+TRIES = 20
 CALIBBIAS = [f"{ACCEL}_{axis}_calibbias" for axis in AXES]
 
 
@@ -156,8 +156,8 @@ class KernelSink(Sink):
         try:
             for _ in range(TRIES):
                 driver.forget()
-                acc = measured(driver, REST_S).acc
-                if len(acc) > FEWEST and is_untouched(acc):
+                acc = measured(driver, 1.0).acc
+                if len(acc) > 10 and is_untouched(acc):
                     return np.asarray(acc.mean(axis=0), np.float64)
         finally:
             driver.stop()

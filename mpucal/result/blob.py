@@ -41,7 +41,6 @@ FORMATS = [
 ]
 CHECKSUM = struct.Struct("<I")
 LENGTHS = [form.size + CHECKSUM.size for form in FORMATS]
-NO_SLOPE, NO_RANGE = (0.0, 0.0, 0.0), (math.nan, math.nan)
 
 # limits of D's largest element, and of its determinant over the cube of that element
 LEAST_GAIN, MOST_GAIN = 1e-3, 1e3
@@ -83,8 +82,8 @@ class Blob:
     applied_b_a: tuple[float, ...]
     K: tuple[float, ...]
     b_omega: tuple[float, ...]
-    b_a_slope: tuple[float, ...] = NO_SLOPE
-    temperature_range_c: tuple[float, ...] = NO_RANGE
+    b_a_slope: tuple[float, ...] = (0.0, 0.0, 0.0)
+    temperature_range_c: tuple[float, ...] = (math.nan, math.nan)
     gyro_counts: float | None = None
 
     def encode(self) -> bytes:
@@ -123,7 +122,7 @@ class Blob:
         low, high = blob.temperature_range_c
         # a slope that cannot be used is none
         if not (all(map(math.isfinite, blob.b_a_slope)) and -math.inf < low <= blob.temperature_c <= high < math.inf):
-            blob = replace(blob, b_a_slope=NO_SLOPE, temperature_range_c=NO_RANGE)
+            blob = replace(blob, b_a_slope=Blob.b_a_slope, temperature_range_c=Blob.temperature_range_c)
         _check_usable(blob)
         return blob
 

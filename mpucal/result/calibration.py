@@ -20,7 +20,7 @@ from ..data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parse_json
-from .blob import NO_RANGE, Blob, BlobError
+from .blob import Blob, BlobError
 from .correlation import UNCORRELATED
 from .document import DIGEST, digest, digest_warning, drop_unserialisable, from_document, to_document
 from .error_model import bias_mg, scale_factor_error
@@ -244,7 +244,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         sensor = self.sensor
         arrays = {name: tuple(getattr(self, attribute).ravel().tolist()) for name, attribute in OF_BLOB.items()}
         if not self.follows_temperature:
-            arrays["temperature_range_c"] = NO_RANGE
+            arrays["temperature_range_c"] = Blob.temperature_range_c
         return Blob(
             **arrays,
             who_am_i=sensor.who_am_i or 0,

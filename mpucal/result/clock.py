@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-# A clock that shows an earlier year was never set, as on a Raspberry Pi without a network.
-LEAST_YEAR = 2025
-
 
 def warn_unset() -> str:
     """Return a warning if the computer's clock is not set, else empty."""
-    if (now := datetime.now(UTC)).year >= LEAST_YEAR:
+    # A clock that shows an earlier year was never set, as on a Raspberry Pi without a network.
+    if (now := datetime.now(UTC)).year >= 2025:
         return ""
     return f"The computer's clock shows {now:%Y-%m-%d}: set it, or names and dates of the results are wrong."
 

@@ -11,8 +11,6 @@ from ..errors import UsageError
 from ..origin import Origin
 from .calibration import Calibration
 
-# relative and absolute: a parameter is a float32 and passes through text
-TOLERANCE = 1e-5
 THIS_CHIP = "give the calibration of this chip"
 
 
@@ -104,7 +102,8 @@ def _check_parameters(calibration: Calibration, autopilot: Autopilot | None) -> 
         return
     old, now = of.get("params_old", {}), autopilot.parameters
     for name in of.get("params_new", {}):
-        if name in old and name in now and not np.isclose(old[name], now[name], rtol=TOLERANCE, atol=TOLERANCE):
+        # a parameter is a float32 and passes through text
+        if name in old and name in now and not np.isclose(old[name], now[name], rtol=1e-5, atol=1e-5):
             raise UsageError(
                 f"{name} was {now[name]:g} while these samples were taken, but {old[name]:g} during the calibration",
                 "give calibration-on-autopilot.json, which the write to the autopilot left",

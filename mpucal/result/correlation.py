@@ -22,8 +22,6 @@ NAMES = (
 )
 KEY, LOWER = "correlation", np.tril_indices(len(NAMES), -1)
 UPPER = np.triu_indices(3)
-# further digits differ between processors
-DIGITS = 5
 # also the value if the correlation is not known
 UNCORRELATED = np.eye(len(NAMES))
 
@@ -42,7 +40,8 @@ def correlation_of(names: Sequence[str], covariance: Vector, std: Vector) -> Vec
         ours, theirs = (np.array(column) for column in zip(*of, strict=True))
         rho[np.ix_(ours, ours)] = covariance[np.ix_(theirs, theirs)] / np.outer(std[ours], std[ours])
     below: Vector = np.clip(rho[LOWER], -1.0, 1.0)
-    return from_lower(below.round(DIGITS))
+    # further digits differ between processors
+    return from_lower(below.round(5))
 
 
 def from_lower(values: Vector) -> Vector:

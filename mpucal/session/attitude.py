@@ -23,8 +23,6 @@ STILL_S, MOVING_S = 0.2, 2.0
 CORRECT_RAD_S = math.radians(60.0)
 # Until the end of the flat rest, a board at rest is turned about the vertical towards straight, at most so fast.
 STRAIGHTEN_RAD_S = math.radians(30.0)
-# A board that lies on its component side was turned over about its x axis.
-_TURNED_OVER: Quaternion = (0.0, 1.0, 0.0, 0.0)
 
 
 class Attitude:
@@ -144,7 +142,8 @@ def turned_up(attitude: Quaternion, up: Direction) -> Quaternion:
 
 def straight(up: Direction) -> Quaternion:
     """Return the attitude nearest to a board laid straight in which the unit vector `up` of its axes points up."""
-    return turned_up(LAID if up[2] >= 0.0 else _TURNED_OVER, up)
+    # A board that lies on its component side was turned over about its x axis.
+    return turned_up(LAID if up[2] >= 0.0 else (0.0, 1.0, 0.0, 0.0), up)
 
 
 def canonical(q: Quaternion) -> Quaternion:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from ..data import Samples
+from ..rests.flat import ENOUGH_FLAT_S
 from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import WINDOW_S, Windows
@@ -13,8 +14,6 @@ from .boards import BOARD, KINDS
 from .events import Caution, Countdown, Output, Outputs, Progress, Prompt, PromptKind, Rested, Stopped, triple
 from .step import PATIENCE_S, SAY_AGAIN_S, Step
 
-# Least rest in a recording without a session, whose person knew of no countdown.
-RECORDED_S = 5.0
 # Remedy for missing samples, for every source.
 LOST = "check the wires or the link, end other programs, or take a lower --rate"
 
@@ -39,7 +38,8 @@ class LayFlat(Step):
 
     Parameters
     ----------
-    patient : there is no time limit, and RECORDED_S of rest is enough once the board is moved.
+    patient : there is no time limit, and once the board is moved, a rest of ENOUGH_FLAT_S is enough, as in a recording
+        without a session, whose person knew of no countdown.
     board : its kind, for the words of the prompts. flat_s : time for which it is to be still.
     """
 
@@ -63,7 +63,7 @@ class LayFlat(Step):
                 self._begun_s = self._cautioned_s = window.start_s
             t_s, sight = window.end_s, self._stillness.add(window)
             if isinstance(sight, Moved):
-                if self._patient and self._still is not None and self._still.seconds >= RECORDED_S:
+                if self._patient and self._still is not None and self._still.seconds >= ENOUGH_FLAT_S:
                     return [*outputs, self._rested(self._still)]
                 outputs += self._moved(sight, t_s)
                 if not self._patient and t_s - self._begun_s >= PATIENCE_S:

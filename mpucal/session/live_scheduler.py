@@ -124,10 +124,6 @@ class FitScheduler:
         return unsent
 
 
-# The reading loop is scheduled before the fits.
-NICENESS = 5
-
-
 class ProcessWorker:
     """Worker that executes the tasks in a process, which it starts at once and which `close` kills.
 
@@ -181,7 +177,8 @@ def serve() -> None:
     # Output of print must not get between the answers.
     sys.stdout = sys.stderr
     if hasattr(os, "nice"):
-        os.nice(NICENESS)
+        # The reading loop is scheduled before the fits.
+        os.nice(5)
     with suppress(EOFError, BrokenPipeError):
         fits = Fits(*pickle.load(tasks))
         while True:

@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import cycle
-from itertools import product as combinations
 
 import numpy as np
 
 from ..data import Vector
+from ..session.aims import ALL_AROUND
 from . import rotation
 from .disturbance import knock, slip, warming
 from .hand import IN_THE_HAND, ON_THE_TABLE, PAUSE_S, TURN_RAD, USUAL, Hand, Manner, Stance
@@ -22,8 +22,6 @@ class Guided(Hand):
 
     def __init__(self, rng: np.random.Generator, manner: Manner = USUAL) -> None:
         super().__init__(rng, manner)
-        corners = np.array([c for c in combinations((-1.0, 0.0, 1.0), repeat=3) if any(c)])
-        self._places = corners / np.linalg.norm(corners, axis=1, keepdims=True)
         self._visited: list[Vector] = []
 
     def rotate(self, now: Stance) -> Leg:
@@ -39,11 +37,11 @@ class Guided(Hand):
         down = -rotation.up_in_board(now.attitude)
         if not self._visited:
             self._visited.append(down)
-        angle = np.arccos(np.clip(self._places @ down, -1.0, 1.0))
-        nearest = np.max(self._places @ np.array(self._visited).T, axis=1)
+        angle = np.arccos(np.clip(ALL_AROUND @ down, -1.0, 1.0))
+        nearest = np.max(ALL_AROUND @ np.array(self._visited).T, axis=1)
         reachable = (angle > TURN_RAD[0]) & (angle < TURN_RAD[1] - 0.2)
         cost = nearest + self._rng.uniform(0.0, 0.2, len(nearest)) + np.where(reachable, 0.0, 10.0)
-        place = self._places[int(np.argmin(cost))]
+        place = ALL_AROUND[int(np.argmin(cost))]
         self._visited.append(place)
         return self._varied(now, self.inaccurate(place))
 

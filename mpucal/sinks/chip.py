@@ -35,7 +35,7 @@ from ..errors import ChipError
 from ..result.calibration import Calibration
 from ..result.comparison import is_better
 from ..result.correction import THIS_CHIP, other_who_am_i
-from ..result.error_model import mg_text
+from ..result.error_model import MG_PER_MPS2, mg_text
 from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.chip import OpenedChip
@@ -47,8 +47,6 @@ FORMAT, REGISTERS = "mpucal.chip_offsets", "registers"
 
 # m/s^2: error of gravity with the calibration of this chip, in any orientation
 GRAVITY_MPS2 = 0.2
-# half a step of 1 mg, rms over three axes
-STEP_MPS2 = 0.001 * STANDARD_GRAVITY_MPS2 * 0.5
 # relative tolerance of a measured step, besides MOTION_G: the accelerometer's scale is known to 3 %
 SHIFT_SHARE = 0.1
 
@@ -123,7 +121,8 @@ class ChipSink(Sink):
         bias, std = (
             float(np.linalg.norm(np.nan_to_num(b))) for b in (calibration.b_a_to_subtract, calibration.b_a_std)
         )
-        if is_better(STEP_MPS2, bias, std):
+        # half a step of 1 mg is left, rms over three axes
+        if is_better(0.5 / MG_PER_MPS2, bias, std):
             return None
         return f"b_a is only {bias:.3f} m/s^2, which the offset registers of {self.where} cannot reduce"
 

@@ -34,9 +34,6 @@ from .kind import Request
 
 # Longest message of i2c-dev.
 MAX_MESSAGE_BYTES = 8192
-SMBUS_BLOCK_BYTES = 32
-# An adapter that refuses even so few bytes does not support the kind of transfer.
-LEAST_LIMIT_BYTES = 4
 
 
 def open_source(request: Request) -> OpenedChip:
@@ -103,7 +100,7 @@ class I2cBus(RegisterBus):
             self._blocks = not self._smbus.funcs & smbus2.I2cFunc.I2C
             if self._blocks and not self._smbus.funcs & smbus2.I2cFunc.SMBUS_READ_I2C_BLOCK:
                 raise BusError(f"the adapter {self._path} transfers single bytes only", "use another adapter")
-            self._longest = SMBUS_BLOCK_BYTES if self._blocks else MAX_MESSAGE_BYTES
+            self._longest = smbus2.smbus2.I2C_SMBUS_BLOCK_MAX if self._blocks else MAX_MESSAGE_BYTES
             self._repeated_start = True
             self.address = find_chip(self._path, address, self._who_am_i)
             chip = f"the chip at 0x{self.address:02x} on {self._path}"
@@ -159,8 +156,9 @@ class I2cBus(RegisterBus):
         except OSError as error:
             if error.errno != errno.EOPNOTSUPP:
                 raise
-            # The kernel refused it before anything was sent (i2c_check_for_quirks).
-            if count > LEAST_LIMIT_BYTES:
+            # The kernel refused it before anything was sent (i2c_check_for_quirks). An adapter that refuses even four
+            # bytes does not support the kind of transfer.
+            if count > 4:
                 self._longest = count // 2
             elif self._repeated_start:
                 self._repeated_start, self._longest = False, MAX_MESSAGE_BYTES

@@ -8,12 +8,11 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..chip.records import ABORT, KEY, RESUMED, SessionEvent
+from ..clocks import S
 
 if TYPE_CHECKING:
     from ..files.mcap import Record
 
-# Time between two parts whose clocks do not tell it.
-BETWEEN_PARTS_NS = 1_000_000_000
 
 Item = TypeVar("Item")
 
@@ -105,7 +104,7 @@ class RecordedParts(ABC, Generic[Item]):
 
     def _begin_clock(self, now_ns: int) -> int:
         """Join the clock of the sensor or vehicle, which shows `now_ns`, to the session's; return the shift."""
-        self._shift_ns = max(self._last_ns + BETWEEN_PARTS_NS - now_ns, 0)
+        self._shift_ns = max(self._last_ns + S - now_ns, 0)
         return self._shift_ns
 
     def _shifted(self, t_ns: int) -> int:

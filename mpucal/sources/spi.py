@@ -18,7 +18,7 @@ from .chip import OpenedChip
 from .host_bus import RegisterBus, converting, device_error, lock_device
 from .kind import Request
 
-READ, MODE = 0x80, 3
+READ = 0x80
 REGISTER_HZ, LEAST_DATA_HZ = 1_000_000, 8_000_000
 I2C_IF_DIS = 0x10
 I2C_IF, I2C_IF_OFF = 0x70, 0x40
@@ -62,7 +62,7 @@ class SpiBus(RegisterBus):
         try:
             lock_device(self._device.fileno(), f"the chip on {self._path}")
             with converting(self._error):
-                self._device.mode = MODE
+                self._device.mode = 3
                 self._device.bits_per_word = 8
                 self._device.max_speed_hz = self._data_hz
         except BusError:

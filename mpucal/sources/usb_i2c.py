@@ -21,7 +21,6 @@ from .kind import Request
 I2C_HZ = 400_000
 # Command buffer of an MPSSE engine; shorter transfers are not faster, by the adapter's latency.
 MAX_READ_BYTES = 1024
-MCP2221_VENDOR, MCP2221_PRODUCT = 0x04D8, 0x00DD
 
 
 class UsbBus(RegisterBus):
@@ -172,7 +171,7 @@ def adapters() -> list[tuple[str, str]]:
 def _mcp2221_adapters() -> list[tuple[str, str]]:
     from EasyMCP2221.MCP2221 import hid  # noqa: PLC0415 - an extra
 
-    devices: list[dict[str, Any]] = hid.enumerate(MCP2221_VENDOR, MCP2221_PRODUCT)
+    devices: list[dict[str, Any]] = hid.enumerate(0x04D8, 0x00DD)
     several = len(devices) > 1
     # With the factory's settings they do not report their serial numbers over USB.
     return [
