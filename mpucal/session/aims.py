@@ -123,15 +123,13 @@ class Aim:
     Attributes
     ----------
     target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
-    least_of_vehicle : the same of a vehicle, whose samples are filtered, rounded, or late.
     longest_s : time limit of the turning [s]. verify : number of new orientations for the verification.
-    least_placed : the same of a vehicle that is put down in each, in place of `least`; 0: it makes no difference.
+    least_placed : those of a vehicle that is put down in each, in place of `least`; 0: it makes no difference.
     flat_s : time for which the board lies flat first.
     """
 
     target: Target
     least: int
-    least_of_vehicle: int
     longest_s: float
     verify: int
     least_placed: int = 0
@@ -139,9 +137,9 @@ class Aim:
 
 
 AIMS: Mapping[str, Aim] = {
-    "quick": Aim(Target(0.3, 0.15, 3.0), least=8, least_of_vehicle=8, longest_s=60.0, verify=2),
-    "normal": Aim(Target(0.1, 0.05, 1.0), least=10, least_of_vehicle=14, longest_s=120.0, verify=3),
-    "best": Aim(Target(0.04, 0.02, 0.4), least=14, least_of_vehicle=14, longest_s=240.0, verify=3),
+    "quick": Aim(Target(0.3, 0.15, 3.0), least=8, longest_s=60.0, verify=2),
+    "normal": Aim(Target(0.1, 0.05, 1.0), least=10, longest_s=120.0, verify=3),
+    "best": Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
 }
 NORMAL = "normal"
 # Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
@@ -153,11 +151,11 @@ VERIFY_PLACED = 1
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
-    """Return the aim of a target, one of AIMS; a vehicle's IMU needs more orientations for the normal one."""
+    """Return the aim of a target, one of AIMS; a vehicle lies flat for less, and may be put down on its sides."""
     aim = AIMS[target]
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
-    return replace(aim, least=aim.least_of_vehicle, least_placed=len(SIDES), flat_s=SHORTEST_FLAT_S)
+    return replace(aim, least_placed=len(SIDES), flat_s=SHORTEST_FLAT_S)
 
 
 def unseen_rad(tilt_only: bool) -> float:
