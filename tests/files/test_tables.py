@@ -681,6 +681,16 @@ def test_a_field_of_unit_length_is_no_gravity_beside_one_in_si(walk, tmp_path):
     np.testing.assert_allclose(mpucal.load(path, columns="t,gx,gy,gz,ax,ay,az").acc, driven)
 
 
+def test_the_columns_that_turn_are_suggested_as_accelerations(walk, tmp_path):
+    """Suggest them after the rates, which hardly turn beside a bias of 500 deg/s and so are as constant as gravity."""
+    rates = np.degrees(walk.gyr) * 16.4 + [-8000, 8000, 8400]
+    path = tmp_path / "counts.csv"
+    np.savetxt(path, 32768 + np.rint(np.column_stack([rates, walk.acc * 670])), "%d", ",")
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(path)
+    assert refused.value.options == "--columns gx,gy,gz,ax,ay,az"
+
+
 def test_large_whole_numbers_that_hardly_change_are_no_gravity(table):
     """Do not take a pressure or a place on the earth for an accelerometer, as a power of two is near any number."""
     rng = np.random.default_rng(12)

@@ -27,6 +27,7 @@ from .shown_units import (
     gyro_unit,
     is_gravity,
     mean_acceleration_unit,
+    seem_counts,
     time_unit,
     to_signed,
     turning,
@@ -42,6 +43,8 @@ WIDEST = 16
 ONE_G = 0.04
 # largest distance of the quartiles of |a|, over its median: gravity, with the biases of an uncalibrated sensor
 MOST_SCATTER = 0.75
+# directions of gravity are as many times farther apart than those of rates beside a bias
+HARDLY = 4.0
 # correlation of a clock with the number of its samples, even if a logger paused for a tenth of the time
 EVEN = 0.99
 # a correlation that is less by as much is no worse
@@ -105,7 +108,7 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     values = triples[acc]
     # rates turn gravity and are none at times, other than a magnetic field
     others = [triple for triple in triples if triple != acc]
-    others.sort(key=lambda triple: _least(triples[triple]) - turning(t, values, triples[triple])[1])
+    others.sort(key=lambda triple: _least(triples[triple]) - _turning(t, values, triples[triple]))
     found = [place for triple in (acc, *others[:1]) for place in triple]
     roles = dict(zip(ROLES[1:], found, strict=False)) | dict(zip("t", clocks, strict=False))
     return roles, OF_INCREMENTS if increments else "" if _has_size(values) else mean_acceleration_unit(values)
@@ -114,12 +117,17 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
 def _sized_triples(
     of: Columns, places: Sequence[int], arrays: Mapping[int, str]
 ) -> tuple[dict[Places, Vector], list[Places], Places]:
-    """Return the triples of columns, those that may be as long as gravity, and the first that keeps its length."""
+    """Return the triples of columns, those that may be as long as gravity, and the first that is most likely it.
+
+    That keeps its length. So do the rates of a gyroscope that counts from a large number, but they hardly turn.
+    """
     of_arrays = (_triples([*group]) for _, group in groupby(places, arrays.get))
     triples = {triple: _stacked(of, triple) for group in of_arrays for triple in group}
     sized = [triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)]
-    steady = (triple for triple in sized if _keeps_size(triples[triple]) and all(np.ptp(of[at]) > 0.0 for at in triple))
-    return triples, sized, next(steady, ())
+    steady = [triple for triple in sized if _keeps_size(triples[triple]) and all(np.ptp(of[at]) > 0.0 for at in triple)]
+    counts = [a for a in map(triples.__getitem__, steady) if seem_counts(a) and _least(a) > 1.0 - MOST_SCATTER]
+    most = max(map(_spread, counts), default=0.0)
+    return triples, sized, next((triple for triple in steady if HARDLY * _spread(triples[triple]) >= most), ())
 
 
 def _triples(places: Sequence[int]) -> list[tuple[int, ...]]:
@@ -136,6 +144,17 @@ def _least(values: Vector) -> float:
     """Return about the least length of (n, 3) numbers, over their median."""
     least, size = np.percentile(np.linalg.norm(values, axis=1), [1, 50]).tolist()
     return least / size if size else 0.0
+
+
+def _spread(values: Vector) -> float:
+    """Return how far the directions of (n, 3) numbers are apart: 0 if they are one, and 1 if they are all around."""
+    lengths = np.linalg.norm(values, axis=1, keepdims=True)
+    return 1.0 - float(np.linalg.norm((values / np.maximum(lengths, np.finfo(float).tiny)).mean(axis=0)))
+
+
+def _turning(t: Vector, acc: Vector, rates: Vector) -> float:
+    """Return how well (n, 3) rates, of which the bias may be large, explain the turning of gravity; see turning."""
+    return turning(t, acc, rates - np.median(rates, axis=0))[1]
 
 
 def _is_one_g(acc: Vector) -> bool:
