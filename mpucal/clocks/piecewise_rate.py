@@ -12,11 +12,10 @@ from itertools import pairwise
 import numpy as np
 
 from ..arguments import Vector
+from . import UNIFORM
 
 # A break must explain this many times the residual variance. Chance alone, over all places, stays below 30.
 LEAST_BREAK_RATIO = 100.0
-# Variance of a poll that falls anywhere between two samples: the least that a residual variance can be.
-LEAST_VARIANCE = 1 / 12
 # Two slopes differ if they do by so many standard deviations.
 DIFFERENT_SLOPE_STDS = 8.0
 # Points on either side of a break, and time [s].
@@ -50,7 +49,7 @@ def fit_lines(t_s: Vector, y: Vector) -> list[Line]:
         dt, dy = t_s[begin:end] - t_mean, y[begin:end] - y_mean
         spread, product = float(dt @ dt), float(dt @ dy)
         residual = float(dy @ dy) - (product * product / spread if spread else 0.0)
-        variance = max(residual / max(len(dt) - 2, 1), LEAST_VARIANCE)
+        variance = max(residual / max(len(dt) - 2, 1), UNIFORM)
         lines.append(Line(first, t_mean, y_mean, spread, product, variance))
     return lines
 
@@ -60,7 +59,7 @@ def merge_equal_slopes(pieces: list[Line], nominal: float, tolerance: float) -> 
 
     The prior of a slope is `nominal`, within `tolerance` of itself.
     """
-    prior_s2 = LEAST_VARIANCE / (tolerance * nominal) ** 2
+    prior_s2 = UNIFORM / (tolerance * nominal) ** 2
     groups: list[list[Line]] = []
     for piece in pieces:
         if groups and _have_equal_slopes(groups[-1], piece):
@@ -117,7 +116,7 @@ def _find_break(t_s: Vector, y: Vector) -> int | None:
         return None
     both = before[places - 1] + after[places]
     best = int(np.argmin(both))
-    variance = max(both[best] / (n - 4), LEAST_VARIANCE)
+    variance = max(both[best] / (n - 4), UNIFORM)
     return int(places[best]) if before[-1] - both[best] > LEAST_BREAK_RATIO * variance else None
 
 

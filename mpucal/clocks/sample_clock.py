@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Vector
+from . import UNIFORM
 from .piecewise_rate import fit_lines, merge_equal_slopes
 
 NS = 1e-9
@@ -38,8 +39,6 @@ Times = Callable[[Whole, Whole], Vector]
 
 # Larger than the number of samples in any segment.
 SEGMENT_STRIDE = 2.0**40
-# A poll falls anywhere between two samples: a uniform distribution's standard deviation.
-POLL_STD_SAMPLES = 12**-0.5
 
 # The fractional parts of the golden ratio's multiples lie evenly between 0 and 1.
 GOLDEN = (5**0.5 - 1) / 2
@@ -140,7 +139,7 @@ class SampleClock:
     @property
     def rate_hz(self) -> float:
         """Sample rate as far as it is known; a segment must have begun."""
-        prior = (POLL_STD_SAMPLES / (RATE_TOLERANCE * self._nominal_hz)) ** 2
+        prior = UNIFORM / (RATE_TOLERANCE * self._nominal_hz) ** 2
         spread = self._past_spread_s2 + self._segments[-1].spread_s2
         product = self._past_product_s + self._segments[-1].product_s
         return (product + prior * self._nominal_hz) / (spread + prior)

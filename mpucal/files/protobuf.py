@@ -19,7 +19,6 @@ from ._packed import frames, packed, unpacked
 Columns = NDArray[np.uint64]
 
 VARINT, BYTES = 0, 2
-LONGEST = 10
 __all__ = ["field", "fields", "frames", "pack_varints", "schema", "unpacked", "unzigzag", "zigzag"]
 
 # descriptor.proto: types and labels of fields
@@ -87,9 +86,9 @@ def schema(package: str, messages: Mapping[str, Sequence[tuple[str, str, bool]]]
 
 
 def _read(message: bytes, at: int) -> tuple[int, int]:
-    """Return a varint and the offset of its end."""
+    """Return a varint, of ten bytes at most, and the offset of its end."""
     value = 0
-    for place in range(LONGEST):
+    for place in range(10):
         if at + place >= len(message):
             break
         digit = message[at + place]

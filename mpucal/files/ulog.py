@@ -29,8 +29,6 @@ from .tables.streams import join_streams
 from .tables.times import Stream
 
 COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
-# size and type of a message; bytes that are checked for zeros
-NO_MESSAGE, PAGE = bytes(3), 4096
 _DAMAGE = (*DAMAGED, struct.error)
 
 
@@ -44,7 +42,8 @@ class _PastTheEnd(BufferedReader):
     def read(self, size: int | None = -1, /) -> bytes:
         """Return at most `size` bytes."""
         data = super().read(size)
-        if data == NO_MESSAGE and len(ahead := self.peek()) >= PAGE and not any(ahead):
+        # the size and the type of a message are three bytes
+        if data == bytes(3) and len(ahead := self.peek()) >= 4096 and not any(ahead):
             self.seek(0, os.SEEK_END)
             data = b""
         if size is not None and len(data) < size:

@@ -24,8 +24,6 @@ from .tables.table import Table
 
 _SHEET = re.compile(r"xl/worksheets/sheet(\d{1,4})\.xml").fullmatch
 _STRINGS, _BOOK, _RELATIONS = "xl/sharedStrings.xml", "xl/workbook.xml", "xl/_rels/workbook.xml.rels"
-# columns of a sheet, of which the last is XFD
-MOST_COLUMNS = 16384
 
 
 def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -108,7 +106,8 @@ def _cells(row: Element, strings: Sequence[str]) -> list[str]:
     found: list[str] = []
     for cell in row:
         place = _place(cell.get("r", "")) if cell.get("r") else len(found)
-        if not len(found) <= place < MOST_COLUMNS:
+        # the last of a sheet's columns is XFD
+        if not len(found) <= place < 16384:
             raise ValueError(f"a cell is at {cell.get('r')}")
         text = _text(cell)
         found += [""] * (place - len(found))

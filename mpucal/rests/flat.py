@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..clocks import UNIFORM
 from ..data import Recording, Vector
 from ..kernel import _kernel
 from .limits import QUIET
@@ -21,7 +22,6 @@ LONG = 6  # windows of a flat segment that can do without its first and its last
 
 # With less variance at rest than this [steps^2], the readings stay on one step or two, and no mean makes them finer.
 UNVARIED = 0.3
-UNIFORM = 1.0 / 12.0  # variance of rounding [steps^2]
 VISIBLE = 699  # fewer changes from one value to the next larger one, among a thousand, are visible steps
 # Share of this variance that a short rest in a hand leaves: noise and tremor, low-passed by an autopilot, cross few
 # steps. From simulated vehicles with low passes of 5 and 20 Hz.

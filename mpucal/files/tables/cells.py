@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
 from enum import Enum
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clocks import S
+from ...clocks import US, S
 from ...clocks.sample_clock import GAP_INTERVALS
 from ...data import Vector
 from ...strict_json import MOST_DIGITS
@@ -20,7 +20,6 @@ from ..reading import MOST_ODD
 
 # cells by which a column's kind is known
 LOOKED_AT = 50
-EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 DAY_NS = 86400 * S
 CLOCK = r"\d\d?:\d\d:\d\d(?:[.,]\d{1,9})?"
 # among other text; lengths are bounded: the search takes linear time
@@ -102,8 +101,8 @@ def parse_cell(text: str) -> Decimal:
             before = _days(*date.groups()[:4]) if date else 0
             return before * DAY_NS + (at + Decimal(f"0.{(below or '.0')[1:]}")) * S
         moment = datetime.fromisoformat(re.sub(" (?:UTC|GMT)$", "Z", text))
-        since = moment - (EPOCH if moment.tzinfo else datetime.min)
-        return Decimal((since.days * 86400 + since.seconds) * S + since.microseconds * 1000)
+        since = moment - (datetime(1970, 1, 1, tzinfo=UTC) if moment.tzinfo else datetime.min)
+        return Decimal(since // timedelta(microseconds=1) * US)
     raise ValueError(text)
 
 

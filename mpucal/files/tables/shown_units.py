@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from ...chip.families import MPU6050
 from ...data import ACCEL_COUNTS, GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
 from .units import DAYS, QUANTITIES
 
@@ -43,9 +44,9 @@ SHAKEN = 100
 SETTLED = 0.25
 # the fastest rate of a hand and of usual sensors
 FASTEST_RAD_S = 37.0
-# samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; the largest
-# bias, of the MPU-6050; and how much more than it does gravity may seem to turn by noise
-QUIET, LEAST_NOISE_RAD_S, MOST_BIAS_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), math.radians(20.0), 3.0
+# samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; and how much
+# more than it does gravity may seem to turn by noise
+QUIET, LEAST_NOISE_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), 3.0
 # larger numbers are not from a sensor in any unit; their squares are finite
 BEYOND = 1e12
 # the least duration of a recording that shows how gravity turns, in halves of TURN_S
@@ -226,7 +227,7 @@ def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:
         for unit, si in QUANTITIES["gyr"].items()
         if unit in ("rad/s", "deg/s")
         and si < MOST_TURNED_MORE * ratio
-        and bias * si < MOST_BIAS_RAD_S
+        and bias * si < math.radians(MPU6050.zero_rate_dps)
         and fastest * si < FASTEST_RAD_S
         and not 0.0 < noise * si < LEAST_NOISE_RAD_S
     ]

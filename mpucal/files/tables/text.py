@@ -29,9 +29,6 @@ MORE_HEADS = 3
 HEAD = 4096
 # a header may begin with such a mark; any other line that does is a comment
 COMMENT = ("#", "%", "//")
-# Bytes that a line takes at least while it is read, in CPython on 64 bits: a list (56), its reference and line number
-# (16 and 32), a Decimal of its time (104 and 8). A cell takes two references and a float64.
-LINE, CELL = 216, 24
 # names within quotation marks may span lines
 _QUOTED = re.compile(r'"[^"]*"')
 # Serial monitors, terminals and loggers write the time before each line: `12:03:04.123 -> `, `[2024-05-01 12:03:04] `,
@@ -231,7 +228,9 @@ def _counts(cells: Cells) -> bool:
 
 def read_table(text: str, name: str, header: Cells, first: int, separator: str | None) -> Table:
     """Return the table below the first `first` lines."""
-    check_size(Path(name), text.count("\n") * (LINE + CELL * len(header)))
+    # In CPython on 64 bits a line takes at least a list (56 bytes), its reference and line number (16 and 32), and a
+    # Decimal of its time (104 and 8); a cell takes two references and a float64.
+    check_size(Path(name), text.count("\n") * (216 + 24 * len(header)))
     rows, lines = [], []
     source = StringIO(text, newline="")
     for _ in range(first):
