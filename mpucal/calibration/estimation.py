@@ -17,10 +17,12 @@ from .checks import NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reason
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hand import HandFit
+from .hand_noise import Noise
 from .hypotheses import Explanation, explain, gyroscope_change, rank, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, fit_model
 from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
+from .sensitivity import Sensitivity, find_sensitivity
 from .static import fit_static
 from .uncertainty import claim_uncertainty, inflate
 from .words import decode
@@ -133,11 +135,15 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
     before = replace(before, flat=flat)
     if flat is None or is_unusable(before):
         return before, NOTHING | {"model": model}
-    fitted = without_changes(_Fitted(recording, (flat, gravity, model)))
+    fitted = _Fitted(recording, (flat, gravity, model))
+    sensitivity = fitted.find_sensitivity()
+    if sensitivity is not None:
+        fitted = _Fitted(sensitivity.removed_from(recording, flat), (flat, gravity, model))
+    fitted = without_changes(fitted)
     choice, plain = fitted.choice, fitted.choice.plain
     # the share of the variance that the removed changes added
     freed = sum((change.freed[ACCELEROMETER] for change in fitted.changes), np.zeros(len(D_NAMES + B_A_NAMES)))
-    fit = choice.honest()
+    fit = choice.honest() if sensitivity is None else sensitivity.held_by(choice.honest())
     claim = claim_uncertainty(fit, gravity, explain(plain.parts, plain.D, fitted.explanations), freed)
     fit = inflate(fit, claim).right_handed()
     evidence = replace(before, fit=fit, model=choice.model, claim=claim, walks=fitted.changes)
@@ -164,6 +170,12 @@ class _Fitted:
         """Changes that were removed before the fit; a hand's fit removes changes itself."""
         found = self.choice.found
         return self._changes + (found.changes if isinstance(found, HandFit) else ())
+
+    def find_sensitivity(self) -> Sensitivity | None:
+        """Return the gyroscope's sensitivity to acceleration that no rest shows; None where there is none."""
+        found, (flat, gravity, _) = self.choice.found, self._of
+        noise = found.noise if isinstance(found, HandFit) else Noise("none", 0.0)
+        return find_sensitivity(self._recording, flat, gravity, self.choice.plain, noise, self.explanations)
 
     def cost(self) -> float:
         """Return the cost function (8) where the search ended."""

@@ -8,6 +8,8 @@ import pytest
 from mpucal.calibration import calibrate
 from mpucal.data import Recording
 from tools.lab.judge import judged
+from tools.lab.scenarios.family import drawn
+from tools.lab.scenarios.table import FAMILIES
 
 G = 9.82
 
@@ -37,3 +39,13 @@ def test_a_sensor_that_changed_is_calibrated_as_it_is_now(hand, share):
     assert "from what was recorded after" in reason["message"]
     assert "what precedes" in calibration.fit["why"]
     assert judged(calibration, ((1.0 + share) * made.truth.D, b_a)).farthest < 4.0
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_gyroscope_that_feels_acceleration_is_found_without_rests(seed):
+    """Turn the sensor slowly on a machine: without the sensitivity, both are good, and 4 and 13 sigma off."""
+    made = drawn(FAMILIES["turntable whose acceleration the gyroscope feels"], seed)
+    calibration = calibrate(made.recording, "auto", made.truth.gravity)
+    assert calibration.verdict == "good"
+    assert judged(calibration, (made.truth.D, made.truth.b_a)).farthest < 3.0
+    assert np.abs(calibration.D - made.truth.D).max() < 1e-3

@@ -143,6 +143,12 @@ def gyro_moves(readings: Readings, rng: Rng, drift_dps: float = 0.0, step_dps: f
     return replace(readings, gyr=readings.gyr + np.radians(drift + step))
 
 
+def gyro_feels(readings: Readings, rng: Rng, dps_per_g: float = 0.05) -> Readings:
+    """Add a sensitivity to acceleration to the rates: of each axis to each, dps_per_g rms."""
+    sensitivity = np.radians(dps_per_g) / STANDARD_GRAVITY_MPS2 * rng.standard_normal((3, 3))
+    return replace(readings, gyr=readings.gyr + readings.force @ sensitivity.T)
+
+
 def zero_step(readings: Readings, rng: Rng, mg: float = 10.0) -> Readings:
     """Step the accelerometer's zero by `mg` in some direction, midway."""
     after = readings.t > readings.turning_share(rng.uniform(0.3, 0.7))

@@ -82,6 +82,7 @@ _SHARP = (
     but(CONTINUOUS, "quiet continuous", hand=STEADY, chip=QUIET),
     but(BENCH, "quiet bench", hand=STEADY, chip=QUIET),
     but(TURNTABLE, "quiet turntable", chip=QUIET),
+    but(TURNTABLE, "turntable whose acceleration the gyroscope feels", faults=(faults.gyro_feels,)),
     VEHICLE,
     but(VEHICLE, "vehicle reset at the end", faults=(partial(faults.gyro_moves, drift_dps=0.08), faults.teleport)),
 )

@@ -1,0 +1,104 @@
+"""Sensitivity of the gyroscope to acceleration, in a recording without the rests that would show it.
+
+A machine may turn a sensor without a pause. S (3, 3) is then estimated together with theta, by the method of
+Gauss-Newton on the innovations of the hand's filter: the rates are omega - S (y - y_flat), since b_omega is the mean
+rate of the flat segment. The derivatives of the innovations are differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..data import Recording, Vector
+from ..rests.flat import Flat, flat_statistics
+from ..rests.gyro_drift import SENSITIVITY_SD
+from ..rests.intervals import RestFinder
+from .downsampling import SEARCH_HZ, downsampled
+from .fit import Fit
+from .hand_noise import Noise
+from .hypotheses import SURE, Explanation
+from .likelihood import trace
+from .parameters import HAND, NAMES
+from .preprocessing import prepare
+from .theta import Theta
+
+PASSES = 3
+DIVERGED = 2.0  # a step that leaves more times the sum of squares
+STEP = 1e-6  # of the differences, in m/s^2, rad, rad/s, m, s or 1
+
+
+class Sensitivity(NamedTuple):
+    """Sensitivity of the rates to acceleration.
+
+    S : (3, 3) rad/s per m/s^2, its mean. covariance : (p, p) that it adds to theta's, in the order of NAMES.
+    """
+
+    S: Vector
+    covariance: Vector
+
+    def removed_from(self, recording: Recording, flat: Flat) -> Recording:
+        """Return the recording without it; the flat segment keeps its mean rate."""
+        return replace(recording, gyr=recording.gyr - (recording.acc - flat.y) @ self.S.T)
+
+    def held_by(self, fit: Fit) -> Fit:
+        """Return the fit of the recording without it, with its uncertainty."""
+        at = [NAMES.index(name) for name in fit.names]
+        return replace(fit, covariance=fit.covariance + self.covariance[np.ix_(at, at)])
+
+
+def find_sensitivity(
+    recording: Recording, flat: Flat, gravity: float, fit: Fit, noise: Noise, explanations: Sequence[Explanation]
+) -> Sensitivity | None:
+    """Return the sensitivity that a recording of few rests may show; None where it surely shows none.
+
+    Its mean and covariance are those of a mixture: S with the weight of its evidence among the explanations, else 0.
+
+    fit : of any model with a gyroscope. noise : of the hand. explanations : of the fit, see hypotheses.py.
+    """
+    thin, at = downsampled(recording, flat, SEARCH_HZ)
+    rest = flat_statistics(thin, at)
+    # With the drift: from slow turns that pass for rests, it would be taken wrongly.
+    prepared = prepare(thin, at, RestFinder(thin, rest).typical(), gravity)
+    if prepared.rests_often:
+        return None
+    problem, prior = replace(noise.problem(prepared), huber=np.inf), prepared.prior()
+    series = problem.series
+    y = np.vstack([rest.y, series.y])
+    force = 0.5 * (y[1:] + y[:-1]) - rest.y
+
+    def innovations(theta: Theta, S: Vector) -> Vector:
+        less = replace(series, omega=series.omega - force @ S.T)
+        return trace(replace(problem, series=less), theta).innovation.ravel()
+
+    up = np.linalg.solve(fit.D, flat.y - fit.b_a)
+    start = Theta.start(fit.D, fit.b_a, fit.b_omega, up / np.linalg.norm(up))
+    theta, S = replace(start, K=fit.K, tau=fit.delay_s), np.zeros((3, 3))
+    precision = np.append(prior.precision, np.full(9, SENSITIVITY_SD**-2))
+    others = np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)])  # nothing's share is 1
+    squares = np.inf
+    for _ in range(PASSES):
+        e = innovations(theta, S)
+        if e @ e > DIVERGED * squares:
+            return None
+        squares = float(e @ e)
+        by_theta = [innovations(theta.moved(step), S) - e for step in STEP * np.eye(HAND)]
+        by_S = [innovations(theta, S + step.reshape(3, 3)) - e for step in STEP * np.eye(9)]
+        J = np.array(by_theta + by_S).T / STEP
+        H = J.T @ J + np.diag(precision)
+        g = J.T @ e + precision * np.append(theta.values() - prior.mean, S)
+        unit = 1.0 / np.sqrt(np.diag(H))
+        C = unit[:, None] * np.linalg.inv(unit[:, None] * H * unit) * unit
+        step = -C @ g
+        theta, S = theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
+        known = np.linalg.inv(C[HAND:, HAND:])
+        evidence = 0.5 * float(S.ravel() @ known @ S.ravel() - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
+        if not evidence > -np.log(SURE):
+            return None
+    weight = np.exp(evidence - np.logaddexp(others, evidence))
+    carried, s = C[:HAND, HAND:] @ known, S.ravel()
+    covariance = weight * (C[HAND:, HAND:] + (1.0 - weight) * np.outer(s, s))
+    return Sensitivity(weight * S, carried @ covariance @ carried.T)
