@@ -18,7 +18,6 @@ from .errors import Abandoned, MpucalError, OutputError, SourceError, escape_con
 from .session.beside import ONE_THREAD
 from .terminal.hangup import logging_after_hangup
 
-BUG = 1
 # errors of a full disk or quota behind stdout
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # the loader's message about a library that does not fit into memory
@@ -154,7 +153,7 @@ def _report_bug(words: Sequence[str]) -> int:
     import traceback  # noqa: PLC0415
 
     traceback.print_exc()
-    return _report(words, BUG, "this is a bug in mpucal", "please report it with the lines above")
+    return _report(words, MpucalError.exit_code, "this is a bug in mpucal", "please report it with the lines above")
 
 
 if __name__ == "__main__":

@@ -30,8 +30,6 @@ MOST_LEFT_OUT = 7
 LEAST_PROBABILITY = 1e-3
 # iterations of the weights; share of the diagonal that stays in them
 ITERATIONS, LEAST_SHARE = 6, 1e-4
-# the ends of an interval are searched at this number of values between these multiples of the square or its deviation
-SEARCH_FROM, SEARCH_TO, SEARCH_POINTS = 1e-3, 1e2, 40
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,8 @@ class _Fit:
 
         square, far = float(self.squares[i]), float(norm.isf(0.5 * (1.0 - confidence)))
         largest = max(square, float(self._std(i, 0.0)[0]))
-        truth = np.concatenate([[0.0], np.geomspace(SEARCH_FROM, SEARCH_TO, SEARCH_POINTS) * largest])
+        # multiples of the square or of its deviation, whichever is larger
+        truth = np.concatenate([[0.0], np.geomspace(1e-3, 1e2, 40) * largest])
         std = self._std(i, truth)
         low, high = (np.interp(square, np.maximum.accumulate(truth + sign * far * std), truth) for sign in (1, -1))
         return float(low), float(high)

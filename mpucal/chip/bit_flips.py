@@ -27,7 +27,6 @@ NEAR_MEDIANS, NEAR_COUNTS = 6.0, 8.0
 INITIAL_MEDIAN = 30.0
 # A word that jumps by T or more and returns has made a step of at least 7/8 T: T is 6 R or more.
 LEAST_STEP = 5.25
-BITS = (1 << np.arange(16)).astype(np.uint16)
 
 
 class BitFlipFilter:
@@ -92,7 +91,7 @@ class BitFlipFilter:
     def _repaired_word(self, run: Counts, at: int, word: int) -> np.int16:
         """Return the word with one bit inverted if that brings it near its neighbours' mean; else unchanged."""
         mean = (float(run[at - 1, word]) + float(run[at + 1, word])) / 2
-        each = (run[at, word].astype(np.uint16) ^ BITS).astype(np.int16)
+        each = (run[at, word].astype(np.uint16) ^ (1 << np.arange(16, dtype=np.uint16))).astype(np.int16)
         best = each[np.argmin(np.abs(each - mean))]
         if abs(best - mean) > self._near[word]:
             return np.int16(run[at, word])

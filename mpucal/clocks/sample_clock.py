@@ -40,9 +40,6 @@ Times = Callable[[Whole, Whole], Vector]
 # Larger than the number of samples in any segment.
 SEGMENT_STRIDE = 2.0**40
 
-# The fractional parts of the golden ratio's multiples lie evenly between 0 and 1.
-GOLDEN = (5**0.5 - 1) / 2
-
 
 def poll_phase(n: int) -> float:
     """Return the offset of poll number `n` from its due time, -1/2..1/2 of a sample interval.
@@ -50,7 +47,8 @@ def poll_phase(n: int) -> float:
     Regular polls would fall at the same phase again and again if their period is a whole number of intervals; a rate
     error of 100 ppm would then stay hidden for a minute.
     """
-    return n * GOLDEN % 1 - 0.5
+    # The fractional parts of the golden ratio's multiples lie evenly between 0 and 1.
+    return n * (5**0.5 - 1) / 2 % 1 - 0.5
 
 
 @dataclass

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..data import Vector
+from ..errors import Abandoned, RefusedError
 from ..result.calibration import Calibration
 from ..result.correlation import UPPER
 from ..result.error_model import AXES, MG_PER_MPS2, with_std
@@ -20,7 +21,6 @@ DRIFTED: Verdict = "drifted"
 REMOUNTED: Verdict = "remounted"
 ANOTHER_SENSOR: Verdict = "another sensor"
 CANNOT_BE_TOLD: Verdict = "cannot be told"
-EXIT_CODES: Mapping[Verdict, int] = {STILL_GOOD: 0, DRIFTED: 5, REMOUNTED: 5, ANOTHER_SENSOR: 5, CANNOT_BE_TOLD: 4}
 CORRECTED_BY_BIASES = ("nothing", "bias", "gyroscope's bias", "temperature")
 
 
@@ -88,7 +88,8 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
     @property
     def exit_code(self) -> int:
         """Exit code of `mpucal check`: 0 still good, 5 changed, 4 cannot be told."""
-        return EXIT_CODES[self.verdict]
+        codes = {STILL_GOOD: 0, CANNOT_BE_TOLD: Abandoned.exit_code}
+        return codes.get(self.verdict, RefusedError.exit_code)
 
     @property
     def only_biases(self) -> bool:

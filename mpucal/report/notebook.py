@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH_IN, HEIGHT_IN = 8.0, 4.5
+HEIGHT_IN = 4.5
 
 
 def html(calibration: Calibration) -> str:
@@ -71,7 +71,7 @@ def _figure(height_in: float) -> Figure:
     """Return an empty figure, which a notebook shows as a picture."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - only for a plot
 
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    figure = Figure(figsize=(8.0, height_in), layout="constrained")
     # IPython knows figures only if pyplot is imported
     vars(figure)["_repr_png_"] = partial(_png, figure)
     return figure

@@ -153,10 +153,9 @@ def _span(values: Vector) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-# viewpoint of the sphere, that of the page's ball; enlargements of deviations, and their largest share of the radius
+# viewpoint of the sphere, that of the page's ball; the largest share of the radius to which deviations are enlarged
 _VIEWPOINT = (0.302, -0.830, -0.469)
-_ENLARGEMENTS, _MOST_DEVIATION = (20, 10, 5, 2, 1), 0.5
-_FEWEST_RESTS, _MOST_LINES = 3, 60
+_MOST_DEVIATION = 0.5
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 121)
 _UNIT_CIRCLE = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
 _HEIGHT, _COVERAGE_HEIGHT = 340.0, 230.0
@@ -181,7 +180,7 @@ def sphere(track: Track) -> str:
     """
     both = [-_points(track, acc) / track.gravity for acc in (track.recording.acc, track.calibrated)]
     farthest = max(float(np.abs(np.linalg.norm(points, axis=1) - 1.0).max()) for points in both)
-    times = next((k for k in _ENLARGEMENTS if k * farthest <= _MOST_DEVIATION), 1)
+    times = next((k for k in (20, 10, 5, 2) if k * farthest <= _MOST_DEVIATION), 1)
     disc = _Disc(WIDTH / 2.0, _HEIGHT / 2.0 + 4.0, 145.0 / (1.0 + min(times * farthest, _MOST_DEVIATION)))
     view = _view()
     marks = []
@@ -198,7 +197,7 @@ def sphere(track: Track) -> str:
     for points in both:
         size = np.linalg.norm(points, axis=1, keepdims=True)
         drawn.append(points / size * (1.0 + times * (size - 1.0)) @ view.T)
-    if len(drawn[0]) <= _MOST_LINES:
+    if len(drawn[0]) <= 60:
         marks += [line(*disc.place(pair), FAINT, 0.5) for pair in np.stack(drawn, axis=1)]
     for seen, colour in zip(drawn, (BEFORE, AFTER), strict=True):
         front = seen[:, 2] >= 0.0
@@ -232,7 +231,7 @@ def coverage(track: Track) -> str:
 def _points(track: Track, acc: Vector) -> Vector:
     """Return (k, 3) m/s^2: the means of rests, or single samples if there are hardly any rests."""
     rests = track.at_rest(acc)
-    return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // POINTS, 1)]
+    return rests if len(rests) >= 3 else acc[:: max(len(acc) // POINTS, 1)]
 
 
 def _view() -> Vector:

@@ -12,8 +12,8 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from .flat import Flat
 from .intervals import BIAS_RUN_S, Intervals, gravity_turns, statistics
+from .tremor import TREMOR_PER_S
 
-TREMOR_S = 0.05  # correlation time of a hand's tremor
 RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # densities, (rad/s)^2 a second; the first is none
 # Twice the gain of the log likelihood by walks on three axes; by chance 5 % gain as much, since a density is not
 # negative: the mixture 1/8 chi2(0) + 3/8 chi2(1) + 3/8 chi2(2) + 1/8 chi2(3). A marginal likelihood, in which the
@@ -36,7 +36,7 @@ def remove_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording
     t, n = 0.5 * (recording.t[first] + recording.t[last - 1]), (last - first)[:, None]
     mean, spread = statistics(recording.gyr, runs)
     tremor = np.maximum(spread - 1.2 * flat.Sigma_omega, 0.0)
-    variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
+    variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 / TREMOR_PER_S * recording.rate_hz / n)
     # As far as gravity turns in a run, its mean rate may be a turn and no bias.
     variance = variance + gravity_turns(recording, runs)[:, None] ** 2
     walk, sensitivity = _smoothed(t, mean, statistics(recording.acc, runs)[0], variance)

@@ -19,7 +19,6 @@ from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmwar
 from .options import VehicleOptions
 
 Three = tuple[float, float, float]
-PASSES: Three = (1.0, 0.0, 0.0)
 
 
 class LowPass:
@@ -31,7 +30,7 @@ class LowPass:
     """
 
     def __init__(self, cutoffs_hz: tuple[float, ...], rate_hz: float) -> None:
-        made = [butterworth(cutoff, rate_hz) if cutoff > 0 else (PASSES, PASSES) for cutoff in cutoffs_hz]
+        made = [butterworth(cutoff, rate_hz) if cutoff > 0 else ((1.0, 0.0, 0.0),) * 2 for cutoff in cutoffs_hz]
         # Each is (3, k, 1).
         self._b, self._a = np.array(made).transpose(1, 2, 0)[..., None]
         self._past: list[Vector] = []
@@ -61,10 +60,8 @@ def butterworth(cutoff_hz: float, rate_hz: float) -> tuple[Three, Three]:
 LOOP_HZ = 400
 DEVICE_IDS = (2753028, 2753036, 2753044)
 SLOTS = all_slots(ARDUPILOT)
-# Defaults of a SITL, which are not the identity.
-OFFSET, SCALE = 0.001, 1.001
-# Greatest difference of the accelerometers from the first, where z counts half, and the time that they must agree.
-INCONSISTENT_MPS2, AGREED_S = np.array([0.75, 0.75, 2.25]), 10
+# Greatest difference of the accelerometers from the first, where z counts half.
+INCONSISTENT_MPS2 = np.array([0.75, 0.75, 2.25])
 
 
 class ArduPilot(Firmware):
@@ -89,8 +86,9 @@ class ArduPilot(Firmware):
             store.add(name, cutoff_hz, int16)
         for imu, slot in enumerate(SLOTS):
             exists = imu < options.imus
-            store.add_all(slot.offset, OFFSET if exists else 0.0)
-            store.add_all(slot.scale, SCALE if exists else 1.0)
+            # Defaults of a SITL, which are not the identity.
+            store.add_all(slot.offset, 0.001 if exists else 0.0)
+            store.add_all(slot.scale, 1.001 if exists else 1.0)
             store.add(slot.sensor_id, DEVICE_IDS[imu] if exists else 0, INT32)
             store.add("INS_USE" + (str(imu + 1) if imu else ""), 1, int8)
 
@@ -184,7 +182,7 @@ class ArduPilot(Firmware):
             if self._saved_ids[imu] != DEVICE_IDS[imu] or not offset.any() or not scale.all():
                 return ["PreArm: 3D Accel calibration needed"]
         since = self._compare(self.corrected, self._ticks)
-        agree = len(self.corrected) == 1 or (since is not None and self._ticks - since >= AGREED_S * LOOP_HZ)
+        agree = len(self.corrected) == 1 or (since is not None and self._ticks - since >= 10 * LOOP_HZ)
         return [] if agree else ["PreArm: Accels inconsistent"]
 
     def _compare(self, sample: Vector, tick: int) -> int | None:

@@ -19,7 +19,6 @@ from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmwar
 from .options import VehicleOptions
 
 LOOP_HZ = 250
-SHORTEST_US = 8000
 SLOTS = all_slots(PX4)
 DEVICE_IDS = (1310988, 1310996, 1311004)
 # MAV_PARAM_ERROR
@@ -111,7 +110,8 @@ class Px4(Firmware):
         if interval_us <= 0:
             return m.MAV_RESULT_ACCEPTED, 0
         # A sample that comes before its interval is over is omitted: every one is sent, or every second.
-        return m.MAV_RESULT_ACCEPTED, self.tick_us if interval_us <= self.tick_us else max(interval_us, SHORTEST_US)
+        slower = interval_us > self.tick_us
+        return m.MAV_RESULT_ACCEPTED, max(interval_us, 2 * self.tick_us) if slower else self.tick_us
 
     def set(self, wanted: Parameter) -> list[str] | int:
         """Echo the parameter; an unknown name or another type is an error."""

@@ -54,12 +54,10 @@ class StreamTimes:
 
 FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
 
-COMPONENT = 1
 SLOWER_WHILE_BUSY = 4
 # Names of MAV_TYPE.
 TYPES = {"plane": "FIXED_WING", "copter": "QUADROTOR", "rover": "GROUND_ROVER"}
 REBOOT_US = 2 * S_US
-SECOND_STATION, SECOND_STATION_HZ = 255, 4
 
 
 class SimulatedVehicle:
@@ -80,7 +78,7 @@ class SimulatedVehicle:
                 raise UsageError(f"the simulated vehicle has no parameter {name}", "omit it, or correct its name")
             self.firmware.store[name] = value
         self.imus = Imus(options, self.firmware.rotation, S_US / self.firmware.tick_us, gravity)
-        self._mav: Any = dialect().MAVLink(None, options.system, COMPONENT)
+        self._mav: Any = dialect().MAVLink(None, options.system, dialect().MAV_COMP_ID_AUTOPILOT1)
         if key is not None:
             self._mav.signing.secret_key, self._mav.signing.sign_outgoing = key, True
         self._parser = Parser(self._mav)
@@ -215,7 +213,8 @@ class SimulatedVehicle:
             self._send_value(name)
 
     def _param_error(self, name: str, error: int) -> None:
-        self._send(dialect().MAVLink_param_error_message(self.options.system, COMPONENT, name_bytes(name), -1, error))
+        here = self._mav.srcSystem, self._mav.srcComponent
+        self._send(dialect().MAVLink_param_error_message(*here, name_bytes(name), -1, error))
 
     def _on_request_data_stream(self, message: Message) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
@@ -299,8 +298,8 @@ class SimulatedVehicle:
         self._silent_until_us = math.inf
 
     def obey_second_station(self) -> None:
-        """Set the rates that another ground station requests by default, and pass its HEARTBEAT on."""
+        """Set the 4 Hz that another ground station requests by default, and pass its HEARTBEAT on."""
         m = dialect()
         station = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3)
-        self._out.append(bytes(station.pack(m.MAVLink(None, SECOND_STATION, OWN_COMPONENT))))
-        self._set_intervals(self.firmware.group(SECOND_STATION_HZ))
+        self._out.append(bytes(station.pack(m.MAVLink(None, 255, OWN_COMPONENT))))
+        self._set_intervals(self.firmware.group(4))
