@@ -249,7 +249,18 @@ FORMS = {
         "",
         "a w",
         "$VNIMU,+00.1,+00.2,+00.3" + ",{:+.9f}" * 6 + ",+26.8,+096.5*67\n",
-        says="rates in rad/s",
+        says="rates in rad/s.",
+        hints=AT_100_HZ,
+    ),
+    "VectorNav's attitudes": Form(
+        *("", "a w", "$VNYMR,-165.9,-037.2,+001.2,+0.28,+0.07,+0.74" + ",{:+.9f}" * 6 + "*69\n"),
+        says="rates in rad/s.",
+        hints=AT_100_HZ,
+    ),
+    "axes of two words": Form(
+        *("", "w a"),
+        "[IMU] Orientation: (0, 0, 0, 1), Angular Velocity: ({}, {}, {}), Linear Acceleration: ({}, {}, {})\n",
+        says="rates in rad/s.",
         hints=AT_100_HZ,
     ),
     "MPU6050_raw": Form(
@@ -689,6 +700,16 @@ def test_the_columns_that_turn_are_suggested_as_accelerations(walk, tmp_path):
     with pytest.raises(RecordingError) as refused:
         mpucal.load(path)
     assert refused.value.options == "--columns gx,gy,gz,ax,ay,az"
+
+
+def test_constant_columns_before_each_sensor_are_no_axes(walk, table):
+    """Suggest none of the numbers by which an app tells its sensors apart, beside a board that hardly turned."""
+    n = len(walk)
+    field, fives = np.random.default_rng(3).normal([20, -30, 9], 0.3, (n, 3)), np.full(n, 5)
+    path = table("", walk.t, np.full(n, 3), walk.acc[:, ::-1], np.full(n, 4), 0.001 * field, fives, field)
+    with pytest.raises(RecordingError) as refused:
+        mpucal.load(path)
+    assert refused.value.options == "--columns t,-,ax,ay,az,-,gx,gy,gz"
 
 
 def test_large_whole_numbers_that_hardly_change_are_no_gravity(table):

@@ -95,6 +95,9 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     vary = [place for place in places if np.ptp(of[place]) > 0.0]
     # other columns may be before theirs, such as a label that never changes
     places = places[places.index(vary[0]) :] if vary else places
+    # or between, such as a number before each sensor
+    runs = [len([*run]) for moves, run in groupby(places, vary.__contains__) if moves]
+    places = places if any(run % 3 for run in runs) else vary
     alignments = [_sized_triples(of, some, arrays) for some in (places, vary, vary[1:], vary[2:])]
     triples, sized, acc = next((found for found in alignments if found[2]), alignments[0])
     if not triples:

@@ -39,10 +39,10 @@ _TIMES = (
 )
 _QUOTES = dict.fromkeys(map(ord, "{}'\""))
 # three axes at once, below their sensor or beside it: `accel=(9252, -5612, -12084)`, `GYRO: X=0.1,Y=0.2,Z=0.3`,
-# `Accel  x 0.1  y 0.2  z 9.8`, `Gyro [dps]: 0.6 -0.8 -0.2`
+# `Accel  x 0.1  y 0.2  z 9.8`, `Gyro [dps]: 0.6 -0.8 -0.2`, `Angular Velocity: (0.1, 0.2, 0.3)`
 _AXES = (rf"(?:{axis}[ \t]{{0,9}}[:=]?[ \t]{{0,9}})?({NUMBER}|nan)" for axis in ("[Xx]", "[Yy]", "[Zz]"))
 _THREE = re.compile(
-    r"(?<![\w.])([A-Za-z_]\w{0,40})[ \t]{0,9}(?:[(\[]([^\d()\[\],;\s][^()\[\],;\s]{0,11})[)\]])?"
+    r"(?<![\w.])((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})[ \t]{0,9}(?:[(\[]([^\d()\[\],;\s][^()\[\],;\s]{0,11})[)\]])?"
     + r"[ \t]{0,9}[:=]?\s{0,3}[(\[]?[ \t]{0,9}"
     + r"(?:[ \t]{0,9}[,;|][ \t]{0,9}|[ \t]{1,9})".join(_AXES)
     + r"(?![\w.])(?![ \t]{0,9}[,;|]?[ \t]{0,9}[-+.\d])"
@@ -70,13 +70,13 @@ MARKED = (
         "ax(lsb) ay(lsb) az(lsb) gx(lsb) gy(lsb) gz(lsb)",
         (2.0, 250.0),
     ),
-    # VectorNav's VN-100 to VN-300
+    # VectorNav's VN-100 to VN-300, whose checksums are left out
     Marked(
-        r"^\$VNIMU((?:,[-+0-9.]{1,20}){11})\*",
+        r"^\$VNIMU((?:,[-+0-9.]{1,20}){11})[ \t\r]*$",
         "mx my mz ax(m/s^2) ay(m/s^2) az(m/s^2) gx(rad/s) gy(rad/s) gz(rad/s) temperature_c pressure",
     ),
     Marked(
-        r"^\$VNYMR((?:,[-+0-9.]{1,20}){12})\*",
+        r"^\$VNYMR((?:,[-+0-9.]{1,20}){12})[ \t\r]*$",
         "yaw pitch roll mx my mz ax(m/s^2) ay(m/s^2) az(m/s^2) gx(rad/s) gy(rad/s) gz(rad/s)",
     ),
 )
@@ -158,7 +158,9 @@ def _join_records(text: str) -> str:
 def _name_axes(found: re.Match[str]) -> str:
     """Return `NAME_x_UNIT=..., NAME_y_UNIT=...` and so on of a sensor's three numbers; other words as they are."""
     unit = _ENDINGS.get(find_unit(found[2] or ""), "")
-    named = zip(axes_of(found[1]), found.groups()[2:], strict=False)
+    # of two words, the first may be another's: RAW accel
+    axes = axes_of(found[1]) or axes_of(found[1].split()[-1])
+    named = zip(axes, found.groups()[2:], strict=False)
     return ", ".join(f"{axis}{unit}={cell}" for axis, cell in named) or found[0]
 
 
