@@ -101,7 +101,7 @@ class BridgeBus:
         return self._not_after_looks(self._ask(*requests)[-1][-1].t_ns)
 
     def sleep_until(self, t_ns: int) -> None:
-        """Wait until the bridge's clock shows `t_ns`, as far as it is known, and take what it pushes."""
+        """Receive pushed frames until the bridge's clock shows `t_ns`, as far as that is known."""
         self._wait(lambda host_ns: t_ns - self.link.clock.now(host_ns))
 
     def close(self) -> None:
@@ -111,7 +111,7 @@ class BridgeBus:
         self.link.close()
 
     def _wait(self, left_ns: Callable[[int], int]) -> None:
-        """Take what is pushed until `left_ns` of the host's time is 0; a late program takes what came until now."""
+        """Receive pushed frames until `left_ns` of the host's time is 0; a late program receives those of the past."""
         begun_ns = self._port.now_ns()
         while True:
             left = left_ns(host_ns := self._port.now_ns())
@@ -182,7 +182,7 @@ class BridgeBus:
             try:
                 self._chip.repeat_if_overdue()
                 heard_ns = self.link.wait(min(give_up_ns, self._port.now_ns() + REPEAT_NS))
-                # What came in time counts, also if this busy program reads it late.
+                # Bytes that came in time count, even if this busy program reads them late.
                 if (self._port.now_ns() if heard_ns is None else heard_ns) >= give_up_ns:
                     raise LinkLost(*no_reply(self._port.name))
             except BusError as error:

@@ -143,7 +143,7 @@ class Link:
         return (self._seq + 1 + n) % 256
 
     def wait(self, until_ns: int) -> int | None:
-        """Take what is pushed until the host's clock shows `until_ns`; return as soon as something came, with its time.
+        """Receive pushed frames until the host's clock shows `until_ns`; return at the first bytes, with their time.
 
         Raises
         ------

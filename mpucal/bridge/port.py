@@ -227,10 +227,10 @@ class ProcessReader:
 
 
 def _read_apart(handle: int, name: str, session: Connection) -> None:
-    """Read in a process, and send what was read to the session, until that has ended."""
+    """Read in a process, and send the bytes to the session, until that has ended."""
     from ..sources.reading_process import Outbox  # noqa: PLC0415 - loaded before the fork
 
-    # What the session has open besides is to be closed when it closes that.
+    # The session's other files and sockets would stay open here after the session has closed them.
     for path in [*Path("/proc/self/fd").iterdir()]:
         if int(path.name) not in (0, 1, 2, handle, session.fileno()):
             with suppress(OSError):

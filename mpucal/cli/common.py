@@ -74,7 +74,7 @@ def together(*options: Decorator) -> Decorator:
 
 
 class CalibrationPath(click.Path):
-    """Path of a calibration; of the folder of a session, that of its calibration.json."""
+    """Path of a calibration; a session's folder stands for the calibration.json in it."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)

@@ -1,4 +1,4 @@
-"""Options of the sources, and checks of what is given of them together."""
+"""Options of the sources, and checks of their combinations."""
 
 from __future__ import annotations
 

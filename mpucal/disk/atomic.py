@@ -13,7 +13,7 @@ from ..errors import OutputError, UsageError
 
 
 def check_not_input(target: Path, inputs: Iterable[Path]) -> None:
-    """Raise UsageError if `target` is one of `inputs`: a result must not replace what it is made of."""
+    """Raise UsageError if `target` is one of `inputs`: a result must not replace a file that it is made from."""
     if target.exists() and any(read.exists() and target.samefile(read) for read in inputs):
         raise UsageError(f"{target} is an input file", "choose another name with -o")
 

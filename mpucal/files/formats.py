@@ -164,7 +164,7 @@ def find_format(path: Path, hints: Hints = NO_HINTS) -> Format:
     of_suffix = [row for row in FORMATS if row.is_read and row.suffix == _suffix(path)]
     found = recognise(path)
     if hints.given and not (found and found.hinted):
-        # What mpucal recorded is no other program's either.
+        # A recording of mpucal is not read as another program's file.
         if not (found and (found.session or found.suffix == FOLDER)):
             found = next((row for row in reversed(of_suffix) if row.hinted), found)
         if found is None or not found.hinted:

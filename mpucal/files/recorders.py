@@ -35,7 +35,7 @@ class Recorder:
 
     @property
     def family(self) -> str:
-        """Name of the driver, whatever its version; empty for that of chips."""
+        """Name of the driver without its version; empty for the driver of chips."""
         return _family(self.version)
 
 

@@ -222,7 +222,7 @@ def read_scale(kind: str, device: str, texts: Texts, elements: Mapping[str, Scan
 
 
 def _mpu_scale(kind: str, printed: float) -> float:
-    """Return the data sheet's scale of which a driver printed a rounded one; else what it printed."""
+    """Return the data sheet's scale if `printed` is one of them, rounded by a driver; else `printed`."""
     near = (scale for scale in MPU_SCALES[kind] if abs(printed - scale) < SCALE_TOLERANCE * scale)
     return next(near, printed)
 

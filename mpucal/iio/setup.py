@@ -82,7 +82,7 @@ class DeviceSetup:
         return self._files.read(f"{self.device}/{name}", count).decode(errors="replace").strip()
 
     def read_frames(self) -> None:
-        """Read what the buffer holds, up to FRAMES_BYTES."""
+        """Read the frames in the buffer, up to LIST_BYTES."""
         self._files.read(self.device, LIST_BYTES)
 
     def set(self, name: str, text: str) -> str:

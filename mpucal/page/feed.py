@@ -130,7 +130,7 @@ class Feed:
         return self._server.visited
 
     def hear(self, output: Output) -> None:
-        """Change the view, and what is said about it."""
+        """Change the view, and the announcement about it."""
         self._view = self._view.after(output)
         self._voice.hear(self._view)
         self._changed.set()

@@ -1,4 +1,4 @@
-"""Filter of requests: a pure function from a request to what it may have, or the status that refuses it.
+"""Filter of requests: a pure function from a request to the permitted resource, or to the status that refuses it.
 
 A request is allowed if its only Host header names this server, which defeats DNS rebinding, and its path has the token.
 It may read the page's own files, the session's events, and the results by their names. A key is pressed by POST, if

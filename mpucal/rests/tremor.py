@@ -46,8 +46,8 @@ def without_tremor(recording: Recording, flat: Flat, runs: Intervals, noise_fact
     n = len(window)
     tremor = tremor_variance(statistics(acc, runs)[1], noise)
     samples = np.asarray(runs[:, 1] - runs[:, 0], np.float64)
-    # What goes on from the flat segment is not in a hand, and the low pass would leave nothing of a short rest. A table
-    # that hums is low-passed, too: a skewed wave would move the robust mean of a rest.
+    # A rest that continues the flat segment is not in a hand, and of a short rest the low pass would leave nothing. A
+    # table that hums is low-passed, too: a skewed wave would move the robust mean of a rest.
     is_held, is_long = runs[:, 0] > flat.last, samples >= SHORTEST * n
     for k in np.flatnonzero(is_held & is_long):
         first, last = runs[k]

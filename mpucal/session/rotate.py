@@ -128,7 +128,7 @@ class Rotate(PoseStep):
 
     @property
     def wanted(self) -> events.Direction | None:
-        """Unit vector that is to point down; where nothing is asked for, the one that would help most."""
+        """Unit vector that is to point down; without a requested orientation, the most useful one."""
         if self.prompt.down is not None or self._knowledge is None:
             return self.prompt.down
         return self._knowledge.down

@@ -215,7 +215,7 @@ class ChipSink(Sink):
 
 
 def _check_gravity(calibration: Calibration, mean_g: Vector, applied_mps2: Vector) -> None:
-    """Check that the calibration gives gravity for the mean (3,) at rest, with what the registers subtract (3,)."""
+    """Check that the calibration gives gravity for the mean (3,) at rest, less what the registers subtract (3,)."""
     gravity = calibration.gravity
     a = replace(calibration, applied_in_hardware=applied_mps2).apply(mean_g * STANDARD_GRAVITY_MPS2)
     if not abs(np.linalg.norm(a) - gravity) < GRAVITY_MPS2:

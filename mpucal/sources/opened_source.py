@@ -41,7 +41,7 @@ class ActiveSource(NamedTuple):
 
 
 class CaptureRecorder:
-    """Recorder of a session; of a resumed one, without what is replayed.
+    """Recorder of a session; the replayed part of a resumed session is left out.
 
     The time of day stands before the first successful access, so that the samples can be merged with other recordings;
     a replay keeps the recorded one.

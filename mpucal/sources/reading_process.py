@@ -76,7 +76,7 @@ class ProcessSource:
             self._followed.tell(prompt)
 
     def close(self) -> None:
-        """End the process, which stops the sensor if nobody did."""
+        """End the process, which stops the sensor if it still runs."""
         if self._followed is not None:
             self._followed.close()
 
@@ -99,7 +99,7 @@ class ProcessSource:
                 outbox.put(error)
 
     def _should_stop(self, session: Connection) -> bool:
-        """Pass what the session sent to the hands; return True if it wishes to stop, or has ended."""
+        """Pass the prompts of the session to the hands; return True if it asks to stop, or has ended."""
         with suppress(OSError, EOFError):
             while session.poll():
                 wish = session.recv()
@@ -165,7 +165,7 @@ class Outbox:
         self._items.clear()
 
     def close(self) -> None:
-        """Send what is left."""
+        """Send the remaining items."""
         self.send()
         self._queue.put(None)
         self._thread.join()
@@ -217,7 +217,7 @@ class FollowedBus(ReplayBus):
         return successful(as_asked(asked, self._received(), "that of the reading process"))
 
     def _received(self) -> Any:
-        """Wait for the next access; raise what the process raised in its place, or BusError if that has ended."""
+        """Wait for the next access; raise an exception that the process sent instead, or BusError if it has ended."""
         if self._ended is not None:
             raise self._ended
         try:

@@ -118,7 +118,7 @@ class PacketReplay(RecordedParts[RawPacket]):
             self._live.restrict(address)
 
     def unread(self) -> int:
-        """Return 0: what a vehicle sends does not depend on what is read."""
+        """Return 0: a vehicle sends its packets whether they are read or not."""
         return 0
 
     def _is_due(self, event: SessionEvent) -> bool:

@@ -99,7 +99,7 @@ def _may_be_no_seconds(table: Table, path: Path) -> bool:
     place = [name.strip().lower() for name in table.header].index("t")
     if len(table) and OF_DAY(str(table.cells[place][0])):
         return True
-    # what was read of the file may end within a number
+    # the part of the file that was read may end within a number
     t = table.numbers([Column("t", place, TIME)])[:-1, 0]
     if len(t) < FEWEST or not is_index(t):
         return len(t) >= FEWEST and not increases(t)
@@ -227,7 +227,7 @@ def _oldest_first(table: Table) -> Table:
     """Return a table whose lines are the newest first, as databases export them, in the order of their times."""
     if len(table) < FEWEST:
         return table
-    # what was read of the file may end within its last line
+    # the part of the file that was read may end within a line
     some = np.isin(np.arange(len(table)), np.linspace(0, len(table) - 2, LOOKED_AT).astype(int))
     # damaged times are told where all are read
     with suppress(RecordingError):

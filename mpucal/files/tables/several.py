@@ -41,7 +41,7 @@ MOST_SENSORS, MOST_TURNS = 32, 6
 BEGUN = 2000
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
 FEWEST_COLUMNS, FARTHER = 3, 2.0
-# what separates the words of a name, and the most words of a name that is looked at; a digit ends a word of letters
+# separators of the words in a name, and the largest number of words considered; a digit ends a word of letters
 _BETWEEN, MOST_WORDS = re.compile(r"[_ .\-]+"), 6
 _NUMBERED = re.compile(r"([A-Za-z]+)(\d)").fullmatch
 # a place before an axis: Leftax

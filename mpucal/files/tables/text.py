@@ -82,7 +82,7 @@ def decode_text(data: bytes, name: str) -> str:
         text = text.replace("\r", "\n").replace("}{", "}\n{")
     head = _QUOTED.sub(lambda q: q[0].replace("\n", " ") if len(q[0]) <= LONGEST_NAME + 2 else q[0], text[:HEAD])
     text = _EXPONENT.sub("E", _MARKS.sub("", head + text[HEAD:]))
-    # what was read of the file may end within a line
+    # the part of the file that was read may end within a line
     begun = text[:HEAD].rpartition("\n")[0] or text
     stamped = [*MONITORED.finditer(begun)]
     if 2 * len(stamped) <= begun.count("\n"):

@@ -1,4 +1,4 @@
-"""Units by their names, and the one that is read where the file and its samples each show one."""
+"""Units by their names, and the choice where the file names a unit and its samples show one."""
 
 from __future__ import annotations
 

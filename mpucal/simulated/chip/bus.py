@@ -47,7 +47,7 @@ class RealClock:
         self._busy_until = 0
 
     def now(self) -> int:
-        """Return the time; during a transfer, that of its end."""
+        """Return the time; during a transfer, the time of its end."""
         return max(self._busy_until, self._passed())
 
     def spend(self, ns: int) -> None:

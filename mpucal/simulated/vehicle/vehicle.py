@@ -25,7 +25,7 @@ from .px4 import Px4
 
 
 class StreamTimes:
-    """Schedule of the streams; a stream that is late skips what it missed."""
+    """Schedule of the streams; a late stream skips the messages that it missed."""
 
     def __init__(self) -> None:
         self._interval_us: dict[int, int] = {}
