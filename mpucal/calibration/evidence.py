@@ -15,7 +15,7 @@ from ..data import GYRO_RANGES_DPS, Recording, Vector
 from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
 from ..rests.intervals import Intervals, RestFinder, statistics
-from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
+from ..rests.limits import ENOUGH_ORIENTATIONS, LEAST_TURN_RAD, MOVING_RAD_S
 from ..rests.windows import WINDOW_S
 from .fit import Fit
 from .hypotheses import Explanation
@@ -111,12 +111,12 @@ class Evidence:
 
     @cached_property
     def was_held_all_around(self) -> bool:
-        """True if the board rested on each of its six sides, and twelve times or more in all."""
+        """True if the board rested on each of its six sides, and ENOUGH_ORIENTATIONS times or more in all."""
         if self.flat is None or self.calibrated is None:
             return False
         means = statistics(self.calibrated, self.rests)[0]
         rests = np.bincount(sides_down(means), minlength=6)
-        return bool(rests.all()) and rests.sum() >= 2 * len(rests)
+        return bool(rests.all()) and rests.sum() >= ENOUGH_ORIENTATIONS
 
     @cached_property
     def magnitude(self) -> Vector:

@@ -24,6 +24,8 @@ TURNS_RAD_S = 0.02
 # Orientations so far apart count as different: 12 of them are far from parallel, and a sphere holds some seventy.
 MOVING_RAD_S = 0.3
 LEAST_TURN_RAD = math.radians(20.0)
+# So many orientations, on all sides, show a sensor well where nothing disturbs it.
+ENOUGH_ORIENTATIONS = 10
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..data import Sensor, Vector
 from ..origin import Origin
-from ..rests.limits import LEAST_TURN_RAD
+from ..rests.limits import ENOUGH_ORIENTATIONS, LEAST_TURN_RAD
 from .events import Direction, Target
 
 # A direction that was only passed is disturbed by the hand's accelerations: so many count as one pause.
@@ -138,7 +138,7 @@ class Aim:
 
 AIMS: Mapping[str, Aim] = {
     "quick": Aim(Target(0.3, 0.15, 3.0), least=8, longest_s=60.0, verify=2),
-    "normal": Aim(Target(0.1, 0.05, 1.0), least=10, longest_s=120.0, verify=3),
+    "normal": Aim(Target(0.1, 0.05, 1.0), least=ENOUGH_ORIENTATIONS, longest_s=120.0, verify=3),
     "best": Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
 }
 NORMAL = "normal"

@@ -23,7 +23,7 @@ from ..result import error_model
 from ..result.calibration import REFUSED
 from .aims import AIMS, directions, unseen_rad
 from .events import Checked, Event, FitKind, Knowledge, Learnt, Target, Tried, down_of, triple
-from .live_verification import explain_contradiction, is_much_clipped, judge_verification, select_unseen
+from .live_verification import CONTRADICTIONS, explain_contradiction, is_much_clipped, judge_verification, select_unseen
 from .plan import Plan
 
 CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
@@ -123,7 +123,7 @@ def _most_specific_reason(reasons: list[Reason], recording: Recording) -> Reason
             return 0
         if each.code == CLIPPED and is_much_clipped(recording):
             return 1
-        return 2 if each.code == CONTRADICTION else 3
+        return 2 if each.code in CONTRADICTIONS else 3
 
     first = min(reasons, key=rank, default=None)
     return explain_contradiction(first, recording) if first is not None and first.code == CONTRADICTION else first

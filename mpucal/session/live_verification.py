@@ -25,6 +25,8 @@ from .rotate import REST_S
 # A shorter turn shows too little of a scale factor error to blame one.
 LONG_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
+# Reasons beside which more orientations do not help, and the reason that asks for some.
+CONTRADICTIONS, FEW = ("inconsistent", "zero_moved"), "few_orientations"
 MUCH_CLIPPED = 0.002
 _IN_DOCUMENT = "down", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "agrees"
 
@@ -190,5 +192,8 @@ def add_verification(calibration: Calibration, checked: Checked | None) -> Calib
         others = [r for r in quality["reasons"] if r["code"] != checked.reason.code]
         refused = checked.agrees is not None or quality["verdict"] == REFUSED
         reasons = [checked.reason.document(), *others]
+        # The first fit and the final one may see it differently. Where either found more, orientations are not few.
+        if checked.reason.code in (FEW, *CONTRADICTIONS) and any(r["code"] in CONTRADICTIONS for r in reasons):
+            reasons = [r for r in reasons if r["code"] != FEW]
         quality = {**quality, "verdict": REFUSED if refused else USABLE, "reasons": reasons}
     return replace(calibration, quality=quality)

@@ -1,5 +1,7 @@
 """Reasons and verdicts that follow from rests in unseen orientations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,6 +110,14 @@ def test_a_disagreement_refuses_and_comes_first():
     assert [reason["code"] for reason in found.quality["reasons"]] == ["verification_failed", "few_orientations"]
     assert found.quality["reasons"][0] == MOVED.document()
     assert not found.quality["verification"]["agrees"]
+
+
+@pytest.mark.parametrize(("first", "final"), [("few_orientations", "zero_moved"), ("zero_moved", "few_orientations")])
+def test_no_more_orientations_are_asked_for_where_a_fit_found_that_the_sensor_changed(first, final):
+    of_all = replace(calibration(), quality={"verdict": "usable", "reasons": [{"code": final, "message": "it"}]})
+    found = add_verification(of_all, Checked((), False, Reason(first, "it is so", "do that", True)))
+    assert found.verdict == "refused"
+    assert [reason["code"] for reason in found.quality["reasons"]] == ["zero_moved"]
 
 
 @pytest.mark.parametrize(("verdict", "then"), [("good", "usable"), ("usable", "usable"), ("refused", "refused")])

@@ -24,9 +24,10 @@ LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 
 
 def few_orientations(e: Evidence) -> Reason | None:
-    """Find directions that the data leave open, where the model holds; after a slip, more orientations do not help.
+    """Find directions that the data leave open, where the model holds.
 
-    Nor do they where a hand held it in many: then it moved as it rested, with the hand or with the ground.
+    More orientations do not help where a slip, another change, or a contradiction decides what is known. Nor do they
+    where a hand held it in many: then it moved as it rested, with the hand or with the ground.
     """
     rms = _model_rms(e)
     if _slip(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
@@ -37,11 +38,14 @@ def few_orientations(e: Evidence) -> Reason | None:
         f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", e.uncertainty.worst, strict=True) if abs(w) > 0.4
     )
     known = max(rms, e.uncertainty.rms_mps2) if _is_useless(e) else rms
-    if known < e.gravity and e.model == "hand" and e.was_held_all_around and contradiction(e) is None:
+    if known >= e.gravity:
+        return reason("few_orientations", "not_observable", side=side)
+    contradicted = contradiction(e) is not None
+    if contradicted and e.claim is not None and e.claim.worst is not None:
+        return None
+    if e.model == "hand" and e.was_held_all_around and not contradicted:
         return reason("inconsistent", "moved", _is_useless(e), rms=known)
-    if known < e.gravity:
-        return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
-    return reason("few_orientations", "not_observable", side=side)
+    return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
 
 
 def _model_rms(e: Evidence) -> float | None:
@@ -101,7 +105,8 @@ def contradiction(e: Evidence) -> Reason | None:
     if change is not None and not disturbed and claim.error("change") > LEAST_CHANGE_MPS2:
         begin, end = _since_the_start(e, change.span)
         if change.hypothesis.what != "accelerometer":
-            return reason("inconsistent", "change", claim.error("change") > CHANGED_MPS2, begin=begin, end=end)
+            refuse = claim.error("change") > CHANGED_MPS2 or _is_useless(e)
+            return reason("inconsistent", "change", refuse, begin=begin, end=end)
         size = 1e3 * change.size / STANDARD_GRAVITY_MPS2
         return reason("zero_moved", "walk", _is_useless(e), size=size, begin=begin, end=end)
     disturbed |= not e.estimate.converged
