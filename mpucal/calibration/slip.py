@@ -78,7 +78,8 @@ def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
     """Return probabilities (k,) of a slip in each transition; 0 but for the first and last two.
 
     There a slip looks like a turn that the gyroscope lost, and leaves no pattern. One of SURE recordings has one there.
-    Without one, a miss as large has the chance that Student's t gives, in each of these transitions.
+    Without one, a miss as large has the chance that Student's t gives, in each of these transitions. What the next
+    transition undoes is an error of the rest between them.
 
     spoilt : (n,) True for samples whose rates are lost or clipped; the transitions that have some are left out.
     """
@@ -86,11 +87,20 @@ def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
     n, p = _numbers(transitions)
     ends = [i for i in (0, 1, k - 2, k - 1) if n > p and not spoilt[transitions[i].span].any()]
     if ends:
-        misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
+        known, misses = np.array([each.variance for each in transitions]), _lasting(transitions)
         nu = DEGREES_OF_FREEDOM
         chance = (likely_scale(misses, known)[1][ends] * nu / (nu + 2.0)) ** (0.5 * nu)
         probability[ends] = 1.0 / (1.0 + SURE * len(ends) * chance)
     return probability
+
+
+def _lasting(transitions: Sequence[Transition]) -> Vector:
+    """Return the misses (k, 3), or those of two transitions together, wherever that is less."""
+    misses = np.array([each.miss for each in transitions])
+    both = misses[1:] + [each.F @ before for each, before in zip(transitions[1:], misses, strict=False)]
+    far = np.full((1, 3), np.inf)
+    of_all = np.array([misses, np.concatenate([far, both]), np.concatenate([both, far])])
+    return of_all[np.linalg.norm(of_all, axis=2).argmin(axis=0), np.arange(len(misses))]
 
 
 def _numbers(transitions: Sequence[Transition]) -> tuple[int, int]:
