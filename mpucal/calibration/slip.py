@@ -100,7 +100,7 @@ def _lasting(transitions: Sequence[Transition]) -> Vector:
     both = misses[1:] + [each.F @ before for each, before in zip(transitions[1:], misses, strict=False)]
     far = np.full((1, 3), np.inf)
     of_all = np.array([misses, np.concatenate([far, both]), np.concatenate([both, far])])
-    return of_all[np.linalg.norm(of_all, axis=2).argmin(axis=0), np.arange(len(misses))]
+    return np.asarray(of_all[np.linalg.norm(of_all, axis=2).argmin(axis=0), np.arange(len(misses))])
 
 
 def _numbers(transitions: Sequence[Transition]) -> tuple[int, int]:

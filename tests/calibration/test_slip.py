@@ -9,6 +9,8 @@ import pytest
 
 from mpucal.calibration import calibrate, estimate
 from mpucal.calibration.rotation import turned
+from mpucal.calibration.slip import end_slips
+from mpucal.calibration.transitions import Transition
 from tools.lab.scenarios import faults
 from tools.lab.scenarios.family import Family, drawn
 
@@ -85,3 +87,19 @@ def test_a_slip_in_the_last_rest_divides_it(hand, seed):
         "refused",
         ["inconsistent"],
     )
+
+
+def test_a_miss_near_the_end_that_the_next_one_undoes_is_no_slip():
+    """Twenty turns that miss by chance: a rest held askew misses forth and back, and a slip once."""
+    rng = np.random.default_rng(3)
+    F = [turned(rng.normal(0.0, 1.0, (1, 3))) for _ in range(20)]
+    askew = 0.03 * np.array([0.6, -0.6, 0.53])
+    for back, least, most in ((0.0, 0.9, 1.0), (1.0, 0.0, 0.1)):
+        misses = rng.normal(0.0, 1e-3, (20, 3))
+        misses[18] += askew
+        misses[19] -= back * F[19] @ askew
+        turns = [
+            Transition(slice(0, 1), R, AXIS[0], AXIS[0], miss, 1e-6, 1e-7) for R, miss in zip(F, misses, strict=True)
+        ]
+        ends = end_slips(turns, np.zeros(1, bool))
+        assert least < ends.max() <= most
