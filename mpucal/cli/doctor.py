@@ -16,7 +16,7 @@ from ..session.lay_flat import PUT_DOWN, STAND, put_down
 from ..sinks.choose import interrupted_writes
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
-from .common import say
+from .common import json_option, say
 from .options import Finite
 from .source_options import check_source, source_options
 
@@ -25,7 +25,7 @@ EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus si
 
 @click.command("doctor", epilog=EXAMPLE)
 @source_options("doctor")
-@click.option("--json", "as_json", is_flag=True, help="Print only the findings, as JSON.")
+@json_option("Print only the findings, as JSON.")
 @click.option("--seconds", type=Finite(2.0), default=10.0, show_default=True, help="Time to observe the samples [s].")
 @click.option(
     "--conformance", is_flag=True, help="Examine a bridge's firmware (--serial) alone, by the protocol's talks."
