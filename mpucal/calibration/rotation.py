@@ -21,7 +21,7 @@ def lengths(v: Vector) -> NDArray[np.float64]:
 
 
 def cross_rows(u: Vector, v: Vector) -> NDArray[np.float64]:
-    """Return u x v of vectors (n, 3), by columns, which takes a third of np.cross's time."""
+    """Return u x v of (n, 3) and (n, 3) or (3,), by columns, which takes a third of np.cross's time."""
     (a, b, c), (x, y, z) = u.T, v.T
     return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
 

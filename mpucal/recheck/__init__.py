@@ -13,7 +13,7 @@ from ..result.calibration import Calibration
 from ..result.comparison import CONFIDENCE
 from ..result.correction import make_correction, other_who_am_i, same_trim
 from . import drift
-from .hypotheses import NOTHING, Comparison, compare_hypotheses, estimate, p_value
+from .hypotheses import NOTHING, HypothesisOdds, compare_hypotheses, estimate, p_value
 from .observed import NOISE, Observations, apply_errors, observe
 from .outcome import (
     ANOTHER_SENSOR,
@@ -177,7 +177,7 @@ def _describe_change(result: CheckResult) -> CheckResult:
     return replace(result, message=message, remedy=remedy)
 
 
-def _close_hypotheses(comparison: Comparison) -> tuple[str, ...]:
+def _close_hypotheses(comparison: HypothesisOdds) -> tuple[str, ...]:
     """Return the hypotheses that are nearly as likely as the likeliest."""
     best, log_odds = comparison.likeliest, comparison.log_odds
     if best == NOTHING:

@@ -23,7 +23,7 @@ NOTHING = "nothing"
 
 
 @dataclass(frozen=True)
-class Comparison:
+class HypothesisOdds:
     """Evidence for each hypothesis.
 
     Attributes
@@ -39,7 +39,7 @@ class Comparison:
 
 def compare_hypotheses(
     observed: Observations, nothing: Vector, hypotheses: Mapping[str, tuple[float, Vector]]
-) -> Comparison:
+) -> HypothesisOdds:
     """Return the evidence for each hypothesis, and the likeliest.
 
     Parameters
@@ -57,7 +57,7 @@ def compare_hypotheses(
     largest = np.max(list(odds.values()), axis=0)
     probability = float((1 + np.sum(largest[1:] >= largest[0])) / (1 + DRAWS))
     likeliest = max(odds, key=lambda name: odds[name][0]) if probability < 1.0 - CONFIDENCE else NOTHING
-    return Comparison(likeliest, probability, {name: float(of[0]) for name, of in odds.items()})
+    return HypothesisOdds(likeliest, probability, {name: float(of[0]) for name, of in odds.items()})
 
 
 def estimate(observed: Observations, P: Vector) -> tuple[Vector, Vector]:

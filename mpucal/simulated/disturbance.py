@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..calibration.rotation import cross_rows
 from ..data import Vector
 from ..result.error_model import MG_PER_MPS2
 from .legs import minimum_jerk
-from .rotation import cross_rows
 
 SWAY_HZ, TREMOR_HZ = (0.5, 4.0), (2.0, 10.0)
 # Sway and physiological tremor of an arm that holds a pose

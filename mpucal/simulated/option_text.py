@@ -10,6 +10,7 @@ from functools import cache
 from typing import Annotated, Any, ClassVar, Self, get_origin, get_type_hints
 
 from ..errors import UsageError, did_you_mean
+from ..sources.table import whole_number
 from .faults import Fault, Where, fault_kinds
 
 FAULT = "fault"
@@ -94,13 +95,8 @@ def at_least(lowest: float) -> Parser:
 
 def whole(lowest: int, highest: int | None = None) -> Parser:
     """Return the parser of a whole number within limits."""
-
-    def parse(text: str) -> int:
-        if (value := int(text)) < lowest or (highest is not None and value > highest):
-            raise ValueError(text)
-        return value
-
-    return parse, f"a whole number from {lowest} " + ("on" if highest is None else f"to {highest}")
+    allowed = "on" if highest is None else f"to {highest}"
+    return whole_number(lowest, highest), f"a whole number from {lowest} {allowed}"
 
 
 def one_of(names: Collection[str]) -> Parser:

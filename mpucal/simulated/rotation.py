@@ -47,13 +47,6 @@ def _norm(v: Vector) -> Vector:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def cross_rows(a: Vector, b: Vector) -> Vector:
-    """Return a x b of (n, 3) and (n, 3) or (3,), three times as fast as np.cross."""
-    (a_x, a_y, a_z), (b_x, b_y, b_z) = a.T, b.T
-    axes = (a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x)
-    return np.stack(axes, axis=1)
-
-
 def conjugate(q: Vector) -> Vector:
     """Return the inverse of each of (..., 4)."""
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))

@@ -12,6 +12,7 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...session.plan import Plan
 from ...sources.chip import OpenedChip
 from ...sources.kind import Request
+from ...sources.table import whole_number
 from ...sources.usb_i2c import I2C_HZ
 from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_CHIP, Fault, Where, begin_mishaps
@@ -100,12 +101,6 @@ def _positive(text: str) -> float:
     return value
 
 
-def _identity(text: str) -> int:
-    if not 0 <= (value := int(text, 0)) <= 0xFF:
-        raise ValueError(text)
-    return value
-
-
 def _vector(text: str) -> Vector:
     return np.array([number(part) for part in text.split("/")]).reshape(3)
 
@@ -134,7 +129,7 @@ class ChipOptions(SimulationOptions):
     """
 
     chip: Annotated[str, one_of(MODELS)] = "mpu6050"
-    who_am_i: Annotated[int | None, (_identity, "a byte such as 0x68")] = None
+    who_am_i: Annotated[int | None, (whole_number(0, 0xFF), "a byte such as 0x68")] = None
     offsets: Annotated[str, one_of(OFFSETS)] = "2048"
     seed: Annotated[int, whole(0)] = 0
     hand: Annotated[str, one_of(HANDS)] = "guided"
