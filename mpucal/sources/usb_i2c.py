@@ -169,9 +169,9 @@ def adapters() -> list[tuple[str, str]]:
 
 
 def _mcp2221_adapters() -> list[tuple[str, str]]:
-    from EasyMCP2221.MCP2221 import hid  # noqa: PLC0415 - an extra
+    from EasyMCP2221.MCP2221 import DEV_DEFAULT_PID, DEV_DEFAULT_VID, hid  # noqa: PLC0415 - an extra
 
-    devices: list[dict[str, Any]] = hid.enumerate(0x04D8, 0x00DD)
+    devices: list[dict[str, Any]] = hid.enumerate(DEV_DEFAULT_VID, DEV_DEFAULT_PID)
     several = len(devices) > 1
     # With the factory's settings they do not report their serial numbers over USB.
     return [
