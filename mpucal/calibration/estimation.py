@@ -50,7 +50,10 @@ def estimate(
     decoded = decode(recording)
     masked = with_masks(decoded.recording)
     before = Evidence(masked, gravity, None, None, model, gravity_anyway=gravity_anyway, decoded=decoded)
-    whole = _with_gyroscope(before) if NO_GYROSCOPE.reason(before) is None else (before, NOTHING | {"model": model})
+    missing = NO_GYROSCOPE.reason(before)
+    whole = _with_gyroscope(before) if missing is None else (before, NOTHING | {"model": model})
+    if model == "static" and missing is not None:
+        return _of_rests(before, missing), {"model": model, "why": "asked for"}
     if model != "auto":
         return whole
     at_fault = find_gyroscope_fault(whole[0])
@@ -58,7 +61,7 @@ def estimate(
         return _of_a_part(whole[0]) or whole
     of_rests = _of_rests(before, at_fault)
     if refusing := tuple(reason for reason in find_reasons(of_rests) if reason.refuse):
-        if NO_GYROSCOPE.reason(before) is not None:
+        if missing is not None:
             return replace(whole[0], against_rests=refusing), whole[1]
         # other faults of the gyroscope can be mended, and then the rests need not be enough
         return _of_a_part(whole[0]) or whole

@@ -193,11 +193,27 @@ class Evidence:
         ]
 
     def _turns_of_rests(self, flat: Flat) -> list[_Turn]:
-        """Return the turns from rest to rest that move gravity far."""
+        """Return the turns from rest to rest that move gravity far, without interruption."""
         r, runs = self.recording, self.rests
         u, first, last = _units(statistics(r.acc, runs)[0]), runs[1:, 0], runs[:-1, 1]
-        far = _angles(u[1:], u[:-1]) > LEAST_TURN_RAD
-        return [self._turn(flat, u[k], u[k + 1], last[k], first[k]) for k in np.flatnonzero(far).tolist()]
+        whole = [k for k in self._far_turns if not self._is_interrupted(last[k] - 1, first[k])]
+        return [self._turn(flat, u[k], u[k + 1], last[k], first[k]) for k in whole]
+
+    @cached_property
+    def _far_turns(self) -> list[int]:
+        """Which of the turns from rest to rest move gravity far."""
+        u = _units(statistics(self.recording.acc, self.rests)[0])
+        found: list[int] = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_TURN_RAD).tolist()
+        return found
+
+    def _is_interrupted(self, first: int, last: int) -> bool:
+        begin_s, end_s = self.recording.t[[first, last]].tolist()
+        return any(begin_s <= at < end_s for at in self.recording.interrupted)
+
+    @property
+    def turned_unrecorded(self) -> bool:
+        """True if the board was turned between the parts of an interrupted recording alone."""
+        return self.flat is not None and len(self._far_turns) > 0 and not self._turns_of_rests(self.flat)
 
     @cached_property
     def gyro_factor(self) -> float:

@@ -40,7 +40,7 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """
     y, variance = _rests(recording, flat)
     start = x = np.append(np.eye(3)[UPPER], np.zeros(3))
-    extra, iterations, settled = SPREADS_MPS2[-1], 0, False
+    extra, iterations, settled = SPREADS_MPS2[0], 0, False
     while True:
         e, J, along = _residuals(x, y, gravity, variance)
         weight = 1.0 / (along + extra**2)

@@ -50,19 +50,36 @@ def test_the_static_model_is_an_ellipsoid_through_the_rests(hand):
     assert np.abs(away / std).max() < 1.0
 
 
-def test_six_faces_that_were_joined_give_biases_and_scale_factors():
+@pytest.mark.parametrize(
+    ("diagonal", "b_a"),
+    [([1.015, 0.985, 1.01], [0.3, -0.2, 0.4]), ([1.04, 0.99, 0.98], [0.66, 0.05, -0.07])],
+    ids=["usual errors", "errors beyond the data sheet's"],
+)
+def test_six_faces_that_were_joined_give_biases_and_scale_factors(diagonal, b_a):
+    """Find them with a gyroscope that missed the turns between, and without it, also where the model is asked for."""
     rng = np.random.default_rng(7)
-    D, b_a = np.diag([1.015, 0.985, 1.01]), np.array([0.3, -0.2, 0.4])
-    n = 500
+    D = np.diag(diagonal)
+    n = 300
     acc = np.concatenate([G * D @ face + b_a + rng.normal(0.0, 0.03, (n, 3)) for face in FACES[[5, *range(5)]]])
     gyr = rng.normal(0.0, 0.002, acc.shape)
     t = 0.01 * np.arange(len(acc)) + 3.0 * (np.arange(len(acc)) // n)
-    calibration = calibrate(Recording.from_arrays(t, acc, gyr), "auto", G)
-    assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
-    assert calibration.fit["at_prior"] == ["D_xy", "D_xz", "D_yx", "D_yz", "D_zx", "D_zy"]
-    np.testing.assert_allclose(np.diag(calibration.D), np.diag(D), atol=1e-3)
-    np.testing.assert_allclose(calibration.b_a, b_a, atol=0.01)
-    assert {reason["code"] for reason in calibration.quality["reasons"]} == {"gyro_off", "few_orientations"}
+    recording = Recording.from_arrays(t, acc, gyr)
+    of_files = replace(recording, interrupted=tuple(t[n - 1 :: n][:-1]))
+    without = replace(recording, gyr=np.full_like(gyr, np.nan))
+    for each, model, says in (
+        (recording, "auto", "from where the gyroscope's rates lead it"),
+        (of_files, "auto", "how the board was turned between its rests was not recorded"),
+        (without, "auto", "holds no rates of a gyroscope"),
+        (without, "static", "holds no rates of a gyroscope"),
+    ):
+        calibration = calibrate(each, model, G)
+        assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
+        assert calibration.fit["at_prior"] == ["D_xy", "D_xz", "D_yx", "D_yz", "D_zx", "D_zy"]
+        np.testing.assert_allclose(np.diag(calibration.D), np.diag(D), atol=1e-3)
+        np.testing.assert_allclose(calibration.b_a, b_a, atol=0.01)
+        reasons = {reason["code"]: reason["message"] for reason in calibration.quality["reasons"]}
+        assert reasons.keys() == {"gyro_off", "few_orientations"}
+        assert says in reasons["gyro_off"]
 
 
 def test_rests_that_differ_little_are_refused(hand):

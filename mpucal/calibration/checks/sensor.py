@@ -102,6 +102,8 @@ def gyro_contradicts(e: Evidence) -> Reason | None:
         carried = e.model in ("accel", "imu") and inconsistent(e) is None
         if carried or e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2:
             return None
+    if e.turned_unrecorded:
+        return reason("gyro_off", "interrupted")
     within, of_all = e.gyro_miss
     if within > MOST_MISS_RAD:
         if (by := e.gyro_axes) is not None:
