@@ -25,12 +25,13 @@ ROUGHLY = 0.05  # the decrement at which a search on block means ends
 # Below so many times the decrement that ends a search, a whole step leaves nearly nothing of it, and is not evaluated.
 LAST = 30.0
 MOST_ITERATIONS = 60
-# After so many trials that do not halve the decrement the search has failed, as in a valley without an end: turns so
-# slow that the gyroscope's noise loses gravity. Estimates that converge halve it within 5 trials.
-MOST_IN_VAIN = 10
-# V may rise by so much in a step with frozen gains. If the decrement falls to less than this share, the root is near,
-# and V, whose minimum is elsewhere, may rise by more.
-FROZEN_SLACK, NEAR_A_ROOT, SLACK_NEAR_A_ROOT = 1.0, 0.1, 200.0
+# A trial that leaves less than this share of the decrement is progress. After so many without any the search has
+# failed, as in a valley without an end: turns so slow that the gyroscope's noise loses gravity. Estimates that converge
+# make some within 5 trials.
+PROGRESS, MOST_IN_VAIN = 0.5, 10
+# V may rise by so much in a step with frozen gains, and by more in one that is progress: its minimum is elsewhere, most
+# of all after an interruption.
+FROZEN_SLACK, SLACK_OF_PROGRESS = 1.0, 200.0
 DAMPING, EASIER, HARDER = 1e-3, 0.1, 8.0
 
 
@@ -110,7 +111,7 @@ def minimise(
     least, in_vain, last = np.inf, 0, np.zeros(parameters)
     while iterations < most and in_vain < MOST_IN_VAIN:
         gradient, H, decrement = at.gradient, at.free_H, at.decrement
-        least, in_vain = (decrement, 0) if 2.0 * decrement < least else (least, in_vain + 1)
+        least, in_vain = (decrement, 0) if decrement < PROGRESS * least else (least, in_vain + 1)
         if decrement < until:
             converged = True
             break
@@ -136,7 +137,7 @@ def minimise(
 def _nearer(trial: _At, at: _At) -> bool:
     """Return True if a step came nearer to the root of the gradient with frozen gains."""
     shrunk, risen = trial.decrement / at.decrement, trial.V - at.V
-    return shrunk < 1.0 and risen < (SLACK_NEAR_A_ROOT if shrunk < NEAR_A_ROOT else FROZEN_SLACK)
+    return shrunk < 1.0 and risen < (SLACK_OF_PROGRESS if shrunk < PROGRESS else FROZEN_SLACK)
 
 
 class _At:

@@ -2,6 +2,7 @@
 
 import importlib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from mpucal.calibration import calibrate, likelihood, parameters
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
 from mpucal.calibration.initial_estimate import initialise
-from mpucal.calibration.levenberg_marquardt import MOST_ITERATIONS, minimise
+from mpucal.calibration.levenberg_marquardt import MOST_ITERATIONS, _nearer, minimise
 from mpucal.calibration.model_selection import METHODS, choose_model
 from mpucal.calibration.paper import expand
 from mpucal.calibration.parameters import ACCEL, B_A_NAMES, D_NAMES, K_NAMES
@@ -174,6 +175,14 @@ def test_a_valley_without_an_end_is_left_soon():
     minimum = minimise(slow, initialise(slow, slow.flat.b_omega), ACCEL, prior, most=1000)
     assert not minimum.converged
     assert minimum.iterations < MOST_ITERATIONS
+
+
+@pytest.mark.parametrize(
+    ("decrement", "risen", "taken"), [(1.0, 5.0, True), (2.0, 5.0, False), (2.0, 0.5, True), (3.0, 0.5, False)]
+)
+def test_frozen_gains_may_raise_the_cost_by_more_in_a_step_that_halves_the_decrement(decrement, risen, taken):
+    before, after = SimpleNamespace(decrement=2.5, V=0.0), SimpleNamespace(decrement=decrement, V=risen)
+    assert _nearer(after, before) == taken
 
 
 def test_a_kernel_of_another_table_is_refused(monkeypatch):
