@@ -6,6 +6,7 @@ of one turning of it; the motion between two files is unknown: a gap, long enoug
 
 from __future__ import annotations
 
+import re
 import shlex
 from dataclasses import replace
 from itertools import chain
@@ -18,12 +19,14 @@ from ..data import Recording, Samples
 from ..errors import RecordingError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
 from . import formats
-from .hints import NO_HINTS, Hints
+from .hints import NO_HINTS, Hints, parse_columns
 from .reading import reading
 from .rows import Rows
 from .tables.phone import tables_of_sides
 from .tables.times import GAP_S
 
+# what is said of a recording whose columns have no names
+GUESSED = re.compile(r"(?P<unit>accelerations in [^(,;]+).*guessed from [a-z ]+: --columns (?P<order>[\w,-]+)")
 # of files that may be such recordings
 SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet", ".json", ".jsonl")
 MOST = 500
@@ -69,13 +72,10 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
         files = _recordings(path)
     if len(files) == 1:
         return formats.find_format(files[0], hints).read(files[0], hints=hints)
-    read: dict[str, Recording] = {}
-    failed: dict[str, RecordingError] = {}
-    for file in files:
-        try:
-            read[file.name] = formats.find_format(file, hints).read(file, hints=hints)
-        except RecordingError as error:
-            failed[file.name] = error
+    read, failed = _read_each(files, hints)
+    read |= _read_alike([file for file in files if file.name in failed], read, hints)
+    read = {file.name: read[file.name] for file in files if file.name in read}
+    failed = {name: error for name, error in failed.items() if name not in read}
     if len(read) < 2:
         first_error = next(iter(failed.values()))
         what = f"{path}: {first_error.what}"
@@ -107,6 +107,30 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
         taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
     facts: dict[str, Any] = {"sensor": first.sensor, "name": name, "utc_ns": first.utc_ns, "taken": taken.strip()}
     return Recording(**vars(whole), **facts, interrupted=interrupted)
+
+
+def _read_each(files: list[Path], hints: Hints) -> tuple[dict[str, Recording], dict[str, RecordingError]]:
+    """Return the recordings by the names of their files, and the errors of those that cannot be read."""
+    read: dict[str, Recording] = {}
+    failed: dict[str, RecordingError] = {}
+    for file in files:
+        try:
+            read[file.name] = formats.find_format(file, hints).read(file, hints=hints)
+        except RecordingError as error:
+            failed[file.name] = error
+    return read, failed
+
+
+def _read_alike(files: list[Path], read: dict[str, Recording], hints: Hints) -> dict[str, Recording]:
+    """Return the recordings in files whose columns were not known, by those of the others, if their unit is the same.
+
+    A side with a large bias does not show its columns by the length of gravity.
+    """
+    guess = next(filter(None, (GUESSED.search(part.taken or "") for part in read.values())), None)
+    if guess is None:
+        return {}
+    found, _ = _read_each(files, replace(hints, columns=parse_columns(guess["order"])))
+    return {name: part for name, part in found.items() if guess["unit"] in (part.taken or "")}
 
 
 def _recordings(path: Path) -> list[Path]:

@@ -215,6 +215,18 @@ def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_p
     assert "Left out were results.mat (" in read.taken
 
 
+def test_a_side_with_a_large_bias_has_the_columns_of_the_others(tmp_path):
+    """Read it, whose length of gravity shows no columns, and leave out a table of another unit."""
+    rng = np.random.default_rng(4)
+    for name, side in (("x_up", [1.07, 0, 0]), ("y_up", [0, 1, 0]), ("z_up", [0, 0, 1]), ("places", [900, 1, 5])):
+        values = [*(np.array(side) * 16384 / (1 if side[0] < 2 else 16384)), 90, -70, 30]
+        np.savetxt(tmp_path / f"{name}.txt", np.rint(values + rng.normal(0, 3, (300, 6))), "%d")
+    read = mpucal.load(tmp_path)
+    assert "of 3 files" in read.taken
+    assert "x_up.txt, y_up.txt, z_up.txt" in read.taken
+    np.testing.assert_allclose(np.abs(read.acc).max(axis=0) / G, [1.07, 1.0, 1.0], atol=0.01)
+
+
 def test_packed_recordings_are_read_as_what_is_in_them(walk, table, assert_same, tmp_path):
     """Read a file, and a folder of our own tables, beside what others add; name the file that cannot be read."""
     content = table("t,ax,ay,az,gx,gy,gz", walk.t, walk.acc, walk.gyr).read_bytes()

@@ -95,6 +95,8 @@ COLUMNS = {
     "bno055": lambda w, ns: np.rint(np.column_stack([w.acc * 100, np.degrees(w.gyr) * 16])).astype(int),
     "unsigned": lambda w, ns: counts(w) % 65536,
     "upward": lambda w, ns: counts(w) + 32768,
+    "unsigned_20": lambda w, ns: counts(w) * 16 % 2**20,
+    "upward_12": lambda w, ns: np.rint(counts(w) / 16).astype(int) + 2048,
 }
 
 
@@ -236,6 +238,8 @@ FORMS = {
     ),
     "counts without a sign": Form("", "ms unsigned 3 0 4", "\t", "walk.txt", says="counts", atol=IN_COUNTS),
     "counts from the lowest on": Form("", "t upward", " ", "walk.txt", says="counts", atol=IN_COUNTS),
+    "counts of 20 bits without a sign": Form(f"ms,{AXES}", "ms unsigned_20", says="±0.25 g", atol=IN_COUNTS),
+    "counts of 12 bits from the lowest on": Form(f"ms,{AXES}", "ms upward_12", says="±64 g", atol=9 * IN_COUNTS),
     "a sketch's counts": Form(AXES, "counts", hints=AT_100_HZ, atol=IN_COUNTS, says="±500 deg/s (by how gravity"),
     "a rocket's": Form(
         "state,timestamp_seconds,temperature_celsius,raw_acceleration_x_gs,raw_acceleration_y_gs,raw_acceleration_z_gs"

@@ -47,6 +47,8 @@ FASTEST_RAD_S = 37.0
 # samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; and how much
 # more than it does gravity may seem to turn by noise
 QUIET, LEAST_NOISE_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), 3.0
+# share of half the range by which counts from the lowest may turn, or rest, about another point
+OFF_CENTRE = 0.05
 # larger numbers are not from a sensor in any unit; their squares are finite
 BEYOND = 1e12
 # the least duration of a recording that shows how gravity turns, in halves of TURN_S
@@ -122,13 +124,25 @@ def counts_per_g(size: float) -> int:
 
 
 def to_signed(values: Vector) -> Vector:
-    """Return (n, 3) 16-bit counts with their sign, if they were read as unsigned or count from the lowest value."""
-    if values.min() < 0 or not ACCEL_COUNTS <= values.max() < 2 * ACCEL_COUNTS or not (values == np.rint(values)).all():
+    """Return (n, 3) counts with their sign, if they were read as unsigned or count from the lowest value.
+
+    Of another width than 16 bits, they only do so where gravity turns, or rates rest, about half the range.
+    """
+    most = float(values.max())
+    if values.min() < 0 or not 2.0**FEWEST_PER_G <= most < BEYOND or not (values == np.rint(values)).all():
         return values
-    wrapped, shifted = np.where(values >= ACCEL_COUNTS, values - 2 * ACCEL_COUNTS, values), values - ACCEL_COUNTS
+    half = 2.0 ** (int(most).bit_length() - 1)
+    wrapped, shifted = np.where(values >= half, values - 2 * half, values), values - half
     # the wrong reading jumps from one end of the range to the other
-    steps = [float(np.abs(np.diff(each, axis=0)).sum()) for each in (wrapped, shifted)]
-    return np.asarray(wrapped if steps[0] < steps[1] else shifted)
+    steps = [float(np.abs(np.diff(each, axis=0)).sum()) for each in (wrapped, values)]
+    if steps[0] < steps[1]:
+        return wrapped
+    centre = offset(values)
+    # a converter's counts for 1 g may be any number, and are named by the user
+    of_converter = centre is not None and typical_size(shifted)[0] < 2.0 ** (FEWEST_PER_G - 0.5)
+    centre = np.median(values, axis=0) if centre is None else centre
+    near = bool((np.abs(centre - half) < OFF_CENTRE * half).all())
+    return shifted if half == ACCEL_COUNTS or (near and not of_converter) else values
 
 
 def are_counts(values: Vector) -> bool:
