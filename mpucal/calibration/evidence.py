@@ -201,7 +201,7 @@ class Evidence:
 
     @cached_property
     def _far_turns(self) -> list[int]:
-        """Which of the turns from rest to rest move gravity far."""
+        """Places of the turns, from rest to rest, that move gravity far."""
         u = _units(statistics(self.recording.acc, self.rests)[0])
         found: list[int] = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_TURN_RAD).tolist()
         return found
