@@ -133,10 +133,11 @@ def test_files_that_cannot_be_read_are_3_and_a_sentence(mpucal, tmp_path):
     for name in ("text.mcap", "text.npz", "text.docx", "c.bin"):
         (tmp_path / name).write_text("hello")
     (tmp_path / "c.json").write_text('{"format": "other"}')
+    (tmp_path / "empty").mkdir()
     for verb in ("calibrate", "show"):
         for name in ("nothing", "nothing.npz", "nothing.mcap", "nothing/there.csv"):
             assert mpucal(verb, name) == (3, f"mpucal: there is no file {name}: check the path.\n")
-        for name, sentence in (("text.mcap", "text.mcap is not an MCAP file"), (".", "capture.mcap")):
+        for name, sentence in (("text.mcap", "text.mcap is not an MCAP file"), ("empty", "capture.mcap")):
             code, said = mpucal(verb, name)
             assert (code, sentence in said) == (3, True)
         for name in ("text.npz", "text.docx", "c.bin", "c.json"):
