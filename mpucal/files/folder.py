@@ -78,8 +78,10 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     failed = {name: error for name, error in failed.items() if name not in read}
     if len(read) < 2:
         first_error = next(iter(failed.values()))
-        what = f"{path}: {first_error.what}"
-        raise RecordingError(what, first_error.remedy, first_error.options) from first_error
+        alike = len({error.options for error in failed.values()}) == 1
+        remedy = first_error.remedy if alike else "give the one file that holds an accelerometer and a gyroscope"
+        options = first_error.options if alike else ""
+        raise RecordingError(f"{path}: {first_error.what}", remedy, options) from first_error
     parts, name = list(read.values()), path.resolve().name
     begins_ns = [(part.utc_ns or 0) + part.t[0] * 1e9 for part in parts]
     known = all(part.utc_ns is not None for part in parts)
