@@ -389,6 +389,16 @@ def test_more_orientations_are_not_asked_for_where_a_knock_moved_the_bias(hand):
     assert "few_orientations" not in reasons
 
 
+def test_a_slip_that_leads_the_fit_astray_is_named(hand):
+    calm = hand(1, "pose12").recording
+    slipped = np.where(
+        calm.t[:, None] > calm.t[0] + 28.0, calm.acc @ rotation(np.array([0.1, 0.08, -0.06])).T, calm.acc
+    )
+    verdict, reasons = judged(replace(calm, acc=slipped))
+    assert (verdict, list(reasons)) == ("refused", ["inconsistent"])
+    assert "not the same before 28 s and after 30 s" in reasons["inconsistent"]
+
+
 def test_a_sensor_that_changed_at_the_only_rest_is_refused(hand):
     # The board lies for 25 s, and is never still again.
     turned = hand(3, "continuous").recording

@@ -30,7 +30,7 @@ def few_orientations(e: Evidence) -> Reason | None:
     where a hand held it in many: then it moved as it rested, with the hand or with the ground.
     """
     rms = _model_rms(e)
-    if _slip(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
+    if likely_slip(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
         return None
     if e.uncertainty is None or rms is None:
         return reason("few_orientations", "nothing_known")
@@ -99,7 +99,7 @@ def contradiction(e: Evidence) -> Reason | None:
     if claim is None or e.uncertainty is None or inconsistent(e) is not None:
         return None
     rms, change, disturbed = e.uncertainty.rms_mps2, claim.change, _is_disturbed(e)
-    if (slip := _slip(e)) is not None:
+    if (slip := likely_slip(e)) is not None:
         begin, end = _since_the_start(e, slip.span)
         return reason("inconsistent", "change", bool(e.gravity * norm(slip.delta) > CHANGED_MPS2), begin=begin, end=end)
     if change is not None and not disturbed and claim.error("change") > LEAST_CHANGE_MPS2:
@@ -120,11 +120,13 @@ def contradiction(e: Evidence) -> Reason | None:
     return reason("inconsistent", "part", _is_useless(e), begin=begin, end=end, rms=rms)
 
 
-def _slip(e: Evidence) -> Slip | None:
-    """Return the slip of the mount, if the mount explains most, and a calibration would not be good with it."""
-    slip, explanations = e.estimate.slip, () if e.claim is None else e.claim.explanations
-    likeliest = next((each.hypothesis.what for each in explanations if each.hypothesis.what != "gyroscope"), None)
-    if slip is None or not (slip.near_end or likeliest == "mount"):
+def likely_slip(e: Evidence) -> Slip | None:
+    """Return the slip of the mount, unless another change surely happened, or a calibration would be good with it.
+
+    Times or sides that differ do not speak against it: where a slip leads the fit astray, they do.
+    """
+    slip, change = e.estimate.slip, None if e.claim is None else e.claim.change
+    if slip is None or not (slip.near_end or change is None or change.hypothesis.what == "mount"):
         return None
     return slip if e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
 

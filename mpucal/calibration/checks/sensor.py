@@ -17,7 +17,7 @@ from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
 from ..rotation import signed_permutations
 from ..transitions import MOST_MISS_RAD
-from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent
+from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent, likely_slip
 
 WORST_AXES_RAD = np.deg2rad(60.0)
 # Of all three scale factors alike: data sheets say 3 %, and chips that were soldered by hand are within 5 %; beyond
@@ -96,7 +96,12 @@ def gyro_range(e: Evidence) -> Reason | None:
 
 
 def gyro_contradicts(e: Evidence) -> Reason | None:
-    """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest."""
+    """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest.
+
+    A slip of the mount explains that by itself.
+    """
+    if likely_slip(e) is not None:
+        return None
     if is_trustworthy(e) and e.uncertainty is not None:
         # Where white noise explains the samples, the rates carry gravity to each of them.
         carried = e.model in ("accel", "imu") and inconsistent(e) is None
