@@ -20,14 +20,14 @@ from ..rests.intervals import RestFinder
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand_noise import Noise
-from .hypotheses import SURE, Explanation
+from .hypotheses import SURE, Explanation, gyroscope_change
 from .likelihood import trace
 from .parameters import HAND, NAMES
 from .preprocessing import prepare
 from .theta import Theta
+from .uncertainty import MOST_NIS
 
 PASSES = 3
-DIVERGED = 2.0  # a step that leaves more times the sum of squares
 STEP = 1e-6  # of the differences, in m/s^2, rad, rad/s, m, s or 1
 
 
@@ -53,7 +53,9 @@ class Sensitivity(NamedTuple):
 def find_sensitivity(
     recording: Recording, flat: Flat, gravity: float, fit: Fit, noise: Noise, explanations: Sequence[Explanation]
 ) -> Sensitivity | None:
-    """Return the sensitivity that a recording of few rests may show; None where it surely shows none.
+    """Return the sensitivity that the turns may show; None where they surely show none, or it does not explain them.
+
+    It is not looked for where the rests are enough and the gyroscope seems sound.
 
     Its mean and covariance are those of a mixture: S with the weight of its evidence among the explanations, else 0.
 
@@ -63,7 +65,7 @@ def find_sensitivity(
     rest = flat_statistics(thin, at)
     # With the drift: from slow turns that pass for rests, it would be taken wrongly.
     prepared = prepare(thin, at, RestFinder(thin, rest).typical(), gravity)
-    if prepared.rests_often:
+    if prepared.rests_often and gyroscope_change(explanations) is None:
         return None
     problem, prior = replace(noise.problem(prepared), huber=np.inf), prepared.prior()
     series = problem.series
@@ -79,12 +81,8 @@ def find_sensitivity(
     theta, S = replace(start, K=fit.K, tau=fit.delay_s), np.zeros((3, 3))
     precision = np.append(prior.precision, np.full(9, SENSITIVITY_SD**-2))
     others = np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)])  # nothing's share is 1
-    squares = np.inf
     for _ in range(PASSES):
         e = innovations(theta, S)
-        if e @ e > DIVERGED * squares:
-            return None
-        squares = float(e @ e)
         by_theta = [innovations(theta.moved(step), S) - e for step in STEP * np.eye(HAND)]
         by_S = [innovations(theta, S + step.reshape(3, 3)) - e for step in STEP * np.eye(9)]
         J = np.array(by_theta + by_S).T / STEP
@@ -98,6 +96,9 @@ def find_sensitivity(
         evidence = 0.5 * float(S.ravel() @ known @ S.ravel() - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
         if not evidence > -np.log(SURE):
             return None
+    e = innovations(theta, S)
+    if not 3.0 * (e @ e) < MOST_NIS * len(e):
+        return None
     weight = np.exp(evidence - np.logaddexp(others, evidence))
     carried, s = C[:HAND, HAND:] @ known, S.ravel()
     covariance = weight * (C[HAND:, HAND:] + (1.0 - weight) * np.outer(s, s))
