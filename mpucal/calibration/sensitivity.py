@@ -55,8 +55,8 @@ def find_sensitivity(
 ) -> Sensitivity | None:
     """Return the sensitivity that the turns may show; None where they surely show none, or it does not explain them.
 
-    Nor is it estimated where the rests suffice. Its mean and covariance are those of a mixture: S with the weight of its
-    evidence among the explanations, else 0.
+    Nor is it estimated where the rests suffice. Its mean and covariance are those of a mixture: S with the weight
+    of its evidence among the explanations, else 0.
 
     fit : of any model with a gyroscope. noise : of the hand. explanations : of the fit, see hypotheses.py.
     """
