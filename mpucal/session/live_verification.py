@@ -14,7 +14,7 @@ from ..calibration.hypothesis_tests import MOST_STD
 from ..calibration.verification import NewOrientation
 from ..data import Recording, Vector
 from ..origin import Origin
-from ..reasons import Reason, reason
+from ..reasons import Reason, ReasonFound, reason
 from ..rests.intervals import RestFinder
 from ..result.calibration import REFUSED, USABLE, Calibration
 from ..result.error_model import AXES
@@ -189,11 +189,22 @@ def add_verification(calibration: Calibration, checked: Checked | None) -> Calib
         "verification": {"agrees": checked.agrees, "orientations": orientations},
     }
     if checked.reason is not None:
-        others = [r for r in quality["reasons"] if r["code"] != checked.reason.code]
         refused = checked.agrees is not None or quality["verdict"] == REFUSED
-        reasons = [checked.reason.document(), *others]
-        # The first fit and the final one may see it differently. Where either found more, orientations are not few.
-        if checked.reason.code in (FEW, *CONTRADICTIONS) and any(r["code"] in CONTRADICTIONS for r in reasons):
-            reasons = [r for r in reasons if r["code"] != FEW]
+        reasons = _reasons_of_both(checked.reason, bool(checked.verifications), quality["reasons"])
         quality = {**quality, "verdict": REFUSED if refused else USABLE, "reasons": reasons}
     return replace(calibration, quality=quality)
+
+
+def _reasons_of_both(first: Reason, verified: bool, final: Sequence[ReasonFound]) -> list[ReasonFound]:
+    """Return the reason against the first fit or its verification, and those against the final fit, without conflict.
+
+    The final fit has seen more: it knows better how the sensor changed, unless the first one was compared with new
+    orientations. If the sensor changed, orientations are not few.
+    """
+    reasons = [first.document(), *(each for each in final if each["code"] != first.code)]
+    if first.code not in (FEW, *CONTRADICTIONS):
+        return reasons
+    if not verified and any(each["code"] in CONTRADICTIONS for each in final):
+        reasons = list(final)
+    changed = any(each["code"] in CONTRADICTIONS for each in reasons)
+    return [each for each in reasons if not (changed and each["code"] == FEW)]

@@ -112,7 +112,10 @@ def test_a_disagreement_refuses_and_comes_first():
     assert not found.quality["verification"]["agrees"]
 
 
-@pytest.mark.parametrize(("first", "final"), [("few_orientations", "zero_moved"), ("zero_moved", "few_orientations")])
+@pytest.mark.parametrize(
+    ("first", "final"),
+    [("few_orientations", "zero_moved"), ("zero_moved", "few_orientations"), ("inconsistent", "zero_moved")],
+)
 def test_no_more_orientations_are_asked_for_where_a_fit_found_that_the_sensor_changed(first, final):
     of_all = replace(calibration(), quality={"verdict": "usable", "reasons": [{"code": final, "message": "it"}]})
     found = add_verification(of_all, Checked((), False, Reason(first, "it is so", "do that", True)))
