@@ -79,8 +79,9 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     if len(read) < 2:
         first_error = next(iter(failed.values()))
         alike = len({error.options for error in failed.values()}) == 1
-        remedy = first_error.remedy if alike else "give the one file that holds an accelerometer and a gyroscope"
-        options = first_error.options if alike else ""
+        one = next(iter(read), "the one file that holds an accelerometer and a gyroscope")
+        remedy = first_error.remedy if alike and not read else f"give {one} alone"
+        options = first_error.options if alike and not read else ""
         raise RecordingError(f"{path}: {first_error.what}", remedy, options) from first_error
     parts, name = list(read.values()), path.resolve().name
     begins_ns = [(part.utc_ns or 0) + part.t[0] * 1e9 for part in parts]

@@ -227,6 +227,13 @@ def test_a_side_with_a_large_bias_has_the_columns_of_the_others(tmp_path):
     np.testing.assert_allclose(np.abs(read.acc).max(axis=0) / G, [1.07, 1.0, 1.0], atol=0.01)
 
 
+def test_the_one_recording_among_other_tables_is_named(walk, tmp_path):
+    np.save(tmp_path / "imu.npy", np.column_stack([walk.t, walk.acc, walk.gyr]))
+    np.save(tmp_path / "places.npy", np.column_stack([walk.t, 1e-3 * walk.acc]))
+    with pytest.raises(RecordingError, match=r"places\.npy holds no .*: give imu\.npy alone"):
+        mpucal.load(tmp_path)
+
+
 def test_packed_recordings_are_read_as_what_is_in_them(walk, table, assert_same, tmp_path):
     """Read a file, and a folder of our own tables, beside what others add; name the file that cannot be read."""
     content = table("t,ax,ay,az,gx,gy,gz", walk.t, walk.acc, walk.gyr).read_bytes()
