@@ -17,7 +17,6 @@ from .checks import NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reason
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hand import HandFit
-from .hand_noise import Noise
 from .hypotheses import Explanation, explain, gyroscope_change, rank, remove_change
 from .masks import find_reset, with_masks
 from .model_selection import METHODS, ModelChoice, fit_model
@@ -175,10 +174,11 @@ class _Fitted:
         return self._changes + (found.changes if isinstance(found, HandFit) else ())
 
     def find_sensitivity(self) -> Sensitivity | None:
-        """Return the gyroscope's sensitivity to acceleration that no rest shows; None where there is none."""
+        """Return the gyroscope's sensitivity to acceleration that no rest shows; None if there is none, or a hand."""
         found, (flat, gravity, _) = self.choice.found, self._of
-        noise = found.noise if isinstance(found, HandFit) else Noise("none", 0.0)
-        return find_sensitivity(self._recording, flat, gravity, self.choice.plain, noise, self.explanations)
+        if isinstance(found, HandFit) and found.noise.kind != "none":
+            return None
+        return find_sensitivity(self._recording, flat, gravity, self.choice.plain, self.explanations)
 
     def cost(self) -> float:
         """Return the cost function (8) where the search ended."""

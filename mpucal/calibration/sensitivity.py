@@ -19,7 +19,6 @@ from ..rests.gyro_drift import SENSITIVITY_SD
 from ..rests.intervals import RestFinder
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
-from .hand_noise import Noise
 from .hypotheses import SURE, Explanation, gyroscope_change
 from .likelihood import trace
 from .parameters import HAND, NAMES
@@ -51,23 +50,22 @@ class Sensitivity(NamedTuple):
 
 
 def find_sensitivity(
-    recording: Recording, flat: Flat, gravity: float, fit: Fit, noise: Noise, explanations: Sequence[Explanation]
+    recording: Recording, flat: Flat, gravity: float, fit: Fit, explanations: Sequence[Explanation]
 ) -> Sensitivity | None:
     """Return the sensitivity that the turns may show; None where they surely show none, or it does not explain them.
 
     Nor is it estimated where the rests suffice. Its mean and covariance are those of a mixture: S with the weight
     of its evidence among the explanations, else 0.
 
-    fit : of any model with a gyroscope. noise : of the hand. explanations : of the fit, see hypotheses.py.
+    fit : of any model with a gyroscope. explanations : of the fit, see hypotheses.py.
     """
     thin, at = downsampled(recording, flat, SEARCH_HZ)
     rest = flat_statistics(thin, at)
     # With the drift: from slow turns that pass for rests, it would be taken wrongly.
     prepared = prepare(thin, at, RestFinder(thin, rest).typical(), gravity)
-    in_place = noise.kind == "none"  # slow turns of a machine pass for rests
-    if prepared.rests_often and not (in_place and gyroscope_change(explanations)):
+    if prepared.rests_often and gyroscope_change(explanations) is None:  # a machine's slow turns pass for rests
         return None
-    problem, prior = replace(noise.problem(prepared), huber=np.inf), prepared.prior()
+    problem, prior = replace(prepared.white(0.0), huber=np.inf), prepared.prior()
     series = problem.series
     y = np.vstack([rest.y, series.y])
     force = 0.5 * (y[1:] + y[:-1]) - rest.y
