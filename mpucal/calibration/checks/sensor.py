@@ -101,7 +101,7 @@ def gyro_contradicts(e: Evidence) -> Reason | None:
     A slip of the mount explains that by itself, if little is left.
     """
     slip = likely_slip(e)
-    if slip is not None and np.median(lengths(np.array([each.miss for each in slip.transitions]))) < MOST_MISS_RAD:
+    if slip is not None and max(lengths(np.array([each.miss for each in slip.transitions]))) < MOST_MISS_RAD:
         return None
     if is_trustworthy(e) and e.uncertainty is not None:
         # Where white noise explains the samples, the rates carry gravity to each of them.
