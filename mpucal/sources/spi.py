@@ -21,6 +21,7 @@ from .kind import Request
 READ = 0x80
 REGISTER_HZ, LEAST_DATA_HZ = 1_000_000, 8_000_000
 I2C_IF_DIS = 0x10
+I2C_IF, I2C_IF_OFF = 0x70, 0x40
 # Size of spidev's buffer, less the byte of the address.
 MAX_DATA_BYTES = 4095
 DATA = (*range(reg.ACCEL_XOUT_H, reg.ACCEL_XOUT_H + reg.FRAME_BYTES), reg.FIFO_R_W)
@@ -89,8 +90,7 @@ class SpiBus(RegisterBus):
         self._transfer(bytes([register]) + _change_user_ctrl(register, data, lambda value: value | off), REGISTER_HZ)
         reset = register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET
         if self._has_i2c_if and register == reg.PWR_MGMT_1 and not reset:
-            # bit 6 of their register 112
-            self._transfer(bytes([112, 1 << 6]), REGISTER_HZ)
+            self._transfer(bytes([I2C_IF, I2C_IF_OFF]), REGISTER_HZ)
         return t_ns
 
     def close(self) -> None:
