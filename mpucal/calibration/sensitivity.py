@@ -21,6 +21,7 @@ from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hypotheses import SURE, Explanation, gyroscope_change
 from .likelihood import trace
+from .normal_equations import inverse
 from .parameters import HAND, NAMES
 from .preprocessing import prepare
 from .theta import Theta
@@ -84,13 +85,11 @@ def find_sensitivity(
         by_theta = [innovations(theta.moved(step), S) - e for step in STEP * np.eye(HAND)]
         by_S = [innovations(theta, S + step.reshape(3, 3)) - e for step in STEP * np.eye(9)]
         J = np.array(by_theta + by_S).T / STEP
-        H = J.T @ J + np.diag(precision)
+        C = inverse(J.T @ J + np.diag(precision))
         g = J.T @ e + precision * np.append(theta.values() - prior.mean, S)
-        unit = 1.0 / np.sqrt(np.diag(H))
-        C = unit[:, None] * np.linalg.inv(unit[:, None] * H * unit) * unit
         step = -C @ g
         theta, S = theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
-        known = np.linalg.inv(C[HAND:, HAND:])
+        known = inverse(C[HAND:, HAND:])
         evidence = 0.5 * float(S.ravel() @ known @ S.ravel() - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
         if not evidence > -np.log(SURE):
             return None
