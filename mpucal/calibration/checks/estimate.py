@@ -11,6 +11,7 @@ from ...reasons import Reason, reason
 from ..evidence import Evidence
 from ..slip import Slip
 from ..tilt import CONE_RAD
+from ..transitions import MOST_MISS_RAD
 from ..uncertainty import MOST_NIS
 from .recording import SEPARABLE_HZ
 
@@ -123,12 +124,14 @@ def contradiction(e: Evidence) -> Reason | None:
 def likely_slip(e: Evidence) -> Slip | None:
     """Return the slip of the mount, unless another change surely happened, or a calibration would be good with it.
 
-    Times or sides that differ do not speak against it: where a slip leads the fit astray, they do.
+    Times or sides that differ do not speak against it: where a slip leads the fit astray, they do. A large miss that is
+    left between rests does: a gyroscope at fault misses anywhere.
     """
     slip, change = e.estimate.slip, None if e.claim is None else e.claim.change
     if slip is None or not (slip.near_end or change is None or change.hypothesis.what == "mount"):
         return None
-    return slip if e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
+    left = max(norm(each.miss) for each in slip.transitions)
+    return slip if left < MOST_MISS_RAD and e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
 
 
 def _is_useless(e: Evidence) -> bool:

@@ -15,7 +15,7 @@ from ...result.error_model import sensor_axes
 from ..evidence import Evidence, once
 from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
-from ..rotation import lengths, signed_permutations
+from ..rotation import signed_permutations
 from ..transitions import MOST_MISS_RAD
 from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent, likely_slip
 
@@ -98,10 +98,9 @@ def gyro_range(e: Evidence) -> Reason | None:
 def gyro_contradicts(e: Evidence) -> Reason | None:
     """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest.
 
-    A slip of the mount explains that by itself, if little is left.
+    A slip of the mount explains that by itself.
     """
-    slip = likely_slip(e)
-    if slip is not None and max(lengths(np.array([each.miss for each in slip.transitions]))) < MOST_MISS_RAD:
+    if likely_slip(e) is not None:
         return None
     if is_trustworthy(e) and e.uncertainty is not None:
         # Where white noise explains the samples, the rates carry gravity to each of them.
