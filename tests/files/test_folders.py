@@ -303,3 +303,10 @@ def test_an_archive_in_an_archive_and_a_damaged_gz_file_are_refused(tmp_path):
     damaged.write_bytes(gzip.compress(b"ax,ay,az\n" * 1000)[:-8] + bytes(8))
     with pytest.raises(RecordingError, match="is not a whole archive"):
         mpucal.load(damaged)
+
+
+def test_a_damaged_file_of_a_pair_is_named_alone_beside_the_given_one(tmp_path):
+    (tmp_path / "walk_acc.csv").write_text("t,x,y,z\n" + "".join(f"{0.01 * n:.2f},0.1,0.2,9.8\n" for n in range(300)))
+    (tmp_path / "walk_gyro.csv").write_text("t,x\n0.00,0.1\n")
+    with pytest.raises(RecordingError, match=r"^walk_gyro\.csv "):
+        mpucal.load(tmp_path / "walk_acc.csv")

@@ -178,7 +178,8 @@ def _recording(
         members = [member.name for member in alike if member.quantity == quantity]
         for member in members:
             try:
-                of = f"{name}/{Path(member).name}" if member != name else name
+                # beside a file that was given, or in the working directory, a name alone says where it is
+                of = Path(member).name if wanted or not name else f"{name}/{Path(member).name}"
                 found.append((member, _stream(of, read(member), quantity, hints)))
             except RecordingError:
                 # another table of that sensor may do
