@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from operator import attrgetter, itemgetter
 from pkgutil import resolve_name
@@ -124,13 +124,14 @@ class Autopilot:
     Attributes
     ----------
     firmware : ArduPilot or PX4. imu : number of the IMU, from 1. message : MAVLink name of the stream.
-    parameters : all known ones, by name.
+    parameters : all known ones, by name. first : those that were changed during the recording, as they were at first.
     """
 
     firmware: str
     imu: int
     message: str
     parameters: Mapping[str, float]
+    first: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,7 @@ class Log:
 
     Attributes
     ----------
-    changed : names of the parameters that were changed while the vehicle streamed.
+    changed : names of the parameters that were changed while the vehicle streamed. first : their values before.
     latest : time of the latest reading [us], and when it was received [ns]; zeros before it.
     """
 
@@ -50,6 +50,7 @@ class Log:
         self._over_reboots = over_reboots
         self.segments = [Segment({})]
         self.changed: list[str] = []
+        self.first: dict[str, float] = {}
         self.latest = 0.0, 0
         self._changed_ns: int | None = None
         self._now_ns = 0
@@ -73,6 +74,7 @@ class Log:
             now = now.following()
             self.segments.append(now)
             self.changed.append(name)
+            self.first.setdefault(name, known[name])
             self._changed_ns = self._now_ns
         now.parameters[name] = value
 
@@ -137,7 +139,7 @@ class Log:
         RecordingError : it holds no IMU messages that a calibration may take.
         """
         longest = join_segments(self.segments, self.firmware, self._over_reboots)
-        recordings = longest.recordings(self.firmware, name)
+        recordings = longest.recordings(self.firmware, name, self.first)
         if not recordings:
             raise _no_imu(name, self.firmware, longest)
         first, *others = [replace(recording, flat=find_flat(recording)) for recording in recordings]

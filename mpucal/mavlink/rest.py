@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -143,6 +144,13 @@ HEARD_NS, BACK_NS, SETTLED_NS = 5 * S, 60 * S, 60 * S
 STEADY_DEG = 0.05
 
 
+class Attitude(NamedTuple):
+    """Attitude that a vehicle at rest reports, as roll and pitch (2,) [deg], and its difference from gravity."""
+
+    roll_pitch_deg: Vector
+    error_deg: Vector
+
+
 class Horizon:
     """Listener to the attitude of the vehicle that `link` is locked to."""
 
@@ -181,8 +189,8 @@ class Horizon:
         self._heard.clear()
         return True
 
-    def error_deg(self, stream: Stream, trim_deg: Vector) -> Vector | None:
-        """Return roll and pitch (2,) by which the settled attitude differs from gravity; None if it does not rest.
+    def settled(self, stream: Stream, trim_deg: Vector) -> Attitude | None:
+        """Return the attitude once it has settled, compared with gravity; None if the vehicle does not rest.
 
         Parameters
         ----------
@@ -202,10 +210,11 @@ class Horizon:
             heard = [angles for t_ns, *angles in self._heard if t_ns >= since_ns]
             if rest is None or not heard:
                 return None
-            apart = np.mean(heard, axis=0) - attitude_deg(self._link.vehicle.family, trim_deg, rest.mean[stream])
+            shown = np.mean(heard, axis=0)
+            apart = shown - attitude_deg(self._link.vehicle.family, trim_deg, rest.mean[stream])
             steady = before is not None and np.abs(apart - before).max() <= STEADY_DEG
             if steady or self._link.now_ns() >= end_ns:
-                return np.asarray(apart)
+                return Attitude(shown, apart)
             before = apart
 
     def _request(self) -> None:

@@ -125,8 +125,8 @@ class Segment:
         streams = {stream: StreamBuffer(stream, buffer.clock) for stream, buffer in self.streams.items()}
         return Segment(dict(self.parameters), rebooted, streams)
 
-    def recordings(self, firmware: str, name: str) -> list[Recording]:
-        """Return one recording of each IMU, the first IMU's first, by the best message of each."""
+    def recordings(self, firmware: str, name: str, first: Mapping[str, float]) -> list[Recording]:
+        """Return one recording of each IMU in turn, by the best message of each; `first` : see Autopilot."""
         order, chosen = preferred_messages(firmware, self.parameters), []
         for imu in sorted({stream.imu for stream in self.streams}):
             known = [b for s, b in self.streams.items() if s.imu == imu and s.name in order]
@@ -136,7 +136,7 @@ class Segment:
         exact_us = next((b.rows()[0] for b in chosen if b.stream.name not in SCALED), None)
         made = []
         for buffer in chosen:
-            autopilot = Autopilot(firmware, buffer.stream.imu, buffer.stream.name, self.parameters)
+            autopilot = Autopilot(firmware, buffer.stream.imu, buffer.stream.name, self.parameters, first)
             made.append(_recording(buffer, exact_us, autopilot, name))
         return made
 

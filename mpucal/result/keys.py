@@ -147,6 +147,7 @@ class Autopilot(TypedDict, total=False):
     imu: Annotated[int, "number of the IMU, from 1"]
     message: Annotated[str, "MAVLink message of the samples"]
     params_old: Annotated[Parameters, "parameters during the measurement, by name"]
+    params_first: Annotated[Parameters, "those that were changed meanwhile, as they were at first"]
     params_new: Annotated[Parameters, "parameters to write, by name"]
     residual_mps2: Annotated[Number, "greatest error of |a| that the new parameters leave, m/s^2"]
     residual_old_mps2: Annotated[Number, "greatest error of |a| with the old parameters, m/s^2"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,10 +30,10 @@ from ..mavlink.parameters.plan import (
     select_improving,
     swap_slots,
 )
-from ..mavlink.parameters.slots import all_slots
+from ..mavlink.parameters.slots import Correction, all_slots
 from ..mavlink.parameters.write import NEW, OLD, SwappedSlotsError, Writer, is_partial_write, verify
 from ..mavlink.requests import PrearmState, check_prearm, is_armed, send_command
-from ..mavlink.rest import Horizon, RestMeans, RestMonitor
+from ..mavlink.rest import Attitude, Horizon, RestMeans, RestMonitor
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.lay_flat import STAND, put_down
@@ -54,6 +55,9 @@ NOT_CHECKED = "look whether its horizon is level before it flies"
 NOT_REBOOTED = "reboot it before it flies: its attitude estimate keeps biases that it learnt under the old parameters"
 TILTED_DEG = 0.1
 KEPT_LEVEL = "what was level stays level"
+CHANGED_LEVEL = (
+    "somebody else changed its offsets, so of two possible levels it has the one by which it stands less tilted"
+)
 MEASURED_LEVEL = "it is level as it stands now"
 TOO_TILTED = "it stands too tilted for a level, so what was level stays level"
 # PX4 saves parameters late.
@@ -206,7 +210,8 @@ class AutopilotSink(Sink):
             rest = _at_rest(monitor)
             held = first.slot.correction(old) if first in planned else None
             leveller = Leveller(self._firmware, trim_of(self._firmware, old), held, first.new, first.mounting)
-            level, of_level = leveller.keep(), KEPT_LEVEL
+            then = first.slot.correction(_first_parameters(calibration))
+            level, of_level = _keep_level(leveller, then, rest.mean[first.stream])
             if self._does_stand_level(leveller.standing_deg(level, rest.mean[first.stream])):
                 rest = _at_rest(monitor)
                 measured = leveller.measure(rest.mean[first.stream])
@@ -254,7 +259,7 @@ class AutopilotSink(Sink):
                 yield f"it refused to reboot; {left}"
                 return
             left = NOT_CHECKED
-            yield _horizon_clause(horizon.error_deg(first.stream, level.wanted_deg))
+            yield _horizon_clause(horizon.settled(first.stream, level.wanted_deg), bool(self._stands_level))
             yield f"before, it {before}; now it {self._await_ready(before)}"
         except LinkError as error:
             yield f"but {error.what}: {error.remedy}, and {left}"
@@ -325,6 +330,29 @@ def _tilt_words(roll_pitch_deg: Vector) -> str:
     return f"{abs(pitch):.1f} deg nose {nose} and {abs(roll):.1f} deg {side} side down"
 
 
+def _first_parameters(calibration: Calibration) -> dict[str, float]:
+    """Return the vehicle's parameters as they were when it was first seen, by name."""
+    autopilot = calibration.extra[document.AUTOPILOT]
+    return {**autopilot[document.OLD], **autopilot.get(document.FIRST, {})}
+
+
+def _keep_level(leveller: Leveller, then: Correction | None, mean: Vector) -> tuple[Level, str]:
+    """Return the level by which what was level stays level, and words on it.
+
+    If the offsets were changed after the vehicle was first seen, nobody knows under which of them the trim was taken:
+    of the two levels it is the one by which the vehicle stands less tilted.
+
+    Parameters
+    ----------
+    then : the first accelerometer's correction when the vehicle was first seen. mean : of its stream now.
+    """
+    level, held, new = leveller.keep(), leveller.old, leveller.new
+    if held is None or then is None or new is None or held.is_close(then) or held.is_close(new):
+        return level, KEPT_LEVEL
+    levels = level, replace(leveller, old=then).keep()
+    return min(levels, key=lambda each: float(np.abs(leveller.standing_deg(each, mean)).max())), CHANGED_LEVEL
+
+
 def _level_clause(level: Level, words: str) -> str:
     """Return a clause on the new trim."""
     if not level.wanted_deg[:2].any():
@@ -339,14 +367,23 @@ def _level_clause(level: Level, words: str) -> str:
     return f"{words} ({listed}, read back){doubt}"
 
 
-def _horizon_clause(error_deg: Vector | None) -> str:
-    """Return a clause on the error of the attitude after a reboot."""
-    if error_deg is None:
+def _horizon_clause(attitude: Attitude | None, measured: bool) -> str:
+    """Return a clause on the attitude after a reboot; only a person knows if a vehicle stands as it should hover."""
+    if attitude is None:
         return "it is rebooted, but its horizon was not checked, as it did not rest"
-    apart = float(np.abs(error_deg).max())
-    if apart <= TILTED_DEG:
-        return f"it is rebooted, and its horizon is level within {max(apart, 0.01):.2f} deg"
-    return f"it is rebooted, and its horizon is tilted by {apart:.2f} deg: calibrate its level before it flies"
+    apart, shown = (float(np.abs(angles).max()) for angles in (attitude.error_deg, attitude.roll_pitch_deg))
+    if apart > TILTED_DEG:
+        return f"it is rebooted, and its horizon is tilted by {apart:.2f} deg: calibrate its level before it flies"
+    within = f"within {max(apart, 0.01):.2f} deg"
+    if measured:
+        return f"it is rebooted, and its horizon is level {within}"
+    agrees = f"it is rebooted, its horizon agrees with gravity {within}"
+    if shown <= TILTED_DEG:
+        return f"{agrees}, and it shows level as it stands"
+    return (
+        f"{agrees}, and it shows {_tilt_words(attitude.roll_pitch_deg)} as it stands: if it stands as it should hover,"
+        " run `mpucal write` with this calibration at a terminal, and say so there"
+    )
 
 
 def _unchanged_clauses(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:

@@ -23,7 +23,7 @@ def test_a_session_sets_the_parameters_and_notes_them_in_its_files(flown):
     assert entry["to"] == "autopilot"
     assert "read back and verified in its streams" in entry["what"]
     assert "Results are written to files and the autopilot" in flown.err
-    assert "horizon is level within" in entry["what"]
+    assert "its horizon agrees with gravity within" in entry["what"]
 
 
 def test_a_session_with_a_vehicle_does_not_speak_of_a_board(flown):

@@ -196,15 +196,32 @@ def test_a_levelled_vehicle_is_level_again_after_the_write_and_its_reboot(firmwa
     assert np.abs(tilted[0]).max() > 1
     assert np.abs(attitude_deg(vehicle, link)).max() < 0.2
     assert [q.split()[0] for q in questions] == ["system", "Reboot"]
-    said = r"what was level stays level .* horizon is level within 0\.0\d deg.* now it would arm"
+    said = r"what was level stays level .* horizon agrees with gravity within 0\.0\d deg, and it shows .* would arm"
     assert re.search(said, applied.what)
+
+
+def test_a_level_that_belongs_to_earlier_offsets_is_kept_by_them():
+    vehicle, _, link = vehicle_of("ardupilot", ",imus=1")
+    first = float(vehicle.firmware.store["INS_ACCOFFS_X"])
+    assert send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 2) == 0
+    # another station changes an offset while the vehicle is measured, or before
+    vehicle.firmware.store["INS_ACCOFFS_X"] = first + 0.5
+    during, before = calibration_of(vehicle), calibration_of(vehicle)
+    during.extra["autopilot"]["params_first"] = {"INS_ACCOFFS_X": first}
+    known, unknown = copy.deepcopy((vehicle, link)), (vehicle, link)
+    for (at, to), calibration, is_level in ((known, during, True), (unknown, before, False)):
+        said = AutopilotSink(to, confirm=yes).write(calibration).what
+        assert (np.abs(attitude_deg(at, to)).max() < 0.2) == is_level
+        assert ("it shows level as it stands" in said) is is_level
+        assert ("if it stands as it should hover" in said) is not is_level
+        assert "is level within" not in said
 
 
 def test_a_vehicle_is_level_as_it_stands_if_the_person_confirms_it():
     vehicle, _, link = vehicle_of("px4", ",imus=1" + LEVELLED["px4"])
     applied = AutopilotSink(link, confirm=lambda question, with_yes: True).write(calibration_of(vehicle))
     assert np.abs(attitude_deg(vehicle, link)).max() < 0.1
-    assert "it is level as it stands now" in applied.what
+    assert re.search(r"it is level as it stands now .* horizon is level within 0\.0\d deg", applied.what)
     truth = vehicle.truth_document()
     np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
     np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
@@ -214,7 +231,7 @@ def test_an_unchecked_horizon_after_a_reboot_asks_for_no_second_reboot(monkeypat
     def silent(*_):
         raise LinkError("it is silent", "look")
 
-    monkeypatch.setattr(Horizon, "error_deg", silent)
+    monkeypatch.setattr(Horizon, "settled", silent)
     vehicle, _, link = vehicle_of("ardupilot", ",imus=1")
     applied = AutopilotSink(link, confirm=lambda question, with_yes: with_yes).write(calibration_of(vehicle))
     assert "it is silent: look, and look whether its horizon is level before it flies" in applied.what

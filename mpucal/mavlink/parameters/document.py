@@ -12,7 +12,7 @@ from ...data import STANDARD_GRAVITY_MPS2, Autopilot, Recording
 from ...result.calibration import Calibration
 
 AUTOPILOT, OTHERS = "autopilot", "others"
-OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
+OLD, NEW, RESIDUAL, FIRST = "params_old", "params_new", "residual_mps2", "params_first"
 RESIDUAL_OLD, UNCERTAIN, RESIDUAL_DEG = "residual_old_mps2", "uncertainty_mps2", "residual_deg"
 
 
@@ -20,8 +20,9 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
     """Return the entry `autopilot` of one IMU.
 
     Its keys: firmware, imu (from 1), message (the stream it was fitted to), params_old and params_new by name,
-    residual_mps2 (greatest error of |a| that is left), residual_old_mps2 (the same with the old parameters),
-    residual_deg (greatest error of the direction that is left, beside turn_deg),
+    params_first (those of params_old that were changed meanwhile, as they were at first), residual_mps2 (greatest error
+    of |a| that is left), residual_old_mps2 (the same with the old parameters), residual_deg (greatest error of the
+    direction that is left, beside turn_deg),
     uncertainty_mps2 (standard uncertainty of |a| by the calibration), turn_deg (the rotation that parameters do not
     hold), and mounting (R_b by row). If the vehicle did not tell what is needed, params_new is empty, and `why` says
     what is missing.
@@ -37,6 +38,8 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
         NEW: {},
         RESIDUAL: None,
     }
+    if autopilot.first:
+        document[FIRST] = dict(autopilot.first)
     slot = find_slot(autopilot.firmware, autopilot.imu, autopilot.parameters)
     if slot is None:
         return document | {"why": f"no slot of the vehicle names the sensor of IMU {autopilot.imu}"}

@@ -13,7 +13,7 @@ from ...errors import WriteBackError
 from ...result.calibration import REFUSED, Calibration
 from ...result.comparison import is_better
 from ..imu import Stream, live_stream
-from .document import AUTOPILOT, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_DEG, RESIDUAL_OLD, UNCERTAIN
+from .document import AUTOPILOT, FIRST, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_DEG, RESIDUAL_OLD, UNCERTAIN
 from .mounting import Level
 from .slots import Correction, Slot, slot_of
 
@@ -146,7 +146,8 @@ def _adapt(calibration: Calibration, changes: Mapping[int, Change], level: Level
         c = change.mounting @ (change.new.scale * (change.old.offset - change.new.offset))
         D, b_a = A @ D, A @ b_a + c
         values = change.slot.values(change.new)
-        autopilot = {**autopilot, NEW: values, OLD: {**autopilot[OLD], **values}, RESIDUAL_OLD: autopilot[RESIDUAL]}
+        held = {**autopilot[OLD], **values}
+        autopilot = {**autopilot, NEW: values, OLD: held, FIRST: {}, RESIDUAL_OLD: autopilot[RESIDUAL]}
     extra = {**calibration.extra, AUTOPILOT: autopilot} if autopilot else calibration.extra
     if "mounting" not in autopilot or np.array_equal(Q, np.eye(3)):
         return replace(calibration, D=D, b_a=b_a, extra=extra)

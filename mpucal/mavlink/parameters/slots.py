@@ -36,6 +36,10 @@ class Correction:
         s = y @ R_b / self.scale + self.offset
         return np.asarray(((s - new.offset) * new.scale) @ R_b.T)
 
+    def is_close(self, other: Correction) -> bool:
+        """Return True if they differ by no more than parameters of 32 bits do."""
+        return bool(np.allclose([self.offset, self.scale], [other.offset, other.scale], atol=1e-6))
+
 
 @dataclass(frozen=True)
 class Composed:
