@@ -230,13 +230,38 @@ class Evidence:
 
     @cached_property
     def gyro_axes(self) -> Vector | None:
-        """Rotation (3, 3) by right angles, or -1, with which rates explain how gravity turned between rests."""
-        turns = [] if self.flat is None else _measured(self._turns_of_rests(self.flat))
+        """Rotation (3, 3) by right angles, or -1, with which rates explain how gravity turned between rests.
+
+        It is None where it explains none, and where the rates explain all but few turns as they are.
+        """
+        turns, misses = self._turns_and_misses
+        turns = [turn for turn, miss in zip(turns, misses.tolist(), strict=True) if miss > MOST_MISS_RAD]
         if len(turns) < FEWEST_TRANSITIONS:
             return None
         rotations = [M for M in signed_permutations() if np.linalg.det(M) > 0.0]
         by, miss = _least_miss(turns, [np.eye(3), -np.eye(3), *rotations])
         return by if miss < MOST_MISS_RAD else None
+
+    @cached_property
+    def exchanged(self) -> tuple[float, float] | None:
+        """Times [s since the recording's start] between which axes were exchanged, or None.
+
+        Before or after, the rates explain how gravity turned as they are, and on the other side only with other axes.
+        """
+        if self.gyro_axes is None:
+            return None
+        turns, misses = self._turns_and_misses
+        as_they_are = CLEARLY * misses < _misses(turns, self.gyro_axes)
+        if np.count_nonzero(as_they_are) < FEWEST_TRANSITIONS:
+            return None
+        first = int(np.flatnonzero(as_they_are != as_they_are[0])[0])
+        return turns[first - 1].start_s, turns[first].end_s
+
+    @cached_property
+    def _turns_and_misses(self) -> tuple[list[_Turn], Vector]:
+        """Turns from rest to rest within the gyroscope's range, and by how much the rates miss gravity after each."""
+        turns = [] if self.flat is None else _measured(self._turns_of_rests(self.flat))
+        return turns, _misses(turns, np.eye(3))
 
     @cached_property
     def gyro_miss(self) -> tuple[float, float]:
@@ -255,7 +280,8 @@ class Evidence:
         r = self.recording
         dt = r.t[first:last] - r.t[first - 1 : last - 1]
         steps = dt[:, None] * (r.gyr[first:last] - flat.b_omega)
-        return _Turn(before, steps, after, bool(r.gyr_clipped[first:last].any()))
+        times = float(r.t[first - 1] - r.t[0]), float(r.t[last - 1] - r.t[0])
+        return _Turn(before, steps, after, bool(r.gyr_clipped[first:last].any()), *times)
 
 
 def once(function: Callable[[Evidence], T]) -> Callable[[Evidence], T]:
@@ -276,12 +302,15 @@ class _Turn(NamedTuple):
     """Gravity's direction before (3,) and after (3,) a turn, and the gyroscope's steps (m, 3) [rad] between them.
 
     clipped : it went beyond the gyroscope's range, so that its rates say nothing about the gyroscope.
+    start_s, end_s : times since the recording's start [s].
     """
 
     before: Vector
     steps: Vector
     after: Vector
     clipped: bool
+    start_s: float
+    end_s: float
 
 
 def _measured(turns: list[_Turn]) -> list[_Turn]:
@@ -304,11 +333,18 @@ def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
 
 def _miss(turns: list[_Turn], by: Vector) -> float:
     """Return the median angle [rad] by which the rates, multiplied by (3, 3), miss gravity after the turns."""
+    return float(np.median(_misses(turns, by)))
+
+
+def _misses(turns: list[_Turn], by: Vector) -> Vector:
+    """Return the angles (k,) [rad] by which the rates, multiplied by (3, 3), miss gravity after each turn."""
+    if not turns:
+        return np.zeros(0)
     steps = -np.concatenate([turn.steps for turn in turns]) @ by.T
     ends = np.cumsum([len(turn.steps) for turn in turns]).tolist()
     F = [turned(steps[first:last]) for first, last in pairwise([0, *ends])]
     before, after = (np.array([getattr(turn, name) for turn in turns]) for name in ("before", "after"))
-    return float(np.median(_angles(np.einsum("kij,kj->ki", F, before), after)))
+    return _angles(np.einsum("kij,kj->ki", F, before), after)
 
 
 def _means(values: Vector, n: int) -> Vector:

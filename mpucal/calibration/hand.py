@@ -40,9 +40,8 @@ from .likelihood import evaluate, value
 from .parameters import HAND
 from .preprocessing import Preprocessed, find_rests, prepare
 from .problem import Problem
-from .rotation import cross
 from .scores import ends_of, parts_of
-from .slip import end_slips, find_slip
+from .slip import end_slips, find_slip, slip_squares
 from .theta import Prior, Theta
 from .transitions import (
     Transition,
@@ -156,9 +155,7 @@ def _fit_samples(search: _Search) -> HandFit:
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
-    turns = [fit.D @ cross(each.miss) for each in transitions]
-    changes = [np.append(turn, turn @ each.coming) for turn, each in zip(turns, transitions, strict=True)]
-    slipped = end_slips(transitions, spoilt) @ np.reshape(changes, (-1, 12)) ** 2
+    slipped = end_slips(transitions, spoilt) @ np.reshape([slip_squares(each, fit.D) for each in transitions], (-1, 12))
     return HandFit(replace(fit, slip=slip, slipped=slipped), minimum, noise, search, fine)
 
 

@@ -12,13 +12,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from ..data import Mask, Vector
 from .hypotheses import SURE
 from .parameters import PLACES
 from .problem import Series
-from .rotation import lengths
+from .rotation import cross, lengths
 from .theta import Theta
 from .transitions import (
     DEGREES_OF_FREEDOM,
@@ -94,13 +95,23 @@ def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
     return probability
 
 
+def slip_squares(transition: Transition, D: Vector) -> Vector:
+    """Return mean squares (12,) of what D and b_a change by, if a slip in a transition explains its miss.
+
+    The miss does not show the rotation about gravity; each axis of a rotation turns as much as the others.
+    """
+    seen = D @ cross(transition.miss)
+    unseen = D @ cross(transition.coming / norm(transition.coming)) * norm(transition.miss) / math.sqrt(2.0)
+    return np.append(seen**2 + unseen**2, (seen @ transition.coming) ** 2)
+
+
 def _lasting(transitions: Sequence[Transition]) -> Vector:
     """Return the misses (k, 3), or those of two transitions together, wherever that is less."""
     misses = np.array([each.miss for each in transitions])
     both = misses[1:] + [each.F @ before for each, before in zip(transitions[1:], misses, strict=False)]
     far = np.full((1, 3), np.inf)
     of_all = np.array([misses, np.concatenate([far, both]), np.concatenate([both, far])])
-    return np.asarray(of_all[np.linalg.norm(of_all, axis=2).argmin(axis=0), np.arange(len(misses))])
+    return np.asarray(of_all[norm(of_all, axis=2).argmin(axis=0), np.arange(len(misses))])
 
 
 def _numbers(transitions: Sequence[Transition]) -> tuple[int, int]:

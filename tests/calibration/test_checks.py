@@ -115,7 +115,7 @@ def without(*spans):
 
 
 # A name: the base, how it is spoilt, the code, and words of the sentence. Those of MORE have further reasons.
-MORE = {"beyond the range", "moved", "mostly lost", "other turns", "gravity that is followed"}
+MORE = {"swapped midway", "beyond the range", "moved", "mostly lost", "other turns", "gravity that is followed"}
 REFUSED = {
     "shaken": ("bench", changed(gyr=noisy(0.5), flat=None), "never_still", "never lay still", "for ten seconds"),
     "turned at once": ("bench", lambda r: replace(r.part(500, 1500), flat=None), "never_still", "never lay still"),
@@ -161,6 +161,12 @@ REFUSED = {
         "the sign of its x and z axes, or of its y axis where",
     ),
     "swapped": ("bench", changed(lambda acc: acc[:, [1, 0, 2]] * [1, -1, 1]), "swapped_axes", "gyroscope's y, -x, z;"),
+    "swapped midway": (
+        "hand",
+        changed(lambda acc: np.concatenate([acc[:2400], acc[2400:, [1, 0, 2]]])),
+        "inconsistent",
+        "not the same before",
+    ),
     "moved": ("bench", changed(plus(slice(250, 500), [0, 2.0, 0])), "moved_while_still", "(y changed by 2 m/s^2"),
     "mostly lost": ("bench", without((600, 1900)), "data_lost", "place"),
 }

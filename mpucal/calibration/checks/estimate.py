@@ -31,7 +31,7 @@ def few_orientations(e: Evidence) -> Reason | None:
     where a hand held it in many: then it moved as it rested, with the hand or with the ground.
     """
     rms = _model_rms(e)
-    if likely_slip(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
+    if likely_slip(e) is not None or were_exchanged(e) or (rms is not None and rms <= GOOD_RMS_MPS2):
         return None
     if e.uncertainty is None or rms is None:
         return reason("few_orientations", "nothing_known")
@@ -80,10 +80,12 @@ def smoothed(e: Evidence) -> Reason | None:
 
 
 def inconsistent(e: Evidence) -> Reason | None:
-    """Find data that the model does not explain: innovations beyond white noise."""
+    """Find data that the model does not explain: axes exchanged midway, rests that differ, innovations beyond noise."""
     fit = e.estimate
     if e.uncertainty is None:
         return None
+    if were_exchanged(e) and e.exchanged is not None:
+        return reason("inconsistent", "change", True, begin=e.exchanged[0], end=e.exchanged[1])
     if fit.spread_mps2 > CHANGED_MPS2:
         return reason("inconsistent", "rests", spread=fit.spread_mps2)
     # A robust model leaves outliers in its innovations: its parts judge it, or its uncertainty has grown by them.
@@ -132,6 +134,12 @@ def likely_slip(e: Evidence) -> Slip | None:
         return None
     left = max(norm(each.miss) for each in slip.transitions)
     return slip if left < MOST_MISS_RAD and e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
+
+
+def were_exchanged(e: Evidence) -> bool:
+    """Return True if axes were exchanged midway; a calibration that is good leaves no doubt of them."""
+    is_good = e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2
+    return not is_good and e.exchanged is not None
 
 
 def _is_useless(e: Evidence) -> bool:

@@ -17,7 +17,7 @@ from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
 from ..rotation import signed_permutations
 from ..transitions import MOST_MISS_RAD
-from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent, likely_slip
+from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent, likely_slip, were_exchanged
 
 WORST_AXES_RAD = np.deg2rad(60.0)
 # Of all three scale factors alike: data sheets say 3 %, and chips that were soldered by hand are within 5 %; beyond
@@ -98,9 +98,9 @@ def gyro_range(e: Evidence) -> Reason | None:
 def gyro_contradicts(e: Evidence) -> Reason | None:
     """Find rates, within the range or beyond it, that carry gravity far away from where it is at the next rest.
 
-    A slip of the mount explains that by itself.
+    A slip of the mount explains that by itself, and so do axes that were exchanged midway.
     """
-    if likely_slip(e) is not None:
+    if likely_slip(e) is not None or were_exchanged(e):
         return None
     if is_trustworthy(e) and e.uncertainty is not None:
         # Where white noise explains the samples, the rates carry gravity to each of them.
@@ -151,8 +151,9 @@ def clock_off(e: Evidence) -> Reason | None:
 
 def sensors_lag(e: Evidence) -> Reason | None:
     """Find an accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters explain."""
-    # A sensor that changed, or was exchanged for another one, looks late.
-    if e.claim is None or e.claim.change is not None or e.recording.sensor.origin is Origin.VEHICLE:
+    if e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
+        return None
+    if e.claim.change is not None or were_exchanged(e):  # a sensor that changed looks late
         return None
     (of_prior,) = BY_NAME["tau"].sd
     std = float(replace(e.estimate, covariance=e.claim.covariance).std("tau")[0])
