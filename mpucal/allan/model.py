@@ -84,7 +84,7 @@ class _Fit:
 
     def __init__(self, sizes: Vector, variances: Vector, samples: int, terms: int) -> None:
         from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
-        from scipy.stats import chi2  # noqa: PLC0415
+        from scipy.special import chdtrc  # noqa: PLC0415
 
         self._A = design_matrix(sizes)[:, :terms]
         # covariance of independent octaves: the start, and a floor for noise of other kinds
@@ -98,7 +98,7 @@ class _Fit:
             self.squares = self._scale * nnls(W, w)[0]
             C = np.einsum("a,b,abij->ij", self.squares, self.squares, self._products)
         left = w - W @ (self.squares / self._scale)
-        self.probability = float(chi2.sf(left @ left, max(len(sizes) - terms, 1)))
+        self.probability = float(chdtrc(max(len(sizes) - terms, 1), left @ left))
 
     def unbiased(self, i: int) -> float:
         """Return square i, corrected so that the mean of its root is unbiased.
@@ -114,9 +114,9 @@ class _Fit:
 
         The standard deviation depends on the true value, and grows with it.
         """
-        from scipy.stats import norm  # noqa: PLC0415
+        from scipy.special import ndtri  # noqa: PLC0415
 
-        square, far = float(self.squares[i]), float(norm.isf(0.5 * (1.0 - confidence)))
+        square, far = float(self.squares[i]), float(ndtri(0.5 * (1.0 + confidence)))
         largest = max(square, float(self._std(i, 0.0)[0]))
         # multiples of the square or of its deviation, whichever is larger
         truth = np.concatenate([[0.0], np.geomspace(1e-3, 1e2, 40) * largest])

@@ -205,14 +205,14 @@ class Spectrum:
     def tones(self, rate_hz: float) -> list[Tone]:
         """Return the strongest line of each axis that is significant."""
         from scipy.ndimage import median_filter  # noqa: PLC0415 - slow to import
-        from scipy.stats import chi2  # noqa: PLC0415
+        from scipy.special import chdtri  # noqa: PLC0415
 
         if not self._segments:
             return []
         density = 2.0 * self._power / (self._segments * rate_hz * np.sum(self._window**2))
         freedom = 2 * self._segments
         # relative to the median, as the floor is a median of the neighbours
-        most = float(chi2.isf(CHANCE / density.shape[1], freedom) / chi2.median(freedom))
+        most = float(chdtri(freedom, CHANCE / density.shape[1]) / chdtri(freedom, 0.5))
         found: list[Tone] = []
         for axis, of in enumerate(density):
             # the narrow neighbourhood follows a steep density, such as drift at low frequencies

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,6 @@ def _is_plain(evidence: Evidence) -> bool:
 
 def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     """Return the fit of the other accelerometer by the first one's; None where they have too few samples in common."""
-    from scipy.linalg import block_diag, polar  # noqa: PLC0415 - SciPy loads slowly
-
     there, here = first.recording, other.recording
     after = np.clip(np.searchsorted(there.t, here.t), 1, len(there) - 1)
     near = (there.t[after] - there.t[after - 1] < APART_S) & (here.t >= there.t[0]) & (here.t <= there.t[-1])
@@ -83,14 +81,15 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     theta, covariance = _solve([_axis(axis, t, here.acc[near], s, more, here.sensor.steps[0], n) for axis in range(3)])
     D = theta[:9].reshape(3, 3)
     # The errors of the first one's D and b_a are errors of s.
-    by_first = block_diag(np.kron(D @ inverse, np.eye(3)), D @ inverse)
+    by_first = _of_D_and_b_a(np.kron(D @ inverse, np.eye(3)), D @ inverse)
     covariance += by_first @ by.covariance[ACCELEROMETER, ACCELEROMETER] @ by_first.T
     # D is in the axes in which its own gyroscope's K is symmetric: Q turns those of the first one into them.
     later = np.concatenate([np.zeros((len(t), 3, 3)), -alpha[:, :, None]], axis=2)
     M, of_M = _solve([_axis(axis, t, here.gyr[near], rates, later, here.sensor.steps[1], n) for axis in range(3)])
-    Q = polar(own.K @ M[:9].reshape(3, 3) @ np.linalg.inv(by.K))[0]
+    U, _, Vt = np.linalg.svd(own.K @ M[:9].reshape(3, 3) @ np.linalg.inv(by.K))
+    Q = U @ Vt
     D = D @ Q.T
-    in_own_axes = block_diag(np.kron(np.eye(3), Q), np.eye(3))
+    in_own_axes = _of_D_and_b_a(np.kron(np.eye(3), Q), np.eye(3))
     by_M = (0.5 * cross(np.eye(3)) @ Q).reshape(3, 9)  # of the small turn that an error of M is for Q
     by_Q = -(D @ cross(np.eye(3))).reshape(3, 9).T @ by_M
     whole = own.covariance.copy()
@@ -98,6 +97,13 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     whole[ACCELEROMETER, ACCELEROMETER] = in_own_axes @ covariance @ in_own_axes.T
     whole[PLACES["D"], PLACES["D"]] += by_Q @ of_M[:9, :9] @ by_Q.T
     return replace(own, D=D, b_a=theta[9:12], covariance=whole)
+
+
+def _of_D_and_b_a(of_D: NDArray[np.floating[Any]], of_b_a: NDArray[np.floating[Any]]) -> Vector:  # noqa: N802 - the paper's letter
+    """Return the matrix (12, 12) that maps D, row-major, by `of_D` (9, 9) and b_a by `of_b_a` (3, 3)."""
+    whole = np.zeros((12, 12))
+    whole[:9, :9], whole[9:, 9:] = of_D, of_b_a
+    return whole
 
 
 class _Measurements(NamedTuple):

@@ -147,11 +147,11 @@ def _temperature(celsius: float) -> Finding:
 
 def noise_density(values: Vector, rate_hz: float, band_hz: tuple[float, float] = HIGH_HZ) -> Vector:
     """Return (3,) unit/sqrt(Hz): the root of the mean one-sided spectrum of `values` (n, 3) within `band_hz`."""
-    from scipy.signal import periodogram  # noqa: PLC0415 - slow to import
-
-    hz, power = periodogram(values, rate_hz, "hann", axis=0)
-    inside = (band_hz[0] <= hz) & (hz <= band_hz[1])
-    return np.asarray(np.sqrt(power[inside].mean(0)))
+    n = len(values)
+    window, hz = np.hanning(n + 1)[:-1], np.fft.rfftfreq(n, 1.0 / rate_hz)
+    lines = np.fft.rfft((values - values.mean(0)) * window[:, None], axis=0)[(band_hz[0] <= hz) & (hz <= band_hz[1])]
+    power = 2.0 * (lines.real**2 + lines.imag**2) / (rate_hz * np.sum(window**2))
+    return np.asarray(np.sqrt(power.mean(0)))
 
 
 def is_trembling(values: Vector, rate_hz: float) -> bool:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...calibration.rotation import rotation
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..dialect import dialect
 from ..firmwares import PX4
@@ -42,9 +43,8 @@ def mounting(firmware: str, slot: Slot, values: Values) -> Vector | None:
 
 def euler_matrix(degrees: tuple[float, ...] | list[float]) -> Vector:
     """Return R_b = R_z(yaw) R_y(pitch) R_x(roll) of roll, pitch and yaw."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to load
-
-    return np.asarray(Rotation.from_euler("xyz", degrees, degrees=True).as_matrix())
+    x, y, z = rotation(np.diag(np.radians(degrees)))
+    return np.asarray(z @ y @ x)
 
 
 def orientation_matrix(number: int) -> Vector | None:
