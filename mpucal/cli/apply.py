@@ -18,7 +18,7 @@ from ..errors import UsageError
 from ..files import open_rows, open_writer
 from ..files.csv import CsvText
 from ..files.formats import writable_formats
-from ..files.rows import Rows
+from ..files.rows import Rows, is_complete
 from ..result.correction import make_correction
 from ..result.session_files import captures_in
 from .common import PATH, calibration_argument, json_option, load_calibration, output_option, say
@@ -88,7 +88,7 @@ class _Totals:
 
     def add(self, before: Samples, after: Samples, magnitudes: bool) -> None:
         self.samples += len(before)
-        complete = ~np.isnan(after.acc[:, 0])
+        complete = is_complete(after.acc, after.gyr)
         self.lack += len(before) - int(complete.sum())
         # The magnitudes take as long as all the rest.
         if magnitudes:

@@ -143,7 +143,7 @@ def to_si(samples: S, units: Mapping[str, str]) -> S:
     return replace(samples, **{key: getattr(samples, key) * QUANTITIES[key][of] for key, of in units.items() if of})
 
 
-def _is_complete(acc: Vector, gyr: Vector) -> Mask:
+def is_complete(acc: Vector, gyr: Vector) -> Mask:
     """Return (n,) True where a sample has all its numbers; an accelerometer alone has no rates at all."""
     rates = is_plausible(gyr).all(axis=1)
     return np.asarray(is_plausible(acc).all(axis=1) & (rates | ~rates.any()))
@@ -151,7 +151,7 @@ def _is_complete(acc: Vector, gyr: Vector) -> Mask:
 
 def drop_incomplete(samples: S) -> S:
     """Return the samples that have all their numbers; where more than one in a row has not, is a gap."""
-    complete = _is_complete(samples.acc, samples.gyr)
+    complete = is_complete(samples.acc, samples.gyr)
     if complete.all():
         return samples
     at = np.flatnonzero(complete)
@@ -181,7 +181,7 @@ def check_runs(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
             )
         for values in (samples.acc, samples.gyr):
             values[~is_plausible(values)] = np.nan
-        any_complete |= bool(_is_complete(samples.acc, samples.gyr).any())
+        any_complete |= bool(is_complete(samples.acc, samples.gyr).any())
         with np.errstate(over="ignore"):
             back = np.diff(samples.t, prepend=last) < 0
         if back.any():

@@ -99,11 +99,11 @@ def test_missing_numbers_stay_missing_in_every_format(mpucal, session, calibrati
     assert np.flatnonzero(read.gap).tolist() == [2998]
 
 
-def test_a_sample_that_lacks_a_number_is_carried_into_a_capture(mpucal, save, session, calibration):
+def test_samples_that_lack_a_number_are_carried_into_a_capture(mpucal, save, session, calibration):
     recording = load(session.folder).part(0, 500)
-    recording.acc[7, 1] = np.nan
+    recording.acc[7, 1] = recording.gyr[9, 2] = np.nan
     save(recording, "in.npz")
-    assert "500 samples, 1 of which lack a number" in mpucal("apply", "c.json", "in.npz", "-o", "out.mcap").out
+    assert "500 samples, 2 of which lack a number" in mpucal("apply", "c.json", "in.npz", "-o", "out.mcap").out
 
 
 def test_b_a_follows_the_temperature(mpucal, session, calibration):
