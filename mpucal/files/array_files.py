@@ -45,8 +45,10 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
             return dict(_READERS[path.suffix.lower()](path))
     except DAMAGED as error:
         # NumPy takes unknown bytes for pickled objects, and advises to load these, which would run code
-        said = "damaged, or pickled Python objects" if "pickle" in str(error) else error
-        raise RecordingError(f"{path} is not a whole file of arrays ({said})", NAME_ARRAYS) from error
+        pickled = "pickle" in str(error)
+        said = "damaged, or pickled Python objects" if pickled else error
+        remedy = NAME_ARRAYS if pickled else "it is cut short or damaged: copy or export it again"
+        raise RecordingError(f"{path} is not a whole file of arrays ({said})", remedy) from error
 
 
 def _read_numpy(path: Path) -> Arrays:
@@ -77,7 +79,10 @@ def _read_json(path: Path) -> Arrays:
     except ValueError:
         # an object on each line, or one after the other, of which the last may be torn
         lines = [line for line in text.replace("}{", "}\n{").split("\n") if line.strip()]
-        document = [json.loads(line) for line in lines[: len(lines) if text.endswith("\n") else -1]]
+        lines = lines if text.endswith("\n") else lines[:-1]
+        if not lines or lines[0].strip() in ("{", "["):
+            raise
+        document = [json.loads(line) for line in lines]
     arrays = [*_json_arrays("", document)]
     indices = [array for name, array in arrays if name == INDEX]
     if any(not np.array_equal(index, indices[0]) for index in indices):
@@ -162,7 +167,7 @@ def _read_parquet(path: Path) -> Arrays:
 
 
 _READERS = {
-    **dict.fromkeys((".mat", ".h5", ".hdf5"), read_matlab_arrays),
+    **dict.fromkeys((".mat", ".h5", ".hdf5", ".hdf"), read_matlab_arrays),
     **dict.fromkeys((".npz", ".npy"), _read_numpy),
     **dict.fromkeys((".json", ".jsonl", ".ndjson"), _read_json),
     ".parquet": _read_parquet,

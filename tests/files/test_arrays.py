@@ -281,6 +281,15 @@ def test_files_of_arrays_that_are_none(name, content, tmp_path):
         mpucal.load(tmp_path / name)
 
 
+@pytest.mark.parametrize("indent", [None, 1])
+def test_a_torn_file_of_a_pair_is_called_so(indent, walk, tmp_path):
+    for name, values in (("acc", walk.acc), ("gyr", walk.gyr)):
+        text = json.dumps(dict(zip("xyz", values.T.tolist(), strict=True)), indent=indent)
+        (tmp_path / f"{name}.json").write_text(text if name == "gyr" else text[: len(text) // 2])
+    with pytest.raises(RecordingError, match=r"acc.json is not a whole file of arrays .*: it is cut short or damaged"):
+        mpucal.load(tmp_path / "gyr.json")
+
+
 def test_a_calibration_is_no_recording(stored_calibration, tmp_path):
     stored_calibration[1].save(tmp_path / "calibration.json")
     with pytest.raises(RecordingError, match=r"mpucal knows: .* shows a calibration"):

@@ -192,7 +192,7 @@ def _recording(
     of = " and ".join(Path(member).name.removesuffix(OF_FILE) for member in (of_acc, of_gyr))
     more = f"of {len(pairs)} pairs of tables, it is the first; give one file of another pair to read that"
     remarks = [f"from {of}", more if len(pairs) > 1 and not wanted else "", remark]
-    return join_streams(acc, gyr, hints, name, remarks=remarks)
+    return join_streams(acc, gyr, hints, name or "the folder", remarks=remarks)
 
 
 def _read_app_metadata(files: Iterable[tuple[str, bytes]]) -> tuple[bool, int | None, str]:
