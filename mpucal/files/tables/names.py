@@ -174,7 +174,7 @@ def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Colum
             word = word.removeprefix(prefix)
             words.append(word)
     # a field of a structure, such as samples.acc.x
-    words += [_plain(text[at + 1 :]) for at, letter in enumerate(text) if letter == "."]
+    words += [_plain(text[at + 1 :]) for at, letter in enumerate(text) if letter in ".:"]
     for word in words:
         for quantity, stems in STEMS.items():
             of_axes = quantity in (ACC, GYR)
