@@ -17,7 +17,6 @@ from ..mavlink.dialect import import_pymavlink
 from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.imu import DATAFLASH, Reading, Stream
 from ..mavlink.log import Log
-from .hints import ROLES
 from .reading import first_bytes
 
 MAGIC = b"\xa3\x95"
@@ -36,13 +35,8 @@ def load_dataflash(path: Path) -> Recording:
 
     Raises
     ------
-    RecordingError : it is not a dataflash log, or holds no IMU messages.
+    RecordingError : it holds no IMU messages.
     """
-    if not is_dataflash(path):
-        raise RecordingError(
-            f"{path} is not a dataflash log of ArduPilot, and mpucal knows no other .bin",
-            f"have the program that wrote it write a table with the columns {','.join(ROLES)}, and give that",
-        )
     log = Log(ARDUPILOT)
     # the reader prints its complaints
     with redirect_stderr(StringIO()), redirect_stdout(StringIO()):

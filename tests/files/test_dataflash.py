@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import mpucal
-from mpucal.errors import RecordingError
+from mpucal.errors import RecordingError, UsageError
 from mpucal.mavlink.parameters.document import calibrate_vehicle
 
 D = np.array([[1.02, 0.003, 0.0], [0.0, 0.99, -0.004], [0.002, 0.0, 0.97]])
@@ -118,6 +118,9 @@ def test_files_that_hold_no_imu_say_what_to_do(dataflash, tmp_path):
         (tmp_path / "x.bin").write_bytes(content)
         with pytest.raises(RecordingError, match=says):
             mpucal.load(tmp_path / "x.bin")
+    (tmp_path / "x.bin").write_bytes(dataflash.bytes())
+    with pytest.raises(UsageError, match="is a dataflash log of ArduPilot: leave out"):
+        mpucal.load(tmp_path / "x.bin", rate=100)
 
 
 @settings(max_examples=25)

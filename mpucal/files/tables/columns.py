@@ -49,7 +49,7 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
     named, clocks = names_both(columns), table.clocks(columns)
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if not (named and (clocks or hints.rate_hz)):
-        of = _numbers(table)
+        of = measured(table)
         counts = [at for at in of if COUNTER.search(table.name_of(at)) and not np.any(of[at] % 1.0)]
         even = [at for at in of if is_even_clock(of[at]) and at not in counts]
         if named:
@@ -94,7 +94,7 @@ def columns_by_hint(table: Table, roles: Mapping[str, str | int]) -> list[Column
     return found
 
 
-def _numbers(table: Table) -> dict[int, Vector]:
+def measured(table: Table) -> dict[int, Vector]:
     """Return place -> (n,) of the columns of numbers that a sensor may have measured, in whole lines."""
     places = [place for place in table.places(Kind.NUMBER) if not ESTIMATED.search(table.name_of(place))]
     with suppress(RecordingError):
@@ -122,7 +122,7 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
         )
     # name(1), name(2) and so on are of a matrix
     arrays = {place: found[1] for place, name in enumerate(table.header) if (found := OF_ARRAY(name))}
-    likely = likely_columns(_numbers(table), [clock.place for clock in table.clocks(columns)], arrays)
+    likely = likely_columns(measured(table), [clock.place for clock in table.clocks(columns)], arrays)
     if likely is None or len(table.places(Kind.NUMBER)) < len("xyz"):
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
         return RecordingError(what, _GIVE_VALUES)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...clocks.stamps import FEWEST, sample_period
 from ...data import ACCEL_COUNTS, STANDARD_GRAVITY_MPS2, Vector
-from ..hints import ROLES, Hints
+from ..hints import NO_HINTS, ROLES, Hints
 from .shown_units import (
     ANY_HZ,
     EXPLAINED,
@@ -80,6 +80,21 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
     return alone | (dict(zip("t", clocks, strict=False)) if alone else {})
 
 
+def side_by_side(of: Columns) -> list[dict[str, int]]:
+    """Return role -> place of each of the sensors whose six columns lie side by side, as physics confirms."""
+    clocks = [place for place, column in of.items() if is_even_clock(column)]
+    places = [place for place in of if place not in clocks[:1]]
+    t = _seconds(of[clocks[0]] if clocks else None, len(next(iter(of.values()), ())), NO_HINTS)
+    sixes = [tuple(places[at : at + 6]) for at in range(len(places) - 5)]
+    pairs = [pair for six in sixes for pair in (six, six[3:] + six[:3]) if _keeps_size(_stacked(of, pair[:3]))]
+    turned = {pair: _turned(of, pair, t, any_rate=not clocks) for pair in pairs}
+    found: list[Places] = []
+    for pair in sorted(turned, key=turned.__getitem__, reverse=True):
+        if turned[pair] >= EXPLAINED and not any({*pair} & {*other} for other in found):
+            found.append(pair)
+    return [dict(zip(ROLES[1:], pair, strict=True)) for pair in sorted(found, key=min)]
+
+
 def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]) -> tuple[dict[str, int], str] | None:
     """Return role -> place of triples of columns that are the sensors', and a unit of the accelerations to be named.
 
@@ -102,7 +117,7 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     triples, sized, acc = next((found for found in alignments if found[2]), alignments[0])
     if not triples:
         return {}, ""
-    t = _seconds(next((of[at] for at in clocks if at in of), None), len(next(iter(of.values()))), Hints())
+    t = _seconds(next((of[at] for at in clocks if at in of), None), len(next(iter(of.values()))), NO_HINTS)
     rate_hz = 1.0 / (sample_period(t) or math.inf)
     increments = () if sized else next((triple for triple, a in triples.items() if _is_in_si(a * rate_hz)), ())
     if not sized and not increments:
@@ -248,6 +263,9 @@ def _pairs(of: Columns, places: list[int]) -> list[tuple[int, ...]]:
 def _turned(of: Columns, pair: Sequence[int], t: Vector, *, any_rate: bool) -> float:
     """Return how well the rates explain the turning of gravity, from 0 to 1; 0 if it is at no unit's speed."""
     acc, gyr = _stacked(of, pair[:3]), _stacked(of, pair[3:])
+    # a place, whose numbers hardly change, is no rate about one axis
+    if _spread(gyr) * FEWEST < 1.0:
+        return 0.0
     factor, correlation = turning(t, acc, gyr)
     of_a_unit = (
         any_rate

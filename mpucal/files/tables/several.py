@@ -22,6 +22,8 @@ from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind, is_number, parse_cell
+from .columns import measured
+from .guess import WIDEST, side_by_side
 from .names import ACC, GYR, WITHOUT_GRAVITY, Column, axes_of, first_triple, names_both, parse_column_name, parse_header
 from .shown_units import BEYOND
 from .table import Table
@@ -77,7 +79,7 @@ def of_one_place(table: Table, sensor: str | None = None) -> Table:
             if first_triple(parse_header(short), ACC) and first_triple(parse_header(names), GYR):
                 found[" ".join(place)] = place
     if not found:
-        return table
+        return _of_one_side(table, sensor)
     chosen = _choose([*found], sensor, table.name)
     own, others = found[chosen], [place for name, place in found.items() if name != chosen]
     header = [
@@ -86,6 +88,20 @@ def of_one_place(table: Table, sensor: str | None = None) -> Table:
     ]
     more = f" ({CHOOSES} of {', '.join(found)})" if len(found) > 1 else ""
     said = f"of its columns, those called {chosen} were read{more}"
+    return replace(table, header=header, remarks=(*table.remarks, said), chosen=True)
+
+
+def _of_one_side(table: Table, sensor: str | None) -> Table:
+    """Return a table of several sensors side by side, whose names do not show them, with the names of one's columns."""
+    of = {} if table.of_sensors else measured(table)
+    sensors = {str(i): roles for i, roles in enumerate(side_by_side(of), 1)} if len(of) > WIDEST or sensor else {}
+    if len(sensors) < 2:
+        return table
+    chosen = _choose([*sensors], sensor, table.name)
+    others = {place for roles in sensors.values() for place in roles.values()}
+    own = {place: role for role, place in sensors[chosen].items()}
+    said = f"{len(sensors)} sensors are side by side, of which number {chosen} was read ({CHOOSES})"
+    header = [own.get(at, "" if at in others else table.name_of(at)) for at in range(len(table.cells))]
     return replace(table, header=header, remarks=(*table.remarks, said), chosen=True)
 
 

@@ -186,6 +186,12 @@ def turning(t: Vector, acc: Vector, gyr: Vector) -> tuple[float, float]:
     inner = slice(width, len(t) - width)
     lag = 2 * width
     seen, predicted = (values[inner][lag:] - values[inner][:-lag] for values in (smooth, path))
+    # a shake at the end would outweigh all turns before it
+    lengths = np.linalg.norm(acc, axis=1)
+    shaken = np.cumsum(np.abs(lengths - np.median(lengths)) > SCATTER * np.median(lengths))[inner]
+    calm = shaken[lag:] == shaken[:-lag]
+    if 2 * np.count_nonzero(calm) > len(calm):
+        seen, predicted = seen[calm], predicted[calm]
     sizes, both = [math.sqrt(float((each**2).sum())) for each in (seen, predicted)], float((seen * predicted).sum())
     if 0.0 in sizes:
         return math.inf, 0.0
