@@ -75,7 +75,7 @@ class Coverage:
     placed : True if nobody touched it in the pauses so far: it is put down in each orientation.
     """
 
-    placed = False
+    placed = True
 
     def __init__(self) -> None:
         self.paused, self.passed, self.rested = Directions(), Directions(), Directions(SAME_RAD)
@@ -124,16 +124,15 @@ class Aim:
     ----------
     target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
     longest_s : time limit of the turning [s]. verify : number of new orientations for the verification.
-    least_placed : those of a vehicle that is put down in each, in place of `least`; 0: it makes no difference.
-    flat_s : time for which the board lies flat first.
+    flat_s : time for which the board lies flat first. by_sides : ask for SIDES first.
     """
 
     target: Target
     least: int
     longest_s: float
     verify: int
-    least_placed: int = 0
     flat_s: float = FLAT_S
+    by_sides: bool = False
 
 
 AIMS: Mapping[str, Aim] = {
@@ -143,19 +142,24 @@ AIMS: Mapping[str, Aim] = {
 }
 NORMAL = "normal"
 # Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
-# quarter turn from the last, about another axis. One that rests on things needs one more, tilted, which with the
-# gyroscope gives the angles between the axes, and one new orientation for its verification: no hand moves it.
+# quarter turn from the last, about another axis. They show what its parameters hold best, biases and scale factors. One
+# more, tilted, gives with the gyroscope the angles between the axes. Two new orientations verify that nothing slipped
+# in a hand, and one where no hand moves it.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
-VERIFY_PLACED = 1
+VERIFY_HELD, VERIFY_PLACED = 2, 1
+# Its parameters hold no angles between the axes, which need only be so well known that the biases are.
+STRICTER, LOOSER = 1.5, 6.0
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
-    """Return the aim of a target, one of AIMS; a vehicle lies flat for less, and may be put down on its sides."""
+    """Return the aim of a target, one of AIMS; a vehicle lies flat for less, and is turned onto its sides."""
     aim = AIMS[target]
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
-    return replace(aim, least_placed=len(SIDES), flat_s=SHORTEST_FLAT_S)
+    of_board = aim.target
+    std = Target(of_board.gain_pct, of_board.misalignment_deg * LOOSER, of_board.bias_mg / STRICTER)
+    return replace(aim, target=std, least=len(SIDES), verify=VERIFY_HELD, flat_s=SHORTEST_FLAT_S, by_sides=True)
 
 
 def unseen_rad(tilt_only: bool) -> float:

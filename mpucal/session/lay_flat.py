@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from ..data import Samples
 from ..rests.flat import ENOUGH_FLAT_S
 from ..rests.limits import QUIET
@@ -49,7 +51,9 @@ class LayFlat(Step):
         text = f"{lay} on a firm surface, let go of it, and leave it still for {flat_s:.0f} s."
         self.prompt = Prompt(PromptKind.LAY_FLAT, text)
         self._windows = Windows(WINDOW_S)
-        self._stillness = Detector(QUIET)
+        silent = np.zeros(3)
+        # In a shorter time a hand's tremor is not told from the noise of a sensor; an autopilot's streams have less.
+        self._stillness = Detector(QUIET, (silent, silent) if flat_s < FLAT_S else None)
         self._still: Still | None = None
         self._begun_s: float | None = None
         self._cautioned_s = 0.0

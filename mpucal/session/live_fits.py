@@ -21,7 +21,7 @@ from ..reasons import KINDS, Reason, reason
 from ..rests.flat import Flat, find_flat, flat_statistics
 from ..result import error_model
 from ..result.calibration import REFUSED
-from .aims import AIMS, directions, unseen_rad
+from .aims import directions, select_aim, unseen_rad
 from .events import Checked, Event, FitKind, Knowledge, Learnt, Target, Tried, down_of, triple
 from .live_verification import CONTRADICTIONS, explain_contradiction, is_much_clipped, judge_verification, select_unseen
 from .plan import Plan
@@ -53,7 +53,7 @@ class Fits:
     """
 
     def __init__(self, plan: Plan, sensor: Sensor) -> None:
-        self._plan = plan
+        self._plan, self._target = plan, select_aim(plan.target, sensor).target
         self._store = SampleStore(sensor)
         self._flat: Flat | None = None
         self._known: InterimEstimate | None = None
@@ -84,12 +84,11 @@ class Fits:
             self._flat = flat_statistics(recording, segment)
         flat, gravity = self._flat, self._plan.gravity
         self._known = interim_estimate(recording, flat, gravity, self._known)
-        target = AIMS[self._plan.target].target
         down = None
         if advice:
             allowed = directions(down_of(flat.y), self._plan.tilt_only)
-            down = allowed[next_orientation(self._known, target_std(target), allowed)]
-        return Learnt(knowledge(self._known, target, float(recording.t[-1]), down), advice)
+            down = allowed[next_orientation(self._known, target_std(self._target), allowed)]
+        return Learnt(knowledge(self._known, self._target, float(recording.t[-1]), down), advice)
 
     def _try(self) -> Event:
         recording = self._store.recording()

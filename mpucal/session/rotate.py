@@ -11,13 +11,13 @@ import numpy as np
 from ..data import Samples, Vector
 from ..rests.windows import Windows
 from . import events
-from .aims import SIDES, VERIFY_PLACED, Aim, Coverage
+from .aims import SIDES, Aim, Coverage
 from .plan import Plan
-from .step import ENOUGH, HAND_WINDOW_S, HOLD_S, PATIENCE_S, WAIT_S, Pause, PoseStep
+from .step import ENOUGH, HAND_WINDOW_S, HOLD_S, MEANT_RAD, PATIENCE_S, WAIT_S, Pause, PoseStep
 
 PASS_WINDOW_S = 0.1
-# Least length of a pause. A fit uses shorter rests, too. A vehicle that nobody touches in a rest has been put down,
-# and stays there until a person has heard of the next side.
+# Least length of a pause. A fit uses shorter rests, too. A vehicle that is where it was asked to be stays there
+# until the next side is named.
 PAUSE_S, REST_S = 1.0, 0.5
 # Nine tilts may be asked for; a sloppy hand makes this many different ones of them.
 TILTS = 6
@@ -46,7 +46,7 @@ class Rotate(PoseStep):
 
     def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         super().__init__(flat, plan)
-        self._takes_sides = aim.least_placed > 0 and not (plan.tilt_only or plan.until_end)
+        self._takes_sides = aim.by_sides and not (plan.tilt_only or plan.until_end)
         self._aim, self._coverage = aim, coverage
         self._passes = Windows(PASS_WINDOW_S, spread=False)
         acc = np.array(flat.acc)
@@ -114,16 +114,14 @@ class Rotate(PoseStep):
         return outputs
 
     def _next_side(self) -> Vector | None:
-        """Return the next side to put a vehicle down on; None if no other is left, or if it is held in a hand."""
-        if not self._coverage.placed:
+        """Return the next side to turn a vehicle onto; None if no other is left."""
+        if not self._takes_sides:
             return None
         left = (side for side in SIDES if not self._coverage.paused.near(-side))
         return next((side for side in left if events.triple(side) != self.prompt.down), None)
 
     @property
     def _least(self) -> int:
-        if self._coverage.placed:
-            return self._aim.least_placed
         return TILTS if self._plan.tilt_only else self._aim.least
 
     @property
@@ -148,22 +146,22 @@ class Rotate(PoseStep):
         outputs: events.Outputs = [*pause.counting(self._held[1])] if self._requested or not advised else []
         if pause.seconds >= REST_S - 1e-6:
             self._coverage.rested.add(pause.acc)
-        lies = self._takes_sides and not pause.touched and (self._coverage.placed or self._advised_run < 0)
-        least_s = REST_S if lies else HOLD_S - WAIT_S
+        there = self._takes_sides and pause.is_near(self.prompt.down, MEANT_RAD)
+        least_s = REST_S if there else HOLD_S - WAIT_S
         ends = not (self._plan.until_end or advised) and pause.seconds >= least_s - 1e-6
         if ends:
-            self._coverage.placed = lies
-        counts = pause.seconds >= PAUSE_S - 1e-6 or (ends and self._coverage.placed)
+            self._coverage.placed &= not pause.touched
+        counts = pause.seconds >= PAUSE_S - 1e-6 or (ends and there)
         if counts and self._coverage.paused.add(pause.acc):
             self._new_s = pause.t_s
             outputs.append(events.Seen(pause.t_s, len(self._coverage.paused), events.down_of(pause.acc), paused=True))
         if ends and (side := self._next_side()) is not None:
-            # It is known without a fit, and the vehicle lies still until the person has heard of it.
+            # It is known without a fit.
             self._advised_run, self._prompted_s, self.prompt = pause.run, pause.t_s, self._prompt_for(side)
             outputs += [pause.held(self._held[1]), self.prompt]
         elif ends and not self._requested:
             self._advised_run = pause.run
-            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s, HAND_WINDOW_S if lies else WAIT_S))
+            outputs.append(self._request(events.FitKind.ADVISE, pause.t_s, HAND_WINDOW_S if there else WAIT_S))
         return outputs
 
     def _request(self, kind: events.FitKind, t_s: float, wait_s: float = WAIT_S) -> events.RequestFit:
@@ -209,26 +207,27 @@ class Rotate(PoseStep):
                 return None
             left = max(left, math.ceil(taken * (1.0 - known) / known))
         # The orientation that is being turned to has begun when the last new one was found.
-        verify = VERIFY_PLACED if self._coverage.placed else self._aim.verify
         pace_s, since_s = (self._new_s - self._begun_s) / taken, t_s - self._new_s
         if since_s > LATE * pace_s:
             return None
-        return max((left + verify) * pace_s - since_s, verify * pace_s)
+        return max((left + self._aim.verify) * pace_s - since_s, self._aim.verify * pace_s)
 
     def _is_certain(self) -> bool:
         return self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _adds_nothing(self, down: Vector) -> bool:
         """Return True for an orientation that was seen, where the target is reached or a vehicle was on all sides."""
-        return (self._is_certain() or self._coverage.placed) and self._coverage.paused.near(-down)
+        return (self._is_certain() or self._was_on_all_sides) and self._coverage.paused.near(-down)
 
     def _is_enough(self) -> bool:
-        if self._coverage.placed:
-            # Sides are not varied: they leave the angles between the axes to the gyroscope.
-            return len(self._coverage.paused) >= self._least and self._is_certain()
         if self._coverage.number < self._least or self._plan.tilt_only:
             return self._coverage.number >= self._least
-        return self._coverage.varied and self._is_certain()
+        # Sides are not varied: they leave the angles between the axes to the gyroscope.
+        return (self._coverage.varied or self._was_on_all_sides) and self._is_certain()
+
+    @property
+    def _was_on_all_sides(self) -> bool:
+        return self._takes_sides and all(self._coverage.paused.near(-side) for side in SIDES)
 
     def _time_out(self, t_s: float) -> events.Turned | None:
         known = f": {self._knowledge.words}" if self._knowledge else ""

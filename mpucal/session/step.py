@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -64,8 +63,6 @@ class Step:
 HAND_WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
-# Number of the newest windows that tell whether somebody touches the board.
-NEWEST = 2
 # The prompt is repeated after this time without a new orientation.
 REMIND_S = 8.0
 # Rests, turnings and questions end after this time without progress; a check and a verification after the second one.
@@ -174,7 +171,6 @@ class PauseDetector:
         self._hold_s = hold_s
         silent = np.zeros(3)
         self._hands = Detector(UNTOUCHED, (silent, silent), bias=np.array(flat.gyr))
-        self._touched: deque[bool] = deque(maxlen=NEWEST)
         self._windows = Windows(HAND_WINDOW_S)
         self._stillness = Detector(HAND, bias=np.array(flat.gyr), learns=True)
         self._last_run: int | None = None
@@ -192,7 +188,6 @@ class PauseDetector:
         pauses: list[Pause] = []
         for window in self._windows.add(samples):
             sight = self._stillness.add(window)
-            self._touched.append(float(self._hands.shares(window).level) > 1.0)
             if self._last_run is None:
                 self._last_run = sight.run if isinstance(sight, Still) else -1
             if not isinstance(sight, Still) or sight.run <= self._last_run:
@@ -202,5 +197,6 @@ class PauseDetector:
                 left_s = max(self._hold_s - sight.seconds, 0.0)
                 remaining = events.Countdown(window.end_s, left_s, self._hold_s, paused=False)
             acc = np.asarray(sight.acc)
-            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, any(self._touched), remaining))
+            touched = float(self._hands.shares(window).level) > 1.0
+            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, touched, remaining))
         return pauses

@@ -12,7 +12,6 @@ from ..result.calibration import REFUSED
 from . import events
 from .aims import AIMS, NORMAL, SAME_RAD, VERIFY_PLACED, Aim, Coverage, Directions, unseen_rad
 from .plan import Plan
-from .rotate import PAUSE_S
 from .step import ENOUGH, HOLD_S, MEANT_RAD, PATIENCE_S, USE_TEXTS, VERIFY_PATIENCE_S, WAIT_S, Pause, PoseStep
 
 
@@ -97,8 +96,8 @@ class Verify(NewPoses):
     """
 
     def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
-        of, hold_s = (VERIFY_PLACED, PAUSE_S) if coverage.placed else (aim.verify, HOLD_S)
-        super().__init__(flat, plan, of, coverage.rested, BENT * unseen_rad(plan.tilt_only), hold_s)
+        of = VERIFY_PLACED if aim.by_sides and coverage.placed else aim.verify
+        super().__init__(flat, plan, of, coverage.rested, BENT * unseen_rad(plan.tilt_only))
         self._refusal: events.Finished | None = None
         self._more = MOST_MORE
         self._doubt: events.Checked | None = None

@@ -6,7 +6,6 @@ import pytest
 from mpucal.data import Samples, Sensor
 from mpucal.reasons import Reason
 from mpucal.session import events
-from mpucal.session.aims import AIMS, NORMAL
 from mpucal.session.machine import Machine
 from mpucal.session.plan import Plan
 from mpucal.session.table import TRANSITIONS, IllegalEvent, State
@@ -209,11 +208,19 @@ def test_a_side_that_a_vehicle_was_not_put_on_is_asked_for_again_and_the_other_i
     assert "tilted" in sides[5]
 
 
-def test_a_vehicle_in_a_hand_needs_as_many_orientations_as_a_board(make_board):
+def test_a_vehicle_in_a_hand_is_turned_onto_its_sides_too(make_board):
     session, held = placed(make_board, 0.15)
-    assert len(held) == 6 and session.state is State.ROTATE
-    assert held[1] != "on its left side"
-    assert session.of(events.Progress)[-1].of == AIMS[NORMAL].least
+    assert held == placed(make_board, 0.0)[1]
+    assert session.state is State.VERIFY
+
+
+def test_a_vehicle_in_a_hand_does_not_lie_flat(make_board):
+    board, session = make_board(), Session()
+    session.machine = Machine(Plan())
+    session.machine.handle(events.Connected(Sensor(message="RAW_IMU")))
+    session.feed(board.shaken(4.0, 0.35))
+    assert session.state is State.LAY_FLAT
+    assert session.feed(board.still(3.0)).state is State.ROTATE
 
 
 def test_once_the_target_is_reached_each_orientation_asked_for_is_a_new_one(rotating, board):

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Annotated
 
 from mpucal.chip.families import FAMILIES
+from mpucal.data import Sensor
 from mpucal.export.forms import FORMS
 from mpucal.reasons import KINDS, Kind
 from mpucal.result.session_files import SESSION_FILES
-from mpucal.session.aims import AIMS
+from mpucal.session.aims import AIMS, select_aim
 from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Where, fault_kinds
 from mpucal.sinks.choose import source_flags
 from mpucal.sinks.table import SINKS
@@ -140,10 +141,12 @@ def targets() -> str:
     """Return the table of the targets of a session."""
     head = "bias", "scale factor error", "misalignment", "orientations at least", "turning at most", "verified by"
     rows = []
-    for name, aim in AIMS.items():
-        std = aim.target
-        uncertainties = f"{std.bias_mg:g} mg", f"{std.gain_pct:g} %", f"{std.misalignment_deg:g} deg"
-        rows.append(_row(f"`{name}`", *uncertainties, str(aim.least), f"{aim.longest_s:g} s", str(aim.verify)))
+    for sensor, of in ((None, ""), (Sensor(message="SCALED_IMU"), ", vehicle")):
+        for name in AIMS:
+            aim = select_aim(name, sensor)
+            std = aim.target
+            uncertainties = f"{std.bias_mg:.2g} mg", f"{std.gain_pct:.2g} %", f"{std.misalignment_deg:.2g} deg"
+            rows.append(_row(f"`{name}`{of}", *uncertainties, str(aim.least), f"{aim.longest_s:g} s", str(aim.verify)))
     return "\n".join([_row("`--target` (1 sigma)", *head), f"|{'---|' * 7}", *rows])
 
 
