@@ -131,7 +131,7 @@ def test_samples_that_a_resumed_session_lost_are_told(mpucal, cut_off, tmp_path)
 
 
 def test_a_kernel_device_is_resumed_after_a_reboot(mpucal, cut_off, tmp_path):
-    words = ("--iio", "sim:seed=3", "--rate", "50", "--target", "quick", "--no-write")
+    words = ("--iio", "sim:seed=3", "--rate", "25", "--target", "quick", "--no-write")
     assert mpucal(*WORDS, *words, "-o", "whole").code == 0
     cut_off(tmp_path / "whole", 20.0)
     recording, _, _ = resume_cut(mpucal, "rotate")
