@@ -1,4 +1,4 @@
-"""Files of arrays by name: NumPy (.npz, .npy), MATLAB (.mat), HDF5, Parquet, and JSON."""
+"""Files of arrays by name: NumPy (.npz, .npy), MATLAB (.mat), HDF5, Parquet, Feather, and JSON."""
 
 from __future__ import annotations
 
@@ -152,10 +152,11 @@ def _samples(row: dict[str, Any]) -> list[dict[str, Any]]:
     return [{**row, **dict(zip(lists, sample, strict=True))} for sample in several] if lists else [row]
 
 
-def _read_parquet(path: Path) -> Arrays:
-    arrow, parquet = (import_extra(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
+def _read_arrow(path: Path) -> Arrays:
+    kind = path.suffix[1:].lower()
+    arrow, reader = (import_extra(name, "parquet", path) for name in ("pyarrow", f"pyarrow.{kind}"))
     try:
-        table = parquet.read_table(path)
+        table = reader.read_table(path)
     except (arrow.ArrowException, OSError) as error:
         raise ValueError(error) from error
     for place, field in enumerate(table.schema):
@@ -170,5 +171,5 @@ _READERS = {
     **dict.fromkeys((".mat", ".h5", ".hdf5", ".hdf"), read_matlab_arrays),
     **dict.fromkeys((".npz", ".npy"), _read_numpy),
     **dict.fromkeys((".json", ".jsonl", ".ndjson"), _read_json),
-    ".parquet": _read_parquet,
+    **dict.fromkeys((".parquet", ".feather"), _read_arrow),
 }

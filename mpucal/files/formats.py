@@ -124,7 +124,7 @@ FORMATS = (
     *_others(".h5 .hdf5 .hdf", "a file of HDF5", _ARRAYS),
     *_others(".json .jsonl .ndjson", "samples in JSON", _ARRAYS, "arrays:is_json_of_samples"),
     Format(".npz", "a NumPy archive", rows=f"{_HERE}.npz:npz_rows", writer=f"{_HERE}.npz:npz_file"),
-    *_others(".parquet", "a Parquet file", _ARRAYS, only=False),
+    *_others(".parquet .feather", "a file of Arrow", _ARRAYS, only=False),
     *_others(".xlsx", "a workbook", "workbook:load_workbook", only=False),
     Format(
         ".csv",

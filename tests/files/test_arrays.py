@@ -122,6 +122,7 @@ WRITTEN = {
     "Mission Planner's log": ("a.mat", as_mission_planner, "of several sensors (imu: 0.0, 1.0)"),
     "a matrix of MATLAB without names": ("a.mat", as_matlabs_matrix, "counts of ±4 g"),
     "Parquet": ("a.parquet", lambda p, w, ns: frame(w, timestamp=ns).to_parquet(p), "accelerations in g"),
+    "Feather": ("a.feather", lambda p, w, ns: frame(w, t=w.t).to_feather(p), "times in s"),
     "Parquet with dates": (
         *("a.parquet", lambda p, w, ns: frame(w, timestamp=pd.to_datetime(ns, utc=True)).to_parquet(p)),
         "times in ns",

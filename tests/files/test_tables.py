@@ -89,12 +89,14 @@ COLUMNS = {
     "jerk": lambda w, ns: 0.3 * w.gyr,
     "000": lambda w, ns: 0.0 * w.acc,
     "counts": lambda w, ns: counts(w),
+    "hex": lambda w, ns: [[f"0x{of % 65536:04X}" for of in row] for row in counts(w).tolist()],
     "20_bits": lambda w, ns: np.rint(np.column_stack([w.acc, w.gyr]) * COUNTS * 16).astype(int),
     "1024": lambda w, ns: np.rint(w.acc * 1024 / G).astype(int),
     "rates": lambda w, ns: counts(w)[:, 3:],
     "bno055": lambda w, ns: np.rint(np.column_stack([w.acc * 100, np.degrees(w.gyr) * 16])).astype(int),
     "unsigned": lambda w, ns: counts(w) % 65536,
     "upward": lambda w, ns: counts(w) + 32768,
+    "24_bits": lambda w, ns: np.rint(np.column_stack([w.acc, w.gyr]) * COUNTS * 256).astype(int),
     "unsigned_20": lambda w, ns: counts(w) * 16 % 2**20,
     "upward_12": lambda w, ns: np.rint(counts(w) / 16).astype(int) + 2048,
 }
@@ -408,6 +410,12 @@ FORMS = {
         "walk.log",
         "times in ms, accelerations in g and rates in deg/s",
     ),
+    "a kernel's log": Form(
+        *("", "t counts", "[{:12.6f}] RAW 0x68: accel=({}, {}, {}) temp_raw=-521 gyro=({}, {}, {})\n"),
+        *("boot.log", "times in s, accelerations in counts of ±4 g", None, IN_COUNTS),
+    ),
+    "counts in hexadecimal digits": Form(f"t,{AXES}", "t hex", says="accelerations in counts of ±4 g", atol=IN_COUNTS),
+    "counts of 24 bits": Form(f"t,{AXES}", "t 24_bits", says="accelerations in counts of ", atol=IN_COUNTS),
     "Teleplot": Form(
         "", "epoch a w", ">ax:{0}:{1}\n>ay:{0}:{2}\n>az:{0}:{3}\n>gx:{0}:{4}\n>gy:{0}:{5}\n>gz:{0}:{6}\n", "walk.log"
     ),

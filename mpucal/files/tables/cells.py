@@ -43,6 +43,8 @@ _MARKED = re.compile(
 ).fullmatch
 # the time of day without the date, as the first cell of a column has it; the numbers then show if it is one
 OF_DAY = re.compile(r"\s*([01]\d|2[0-3])([0-5]\d){2}(\.\d+|\d{3})?\s*").fullmatch
+# counts; of two digits it is a chip's address, which names a sensor
+_HEXADECIMAL = re.compile(r"\s*0x[\dA-Fa-f]{3,8}\s*").fullmatch
 _ISO = re.compile(r"\d{4}-\d\d-\d\d").match
 _MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
 
@@ -71,7 +73,9 @@ def kind_of(cells: Cells) -> Kind:
 
 
 def with_point(text: str) -> str:
-    """Return a number's text with a decimal point in place of a comma."""
+    """Return a number's text with a decimal point in place of a comma, and in decimal digits."""
+    if "x" in text and _HEXADECIMAL(text):
+        return str(int(text, 16))
     return text.replace(",", ".") if "," in text and "." not in text else text
 
 

@@ -29,11 +29,13 @@ from .units import find_unit
 # a name of one or two words, `:` or `=`, and a number or a date; lengths are bounded: the search takes linear time
 _NAME = r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})"
 _PAIR = re.compile(rf"{_NAME}\s?[:=][ \t]{{0,9}}(?:({MOMENT})|({NUMBER}))(?![\w:])")
-# programs' ways to write the time of a line, beside a date at its beginning: ESP-IDF's log, Teleplot, InfluxDB
+# programs' ways to write the time of a line, beside a date at its beginning: logs of ESP-IDF and of kernels, Teleplot,
+# InfluxDB
 _AT = "line_time="
 _TIMES = (
     (re.compile(rf"^(?:[\w-]{{1,12}} ){{0,3}}({MOMENT})\b:?", re.MULTILINE), rf"{_AT}\1 "),
     (re.compile(r"^[EWIDV] \((\d{1,12})\) ", re.MULTILINE), rf"{_AT}\1, "),
+    (re.compile(r"^\[ {0,9}(\d{1,9}\.\d{1,9})\] ", re.MULTILINE), rf"{_AT}\1, "),
     (re.compile(r"^>([A-Za-z_]\w{0,40}):(\d{10,19}):", re.MULTILINE), rf"{_AT}\2, \1:"),
     (re.compile(r"(?<=\d)[ \t](\d{10,19})\r?$", re.MULTILINE), rf", {_AT}\1"),
 )

@@ -15,8 +15,8 @@ from ...chip.families import MPU6050
 from ...data import ACCEL_COUNTS, GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
 from .units import DAYS, QUANTITIES
 
-# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 20 at ±0.5 g or 24 at ±8 g; and the largest count
-FEWEST_PER_G, MOST_PER_G, MOST_COUNTS = 8, 20, 2.0**23
+# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 24 at ±2 g; and the largest count
+FEWEST_PER_G, MOST_PER_G, MOST_COUNTS = 8, 22, 2.0**23
 # the units that samples show without a name; the others are too near to these, to counts, or to a magnetic field in uT
 SHOWN = {
     "t": ("s", "ms", "us", "ns", "0.1ms", DAYS),
