@@ -161,12 +161,26 @@ def jerk_density(sigma: float, lam: float) -> float:
 
 
 def smoothed_rates(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
-    """Return rate and angular acceleration (n, 3) after the flat segment, for the acceleration by a lever arm."""
-    k = int(SMOOTH_S * recording.rate_hz)
-    rate = _kernel.moving_mean(recording.gyr - flat.b_omega, k)
+    """Return rate and angular acceleration (n, 3) after the flat segment, for the acceleration by a lever arm.
+
+    Noise in a regressor biases the lever arm towards zero. The rates of a machine, which turns steadily, are smoothed
+    over more than SMOOTH_S: as long as that makes the error of the angular acceleration smaller, by Stein's unbiased
+    risk estimate (Annals of Statistics 9, 1981).
+    """
+    measured, half = recording.gyr - flat.b_omega, int(SMOOTH_S * recording.rate_hz)
     # The times are smoothed as the rates are, since a computer's times jitter.
-    times = _kernel.moving_mean((recording.t - recording.t[0])[:, None], k)[:, 0]
-    return rate[flat.last :], np.gradient(rate, times, axis=0)[flat.last :]
+    times = _kernel.moving_mean((recording.t - recording.t[0])[:, None], half)[:, 0]
+    least, rate = np.inf, measured
+    while True:
+        wider = _kernel.moving_mean(measured, half)
+        away = (wider - measured)[flat.last :]
+        step = away[2:] - away[:-2]  # of 2 samples, times the difference of the angular accelerations
+        # The noise of both is the same in part, if the window is shorter than the step.
+        shared = 4.0 * len(step) * flat.Sigma_omega.sum() / (2 * half + 1) if half < 2 else 0.0
+        risk = float(np.vdot(step, step)) + shared
+        if not risk < least:
+            return rate[flat.last :], np.gradient(rate, times, axis=0)[flat.last :]
+        least, rate, half = risk, wider, 2 * half + 1
 
 
 def _shaken(recording: Recording, flat: Flat) -> Vector:
