@@ -96,12 +96,16 @@ def columns_by_hint(table: Table, roles: Mapping[str, str | int]) -> list[Column
 
 def measured(table: Table) -> dict[int, Vector]:
     """Return place -> (n,) of the columns of numbers that a sensor may have measured, in whole lines."""
-    places = [place for place in table.places(Kind.NUMBER) if not ESTIMATED.search(table.name_of(place))]
+    places = _measured_places(table)
     with suppress(RecordingError):
         numbers = table.numbers([Column("", place, "") for place in places])
         whole = (np.abs(numbers) < BEYOND**2).all(axis=1)
         return dict(zip(places, numbers[whole].T, strict=True)) if whole.any() else {}
     return {}
+
+
+def _measured_places(table: Table) -> list[int]:
+    return [place for place in table.places(Kind.NUMBER) if not ESTIMATED.search(table.name_of(place))]
 
 
 def _order(roles: Mapping[str, int]) -> str:
@@ -123,7 +127,7 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
     # name(1), name(2) and so on are of a matrix
     arrays = {place: found[1] for place, name in enumerate(table.header) if (found := OF_ARRAY(name))}
     likely = likely_columns(measured(table), [clock.place for clock in table.clocks(columns)], arrays)
-    if likely is None or len(table.places(Kind.NUMBER)) < len("xyz"):
+    if likely is None or len(_measured_places(table)) < len("xyz"):
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
         return RecordingError(what, _GIVE_VALUES)
     roles, unit = likely

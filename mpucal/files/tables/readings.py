@@ -72,10 +72,11 @@ def accelerations(
         return Reading.of(values, QUANTITIES["acc"]["mm/s^2"], f"in mm/s^2 {by}")
     if said == COUNTS or (whole and unclear):
         return _scaled_counts(values, hints, name, size, OR_MG if likely_whole and not beside else BY_SIZE)
-    near = "" if seen or said else units.mean_acceleration_unit(values)
+    at_rest = units.quietest(values)
+    near = "" if seen or said else units.mean_acceleration_unit(values) or units.acceleration_unit(at_rest)
     if near:
         raise RecordingError(
-            f"{name}: |a| varies too much to show its unit; on average it would be gravity in {near}",
+            f"{name}: |a| varies too much to show its unit; on average, or at rest, it would be gravity in {near}",
             f"name the unit with --units acc={near}",
             f"--units acc={near}",
         )

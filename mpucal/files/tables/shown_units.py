@@ -86,6 +86,13 @@ def mean_acceleration_unit(values: Vector) -> str:
     return acceleration_unit(averaged(whole)) if len(whole) > 1 else ""
 
 
+def quietest(values: Vector) -> Vector:
+    """Return the part of (n, 3) samples that varies least, as a sensor at rest does."""
+    width = min(len(values), QUIET)
+    parts = values[: len(values) // width * width].reshape(-1, width, 3)
+    return np.asarray(min(parts, key=lambda part: float(part.std(axis=0).sum())))
+
+
 def averaged(values: Vector) -> Vector:
     """Return means of adjacent samples (n, 3): shaking averages out, and gravity does not."""
     width = min(SHAKEN, len(values) // 2)
@@ -236,9 +243,7 @@ def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:
 
     In larger units its rates would turn gravity, or its bias be too large; in smaller ones it would be too quiet.
     """
-    width = min(len(gyr), QUIET)
-    parts = gyr[: len(gyr) // width * width].reshape(-1, width, 3)
-    quiet = min(parts, key=lambda part: float(part.std(axis=0).sum()))
+    quiet = quietest(gyr)
     noise, bias = float(quiet.std(axis=0).max()), float(np.abs(quiet.mean(axis=0)).max())
     fastest = float(np.percentile(np.abs(gyr), 99))
     ratio = abs(turning(t, acc, gyr)[0])
