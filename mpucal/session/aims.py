@@ -68,14 +68,7 @@ class Directions:
 
 
 class Coverage:
-    """Orientations that the board has paused in, passed, and rested in, long or short.
-
-    Attributes
-    ----------
-    placed : True if nobody touched it in the pauses so far: it is put down in each orientation.
-    """
-
-    placed = True
+    """Orientations that the board has paused in, passed, and rested in, long or short."""
 
     def __init__(self) -> None:
         self.paused, self.passed, self.rested = Directions(), Directions(), Directions(SAME_RAD)
@@ -143,11 +136,11 @@ AIMS: Mapping[str, Aim] = {
 NORMAL = "normal"
 # Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
 # quarter turn from the last, about another axis. They show what its parameters hold best, biases and scale factors. One
-# more, tilted, gives with the gyroscope the angles between the axes. Two new orientations verify that nothing slipped
-# in a hand, and one where no hand moves it.
+# more, tilted, gives with the gyroscope the angles between the axes. One new orientation verifies a first calibration
+# that is good, and two verify one with reservations, of which a slip may be the cause.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
-VERIFY_HELD, VERIFY_PLACED = 2, 1
+VERIFY_GOOD, VERIFY_DOUBTED = 1, 2
 # Its parameters hold no angles between the axes, which need only be so well known that the biases are.
 STRICTER, LOOSER = 1.5, 6.0
 
@@ -159,7 +152,7 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
         return aim
     of_board = aim.target
     std = Target(of_board.gain_pct, of_board.misalignment_deg * LOOSER, of_board.bias_mg / STRICTER)
-    return replace(aim, target=std, least=len(SIDES), verify=VERIFY_HELD, flat_s=SHORTEST_FLAT_S, by_sides=True)
+    return replace(aim, target=std, least=len(SIDES), verify=VERIFY_GOOD, flat_s=SHORTEST_FLAT_S, by_sides=True)
 
 
 def unseen_rad(tilt_only: bool) -> float:

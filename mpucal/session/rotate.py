@@ -149,8 +149,6 @@ class Rotate(PoseStep):
         there = self._takes_sides and pause.is_near(self.prompt.down, MEANT_RAD)
         least_s = REST_S if there else HOLD_S - WAIT_S
         ends = not (self._plan.until_end or advised) and pause.seconds >= least_s - 1e-6
-        if ends:
-            self._coverage.placed &= not pause.touched
         counts = pause.seconds >= PAUSE_S - 1e-6 or (ends and there)
         if counts and self._coverage.paused.add(pause.acc):
             self._new_s = pause.t_s

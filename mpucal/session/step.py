@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Samples, Vector
-from ..rests.limits import HAND, LEAST_TURN_RAD, UNTOUCHED
+from ..rests.limits import HAND, LEAST_TURN_RAD
 from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
 from . import events
@@ -84,15 +84,13 @@ class Pause:
 
     Attributes
     ----------
-    acc : (3,) mean acceleration [m/s^2]. touched : False where nobody touches the board.
-    countdown : to the end of the hold; None once that is past.
+    acc : (3,) mean acceleration [m/s^2]. countdown : to the end of the hold; None once that is past.
     """
 
     t_s: float
     seconds: float
     acc: Vector
     run: int
-    touched: bool
     countdown: events.Countdown | None = None
 
     def is_near(self, wanted: events.Direction | None, near_rad: float) -> bool:
@@ -169,8 +167,6 @@ class PauseDetector:
 
     def __init__(self, flat: events.Rested, hold_s: float = HOLD_S) -> None:
         self._hold_s = hold_s
-        silent = np.zeros(3)
-        self._hands = Detector(UNTOUCHED, (silent, silent), bias=np.array(flat.gyr))
         self._windows = Windows(HAND_WINDOW_S)
         self._stillness = Detector(HAND, bias=np.array(flat.gyr), learns=True)
         self._last_run: int | None = None
@@ -197,6 +193,5 @@ class PauseDetector:
                 left_s = max(self._hold_s - sight.seconds, 0.0)
                 remaining = events.Countdown(window.end_s, left_s, self._hold_s, paused=False)
             acc = np.asarray(sight.acc)
-            touched = float(self._hands.shares(window).level) > 1.0
-            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, touched, remaining))
+            pauses.append(Pause(window.end_s, sight.seconds, acc, sight.run, remaining))
         return pauses

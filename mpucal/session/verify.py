@@ -8,9 +8,9 @@ import numpy as np
 
 from ..data import Samples
 from ..reasons import KINDS, Reason, reason
-from ..result.calibration import REFUSED
+from ..result.calibration import GOOD, REFUSED
 from . import events
-from .aims import AIMS, NORMAL, SAME_RAD, VERIFY_PLACED, Aim, Coverage, Directions, unseen_rad
+from .aims import AIMS, NORMAL, SAME_RAD, VERIFY_DOUBTED, Aim, Coverage, Directions, unseen_rad
 from .plan import Plan
 from .step import ENOUGH, HOLD_S, MEANT_RAD, PATIENCE_S, USE_TEXTS, VERIFY_PATIENCE_S, WAIT_S, Pause, PoseStep
 
@@ -87,7 +87,7 @@ MOST_MORE = 2
 
 
 class Verify(NewPoses):
-    """Step that asks for `aim.verify` new orientations, or VERIFY_PLACED, and compares the first calibration with them.
+    """Step that asks for `aim.verify` new orientations, and compares the first calibration with them.
 
     Parameters
     ----------
@@ -96,8 +96,7 @@ class Verify(NewPoses):
     """
 
     def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
-        of = VERIFY_PLACED if aim.by_sides and coverage.placed else aim.verify
-        super().__init__(flat, plan, of, coverage.rested, BENT * unseen_rad(plan.tilt_only))
+        super().__init__(flat, plan, aim.verify, coverage.rested, BENT * unseen_rad(plan.tilt_only))
         self._refusal: events.Finished | None = None
         self._more = MOST_MORE
         self._doubt: events.Checked | None = None
@@ -147,6 +146,8 @@ class Verify(NewPoses):
 
     def _tried(self, tried: events.Tried) -> events.Outputs:
         """Take the first calibration; one that is refused needs no verification."""
+        if tried.verdict != GOOD and not self._closed:
+            self._of = max(self._of, VERIFY_DOUBTED)
         if tried.verdict != REFUSED or tried.reason is None:
             return []
         self.checked = events.Checked((), False, tried.reason)

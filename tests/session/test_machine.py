@@ -154,7 +154,7 @@ def placed(make_board, tremor, target="normal", late=False, known=1.0, down=DOWN
     """
     board, session = make_board(), Session()
     board.up = np.array([0.0, 0.0, -1.0])
-    session.machine = Machine(Plan(target=target))
+    session.board, session.machine = board, Machine(Plan(target=target))
     session.said = session.machine.handle(events.Connected(Sensor(message="RAW_IMU")))
     assert "still for 2 s" in session.of(events.Prompt)[-1].text
     session.feed(board.still(2.6))
@@ -206,6 +206,15 @@ def test_a_side_that_a_vehicle_was_not_put_on_is_asked_for_again_and_the_other_i
     _, sides = placed(make_board, 0.0, elsewhere=(2,))
     assert sides[:5] == ["on its left side", "nose down", "on its back", "nose down", "on its right side"]
     assert "tilted" in sides[5]
+
+
+@pytest.mark.parametrize(("verdict", "of"), [("good", 1), ("usable", 2)])
+def test_a_first_calibration_with_reservations_is_verified_twice(make_board, verdict, of):
+    session, _ = placed(make_board, 0.0)
+    session.give(events.Tried(verdict))
+    session.feed(session.board.turn_to(-np.array(session.of(events.Prompt)[-1].down))).feed(session.board.still(2.0))
+    assert [each.of for each in session.of(events.Progress)][-1] == of
+    assert ("Verification 2 of 2" in session.of(events.Prompt)[-1].text) is (of == 2)
 
 
 def test_a_vehicle_in_a_hand_is_turned_onto_its_sides_too(make_board):
