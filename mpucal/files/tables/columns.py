@@ -13,7 +13,7 @@ from ...data import Vector
 from ...errors import RecordingError
 from ..hints import ROLES, Hints
 from .cells import Kind
-from .guess import guess_columns, is_even_clock, likely_columns
+from .guess import WIDEST, guess_columns, is_even_clock, likely_columns
 from .names import (
     ACC,
     CHOSEN,
@@ -126,7 +126,10 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
         )
     # name(1), name(2) and so on are of a matrix
     arrays = {place: found[1] for place, name in enumerate(table.header) if (found := OF_ARRAY(name))}
-    likely = likely_columns(measured(table), [clock.place for clock in table.clocks(columns)], arrays)
+    of = measured(table)
+    # among many columns with names of their own, three that are as long as gravity are so by chance
+    named = sum(bool(table.name_of(place)) and place not in arrays for place in of) > WIDEST
+    likely = ({}, "") if named else likely_columns(of, [clock.place for clock in table.clocks(columns)], arrays)
     if likely is None or len(_measured_places(table)) < len("xyz"):
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
         return RecordingError(what, _GIVE_VALUES)

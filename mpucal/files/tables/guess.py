@@ -98,14 +98,12 @@ def side_by_side(of: Columns) -> list[dict[str, int]]:
 def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]) -> tuple[dict[str, int], str] | None:
     """Return role -> place of triples of columns that are the sensors', and a unit of the accelerations to be named.
 
-    They are none if there are no triples, or too many columns. None if no triple may be as long as gravity.
+    They are none if there are no triples. None if no triple may be as long as gravity.
 
     Parameters
     ----------
     arrays : place -> the array of which it is a column; a triple is of one.
     """
-    if len(of) > WIDEST:
-        return {}, ""
     increasing = [place for place in of if _hardly_decreases(of[place])]
     clocks = clocks or [place for place in increasing if is_even_clock(of[place]) or _begins_anew(of[place])]
     places = [place for place in of if place not in {*clocks, *increasing}]

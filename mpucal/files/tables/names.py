@@ -75,7 +75,8 @@ WITHOUT_GRAVITY = re.compile(r".*(?:free|user|linear)[ _]?acc(?!.*covariance)", 
 # vectors that turn as gravity does: a program's estimate of gravity, and a magnetic field; and attitudes, places and
 # what else a board measures, whose parts may be as long
 ESTIMATED = re.compile(
-    r"gravity|^mag|magnet|quat|orientation|position|altitude|latitude|longitude|height|pressure|temperature|volt|^q[_.]?[wxyz0-3]$|^r_?[0-3][0-3]$|(?<![a-z])ang[_ ]?[xyz](?![a-z])"
+    r"gravity|^mag|magnet|quat|orientation|position|altitude|latitude|longitude|height|pressure|temperature|volt"
+    r"|^q[_.]?[wxyz0-3]$|^r_?[0-3][0-3]$|(?<![a-z])ang[_ ]?[xyz](?![a-z])"
     r"|^(?!.*(?:rate|speed|vel|gyr|acc|omega)).*(?:roll|pitch|yaw|euler|heading|azimuth|angle|attitude|degree|dir_?cos)",
     re.IGNORECASE,
 )

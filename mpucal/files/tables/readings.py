@@ -82,11 +82,13 @@ def accelerations(
         )
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
         increments = f"--units acc={OF_INCREMENTS}" if units.is_gravity(size * rate_hz) else ""
+        of_g = "--units acc=g" if not said and units.is_gravity(size * QUANTITIES["acc"]["g"]) else ""
         raise RecordingError(
             f"{name}: the median |a| is only {f'{size:.3g} {said}'.strip()}, so gravity is not in it",
             "give the accelerometer's own values, not the linear acceleration computed from them"
-            + f", or {increments} (or deg/sample) if these are increments of velocity and angle" * bool(increments),
-            increments,
+            + f", or {increments} (or deg/sample) if these are increments of velocity and angle" * bool(increments)
+            + f", or {of_g} if these are in g" * bool(of_g),
+            increments or of_g,
         )
     likely = units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
     likely = likely or not (values == np.rint(values)).all()
