@@ -135,6 +135,12 @@ def test_phyphox_says_the_time_of_day_in_a_file_beside_its_tables(events, utc_ns
     assert ("paused once" in read.taken) == (len(events) > 1)
 
 
+def test_sensor_loggers_table_without_gravity_is_called_so(walk, walk_ns, table):
+    path = table("time,seconds_elapsed,z,y,x", walk_ns, walk.t, walk.acc[:, ::-1], file="Accelerometer.csv")
+    with pytest.raises(RecordingError, match="writes accelerations without gravity into that table: record its Total"):
+        mpucal.load(path)
+
+
 def test_two_tables_are_joined_by_time(walk, walk_ns, tmp_path):
     phyphox(tmp_path, walk, walk_ns, later=0.0123, sep=";", decimal=",")
     read = mpucal.load(tmp_path)

@@ -49,7 +49,9 @@ STAMP = re.compile(r"[12]\d{9},\d{7,9},").match
 # bytes in which a board is turned
 TURNED = 1 << 20
 FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
-# stems of Sensor Logger's one table: the first is in g on iOS; the second does not tell iOS from Android
+# a column of Sensor Logger's tables, and its table of accelerations without gravity
+OF_SENSOR_LOGGER, LINEAR = "seconds_elapsed", "accelerometer"
+# stems of its one table: the first is in g on iOS; the second does not tell iOS from Android
 IN_G_ON_IOS, EITHER_SIGN = "accelerometeruncalibrated_", "totalacceleration_"
 
 
@@ -166,8 +168,17 @@ def with_sensor_of_file(table: Table) -> Table:
     """Return a table of one sensor, whose columns are x, y, z, or [time and] three without names, under its name.
 
     The sensor is that of their unit, or of the file's name.
+
+    Raises
+    ------
+    RecordingError : it is Sensor Logger's table of accelerations without gravity.
     """
     header, of_file = table.header, axes_of(Path(table.name).stem)
+    if OF_SENSOR_LOGGER in header and Path(table.name).stem.lower() == LINEAR:
+        raise RecordingError(
+            f"{table.name} is of Sensor Logger, which writes accelerations without gravity into that table",
+            "record its Total Acceleration or the uncalibrated accelerometer, and give the folder",
+        )
     axes = [parse_axis_name(name) for name in header]
     if not header and len(table) and STAMP(",".join(cells[0] for cells in table.cells)):
         header = ["stamp.sec", "stamp.nanosec", *[""] * (len(table.cells) - 2)]
