@@ -43,7 +43,7 @@ def files(walk, write_bag, tmp_path_factory):
     counts = np.rint(np.column_stack([some.acc / 9.80665 * 16384, np.degrees(some.gyr) * 131])).astype(int)
     (folder / "a.txt").write_text("".join("a/g:\t" + "\t".join(map(str, row)) + "\n" for row in counts.tolist()))
     with zipfile.ZipFile(folder / "a.zip", "w", zipfile.ZIP_DEFLATED) as file:
-        for name, values in (("Accelerometer", some.acc), ("Gyroscope", some.gyr)):
+        for name, values in (("TotalAcceleration", some.acc), ("Gyroscope", some.gyr)):
             made = pd.DataFrame(np.column_stack([some.t, values]), columns=["seconds_elapsed", "x", "y", "z"])
             file.writestr(f"{name}.csv", made.to_csv(index=False))
     for kind in ("mcap", "db3", "bag"):
