@@ -128,12 +128,12 @@ class Aim:
     by_sides: bool = False
 
 
+NORMAL, BEST = "normal", "best"
 AIMS: Mapping[str, Aim] = {
     "quick": Aim(Target(0.3, 0.15, 3.0), least=8, longest_s=60.0, verify=2),
-    "normal": Aim(Target(0.1, 0.05, 1.0), least=ENOUGH_ORIENTATIONS, longest_s=120.0, verify=3),
-    "best": Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
+    NORMAL: Aim(Target(0.1, 0.05, 1.0), least=ENOUGH_ORIENTATIONS, longest_s=120.0, verify=3),
+    BEST: Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
 }
-NORMAL = "normal"
 # Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
 # quarter turn from the last, about another axis. They show what its parameters hold best, biases and scale factors. One
 # more, tilted, gives with the gyroscope the angles between the axes. One new orientation verifies a first calibration
@@ -142,7 +142,7 @@ SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
 VERIFY_GOOD, VERIFY_DOUBTED = 1, 2
 # Its parameters hold no angles between the axes, which need only be so well known that the biases are.
-STRICTER, LOOSER = 1.5, 6.0
+STRICTER, LOOSER = 0.7, 6.0
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
@@ -151,8 +151,10 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
     of_board = aim.target
-    std = Target(of_board.gain_pct, of_board.misalignment_deg * LOOSER, of_board.bias_mg / STRICTER)
-    return replace(aim, target=std, least=len(SIDES), verify=VERIFY_GOOD, flat_s=SHORTEST_FLAT_S, by_sides=True)
+    std = Target(of_board.gain_pct, of_board.misalignment_deg * LOOSER, of_board.bias_mg * STRICTER)
+    aim = replace(aim, target=std, flat_s=SHORTEST_FLAT_S, by_sides=True)
+    # Whoever wants the best takes the time for it.
+    return aim if target == BEST else replace(aim, least=len(SIDES), verify=VERIFY_GOOD)
 
 
 def unseen_rad(tilt_only: bool) -> float:

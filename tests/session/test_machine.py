@@ -176,7 +176,7 @@ def placed(make_board, tremor, target="normal", late=False, known=1.0, down=DOWN
 
 @pytest.mark.parametrize("late", [False, True])
 def test_a_vehicle_that_is_put_down_on_six_sides_needs_one_tilt_more(make_board, late):
-    session, (*sides, tilt) = placed(make_board, 0.0, "best", late)
+    session, (*sides, tilt) = placed(make_board, 0.0, "quick", late)
     assert sides == ["on its left side", "nose down", "on its back", "on its right side", "nose up"]
     assert "tilted" in tilt
     assert session.state is State.VERIFY

@@ -38,7 +38,7 @@ from .runner import Trial
 from .sessions import by_command
 from .table import Row, known, over
 
-OFFSET_MPS2, SCALE, LEVEL_DEG, Z = 3e-3, 5e-4, 0.1, (0.7, 1.3)
+OFFSET_MPS2, SCALE, LEVEL_DEG, Z = 6e-3, 1e-3, 0.1, (0.7, 1.3)
 LIES_NS, BOOTED_NS, HEARD_NS = 6 * S, 4 * S, 3 * S
 FIRST_SEED = 100
 # parameters, mounting and filters of vehicles that were in use
