@@ -9,17 +9,17 @@ from mpucal.calibration.theta import Theta
 from mpucal.kernel import _kernel
 from mpucal.rests.flat import Flat
 
-N = 245
+N = 140
 
 
 @pytest.fixture(scope="session")
 def hand_series():
     rng = np.random.default_rng(5)
     reset = np.full(N, -1.0)
-    reset[[100, 160]] = 0.1, 0.0
+    reset[[50, 80]] = 0.1, 0.0
     dt = rng.uniform(0.004, 0.02, N)
-    dt[200:220] = 0.01  # equal steps, which the filter may compute once
-    dt[230] = 0.7  # a gap
+    dt[100:120] = 0.01  # equal steps, which the filter may compute once
+    dt[130] = 0.7  # a gap
     return Series(
         y=rng.normal([1.0, -2.0, 9.3], 0.4, (N, 3)),
         omega=rng.normal(0.2, 1.0, (N, 3)),

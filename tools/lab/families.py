@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from itertools import combinations
 
 import numpy as np
 
@@ -98,10 +97,11 @@ def told_apart(runs: Sequence[Row]) -> float:
     The difference of two has the errors of both; they are compared as if both claimed as much.
     """
     good = [run for run in runs if run.verdict == GOOD]
-    apart = [
-        np.abs(np.subtract(one.z, other.z)).max() > math.sqrt(2.0) * _limit(len(one.z), one.model, other.model)
-        for one, other in combinations(good, 2)
-    ]
+    z = np.array([run.z for run in good])
+    apart: list[bool] = []
+    for i, one in enumerate(good):
+        limits = [math.sqrt(2.0) * _limit(len(one.z), one.model, other.model) for other in good[i + 1 :]]
+        apart += (np.abs(z[i + 1 :] - z[i]).max(axis=1, initial=0.0) > limits).tolist()
     return float(np.mean(apart)) if apart else math.nan
 
 

@@ -81,7 +81,7 @@ def test_broken_limits_are_reported_by_name():
 
 def test_pairs_with_true_uncertainties_are_told_apart_as_often_as_diff_promises():
     rng = np.random.default_rng(0)
-    runs = [verdict(z=tuple(rng.standard_normal(12)), model="accel") for _ in range(400)]
+    runs = [verdict(z=tuple(rng.standard_normal(12)), model="accel") for _ in range(200)]
     assert families.told_apart(runs) == pytest.approx(0.01, abs=0.003)
     for run in runs:
         run.model = "hand"
