@@ -6,7 +6,8 @@ limits from the recording, since hands tremble by 0.5 to 7 deg/s as they rest.
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Iterator
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,28 +79,32 @@ class RestFinder:
         for first, last in few[inside].tolist():
             if still[first - 1] and still[last]:
                 still[first:last] = False
-        rests = self._trimmed(true_runs(still))
+        levels = [true_runs(still)]
         # Of a run in which gravity turns, keep the samples in which the gyroscope hardly turns.
         slow = np.asarray(np.all(np.abs(self._windows.gyr - flat.b_omega) < TURNS_RAD_S, axis=1))
         still[self._n // 2 : self._n // 2 + len(slow)] &= slow
-        slow_runs = true_runs(still)
-        rests = _and_others(rests, self._trimmed(slow_runs))
+        runs = true_runs(still)
         # Where gravity turns and the gyroscope does not, the sensor changed: keep the halves in which gravity rests.
-        while len(slow_runs := _halves(slow_runs, self._n)):
-            rests = _and_others(rests, self._trimmed(slow_runs))
-        return rests
+        while len(runs):
+            levels.append(runs)
+            runs = _halves(runs, self._n)
+        return reduce(_and_others, self._trimmed(levels))
 
     @cached_property
     def _quiet(self) -> Intervals:
         return self.within(QUIET)
 
-    def _trimmed(self, runs: Intervals) -> Intervals:
-        """Return the runs without their ends, if they are long enough and gravity does not turn in them."""
+    def _trimmed(self, levels: list[Intervals]) -> Iterator[Intervals]:
+        """Yield of each level the runs without their ends that are long enough and in which gravity does not turn."""
         rate = self._recording.rate_hz
+        # All at once, since there are many levels of few runs.
+        runs, level = np.concatenate(levels), np.repeat(np.arange(len(levels)), list(map(len, levels)))
         trim = np.clip(TRIM * (runs[:, 1] - runs[:, 0]), LEAST_TRIM_S * rate, MOST_TRIM_S * rate).astype(np.intp)
         runs = runs + np.stack([trim, -trim], axis=1)
-        runs = runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate]
-        return np.asarray(runs[gravity_turns(self._recording, runs) < TURNS_RAD_S])
+        is_long = runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate
+        runs, level = runs[is_long], level[is_long]
+        rests = gravity_turns(self._recording, runs) < TURNS_RAD_S
+        return (runs[rests & (level == k)] for k in range(len(levels)))
 
     def _learned(self) -> Limits:
         if self._windows is None:
