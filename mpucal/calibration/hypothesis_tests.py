@@ -19,17 +19,20 @@ from .theta import Prior
 
 K = BY_NAME["K"]
 MOST_STD = 4.0  # standard deviations of a normal deviate, beyond which chance explains nothing
-WALD_99 = 16.8  # scipy.stats.chi2.ppf(0.99, 6): below it, K is not significantly different from the identity
+RARE_STD = 2.326  # those that chance exceeds in one case of a hundred: enough for parameters that do no harm
 KNOWN = 0.5  # the data determine a parameter whose standard deviation they reduce to this share of the prior's
 LEAST_LEVER_M = 1e-3  # the axes of one chip are as far from each other
 
 
-def most_chi2(n: int) -> float:
-    """Return chi^2 of n degrees of freedom that chance exceeds as rarely as a normal deviate exceeds MOST_STD.
+def most_chi2(n: int, deviate: float = MOST_STD) -> float:
+    """Return chi^2 of n degrees of freedom that chance exceeds as rarely as a normal deviate exceeds `deviate`.
 
     Source: Wilson, Hilferty, PNAS 17 (1931).
     """
-    return n * (1.0 - 2.0 / (9.0 * n) + MOST_STD * math.sqrt(2.0 / (9.0 * n))) ** 3
+    return n * (1.0 - 2.0 / (9.0 * n) + deviate * math.sqrt(2.0 / (9.0 * n))) ** 3
+
+
+WALD_99 = most_chi2(len(K.names), RARE_STD)  # below it, K is not significantly different from the identity
 
 
 def wald(minimum: Minimum) -> float:
@@ -48,7 +51,7 @@ def undetermined(covariance: Vector) -> tuple[str, ...]:
 
 
 def find_lever_arm(problem: Problem, recording: Recording, flat: Flat, minimum: Minimum, prior: Prior) -> Vector | None:
-    """Return the lever arm r (3,) [m] that the data show beyond chance; None where the sensor turns in place.
+    """Return the lever arm r (3,) [m] that the data likely show; None where the sensor turns in place.
 
     The statistic is g' S^-1 g: g is the gradient by r at r = 0 and S its information, both less what the parameters of
     the estimate take of them. S^-1 g is the first step to r.
@@ -69,4 +72,4 @@ def find_lever_arm(problem: Problem, recording: Recording, flat: Flat, minimum: 
     S = at.fisher[np.ix_(r, r)] - at.fisher[np.ix_(r, others)] @ taken
     g = at.gradient[r] - taken.T @ at.gradient[others]
     step = np.linalg.lstsq(S, g, rcond=None)[0]
-    return np.asarray(-step) if g @ step > most_chi2(len(r)) and np.linalg.norm(step) > LEAST_LEVER_M else None
+    return np.asarray(-step) if g @ step > most_chi2(len(r), RARE_STD) and np.linalg.norm(step) > LEAST_LEVER_M else None

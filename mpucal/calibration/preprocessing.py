@@ -163,24 +163,36 @@ def jerk_density(sigma: float, lam: float) -> float:
 def smoothed_rates(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
     """Return rate and angular acceleration (n, 3) after the flat segment, for the acceleration by a lever arm.
 
-    Noise in a regressor biases the lever arm towards zero. The rates of a machine, which turns steadily, are smoothed
-    over more than SMOOTH_S: as long as that makes the error of the angular acceleration smaller, by Stein's unbiased
-    risk estimate (Annals of Statistics 9, 1981).
+    Noise of the angular acceleration biases the lever arm: towards zero by as much as it adds to its square, and away
+    from zero by half of what smoothing takes from that. The rates are smoothed over more than SMOOTH_S as long as that
+    makes the sum of both less: in a machine, which turns steadily.
     """
-    measured, half = recording.gyr - flat.b_omega, int(SMOOTH_S * recording.rate_hz)
+    measured, shortest = recording.gyr - flat.b_omega, int(SMOOTH_S * recording.rate_hz)
     # The times are smoothed as the rates are, since a computer's times jitter.
-    times = _kernel.moving_mean((recording.t - recording.t[0])[:, None], half)[:, 0]
-    least, rate = np.inf, measured
-    while True:
-        wider = _kernel.moving_mean(measured, half)
-        away = (wider - measured)[flat.last :]
-        step = away[2:] - away[:-2]  # of 2 samples, times the difference of the angular accelerations
-        # The noise of both is the same in part, if the window is shorter than the step.
-        shared = 4.0 * len(step) * flat.Sigma_omega.sum() / (2 * half + 1) if half < 2 else 0.0
-        risk = float(np.vdot(step, step)) + shared
-        if not risk < least:
-            return rate[flat.last :], np.gradient(rate, times, axis=0)[flat.last :]
-        least, rate, half = risk, wider, 2 * half + 1
+    times = _kernel.moving_mean((recording.t - recording.t[0])[:, None], shortest)[:, 0]
+
+    def smoothed(x: Vector, half: int) -> Vector:
+        once = _kernel.moving_mean(x, half)
+        # Twicing (J. W. Tukey) keeps the curvature that a mean over a long window loses.
+        return once if half == shortest else 2.0 * once - _kernel.moving_mean(once, half)
+
+    least, rate, half = np.inf, measured, shortest
+    while half < len(measured):
+        impulse = np.zeros((8 * half + 9, 1))
+        impulse[4 * half + 4] = 1.0
+        wider = smoothed(measured, half)
+        squares, of_noise = (np.sum(step**2) for step in (_steps(wider[flat.last :]), _steps(smoothed(impulse, half))))
+        of_noise *= flat.Sigma_omega.sum()
+        bias = of_noise - 0.5 * (squares / (len(wider) - flat.last) - of_noise)
+        if not bias < least:
+            break
+        least, rate, half = bias, wider, 2 * half + 1
+    return rate[flat.last :], np.gradient(rate, times, axis=0)[flat.last :]
+
+
+def _steps(x: Vector) -> Vector:
+    """Return differences over two samples, times which the rate is the angular acceleration."""
+    return np.asarray(x[2:] - x[:-2])
 
 
 def _shaken(recording: Recording, flat: Flat) -> Vector:
