@@ -72,4 +72,5 @@ def find_lever_arm(problem: Problem, recording: Recording, flat: Flat, minimum: 
     S = at.fisher[np.ix_(r, r)] - at.fisher[np.ix_(r, others)] @ taken
     g = at.gradient[r] - taken.T @ at.gradient[others]
     step = np.linalg.lstsq(S, g, rcond=None)[0]
-    return np.asarray(-step) if g @ step > most_chi2(len(r), RARE_STD) and np.linalg.norm(step) > LEAST_LEVER_M else None
+    is_likely = g @ step > most_chi2(len(r), RARE_STD) and np.linalg.norm(step) > LEAST_LEVER_M
+    return np.asarray(-step) if is_likely else None
