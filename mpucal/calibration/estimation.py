@@ -139,7 +139,7 @@ def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
         return before, NOTHING | {"model": model}
     fitted = _Fitted(recording, (flat, gravity, model))
     sensitivity = fitted.find_sensitivity()
-    if sensitivity is not None:
+    if sensitivity is not None and sensitivity.S.any():
         fitted = _Fitted(sensitivity.removed_from(recording, flat), (flat, gravity, model))
     fitted = without_changes(fitted)
     choice, plain = fitted.choice, fitted.choice.plain

@@ -55,8 +55,8 @@ def find_sensitivity(
 ) -> Sensitivity | None:
     """Return the sensitivity that the turns may show; None where they surely show none, or it does not explain them.
 
-    Nor is it estimated where the rests suffice. Its mean and covariance are those of a mixture: S with the weight
-    of its evidence among the explanations, else 0.
+    Nor is it estimated where the rests suffice. The mixture of S, with the weight of its evidence among the
+    explanations, and of 0 gives the covariance, and the mean to remove; that is 0 where 0 is likelier.
 
     fit : of any model with a gyroscope. explanations : of the fit, see hypotheses.py.
     """
@@ -93,10 +93,14 @@ def find_sensitivity(
         evidence = 0.5 * float(S.ravel() @ known @ S.ravel() - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
         if not evidence > -np.log(SURE):
             return None
+        if evidence < 0.0:  # it is not removed
+            break
     e = innovations(theta, S)
     if not 3.0 * (e @ e) < MOST_NIS * len(e):
         return None
     weight = np.exp(evidence - np.logaddexp(others, evidence))
+    removed = weight if weight > 0.5 else 0.0
     carried, s = C[:HAND, HAND:] @ known, S.ravel()
-    covariance = weight * (C[HAND:, HAND:] + (1.0 - weight) * np.outer(s, s))
-    return Sensitivity(weight * S, carried @ covariance @ carried.T)
+    left = weight * (1.0 - removed) ** 2 + (1.0 - weight) * removed**2
+    covariance = weight * C[HAND:, HAND:] + left * np.outer(s, s)
+    return Sensitivity(removed * S, carried @ covariance @ carried.T)
