@@ -1245,6 +1245,8 @@ def test_a_temperature_is_kept_everywhere(walk, table, tmp_path):
         assert mpucal.load(tmp_path / name).sensor.temperature_c == pytest.approx(31.0)
     assert mpucal.calibrate(tmp_path / "own.csv").sensor.temperature_c == pytest.approx(31.0)
     assert mpucal.load(tmp_path / "counts.csv").sensor.temperature_c is None
+    named = Hints(columns=parse_columns(f"t=t,{','.join(f'{axis}={axis}' for axis in AXES.strip().split(','))}"))
+    assert load(tmp_path / "other.csv", named).sensor.temperature_c == pytest.approx(31.0)
 
 
 @pytest.fixture(scope="module")

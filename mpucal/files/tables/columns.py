@@ -43,9 +43,12 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
     ------
     RecordingError : it has no column that the user names, or none of them is known to be an accelerometer.
     """
-    if hints.columns:
-        return columns_by_hint(table, hints.columns), ""
     columns, remark = table.columns, ""
+    if hints.columns:
+        chosen = columns_by_hint(table, hints.columns)
+        taken = {column.place for column in chosen}
+        warm = [c for c in columns if c.quantity == TEMPERATURE and c.place not in taken]
+        return chosen + warm, remark
     named, clocks = names_both(columns), table.clocks(columns)
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if not (named and (clocks or hints.rate_hz)):
