@@ -47,13 +47,14 @@ class Reading:
 
 
 def accelerations(
-    values: Vector, said: str, hints: Hints, name: str, *, beside: str = "", rate_hz: float = math.inf
+    values: Vector, said: str, hints: Hints, name: str, *, beside: str | None = None, rate_hz: float = math.inf
 ) -> Reading:
     """Return (n, 3) accelerations, in the unit `said` by the file, in SI units.
 
     Parameters
     ----------
-    beside : the unit of the rates that their turning shows, COUNTS if it is none; empty if it shows nothing.
+    beside : the unit of the rates that their turning shows, COUNTS if it is none; empty if they do not turn it;
+        None if that is not known.
     rate_hz : of the samples, of which these may be increments.
     """
     said = hints.units.get("acc", said)
@@ -65,7 +66,7 @@ def accelerations(
         )
     size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
     whole = not said and units.are_counts(values)
-    likely_whole = _whole_unit(size, beside) if whole and seen == "mg" else ""
+    likely_whole = _whole_unit(size, beside or "") if whole and seen == "mg" else ""
     unclear = not seen or hints.accel_range_g or likely_whole == COUNTS
     if whole and _away(size, "mm/s^2") < NEAR and beside != COUNTS and not hints.accel_range_g:
         by = "(by |a|; if these are in 0.1 mg or counts, give --units acc=mg/10 or acc=counts)"
@@ -74,21 +75,23 @@ def accelerations(
         return _scaled_counts(values, hints, name, size, OR_MG if likely_whole and not beside else BY_SIZE)
     at_rest = units.quietest(values)
     near = "" if seen or said else units.mean_acceleration_unit(values) or units.acceleration_unit(at_rest)
-    if near:
+    lacks_gravity = not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2
+    if near and (beside != "" or not lacks_gravity):
         raise RecordingError(
             f"{name}: |a| varies too much to show its unit; on average, or at rest, it would be gravity in {near}",
             f"name the unit with --units acc={near}",
             f"--units acc={near}",
         )
-    if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
+    if lacks_gravity:
         increments = f"--units acc={OF_INCREMENTS}" if units.is_gravity(size * rate_hz) else ""
-        of_g = "--units acc=g" if not said and units.is_gravity(size * QUANTITIES["acc"]["g"]) else ""
+        likely = not said and units.is_gravity(size * QUANTITIES["acc"]["g"])
+        of_g = f"--units acc={near or 'g'}" if near or likely else ""
         raise RecordingError(
             f"{name}: the median |a| is only {f'{size:.3g} {said}'.strip()}, so gravity is not in it",
             "give the accelerometer's own values, not the linear acceleration computed from them"
             + f", or {increments} (or deg/sample) if these are increments of velocity and angle" * bool(increments)
-            + f", or {of_g} if these are in g" * bool(of_g),
-            increments or of_g,
+            + f", or {of_g} if these are in {near or 'g'}" * bool(of_g),
+            increments or (of_g if likely else ""),
         )
     likely = units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
     likely = likely or not (values == np.rint(values)).all()
