@@ -128,19 +128,19 @@ class Aim:
     by_sides: bool = False
 
 
-NORMAL, BEST = "normal", "best"
+QUICK, NORMAL, BEST = "quick", "normal", "best"
 AIMS: Mapping[str, Aim] = {
-    "quick": Aim(Target(0.3, 0.15, 3.0), least=8, longest_s=60.0, verify=2),
+    QUICK: Aim(Target(0.3, 0.15, 3.0), least=8, longest_s=60.0, verify=2),
     NORMAL: Aim(Target(0.1, 0.05, 1.0), least=ENOUGH_ORIENTATIONS, longest_s=120.0, verify=3),
     BEST: Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
 }
 # Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
 # quarter turn from the last, about another axis. They show what its parameters hold best, biases and scale factors. One
 # more, tilted, gives with the gyroscope the angles between the axes. One new orientation verifies a first calibration
-# that is good, and two verify one with reservations, of which a slip may be the cause.
+# that is good; one with reservations, of which a slip may be the cause, is verified as often as a board's quickest.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
-VERIFY_GOOD, VERIFY_DOUBTED = 1, 2
+VERIFY_GOOD = 1
 # Its parameters hold no angles between the axes, which need only be so well known that the biases are.
 STRICTER, LOOSER = 0.7, 6.0
 

@@ -10,7 +10,7 @@ from ..data import Samples
 from ..reasons import KINDS, Reason, reason
 from ..result.calibration import GOOD, REFUSED
 from . import events
-from .aims import AIMS, NORMAL, SAME_RAD, VERIFY_DOUBTED, Aim, Coverage, Directions, unseen_rad
+from .aims import AIMS, NORMAL, QUICK, SAME_RAD, Aim, Coverage, Directions, unseen_rad
 from .plan import Plan
 from .step import ENOUGH, HOLD_S, MEANT_RAD, PATIENCE_S, USE_TEXTS, VERIFY_PATIENCE_S, WAIT_S, Pause, PoseStep
 
@@ -147,7 +147,7 @@ class Verify(NewPoses):
     def _tried(self, tried: events.Tried) -> events.Outputs:
         """Take the first calibration; one that is refused needs no verification."""
         if tried.verdict != GOOD and not self._closed:
-            self._of = max(self._of, VERIFY_DOUBTED)
+            self._of = max(self._of, AIMS[QUICK].verify)
         if tried.verdict != REFUSED or tried.reason is None:
             return []
         self.checked = events.Checked((), False, tried.reason)

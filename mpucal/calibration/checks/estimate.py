@@ -31,7 +31,7 @@ def few_orientations(e: Evidence) -> Reason | None:
     where a hand held it in many: then it moved as it rested, with the hand or with the ground.
     """
     rms = _model_rms(e)
-    if likely_slip(e) is not None or were_exchanged(e) or (rms is not None and rms <= GOOD_RMS_MPS2):
+    if likely_slip(e) is not None or exchange(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
         return None
     if e.uncertainty is None or rms is None:
         return reason("few_orientations", "nothing_known")
@@ -84,8 +84,8 @@ def inconsistent(e: Evidence) -> Reason | None:
     fit = e.estimate
     if e.uncertainty is None:
         return None
-    if were_exchanged(e) and e.exchanged is not None:
-        return reason("inconsistent", "change", True, begin=e.exchanged[0], end=e.exchanged[1])
+    if (span := exchange(e)) is not None:
+        return reason("inconsistent", "change", True, begin=span[0], end=span[1])
     if fit.spread_mps2 > CHANGED_MPS2:
         return reason("inconsistent", "rests", spread=fit.spread_mps2)
     # A robust model leaves outliers in its innovations: its parts judge it, or its uncertainty has grown by them.
@@ -136,10 +136,13 @@ def likely_slip(e: Evidence) -> Slip | None:
     return slip if left < MOST_MISS_RAD and e.gravity * norm(slip.delta) > GOOD_RMS_MPS2 else None
 
 
-def were_exchanged(e: Evidence) -> bool:
-    """Return True if axes were exchanged midway; a calibration that is good leaves no doubt of them."""
+def exchange(e: Evidence) -> tuple[float, float] | None:
+    """Return times [s since the recording's start] between which axes were exchanged, or None.
+
+    A calibration that is good leaves no doubt of them.
+    """
     is_good = e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2
-    return not is_good and e.exchanged is not None
+    return None if is_good else e.exchanged
 
 
 def _is_useless(e: Evidence) -> bool:

@@ -17,7 +17,7 @@ from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
 from ..rotation import signed_permutations
 from ..transitions import MOST_MISS_RAD
-from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, inconsistent, likely_slip, were_exchanged
+from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, exchange, inconsistent, likely_slip
 
 WORST_AXES_RAD = np.deg2rad(60.0)
 # Of all three scale factors alike: data sheets say 3 %, and chips that were soldered by hand are within 5 %; beyond
@@ -100,7 +100,7 @@ def gyro_contradicts(e: Evidence) -> Reason | None:
 
     A slip of the mount explains that by itself, and so do axes that were exchanged midway.
     """
-    if likely_slip(e) is not None or were_exchanged(e):
+    if likely_slip(e) is not None or exchange(e) is not None:
         return None
     if is_trustworthy(e) and e.uncertainty is not None:
         # Where white noise explains the samples, the rates carry gravity to each of them.
@@ -153,7 +153,7 @@ def sensors_lag(e: Evidence) -> Reason | None:
     """Find an accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters explain."""
     if e.claim is None or e.recording.sensor.origin is Origin.VEHICLE:
         return None
-    if e.claim.change is not None or were_exchanged(e):  # a sensor that changed looks late
+    if e.claim.change is not None or exchange(e) is not None:  # a sensor that changed looks late
         return None
     (of_prior,) = BY_NAME["tau"].sd
     std = float(replace(e.estimate, covariance=e.claim.covariance).std("tau")[0])
