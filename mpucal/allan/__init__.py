@@ -11,6 +11,7 @@ from ..chip.families import part_named
 from ..data import RUN, STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from ..origin import name_thing
+from ..result.comparison import WARMER_C
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
 from .model import fit_coefficients
 from .trace import Octaves, Spectrum, Trace, find_steps, find_turn
@@ -20,8 +21,8 @@ __all__ = ["NoiseMeter", "noise_of"]
 AXES = tuple(f"{sensor} {axis}" for sensor in (ACCELEROMETER, GYROSCOPE) for axis in "xyz")
 UNITS = tuple(unit for unit in ("m/s²", "rad/s") for _ in "xyz")
 LEAST_SAMPLES = 256
-# degrees Celsius of a change that is reported; correlation of an axis with it that is reported
-WARMED_C, CORRELATED = 2.0, 0.7
+# correlation of an axis with a change of temperature that is reported
+CORRELATED = 0.7
 # rms over the white noise of a sample: a weaker tone is hidden
 LEAST_TONE = 0.05
 
@@ -146,7 +147,7 @@ class NoiseMeter:
             moved = name_thing("the board was moved, or its bias jumped", self._sensor.origin)
             found.append({"code": "step", "message": f"{what}: {moved}"})
         T = course[:, 6]
-        if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > WARMED_C:
+        if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > WARMER_C:
             found.append({"code": "temperature", "message": _temperature_sentence(course[np.isfinite(T)])})
         return found
 

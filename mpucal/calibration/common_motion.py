@@ -26,7 +26,7 @@ from .fit import Fit
 from .hypothesis_tests import most_chi2
 from .parameters import ACCELEROMETER, BY_NAME, MODELS, PLACES
 from .preprocessing import HUBER, smoothed_rates
-from .rotation import cross
+from .rotation import cross, nearest_rotation
 from .sampling import STAYS_S
 from .transitions import REWEIGHTED
 from .uncertainty import UncertaintyClaim
@@ -86,8 +86,7 @@ def _compare(first: Evidence, by: Fit, other: Evidence, own: Fit) -> Fit | None:
     # D is in the axes in which its own gyroscope's K is symmetric: Q turns those of the first one into them.
     later = np.concatenate([np.zeros((len(t), 3, 3)), -alpha[:, :, None]], axis=2)
     M, of_M = _solve([_axis(axis, t, here.gyr[near], rates, later, here.sensor.steps[1], n) for axis in range(3)])
-    U, _, Vt = np.linalg.svd(own.K @ M[:9].reshape(3, 3) @ np.linalg.inv(by.K))
-    Q = U @ Vt
+    Q = nearest_rotation(own.K @ M[:9].reshape(3, 3) @ np.linalg.inv(by.K))
     D = D @ Q.T
     in_own_axes = _of_D_and_b_a(np.kron(np.eye(3), Q), np.eye(3))
     by_M = (0.5 * cross(np.eye(3)) @ Q).reshape(3, 9)  # of the small turn that an error of M is for Q

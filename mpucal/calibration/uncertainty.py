@@ -14,12 +14,12 @@ from typing import Literal
 import numpy as np
 
 from ..data import Vector
+from ..result.blob import is_invertible
 from .fit import Fit
 from .hypotheses import Explanation, Kind
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere
 
-LEAST_DETERMINANT = 1e-6  # a D of less is singular
 # Nothing is known better than this where a change of the gyroscope's bias was removed: it is interpolated linearly.
 FLOOR_MPS2 = 5e-5
 MOST_NIS = 5.0  # NIS of a model that explains the data; 3 is expected
@@ -151,9 +151,9 @@ def claim_uncertainty(
 
 def is_usable(fit: Fit) -> bool:
     """Return True if D is finite and regular, and the covariance finite."""
-    if not (np.isfinite(fit.covariance).all() and np.isfinite(fit.D).all()):
-        return False
-    return not abs(np.linalg.det(fit.D)) < LEAST_DETERMINANT
+    return bool(np.isfinite(fit.covariance).all() and np.isfinite(fit.D).all()) and is_invertible(
+        fit.D.ravel().tolist()
+    )
 
 
 def inflate(fit: Fit, claim: UncertaintyClaim | None) -> Fit:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..clocks.sample_clock import MISSING_INTERVALS
 from ..data import Recording, Vector
 from ..origin import Origin
 from ..rests.flat import Flat
@@ -26,8 +27,6 @@ from .transitions import by_accelerometer, miss_jacobians
 # Errors in no covariance: a mounting is not perfectly stiff, and the gyroscope's bias wanders during the turning.
 FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02)
 LEAST_REST_S, BLOCK_S = 0.75, 0.25
-# In longer intervals of a vehicle, in periods, a sample is missing, or its time is late: their turn is not known.
-LONG = 1.5
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def _verify(
     miss_var += float(y_var.sum() + z_var.sum()) / gravity**2
     direction = math.asin(min(float(np.linalg.norm(miss)), 1.0))
     direction_std = math.hypot(math.sqrt(miss_var), FLOOR_RAD)
-    late = np.where(dt > LONG / r.rate_hz, dt - 1.0 / r.rate_hz, 0.0)
+    late = np.where(dt > MISSING_INTERVALS / r.rate_hz, dt - 1.0 / r.rate_hz, 0.0)
     unsure_rad = float(late @ np.linalg.norm(rates, axis=1)) if r.sensor.origin is Origin.VEHICLE else 0.0
     clipped = bool(r.gyr_clipped[between].any() or r.gap[b : c + 1].any())
     return NewOrientation(

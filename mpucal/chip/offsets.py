@@ -140,10 +140,10 @@ STEPS = (256, 320, 384)
 LARGEST_TO_STEP_UP = WORD.max - max(STEPS)
 
 SCALES_LSB_PER_G = (2048.0, 4096.0)
-# The accelerometer's own scale is within 3 %.
-TOLERANCE = 0.15
-# Half of the smallest step [g], and the largest difference between two readings of a board at rest [g].
-LEAST_SHIFT_G, MOTION_G = 0.03, 0.006
+# Share of a step by which a measured one may differ: the accelerometer's own scale is within 3 %.
+TOLERANCE = 0.1
+# The largest difference between two readings of a board at rest [g].
+MOTION_G = 0.006
 
 
 @dataclass(frozen=True)
@@ -184,8 +184,8 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
                 "the board moved while its offset registers were tried", "put it on a firm surface and let go of it"
             )
         shift = during - (before + after) / 2
-        if (np.abs(shift) > LEAST_SHIFT_G).any():
-            return _identify_scale(place, shift / np.array(word_difference(probe.words, old.words)))
+        if (np.abs(shift) > min(STEPS) / max(SCALES_LSB_PER_G) / 2).any():
+            return _identify_scale(place, shift, np.array(word_difference(probe.words, old.words)))
     raise UnknownOffsets(
         "the accelerometer does not respond to its offset registers, neither at "
         + " nor at ".join(f"0x{place[0]:02x}" for place in PLACES),
@@ -193,11 +193,16 @@ def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likel
     )
 
 
-def _identify_scale(place: Place, g_per_lsb: Vector) -> OffsetResponse:
+def is_as_written(shift_g: Vector, written_g: Vector) -> bool:
+    """Return True if readings at rest changed by (3,) g as the registers did, but for motion and the sensor's scale."""
+    return bool((np.abs(shift_g - written_g) <= MOTION_G + TOLERANCE * np.abs(written_g)).all())
+
+
+def _identify_scale(place: Place, shift_g: Vector, counts: Vector) -> OffsetResponse:
     for scale in SCALES_LSB_PER_G:
-        if (np.abs(g_per_lsb * scale - 1) < TOLERANCE).all():
-            return OffsetResponse(place, scale, g_per_lsb)
-    per_256 = ", ".join(f"{256_000 * value:+.0f}" for value in g_per_lsb)
+        if is_as_written(shift_g, counts / scale):
+            return OffsetResponse(place, scale, shift_g / counts)
+    per_256 = ", ".join(f"{256_000 * value:+.0f}" for value in shift_g / counts)
     raise UnknownOffsets(
         f"256 counts in the offset registers at 0x{place[0]:02x} have an effect of {per_256} mg; known chips have 125"
         " or 62.5",

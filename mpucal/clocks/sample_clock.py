@@ -29,6 +29,8 @@ from .piecewise_rate import fit_lines, merge_equal_slopes
 NS = 1e-9
 # a time between two samples that is longer than this number of intervals is a gap
 GAP_INTERVALS = 2.5
+# in a longer time a sample is missing, or its time is late
+MISSING_INTERVALS = 1.5
 Whole = NDArray[np.int64]
 
 # PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %. So is an RC oscillator; a ceramic resonator is

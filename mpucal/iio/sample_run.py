@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chip.bit_flips import BitFlipFilter
-from ..clocks.sample_clock import NS
+from ..clocks.sample_clock import MISSING_INTERVALS, NS
 from ..data import Samples, Vector
 from .attributes import USUAL_BITS, SensorScale
 
-# Samples are missing if the next one is so many intervals later.
-GAP_INTERVALS = 1.5
 # A row of both sensors: three counts and a mark of each.
 ROW = 8
 
@@ -140,7 +138,9 @@ class SampleRun:
     def _gaps(self, t_ns: Times) -> np.ndarray:
         """Return (n,) True where the buffer dropped samples; polling has no fixed interval."""
         steps = np.diff(t_ns, prepend=t_ns[0] if self._last_ns is None else self._last_ns)
-        longest_ns = math.inf if self.rate_hz is None or len(self.widths) > 2 else GAP_INTERVALS * 1e9 / self.rate_hz
+        longest_ns = (
+            math.inf if self.rate_hz is None or len(self.widths) > 2 else MISSING_INTERVALS * 1e9 / self.rate_hz
+        )
         gaps = np.asarray(steps > longest_ns)
         gaps[0] |= self.gap_next
         self._last_ns, self.gap_next = int(t_ns[-1]), False

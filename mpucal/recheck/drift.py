@@ -16,6 +16,7 @@ import numpy as np
 
 from ..data import Vector
 from ..result.calibration import Calibration
+from ..result.comparison import WARMER_C
 from ..result.correlation import UPPER, standard_deviations
 from ..result.error_model import MG_PER_MPS2
 from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, E, G
@@ -60,8 +61,6 @@ REPEATED = Spread(0.7 / MG_PER_MPS2, 3e-4, 2e-4, math.radians(0.02), math.radian
 WALK_MPS2, WALK_MOST_MPS2 = 0.1 / MG_PER_MPS2, 2.0 / MG_PER_MPS2
 # Standard deviation of a change of temperature that is not known.
 UNKNOWN_C = 3.0
-# A smaller change of temperature is within the thermometer's error, or that of a chip that warms unevenly.
-LEAST_C = 2.0
 # Change in one degree Celsius, by kind of chip.
 BY_TEMPERATURE: Mapping[str, Spread] = {
     "MPU-6050": Spread(0.5 / MG_PER_MPS2, 2e-4, gyro_bias=math.radians(0.16), gyro_scale=2e-4),
@@ -140,6 +139,6 @@ def temperature_covariance(calibration: Calibration, change_c: float) -> Vector:
 def hypotheses(calibration: Calibration, change_c: float | None) -> dict[str, tuple[float, Vector]]:
     """Return the prior probability of each hypothesis and the covariance (23, 23) that it adds to theta."""
     all_ = {name: (prior, spread.covariance()) for name, (prior, spread) in HYPOTHESES.items()}
-    if change_c is not None and abs(change_c) >= LEAST_C:
+    if change_c is not None and abs(change_c) >= WARMER_C:
         all_[TEMPERATURE] = TEMPERATURE_PRIOR, temperature_covariance(calibration, change_c)
     return all_

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import islice
@@ -42,7 +43,7 @@ FORMATS = [
 CHECKSUM = struct.Struct("<I")
 LENGTHS = [form.size + CHECKSUM.size for form in FORMATS]
 
-# limits of D's largest element, and of its determinant over the cube of that element
+# limits of a matrix' largest element, and of its determinant over the cube of that element
 LEAST_GAIN, MOST_GAIN = 1e-3, 1e3
 LEAST_DETERMINANT = 1e-6
 
@@ -154,7 +155,8 @@ def _check_usable(blob: Blob) -> None:
             raise BlobError(f"{name} has {len(values)} numbers, not {count}")
         if name in ("D", "b_a", "applied_b_a") and not all(map(math.isfinite, values)):
             raise BlobError(f"{name} holds a number that is not finite")
-    _check_invertible(blob.D)
+    if not is_invertible(blob.D):
+        raise BlobError("D has no inverse")
     for name in ("accel_range_g", "gyro_range_dps"):
         if not 0.0 <= getattr(blob, name) < math.inf:
             raise BlobError(f"{name} is {getattr(blob, name)}, which is neither a range nor 0")
@@ -162,12 +164,12 @@ def _check_usable(blob: Blob) -> None:
         raise BlobError(f"gyro_counts is {blob.gyro_counts}, which is not a number of counts")
 
 
-def _check_invertible(D: tuple[float, ...]) -> None:
-    a, b, c, d, e, f, g, h, i = D
+def is_invertible(matrix: Iterable[float]) -> bool:
+    """Return True if nine numbers, by row, are a matrix that a calibration may hold: every reader inverts it."""
+    a, b, c, d, e, f, g, h, i = numbers = tuple(matrix)
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    most = max(map(abs, D))
-    if not LEAST_GAIN <= most <= MOST_GAIN or not abs(determinant) > LEAST_DETERMINANT * most**3:
-        raise BlobError("D has no inverse")
+    most = max(map(abs, numbers))
+    return LEAST_GAIN <= most <= MOST_GAIN and abs(determinant) > LEAST_DETERMINANT * most**3
 
 
 def _unix_seconds(created: str) -> int:

@@ -26,13 +26,12 @@ import numpy as np
 
 from ..arguments import LARGEST, LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import Sensor, Vector
+from .blob import is_invertible
 from .correlation import KEY, LOWER, from_lower
 from .keys import ACCELEROMETER_FORMULA, ARRAYS, FORMAT, GYROSCOPE_FORMULA, VERSION, Extra
 
 # written if b_a(T) is known
 TEMPERATURE = ("b_a_slope", "b_a_slope_std", "temperature_range_c")
-# the largest condition number of a matrix near the identity
-WORST_CONDITION = 1e9
 # fromisoformat would accept any character between date and time
 DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}([T ][0-9:]{5,8}([.,][0-9]{1,9})?(Z|[+-][0-9:]{2,8})?)?")
 DIGEST, CREATED, HARDWARE = "digest", "created", "applied_in_hardware"
@@ -130,7 +129,7 @@ def _is_usable(name: str, array: Vector) -> bool:
     """Return False for a matrix that must be inverted and cannot be; a wholly unknown one is usable."""
     if name not in ("D", "K") or np.isnan(array).all():
         return True
-    return bool(np.isfinite(array).all() and np.linalg.cond(array) <= WORST_CONDITION)
+    return bool(np.isfinite(array).all()) and is_invertible(array.ravel().tolist())
 
 
 def _check_numbers(document: Mapping[str, Any]) -> None:

@@ -16,12 +16,12 @@ import numpy as np
 from ..chip.access import Bus
 from ..chip.families import PARTS, part_named
 from ..chip.offsets import (
-    MOTION_G,
     PLACES,
     OffsetRegisters,
     OffsetResponse,
     Place,
     Words,
+    is_as_written,
     measure_offset_response,
     restore,
     shift_words,
@@ -47,8 +47,6 @@ FORMAT, REGISTERS = "mpucal.chip_offsets", "registers"
 
 # m/s^2: error of gravity with the calibration of this chip, in any orientation
 GRAVITY_MPS2 = 0.2
-# relative tolerance of a measured step, besides MOTION_G: the accelerometer's scale is known to 3 %
-SHIFT_SHARE = 0.1
 
 VOLATILE = (
     "these registers are volatile: after a power cycle or reset the factory trim returns,"
@@ -255,8 +253,7 @@ def saved_blocks(path: Path) -> list[OffsetRegisters]:
 
 def check_shift(shift: Vector, expected: Vector, remedy: str) -> None:
     """Raise ChipError if samples at rest changed by (3,) m/s^2, other than `expected` of what was written."""
-    limit = MOTION_G * STANDARD_GRAVITY_MPS2 + SHIFT_SHARE * np.abs(expected)
-    if (np.abs(shift - expected) > limit).any():
+    if not is_as_written(shift / STANDARD_GRAVITY_MPS2, expected / STANDARD_GRAVITY_MPS2):
         raise ChipError(
             f"the samples changed by ({mg_text(shift)}) mg, but ({mg_text(expected)}) mg were written", remedy
         )

@@ -100,7 +100,7 @@ def test_without_uncertainties_nothing_is_claimed():
     ("change", "says"),
     [
         ({"sensor": Sensor(who_am_i=0x70)}, "of two chips"),
-        ({"sensor": Sensor(temperature_c=40.0)}, "mpucal merge"),
+        ({"sensor": Sensor(temperature_c=22.5)}, "mpucal merge"),
         ({"fit": {"gravity": 9.81}}, r"scale factors by \+0.034 %"),
         ({"extra": {"autopilot": {"params_old": {"INS_ACCOFFS_X": 1.0}}}}, "parameters of the autopilot"),
     ],

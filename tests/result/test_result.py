@@ -124,6 +124,15 @@ def test_files_that_hold_no_calibration(tmp_path, name, content, says):
     assert str(tmp_path / name) in str(raised.value)
 
 
+@pytest.mark.parametrize("D", [np.diag([1.0, 1.0, 1e-7]), 1e-4 * np.eye(3)], ids=["nearly singular", "tiny"])
+def test_a_document_holds_no_matrix_that_a_blob_may_not_hold(calibration, tmp_path, D):
+    with pytest.raises(ValueError, match="D has no inverse"):
+        replace(calibration, D=D).save(tmp_path / "a.bin")
+    document = calibration.document() | {"accelerometer": {"D": D.tolist(), "b_a": [0, 0, 0]}}
+    with pytest.raises(ValueError, match="D cannot be inverted"):
+        Calibration.from_document(document)
+
+
 def test_places_that_cannot_be_read_or_written(calibration, tmp_path):
     with pytest.raises(RecordingError, match="No such file"):
         Calibration.load(tmp_path / "none.json")

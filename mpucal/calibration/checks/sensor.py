@@ -15,7 +15,7 @@ from ...result.error_model import sensor_axes
 from ..evidence import Evidence, once
 from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
-from ..rotation import signed_permutations
+from ..rotation import nearest_rotation, signed_permutations
 from ..transitions import MOST_MISS_RAD
 from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, exchange, inconsistent, likely_slip
 
@@ -54,8 +54,7 @@ def scale_factors(e: Evidence) -> Reason | None:
 
 def axes(e: Evidence) -> Reason | None:
     """Find axes that are mirrored or swapped relative to the gyroscope's."""
-    U, _, Vt = np.linalg.svd(e.estimate.D)
-    Q = U @ Vt
+    Q = nearest_rotation(e.estimate.D)
     if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
         return None
     return _named_axes(e, max(signed_permutations(), key=lambda M: float(abs(np.sum(M * Q)) + 0.01 * np.trace(M))))
