@@ -8,7 +8,7 @@ in reasons.toml and a check. `python -m tools.make pages` makes docs/reasons.md 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Required, Self, TypedDict
@@ -92,6 +92,7 @@ class Kind:
     refused_when: str = ""
     turn_again: bool = False
     of_the_sensor: bool = False
+    explained_by: Collection[str] = ()
 
     @classmethod
     def of(cls, rows: Mapping[str, Any]) -> Self:
@@ -123,6 +124,11 @@ def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: Any)
     decided = bool(refuse if row.refuse is None else row.refuse)
     span = (float(numbers["begin"]), float(numbers["end"])) if row.divides else None
     return Reason(code, row.what.format(**numbers), row.remedy.format(**numbers), decided, span)
+
+
+def is_explained(code: str, codes: Collection[str]) -> bool:
+    """Return True if a reason among others, by their codes, is their consequence, and is not told."""
+    return any(other in codes for other in KINDS[code].explained_by)
 
 
 # after a reason against the gyroscope, or against a part of the recording, where an estimate is possible without it

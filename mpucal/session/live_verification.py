@@ -14,7 +14,7 @@ from ..calibration.hypothesis_tests import MOST_STD
 from ..calibration.verification import NewOrientation
 from ..data import Recording, Vector
 from ..origin import Origin
-from ..reasons import Reason, ReasonFound, reason
+from ..reasons import KINDS, Reason, ReasonFound, is_explained, reason
 from ..rests.intervals import RestFinder
 from ..result.calibration import REFUSED, USABLE, Calibration
 from ..result.error_model import AXES
@@ -25,8 +25,9 @@ from .rotate import REST_S
 # A shorter turn shows too little of a scale factor error to blame one.
 LONG_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
-# Reasons beside which more orientations do not help, and the reason that asks for some.
-CONTRADICTIONS, FEW = ("inconsistent", "zero_moved"), "few_orientations"
+# The reason that asks for more orientations, and those beside which they do not help.
+FEW = "few_orientations"
+CONTRADICTIONS = KINDS[FEW].explained_by
 MUCH_CLIPPED = 0.002
 _IN_DOCUMENT = "down", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "agrees"
 
@@ -199,12 +200,11 @@ def _reasons_of_both(first: Reason, verified: bool, final: Sequence[ReasonFound]
     """Return the reason against the first fit or its verification, and those against the final fit, without conflict.
 
     The final fit has seen more: it knows better how the sensor changed, unless the first one was compared with new
-    orientations. If the sensor changed, orientations are not few.
+    orientations.
     """
     reasons = [first.document(), *(each for each in final if each["code"] != first.code)]
-    if first.code not in (FEW, *CONTRADICTIONS):
-        return reasons
-    if not verified and any(each["code"] in CONTRADICTIONS for each in final):
+    knows_better = not verified and first.code in (FEW, *CONTRADICTIONS)
+    if knows_better and any(each["code"] in CONTRADICTIONS for each in final):
         reasons = list(final)
-    changed = any(each["code"] in CONTRADICTIONS for each in reasons)
-    return [each for each in reasons if not (changed and each["code"] == FEW)]
+    codes = {each["code"] for each in reasons}
+    return [each for each in reasons if not is_explained(each["code"], codes)]

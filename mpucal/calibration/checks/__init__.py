@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Literal, NamedTuple
 
-from ...reasons import Reason
+from ...reasons import Reason, is_explained
 from ..evidence import Evidence, once
 from . import bits, estimate, recording, sensor, unusable
 from .sensor import is_trustworthy
@@ -93,14 +93,15 @@ def find_gyroscope_fault(e: Evidence) -> Reason | None:
 
 @once
 def find_reasons(e: Evidence) -> list[Reason]:
-    """Return all reasons against an estimate, those that refuse it first."""
+    """Return all reasons against an estimate that no other explains, those that refuse it first."""
     of_rests = e.model == "static"
     if not of_rests and (only := [*_found(e, (NO_GYROSCOPE, OTHER_RANGE))]):
         return [only[0], *e.against_rests]
     # A fit with the gyroscope exists only where the recording is usable.
     rows = [row for row in TABLE if not (row.of_gyroscope if of_rests else row.unusable and e.fit is not None)]
     reasons = [known for known in (e.gyroscope, e.changed) if known is not None] + [*_found(e, rows)]
-    return sorted(reasons, key=lambda reason: not reason.refuse)
+    codes = {each.code for each in reasons}
+    return sorted((each for each in reasons if not is_explained(each.code, codes)), key=lambda each: not each.refuse)
 
 
 def is_unusable(e: Evidence) -> bool:

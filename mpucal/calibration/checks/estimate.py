@@ -18,20 +18,21 @@ from .recording import SEPARABLE_HZ
 # Claimed uncertainty, 1 sigma, of a good and of a usable calibration: errors above 0.1 m/s^2 are then rare.
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
 # How far |a| strays, in units of its change of course within 10 ms, and this change. In hands, also behind a filter,
-# they are at most 30, or at least 0.013 m/s^2; in a fusion filter's gravity at least 76, and at most 0.005 m/s^2.
-SMOOTH, LEAST_BENT_MPS2 = 40.0, 0.008
+# they are at most 30, or at least 0.013 m/s^2, and of a quiet sensor on a machine's arm at most 57; in the gravity of a
+# fusion filter at least 76, and at most 0.005 m/s^2.
+SMOOTH, LEAST_BENT_MPS2 = 66.0, 0.008
 # Errors of readings by a change of the sensor: smaller ones are not reported, larger ones of its matrix refused.
 LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 
 
 def few_orientations(e: Evidence) -> Reason | None:
-    """Find directions that the data leave open, where the model holds.
+    """Find directions that the data leave open.
 
-    More orientations do not help where a slip, another change, or a contradiction decides what is known. Nor do they
-    where a hand held it in many: then it moved as it rested, with the hand or with the ground.
+    More orientations do not help where a hand held it in many: then it moved as it rested, with the hand or with the
+    ground.
     """
     rms = _model_rms(e)
-    if likely_slip(e) is not None or exchange(e) is not None or (rms is not None and rms <= GOOD_RMS_MPS2):
+    if rms is not None and rms <= GOOD_RMS_MPS2:
         return None
     if e.uncertainty is None or rms is None:
         return reason("few_orientations", "nothing_known")
@@ -41,10 +42,7 @@ def few_orientations(e: Evidence) -> Reason | None:
     known = max(rms, e.uncertainty.rms_mps2) if _is_useless(e) else rms
     if known >= e.gravity:
         return reason("few_orientations", "not_observable", side=side)
-    contradicted = contradiction(e) is not None
-    if contradicted and e.claim is not None and e.claim.worst is not None:
-        return None
-    if e.model == "hand" and e.was_held_all_around and not contradicted:
+    if e.model == "hand" and e.was_held_all_around and contradiction(e) is None:
         return reason("inconsistent", "moved", _is_useless(e), rms=known)
     return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
 
