@@ -35,8 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for variable, one in ONE_THREAD.items():
         os.environ.setdefault(variable, one)
     _keep_streams()
-    # nearly every object lives as long as the program or ends with its last reference: few cycles, looked for seldom
-    gc.set_threshold(50_000)
+    # nearly every object lives as long as the program or ends with its last reference: few cycles, looked for seldom,
+    # and what a module made is not looked at again
+    gc.set_threshold(50_000, 1_000)
     # SIGTERM and SIGHUP end a command as Ctrl-C does
     if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -213,11 +213,6 @@ def is_suffix(suffix: str) -> bool:
     return any(row.is_read and row.suffix == suffix.lower() for row in FORMATS)
 
 
-def is_of_session(name: str) -> bool:
-    """Return True if a file of this name is in a format of session captures."""
-    return any(row.session and row.suffix == Path(name).suffix.lower() for row in FORMATS)
-
-
 def readable_formats() -> str:
     """Return the formats that can be read, as text."""
     return _list_formats(row for row in FORMATS if row.is_read)

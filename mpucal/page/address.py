@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from dataclasses import dataclass
 from io import StringIO
 
@@ -40,6 +39,8 @@ def parse_address(text: str) -> Address:
 
 def lan_host() -> str:
     """Return this computer's address in its network; the loopback address if it is in none."""
+    import socket  # noqa: PLC0415 - only a page needs it
+
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             # An address for documentation (RFC 5737): the socket chooses its interface for it, and sends nothing.

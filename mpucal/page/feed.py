@@ -9,7 +9,6 @@ import secrets
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,23 +20,6 @@ from ..terminal.console import count, groups
 from ..terminal.view import View
 from ..terminal.voice import Announcement, Voice, in_words
 from .address import Address
-
-
-@dataclass(frozen=True)
-class Result:
-    """Result of a session or a check, as the page shows it.
-
-    Attributes
-    ----------
-    verdict : one word or two. estimated_error : a sentence. reasons : as calibration.json has them.
-    values : name of each row of the table, and its cells for x, y and z. summary : further text.
-    """
-
-    verdict: str
-    estimated_error: str = ""
-    reasons: Sequence[Mapping[str, object]] = ()
-    values: Sequence[tuple[str, Sequence[str]]] = ()
-    summary: str = ""
 
 
 def state(view: View, said: Announcement | None = None) -> dict[str, Any]:

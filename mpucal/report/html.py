@@ -11,10 +11,9 @@ import numpy as np
 
 from .. import __version__
 from ..data import Recording
-from ..files.formats import is_of_session
 from ..origin import Origin
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
-from ..result.session_files import CAPTURE
+from ..result.session_files import CAPTURE, is_of_session
 from . import sections
 from .elements import (
     as_float,

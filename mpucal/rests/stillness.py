@@ -65,6 +65,13 @@ class Moved:
     lost: bool = False
 
 
+class Sighting(NamedTuple):
+    """A window, and whether the board was still in it."""
+
+    window: Window
+    sight: Still | Moved
+
+
 class Shares(NamedTuple):
     """Shares of the limits that windows (..., 3) use; above 1 they are not still."""
 

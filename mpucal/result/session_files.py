@@ -73,6 +73,11 @@ def captures_in(folder: Path) -> list[Path]:
     return [*CAPTURE.all_in(folder), *CAPTURE_OF_VEHICLE.all_in(folder)]
 
 
+def is_of_session(name: str) -> bool:
+    """Return True if a file of this name is in a format of session captures."""
+    return Path(name).suffix.lower() in {Path(row.name).suffix for row in (CAPTURE, CAPTURE_OF_VEHICLE)}
+
+
 def is_unfinished(folder: Path) -> bool:
     """Return True if `folder` holds a session that was interrupted before its result."""
     return bool(captures_in(folder)) and not (folder / DOCUMENT.name).exists()

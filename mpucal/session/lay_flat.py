@@ -9,7 +9,7 @@ import numpy as np
 from ..data import Samples
 from ..rests.flat import ENOUGH_FLAT_S
 from ..rests.limits import QUIET
-from ..rests.stillness import Detector, Moved, Still
+from ..rests.stillness import Detector, Moved, Sighting, Still
 from ..rests.windows import WINDOW_S, Windows
 from .aims import FLAT_S, SHORTEST_FLAT_S
 from .boards import BOARD, KINDS
@@ -59,8 +59,8 @@ class LayFlat(Step):
         self._cautioned_s = 0.0
         self._motion = ""
 
-    def add(self, samples: Samples) -> Outputs:
-        """Return the outputs for `samples`; Rested or Stopped comes last and ends the step."""
+    def add(self, samples: Samples, sightings: Sequence[Sighting]) -> Outputs:
+        """See Step; Rested or Stopped comes last and ends the step."""
         outputs: Outputs = []
         for window in self._windows.add(samples):
             if self._begun_s is None:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Samples
+from ..data import Samples, Sensor
 from . import events
 from .aims import Coverage, select_aim
 from .boards import speak_of, usual_board
@@ -51,7 +51,7 @@ class Machine:
         self._aim = select_aim(self._plan.target)
         self._step: Step = LayFlat()
         self._coverage = Coverage()
-        self._watch: MotionWatch | None = None
+        self._watch = MotionWatch(Sensor())
         self._flat: events.Rested | None = None
         self._samples = self._flat_samples = 0
         self._sampled_s: float | None = None
@@ -86,8 +86,7 @@ class Machine:
                 self._plan = replace(self._plan, board=self._plan.board or usual_board(sensor.origin))
             case events.Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples
-                if self._watch is not None:
-                    self._watch.flat()
+                self._watch.flat()
                 return [events.Decision(f"flat and still for {still_s:.0f} s: done")]
             case events.Turned(why) | events.Finished(why):
                 return [events.Decision(why)]
@@ -101,7 +100,7 @@ class Machine:
                 self._sampled_s = self._ticked_s = None
                 return [
                     events.Decision("the session resumes where it stopped"),
-                    *([] if begins else self._step.resumed()),
+                    *([] if begins else self._resumed()),
                 ]
             case events.Learnt() | events.Tried() | events.Checked():
                 return self._dispatch(self._step.answer(event))
@@ -119,6 +118,8 @@ class Machine:
 
     def _begin(self) -> Sequence[events.Output]:
         """Begin the step of the present state, if it has one; return the first outputs."""
+        if self._flat is not None:
+            self._watch.begin(np.array(self._flat.gyr))
         match self.state:
             case State.LAY_FLAT:
                 self._step = LayFlat(self._plan.until_end, self._plan.board, self._aim.flat_s)
@@ -144,11 +145,16 @@ class Machine:
         silent = first_s - before_s > SILENT_S or (
             last_s - first_s > SILENT_S and float(np.diff(samples.t).max()) > SILENT_S
         )
-        again = self._step.resumed() if silent else []
+        again = self._resumed() if silent else []
         self._sampled_s, self._away_s = last_s, 0.0
         self._samples += len(samples)
-        meters = self._watch.add(samples, self._step.wanted) if self._watch else []
-        return [*again, *meters, *self._dispatch(self._step.add(samples))]
+        meters = self._watch.add(samples, self._step.wanted)
+        return [*again, *meters, *self._dispatch(self._step.add(samples, self._watch.sightings))]
+
+    def _resumed(self) -> Sequence[events.Output]:
+        """Start the present prompt again after a gap."""
+        self._watch.forget()
+        return self._step.resumed()
 
     def _dispatch(self, items: events.Outputs) -> list[events.Output]:
         """Return the outputs of a step; its events change the state, and add their outputs."""

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data import Samples, Sensor
+from ..data import Samples, Sensor, Vector
 from ..rests.limits import HAND
-from ..rests.stillness import Detector, Moved
-from ..rests.windows import Window, Windows
+from ..rests.stillness import Detector, Moved, Sighting
+from ..rests.windows import Windows
 from .attitude import Attitude, canonical, compose, from_vector, rotate, turned_up, yaw_between
 from .events import LAID, Caution, Direction, Meter, Output, Quaternion, down_of
 from .step import HAND_WINDOW_S, SAY_AGAIN_S
@@ -19,27 +19,37 @@ NEAR_RANGE = 0.8
 
 
 class MotionWatch:
-    """Source of Meter and Caution in every step.
+    """Source of Meter and Caution in every step, and of the sightings in which a step finds pauses.
 
     Parameters
     ----------
     sensor : its ranges decide about cautions.
+
+    Attributes
+    ----------
+    sightings : the windows that the last samples completed.
     """
 
     def __init__(self, sensor: Sensor) -> None:
         self._sensor = sensor
-        self._windows = Windows(HAND_WINDOW_S)
-        self._stillness = Detector(HAND)
+        self._windows, self._stillness = Windows(HAND_WINDOW_S), Detector(HAND)
+        self.sightings: list[Sighting] = []
         self._attitude, self._guide = Attitude(), TurnGuide()
         self._still = False
         self._last_s: dict[str, float] = {}
         self._temperature_c: float | None = None
 
     def flat(self) -> None:
-        """End the flat rest: the gyroscope's bias is known from now on."""
-        bias = self._stillness.rest_rad_s
-        self._attitude.flat(bias)
-        self._stillness = Detector(HAND, bias=bias, learns=True)
+        """End the flat rest: from now on the gyroscope carries the heading."""
+        self._attitude.flat(self._stillness.rest_rad_s)
+
+    def begin(self, bias: Vector) -> None:
+        """Begin a step that asks for orientations; `bias` (3,) rad/s: the gyroscope's, by the flat rest."""
+        self._windows, self._stillness = Windows(HAND_WINDOW_S), Detector(HAND, bias=bias, learns=True)
+
+    def forget(self) -> None:
+        """Forget what was seen before a gap, in which the board may have been moved."""
+        self._stillness.forget()
 
     def add(self, samples: Samples, wanted: Direction | None = None) -> list[Output]:
         """Return the outputs for `samples`; `wanted` : unit vector of the board's axes that is to point down."""
@@ -49,10 +59,14 @@ class MotionWatch:
         known = samples.temperature_c[np.isfinite(samples.temperature_c)]
         if len(known):
             self._temperature_c = float(known[-1])
-        return [*cautions, *(self._meter(window, wanted) for window in self._windows.add(samples))]
+        self.sightings, meters = [], []
+        for window in self._windows.add(samples):
+            self.sightings.append(Sighting(window, self._stillness.add(window)))
+            meters.append(self._meter(self.sightings[-1], wanted))
+        return [*cautions, *meters]
 
-    def _meter(self, window: Window, wanted: Direction | None) -> Meter:
-        sight = self._stillness.add(window)
+    def _meter(self, sighting: Sighting, wanted: Direction | None) -> Meter:
+        window, sight = sighting
         moving = isinstance(sight, Moved)
         self._still = not moving
         turn = NO_TURN if wanted is None else self._guide.turn_to(wanted, self._attitude.now)

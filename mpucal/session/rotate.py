@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Samples, Vector
+from ..rests.stillness import Sighting
 from ..rests.windows import Windows
 from . import events
 from .aims import SIDES, Aim, Coverage
@@ -65,8 +66,8 @@ class Rotate(PoseStep):
         first = SIDES[1] if self._takes_sides and coverage.paused.near(-SIDES[0]) else self._farthest(coverage.paused)
         self.prompt = self._prompt_for(first)
 
-    def add(self, samples: Samples) -> events.Outputs:
-        """Return the outputs for `samples`; Turned comes last and ends the step."""
+    def add(self, samples: Samples, sightings: Sequence[Sighting]) -> events.Outputs:
+        """See Step; Turned comes last and ends the step."""
         if self._begun_s is None:
             self._begun_s = self._new_s = self._known_s = self._reported_s = self._prompted_s = float(samples.t[0])
         for window in self._passes.add(samples):
@@ -74,7 +75,7 @@ class Rotate(PoseStep):
             if steady and self._coverage.passed.add(window.acc):
                 self._new_s = window.end_s
         outputs: events.Outputs = []
-        for pause in self._pauses.add(samples):
+        for pause in self._pauses.add(sightings):
             outputs += self._hold(pause)
         self._t_s = t_s = float(samples.t[-1])
         outputs += self._periodic(t_s)

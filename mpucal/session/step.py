@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Samples, Vector
-from ..rests.limits import HAND, LEAST_TURN_RAD
-from ..rests.stillness import Detector, Still
-from ..rests.windows import Windows
+from ..rests.limits import LEAST_TURN_RAD
+from ..rests.stillness import Sighting, Still
 from . import events
 from .aims import Directions, directions
 from .boards import describe, describe_tilt
@@ -42,8 +41,8 @@ class Step:
         """Return the first outputs."""
         return [self.prompt]
 
-    def add(self, samples: Samples) -> events.Outputs:
-        """Return the outputs for `samples`."""
+    def add(self, samples: Samples, sightings: Sequence[Sighting]) -> events.Outputs:
+        """Return the outputs for `samples`, and for the short windows that they complete."""
         raise NotImplementedError
 
     def answer(self, event: events.Answer) -> events.Outputs:
@@ -126,7 +125,7 @@ class PoseStep(Step):
 
     def __init__(self, flat: events.Rested, plan: Plan, hold_s: float = HOLD_S) -> None:
         self._plan = plan
-        self._pauses = PauseDetector(flat, hold_s)
+        self._pauses = PauseDetector(hold_s)
         self._directions = directions(events.down_of(np.array(flat.acc)), plan.tilt_only)
         self._begun_s: float | None = None
         self._prompted_s = 0.0
@@ -134,7 +133,6 @@ class PoseStep(Step):
     def resumed(self) -> Sequence[events.Output]:
         """See Step."""
         self._begun_s = None
-        self._pauses.forget()
         return super().resumed()
 
     def _farthest(self, seen: Directions) -> Vector:
@@ -162,28 +160,21 @@ class PauseDetector:
 
     Parameters
     ----------
-    flat : the flat rest, which gives the gyroscope's bias. hold_s : time for which each orientation is to be held.
+    hold_s : time for which each orientation is to be held.
     """
 
-    def __init__(self, flat: events.Rested, hold_s: float = HOLD_S) -> None:
+    def __init__(self, hold_s: float = HOLD_S) -> None:
         self._hold_s = hold_s
-        self._windows = Windows(HAND_WINDOW_S)
-        self._stillness = Detector(HAND, bias=np.array(flat.gyr), learns=True)
         self._last_run: int | None = None
 
     def leave(self, run: int) -> None:
         """Ignore the stillness number `run` from now on."""
         self._last_run = run
 
-    def forget(self) -> None:
-        """Reset after a discontinuity."""
-        self._stillness.forget()
-
-    def add(self, samples: Samples) -> list[Pause]:
-        """Return the pauses that `samples` show, one for each window of stillness."""
+    def add(self, sightings: Sequence[Sighting]) -> list[Pause]:
+        """Return the pauses in windows, one for each window of stillness."""
         pauses: list[Pause] = []
-        for window in self._windows.add(samples):
-            sight = self._stillness.add(window)
+        for window, sight in sightings:
             if self._last_run is None:
                 self._last_run = sight.run if isinstance(sight, Still) else -1
             if not isinstance(sight, Still) or sight.run <= self._last_run:

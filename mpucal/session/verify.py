@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..data import Samples
 from ..reasons import KINDS, Reason, reason
+from ..rests.stillness import Sighting
 from ..result.calibration import GOOD, REFUSED
 from . import events
 from .aims import AIMS, NORMAL, QUICK, SAME_RAD, Aim, Coverage, Directions, unseen_rad
@@ -35,10 +37,10 @@ class NewPoses(PoseStep):
         self._closed = False
         self.prompt = self._next()
 
-    def _take(self, samples: Samples) -> list[events.Output]:
-        """Return the outputs for the pauses that `samples` show."""
+    def _take(self, sightings: Sequence[Sighting]) -> list[events.Output]:
+        """Return the outputs for the pauses in `sightings`."""
         outputs: list[events.Output] = []
-        for pause in self._pauses.add(samples):
+        for pause in self._pauses.add(sightings):
             if self._closed:
                 break
             new = not self._seen.near(pause.acc, self._apart_rad)
@@ -107,15 +109,15 @@ class Verify(NewPoses):
         """See Step."""
         return [events.RequestFit(events.FitKind.TRY, TRY_WAIT_S), self.prompt]
 
-    def add(self, samples: Samples) -> events.Outputs:
-        """Return the outputs for `samples`; Finished comes last and ends the step."""
+    def add(self, samples: Samples, sightings: Sequence[Sighting]) -> events.Outputs:
+        """See Step; Finished comes last and ends the step."""
         t_s = self._now_s = float(samples.t[-1])
         if self._begun_s is None:
             self._begun_s = self._prompted_s = t_s
         if self._refusal is not None:
             return [self._refusal] if t_s - self._begun_s >= PATIENCE_S else []
         waits = self._closed
-        outputs: events.Outputs = [*self._take(samples)]
+        outputs: events.Outputs = [*self._take(sightings)]
         if waits:
             return outputs
         if not self._closed:
@@ -219,12 +221,12 @@ class CheckPoses(NewPoses):
         seen.add(np.array(flat.acc))
         super().__init__(flat, plan, AIMS[NORMAL].verify, seen, unseen_rad(plan.tilt_only), CHECK_HOLD_S)
 
-    def add(self, samples: Samples) -> events.Outputs:
-        """Return the outputs for `samples`; Finished comes last and ends the step."""
+    def add(self, samples: Samples, sightings: Sequence[Sighting]) -> events.Outputs:
+        """See Step; Finished comes last and ends the step."""
         t_s = float(samples.t[-1])
         if self._begun_s is None:
             self._begun_s = self._prompted_s = t_s
-        outputs = self._take(samples)
+        outputs = self._take(sightings)
         if self._closed:
             return [*outputs, events.Finished(f"{self._of} orientations: done")]
         if t_s - self._begun_s >= VERIFY_PATIENCE_S:

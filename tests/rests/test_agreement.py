@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.calibration.verification import LEAST_REST_S
-from mpucal.data import Recording
+from mpucal.data import Recording, Sensor
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
-from mpucal.session.events import Rested
+from mpucal.session.meter import MotionWatch
 from mpucal.session.step import HOLD_S, PauseDetector
 from tools.lab.scenarios.body import attitudes, board_from_world
 
@@ -46,10 +46,12 @@ def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
 )
 def test_an_accepted_rest_is_found_by_the_verification(tremor_dps, hertz, holds_s, seed):
     recording, starts = held_in_a_hand(np.radians(tremor_dps), hertz, holds_s, seed)
-    pauses = PauseDetector(Rested(FLAT_S, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0)))
+    watch, pauses = MotionWatch(Sensor()), PauseDetector()
+    watch.begin(np.zeros(3))
     told = {}
     for first in range(recording.flat[1], len(recording), 20):
-        for pause in pauses.add(recording.part(first, first + 20)):
+        watch.add(recording.part(first, first + 20))
+        for pause in pauses.add(watch.sightings):
             if pause.seconds >= HOLD_S:
                 told[pause.run] = pause.t_s
     runs = RestFinder(recording, flat_statistics(recording, recording.flat)).any_hand()

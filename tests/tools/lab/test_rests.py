@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.masks import with_masks
+from mpucal.data import Sensor
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
-from mpucal.session.events import Rested
+from mpucal.session.meter import MotionWatch
 from mpucal.session.step import HOLD_S, PauseDetector
 from tools.lab.scenarios.family import drawn
 from tools.lab.scenarios.table import FAMILIES
@@ -18,12 +19,15 @@ LARGEST_PART = 60  # samples
 
 def holds(flat, parts):
     """Return the spans [s] of the holds that a session detects as these samples arrive."""
-    pauses, found = PauseDetector(Rested(flat.n, tuple(flat.y.tolist()), tuple(flat.b_omega.tolist()))), {}
+    watch, pauses, found = MotionWatch(Sensor()), PauseDetector(), {}
+    watch.begin(flat.b_omega)
     # a session ignores the rest in which it begins
     pauses.leave(-1)
-    for pause in (pause for samples in parts for pause in pauses.add(samples)):
-        if pause.seconds >= HOLD_S:
-            found[pause.run] = (found.get(pause.run, (pause.t_s - pause.seconds,))[0], pause.t_s)
+    for samples in parts:
+        watch.add(samples)
+        for pause in pauses.add(watch.sightings):
+            if pause.seconds >= HOLD_S:
+                found[pause.run] = (found.get(pause.run, (pause.t_s - pause.seconds,))[0], pause.t_s)
     return list(found.values())
 
 
