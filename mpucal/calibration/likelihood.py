@@ -104,17 +104,20 @@ class Trace(NamedTuple):
     """Predictions of the hand's filter for every sample, (n, 3) each.
 
     innovation : whitened, L^-1 e. s, a : m/s^2, gravity and the hand's acceleration in the body frame, as predicted.
+    by_theta : (3 n, p) derivatives of the innovations with fixed gains, in the order of NAMES; (3 n, 0) if not asked.
     """
 
     innovation: NDArray[np.float64]
     s: NDArray[np.float64]
     a: NDArray[np.float64]
+    by_theta: NDArray[np.float64]
 
 
-def trace(problem: Problem, theta: Theta) -> Trace:
-    """Run the hand's filter, and return its predictions sample by sample."""
+def trace(problem: Problem, theta: Theta, derivatives: bool = False) -> Trace:
+    """Run the hand's filter, and return its predictions sample by sample, with their derivatives if asked."""
     series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
-    return Trace(*_kernel.trace_hand(theta.packed, problem.constants_of_a_hand(), **series))
+    *course, rows = _kernel.trace_hand(theta.packed, problem.constants_of_a_hand(), derivatives, **series)
+    return Trace(*course, rows[:, _lanes(HAND if derivatives else 0)])
 
 
 def _exact(

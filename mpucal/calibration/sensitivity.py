@@ -2,7 +2,8 @@
 
 A machine may turn a sensor without a pause. S (3, 3) is then estimated together with theta, by the method of
 Gauss-Newton on the innovations of the hand's filter: the rates are omega - S (y - y_flat), since b_omega is the mean
-rate of the flat segment. The derivatives of the innovations are differences.
+rate of the flat segment. The derivatives of the innovations by S are differences; all derivatives are those at the
+begin, from which the steps lead nowhere far.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from ..rests.intervals import RestFinder
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hypotheses import SURE, Explanation, gyroscope_change
-from .likelihood import trace
+from .likelihood import Trace, trace
 from .normal_equations import inverse
 from .parameters import HAND, NAMES
 from .preprocessing import prepare
@@ -28,7 +29,7 @@ from .theta import Theta
 from .uncertainty import MOST_NIS
 
 PASSES = 3
-STEP = 1e-6  # of the differences, in m/s^2, rad, rad/s, m, s or 1
+STEP = 1e-6  # of the differences, in rad/s per m/s^2
 
 
 class Sensitivity(NamedTuple):
@@ -71,31 +72,34 @@ def find_sensitivity(
     y = np.vstack([rest.y, series.y])
     force = 0.5 * (y[1:] + y[:-1]) - rest.y
 
-    def innovations(theta: Theta, S: Vector) -> Vector:
+    def predicted(theta: Theta, S: Vector, derivatives: bool = False) -> Trace:
         less = replace(series, omega=series.omega - force @ S.T)
-        return trace(replace(problem, series=less), theta).innovation.ravel()
+        return trace(replace(problem, series=less), theta, derivatives)
+
+    def innovations(theta: Theta, S: Vector) -> Vector:
+        return predicted(theta, S).innovation.ravel()
 
     up = np.linalg.solve(fit.D, flat.y - fit.b_a)
     start = Theta.start(fit.D, fit.b_a, fit.b_omega, up / np.linalg.norm(up))
     theta, S = replace(start, K=fit.K, tau=fit.delay_s), np.zeros((3, 3))
     precision = np.append(prior.precision, np.full(9, SENSITIVITY_SD**-2))
     others = np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)])  # nothing's share is 1
+    begin = predicted(theta, S, derivatives=True)
+    e = begin.innovation.ravel()
+    by_S = [(innovations(theta, step.reshape(3, 3)) - e) / STEP for step in STEP * np.eye(9)]
+    J = np.column_stack([begin.by_theta, *by_S])
+    C = inverse(J.T @ J + np.diag(precision))
+    known = inverse(C[HAND:, HAND:])
     for _ in range(PASSES):
-        e = innovations(theta, S)
-        by_theta = [innovations(theta.moved(step), S) - e for step in STEP * np.eye(HAND)]
-        by_S = [innovations(theta, S + step.reshape(3, 3)) - e for step in STEP * np.eye(9)]
-        J = np.array(by_theta + by_S).T / STEP
-        C = inverse(J.T @ J + np.diag(precision))
         g = J.T @ e + precision * np.append(theta.values() - prior.mean, S)
         step = -C @ g
         theta, S = theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
-        known = inverse(C[HAND:, HAND:])
+        e = innovations(theta, S)
         evidence = 0.5 * float(S.ravel() @ known @ S.ravel() - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
         if not evidence > -np.log(SURE):
             return None
         if evidence < 0.0:  # it is not removed
             break
-    e = innovations(theta, S)
     if not 3.0 * (e @ e) < MOST_NIS * len(e):
         return None
     weight = np.exp(evidence - np.logaddexp(others, evidence))

@@ -37,6 +37,7 @@ def evaluate_hand(
 def trace_hand(
     theta: NDArray[numpy.float64],
     constants: NDArray[numpy.float64],
+    derivatives: bool,
     y: NDArray[numpy.float64],
     omega: NDArray[numpy.float64],
     dt: NDArray[numpy.float64],
@@ -48,7 +49,7 @@ def trace_hand(
     r_extra: NDArray[numpy.float64] | None = None,
     jerk: NDArray[numpy.float64] | None = None,
     reset: NDArray[numpy.float64] | None = None,
-) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]: ...
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def moments(
     b_omega: NDArray[numpy.float64],
     y: NDArray[numpy.float64],

@@ -30,7 +30,7 @@ struct HandConstants : Constants {
   double lam;    // 1/s, the chain's poles
 };
 
-// Output: V and squares, and either the next two or the last three where their pointers are not null.
+// Output: V and squares, and where their pointers are not null, sums of the derivatives, and the course of the samples.
 struct HandResult {
   double V;
   double squares;      // sum of e' S^-1 e over the n samples
@@ -40,6 +40,7 @@ struct HandResult {
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update
   double* motion;      // (n, 3) a before the update
+  double* rows;        // (3 n, lanes) derivatives of the whitened innovations, beside the sums alone
 };
 
 using EvaluateHand = void (*)(const HandParameters&, const HandSeries&, const HandConstants&, HandResult&);

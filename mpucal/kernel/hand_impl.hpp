@@ -1,6 +1,7 @@
 // The hand's filter, compiled once for each instruction set: the including file names the function.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "hand_derivatives.hpp"
 
@@ -31,6 +32,12 @@ void trace(const HandSteps* steps, const HandPredicted* predicted, long k, int c
   }
 }
 
+// Derivatives of the samples' innovations among those of these steps
+void keep(const Lane (*rows)[kHandGroups], long k, int count, double* out) {
+  const int flat = k == 0;  // the flat mean is no sample
+  std::memcpy(out + 3 * (k + flat - 1) * 4 * kHandGroups, rows + 3 * flat, 3 * (count - flat) * sizeof *rows);
+}
+
 enum class Wanted { value, derivatives, trace };
 
 template <Wanted wanted>
@@ -50,11 +57,13 @@ void run(const HandParameters& p, const HandSeries& series, const HandConstants&
     const int count = static_cast<int>(std::min(kBlock, all_steps - k)), fours = (count + 3) / 4;
     for (int f = 0; f < fours; ++f) steps[f].read(p, series, c, k + 4 * f, C);
     recursion.run<wanted != Wanted::value>(steps, count, k == 0, predicted);
-    if constexpr (wanted == Wanted::trace) trace(steps, predicted, k, count, result);
+    if constexpr (wanted != Wanted::value)
+      if (result.innovation) trace(steps, predicted, k, count, result);
     if constexpr (derive) {
       for (int f = 0; f < fours; ++f) coefficients[f].compute(p, c.gravity, steps[f], predicted[f]);
       derivatives.run(steps, predicted, coefficients, count, rows);
       fisher.add(rows, 3 * count);
+      if (result.rows) keep(rows, k, count, result.rows);
       constexpr long lanes = 4 * kHandGroups;
       for (; end < result.ends.count && result.ends.at[end] < k + count; ++end) {
         derivatives.write(result.gradient + end * lanes);

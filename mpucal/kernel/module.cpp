@@ -197,16 +197,25 @@ NB_MODULE(_kernel, m) {
 
   m.def(
       "trace_hand",
-      [](const Array& theta, const Array& constants, const Array& y, const Array& omega, const Array& dt,
-         const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
+      [](const Array& theta, const Array& constants, bool derivatives, const Array& y, const Array& omega,
+         const Array& dt, const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
          const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
          const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset) {
         const HandSeries series = make_hand_series(
             make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset);
         const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
+        const std::size_t p = derivatives ? 4 * groups_of(LanesUsed::hand) : 0;
         std::vector<double> innovation(3 * series.n), gravity(3 * series.n), motion(3 * series.n);
+        std::vector<double> sums(p), sums_of_pairs(p * p), rows(3 * series.n * p);
+        const std::vector<long> at = make_ends(std::nullopt, series.n);
         HandResult result{};
+        if (derivatives) {
+          result.ends = {at.data(), 1};
+          result.gradient = sums.data();
+          result.fisher = sums_of_pairs.data();
+          result.rows = rows.data();
+        }
         result.innovation = innovation.data();
         result.gravity = gravity.data();
         result.motion = motion.data();
@@ -216,14 +225,15 @@ NB_MODULE(_kernel, m) {
         }
         const std::size_t n = series.n;
         return std::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}),
-                               give(std::move(motion), {n, 3}));
+                               give(std::move(motion), {n, 3}), give(std::move(rows), {3 * n, p}));
       },
-      nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
+      nb::arg("theta"), nb::arg("constants"), nb::arg("derivatives"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
       nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
       nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
       nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
-      "Return whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter.");
+      "Return whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter, and "
+      "the derivatives (3 n, lanes) of the innovations.");
 
   m.def(
       "moments",

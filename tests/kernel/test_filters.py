@@ -118,6 +118,16 @@ def test_a_trace_has_the_innovations_of_the_value(hand_problem, theta, instructi
     assert abs(at.a[[49, 51, 79, 82]]).min() > 0.0
 
 
+def test_the_derivatives_of_a_trace_add_up_to_those_of_the_value(hand_problem, theta, instruction_set):
+    """In their sums are also those of the flat mean."""
+    plain = replace(hand_problem, huber=np.inf)
+    at, whole, begin = trace(plain, theta, True), evaluate(plain, theta, HAND), evaluate(plain.first(0), theta, HAND)
+    scale = np.sqrt(np.diag(whole.fisher))
+    J, g = at.by_theta / scale, (whole.gradient - begin.gradient) / scale
+    np.testing.assert_allclose(J.T @ J, (whole.fisher - begin.fisher) / np.outer(scale, scale), atol=1e-12)
+    np.testing.assert_allclose(J.T @ at.innovation.ravel(), g, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("filter_", "series", "constants", "message"),
     [

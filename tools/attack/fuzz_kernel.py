@@ -124,7 +124,7 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
             (exact, constants, int(rng.choice([0, *USED.values()])), *series(n, rng), ends(n, rng))
         ),
         _kernel.evaluate_hand: lambda n, rng: (whole, of_hand, bool(rng.integers(2)), *hand(n, rng), ends(n, rng)),
-        _kernel.trace_hand: lambda n, rng: (whole, of_hand, *hand(n, rng)),
+        _kernel.trace_hand: lambda n, rng: (whole, of_hand, bool(rng.integers(2)), *hand(n, rng)),
         _kernel.moments: lambda n, rng: (np.zeros(3), *series(n, rng)[:4]),
         _kernel.turn: lambda n, rng: (some(n, rng, 3), maybe(n, rng, 3)),
         _kernel.statistics: lambda n, rng: (some(n, rng, 3), runs(n, rng)),
