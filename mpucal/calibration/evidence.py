@@ -251,9 +251,13 @@ class Evidence:
         if self.gyro_axes is None:
             return None
         turns, misses = self._turns_and_misses
-        as_they_are = CLEARLY * misses < _misses(turns, self.gyro_axes)
+        others = _misses(turns, self.gyro_axes)
+        as_they_are, exchanged = CLEARLY * misses < others, CLEARLY * others < misses
         if np.count_nonzero(as_they_are) < FEWEST_TRANSITIONS:
-            return None
+            # so few may be by chance, but hardly at one end of a recording
+            known = as_they_are[as_they_are | exchanged]
+            if np.count_nonzero(np.diff(known)) != 1 or misses[as_they_are].max() > CLEARLY * MOST_MISS_RAD:
+                return None
         first = int(np.flatnonzero(as_they_are != as_they_are[0])[0])
         return turns[first - 1].start_s, turns[first].end_s
 

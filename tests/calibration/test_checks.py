@@ -115,7 +115,7 @@ def without(*spans):
 
 
 # A name: the base, how it is spoilt, the code, and words of the sentence. Those of MORE have further reasons.
-MORE = {"swapped midway", "beyond the range", "moved", "mostly lost", "other turns", "gravity that is followed"}
+MORE = {"swapped midway", "swapped early", "beyond the range", "moved", "mostly lost", "other turns", "followed gravity"}
 REFUSED = {
     "shaken": ("bench", changed(gyr=noisy(0.5), flat=None), "never_still", "never lay still", "for ten seconds"),
     "turned at once": ("bench", lambda r: replace(r.part(500, 1500), flat=None), "never_still", "never lay still"),
@@ -148,7 +148,7 @@ REFUSED = {
     "a dead axis": ("bench", changed(put(slice(None), 1, None)), "bits_stuck", "the same on y in every"),
     "stuck for 4 s": ("hand", changed(put(slice(1900, 2300), 2, None)), "bits_stuck", "on z from 19 to 23 s, though"),
     "gravity alone": ("hand", changed(only_gravity), "not_raw", "stays within", "raw accelerometer"),
-    "gravity that is followed": ("pose12", followed, "not_raw", "no hand moves so smoothly", "raw accelerometer"),
+    "followed gravity": ("pose12", followed, "not_raw", "no hand moves so smoothly", "raw accelerometer"),
     "two sensors": ("hand", changed(plus(slice(None, None, 2), 0.1)), "not_raw", "every other reading", "--sensor"),
     "no gravity": ("hand", changed(lambda acc: 0.3 * (acc - only_gravity(acc))), "not_raw", "no gravity in it"),
     "few rests at a half": ("turns", changed(gyr=lambda gyr: 0.25 * gyr), "gyro_off", "4 times as", "--gyro-range"),
@@ -166,6 +166,12 @@ REFUSED = {
         changed(lambda acc: np.concatenate([acc[:2400], acc[2400:, [1, 0, 2]]])),
         "inconsistent",
         "not the same before",
+    ),
+    "swapped early": (
+        "hand",
+        changed(lambda acc: np.concatenate([acc[:1444], acc[1444:, [1, 2, 0]]])),
+        "inconsistent",
+        "not the same before 10 s and after 15 s",
     ),
     "moved": ("bench", changed(plus(slice(250, 500), [0, 2.0, 0])), "moved_while_still", "(y changed by 2 m/s^2"),
     "mostly lost": ("bench", without((600, 1900)), "data_lost", "place"),
