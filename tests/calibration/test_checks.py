@@ -115,7 +115,7 @@ def without(*spans):
 
 
 # A name: the base, how it is spoilt, the code, and words of the sentence. Those of MORE have further reasons.
-MORE = {"swapped midway", "swapped early", "beyond the range", "moved", "mostly lost", "other turns", "followed gravity"}
+MORE = {"swapped midway", "swapped early", "beyond the range", "moved", "lost", "other turns", "followed gravity"}
 REFUSED = {
     "shaken": ("bench", changed(gyr=noisy(0.5), flat=None), "never_still", "never lay still", "for ten seconds"),
     "turned at once": ("bench", lambda r: replace(r.part(500, 1500), flat=None), "never_still", "never lay still"),
@@ -174,7 +174,7 @@ REFUSED = {
         "not the same before 10 s and after 15 s",
     ),
     "moved": ("bench", changed(plus(slice(250, 500), [0, 2.0, 0])), "moved_while_still", "(y changed by 2 m/s^2"),
-    "mostly lost": ("bench", without((600, 1900)), "data_lost", "place"),
+    "lost": ("bench", without((600, 1900)), "data_lost", "place"),
 }
 USABLE = {
     "knocks": (
