@@ -116,8 +116,8 @@ class Trace(NamedTuple):
 def trace(problem: Problem, theta: Theta, derivatives: bool = False) -> Trace:
     """Run the hand's filter, and return its predictions sample by sample, with their derivatives if asked."""
     series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
-    *course, rows = _kernel.trace_hand(theta.packed, problem.constants_of_a_hand(), derivatives, **series)
-    return Trace(*course, rows[:, _lanes(HAND if derivatives else 0)])
+    innovation, s, a, rows = _kernel.trace_hand(theta.packed, problem.constants_of_a_hand(), derivatives, **series)
+    return Trace(innovation, s, a, rows[:, _lanes(HAND if derivatives else 0)])
 
 
 def _exact(
