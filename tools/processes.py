@@ -23,7 +23,7 @@ from unittest.mock import patch
 
 import mpucal
 from mpucal.__main__ import _keep_streams
-from mpucal.chip.config import MAX_FRAMES_A_POLL, Config
+from mpucal.chip.config import Config
 from mpucal.disk.growing_file import SyncThread
 from mpucal.mavlink.dialect import dialect
 from mpucal.session import rotate
@@ -147,7 +147,7 @@ def quick(sync: bool = False) -> Iterator[None]:
 
     sync : captures are synced to the disk, by a thread, which does not go on in a forked process.
     """
-    period_s = property(lambda config: min(POLL_S, MAX_FRAMES_A_POLL / config.rate_hz))
+    period_s = property(lambda config: min(POLL_S, config.longest_s))
     unsynced = patch.object(SyncThread, "__init__", lambda self, _file: setattr(self, "close", lambda: None))
     with ExitStack() as stack:
         stack.enter_context(patch.object(Config, "period_s", period_s))

@@ -23,7 +23,6 @@ from .requests import Answer, Latency, PendingRequest
 # Two and a half times what a bridge needs at most; the line's own latency is added.
 REPLY_NS = 250 * MS
 STORE_NS = 2500 * MS
-HELLO_NS = 300 * MS
 GREET_NS = 5000 * MS
 # A bridge sends a tenth of this while one reply is on its way; a line with more is flooded.
 FLOOD_BYTES = 1 << 18
@@ -175,7 +174,7 @@ class Link:
         """Send HELLO again; return the answer to any of the `greetings`, since a line may be slower than the next."""
         greetings += self._numbered([wire.Hello(address=address)])
         self._send(greetings[-1], again=True)
-        until_ns, budget = self.port.now_ns() + HELLO_NS, FLOOD_BYTES
+        until_ns, budget = self.port.now_ns() + REPLY_NS, FLOOD_BYTES
         while (chunk := self.port.read(until_ns)) is not None:
             diagnosis.add(chunk.data, baud)
             for frame, reply in self._messages(chunk):

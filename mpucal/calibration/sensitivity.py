@@ -20,6 +20,7 @@ from ..rests.gyro_drift import SENSITIVITY_SD
 from ..rests.intervals import RestFinder
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
+from .hand import PASSES
 from .hypotheses import SURE, Explanation, gyroscope_change
 from .likelihood import Trace, trace
 from .normal_equations import inverse
@@ -28,7 +29,6 @@ from .preprocessing import prepare
 from .theta import Theta
 from .uncertainty import MOST_NIS
 
-PASSES = 3
 STEP = 1e-6  # of the differences, in rad/s per m/s^2
 
 

@@ -12,7 +12,7 @@ from typing import Self
 from ..data import Sensor
 from ..errors import ChipError, RecordingError, UsageError
 from . import registers as reg
-from .families import Part
+from .families import MPU6050, Part
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ class Settings:
 
 
 # Some chips corrupt frames if more than 24 to 32 are queued; with the usual periods, 20 are. A simulation at full speed
-# polls less often: it may fill this share of its FIFO, or queue this number of frames of a FIFO of 1024 bytes.
-MOST_FILLED, MAX_FRAMES_A_POLL = 0.75, 54
+# polls less often: it may fill this share of its FIFO.
+MOST_FILLED = 0.75
 MIN_POLL_S = 0.001
 # Samples read one by one take half of the bus's time at this rate and 400 kHz, and all of it at 100 kHz.
 MOST_POLLED_HZ = 250
@@ -133,11 +133,10 @@ class Config:
         _check("gyroscope range", self.gyro_range_dps, "deg/s", reg.GYRO_RANGES_DPS)
         _check("low-pass filter", self.dlpf, "", reg.DLPF_CODES)
         reg.sample_rate_divider(self.rate_hz, self.dlpf)
-        longest_s = MAX_FRAMES_A_POLL / self.rate_hz
-        if not MIN_POLL_S <= self.period_s <= longest_s:
+        if not MIN_POLL_S <= self.period_s <= self.longest_s:
             raise UsageError(
                 f"the FIFO cannot be polled every {self.period_s:g} s at {self.rate_hz:g} Hz",
-                f"poll every {MIN_POLL_S:g} to {longest_s:g} s",
+                f"poll every {MIN_POLL_S:g} to {self.longest_s:g} s",
             )
 
     @property
@@ -146,6 +145,11 @@ class Config:
         if self.poll_s is not None:
             return self.poll_s
         return 0.020 if self.rate_hz > 400 else 0.040
+
+    @property
+    def longest_s(self) -> float:
+        """Longest time between two polls that the largest FIFO of the usual chips allows."""
+        return MOST_FILLED * MPU6050.fifo_bytes // reg.FRAME_BYTES / self.rate_hz
 
     def settings(self, part: Part) -> Settings:
         """Return the settings for one part; one with less sensitivity gets the smallest range that is large enough.

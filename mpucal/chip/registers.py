@@ -87,7 +87,7 @@ GYRO_LSB_PER_DPS: Final = tuple(GYRO_COUNTS / full_scale for full_scale in GYRO_
 # The gyroscope's offset registers: one scale at every full scale.
 GYRO_OFFSET_LSB_PER_DPS: Final = 32.75
 
-DLPF_CODES: Final = (0, 1, 2, 3, 4, 5, 6)
+DLPF_CODES: Final = tuple(range(CONFIG_DLPF_CFG))  # the last code is reserved
 MAX_RATE_HZ: Final = 1000.0
 
 

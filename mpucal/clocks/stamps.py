@@ -24,8 +24,10 @@ from ..arguments import Mask, Vector
 from .sample_clock import GAP_INTERVALS, NS, SampleClock, make_increasing
 
 FEWEST = 100
-# s of a recording, of which 64 bits hold the ns
-LONGEST_S = 1e9
+# the lowest sample rate that can be calibrated
+SLOWEST_HZ = 5.0
+# times of a slow logger may be so many seconds apart; those of any sensor in milliseconds are farther apart
+LONGEST_STEP_S = 2.0
 # periods: steps that vary by less are a clock's own
 MOST_UNEVEN = 0.1
 # samples over which a period is measured, so that bursts do not matter, and the least number of such stretches
@@ -129,7 +131,7 @@ def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
     period, steps = sample_period(stamps, number), np.diff(stamps)
     own = Clock(make_increasing(stamps, MOST_UNEVEN * period), are_gaps(stamps), 1.0 / period if period else 0.0)
     off = steps - period * np.diff(number)
-    if n < FEWEST or not period > 0.0 or stamps[-1] - stamps[0] > LONGEST_S:
+    if n < FEWEST or not period > 0.0 or stamps[-1] - stamps[0] > NS * np.iinfo(np.int64).max / 2:
         return own
     if np.percentile(np.abs(off), 95) <= MOST_UNEVEN * period and off.min() > -period:
         return own

@@ -16,7 +16,7 @@ from ..clocks import S
 from ..errors import RecordingError
 from .matlab import is_matlab, read_matlab_arrays
 from .npz import DAMAGED
-from .reading import HELD, check_size, import_extra, reading
+from .reading import MEMORY_PER_TEXT, check_size, import_extra, reading
 from .tables.cells import is_number
 from .tables.times import UTC_NS
 
@@ -72,7 +72,7 @@ def _fields(name: str, array: NDArray[Any]) -> Arrays:
 
 
 def _read_json(path: Path) -> Arrays:
-    check_size(path, HELD * path.stat().st_size)
+    check_size(path, MEMORY_PER_TEXT * path.stat().st_size)
     text = path.read_text(encoding="utf-8-sig")
     try:
         document = json.loads(text)

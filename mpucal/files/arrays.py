@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..clocks.stamps import FEWEST
 from ..data import Recording
 from ..errors import RecordingError
 from .array_files import NAME_ARRAYS, read_arrays
@@ -17,8 +18,6 @@ from .tables.labelled import pivot
 from .tables.load import recording_from_table
 from .tables.phone import is_pair, recording_of_tables
 
-# numbers at the beginning of a document of JSON beyond which it holds samples, not settings
-FEWEST_NUMBERS = 200
 _IS_OWN = b'"D":', b'"b_a":'
 
 
@@ -35,7 +34,7 @@ def is_of_others(path: Path) -> bool:
 def is_json_of_samples(path: Path) -> bool:
     """Return True if a file of JSON begins with many numbers, and is no calibration."""
     begun = first_bytes(path)
-    return sum(byte in b",:" for byte in begun) > FEWEST_NUMBERS and not all(key in begun for key in _IS_OWN)
+    return sum(byte in b",:" for byte in begun) > 2 * FEWEST and not all(key in begun for key in _IS_OWN)
 
 
 def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:

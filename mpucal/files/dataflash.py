@@ -22,7 +22,7 @@ from .reading import first_bytes
 MAGIC = b"\xa3\x95"
 PARAMETER = "PARM"
 # before ArduPilot 4.0 each IMU had its own message; since then `I` numbers them from 0
-IMUS = {"IMU": 1, "IMU2": 2, "IMU3": 3}
+IMUS = ("IMU", "IMU2", "IMU3")
 
 
 def is_dataflash(path: Path) -> bool:
@@ -79,7 +79,7 @@ def _reader(path: Path) -> Iterator[Any]:
 
 
 def _reading(message: Any) -> Reading | None:
-    imu = getattr(message, "I", IMUS[message.get_type()] - 1) + 1
+    imu = getattr(message, "I", IMUS.index(message.get_type())) + 1
     acc, gyr = (message.AccX, message.AccY, message.AccZ), (message.GyrX, message.GyrY, message.GyrZ)
     if not all(abs(v) <= LARGEST for v in acc + gyr):
         return None

@@ -29,7 +29,7 @@ from .tables.times import GAP_S
 GUESSED = re.compile(r"(?P<unit>accelerations in [^(,;]+).*guessed from [a-z ]+: --columns (?P<order>[\w,-]+)")
 # of files that may be such recordings
 SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet", ".json", ".jsonl")
-MOST = 500
+MOST_FILES = 500
 
 
 def load_folder(folder: Path) -> Recording:
@@ -138,7 +138,9 @@ def _read_alike(files: list[Path], read: dict[str, Recording], hints: Hints) -> 
 
 def _recordings(path: Path) -> list[Path]:
     files = sorted(child for child in path.iterdir() if child.is_file())
-    if {file.name for file in files} & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(files) > MOST:
+    if {file.name for file in files} & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(
+        files
+    ) > MOST_FILES:
         return []
     sides = tables_of_sides(file.name for file in files)
     found = [file for file in files if file.name in sides or (not sides and file.suffix.lower() in SUFFIXES)]

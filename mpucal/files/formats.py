@@ -18,7 +18,7 @@ from ..data import Recording
 from ..errors import OutputError, RecordingError, UsageError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
 from .hints import NO_HINTS, Hints
-from .reading import READ, check_size, first_bytes, is_text
+from .reading import FILE_PER_MEMORY, check_size, first_bytes, is_text
 from .rows import Rows, Write
 
 FOLDER, ANY_TEXT = "/", ".txt"
@@ -62,7 +62,7 @@ class Format:
     def read(self, *paths: Path, hints: Hints = NO_HINTS) -> Recording:
         """Return the whole recording; see load."""
         for path in paths:
-            check_size(path, path.stat().st_size if path.is_file() else 0, READ)
+            check_size(path, path.stat().st_size if path.is_file() else 0, FILE_PER_MEMORY)
         if not self.load:
             return self.read_rows(*paths).recording()
         recording: Recording = resolve_name(self.load)(*paths, *([hints] if self.hinted else []))

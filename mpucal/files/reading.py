@@ -22,9 +22,9 @@ from ..errors import RecordingError
 
 MOST_MB, VARIABLE = 512, "MPUCAL_MOST_MB"
 # bytes of a file for each allowed byte of memory: a log may hold far more than its IMU
-READ = 16
+FILE_PER_MEMORY = 16
 # bytes of memory for a byte of a table of text, whose cells are objects: 6 to 40
-HELD = 6
+MEMORY_PER_TEXT = 6
 # bytes of a line of text
 LONGEST_LINE = 1 << 20
 # bytes of a chunk of an MCAP file; those of mpucal hold ten seconds, 2 MB at most
@@ -32,7 +32,7 @@ LONGEST_CHUNK = 64 << 20
 # bytes from the beginning of a file by which its format is recognised
 SNIFFED = 1 << 16
 # the share of NUL bytes beyond which a file is binary, of words beyond which a column is no clock, and of empty lines
-# beyond which these are another sensor's
+# beyond which these are another sensor's, and of unlike bytes beyond which a record has another size
 MOST_ODD = 0.1
 # errors of zipfile and its decompressors; RuntimeError includes NotImplementedError, of an unknown compression
 DAMAGED_ZIP = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)

@@ -17,7 +17,7 @@ from ..data import Recording
 from ..errors import RecordingError, UsageError
 from .dataflash import is_dataflash
 from .hints import NO_HINTS, ROLES, Hints
-from .reading import HELD, SNIFFED, check_size, reading
+from .reading import MEMORY_PER_TEXT, MOST_ODD, SNIFFED, check_size, reading
 from .tables.columns import measured
 from .tables.guess import is_clock, is_even_clock, side_by_side
 from .tables.load import recording_from_table
@@ -27,8 +27,6 @@ from .tables.table import Table
 # bytes of a record: of six numbers of 16 bits, and of an array of sensors; and numbers that it may hold
 SIZES = range(12, 513)
 TYPES = {"<i2": "16 bits", ">i2": "16 bits, the high byte first", "<f4": "32 bits", "<f8": "64 bits"}
-# part of the largest likeness with which a smaller record is the same
-ALIKE = 0.9
 
 
 def load_records(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -39,7 +37,7 @@ def load_records(path: Path, hints: Hints = NO_HINTS) -> Recording:
     RecordingError : it holds no such records, or none in which gravity turns. UsageError : hints for a dataflash log.
     """
     with reading(path):
-        check_size(path, HELD * path.stat().st_size)
+        check_size(path, MEMORY_PER_TEXT * path.stat().st_size)
         data = np.fromfile(path, np.uint8)
     if is_dataflash(path):
         raise UsageError(f"{path} is a dataflash log of ArduPilot", "leave out the options on how to read it")
@@ -58,7 +56,7 @@ def _tables(name: str, data: NDArray[np.uint8]) -> Iterator[Table]:
     """Yield the columns of the records in a file's bytes, of each type of numbers and from each byte on."""
     some = data[:SNIFFED]
     alike = {size: float((some[size:] == some[:-size]).mean()) for size in SIZES if 2 * size <= len(some)}
-    size = next((size for size in alike if alike[size] >= ALIKE * max(alike.values())), 0)
+    size = next((size for size in alike if alike[size] >= (1 - MOST_ODD) * max(alike.values())), 0)
     if not size:
         return
     # of a part of a stream, a byte that never changes begins the record

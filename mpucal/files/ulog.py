@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clocks.stamps import SLOWEST_HZ
 from ..data import Recording, Vector
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
 from .npz import DAMAGED
 from .reading import import_extra, reading
 from .tables.cells import since_first
-from .tables.shown_units import SLOWEST_HZ
 from .tables.streams import join_streams
 from .tables.times import Stream
 

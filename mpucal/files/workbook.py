@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element, ParseError, iterparse
 from ..data import Recording
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
-from .reading import DAMAGED_ZIP, HELD, check_size, reading
+from .reading import DAMAGED_ZIP, MEMORY_PER_TEXT, check_size, reading
 from .tables.load import find_any_table, is_table_of_sensors, table_of_text
 from .tables.names import ACC, GYR, first_triple
 from .tables.phone import is_pair, recording_of_tables
@@ -35,7 +35,7 @@ def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     try:
         with reading(path), zipfile.ZipFile(path) as archive:
-            check_size(path, HELD * sum(member.file_size for member in archive.infolist()))
+            check_size(path, MEMORY_PER_TEXT * sum(member.file_size for member in archive.infolist()))
             sheets = dict(_sheets(archive))
     except (*DAMAGED_ZIP, LookupError, ParseError) as error:
         raise RecordingError(f"{path} is not a whole workbook ({error})", "save its sheet as .csv") from error

@@ -16,6 +16,7 @@ from ..chip.config import Config
 from ..chip.driver import DEAD_NS
 from ..chip.losses import Loss
 from ..chip.port import Port
+from ..clocks import S
 from ..data import Recording, Samples, Sensor
 from ..errors import BusError, ChipError, EndOfCapture, NoAnswer, UsageError
 from .attributes import ACCEL, AXES, GYRO, TEMP
@@ -62,9 +63,6 @@ def _device(text: str) -> str:
         raise UsageError(f"--iio: {text!r} is not a device", "give iio:deviceN, or accel=iio:deviceN,gyro=iio:deviceM")
     return f"iio:device{found.group(1)}"
 
-
-# The die's temperature changes slowly.
-TEMPERATURE_NS = 1_000_000_000
 
 NO_INTERRUPT_HINT = (
     "it waits for interrupts that do not come: check the chip's INT wire and its line in the device tree. For an"
@@ -195,6 +193,7 @@ class IioDriver:
                 for axis in AXES:
                     each.read(f"{kind}_{axis}_raw")
         first = self._each[0]
-        if f"{TEMP}_raw" in first.names and self.now_ns() - self._warm_ns > TEMPERATURE_NS:
+        # the die's temperature changes slowly
+        if f"{TEMP}_raw" in first.names and self.now_ns() - self._warm_ns > S:
             self._warm_ns = self.now_ns()
             first.read(f"{TEMP}_raw")

@@ -62,8 +62,6 @@ def changes(new: Mapping[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
 
 # Least time between two updates of the page.
 LEAST_INTERVAL_S = 0.03
-# Time that clients have after the end to fetch the results.
-LINGER_S = 5.0
 
 
 class Feed:
@@ -141,7 +139,7 @@ class Feed:
         self.show(ended=True)
         self._closed.set()
         self._updates.join()
-        self._server.end(LINGER_S)
+        self._server.end()
 
     def _press(self, key: str) -> None:
         self._pressed.append(Key(key))

@@ -28,7 +28,7 @@ from .requests import PAGE_FILES, Allowed, RequestFilter
 
 CLIENTS = 4
 CONNECTIONS = 24
-# Limit of the time for a request's head to arrive.
+# Limit of the time for a request's head to arrive, and of that to fetch the results after the end.
 HEAD_S = 5.0
 # A client that takes nothing for this time is disconnected.
 PATIENCE_S = 10.0
@@ -104,9 +104,9 @@ class Server(ThreadingHTTPServer):
             self.visited |= more > 0
             return True
 
-    def end(self, linger_s: float) -> None:
-        """Stop serving when no client follows any more, or after `linger_s`."""
-        self.ending, until_s = True, time.monotonic() + linger_s
+    def end(self) -> None:
+        """Stop serving when no client follows any more, or after HEAD_S."""
+        self.ending, until_s = True, time.monotonic() + HEAD_S
         while self.clients and time.monotonic() < until_s:
             time.sleep(ASK_EVERY_S)
         self.ended = True

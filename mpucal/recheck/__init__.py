@@ -14,7 +14,7 @@ from ..result.comparison import CONFIDENCE
 from ..result.correction import make_correction, other_who_am_i, same_trim
 from . import drift
 from .hypotheses import NOTHING, HypothesisOdds, compare_hypotheses, estimate, p_value
-from .observed import NOISE, Observations, apply_errors, observe
+from .observed import LEAST_ORIENTATIONS, NOISE, Observations, apply_errors, observe
 from .outcome import (
     ANOTHER_SENSOR,
     CANNOT_BE_TOLD,
@@ -28,8 +28,6 @@ from .outcome import (
 
 __all__ = ["CheckResult", "check"]
 
-# The flat rest and three more.
-LEAST_ORIENTATIONS = 4
 # A calibration is called still good only if the bias is known to this standard uncertainty.
 MOST_BIAS_STD_MG = 2.5
 # Hypotheses whose log odds differ by less (20 to 1) are both named.

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..data import Vector
 from ..result.calibration import Calibration
-from ..result.comparison import WARMER_C
+from ..result.comparison import BIAS_MG_PER_C, WARMER_C, like_chip
 from ..result.correlation import UPPER, standard_deviations
 from ..result.error_model import MG_PER_MPS2
 from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, E, G
@@ -61,10 +61,10 @@ REPEATED = Spread(0.7 / MG_PER_MPS2, 3e-4, 2e-4, math.radians(0.02), math.radian
 WALK_MPS2, WALK_MOST_MPS2 = 0.1 / MG_PER_MPS2, 2.0 / MG_PER_MPS2
 # Standard deviation of a change of temperature that is not known.
 UNKNOWN_C = 3.0
-# Change in one degree Celsius, by kind of chip.
+# Change in one degree Celsius, besides the bias, by kind of chip.
 BY_TEMPERATURE: Mapping[str, Spread] = {
-    "MPU-6050": Spread(0.5 / MG_PER_MPS2, 2e-4, gyro_bias=math.radians(0.16), gyro_scale=2e-4),
-    "MPU-6500": Spread(1.0 / MG_PER_MPS2, 2.6e-4, gyro_bias=math.radians(0.24), gyro_scale=4e-4),
+    "MPU-6050": Spread(scale=2e-4, gyro_bias=math.radians(0.16), gyro_scale=2e-4),
+    "MPU-6500": Spread(scale=2.6e-4, gyro_bias=math.radians(0.24), gyro_scale=4e-4),
 }
 # Factory tolerances, for parameters whose uncertainty the calibration does not state.
 TOLERANCE = Spread(80.0 / MG_PER_MPS2, 0.03, 0.02, math.radians(2.0), math.radians(20.0), 0.02, 0.01)
@@ -132,8 +132,8 @@ def ageing(calibration: Calibration, days: float, change_c: float | None) -> Vec
 
 def temperature_covariance(calibration: Calibration, change_c: float) -> Vector:
     """Return the covariance of theta by a change of temperature, from the data sheet."""
-    kind = "MPU-6050" if "6050" in (calibration.sensor.chip or "6050") else "MPU-6500"
-    return BY_TEMPERATURE[kind].covariance() * change_c**2
+    like = like_chip(calibration.sensor.chip)
+    return replace(BY_TEMPERATURE[like], bias=BIAS_MG_PER_C[like] / MG_PER_MPS2).covariance() * change_c**2
 
 
 def hypotheses(calibration: Calibration, change_c: float | None) -> dict[str, tuple[float, Vector]]:

@@ -44,6 +44,8 @@ TURN_NONLINEARITY = 0.001
 BLOCKS_A_REST = 4
 # A rest has few blocks: the mean variance of the other rests counts as this many degrees of freedom more.
 POOLED_FREEDOM = 6.0
+# The flat rest and three more.
+LEAST_ORIENTATIONS = 4
 # Noise averages out in means over this time [s]; means of a board that is shaken vary more, by this factor.
 SHAKEN_S, MOST_SHAKEN_RATIO = 0.1, 4.0
 # Samples of a filtered stream are worth at least this share of independent ones.

@@ -22,12 +22,12 @@ from ..result.calibration import Calibration
 from ..result.error_model import MG_PER_MPS2
 from . import drift
 from .hypotheses import NOTHING, compare_hypotheses
-from .observed import BETA, DELTA, PARAMETERS, Observations, accelerometer_jacobian
+from .observed import BETA, DELTA, LEAST_ORIENTATIONS, PARAMETERS, Observations, accelerometer_jacobian
 
 # Blocks of a rest, at least and at most: a board that lies for hours gives many rests.
 LEAST_BLOCKS, MOST_BLOCKS = 5, 21
-# Number of the last rests that are compared, and the least number that is needed.
-RESTS, LEAST_RESTS = 16, 4
+# Number of the last rests that are compared.
+RESTS = 16
 # Days of rests are compared one by one: each comparison must give fewer false alarms than a check.
 FALSE_ALARMS = 2e-4
 TO_DO = "see what `mpucal check` says"
@@ -108,7 +108,7 @@ class DriftMonitor:
 
     def _compare(self, rests: list[_Rest]) -> list[Contradiction]:
         """Return the contradiction of these rests, if it is beyond chance and does not rest on a single one."""
-        if len(rests) < LEAST_RESTS:
+        if len(rests) < LEAST_ORIENTATIONS:
             return []
         T, T_0 = rests[-1].temperature_c, self._calibration.sensor.temperature_c
         change_c = None if T_0 is None or math.isnan(T) else T - T_0

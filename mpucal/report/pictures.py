@@ -13,7 +13,7 @@ from ..data import Vector
 from ..origin import name_thing
 from ..result.error_model import MG_PER_MPS2
 from .elements import figure
-from .figure import AFTER, BEFORE, FAINT, INK, LINE, WIDTH, XYZ, Axes, dots, legend, line, svg, text
+from .figure import AFTER, BEFORE, FAINT, HEIGHT, INK, LINE, WIDTH, XYZ, Axes, dots, legend, line, svg, text
 from .track import Track
 
 # stretches of a curve, and dots of a moving board
@@ -158,7 +158,7 @@ _VIEWPOINT = (0.302, -0.830, -0.469)
 _MOST_DEVIATION = 0.5
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 121)
 _UNIT_CIRCLE = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
-_HEIGHT, _COVERAGE_HEIGHT = 340.0, 230.0
+_HEIGHT = 340.0
 
 
 class _Disc:
@@ -216,7 +216,7 @@ def coverage(track: Track) -> str:
     rests = -_units(track.at_rest(track.calibrated))
     marks = []
     for centre, sign, name in ((0.25, -1.0, "+Z up"), (0.75, 1.0, "−Z up")):
-        disc = _Disc(centre * WIDTH, _COVERAGE_HEIGHT / 2.0 + 8.0, 84.0)
+        disc = _Disc(centre * WIDTH, HEIGHT / 2.0 + 8.0, 84.0)
         marks += [line(*disc.place(radius * _UNIT_CIRCLE), colour) for radius, colour in ((1.0, INK), (0.5**0.5, LINE))]
         marks.append(text(centre * WIDTH, 12.0, name))
         for at_x, at_y, letter in ((1.13, -0.04, "+X"), (-1.13, -0.04, "−X"), (0.0, 1.05, "+Y"), (0.0, -1.14, "−Y")):
@@ -225,7 +225,7 @@ def coverage(track: Track) -> str:
         for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
             marks.append(dots(*disc.place(_project(units[sign * units[:, 2] >= 0.0])), radius, colour))
     label = "Direction that pointed down, in the axes of x, y and z: large dots held still, small dots moving"
-    return svg("coverage", label, _COVERAGE_HEIGHT, *marks)
+    return svg("coverage", label, HEIGHT, *marks)
 
 
 def _points(track: Track, acc: Vector) -> Vector:

@@ -43,9 +43,8 @@ FORMATS = [
 CHECKSUM = struct.Struct("<I")
 LENGTHS = [form.size + CHECKSUM.size for form in FORMATS]
 
-# limits of a matrix' largest element, and of its determinant over the cube of that element
-LEAST_GAIN, MOST_GAIN = 1e-3, 1e3
-LEAST_DETERMINANT = 1e-6
+# limits of a matrix' largest element, or its inverse, and of its determinant over the cube of that element
+MOST_GAIN, LEAST_DETERMINANT = 1e3, 1e-6
 
 
 class BlobError(ValueError):
@@ -169,7 +168,7 @@ def is_invertible(matrix: Iterable[float]) -> bool:
     a, b, c, d, e, f, g, h, i = numbers = tuple(matrix)
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     most = max(map(abs, numbers))
-    return LEAST_GAIN <= most <= MOST_GAIN and abs(determinant) > LEAST_DETERMINANT * most**3
+    return 1 / MOST_GAIN <= most <= MOST_GAIN and abs(determinant) > LEAST_DETERMINANT * most**3
 
 
 def _unix_seconds(created: str) -> int:

@@ -20,7 +20,7 @@ from ..data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parse_json
-from .blob import Blob, BlobError
+from .blob import Blob, BlobError, is_invertible
 from .correlation import UNCORRELATED
 from .document import DIGEST, digest, digest_warning, drop_unserialisable, from_document, to_document
 from .error_model import bias_mg, scale_factor_error
@@ -154,8 +154,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     @property
     def is_regular(self) -> bool:
         """Return True if D and b_a are known and D can be inverted."""
-        known = np.isfinite(self.D).all() and np.isfinite(self.b_a).all()
-        return bool(known and np.linalg.matrix_rank(self.D) == 3)
+        return bool(np.isfinite(self.b_a).all()) and is_invertible(self.D.ravel().tolist())
 
     @property
     def objection(self) -> str:

@@ -23,6 +23,8 @@ FREEDOM_OF_A_HAND = 12.0
 RESERVED = 2.0
 # a smaller change of temperature is within the thermometer's error, or that of a chip that warms unevenly
 WARMER_C = 2.0
+# change of the bias with the temperature, by the data sheet of the chip or of the one that it is like
+BIAS_MG_PER_C = {"MPU-6050": 0.5, "MPU-6500": 1.0}
 # a covariance covers chance alone: a smaller improvement does not count
 LEAST_STD_MPS2 = 0.001
 
@@ -118,6 +120,11 @@ def degrees_of_freedom(*models: str | None) -> float:
     return FREEDOM_OF_A_HAND if "hand" in models else math.inf
 
 
+def like_chip(chip: str | None) -> str:
+    """Return the chip, of those in BIAS_MG_PER_C, whose bias changes with the temperature as that of `chip` does."""
+    return "MPU-6050" if "6050" in (chip or "6050") else "MPU-6500"
+
+
 def limit_of(count: int, freedom: float = math.inf) -> float:
     """Return the limit of |z| of each of so many numbers, by Šidák's correction, so that CONFIDENCE holds for all.
 
@@ -174,9 +181,11 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
         )
     warm = [c.sensor.temperature_c for c in (a, b)]
     if warm[0] is not None and warm[1] is not None and abs(warm[1] - warm[0]) >= WARMER_C:
+        like = like_chip(a.sensor.chip)
         remarks.append(
-            f"A was measured at {warm[0]:.1f} °C and B at {warm[1]:.1f} °C: an MPU-6050's bias changes by about 0.5 mg"
-            f" per degree{'' if two_chips or other_trim else '; `mpucal merge` makes b_a(T) from both'}."
+            f"A was measured at {warm[0]:.1f} °C and B at {warm[1]:.1f} °C: the bias of an {like} changes by about"
+            f" {BIAS_MG_PER_C[like]:g} mg per degree"
+            f"{'' if two_chips or other_trim else '; `mpucal merge` makes b_a(T) from both'}."
         )
     gravity = [float(c.fit.get("gravity") or math.nan) for c in (a, b)]
     if abs(gravity[1] - gravity[0]) > 1e-6:

@@ -129,7 +129,7 @@ def _is_usable(name: str, array: Vector) -> bool:
     """Return False for a matrix that must be inverted and cannot be; a wholly unknown one is usable."""
     if name not in ("D", "K") or np.isnan(array).all():
         return True
-    return bool(np.isfinite(array).all()) and is_invertible(array.ravel().tolist())
+    return is_invertible(array.ravel().tolist())
 
 
 def _check_numbers(document: Mapping[str, Any]) -> None:

@@ -22,8 +22,8 @@ _LABEL = 19
 _TURN = "turn it "
 # Text is wrapped to at least this width; on narrower screens it is cut.
 NARROWEST = 12
-# Below the first width no bars are shown; from the second on letters are large, and the values are those of all axes.
-NARROW, LARGE_COLUMNS = 60, 120
+# Below this width no bars are shown; from twice this on letters are large, and the values are those of all axes.
+NARROW = 60
 KEYS_NARROW, KEYS_REDO_NARROW = "Enter: skip  q: stop", "Enter: skip  r: again  q: stop"
 KEYS = "Enter: skip ahead    q or Ctrl-C: stop"
 KEYS_REDO = "Enter: skip ahead    r: restart the turning    q or Ctrl-C: stop"
@@ -76,7 +76,7 @@ def _status(view: View, columns: int, glyphs: Glyphs) -> Text:
 def _headline(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     text = view.headline
     style = _headline_style(view)
-    large = columns >= LARGE_COLUMNS and rows >= 40
+    large = columns >= 2 * NARROW and rows >= 2 * LEAST_ROWS
     for scale in (2, 1) if large else (1,):
         if letters.width(text, scale) + 2 <= columns and rows >= LEAST_ROWS:
             return [Text(f" {row}", style=style) for row in letters.large(text, glyphs.block, scale)]
@@ -255,7 +255,7 @@ def _progress(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
 
 def _group(group: Group, columns: int, glyphs: Glyphs) -> Text:
     """Return the row of a group: its least certain axis, or all three where there is space."""
-    shown = range(3) if columns >= LARGE_COLUMNS else (group.worst,)
+    shown = range(3) if columns >= 2 * NARROW else (group.worst,)
     values = "  ".join(f"{'xyz'[i]} {group.text(i)}" for i in shown)
     if columns < NARROW:
         return Text(f" {group.name:<{_LABEL}}{values}")

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TextIO
 
-ROWS = 5
 WIDTH, GAP = 5, 1
 # Rows of two lines of letters of half the height, with a gap between them.
 TWO_ROWS = 6
@@ -35,7 +34,7 @@ OPQRSTUVWXYZ01
 #         #    #      # #   #  #    #   #     #   #     #     #
 ##### ####     #  ####   ###  #      ###   ###   #
 """
-_SPACE, _UNKNOWN = [" " * WIDTH] * ROWS, [" ### ", "#   #", "  ## ", "     ", "  #  "]
+_UNKNOWN = [" ### ", "#   #", "  ## ", "     ", "  #  "]
 
 
 def _cut(sheet: str) -> Iterator[tuple[str, list[str]]]:
@@ -47,7 +46,7 @@ def _cut(sheet: str) -> Iterator[tuple[str, list[str]]]:
             yield name, [row[first : first + WIDTH].ljust(WIDTH) for row in rows]
 
 
-_LETTERS = {" ": _SPACE, **dict(_cut(_SHEET))}
+_LETTERS = {" ": [" " * WIDTH] * len(_UNKNOWN), **dict(_cut(_SHEET))}
 
 
 def width(text: str, scale: int = 1) -> int:
@@ -56,11 +55,11 @@ def width(text: str, scale: int = 1) -> int:
 
 
 def large(text: str, block: str, scale: int = 1) -> list[str]:
-    """Return ROWS * scale rows of `block` and spaces that show `text`."""
+    """Return 5 * scale rows of `block` and spaces that show `text`."""
     letters = [_LETTERS.get(letter, _UNKNOWN) for letter in text.upper()]
     rows = []
-    for k in range(ROWS):
-        row = (" " * GAP).join(letter[k] for letter in letters)
+    for parts in zip(*letters, strict=True):
+        row = (" " * GAP).join(parts)
         rows += ["".join((block if dot == "#" else " ") * scale for dot in row)] * scale
     return rows
 

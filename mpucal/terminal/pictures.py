@@ -18,10 +18,10 @@ from .view import Eye, dot
 Point = tuple[float, float]
 
 # Bits of the dots of one character cell in Unicode's braille: _DOTS[row][column].
-COLUMNS, ROWS = 2, 4
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-_ROW_MASKS = tuple(left | right for left, right in _DOTS)
-_LEFT, _RIGHT = (sum(row[k] for row in _DOTS) for k in range(COLUMNS))
+_ROW_MASKS, _COLUMN_MASKS = tuple(map(sum, _DOTS)), tuple(map(sum, zip(*_DOTS, strict=True)))
+ROWS, COLUMNS = len(_ROW_MASKS), len(_COLUMN_MASKS)
+_LEFT, _RIGHT = _COLUMN_MASKS
 
 
 class Canvas:

@@ -150,7 +150,6 @@ class Pty:
 def serve(monkeypatch):
     """Serves a device on a pseudo terminal, with time-outs that a busy machine does not reach."""
     monkeypatch.setattr(link, "REPLY_NS", 20_000 * MS)
-    monkeypatch.setattr(link, "HELLO_NS", 20_000 * MS)
     monkeypatch.setattr(bus, "GONE_NS", 20_000 * MS)
     servers = []
 

@@ -9,7 +9,7 @@ from contextlib import closing
 
 import pytest
 
-from mpucal.page import feed as feed_module
+from mpucal.page import server
 from mpucal.page.address import Address
 from mpucal.page.feed import Feed
 from mpucal.session.events import Key, Prompt, PromptKind
@@ -61,7 +61,7 @@ def test_keys_and_results_go_through(feed, tmp_path):
 
 
 def test_a_connected_client_receives_the_end_before_the_server_closes(feed, monkeypatch):
-    monkeypatch.setattr(feed_module, "LINGER_S", 0.5)
+    monkeypatch.setattr(server, "HEAD_S", 0.5)
     with closing(urllib.request.urlopen(f"{feed.url}events", timeout=60.0)) as events:
         events.readline()
         feed.end()

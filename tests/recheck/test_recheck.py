@@ -12,10 +12,10 @@ from mpucal.data import Sensor
 from mpucal.errors import RefusedError
 from mpucal.recheck import drift
 from mpucal.recheck.hypotheses import NOTHING, compare_hypotheses
-from mpucal.recheck.observed import CALIBRATED, PARAMETERS, apply_errors, observe
+from mpucal.recheck.observed import CALIBRATED, LEAST_ORIENTATIONS, PARAMETERS, apply_errors, observe
 from mpucal.recheck.outcome import Change
 from mpucal.recheck.update import update_biases
-from mpucal.recheck.watch import LEAST_RESTS, RESTS, DriftMonitor
+from mpucal.recheck.watch import RESTS, DriftMonitor
 from mpucal.result.correlation import NAMES
 from mpucal.result.error_model import MG_PER_MPS2
 from tools.lab.scenarios.recordings import hand_scenario
@@ -217,7 +217,7 @@ def monitored(truth, seed=1, spoil=lambda recording: recording):
 def test_a_monitor_is_silent_about_a_right_calibration():
     said, monitor = monitored(TRUTH)
     assert not said
-    assert len(monitor._rests) > LEAST_RESTS
+    assert len(monitor._rests) > LEAST_ORIENTATIONS
 
 
 def test_a_monitor_reports_once_a_bias_that_moved():

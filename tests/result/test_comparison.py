@@ -151,3 +151,9 @@ def test_an_equal_one_is_not_better_and_neither_is_chance():
     assert is_better(0.01, 0.05, 0.01)
     assert not is_better(0.05, 0.05, 0.0)
     assert not is_better(0.0, 0.014, 0.01)
+
+
+def test_a_change_of_temperature_is_weighed_by_the_chip_of_the_sensor():
+    cold = replace(TRUTH, sensor=Sensor("MPU-6500", who_am_i=0x70, temperature_c=20.0))
+    (remark,) = compare(cold, replace(cold, sensor=replace(cold.sensor, temperature_c=40.0))).remarks
+    assert "the bias of an MPU-6500 changes by about 1 mg per degree" in remark

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...clocks.stamps import LONGEST_STEP_S, SLOWEST_HZ
 from ...data import Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
@@ -15,10 +16,7 @@ from ..masks import stuck_readings
 from ..rotation import lengths
 from ..scores import FEWEST_SAMPLES
 
-SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
-# Times of a slow logger may be so many seconds apart; those of any sensor in milliseconds are farther apart.
-LONGEST_STEP_S = 2.0
 TYPICAL_HZ = 200.0  # the unit of times is that in which the rate is nearest to this
 LEAST_G = 0.5  # magnitude in g below which a recording holds no gravity
 # Half of the magnitudes of gravity are within this share of the median, whatever the sensor's errors; of a hand's own

@@ -13,7 +13,7 @@ from ...data import Vector
 from ...errors import RecordingError
 from ..hints import ROLES, Hints
 from .cells import Kind
-from .guess import WIDEST, guess_columns, is_even_clock, likely_columns
+from .guess import MOST_COLUMNS, guess_columns, is_even_clock, likely_columns
 from .names import (
     ACC,
     CHOSEN,
@@ -28,7 +28,7 @@ from .names import (
     names_both,
     parse_column_name,
 )
-from .shown_units import BEYOND
+from .shown_units import LARGEST_NUMBER
 from .table import Table
 
 NAMED_BY_ORDER = f"--columns {','.join(ROLES)}"
@@ -102,7 +102,7 @@ def measured(table: Table) -> dict[int, Vector]:
     places = _measured_places(table)
     with suppress(RecordingError):
         numbers = table.numbers([Column("", place, "") for place in places])
-        whole = (np.abs(numbers) < BEYOND**2).all(axis=1)
+        whole = (np.abs(numbers) < LARGEST_NUMBER**2).all(axis=1)
         return dict(zip(places, numbers[whole].T, strict=True)) if whole.any() else {}
     return {}
 
@@ -131,7 +131,7 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
     arrays = {place: found[1] for place, name in enumerate(table.header) if (found := OF_ARRAY(name))}
     of = measured(table)
     # among many columns with names of their own, three that are as long as gravity are so by chance
-    named = sum(bool(table.name_of(place)) and place not in arrays for place in of) > WIDEST
+    named = sum(bool(table.name_of(place)) and place not in arrays for place in of) > MOST_COLUMNS
     likely = ({}, "") if named else likely_columns(of, [clock.place for clock in table.clocks(columns)], arrays)
     if likely is None or len(_measured_places(table)) < len("xyz"):
         what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"

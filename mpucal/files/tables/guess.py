@@ -38,24 +38,24 @@ from .units import OF_INCREMENTS, QUANTITIES
 # place -> (n,)
 Columns = Mapping[int, Vector]
 Places = tuple[int, ...]
-WIDEST = 16
+MOST_COLUMNS = 16
 # relative error of |a| at rest that is still nearly 1 g: the scale factors and biases of usual sensors
 ONE_G = 0.04
 # largest distance of the quartiles of |a|, over its median: gravity, with the biases of an uncalibrated sensor
 MOST_SCATTER = 0.75
 # directions of gravity are as many times farther apart than those of rates beside a bias
-HARDLY = 4.0
+SPREAD_RATIO = 4.0
 # correlation of a clock with the number of its samples, even if a logger paused for a tenth of the time
-EVEN = 0.99
+LEAST_CORRELATION = 0.99
 # a correlation that is less by as much is no worse
-ALIKE = 0.1
+CORRELATION_MARGIN = 0.1
 
 
 def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
     """Return role -> place among columns of numbers, which physics confirms; empty if nothing fits."""
     n = len(next(iter(of.values()), ()))
     of = {place: column for place, column in of.items() if n < FEWEST or np.ptp(column) > 0.0}
-    if n < FEWEST or not 6 <= len(of) <= WIDEST:
+    if n < FEWEST or not 6 <= len(of) <= MOST_COLUMNS:
         return {}
     clocks = [place for place, column in of.items() if is_clock(column) and not is_index(column)]
     for at in (*clocks, None):
@@ -66,7 +66,7 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
         for size in (_is_in_si, _is_about_one_g, _has_size, len):
             alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and size(_stacked(of, pair[:3]))]
             best = max((turned[pair] for pair in alike), default=0.0)
-            found = next((pair for pair in alike if turned[pair] >= best - ALIKE), None)
+            found = next((pair for pair in alike if turned[pair] >= best - CORRELATION_MARGIN), None)
             if found is not None and not _has_rival(of, found):
                 return dict(zip(ROLES[1:], found, strict=True)) | ({} if at is None else {"t": at})
     # a board that hardly turned: the only triple of columns as long as gravity
@@ -145,7 +145,11 @@ def _sized_triples(
     steady = [triple for triple in sized if _keeps_size(triples[triple]) and all(np.ptp(of[at]) > 0.0 for at in triple)]
     counts = [a for a in map(triples.__getitem__, steady) if seem_counts(a) and _least(a) > 1.0 - MOST_SCATTER]
     most = max(map(_spread, counts), default=0.0)
-    return triples, sized, next((triple for triple in steady if HARDLY * _spread(triples[triple]) >= most), ())
+    return (
+        triples,
+        sized,
+        next((triple for triple in steady if SPREAD_RATIO * _spread(triples[triple]) >= most), ()),
+    )
 
 
 def _triples(places: Sequence[int]) -> list[tuple[int, ...]]:
@@ -241,7 +245,7 @@ def is_even_clock(column: Vector) -> bool:
     if not is_clock(column) or is_index(column):
         return False
     correlation = float(np.corrcoef(column, np.arange(len(column)))[0, 1])
-    return correlation > EVEN and bool(time_unit(sample_period(column)))
+    return correlation > LEAST_CORRELATION and bool(time_unit(sample_period(column)))
 
 
 def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:

@@ -21,7 +21,7 @@ from .names import (
     parse_column_name,
     parse_header,
 )
-from .several import BEGUN, INSTANCE, MOST_SENSORS
+from .several import FIRST_LINES, INSTANCE, MOST_SENSORS
 from .table import Table
 from .text import read_table, table_of_rows
 from .units import find_unit
@@ -108,7 +108,7 @@ def labelled_table(text: str, name: str) -> Table | None:
 
     A sample is a line, or the lines from one that names the first axis to the next such line.
     """
-    begun = [list(_numbers(line)) for line in _label("\n".join(text.split("\n", BEGUN)[:BEGUN]))]
+    begun = [list(_numbers(line)) for line in _label("\n".join(text.split("\n", FIRST_LINES)[:FIRST_LINES]))]
     together = list(dict.fromkeys(name for names in begun for name in names))
     header = next((names for names in begun if names_both(parse_header(names))), together)
     if not names_both(parse_header(header)):

@@ -14,7 +14,7 @@ from ...clocks.stamps import FEWEST
 from ...data import Recording, Vector
 from ...errors import RecordingError
 from ..hints import NO_HINTS, ROLES, Hints
-from ..reading import HELD, SNIFFED, check_size, first_bytes, reading
+from ..reading import MEMORY_PER_TEXT, SNIFFED, check_size, first_bytes, reading
 from .cells import LOOKED_AT, OF_DAY, Kind
 from .columns import find_columns
 from .guess import is_clock, is_index
@@ -47,7 +47,7 @@ PROGRAMS = {"MT Manager version": {"t": "0.1ms", "acc": "m/s^2", "gyr": "rad/s"}
 # seconds since 1970, and nanoseconds, as the first cells of `ros2 topic echo --csv`
 STAMP = re.compile(r"[12]\d{9},\d{7,9},").match
 # bytes in which a board is turned
-TURNED = 1 << 20
+TURNED_BYTES = 1 << 20
 FLIPPED = "accelerations have the opposite sign, as on iOS, and were negated"
 # a column of Sensor Logger's tables, and its table of accelerations without gravity
 OF_SENSOR_LOGGER, LINEAR = "seconds_elapsed", "accelerometer"
@@ -84,7 +84,7 @@ def _may_be_si(table: Table, path: Path) -> bool:
     values = _accelerations(table)
     if len(values) < FEWEST or (unit := acceleration_unit(values)) == "m/s^2":
         return True
-    turned = None if unit or seem_counts(values) else _begun(path, TURNED)
+    turned = None if unit or seem_counts(values) else _begun(path, TURNED_BYTES)
     return turned is not None and offset(_accelerations(turned)) is None
 
 
@@ -113,7 +113,7 @@ def _may_be_no_seconds(table: Table, path: Path) -> bool:
 
 def _read_text(path: Path) -> str:
     with reading(path):
-        check_size(path, HELD * path.stat().st_size)
+        check_size(path, MEMORY_PER_TEXT * path.stat().st_size)
         return decode_text(path.read_bytes(), path.name)
 
 

@@ -84,8 +84,8 @@ ESTIMATED = re.compile(
 COUNTER = re.compile(r"^(?!.*(?:stamp|time)).*(?:packet|number|index|sequence|frame|sample|counter)", re.IGNORECASE)
 # in a name of MATLAB
 HYPHEN = "0x2[dD]"
-# how many names are remembered, and how long a name is at most
-MOST_NAMES, LONGEST_NAME = 1024, 100
+# of a name, in characters
+LONGEST_NAME = 100
 # the rank of a column that the user or physics chose
 CHOSEN = -1
 # the rank of a column that one word alone calls a clock, such as mac_timestamp and esp32_ms
@@ -140,7 +140,7 @@ class Column:
 
 
 # a log names them on each line
-@lru_cache(MOST_NAMES)
+@lru_cache
 def parse_column_name(name: str, place: int) -> Column | None:
     """Return the column of that name at `place`; None if it holds nothing that is read."""
     text, axis, unit = name.strip().lstrip("#%").strip(), -1, ""
@@ -248,7 +248,7 @@ def parse_header(header: list[str]) -> list[Column]:
     return [column for place, name in enumerate(header) if (column := parse_column_name(name, place)) is not None]
 
 
-@lru_cache(MOST_NAMES)
+@lru_cache
 def axes_of(name: str) -> list[str]:
     """Return names for the columns x, y, z of a matrix or file that is called after a sensor; else an empty list."""
     last = re.sub(HYPHEN, "-", name.rpartition(".")[2])

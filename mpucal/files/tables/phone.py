@@ -27,7 +27,7 @@ from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..array_files import holds_arrays, read_arrays
 from ..hints import NO_HINTS, Hints
-from ..reading import HELD, check_size, first_bytes, reading
+from ..reading import MEMORY_PER_TEXT, check_size, first_bytes, reading
 from .array_table import table_of_arrays
 from .columns import columns_by_hint
 from .load import FLIPPED, find_any_table, with_sensor_of_file
@@ -103,7 +103,7 @@ def _from_folder(path: Path, wanted: str, hints: Hints) -> Recording:
             file = path / name
             if holds_arrays(file):
                 return table_of_arrays(name, read_arrays(file))
-            check_size(path, HELD * file.stat().st_size)
+            check_size(path, MEMORY_PER_TEXT * file.stat().st_size)
             return file.read_bytes()
 
         return _recording(wanted or path.name, names, read, wanted, hints)

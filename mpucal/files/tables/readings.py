@@ -18,11 +18,11 @@ from .units import COUNTS, OF_BNO055, OF_INCREMENTS, QUANTITIES, resolve_unit
 ANOTHER_RANGE = 0.5
 OF_COUNTS = "in counts of"
 # largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther) or counts, or to tenths or hundredths of deg/s
-NEAR = 0.08
+NEAR_LOG = 0.08
 # remarks on a unit that |a| alone shows
 BY_SIZE, OR_MG = " (by |a|)", " (by |a|; if these are in mg, give --units acc=mg)"
 # quartile distance of |a| over its median, beyond which the median is that of a motion
-SHAKING = 0.25
+SHAKEN_SCATTER = 0.25
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,14 @@ def accelerations(
     whole = not said and units.are_counts(values)
     likely_whole = _whole_unit(size, beside or "") if whole and seen == "mg" else ""
     unclear = not seen or hints.accel_range_g or likely_whole == COUNTS
-    if whole and _away(size, "mm/s^2") < NEAR and beside != COUNTS and not hints.accel_range_g:
+    if whole and _away(size, "mm/s^2") < NEAR_LOG and beside != COUNTS and not hints.accel_range_g:
         by = "(by |a|; if these are in 0.1 mg or counts, give --units acc=mg/10 or acc=counts)"
         return Reading.of(values, QUANTITIES["acc"]["mm/s^2"], f"in mm/s^2 {by}")
     if said == COUNTS or (whole and unclear):
         return _scaled_counts(values, hints, name, size, OR_MG if likely_whole and not beside else BY_SIZE)
     at_rest = units.quietest(values)
     near = "" if seen or said else units.mean_acceleration_unit(values) or units.acceleration_unit(at_rest)
-    lacks_gravity = not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2
+    lacks_gravity = not seen and size * QUANTITIES["acc"].get(said, 1.0) < STANDARD_GRAVITY_MPS2 / units.MOST_OF_G
     if near and (beside != "" or not lacks_gravity):
         raise RecordingError(
             f"{name}: |a| varies too much to show its unit; on average, or at rest, it would be gravity in {near}",
@@ -121,7 +121,7 @@ def _whole_unit(size: float, beside: str) -> str:
 
 def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str) -> Reading:
     """Return (n, 3) counts, whose median magnitude is `size`, in SI units; `by` says how their range is known."""
-    if units.typical_size(values)[1] > SHAKING * size:
+    if units.typical_size(values)[1] > SHAKEN_SCATTER * size:
         size = units.typical_size(units.averaged(values))[0]
     per_g = units.counts_per_g(size)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
@@ -132,7 +132,7 @@ def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str
             "give the --accel-range that the sensor had, or --units acc=counts if it was this one",
             f"--accel-range {ACCEL_COUNTS / per_g:g}" if hints.accel_range_g else "",
         )
-    if abs(math.log(size / per_g)) > NEAR:
+    if abs(math.log(size / per_g)) > NEAR_LOG:
         by = f" (the nearest by |a|: 1 g is {size:.4g} counts, which fits no usual range)"
     by = "" if hints.accel_range_g else by
     return Reading.of(values, scale, f"{OF_COUNTS} ±{range_g:g} g{by}", counts=True)
@@ -169,7 +169,7 @@ class Rates:
             return OF_BNO055, "these may be the counts of a BNO055, or else --units acc=mg,gyr=mrad/s"
         decimal = {of: abs(math.log(abs(self._factor) / QUANTITIES["gyr"][of])) for of in ("deg/s/10", "deg/s/100")}
         of = min(decimal, key=decimal.__getitem__)
-        if decimal[of] > NEAR:
+        if decimal[of] > NEAR_LOG:
             return None
         likely, other = _mg_or_cm(units.typical_size(self._acc)[0])
         return {"acc": likely, "gyr": of}, f"|a| suggests these units, or else --units acc={other},gyr={of}"

@@ -23,9 +23,9 @@ from ...data import Vector
 from ...errors import RecordingError
 from .cells import Cells, Kind, is_number, parse_cell
 from .columns import measured
-from .guess import WIDEST, side_by_side
+from .guess import MOST_COLUMNS, side_by_side
 from .names import ACC, GYR, WITHOUT_GRAVITY, Column, axes_of, first_triple, names_both, parse_column_name, parse_header
-from .shown_units import BEYOND
+from .shown_units import LARGEST_NUMBER
 from .table import Table
 from .text import HEAD
 
@@ -40,7 +40,7 @@ MAY_NAME_SENSORS = re.compile(r"(?:.*[ _.-])?(?:id|addr|address|source|port|chan
 INSTANCE = {"I": "imu"}
 MOST_SENSORS, MOST_TURNS = 32, 6
 # lines in which the sensors of a column of any name, or of numbers, take turns; a board's log may come before them
-BEGUN = 2000
+FIRST_LINES = 2000
 # columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
 FEWEST_COLUMNS, FARTHER = 3, 2.0
 # separators of the words in a name, and the largest number of words considered; a digit ends a word of letters
@@ -53,7 +53,7 @@ _BEGINNING = re.compile(
     r"^[\[(<]?((?:0x[\dA-Fa-f]{2}|[A-Za-z]\w{0,20})(?:[ #-]\d{1,2})?)[\])>]?[ \t]?[:|>-]?(?:[ \t]|\r?$)", re.MULTILINE
 )
 # directions of gravity of two sensors that lie otherwise: they differ by as much of it, while its length stays
-APART, SAME_LENGTH = 0.25, 0.1
+LEAST_APART, MOST_LENGTH_CHANGE = 0.25, 0.1
 CHOOSES = "--sensor chooses"
 
 
@@ -94,7 +94,7 @@ def of_one_place(table: Table, sensor: str | None = None) -> Table:
 def _of_one_side(table: Table, sensor: str | None) -> Table:
     """Return a table of several sensors side by side, whose names do not show them, with the names of one's columns."""
     of = {} if table.of_sensors else measured(table)
-    sensors = {str(i): roles for i, roles in enumerate(side_by_side(of), 1)} if len(of) > WIDEST or sensor else {}
+    sensors = {str(i): roles for i, roles in enumerate(side_by_side(of), 1)} if len(of) > MOST_COLUMNS or sensor else {}
     if len(sensors) < 2:
         return table
     chosen = _choose([*sensors], sensor, table.name)
@@ -211,7 +211,7 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
     for place, cells in enumerate(table.cells):
         name = table.name_of(place)
         named = bool(NAMES_SENSORS(name))
-        if not named and (place in known or not 1 < len(set(_words(cells[:BEGUN]))) <= MOST_SENSORS):
+        if not named and (place in known or not 1 < len(set(_words(cells[:FIRST_LINES]))) <= MOST_SENSORS):
             continue
         words = _words(cells)
         of_words = {word: number for number, word in enumerate(dict.fromkeys(filter(str.strip, words)))}
@@ -263,7 +263,7 @@ def turns(acc: Vector) -> int:
 
     From line to line gravity then has another direction, and its length stays; it comes back with the same sensor.
     """
-    acc = np.where((np.abs(acc) < BEYOND).all(axis=1, keepdims=True), acc, np.nan)
+    acc = np.where((np.abs(acc) < LARGEST_NUMBER).all(axis=1, keepdims=True), acc, np.nan)
     lengths = np.linalg.norm(acc, axis=1)
     if np.count_nonzero(np.isfinite(lengths)) < FEWEST:
         return 1
@@ -272,7 +272,7 @@ def turns(acc: Vector) -> int:
         return _median(np.linalg.norm(acc[lag:] - acc[:-lag], axis=1))
 
     size, differ, apart = _median(lengths), _median(np.abs(np.diff(lengths))), step(1)
-    if not (apart > APART * size and differ < SAME_LENGTH * size):
+    if not (apart > LEAST_APART * size and differ < MOST_LENGTH_CHANGE * size):
         return 1
     return next((lag for lag in range(2, MOST_TURNS + 1) if FARTHER * step(lag) < apart), 1)
 
@@ -300,7 +300,7 @@ def _others(table: Table, place: int) -> Vector:
     """Return the numbers in the other columns, (n, k), 0 where there is none; (n, 0) if the table is damaged."""
     with suppress(RecordingError):
         found = table.numbers([Column("", at, "") for at in table.places(Kind.NUMBER) if at != place])
-        return np.where(np.abs(found) < BEYOND, found, 0.0)
+        return np.where(np.abs(found) < LARGEST_NUMBER, found, 0.0)
     return np.zeros((len(table), 0))
 
 

@@ -12,45 +12,44 @@ import math
 import numpy as np
 
 from ...chip.families import MPU6050
+from ...clocks.stamps import LONGEST_STEP_S, SLOWEST_HZ
 from ...data import ACCEL_COUNTS, GAP_INTERVALS, STANDARD_GRAVITY_MPS2, Vector
 from .units import DAYS, QUANTITIES
 
-# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 24 at ±2 g; and the largest count
-FEWEST_PER_G, MOST_PER_G, MOST_COUNTS = 8, 22, 2.0**23
+# counts for 1 g, as powers of two: of 10 bits at ±2 g, and of 24 at ±2 g
+FEWEST_PER_G, MOST_PER_G = 8, 22
 # the units that samples show without a name; the others are too near to these, to counts, or to a magnetic field in uT
 SHOWN = {
     "t": ("s", "ms", "us", "ns", "0.1ms", DAYS),
     "acc": ("m/s^2", "g", "mg"),
     "gyr": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
 }
-SLOWEST_HZ, FASTEST_HZ = 5.0, 8000.0
-# s: the longest step in a named unit; such a recording is too slow to calibrate, but readable
-SLOW_S = 2.0
+FASTEST_HZ = 8000.0
 # m/s^2: whole numbers that are larger are counts
 LARGEST_OF_SI = 300.0
-# |a| / g: a sensor may have gains of 0.5 to 1.5
-LEAST_OF_G, MOST_OF_G = 0.45, 2.0
+# largest ratio of |a| and g, or its inverse: a sensor may have gains of 0.5 to 1.5, and 2048 counts are no cm/s^2
+MOST_OF_G = 2.0
 # the same where nothing else shows that it is gravity in a unit: not counts of 512 for 1 g in mg, or a field in gauss
-LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
-# true over measured rate: the same gains
-LEAST_TURNED, MOST_TURNED = 0.6, 1.6
+MOST_LIKELY = 1.35
+# the same of true and measured rate
+MOST_TURNED = 1.65
 # quartile distance of |a| over its median, beyond which it is not gravity
 SCATTER = 0.45
 # a rate to try on samples without times, and the rates of most loggers
 ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
 # samples over which shaking averages out: a few of its periods at the rates of most loggers
-SHAKEN = 100
+AVERAGED_SAMPLES = 100
 # octaves by which a sample rate may change in the second round
-SETTLED = 0.25
+SETTLED_OCTAVES = 0.25
 # the fastest rate of a hand and of usual sensors
 FASTEST_RAD_S = 37.0
 # samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; and how much
 # more than it does gravity may seem to turn by noise
-QUIET, LEAST_NOISE_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), 3.0
+QUIET_SAMPLES, LEAST_NOISE_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), 3.0
 # share of half the range by which counts from the lowest may turn, or rest, about another point
 OFF_CENTRE = 0.05
 # larger numbers are not from a sensor in any unit; their squares are finite
-BEYOND = 1e12
+LARGEST_NUMBER = 1e12
 # the least duration of a recording that shows how gravity turns, in halves of TURN_S
 LEAST_TURNS = 30
 # s over which the change of gravity is taken, and the correlation with the rates that it needs at least
@@ -58,8 +57,11 @@ TURN_S, EXPLAINED = 0.2, 0.5
 
 
 def time_unit(step: float, said: str = "") -> str:
-    """Return the unit of times that lie `step` apart: `said` if plausible, else by the sample rate; or empty."""
-    if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= SLOW_S:
+    """Return the unit of times that lie `step` apart: `said` if plausible, else by the sample rate; or empty.
+
+    A recording in a named unit is read even if it is too slow to calibrate.
+    """
+    if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= LONGEST_STEP_S:
         return said
     of = QUANTITIES["t"]
     return next((unit for unit in SHOWN["t"] if 1 / FASTEST_HZ <= step * of[unit] <= 1 / SLOWEST_HZ), "")
@@ -70,14 +72,14 @@ def acceleration_unit(acc: Vector, said: str = "") -> str:
 
     The unit `said` by the file is tried first. Without gravity, |a| of a hand scatters by more than half of its median.
     """
-    if not (np.abs(acc) < BEYOND).all():
+    if not (np.abs(acc) < LARGEST_NUMBER).all():
         return ""
     size, scatter = typical_size(acc)
     if scatter > SCATTER * size:
         return ""
     units = (*filter(None, [said]), *SHOWN["acc"])
     of_g = {unit: size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2 for unit in units}
-    return next((unit for unit, ratio in of_g.items() if LEAST_OF_G <= ratio <= MOST_OF_G), "")
+    return next((unit for unit, ratio in of_g.items() if 1 / MOST_OF_G <= ratio <= MOST_OF_G), "")
 
 
 def mean_acceleration_unit(values: Vector) -> str:
@@ -88,14 +90,14 @@ def mean_acceleration_unit(values: Vector) -> str:
 
 def quietest(values: Vector) -> Vector:
     """Return the part of (n, 3) samples that varies least, as a sensor at rest does."""
-    width = min(len(values), QUIET)
+    width = min(len(values), QUIET_SAMPLES)
     parts = values[: len(values) // width * width].reshape(-1, width, 3)
     return np.asarray(min(parts, key=lambda part: float(part.std(axis=0).sum())))
 
 
 def averaged(values: Vector) -> Vector:
     """Return means of adjacent samples (n, 3): shaking averages out, and gravity does not."""
-    width = min(SHAKEN, len(values) // 2)
+    width = min(AVERAGED_SAMPLES, len(values) // 2)
     return np.column_stack([np.convolve(axis, np.full(width, 1 / width), "valid") for axis in values.T])
 
 
@@ -136,7 +138,7 @@ def to_signed(values: Vector) -> Vector:
     Of another width than 16 bits, they only do so where gravity turns, or rates rest, about half the range.
     """
     most = float(values.max())
-    if values.min() < 0 or not 2.0**FEWEST_PER_G <= most < BEYOND or not (values == np.rint(values)).all():
+    if values.min() < 0 or not 2.0**FEWEST_PER_G <= most < LARGEST_NUMBER or not (values == np.rint(values)).all():
         return values
     half = 2.0 ** (int(most).bit_length() - 1)
     wrapped, shifted = np.where(values >= half, values - 2 * half, values), values - half
@@ -154,7 +156,7 @@ def to_signed(values: Vector) -> Vector:
 
 def are_counts(values: Vector) -> bool:
     """Return True if all values are whole numbers of 24 bits at most."""
-    return bool((values == np.rint(values)).all() and np.abs(values).max() <= MOST_COUNTS)
+    return bool((values == np.rint(values)).all() and np.abs(values).max() <= 2.0 ** (MOST_PER_G + 1))
 
 
 def seem_counts(values: Vector) -> bool:
@@ -216,7 +218,7 @@ def likely_rate_hz(acc: Vector, gyr: Vector, unit: str) -> float | None:
         hz = [ANY_HZ]
         while len(hz) < 3 and (factor := rate_factor(np.arange(len(acc)) / hz[-1], acc, gyr)):
             hz.append(hz[-1] * si / abs(factor))
-        if len(hz) == 3 and LIKELY_HZ[0] < hz[2] < LIKELY_HZ[1] and abs(math.log2(hz[2] / hz[1])) < SETTLED:
+        if len(hz) == 3 and LIKELY_HZ[0] < hz[2] < LIKELY_HZ[1] and abs(math.log2(hz[2] / hz[1])) < SETTLED_OCTAVES:
             likely.append(float(f"{hz[2]:.3g}"))
     return likely[0] if len(likely) == 1 else None
 
@@ -229,13 +231,13 @@ def are_increments(t: Vector, acc: Vector, gyr: Vector, rate_hz: float) -> bool:
 
 def is_gravity(size_mps2: float) -> bool:
     """Return True if an acceleration is likely to be gravity, where nothing else shows it."""
-    return LEAST_LIKELY <= size_mps2 / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
+    return 1 / MOST_LIKELY <= size_mps2 / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
 
 
 def gyro_unit(factor: float | None, said: str = "") -> str:
     """Return the unit of rates with this rate_factor, first the one `said` by the file; empty if there is none."""
     units = {unit: QUANTITIES["gyr"][unit] for unit in (*filter(None, [said]), *SHOWN["gyr"])}
-    return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
+    return next((u for u, si in units.items() if factor and 1 / MOST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
 
 
 def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:

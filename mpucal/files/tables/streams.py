@@ -147,7 +147,7 @@ def _checked(stream: Stream, what: str, name: str) -> Stream:
     """Return a stream whose counts have their sign, if it holds numbers that a sensor may give."""
     if np.count_nonzero(stream.complete) < 2:
         raise RecordingError(f"{name} holds {np.count_nonzero(stream.complete)} {what}", "record for longer")
-    beyond = np.asarray((np.abs(stream.values) >= units.BEYOND).any(axis=1))
+    beyond = np.asarray((np.abs(stream.values) >= units.LARGEST_NUMBER).any(axis=1))
     if are_many(int(np.count_nonzero(beyond)), beyond):
         raise RecordingError(
             f"{name}: the {what} of sample {int(beyond.argmax())} are not a sensor's", "leave that sample out"

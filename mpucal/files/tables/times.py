@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from ...clocks import S
-from ...clocks.stamps import FEWEST, Clock, Numbers, are_gaps, fit_clock, sample_period
+from ...clocks.stamps import FEWEST, SLOWEST_HZ, Clock, Numbers, are_gaps, fit_clock, sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
@@ -109,12 +109,12 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     if stream.ticks is None or first.ticks is None:
         rate_hz = hints.rate_hz or units.ANY_HZ
         return Clock(stream.number / rate_hz, are_gaps(stream.number), rate_hz), f"a rate of {rate_hz:g} Hz"
-    if not (np.abs(stream.ticks) < units.BEYOND**2).all():
+    if not (np.abs(stream.ticks) < units.LARGEST_NUMBER**2).all():
         raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
     ticks, wraps = _unwrap(stream.ticks + float(stream.origin - first.origin), float(first.origin))
     step, named = sample_period(ticks), hints.units.get("t", stream.time_unit)
     # milliseconds are whole numbers: a fraction of them is a slow recording's second
-    slow = "s" if step > 1 / units.SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
+    slow = "s" if step > 1 / SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
     seen = hints.units.get("t", units.time_unit(step, named or _unit_of_date(stream.origin) or slow))
     unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}", likely=step > 0.0)
     t, said = ticks * QUANTITIES["t"][unit], f"times in {unit}"

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ...chip.config import MAX_FRAMES_A_POLL
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...session.plan import Plan
 from ...sources.chip import OpenedChip
@@ -80,7 +79,7 @@ LONG_POLL_S = 0.25
 def with_long_polls(plan: Plan, real_time: bool) -> Plan:
     """Return the plan with longer times between polls, unless the simulation runs in real time."""
     config = plan.config
-    polled = replace(config, poll_s=min(LONG_POLL_S, MAX_FRAMES_A_POLL / config.rate_hz))
+    polled = replace(config, poll_s=min(LONG_POLL_S, config.longest_s))
     return plan if real_time else replace(plan, config=polled)
 
 
