@@ -10,7 +10,7 @@ namespace mpucal {
 
 void stuck_odds(const std::int32_t* counts, const bool* gap, std::size_t n, const std::int64_t* edges,
                 std::size_t pieces, double errors, double sound, double* odds) {
-  constexpr std::int64_t word = 0xFFFF, unsign = word >> 1, leap = 1 << (kBits - 2);
+  constexpr std::int64_t word = 0xFFFF, unsign = word >> 1, leap = unsign - (unsign >> 4);
   constexpr std::size_t factors = 64;  // of a product, each of 0.1 to 45, which a double holds
   // the odds of a bit that stays, and of one that changes, where a sound one does so in this share of the steps
   struct Odds {
@@ -44,7 +44,7 @@ void stuck_odds(const std::int32_t* counts, const bool* gap, std::size_t n, cons
         };
         const int bits = std::min(std::ilogb(static_cast<double>(changed)), kBits - 1);
         for (int bit = 0; bit < bits; ++bit) add(bit, odds_at(bit));
-        // Without its sign a value that passes zero leaps from one end of the range to the other.
+        // Without its sign a value that passes zero leaps from one end of the range to the other. A blow does not.
         if (std::abs((after & unsign) - (before & unsign)) > leap) add(kBits - 1, odds_at(kBits - 1));
       }
     }
