@@ -22,7 +22,7 @@ from .transport import PAUSE_NS, ReceivedBytes, Transport
 OWN_SYSTEM, OWN_COMPONENT = 254, 190
 
 LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
-HEARTBEAT_NS, ARMED = S, 128
+HEARTBEAT_NS = S
 SEQUENCE = 256
 # A packet that others overtook is at most LATE numbers late. Numbers start again after a silence, such as a reboot's,
 # which is reported as such.
@@ -198,7 +198,7 @@ class Link:
                 continue
             self._count(message)
             if beats:
-                self.armed = bool(message.base_mode & ARMED)
+                self.armed = bool(message.base_mode & dialect().MAV_MODE_FLAG_SAFETY_ARMED)
             for listener in self._listeners:
                 listener(message)
             yield message

@@ -12,12 +12,12 @@ from ..clocks import S
 from ..errors import LinkError
 from .dialect import dialect
 from .firmwares import PX4
-from .imu import HIGHRES, MESSAGE_ID, decode_reading
+from .imu import HIGHRES, decode_reading
 from .link import Link
 from .parameters.client import read_parameters, set_parameter
 from .parameters.encoding import INT32
 from .parameters.slots import all_slots
-from .requests import send_command
+from .requests import interval_command, send_command
 from .texts import ReceivedPrompt, encode_prompt
 
 AUTOCAL = "SENS_IMU_AUTOCAL"
@@ -25,7 +25,7 @@ AUTOCAL = "SENS_IMU_AUTOCAL"
 QUICK = 4
 ASSIGN_NS = 10 * S
 # Offsets of 60 mg on two axes, which are not known yet, look like 5 degrees of tilt.
-LEVEL_DEG, LEVEL_NS, INTERVAL_US = 8, 20 * S, 20_000
+LEVEL_DEG, LEVEL_NS = 8, 20 * S
 
 
 class Preparation:
@@ -70,7 +70,7 @@ class Preparation:
         vehicle = self._link.vehicle
         self._say(f"Lay {vehicle} level, top up: it assigns ids to its accelerometers then, and offsets as it lies.")
         self._link.send(encode_prompt(ReceivedPrompt("lay_flat", None)))
-        send_command(self._link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[HIGHRES], INTERVAL_US)
+        send_command(self._link, *interval_command(HIGHRES))
         if not self._link.succeeds(self._is_level, LEVEL_NS):
             self._say(
                 f"{vehicle} did not lie level within {LEVEL_DEG} degrees, so it assigns no accelerometer ids:"

@@ -61,8 +61,16 @@ def send_command(link: Link, number: int, *params: float, timeout_s: float = 1.0
     return ask(link, encode_command(link, number, *params), reply, timeout_s, tries)
 
 
-PREARM_CHECK = 0x10000000
-SYS_STATUS = 1
+# Means and attitudes of a vehicle at rest need no more.
+REST_US = 20_000
+
+
+def interval_command(name: str, interval_us: int = REST_US) -> tuple[int, int, int]:
+    """Return the MAV_CMD that has a vehicle send the message `name` each `interval_us`, and its parameters."""
+    m = dialect()
+    return m.MAV_CMD_SET_MESSAGE_INTERVAL, getattr(m, f"MAVLINK_MSG_ID_{name}"), interval_us
+
+
 HEARTBEAT_NS = 5 * S
 COMPLAINTS_NS, TRIES = 3 * S // 2, 3
 PREFIXES = ("PreArm: ", "Preflight Fail: ", "Arm: ")
@@ -112,8 +120,8 @@ def check_prearm(link: Link) -> PrearmState:
     ready: bool | None = None
     complaints: list[str] = []
     for _ in range(TRIES):
-        for number, param in ((m.MAV_CMD_RUN_PREARM_CHECKS, 0), (m.MAV_CMD_REQUEST_MESSAGE, SYS_STATUS)):
-            link.send(encode_command(link, number, param))
+        link.send(encode_command(link, m.MAV_CMD_RUN_PREARM_CHECKS))
+        link.send(encode_command(link, m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_SYS_STATUS))
         for message in link.messages(link.now_ns() + COMPLAINTS_NS):
             if message.get_type() == "SYS_STATUS":
                 ready = _is_ready(message, is_px4)
@@ -128,5 +136,6 @@ def check_prearm(link: Link) -> PrearmState:
 
 def _is_ready(message: Message, is_px4: bool) -> bool | None:
     """Return the state in a SYS_STATUS, None if it lacks the check; PX4 never lists it as present."""
-    known = is_px4 or message.onboard_control_sensors_present & PREARM_CHECK
-    return bool(message.onboard_control_sensors_health & PREARM_CHECK) if known else None
+    check = dialect().MAV_SYS_STATUS_PREARM_CHECK
+    known = is_px4 or message.onboard_control_sensors_present & check
+    return bool(message.onboard_control_sensors_health & check) if known else None

@@ -17,15 +17,14 @@ from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Still
 from ..rests.windows import of_rows
 from .dialect import Message, dialect
-from .imu import MESSAGE_ID, Reading, Stream, decode_reading
+from .imu import Reading, Stream, decode_reading
 from .link import Link
 from .parameters.mounting import attitude_deg
-from .requests import send_command
+from .requests import interval_command, send_command
 
 # A stream that fills no window in SLOW_NS does not come at all.
 WINDOW_NS, PATIENCE_NS, SLOW_NS = 2 * S, 30 * S, 60 * S
 FEWEST = 20
-INTERVAL_US = 20_000
 LONGEST_STEP_S = 1.0
 
 
@@ -102,9 +101,8 @@ class RestMonitor:
             self._request()
 
     def _request(self) -> None:
-        set_interval = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
         for stream in self._streams:
-            send_command(self._link, set_interval, MESSAGE_ID[stream.name], INTERVAL_US, tries=5)
+            send_command(self._link, *interval_command(stream.name), tries=5)
 
     def _on_message(self, message: Message) -> None:
         content = decode_reading(message)
@@ -138,7 +136,7 @@ def _rest_number(detector: Detector, readings: Sequence[Reading]) -> int | None:
     return runs.pop() if len(runs) == 1 else None
 
 
-ATTITUDE, ATTITUDE_US = 30, 100_000
+ATTITUDE = "ATTITUDE"
 HEARD_NS, BACK_NS, SETTLED_NS = 5 * S, 60 * S, 60 * S
 # Two comparisons in succession that differ by no more show that the estimator has settled.
 STEADY_DEG = 0.05
@@ -218,7 +216,7 @@ class Horizon:
             before = apart
 
     def _request(self) -> None:
-        send_command(self._link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, ATTITUDE, ATTITUDE_US)
+        send_command(self._link, *interval_command(ATTITUDE))
 
     def _listen(self, for_ns: int) -> None:
         """Wait for the next ATTITUDE, at most `for_ns`."""
@@ -227,6 +225,6 @@ class Horizon:
                 return
 
     def _on_message(self, message: Message) -> None:
-        if message.get_type() == "ATTITUDE":
+        if message.get_type() == ATTITUDE:
             self._boot_ms = message.time_boot_ms
             self._heard.append((self._link.now_ns(), *np.degrees([message.roll, message.pitch]).tolist()))

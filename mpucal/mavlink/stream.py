@@ -11,7 +11,7 @@ from .dialect import Message, dialect
 from .firmwares import PX4, preferred_messages
 from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, decode_reading
 from .link import Link
-from .requests import encode_command, send_command
+from .requests import encode_command, interval_command, send_command
 
 # ArduPilot's rates at a loop of 400 Hz: the next lower one is requested after one that it denies.
 LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
@@ -111,8 +111,7 @@ class Streams:
     def _request_temperature(self) -> None:
         """Request RAW_IMU for IMU 1's own temperature, which ArduPilot's HIGHRES_IMU lacks; nothing depends on it."""
         if self._takes_temperature:
-            command = dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[RAW], 500_000
-            self._link.send(encode_command(self._link, *command))
+            self._link.send(encode_command(self._link, *interval_command(RAW, 500_000)))
 
     def _restart_window(self) -> None:
         self._times.clear()
@@ -150,8 +149,7 @@ class Streams:
         self._link.send(encode_command(self._link, *self._interval_command(name)))
 
     def _interval_command(self, name: str) -> tuple[int, int, int]:
-        interval_us = round(1e6 / self._requested_hz[name])
-        return dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[name], interval_us
+        return interval_command(name, round(1e6 / self._requested_hz[name]))
 
     def _arrives(self, name: str) -> bool:
         """Wait for IMU 1's messages of that name; return True once enough came."""

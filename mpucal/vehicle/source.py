@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..chip.records import BEGUN, END, OPENED, PAUSED, SAMPLED_NS
+from ..clocks import S
 from ..data import Recording, Samples, Sensor
 from ..errors import EndOfCapture, LinkError
 from ..files.mcap import Capture
@@ -21,7 +22,7 @@ from ..mavlink.texts import encode_prompt
 from ..mavlink.tlog import RawPacket
 from ..mavlink.transports import open_transport
 from ..mavlink.url import parse_url, read_key
-from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
+from ..mavlink.vehicle_source import POLL_NS, VehicleSource, lock_to_vehicle
 from ..origin import Origin
 from ..session.events import Prompt
 from ..session.plan import Plan
@@ -29,8 +30,6 @@ from ..sources.kind import Request
 from ..sources.opened_source import ActiveSource, CaptureRecorder, OpenedSource, Say
 from ..sources.recorded_parts import RecordedParts
 from ..sources.replay import PacketReplay
-
-POLL_S = 0.05
 
 
 class RecordedSource:
@@ -54,7 +53,7 @@ class RecordedSource:
         """
         if self._at == len(self._recording):
             raise EndOfCapture
-        self._now_s += POLL_S
+        self._now_s += POLL_NS / S
         last = int(self._recording.t.searchsorted(self._now_s))
         samples = self._recording.at(slice(self._at, last))
         self._at = last

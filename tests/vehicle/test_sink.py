@@ -22,7 +22,7 @@ from mpucal.mavlink import rest as rest_monitor
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
-from mpucal.mavlink.requests import send_command
+from mpucal.mavlink.requests import interval_command, send_command
 from mpucal.mavlink.rest import Horizon
 from mpucal.mavlink.texts import ReceivedPrompt, encode_prompt
 from mpucal.mavlink.transport import ReceivedBytes
@@ -131,7 +131,7 @@ def error_mps2(vehicle, imu=0):
 def test_a_vehicle_that_is_slow_for_a_moment_is_waited_for(monkeypatch):
     _, _, link = vehicle_of("ardupilot")
     # It sends 4 Hz, as a simulator on a busy computer does: its windows are longer than usual.
-    monkeypatch.setattr(rest_monitor, "INTERVAL_US", 250_000)
+    monkeypatch.setattr(rest_monitor, "interval_command", lambda name: interval_command(name, 250_000))
     begun_ns, stream = link.now_ns(), rest_monitor.Stream("HIGHRES_IMU", 1)
     rest = rest_monitor.RestMonitor(link, [stream]).wait()
     assert np.linalg.norm(rest.mean[stream]) == pytest.approx(9.8, abs=0.8)
@@ -169,7 +169,7 @@ def yes(question, with_yes):
 
 def attitude_deg(vehicle, link):
     """Return the mean roll and pitch of a second of ATTITUDE."""
-    send_command(link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, 30, 20_000)
+    send_command(link, *interval_command("ATTITUDE"))
     heard = [m for m in link.messages(link.now_ns() + 1_000_000_000) if m.get_type() == "ATTITUDE"]
     return np.degrees(np.mean([(m.roll, m.pitch) for m in heard], axis=0))
 

@@ -23,7 +23,7 @@ from mpucal.data import Vector
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.slots import slot_of
-from mpucal.mavlink.requests import send_command
+from mpucal.mavlink.requests import interval_command, send_command
 from mpucal.mavlink.rest import ATTITUDE
 from mpucal.mavlink.texts import ReceivedPrompt, encode_prompt
 from mpucal.result.calibration import GOOD, REFUSED, Calibration
@@ -112,8 +112,8 @@ def level_change_deg(words: str, calibration: Calibration) -> float:
 
 def attitude_deg(link: Link) -> Vector:
     """Return the mean roll and pitch (2,) of a few seconds."""
-    send_command(link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, ATTITUDE, 20_000)
-    heard = [m for m in link.messages(link.now_ns() + HEARD_NS) if m.get_type() == "ATTITUDE"]
+    send_command(link, *interval_command(ATTITUDE))
+    heard = [m for m in link.messages(link.now_ns() + HEARD_NS) if m.get_type() == ATTITUDE]
     return np.degrees(np.mean([(m.roll, m.pitch) for m in heard], axis=0))
 
 

@@ -16,13 +16,11 @@ from .mounting import BOARD_ANGLES, BOARD_ROTATION, CUSTOM_ANGLES, ORIENTATION
 from .slots import all_slots
 
 # Over a radio that loses one packet in five each way, ten tries fail once in 30,000.
-TIMEOUT_S, TRIES = 0.5, 10
-# A second answer may come this much later than the first.
-LATE_NS = S // 2
+ANSWER_NS, TRIES = S // 2, 10
 # A list of all parameters would slow every stream, so they are read by name; ArduPilot does not answer for one that
 # it lacks. A name is given up after SILENT_ROUNDS without any answer: over a radio that loses one packet in five each
 # way, this misses a parameter once in 10,000.
-ROUND_NS, SILENT_ROUNDS = S // 2, 8
+SILENT_ROUNDS = 8
 AT_ONCE = 12
 
 
@@ -78,7 +76,7 @@ def read_agreed(link: Link, names: Sequence[str]) -> dict[str, float]:
     LinkError : one does not come, or comes with two values. EndOfCapture : a replay holds no more.
     """
     held = require_parameters(link, names)
-    for name, value in [*_request(link, names), *_answers(link, names, LATE_NS)]:
+    for name, value in [*_request(link, names), *_answers(link, names)]:
         if value != held[name]:
             raise LinkError(
                 f"{link.vehicle} answers {name} = {held[name]:.6g} and {value:.6g}",
@@ -105,7 +103,7 @@ def set_parameter(link: Link, name: str, value: float, kind: int = REAL32) -> No
         parameter = decode_parameter(received, bytewise)
         return "" if parameter is not None and (parameter.name, parameter.value) == (name, wanted) else None
 
-    why = ask(link, message, refusal, TIMEOUT_S, TRIES)
+    why = ask(link, message, refusal, ANSWER_NS / S, TRIES)
     if why != "":
         raise LinkError(
             f"{link.vehicle} did not take {name} = {value:.6g}: {why or 'it did not confirm it'}",
@@ -122,7 +120,7 @@ def _request(link: Link, names: Sequence[str]) -> list[tuple[str, float]]:
             silent += 1
             for name in missing:
                 link.send(link.encode("param_request_read", name_bytes(name), -1))
-            for name, value in _answers(link, names, ROUND_NS):
+            for name, value in _answers(link, names):
                 heard.append((name, value))
                 if name in missing:
                     missing.remove(name)
@@ -132,9 +130,9 @@ def _request(link: Link, names: Sequence[str]) -> list[tuple[str, float]]:
     return heard
 
 
-def _answers(link: Link, names: Sequence[str], for_ns: int) -> Iterator[tuple[str, float]]:
-    """Yield name and value of each of `names` that comes within `for_ns`."""
-    for message in link.messages(link.now_ns() + for_ns):
+def _answers(link: Link, names: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Yield name and value of each of `names` that comes within ANSWER_NS."""
+    for message in link.messages(link.now_ns() + ANSWER_NS):
         parameter = decode_parameter(message, link.vehicle.family == PX4)
         if parameter is not None and parameter.name in names:
             yield parameter.name, float(parameter.value)

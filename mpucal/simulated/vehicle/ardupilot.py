@@ -13,9 +13,8 @@ from ...mavlink.firmwares import ARDUPILOT, FILTERS
 from ...mavlink.parameters.encoding import INT32, REAL32, Parameter
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES, ORIENTATION, tilt_deg
 from ...mavlink.parameters.slots import AXES, all_slots
-from ...mavlink.requests import SYS_STATUS
 from ...vehicle.sink import SAVE_IDS
-from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
+from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware, learn_bias
 from .options import VehicleOptions
 
 Three = tuple[float, float, float]

@@ -21,8 +21,6 @@ from ...mavlink.parameters.mounting import (
     trim_of,
     trim_values,
 )
-from ...mavlink.requests import PREARM_CHECK, SYS_STATUS
-from ...mavlink.rest import ATTITUDE
 from .imus import Imus
 from .options import VehicleOptions
 
@@ -63,6 +61,7 @@ class ParameterStore(UserDict[str, Number]):
 LSB = np.array([[ACC_LSB_MPS2], [GYRO_LSB_RAD_S]])
 SCALED_IMUS = tuple(MESSAGE_ID[name] for name in SCALED)
 RAW_IMU, HIGHRES_IMU = MESSAGE_ID[RAW], MESSAGE_ID[HIGHRES]
+SYS_STATUS, ATTITUDE = 1, 30
 # 4.7.0, a development version
 VERSION, COMMIT = 0x04_07_00_00, b"5117ed00"
 # An estimator learns nothing of a sensor that reads less than LEAST_MPS2, as without a scale.
@@ -212,9 +211,9 @@ class Firmware(ABC):
 
     def sys_status(self) -> Message:
         """Return SYS_STATUS, whose health holds the result of the pre-arm check."""
-        accelerometer = dialect().MAV_SYS_STATUS_SENSOR_3D_ACCEL
-        sensors = accelerometer | (PREARM_CHECK if self.check_is_present else 0)
-        health = accelerometer | (0 if self.complaints() else PREARM_CHECK)
+        accelerometer, check = dialect().MAV_SYS_STATUS_SENSOR_3D_ACCEL, dialect().MAV_SYS_STATUS_PREARM_CHECK
+        sensors = accelerometer | (check if self.check_is_present else 0)
+        health = accelerometer | (0 if self.complaints() else check)
         return dialect().MAVLink_sys_status_message(sensors, sensors, health, 100, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
 
 

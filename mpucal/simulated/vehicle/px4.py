@@ -13,9 +13,17 @@ from ...mavlink.parameters.encoding import INT32, Parameter
 from ...mavlink.parameters.mounting import BOARD_ANGLES, BOARD_ROTATION, euler_matrix, tilt_deg
 from ...mavlink.parameters.slots import PX4_LIMITS, Slot, all_slots
 from ...mavlink.px4_preparation import AUTOCAL, QUICK
-from ...mavlink.requests import SYS_STATUS
-from ...mavlink.rest import ATTITUDE
-from .firmware import HIGHRES_IMU, LEARN_S, LEVEL, RAW_IMU, SCALED_IMUS, Firmware, learn_bias
+from .firmware import (
+    ATTITUDE,
+    HIGHRES_IMU,
+    LEARN_S,
+    LEVEL,
+    RAW_IMU,
+    SCALED_IMUS,
+    SYS_STATUS,
+    Firmware,
+    learn_bias,
+)
 from .options import VehicleOptions
 
 LOOP_HZ = 250

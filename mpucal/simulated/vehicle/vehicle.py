@@ -13,7 +13,7 @@ from ...clocks.device_clocks import S_US
 from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
-from ...mavlink.link import ARMED, OWN_COMPONENT, SEQUENCE
+from ...mavlink.link import OWN_COMPONENT, SEQUENCE
 from ...mavlink.parameters.encoding import from_wire, name_bytes, to_wire
 from ...mavlink.texts import ReceivedPrompt, decode_prompt
 from ..faults import Schedule
@@ -177,7 +177,8 @@ class SimulatedVehicle:
     def _heartbeat(self) -> Message:
         m = dialect()
         kind = getattr(m, f"MAV_TYPE_{TYPES[self.options.type]}")
-        mode, state = (ARMED, m.MAV_STATE_ACTIVE) if self.firmware.armed else (0, m.MAV_STATE_STANDBY)
+        armed = (m.MAV_MODE_FLAG_SAFETY_ARMED, m.MAV_STATE_ACTIVE)
+        mode, state = armed if self.firmware.armed else (0, m.MAV_STATE_STANDBY)
         return m.MAVLink_heartbeat_message(kind, self.firmware.autopilot, 81 | mode, 0, state, 3)
 
     def _send(self, message: Message) -> None:
