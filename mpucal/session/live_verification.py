@@ -103,8 +103,6 @@ def _find_reason(
     agree = all(rest.agrees for rest in shown)
     if not agree and is_much_clipped(recording):
         return reason("gyro_clipped", "disagreement")
-    if not rests:
-        return reason("verification_failed", "never_still")
     if contradiction is not None:
         return explain_contradiction(contradiction, recording)
     return None if agree else _explain_disagreement(shown, recording)

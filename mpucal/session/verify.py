@@ -160,7 +160,7 @@ class Verify(NewPoses):
         if checked.doubtful and self._doubt is None:
             return self._try_again(checked)
         if checked.agrees is None and self._number >= self._of and self._more and self._doubt is None:
-            # The fit has seen one of these orientations after all: another one replaces it.
+            # The fit has seen one of these orientations after all, or finds too short a rest: another one replaces it.
             self._more, self._closed, self._begun_s = self._more - 1, False, None
             self._number = self._of - 1
             self.prompt = self._next()
