@@ -108,8 +108,9 @@ def labelled_table(text: str, name: str) -> Table | None:
 
     A sample is a line, or the lines from one that names the first axis to the next such line.
     """
-    begun = [list(_numbers(line)) for line in _label("\n".join(text.split("\n", FIRST_LINES)[:FIRST_LINES]))]
-    together = list(dict.fromkeys(name for names in begun for name in names))
+    first_lines = _label("\n".join(text.split("\n", FIRST_LINES)[:FIRST_LINES]))
+    begun = dict.fromkeys(tuple(_numbers(line)) for line in first_lines)
+    together = tuple(dict.fromkeys(name for names in begun for name in names))
     header = next((names for names in begun if names_both(parse_header(names))), together)
     if not names_both(parse_header(header)):
         return None
@@ -130,7 +131,7 @@ def labelled_table(text: str, name: str) -> Table | None:
             records[-1] = _numbers(line) | records[-1]
             named |= there
     rows = [[found.get(of, "") for of in header] if needed <= found.keys() else [] for found in records]
-    return table_of_rows(name, header, rows, lines)
+    return table_of_rows(name, [*header], rows, lines)
 
 
 def _label(text: str) -> list[str]:

@@ -104,6 +104,7 @@ _TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)|gyro?(roll|pitch
 _OF_ALTOS = {"across": "x", "along": "y", "through": "z", "pitch": "x", "roll": "y", "yaw": "z"}
 _OF_A_ROCKET = re.compile(rf"((?:accel|gyro)_)({'|'.join(_OF_ALTOS)})").fullmatch
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
+_LETTER = re.compile("[A-Za-z]").search
 # the ends of names that are units
 _ENDINGS_OF_TIMES = "ns us ms s sec seconds"
 ENDINGS_OF_SENSORS = (
@@ -239,13 +240,17 @@ def with_sensor(header: Sequence[str], sensor: str) -> list[str]:
     return [f"{sensor} {'xyz'[axis[0]]} ({axis[1]})".removesuffix(" ()") if axis else name for name, axis in axes]
 
 
-def parse_header(header: list[str]) -> list[Column]:
+def parse_header(header: Sequence[str]) -> list[Column]:
     """Return the columns of a header whose names are known."""
+    # most lines that may be a header hold numbers
+    if not any(map(_LETTER, header)):
+        return []
     of_rocket = [_OF_A_ROCKET(name.strip().lower()) for name in header]
     if any(found and found[2] == "along" for found in of_rocket):
         plain = [found and found[1] + _OF_ALTOS[found[2]] for found in of_rocket]
         header = [of or name for of, name in zip(plain, header, strict=True)]
-    return [column for place, name in enumerate(header) if (column := parse_column_name(name, place)) is not None]
+    named = ((place, name) for place, name in enumerate(header) if _LETTER(name))
+    return [column for place, name in named if (column := parse_column_name(name, place)) is not None]
 
 
 @lru_cache
