@@ -119,7 +119,7 @@ def test_a_trace_has_the_innovations_of_the_value(hand_problem, theta, instructi
 
 
 def test_the_derivatives_of_a_trace_add_up_to_those_of_the_value(hand_problem, theta, instruction_set):
-    """In their sums are also those of the flat mean."""
+    """Leave out those of the flat mean, which are in the sums as well."""
     plain = replace(hand_problem, huber=np.inf)
     at, whole, begin = trace(plain, theta, True), evaluate(plain, theta, HAND), evaluate(plain.first(0), theta, HAND)
     scale = np.sqrt(np.diag(whole.fisher))
