@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -52,6 +53,16 @@ RUN = 1 << 14
 # names are exported to scripts and source code: these characters cannot end a string or comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
 MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")
+
+
+def mps2_per_count(range_g: float) -> float:
+    """Return the acceleration [m/s^2] of one count at a full scale [g]."""
+    return range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
+
+
+def rad_s_per_count(range_dps: float) -> float:
+    """Return the rate [rad/s] of one count at a full scale [deg/s]."""
+    return math.radians(range_dps / GYRO_COUNTS)
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,10 @@ from ..data import (
     ACCEL_RANGES_G,
     GYRO_COUNTS,
     GYRO_RANGES_DPS,
-    STANDARD_GRAVITY_MPS2,
     Mask,
     Recording,
     Vector,
+    mps2_per_count,
 )
 
 # Values are whole counts within this share.
@@ -68,7 +68,7 @@ def _words_of(recording: Recording) -> tuple[Words | None, Words | None]:
     """Return the words of the accelerometer and of the gyroscope; None where they are not known."""
     acc_range, gyro_range = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
     # A coarse count is no whole number of finer ones.
-    acc_lsbs = [g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS for g in ([acc_range] if acc_range else ACCEL_RANGES_G[::-1])]
+    acc_lsbs = [mps2_per_count(g) for g in ([acc_range] if acc_range else ACCEL_RANGES_G[::-1])]
     gyro_ranges = [gyro_range] if gyro_range else GYRO_RANGES_DPS[-2:0:-1]
     # programs of others divide the range by 2^15 counts
     gyr_lsbs = [np.deg2rad(each / most) for each in gyro_ranges for most in (GYRO_COUNTS, ACCEL_COUNTS)]

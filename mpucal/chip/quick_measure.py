@@ -39,7 +39,7 @@ SETTING = {
     reg.CONFIG: Config.dlpf,
     reg.ACCEL_CONFIG: AFS_SEL << reg.FULL_SCALE_SHIFT,
 }
-# Tries until the board must lie still, 0.6 s each: a person needs some time to put it down.
+# Tries until the board must lie still, 0.6 to 1 s each: a person needs some time to put it down.
 PATIENCE = 40
 
 

@@ -16,7 +16,7 @@ from ..chip.families import Part
 from ..chip.offsets import MOTION_G, OffsetRegisters, OffsetResponse, restoring, shift_words
 from ..chip.port import Port
 from ..chip.quick_measure import AFS_SEL, TemporaryMeasurement
-from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..data import Mask, Recording, Vector, mps2_per_count, rad_s_per_count
 from ..errors import BoardMoved
 from .finding import Finding, Mark
 
@@ -72,8 +72,8 @@ def dead_axes(recording: Recording) -> Iterator[Finding]:
 def _sensors(recording: Recording) -> Iterator[tuple[str, Vector, Mask, float | None]]:
     """Yield each sensor's name, values, mask of clipped samples, and value of one count, if that is known."""
     accel_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
-    mps2 = None if accel_g is None else accel_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
-    rad_s = None if gyro_dps is None else float(np.radians(gyro_dps / GYRO_COUNTS))
+    mps2 = None if accel_g is None else mps2_per_count(accel_g)
+    rad_s = None if gyro_dps is None else rad_s_per_count(gyro_dps)
     yield "accelerometer", recording.acc, recording.acc_clipped, mps2
     yield "gyroscope", recording.gyr, recording.gyr_clipped, rad_s
 

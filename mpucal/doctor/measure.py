@@ -16,8 +16,8 @@ from ..errors import BusError
 from .dead_axes import dead_axes, live_axes
 from .finding import Finding, Mark
 
-# Multiples of the data sheet's typical noise density.
-NOISY_RATIO, BROKEN_RATIO = 1.5, 3.0
+# Multiple of the data sheet's typical noise density, from which on a sensor is noisy, and broken from twice that on.
+NOISY_RATIO = 1.5
 # Relative change of the sample clock's rate that warming of the chip does not explain.
 LEAST_RATE_CHANGE = 0.002
 # The samples may be shorter than asked for by the first and the last poll.
@@ -120,7 +120,7 @@ def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str
     what = f"{', '.join(f'{value:.3g}' for value in measured)} {unit} (data sheet: {typical:g})"
     data = {key: measured.tolist(), f"typical_{key}": typical}
     remedy = "keep vibration away from the board and check its supply; if that does not help, the chip is noisy"
-    mark = Mark.NOTE if share <= BROKEN_RATIO else Mark.BAD
+    mark = Mark.NOTE if share <= 2.0 * NOISY_RATIO else Mark.BAD
     return Finding.check(topic, share <= NOISY_RATIO, what, remedy, data, mark)
 
 
@@ -174,7 +174,7 @@ def examine_speed(bus: Bus) -> Iterator[Finding]:
     BusError : a transfer failed.
     """
     short_ms, long_ms = (median_ms(bus, count) for count in (SHORT_BYTES, LONG_BYTES))
-    times_ms = {"read_2_bytes_ms": short_ms, "read_55_bytes_ms": long_ms}
+    times_ms = {f"read_{SHORT_BYTES}_bytes_ms": short_ms, f"read_{LONG_BYTES}_bytes_ms": long_ms}
     if long_ms - short_ms < LEAST_MS:
         longer = max(long_ms - short_ms, 0.0)
         what = f"not measurable: {LONG_BYTES - SHORT_BYTES} bytes more take only {longer:.2f} ms, as behind USB"

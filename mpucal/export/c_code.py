@@ -5,14 +5,14 @@ The header has functions for the chip's counts, too. The sketch reads the chip o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..chip.config import Config
 from ..chip.families import MPU6050, family_of
 from ..chip.registers import ACCEL_RANGES_G, FULL_SCALE_SHIFT, GYRO_RANGES_DPS
-from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, mps2_per_count, rad_s_per_count
 from ..result.calibration import Calibration
 from .losses import heading, temperature_range
 from .templates import fill, row, rows
@@ -44,8 +44,8 @@ def c_functions(c: Calibration) -> str:
         b_a=row(c.b_a_to_subtract, FLOAT),
         K=rows(c.K, FLOAT, "{}"),
         b_omega=row(np.nan_to_num(c.b_omega), FLOAT),
-        about_a=_about("a", "m/s^2", c.sensor.accel_range_g, "g", STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS),
-        about_w=_about("w", "rad/s", c.sensor.gyro_range_dps, "deg/s", np.radians(1) / GYRO_COUNTS),
+        about_a=_about("a", "m/s^2", c.sensor.accel_range_g, "g", mps2_per_count),
+        about_w=_about("w", "rad/s", c.sensor.gyro_range_dps, "deg/s", rad_s_per_count),
         slope=row(c.b_a_slope, FLOAT),
         at=at,
         start=start,
@@ -71,12 +71,12 @@ def _check(used: str, measured: float, unit: str) -> str:
     return "" if not measured or measured % 1 else fill("check.c", used=used, measured=f"{measured:g}", unit=unit)
 
 
-def _about(result: str, unit: str, full_scale: float | None, of: str, per_count: float) -> str:
-    """Return a comment on y and `result`, and on a count, which is `full_scale` times `per_count`."""
+def _about(result: str, unit: str, full_scale: float | None, of: str, per_count: Callable[[float], float]) -> str:
+    """Return a comment on y and `result`, and on a count, which is `per_count` of `full_scale`."""
     line = f"/* y: as measured, {result}: calibrated, both in {unit}. */"
     if full_scale is None:
         return line
-    return f"{line}\n/* At +-{full_scale:g} {of} one count of the chip is {full_scale * per_count:.9g} {unit}. */"
+    return f"{line}\n/* At +-{full_scale:g} {of} one count of the chip is {per_count(full_scale):.9g} {unit}. */"
 
 
 ACCEL_CONFIG = {float(g): code << FULL_SCALE_SHIFT for code, g in enumerate(ACCEL_RANGES_G)}

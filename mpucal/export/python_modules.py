@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
+from ..data import mps2_per_count, rad_s_per_count
 from ..result.calibration import Calibration
 from .losses import heading, temperature_range
 from .templates import fill, row, rows
@@ -31,8 +31,8 @@ def micropython_text(calibration: Calibration, notes: Sequence[str]) -> str:
         "()",
         "{:.9g}",
         ranges=f"{calibration.sensor.accel_range_g}, {calibration.sensor.gyro_range_dps}",
-        mps2_per_g_count=f"{STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS:.9g}",
-        rad_s_per_dps_count=f"{np.radians(1) / GYRO_COUNTS:.9g}",
+        mps2_per_g_count=f"{mps2_per_count(1.0):.9g}",
+        rad_s_per_dps_count=f"{rad_s_per_count(1.0):.9g}",
     )
 
 

@@ -72,9 +72,9 @@ def csv_rows(path: Path) -> Rows:
 
 
 def _go_on(runs: Iterator[Samples], interrupted: list[float]) -> Iterator[Samples]:
-    """Yield the runs of which the times go on where they begin anew, and note in `interrupted` when they do.
+    """Yield the runs with times that continue where a logger began anew, and add when it did to `interrupted`.
 
-    Of samples that came late, the times become those between their neighbours'.
+    A sample that came late gets a time between its neighbours'.
     """
     count, back, last, end, shift = 0, 0, -np.inf, -np.inf, 0.0
     for samples in runs:

@@ -34,7 +34,8 @@ Block = Accesses | RawPacket | SessionEvent
 
 # of every MCAP file, and the head that follows: the length of its profile
 MAGIC, _HEAD = b"\x89MCAP0\r\n", struct.Struct("<8xBQI")
-FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
+FORMAT, VERSION_KEY = "mpucal.capture", "capture_version"
+VERSION = 2
 # the name of the metadata in a file of calibrated samples, which is not a capture
 CALIBRATED = "mpucal.imu"
 IMU, ROS1, ROS2 = "sensor_msgs/msg/Imu", b"ros1", b"ros2"

@@ -20,7 +20,8 @@ from typing import Any
 
 from ..errors import RecordingError
 
-MOST_MB, VARIABLE = 512, "MPUCAL_MOST_MB"
+MOST_MB = 512
+VARIABLE = "MPUCAL_MOST_MB"
 # bytes of a file for each allowed byte of memory: a log may hold far more than its IMU
 FILE_PER_MEMORY = 16
 # bytes of memory for a byte of a table of text, whose cells are objects: 6 to 40

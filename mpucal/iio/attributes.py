@@ -132,7 +132,7 @@ AXES = "xyz"
 ACCEL, GYRO, TEMP, TIMESTAMP = "in_accel", "in_anglvel", "in_temp", "in_timestamp"
 KINDS = {ACCEL: "accelerometer", GYRO: "gyroscope"}
 # Bits of an MPU's count, if there is no buffer to describe them.
-USUAL_BITS = 16
+USUAL_BITS = np.iinfo(np.int16).bits
 # Plausible full scales: g, deg/s.
 PLAUSIBLE_RANGES = {ACCEL: (1.0, 1000.0), GYRO: (50.0, 20000.0)}
 # Drivers round their scales to 0.1 %.

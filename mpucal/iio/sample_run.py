@@ -14,7 +14,7 @@ from ..clocks.sample_clock import MISSING_INTERVALS, NS
 from ..data import Samples, Vector
 from .attributes import USUAL_BITS, SensorScale
 
-# A row of both sensors: three counts and a mark of each.
+# Columns of a row of both sensors: of each, three counts, and 1 if one of them is clipped.
 ROW = 8
 
 Times = NDArray[np.int64]

@@ -20,6 +20,7 @@ import numpy as np
 from ..chip.config import Config
 from ..chip.offsets import Words
 from ..chip.port import Port
+from ..chip.quick_measure import PATIENCE
 from ..data import Vector
 from ..disk.atomic import write_atomically
 from ..errors import ChipError, OutputError
@@ -41,7 +42,6 @@ from ..sinks.table import IIO_STATE, KERNEL
 from .source import OpenedIio
 
 FORMAT, WORDS, RULE = "mpucal.iio_state", "calibbias", "rule"
-TRIES = 20
 CALIBBIAS = [f"{ACCEL}_{axis}_calibbias" for axis in AXES]
 
 
@@ -154,7 +154,7 @@ class KernelSink(Sink):
         driver = IioDriver(self._source.bus, self._source.devices, Config(), trigger=POLLED)
         driver.start()
         try:
-            for _ in range(TRIES):
+            for _ in range(PATIENCE):
                 driver.forget()
                 acc = measured(driver, 1.0).acc
                 if len(acc) > 10 and is_untouched(acc):

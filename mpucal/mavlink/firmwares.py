@@ -12,7 +12,8 @@ from .imu import DATAFLASH, HIGHRES, RAW, SCALED
 ARDUPILOT, PX4 = "ArduPilot", "PX4"
 
 # Bit 0 has the estimator learn the gyroscope's bias, bit 1 the accelerometer's.
-EKF2_IMU_CTRL, BIASES = "EKF2_IMU_CTRL", 0b11
+EKF2_IMU_CTRL = "EKF2_IMU_CTRL"
+LEARN_GYROSCOPE, LEARN_ACCELEROMETER = 0b01, 0b10
 
 # Cut-off frequencies [Hz] of ArduPilot's low passes of the second order (LowPassFilter2p), 0: none. PX4's streams are
 # those of vehicle_imu, before its filters.
@@ -30,7 +31,7 @@ def preferred_messages(firmware: str, parameters: Mapping[str, float]) -> tuple[
     if firmware != PX4:
         return (DATAFLASH, HIGHRES, RAW, *SCALED)
     control = parameters.get(EKF2_IMU_CTRL)
-    unbiased = control is not None and not int(control) & BIASES
+    unbiased = control is not None and not int(control) & (LEARN_GYROSCOPE | LEARN_ACCELEROMETER)
     return (HIGHRES, *SCALED) if unbiased else tuple(SCALED)
 
 

@@ -26,7 +26,8 @@ HEARTBEAT_NS = S
 SEQUENCE = 256
 # A packet that others overtook is at most LATE numbers late. Numbers start again after a silence, such as a reboot's,
 # which is reported as such.
-LATE, SILENCE_NS = 32, S
+LATE = 32
+SILENCE_NS = S
 # No network has so many vehicles.
 MOST_SENDERS = 64
 # Largest number of pieces without a packet in PATIENCE_NS; more are a flood. A piece is a datagram, or as many bytes

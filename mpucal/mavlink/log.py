@@ -27,7 +27,8 @@ from .stream_buffers import Row, Segment
 from .tlog import RawPacket
 
 # Firmwares make names of these characters; none has so many parameters.
-NAME, MOST_PARAMETERS = re.compile(r"\w{1,16}", re.ASCII), 4096
+NAME = re.compile(r"\w{1,16}", re.ASCII)
+MOST_PARAMETERS = 4096
 IMU_MESSAGES = frozenset(MESSAGE_ID.values())
 
 

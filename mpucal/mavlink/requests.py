@@ -10,7 +10,7 @@ from ..clocks import S
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .firmwares import PX4
-from .link import Link
+from .link import PATIENCE_NS, Link
 
 T = TypeVar("T")
 
@@ -71,7 +71,6 @@ def interval_command(name: str, interval_us: int = REST_US) -> tuple[int, int, i
     return m.MAV_CMD_SET_MESSAGE_INTERVAL, getattr(m, f"MAVLINK_MSG_ID_{name}"), interval_us
 
 
-HEARTBEAT_NS = 5 * S
 COMPLAINTS_NS, TRIES = 3 * S // 2, 3
 PREFIXES = ("PreArm: ", "Preflight Fail: ", "Arm: ")
 # PX4 gives most of its reasons as events (EVENT, 410), whose words are in its component metadata.
@@ -104,7 +103,7 @@ def is_armed(link: Link) -> bool:
     ------
     LinkError : none comes. EndOfCapture : see Link.messages.
     """
-    if link.armed is None and all(link.armed is None for _ in link.messages(link.now_ns() + HEARTBEAT_NS)):
+    if link.armed is None and all(link.armed is None for _ in link.messages(link.now_ns() + PATIENCE_NS)):
         raise LinkError(f"{link.vehicle} sends no heartbeat any more", "check its power and the link")
     return bool(link.armed)
 

@@ -84,7 +84,8 @@ HYPOTHESES: Mapping[str, tuple[float, Spread]] = {
     ),
     "noise": (0.1, Spread(noise=1.0)),
 }
-TEMPERATURE, TEMPERATURE_PRIOR = "temperature", 0.5
+TEMPERATURE = "temperature"
+TEMPERATURE_PRIOR = 0.5
 
 
 def own_uncertainty(calibration: Calibration) -> Vector:

@@ -20,7 +20,8 @@ NAMES = (
     *(f"K_{pair}" for pair in _PAIRS),
     *(f"b_omega_{i}" for i in _AXES),
 )
-KEY, LOWER = "correlation", np.tril_indices(len(NAMES), -1)
+KEY = "correlation"
+LOWER = np.tril_indices(len(NAMES), -1)
 UPPER = np.triu_indices(3)
 # also the value if the correlation is not known
 UNCORRELATED = np.eye(len(NAMES))

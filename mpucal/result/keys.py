@@ -28,7 +28,8 @@ from typing import (
 from ..data import Sensor
 from ..reasons import ReadOnly, ReasonFound
 
-FORMAT, VERSION = "mpucal.calibration", 1
+FORMAT = "mpucal.calibration"
+VERSION = 1
 ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA = "a = inv(D) @ (y - b_a)", "w = K @ (y - b_omega)"
 
 Verdict = Literal["good", "usable", "refused"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chip.families import MPU6050, MPU6500
-from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
+from ..data import ACCEL_COUNTS, STANDARD_GRAVITY_MPS2, Vector, mps2_per_count, rad_s_per_count
 from ..result.error_model import to_body_frame
 from .motion import Motion
 
@@ -43,12 +43,12 @@ class Setting:
     @property
     def mps2_per_lsb(self) -> float:
         """Nominal m/s^2 of an accelerometer count."""
-        return self.accel_range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
+        return mps2_per_count(self.accel_range_g)
 
     @property
     def rad_s_per_lsb(self) -> float:
         """Nominal rad/s of a gyroscope count (131 LSB/(deg/s) at 250 deg/s)."""
-        return float(np.radians(self.gyro_range_dps / GYRO_COUNTS))
+        return rad_s_per_count(self.gyro_range_dps)
 
 
 @dataclass(frozen=True)

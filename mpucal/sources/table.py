@@ -11,7 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..chip.registers import ACCEL_RANGES_G, DLPF_CODES, GYRO_RANGES_DPS
+from ..chip.config import Config
+from ..chip.registers import ACCEL_RANGES_G, DLPF_CODES, GYRO_RANGES_DPS, MAX_RATE_HZ
 from ..origin import Origin
 from .kind import Option, SourceKind
 
@@ -88,22 +89,18 @@ SIGNING_KEY = Option(
     "signing_key", "MAVLink 2 key: 32 bytes, 64 hexadecimal digits, or a passphrase.", "FILE", parse=Path
 )
 
-RATE = Option(
-    "rate",
-    "Samples a second, up to 1000.",
-    "HZ",
-    number,
-    default=200.0,
-)
+RATE = Option("rate", f"Samples a second, up to {MAX_RATE_HZ:g}.", "HZ", number, default=float(Config.rate_hz))
 DLPF = Option(
     "dlpf",
     "Low-pass filter: 1 (184 Hz) to 6 (5 Hz); 0 (260 Hz) for an MPU-6050 only.",
     "CODE",
-    whole_number(DLPF_CODES[0], DLPF_CODES[-1]),
-    default=3,
+    whole_number(min(DLPF_CODES), max(DLPF_CODES)),
+    default=Config.dlpf,
 )
-ACCEL_RANGE = Option("accel_range", "±g.", choices=tuple(map(str, ACCEL_RANGES_G)), default="4")
-GYRO_RANGE = Option("gyro_range", "±deg/s.", choices=tuple(map(str, GYRO_RANGES_DPS)), default="500")
+ACCEL_RANGE = Option("accel_range", "±g.", choices=tuple(map(str, ACCEL_RANGES_G)), default=f"{Config.accel_range_g}")
+GYRO_RANGE = Option(
+    "gyro_range", "±deg/s.", choices=tuple(map(str, GYRO_RANGES_DPS)), default=f"{Config.gyro_range_dps}"
+)
 CHIP_SETTINGS = (RATE, DLPF, ACCEL_RANGE, GYRO_RANGE)
 
 CHIP = partial(SourceKind, origin=Origin.CHIP, settings=CHIP_SETTINGS)

@@ -7,9 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TextIO
 
-WIDTH, GAP = 5, 1
-# Rows of two lines of letters of half the height, with a gap between them.
-TWO_ROWS = 6
+GAP = 1
 _HALVES = {"  ": " ", "# ": "▀", " #": "▄", "##": "█"}
 # Blocks of letters: their names, and five rows of pictures, one column apart.
 _SHEET = """
@@ -35,6 +33,9 @@ OPQRSTUVWXYZ01
 ##### ####     #  ####   ###  #      ###   ###   #
 """
 _UNKNOWN = [" ### ", "#   #", "  ## ", "     ", "  #  "]
+WIDTH = max(map(len, _UNKNOWN))
+# Rows of two lines of letters of half the height, with a gap below each.
+TWO_ROWS = len(_UNKNOWN) + GAP
 
 
 def _cut(sheet: str) -> Iterator[tuple[str, list[str]]]:

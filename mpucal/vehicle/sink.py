@@ -45,7 +45,8 @@ from .source import OpenedVehicle
 SAVE_IDS = 76
 # ArduPilot's complaint about sensors with other ids than their calibration's
 UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)
-INCONSISTENT, AGREE_NS = re.compile(r"accel\w* inconsistent", re.IGNORECASE), 13 * S
+INCONSISTENT = re.compile(r"accel\w* inconsistent", re.IGNORECASE)
+AGREE_NS = 13 * S
 # An estimator that has just started is not ready yet, and says so.
 READY_NS = 40 * S
 REBOOT = (

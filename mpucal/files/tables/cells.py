@@ -17,10 +17,11 @@ from ...clocks.sample_clock import GAP_INTERVALS
 from ...data import Vector
 from ...strict_json import MOST_DIGITS
 from ..reading import MOST_ODD
+from .units import DAYS, QUANTITIES
 
 # cells by which a column's kind is known
 LOOKED_AT = 50
-DAY_NS = 86400 * S
+DAY_NS = round(QUANTITIES["t"][DAYS]) * S
 CLOCK = r"\d\d?:\d\d:\d\d(?:[.,]\d{1,9})?"
 # among other text; lengths are bounded: the search takes linear time
 NUMBER = r"[-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?"

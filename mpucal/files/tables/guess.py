@@ -43,11 +43,11 @@ MOST_COLUMNS = 16
 ONE_G = 0.04
 # largest distance of the quartiles of |a|, over its median: gravity, with the biases of an uncalibrated sensor
 MOST_SCATTER = 0.75
-# directions of gravity are as many times farther apart than those of rates beside a bias
+# the directions of gravity spread this many times as much as those of rates with a large bias
 SPREAD_RATIO = 4.0
 # correlation of a clock with the number of its samples, even if a logger paused for a tenth of the time
 LEAST_CORRELATION = 0.99
-# a correlation that is less by as much is no worse
+# a correlation that is lower by no more than this counts as equally good
 CORRELATION_MARGIN = 0.1
 
 

@@ -65,8 +65,8 @@ STEMS = {
 UNITS = {NANOSECONDS: ("",), TEMPERATURE: ("", "C")} | {of: ("", *units) for of, units in QUANTITIES.items()}
 # SensorLog has a clock for each sensor
 SENSOR_CLOCKS = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
-# counts of 0.1 ms (Xsens MTi) or of us (Movella DOT), and the longest step of the former, of 5 Hz
-COUNTS_OF_XSENS, LONGEST_OF_MTI = "sampletimefine", 2000
+# counts of 0.1 ms (Xsens MTi) or of us (Movella DOT)
+COUNTS_OF_XSENS = "sampletimefine"
 COLDEST_C, WARMEST_C = -60.0, 130.0
 # iOS has the opposite sign of specific force: at rest it reads -1 g along the axis that points upwards
 FLIPPED_STEMS = ("accelerometeracceleration",)

@@ -7,15 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...data import ACCEL_COUNTS, GYRO_COUNTS, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Vector
+from ...data import (
+    ACCEL_COUNTS,
+    GYRO_COUNTS,
+    GYRO_RANGES_DPS,
+    STANDARD_GRAVITY_MPS2,
+    Mask,
+    Vector,
+    mps2_per_count,
+    rad_s_per_count,
+)
 from ...errors import RecordingError
 from ..hints import Hints
 from . import shown_units as units
 from .times import Stream
 from .units import COUNTS, OF_BNO055, OF_INCREMENTS, QUANTITIES, resolve_unit
 
-# octaves: half way to the next range, which leaves room for gains of 0.7 to 1.4
-ANOTHER_RANGE = 0.5
 OF_COUNTS = "in counts of"
 # largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther) or counts, or to tenths or hundredths of deg/s
 NEAR_LOG = 0.08
@@ -125,7 +132,7 @@ def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str
         size = units.typical_size(units.averaged(values))[0]
     per_g = units.counts_per_g(size)
     range_g = hints.accel_range_g or ACCEL_COUNTS / per_g
-    scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
+    scale = mps2_per_count(range_g)
     if is_wrong_full_scale(size * scale / STANDARD_GRAVITY_MPS2) and "acc" not in hints.units:
         raise RecordingError(
             f"{name}: at ±{range_g:g} g the median |a| is {size * scale:.3g} m/s^2, which is not gravity",
@@ -199,7 +206,7 @@ class Rates:
         range_dps = self._hints.gyro_range_dps or _gyro_range_dps(self._factor)
         if range_dps is None:
             return self._left_out("the range of their counts (--gyro-range DPS)")
-        scale, of = np.radians(range_dps) / GYRO_COUNTS, f"counts of ±{range_dps:g} deg/s"
+        scale, of = rad_s_per_count(range_dps), f"counts of ±{range_dps:g} deg/s"
         if self._factor and is_wrong_full_scale(abs(self._factor) / scale) and "gyr" not in self._hints.units:
             fits = f"--gyro-range {_gyro_range_dps(self._factor):g}"
             remedy = "the --gyro-range that the sensor had (if it was this one: --units gyr=counts)"
@@ -235,4 +242,5 @@ def _gyro_range_dps(factor: float | None) -> float | None:
 
 def is_wrong_full_scale(ratio: float) -> bool:
     """Return True if a ratio that should be 1 is 0, or nearer to 2, 4, 8 or an inverse of these."""
-    return ratio == 0.0 or abs(math.log2(ratio)) > ANOTHER_RANGE
+    # half an octave, which leaves room for gains of 0.7 to 1.4
+    return ratio == 0.0 or round(math.log2(ratio)) != 0

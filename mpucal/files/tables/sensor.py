@@ -91,9 +91,10 @@ def _are_of_others(table: Table, empty: Mask) -> bool:
 
 
 def _intervals(since: Vector, first: float, clock: Column) -> Vector | None:
-    """Return the steps between samples (n,) in a column that is called so, given as times since the `first`.
+    """Return the steps (n,) between samples if a column holds these; None if it holds times.
 
-    Its numbers then do not grow, as times under such a name do. The usual step stands for the few that are damaged.
+    The column is called after steps, and its numbers, given as times since the `first`, do not grow. A damaged step is
+    replaced by the usual one.
     """
     named = 0 <= clock.rank < BY_A_WORD and [*STEMS[TIME]][clock.rank] in INTERVALS.split()
     if not named or not len(since) or not np.isfinite(first):

@@ -38,13 +38,17 @@ NAMES_SENSORS = re.compile(
 MAY_NAME_SENSORS = re.compile(r"(?:.*[ _.-])?(?:id|addr|address|source|port|channel|name)", re.IGNORECASE).fullmatch
 # ArduPilot's name of it -> one of those
 INSTANCE = {"I": "imu"}
-MOST_SENSORS, MOST_TURNS = 32, 6
-# lines in which the sensors of a column of any name, or of numbers, take turns; a board's log may come before them
+MOST_SENSORS = 32
+# lines within which the sensors take turns in a column whose name does not say that it names them; a board's log may
+# come before them
 FIRST_LINES = 2000
-# columns that differ from sensor to sensor by more than a sensor's do from sample to sample, and by how much
+# columns that tell sensors apart, at least: they differ from one sensor to the next by this factor more than from one
+# sample of a sensor to the next
 FEWEST_COLUMNS, FARTHER = 3, 2.0
-# separators of the words in a name, and the largest number of words considered; a digit ends a word of letters
-_BETWEEN, MOST_WORDS = re.compile(r"[_ .\-]+"), 6
+# separators of the words in a name; a digit ends a word of letters
+_BETWEEN = re.compile(r"[_ .\-]+")
+# the largest number of words considered
+MOST_WORDS = 6
 _NUMBERED = re.compile(r"([A-Za-z]+)(\d)").fullmatch
 # a place before an axis: Leftax
 _JOINED = re.compile(r"([A-Z][a-z]{2,}?)((?:a|g|[Aa]cc|[Gg]yro?)[xyz])").fullmatch
@@ -52,7 +56,8 @@ _JOINED = re.compile(r"([A-Z][a-z]{2,}?)((?:a|g|[Aa]cc|[Gg]yro?)[xyz])").fullmat
 _BEGINNING = re.compile(
     r"^[\[(<]?((?:0x[\dA-Fa-f]{2}|[A-Za-z]\w{0,20})(?:[ #-]\d{1,2})?)[\])>]?[ \t]?[:|>-]?(?:[ \t]|\r?$)", re.MULTILINE
 )
-# directions of gravity of two sensors that lie otherwise: they differ by as much of it, while its length stays
+# two sensors that lie differently: from one line to the next the acceleration changes by this share of gravity or more,
+# and its length by less than the second share
 LEAST_APART, MOST_LENGTH_CHANGE = 0.25, 0.1
 CHOOSES = "--sensor chooses"
 
@@ -274,7 +279,7 @@ def turns(acc: Vector) -> int:
     size, differ, apart = _median(lengths), _median(np.abs(np.diff(lengths))), step(1)
     if not (apart > LEAST_APART * size and differ < MOST_LENGTH_CHANGE * size):
         return 1
-    return next((lag for lag in range(2, MOST_TURNS + 1) if FARTHER * step(lag) < apart), 1)
+    return next((lag for lag in range(2, MOST_SENSORS + 1) if FARTHER * step(lag) < apart), 1)
 
 
 def _median(values: Vector) -> float:

@@ -39,12 +39,12 @@ SCATTER = 0.45
 ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
 # samples over which shaking averages out: a few of its periods at the rates of most loggers
 AVERAGED_SAMPLES = 100
-# octaves by which a sample rate may change in the second round
+# octaves: largest change of the sample rate in the second round
 SETTLED_OCTAVES = 0.25
 # the fastest rate of a hand and of usual sensors
 FASTEST_RAD_S = 37.0
-# samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; and how much
-# more than it does gravity may seem to turn by noise
+# samples of a quiet part; the least noise of a gyroscope, 0.0028 deg/s/sqrt(Hz) (ICM-42688-P) over 3 Hz; and the ratio
+# of the speed at which gravity seems to turn, by noise, to that at which it turns
 QUIET_SAMPLES, LEAST_NOISE_RAD_S, MOST_TURNED_MORE = 50, math.radians(0.005), 3.0
 # share of half the range by which counts from the lowest may turn, or rest, about another point
 OFF_CENTRE = 0.05

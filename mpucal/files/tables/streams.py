@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...arguments import check_increasing
 from ...clocks.stamps import are_new
-from ...data import GYRO_COUNTS, Mask, Recording, Sensor, Vector
+from ...data import Mask, Recording, Sensor, Vector, rad_s_per_count
 from ...errors import RecordingError
 from ..hints import Hints
 from . import shown_units as units
@@ -193,5 +193,5 @@ def _rate_hz(acc: Stream, gyr: Stream, hints: Hints) -> float | None:
     if unit == COUNTS or (not unit and units.are_counts(values)):
         if not hints.gyro_range_dps:
             return None
-        values, unit = values * np.radians(hints.gyro_range_dps) / GYRO_COUNTS, "rad/s"
+        values, unit = values * rad_s_per_count(hints.gyro_range_dps), "rad/s"
     return units.likely_rate_hz(acc.values[complete], values, unit)

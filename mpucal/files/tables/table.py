@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...clocks import S
-from ...clocks.stamps import FEWEST, sample_period
+from ...clocks.stamps import FEWEST, SLOWEST_HZ, sample_period
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from .cells import DAY_NS, Cells, Kind, is_number, kind_of, parse_cell, since_first, since_midnight, with_point
-from .names import ACC, COUNTS_OF_XSENS, GYR, LONGEST_OF_MTI, NANOSECONDS, TIME, Column, axes_of, parse_header
+from .names import ACC, COUNTS_OF_XSENS, GYR, NANOSECONDS, TIME, Column, axes_of, parse_header
 from .units import QUANTITIES, find_unit
 
 # units of a column beside whole seconds
@@ -157,8 +157,9 @@ class Table:
             if len(more) and max(more) < S:
                 found, unit = found * (1 if unit == "ns" else S) + more, "ns"
         since, first = since_first(found)
-        if not unit and column.name.strip().lower() == COUNTS_OF_XSENS and sample_period(since) <= LONGEST_OF_MTI:
-            unit = "0.1ms"
+        if not unit and column.name.strip().lower() == COUNTS_OF_XSENS:
+            # in us, steps of the former are shorter
+            unit = "0.1ms" if sample_period(since) * QUANTITIES[TIME]["0.1ms"] <= 1 / SLOWEST_HZ else ""
         return since, first, unit
 
     def _exact(self, column: Column, kept: Mask) -> NDArray[Any]:

@@ -63,7 +63,8 @@ SCALED_IMUS = tuple(MESSAGE_ID[name] for name in SCALED)
 RAW_IMU, HIGHRES_IMU = MESSAGE_ID[RAW], MESSAGE_ID[HIGHRES]
 SYS_STATUS, ATTITUDE = 1, 30
 # 4.7.0, a development version
-VERSION, COMMIT = 0x04_07_00_00, b"5117ed00"
+VERSION = 0x04_07_00_00
+COMMIT = b"5117ed00"
 # An estimator learns nothing of a sensor that reads less than LEAST_MPS2, as without a scale.
 LEARN_S, LARGEST_BIAS_MPS2, LEAST_MPS2 = 15.0, 0.4, 1.0
 # param5 of MAV_CMD_PREFLIGHT_CALIBRATION, of both firmwares

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
-from ...mavlink.firmwares import EKF2_IMU_CTRL, PX4
+from ...mavlink.firmwares import EKF2_IMU_CTRL, LEARN_ACCELEROMETER, LEARN_GYROSCOPE, PX4
 from ...mavlink.parameters.encoding import INT32, Parameter
 from ...mavlink.parameters.mounting import BOARD_ANGLES, BOARD_ROTATION, euler_matrix, tilt_deg
 from ...mavlink.parameters.slots import PX4_LIMITS, Slot, all_slots
@@ -29,9 +29,8 @@ from .options import VehicleOptions
 LOOP_HZ = 250
 SLOTS = all_slots(PX4)
 DEVICE_IDS = (1310988, 1310996, 1311004)
-# MAV_PARAM_ERROR
-DOES_NOT_EXIST, PERMISSION_DENIED, TYPE_MISMATCH = 1, 3, 7
-LEARN_GYROSCOPE, LEARN_ACCELEROMETER = 1, 2
+# MAV_PARAM_ERROR, of which pymavlink lacks the end
+TYPE_MISMATCH = 7
 # A lower rate is taken for a bias.
 STILL_RAD_S = 0.05
 
@@ -124,9 +123,9 @@ class Px4(Firmware):
     def set(self, wanted: Parameter) -> list[str] | int:
         """Echo the parameter; an unknown name or another type is an error."""
         if wanted.name not in self.store:
-            return DOES_NOT_EXIST
+            return int(dialect().MAV_PARAM_ERROR_DOES_NOT_EXIST)
         if wanted.name == self.options.refuse:
-            return PERMISSION_DENIED
+            return int(dialect().MAV_PARAM_ERROR_PERMISSION_DENIED)
         if wanted.type != self.store.type(wanted.name):
             return TYPE_MISMATCH
         self.store[wanted.name] = wanted.value
