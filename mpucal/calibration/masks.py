@@ -90,7 +90,10 @@ def find_reset(recording: Recording, flat: Flat) -> int | None:
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
     dt = np.diff(recording.t[flat.last :])[:, None]
     with np.errstate(all="ignore"):
-        missed = lengths(np.diff(acc, axis=0) + cross_rows(rate[1:], acc[:-1]) * dt) / np.linalg.norm(flat.y)
+        unseen = cross_rows(rate[1:], acc[:-1])
+        unseen *= dt
+        unseen += np.diff(acc, axis=0)
+        missed = lengths(unseen) / np.linalg.norm(flat.y)
         for i in np.flatnonzero((missed > LEAST_TURN_RAD) & ~recording.gap[flat.last + 1 :]):
             around, after = missed[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS + 1], acc[i + 1 : i + 1 + NEIGHBOURS].mean(0)
             is_back = np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y)
@@ -188,7 +191,7 @@ def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[
     values, clipped, stuck = getattr(recording, sensor), getattr(recording, f"{sensor}_clipped"), []
     swings = LEAST_TURN_RAD * STANDARD_GRAVITY_MPS2
     for axis, column in enumerate(values.T):
-        same = np.diff(column) == 0.0
+        same = column[1:] == column[:-1]
         # coarse readings repeat throughout, and rates most in a long rest
         parts = (same,) if sensor == "acc" else (same[: max(len(same) // 20, 50)], same)
         by_chance = max((np.count_nonzero(part) + 1) / (len(part) + 2) for part in parts)
@@ -215,7 +218,7 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
     coarse steps repeat, are not.
     """
     clipped = np.zeros(len(values), bool)
-    for column in values.T:
+    for column in np.ascontiguousarray(values.T):
         for rail in (column.max(), column.min()):
             at = column == rail
             if np.count_nonzero(at) == 1:

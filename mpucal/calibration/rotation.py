@@ -17,7 +17,10 @@ from ..result.correlation import UPPER
 def lengths(v: Vector) -> NDArray[np.float64]:
     """Return the lengths (n,) of vectors (n, 3)."""
     x, y, z = v.T  # by columns: a sum over rows of three takes five times as long
-    return np.asarray(np.sqrt(x * x + y * y + z * z))
+    squares = x * x
+    squares += y * y
+    squares += z * z
+    return np.asarray(np.sqrt(squares, out=squares))
 
 
 def cross_rows(u: Vector, v: Vector) -> NDArray[np.float64]:

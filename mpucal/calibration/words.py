@@ -12,9 +12,9 @@ scale that they have where bit 7 does not change, and the odds are those of all 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import compress
+from itertools import chain, compress
 from typing import NamedTuple
 
 import numpy as np
@@ -76,10 +76,18 @@ def _words_of(recording: Recording) -> tuple[Words | None, Words | None]:
 
 
 def _words(values: Vector, lsbs: Iterable[float]) -> Words | None:
+    return next(
+        (Words(counts, lsb) for lsb in chain(lsbs, _finest(values)) if (counts := _counts(values, lsb)) is not None),
+        None,
+    )
+
+
+def _finest(values: Vector) -> Iterator[float]:
+    """Yield the smallest step between two samples, if there is one; a scale that is known needs none."""
     steps = np.abs(np.diff(values, axis=0))
     finest = float(np.min(steps, where=steps > 0.0, initial=np.inf))
-    lsbs = (*lsbs, finest) if np.finfo(np.float64).tiny < finest < np.inf else lsbs
-    return next((Words(counts, lsb) for lsb in lsbs if (counts := _counts(values, lsb)) is not None), None)
+    if np.finfo(np.float64).tiny < finest < np.inf:
+        yield finest
 
 
 def _counts(values: Vector, lsb: float) -> Counts | None:
