@@ -83,7 +83,7 @@ class NewPoses(PoseStep):
 # Bias and scale factor errors bend raw directions by up to a tenth: these must be farther apart by that.
 BENT = 1.1
 # Session time after which the first calibration is taken; the person turns the board meanwhile.
-TRY_WAIT_S = 3.0
+TRY_WAIT_S = 2.5
 # Number of orientations that may be requested in place of ones that the calibration has seen after all.
 MOST_MORE = 2
 
@@ -100,6 +100,7 @@ class Verify(NewPoses):
     def __init__(self, flat: events.Rested, aim: Aim, plan: Plan, coverage: Coverage) -> None:
         super().__init__(flat, plan, aim.verify, coverage.rested, BENT * unseen_rad(plan.tilt_only))
         self._refusal: events.Finished | None = None
+        self._requested = False  # the first calibration
         self._more = MOST_MORE
         self._doubt: events.Checked | None = None
         self._known = 0  # new orientations that the first calibration holds, once it is computed again
@@ -107,7 +108,7 @@ class Verify(NewPoses):
 
     def begin(self) -> list[events.Output]:
         """See Step."""
-        return [events.RequestFit(events.FitKind.TRY, TRY_WAIT_S), self.prompt]
+        return [self.prompt]
 
     def add(self, samples: Samples, sightings: Sequence[Sighting]) -> events.Outputs:
         """See Step; Finished comes last and ends the step."""
@@ -118,6 +119,10 @@ class Verify(NewPoses):
             return [self._refusal] if t_s - self._begun_s >= PATIENCE_S else []
         waits = self._closed
         outputs: events.Outputs = [*self._take(sightings)]
+        if not self._requested and t_s - self._begun_s >= WAIT_S:
+            # Nobody moves at once: the first calibration is to have as much as possible of the last rest.
+            self._requested = True
+            outputs.append(events.RequestFit(events.FitKind.TRY, TRY_WAIT_S))
         if waits:
             return outputs
         if not self._closed:
@@ -184,12 +189,12 @@ class Verify(NewPoses):
 
     def _try_again(self, checked: events.Checked) -> events.Outputs:
         """Compute the first calibration again, with the orientations so far, and request one more to verify it."""
-        self._doubt, self._closed, self._begun_s = checked, False, None
+        self._doubt, self._closed, self._begun_s, self._requested = checked, False, None, False
         self._known, self._of = self._number, self._number + 1
         self.prompt = self._next()
         doubt = checked.reason.what if checked.reason else ""
         caution = events.Caution(self._now_s, "doubtful", doubt, "one more orientation decides if that matters")
-        return [*checked.verifications, events.RequestFit(events.FitKind.TRY, TRY_WAIT_S), caution, self.prompt]
+        return [*checked.verifications, caution, self.prompt]
 
     def _refused(self, refusal: events.Finished, against: Reason) -> events.Outputs:
         """Return the refusal, or offer to turn the board again, where that may help and somebody can answer."""
