@@ -57,6 +57,7 @@ def with_masks(recording: Recording) -> Recording:
 
     This is the first step of every use of a recording; the marks of its source stay.
     """
+    recording = _without_zeros(recording)
     dt = np.diff(recording.t, prepend=recording.t[0])
     # An autopilot's stream comes by radio, and its source says which pauses are more than single lost packets. It is
     # rounded, too, and of a range that no hand reaches: values repeat without being clipped.
@@ -80,6 +81,29 @@ def with_masks(recording: Recording) -> Recording:
         if value in (column.min(), column.max()) and np.count_nonzero(column == value) > last - first:
             marked.acc_clipped[first - 1 : last - 1] = True
     return replace(marked, gyr=_without_spikes(recording))
+
+
+def _without_zeros(recording: Recording) -> Recording:
+    """Return the recording with samples that were not read marked as gaps: all of their readings are zero.
+
+    Between others they are interpolated. Rates of zero before all others are those of a gyroscope that began later.
+    """
+    moves = recording.gyr.any(axis=1)
+    read = moves | recording.acc.any(axis=1)
+    begins = int(moves.argmax())
+    varies = bool(np.ptp(recording.acc[: max(begins, 1)], axis=0).any())
+    late = begins > 1 and varies and not (read & ~moves)[begins:].any()
+    if read.all() and not late:
+        return recording
+    gap = recording.gap | ~read | np.append(False, ~read[:-1])
+    gap[: begins if late else 0] = True
+    if not read.any():
+        return recording
+    acc, gyr = (
+        np.stack([np.interp(recording.t, recording.t[read], column[read]) for column in values.T], axis=1)
+        for values in (recording.acc, recording.gyr)
+    )
+    return replace(recording, acc=acc, gyr=gyr, gap=gap)
 
 
 def find_reset(recording: Recording, flat: Flat) -> int | None:
@@ -193,22 +217,29 @@ def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[
     for axis, column in enumerate(values.T):
         same = column[1:] == column[:-1]
         # coarse readings repeat throughout, and rates most in a long rest
-        parts = (same,) if sensor == "acc" else (same[: max(len(same) // 20, 50)], same)
-        by_chance = max((np.count_nonzero(part) + 1) / (len(part) + 2) for part in parts)
-        longest = max(-np.log(ODDS * len(values)) / np.log(by_chance), SHORTEST_RUN)
+        longest = max(map(_longest_by_chance, (same,) if sensor == "acc" else (same[: max(len(same) // 20, 50)], same)))
         if not same.any() or _run_lengths(same)[same].max() < longest:
             continue
         for first, last in true_runs(same).tolist():
             if last - first < longest or clipped[first]:
                 continue
             # The board turns where gravity moves, or a rate is far from rest, or others change.
-            is_turning = np.ptp(recording.acc[first : last + 1], axis=0).max() > swings
+            is_turning = np.ptp(recording.acc[first : last + (2 if sensor == "gyr" else 1)], axis=0).max() > swings
             if sensor == "gyr":
                 changed = np.ptp(values[first : last + 1], axis=0).max()
                 is_turning |= max(changed, abs(column[first] - column[0])) > MOVING_RAD_S
             if is_turning:
                 stuck.append(Stuck(axis, first + 1, last + 2))
     return stuck
+
+
+def _longest_by_chance(same: Mask) -> float:
+    """Return how many readings in a row repeat by chance at most, SHORTEST_RUN or more.
+
+    same : (n,) True for a reading that repeats the one before.
+    """
+    share = (np.count_nonzero(same) + 1) / (len(same) + 2)
+    return max(-float(np.log(ODDS * len(same)) / np.log(share)), SHORTEST_RUN)
 
 
 def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
@@ -226,7 +257,7 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
             known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
             known &= 2 * np.count_nonzero(at) > np.count_nonzero(np.abs(column - rail) <= RANGE_TOLERANCE * abs(rail))
             runs = int(np.count_nonzero(at[1:] & at[:-1]))
-            if known or (runs >= SHORTEST_RUN and _is_motion(column, rail)):
+            if known or (runs >= _longest_by_chance(np.diff(column) == 0.0) and _is_motion(column, rail)):
                 clipped |= at
     return clipped
 
