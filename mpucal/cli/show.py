@@ -16,8 +16,9 @@ from ..errors import UsageError
 from ..files import load
 from ..files.formats import readable_formats, recognise
 from ..files.hints import Hints
+from ..files.reading import first_bytes
 from ..rests.flat import find_flat
-from ..result.blob import Blob
+from ..result.blob import MAGIC, Blob
 from ..result.calibration import Calibration
 from ..result.error_model import mg_text
 from ..sinks.choose import interrupted_writes
@@ -30,8 +31,6 @@ from .source_options import check_input, check_source, source_options
 from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
-CALIBRATIONS = (".json", ".bin")
-
 
 HELP = f"""Show a calibration (.json), a config blob (.bin), a recording, or what a device holds.
 
@@ -53,7 +52,7 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
             raise UsageError(f"{' and '.join(hints)} say how a file is read, and a device was given", "leave them out")
         kept = {name: value for name, value in options.items() if name not in NAMES}
         _show_device(check_source(click.get_current_context()), kept, as_json)
-    elif file.suffix in CALIBRATIONS and recognise(file) is None:
+    elif (file.suffix.lower() == ".json" or first_bytes(file).startswith((MAGIC, b"{"))) and recognise(file) is None:
         _show_calibration(str(file), load_calibration(file), as_json)
     else:
         _show_recording(file, make_hints(options), as_json)

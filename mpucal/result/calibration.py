@@ -20,7 +20,7 @@ from ..data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ..disk.atomic import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parse_json
-from .blob import Blob, BlobError, is_invertible
+from .blob import MAGIC, Blob, BlobError, is_invertible
 from .correlation import UNCORRELATED
 from .document import DIGEST, digest, digest_warning, drop_unserialisable, from_document, to_document
 from .error_model import bias_mg, scale_factor_error
@@ -264,9 +264,9 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         WrongValue : another suffix. ValueError : a blob of a calibration with unknown numbers.
         """
         path = check_path(path, "the file of a calibration")
-        if path.suffix == ".json":
+        if path.suffix.lower() == ".json":
             write_atomically(path, self.json().encode())
-        elif path.suffix == ".bin":
+        elif path.suffix.lower() == ".bin":
             write_atomically(path, self.blob().encode())
         else:
             raise WrongValue(f"a calibration cannot be saved as {path.name}", "end its name with .json or .bin")
@@ -281,7 +281,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         """
         path = check_path(path, "a calibration")
         data = read_limited(path, MOST_BYTES)
-        if path.suffix == ".bin":
+        if path.suffix.lower() == ".bin" or data.startswith(MAGIC):
             try:
                 return cls.from_blob(Blob.decode(data))
             except BlobError as error:

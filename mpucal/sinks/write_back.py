@@ -175,8 +175,8 @@ def file_recorder(path: Path) -> Recorder:
 
 def is_calibration(path: Path) -> bool:
     """Return False if the file is a saved state of a sink; True for a calibration, even if damaged or missing."""
-    if path.suffix != ".json":
-        return path.suffix == ".bin" or not path.exists()
+    if path.suffix.lower() != ".json":
+        return path.suffix.lower() == ".bin" or not path.exists()
     try:
         return bool(parse_json(read_limited(path, MOST_BYTES)).get("format") == FORMAT)
     except (RecordingError, ValueError, AttributeError):

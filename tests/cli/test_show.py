@@ -53,6 +53,18 @@ def calibration(verdict="good", **changes):
     return Calibration(**{**values, **changes})
 
 
+@pytest.mark.parametrize(("saved", "name"), [("c.json", "C.JSON"), ("c.bin", "C.BIN"), ("c.json", "c"), ("c.bin", "d")])
+def test_a_calibration_is_known_by_what_it_holds(mpucal, saved, name, tmp_path):
+    calibration().save(tmp_path / saved)
+    (tmp_path / saved).rename(tmp_path / name)
+    assert f"{name}: a calibration of" in mpucal("show", tmp_path / name).out
+
+
+def test_records_of_numbers_are_no_config_blob(mpucal, tmp_path):
+    (tmp_path / "log.bin").write_bytes(bytes(range(256)) * 20)
+    assert "nor of records of numbers" in mpucal("show", tmp_path / "log.bin").err
+
+
 def row(text, name):
     return next(line for line in text.splitlines() if line.startswith(name))
 
