@@ -23,12 +23,12 @@ ASK_EVERY_S = 0.01
 def hold(step, call):
     add, calls = step.add, count(1)
 
-    def held(self, samples):
+    def held(self, samples, *seen):
         if next(calls) == call:
             Path("held").touch()
             while not Path("go").exists():
                 time.sleep(ASK_EVERY_S)
-        return add(self, samples)
+        return add(self, samples, *seen)
 
     step.add = held
 

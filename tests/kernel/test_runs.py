@@ -81,7 +81,7 @@ def test_odds_of_stuck_bits():
         halves = steps / 2.0**bit
         share = np.where(halves < 2.0, np.clip(2.0 / halves - 1.0, errors, sound), 0.5)
         odds = np.log(np.where(changed >> bit & 1, errors / share, (1.0 - errors) / (1.0 - share)))
-        may = changed >= 2 << bit if bit < 15 else np.abs(np.diff(counts & 0x7FFF, axis=0)) > 1 << 14
+        may = changed >= 2 << bit if bit < 15 else np.abs(np.diff(counts & 0x7FFF, axis=0)) > 0x7FFF - 0x7FF
         wanted = np.add.reduceat(np.where(may & ~gap[1:, None], odds, 0.0), edges)
         np.testing.assert_allclose(_kernel.stuck_odds(counts, gap, edges, errors, sound)[bit], wanted, atol=1e-11)
     for wrong in ([5, 3], [-1], [400]):
