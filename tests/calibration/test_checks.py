@@ -193,8 +193,14 @@ USABLE = {
     ),
     # the bus of another program's file is unknown
     "lost in a file": ("bench", without((700, 710)), "data_lost", "in 1 place (", "let what records it keep up"),
-    "zeros for lost samples": ("pose12", changed(*2 * [put(slice(900, None, 211), slice(3), 0.0)]), "data_lost", "places"),
-    "frozen from a rest on": ("hand", changed(*2 * [put(slice(1950, 2300), slice(3), None)]), "data_lost", "in 1 place ("),
+    "zeros for lost samples": (
+        *("pose12", changed(*2 * [put(slice(900, None, 211), slice(3), 0.0)])),
+        *("data_lost", "places"),
+    ),
+    "frozen from a rest on": (
+        *("hand", changed(*2 * [put(slice(1950, 2300), slice(3), None)])),
+        *("data_lost", "in 1 place ("),
+    ),
     "rates that begin late": ("pose12", changed(gyr=put(slice(250), slice(3), 0.0), flat=None), "data_lost", "1 place"),
     "gains alike": ("bench", changed(lambda acc: 1.3 * acc), "units_suspect", "data sheets allow 3 %"),
     "warming": (
