@@ -146,6 +146,20 @@ class Evidence:
         return 0.0 if self.flat is None else self._angle_from(self.flat, self.recording.acc[self.flat.last :])
 
     @cached_property
+    def gravity_carried(self) -> float:
+        """Largest angle [rad] between the flat mean and where the rates carry it, from half second to half second."""
+        if self.flat is None or not np.isfinite(self.recording.gyr).all():
+            return 0.0
+        u = start = _units(self.flat.y[None])
+        largest = 0.0
+        for first in range(self.flat.last, len(self.recording) - self._half_second, self._half_second):
+            turn = self._turn(self.flat, u[0], start[0], first, first + self._half_second)
+            if np.linalg.norm(turn.steps.sum(axis=0)) > MOVING_RAD_S * WINDOW_S:  # what is less may be drift
+                u = u @ turned(-turn.steps).T
+                largest = max(largest, float(_angles(u, start)[0]))
+        return largest
+
+    @cached_property
     def gravity_moved_before(self) -> float:
         """Largest angle [rad] between the flat mean and a half-second mean before it."""
         return 0.0 if self.flat is None else self._angle_from(self.flat, self.recording.acc[: self.flat.first])
@@ -172,7 +186,9 @@ class Evidence:
         path, angle = (rotated[first + self._half_second] - rotated[first]).sum(), _angles(u[:, 0], u[:, 1]).sum()
         if not path > CLEARLY * angle > 0.0:  # turns about the vertical exceed it, too
             return False
-        return bool(_least_miss(self._turns_of_half_seconds(flat), [np.eye(3), np.deg2rad(np.eye(3))])[0][0, 0] < 1.0)
+        by, miss = _least_miss(self._turns_of_half_seconds(flat), [np.eye(3), np.deg2rad(np.eye(3))])
+        # of a gravity that does not follow the board, no turn at all explains as much
+        return bool(by[0, 0] < 1.0 and CLEARLY * miss < np.median(_angles(u[:, 0], u[:, 1])))
 
     def _half_seconds(self, flat: Flat) -> tuple[Vector, NDArray[np.int_]]:
         """Return the directions of gravity (k, 2, 3) before and after turns, and the samples (k,) where these begin.

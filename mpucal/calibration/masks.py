@@ -88,8 +88,8 @@ def _without_zeros(recording: Recording) -> Recording:
 
     Between others they are interpolated. Rates of zero before all others are those of a gyroscope that began later.
     """
-    moves = recording.gyr.any(axis=1)
-    read = moves | recording.acc.any(axis=1)
+    moves = np.any(recording.gyr, axis=1)
+    read = moves | np.any(recording.acc, axis=1)
     begins = int(moves.argmax())
     varies = bool(np.ptp(recording.acc[: max(begins, 1)], axis=0).any())
     late = begins > 1 and varies and not (read & ~moves)[begins:].any()

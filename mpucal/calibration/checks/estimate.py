@@ -28,8 +28,8 @@ LEAST_CHANGE_MPS2, CHANGED_MPS2 = 0.004, 0.2
 def few_orientations(e: Evidence) -> Reason | None:
     """Find directions that the data leave open.
 
-    More orientations do not help where a hand held it in many: then it moved as it rested, with the hand or with the
-    ground.
+    More orientations do not help where the readings are coarse, or where a hand held it in many: then it moved as it
+    rested, with the hand or with the ground.
     """
     rms = _model_rms(e)
     if rms is not None and rms <= GOOD_RMS_MPS2:
@@ -42,6 +42,8 @@ def few_orientations(e: Evidence) -> Reason | None:
     known = max(rms, e.uncertainty.rms_mps2) if _is_useless(e) else rms
     if known >= e.gravity:
         return reason("few_orientations", "not_observable", side=side)
+    if contradiction(e) is None and (coarse := _coarse(e, known)) is not None:
+        return coarse
     if e.model == "hand" and e.was_held_all_around and contradiction(e) is None:
         return reason("inconsistent", "moved", _is_useless(e), rms=known)
     return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
@@ -109,10 +111,14 @@ def contradiction(e: Evidence) -> Reason | None:
             refuse = claim.error("change") > CHANGED_MPS2 or _is_useless(e)
             return reason("inconsistent", "change", refuse, begin=begin, end=end)
         size = 1e3 * change.size / STANDARD_GRAVITY_MPS2
+        if change.hypothesis.shape == "step":
+            return reason("zero_moved", "step", _is_useless(e), size=size, begin=begin, end=end)
         return reason("zero_moved", "walk", _is_useless(e), size=size, begin=begin, end=end)
     disturbed |= not e.estimate.converged
     if worst is None or (disturbed and not _is_useless(e)) or not rms > GOOD_RMS_MPS2 >= claim.floored:
         return None
+    if (coarse := _coarse(e, rms)) is not None:
+        return coarse
     if worst.hypothesis.kind == "side":
         if e.recording.rate_hz < SEPARABLE_HZ:
             return reason("inconsistent", "slow", _is_useless(e), rms=rms, rate=e.recording.rate_hz)
@@ -141,6 +147,16 @@ def exchange(e: Evidence) -> tuple[float, float] | None:
     """
     is_good = e.uncertainty is not None and e.uncertainty.rms_mps2 <= GOOD_RMS_MPS2
     return None if is_good else e.exchanged
+
+
+def _coarse(e: Evidence, rms: float) -> Reason | None:
+    """Return the reason of an estimate with an uncertainty [m/s^2] of less than two steps of the readings, or None."""
+    words = None if e.decoded is None else e.decoded.words[0]
+    if words is None:
+        return None
+    steps = np.abs(np.diff(words.counts, axis=0))
+    step = words.lsb * int(np.min(steps, where=steps > 0, initial=np.iinfo(np.int32).max))
+    return reason("inconsistent", "coarse", _is_useless(e), rms=rms, step=step) if rms < 2.0 * step else None
 
 
 def _is_useless(e: Evidence) -> bool:

@@ -85,7 +85,7 @@ def gyroscope_frozen(e: Evidence) -> Reason | None:
 @once
 def _frozen_rates(e: Evidence) -> list[Stuck]:
     """Return where rates repeat while the accelerometer goes on; otherwise whole samples repeat, and are lost."""
-    moves = np.diff(e.recording.acc, axis=0).any(axis=1)
+    moves = np.any(np.diff(e.recording.acc, axis=0), axis=1)
     return [run for run in stuck_readings(e.recording, "gyr") if moves[run.first - 1 : run.last - 2].mean() > 0.5]
 
 

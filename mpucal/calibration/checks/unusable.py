@@ -10,7 +10,7 @@ from ...origin import Origin
 from ...reasons import Reason, reason
 from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 from ...rests.limits import LEAST_TURN_RAD
-from ..evidence import Evidence, once
+from ..evidence import CLEARLY, Evidence, once
 from ..hypothesis_tests import MOST_STD
 from ..masks import stuck_readings
 from ..rotation import lengths
@@ -119,12 +119,15 @@ def never_still(e: Evidence) -> Reason | None:
 
 
 def hardly_turned(e: Evidence) -> Reason | None:
-    """Find a board that was not turned after it lay flat."""
+    """Find a board that was not turned after it lay flat, or whose gravity does not follow it."""
     after = len(e.recording) - e.rest.last
     if _rested_late(e):
         return None
     if e.gravity_moved >= LEAST_TURN_RAD and after >= FEWEST_SAMPLES:
         return None
+    if e.gravity_carried > CLEARLY * max(e.gravity_moved, LEAST_TURN_RAD):
+        moved, carried = np.rad2deg([e.gravity_moved, e.gravity_carried])
+        return reason("not_raw", "stays", degrees=moved, carried=carried)
     return reason("few_orientations", "hardly_turned", degrees=np.rad2deg(e.gravity_moved), samples=after)
 
 
