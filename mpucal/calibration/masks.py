@@ -13,6 +13,7 @@ from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.intervals import true_runs
 from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
+from ..rests.windows import WINDOW_S
 from .problem import Series
 from .rotation import cross_rows, lengths
 from .words import ODDS
@@ -90,20 +91,32 @@ def _without_zeros(recording: Recording) -> Recording:
     """
     moves = np.any(recording.gyr, axis=1)
     read = moves | np.any(recording.acc, axis=1)
-    begins = int(moves.argmax())
-    varies = bool(np.ptp(recording.acc[: max(begins, 1)], axis=0).any())
-    late = begins > 1 and varies and not (read & ~moves)[begins:].any()
-    if read.all() and not late:
+    late = _late_rates(recording, moves, read)
+    if not read.any() or (read.all() and not late):
         return recording
     gap = recording.gap | ~read | np.append(False, ~read[:-1])
-    gap[: begins if late else 0] = True
-    if not read.any():
-        return recording
+    gap[:late] = True
     acc, gyr = (
         np.stack([np.interp(recording.t, recording.t[read], column[read]) for column in values.T], axis=1)
         for values in (recording.acc, recording.gyr)
     )
     return replace(recording, acc=acc, gyr=gyr, gap=gap)
+
+
+def _late_rates(recording: Recording, moves: Mask, read: Mask) -> int:
+    """Return the number of samples before a gyroscope began, while the board rested; 0 if it was there from the start.
+
+    The rates of a board that was simulated without noise are zero in each of its rests. Then it begins to turn: gravity
+    moves, or the rates grow from one sample to the next.
+    """
+    begins = int(moves.argmax())
+    if begins == 0 or (read & ~moves)[begins:].any() or not np.ptp(recording.acc[:begins], axis=0).any():
+        return 0
+    sizes = lengths(recording.gyr[begins : begins + 2 * SHORTEST_RUN])
+    half_second = max(round(WINDOW_S * recording.rate_hz), 1)
+    before, after = recording.acc[:begins].mean(0), recording.acc[begins : begins + half_second].mean(0)
+    rests = np.linalg.norm(after - before) < BACK * np.linalg.norm(before) and 5.0 * sizes[0] > np.median(sizes)
+    return begins if rests else 0
 
 
 def find_reset(recording: Recording, flat: Flat) -> int | None:
