@@ -236,8 +236,10 @@ def stuck_readings(recording: Recording, sensor: Literal["acc", "gyr"]) -> list[
         for first, last in true_runs(same).tolist():
             if last - first < longest or clipped[first]:
                 continue
-            # The board turns where gravity moves, or a rate is far from rest, or others change.
-            is_turning = np.ptp(recording.acc[first : last + (2 if sensor == "gyr" else 1)], axis=0).max() > swings
+            # The board turns where gravity moves, or a rate is far from rest, or others change. If both sensors froze,
+            # the sample that follows shows it; an accelerometer that froze alone may be shaken then.
+            end = last + (2 if sensor == "gyr" else 1)
+            is_turning = np.ptp(recording.acc[first:end], axis=0).max() > swings
             if sensor == "gyr":
                 changed = np.ptp(values[first : last + 1], axis=0).max()
                 is_turning |= max(changed, abs(column[first] - column[0])) > MOVING_RAD_S

@@ -42,10 +42,11 @@ def few_orientations(e: Evidence) -> Reason | None:
     known = max(rms, e.uncertainty.rms_mps2) if _is_useless(e) else rms
     if known >= e.gravity:
         return reason("few_orientations", "not_observable", side=side)
-    if contradiction(e) is None and (coarse := _coarse(e, known)) is not None:
-        return coarse
-    if e.model == "hand" and e.was_held_all_around and contradiction(e) is None:
-        return reason("inconsistent", "moved", _is_useless(e), rms=known)
+    if contradiction(e) is None:
+        if (coarse := _coarse(e, known)) is not None:
+            return coarse
+        if e.model == "hand" and e.was_held_all_around:
+            return reason("inconsistent", "moved", _is_useless(e), rms=known)
     return reason("few_orientations", "uncertain", _is_useless(e), rms=known, side=side)
 
 
@@ -155,7 +156,7 @@ def _coarse(e: Evidence, rms: float) -> Reason | None:
     if words is None:
         return None
     steps = np.abs(np.diff(words.counts, axis=0))
-    step = words.lsb * int(np.min(steps, where=steps > 0, initial=np.iinfo(np.int32).max))
+    step = words.lsb * int(steps[steps > 0].min(initial=np.abs(words.counts).max()))
     return reason("inconsistent", "coarse", _is_useless(e), rms=rms, step=step) if rms < 2.0 * step else None
 
 
