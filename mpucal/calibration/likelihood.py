@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
-from .parameters import ACCEL, HAND, IMU, LANES, LAYOUT, lanes_used
+from .parameters import ACCEL, HAND, IMU, LANES, LANES_OF_S, LAYOUT, lanes_used
 from .problem import SERIES, SERIES_OF_A_HAND, Problem
 from .theta import Theta
 
@@ -42,7 +42,8 @@ def evaluate(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.i
     """Evaluate V(theta) with its derivatives by the first `parameters` of NAMES.
 
     ACCEL, IMU (or 0: V alone) use equation (8) by the exact filter. HAND uses the hand's filter, whose derivatives hold
-    gains and weights fixed: the gradient is zero where the estimate should be, not where V is least.
+    gains and weights fixed: the gradient is zero where the estimate should be, not where V is least. SENSITIVE adds the
+    derivatives by S (9,), row-major, at S = 0, to a series with forces.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def evaluate(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.i
     ------
     ValueError : the exact filter was called with a problem that only the hand's filter can solve.
     """
-    if parameters == HAND:
+    if parameters >= HAND:
         V, squares, gradient, fisher = _hand(problem, theta, derivatives=True, ends=ends)
     else:
         _refuse_a_hand(problem)
@@ -104,20 +105,17 @@ class Trace(NamedTuple):
     """Predictions of the hand's filter for every sample, (n, 3) each.
 
     innovation : whitened, L^-1 e. s, a : m/s^2, gravity and the hand's acceleration in the body frame, as predicted.
-    by_theta : (3 n, p) derivatives of the innovations with fixed gains, in the order of NAMES; (3 n, 0) if not asked.
     """
 
     innovation: NDArray[np.float64]
     s: NDArray[np.float64]
     a: NDArray[np.float64]
-    by_theta: NDArray[np.float64]
 
 
-def trace(problem: Problem, theta: Theta, derivatives: bool = False) -> Trace:
-    """Run the hand's filter, and return its predictions sample by sample, with their derivatives if asked."""
+def trace(problem: Problem, theta: Theta) -> Trace:
+    """Run the hand's filter, and return its predictions sample by sample."""
     series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
-    innovation, s, a, rows = _kernel.trace_hand(theta.packed, problem.constants_of_a_hand(), derivatives, **series)
-    return Trace(innovation, s, a, rows[:, _lanes(HAND if derivatives else 0)])
+    return Trace(*_kernel.trace_hand(theta.packed, problem.constants_of_a_hand(), **series))
 
 
 def _exact(
@@ -137,7 +135,7 @@ def _hand(
 
 @cache
 def _lanes(parameters: int) -> NDArray[np.intp]:
-    return np.array(LANES[:parameters], np.intp)
+    return np.array((LANES + LANES_OF_S)[:parameters], np.intp)
 
 
 def _refuse_a_hand(problem: Problem) -> None:

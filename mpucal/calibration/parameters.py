@@ -105,6 +105,10 @@ ACCELEROMETER = slice(PLACES["D"].start, PLACES["b_a"].stop)
 # Number of parameters of each model.
 ACCEL, IMU, HAND = (sum(len(row.names) for row in estimated(model)) for model in MODELS)
 
+# S, the gyroscope's sensitivity to acceleration, row-major: its columns are groups of lanes after the hand's.
+LANES_OF_S = tuple(-(-lanes_used("hand") // 4) * 4 + 4 * j + i for i in range(3) for j in range(3))
+SENSITIVE = HAND + len(LANES_OF_S)
+
 # A kernel that was built for another table must not run.
 LAYOUT = ", ".join(f"{row.name} {row.form.name} {row.model} {[*row.lanes]}" for row in TABLE)
 

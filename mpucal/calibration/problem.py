@@ -29,6 +29,8 @@ class Series:
     jerk : (n,) (m/s^3)^2/Hz, spectral density of the hand's jerk over the step that leads to the sample [0].
     reset : (n,) m/s^2, not below zero where the hand comes to rest or leaves it: its travel begins anew as in a long
         rest, with this standard deviation of its acceleration [nowhere].
+    force : (n, 3) m/s^2 over the step that leads to the sample, less that of the flat segment, for the derivatives by
+        the gyroscope's sensitivity S to it [none].
     """
 
     y: Vector
@@ -42,6 +44,7 @@ class Series:
     r_extra: Vector | None = None
     jerk: Vector | None = None
     reset: Vector | None = None
+    force: Vector | None = None
 
     def __len__(self) -> int:
         return len(self.dt)
@@ -60,7 +63,7 @@ class Series:
 
 SERIES = ("y", "omega", "dt", "r_scale", "q_scale", "q_extra")
 
-SERIES_OF_A_HAND = ("rate", "alpha", "r_extra", "jerk", "reset")
+SERIES_OF_A_HAND = ("rate", "alpha", "r_extra", "jerk", "reset", "force")
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,7 @@
 
 A machine may turn a sensor without a pause. S (3, 3) is then estimated together with theta, by the method of
 Gauss-Newton on the innovations of the hand's filter: the rates are omega - S (y - y_flat), since b_omega is the mean
-rate of the flat segment. The derivatives of the innovations by S are differences; all derivatives are those at the
-begin, from which the steps lead nowhere far.
+rate of the flat segment.
 """
 
 from __future__ import annotations
@@ -22,14 +21,12 @@ from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import PASSES
 from .hypotheses import SURE, Explanation, gyroscope_change
-from .likelihood import Trace, trace
+from .likelihood import Evaluation, evaluate
 from .normal_equations import inverse
-from .parameters import HAND, NAMES
+from .parameters import HAND, NAMES, SENSITIVE
 from .preprocessing import prepare
 from .theta import Theta
 from .uncertainty import MOST_NIS
-
-STEP = 1e-6  # of the differences, in rad/s per m/s^2
 
 
 class Sensitivity(NamedTuple):
@@ -72,39 +69,30 @@ def find_sensitivity(
     y = np.vstack([rest.y, series.y])
     force = 0.5 * (y[1:] + y[:-1]) - rest.y
 
-    def predicted(theta: Theta, S: Vector, derivatives: bool = False) -> Trace:
-        less = replace(series, omega=series.omega - force @ S.T)
-        return trace(replace(problem, series=less), theta, derivatives)
-
-    def innovations(theta: Theta, S: Vector) -> Vector:
-        return predicted(theta, S).innovation.ravel()
+    def at_sensitivity(theta: Theta, S: Vector) -> Evaluation:
+        less = replace(series, omega=series.omega - force @ S.T, force=force)
+        return evaluate(replace(problem, series=less), theta, SENSITIVE)
 
     up = np.linalg.solve(fit.D, flat.y - fit.b_a)
     start = Theta.start(fit.D, fit.b_a, fit.b_omega, up / np.linalg.norm(up))
     theta, S = replace(start, K=fit.K, tau=fit.delay_s), np.zeros((3, 3))
     precision = np.append(prior.precision, np.full(9, SENSITIVITY_SD**-2))
     others = np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)])  # nothing's share is 1
-    begin = predicted(theta, S, derivatives=True)
-    e = begin.innovation.ravel()
-    by_S = [(innovations(theta, step.reshape(3, 3)) - e) / STEP for step in STEP * np.eye(9)]
-    J = np.column_stack([begin.by_theta, *by_S])
-    C = inverse(J.T @ J + np.diag(precision))
-    known = inverse(C[HAND:, HAND:])
     for _ in range(PASSES):
-        g = J.T @ e + precision * np.append(theta.values() - prior.mean, S)
-        step = -C @ g
+        found = at_sensitivity(theta, S)
+        C = inverse(found.fisher + np.diag(precision))
+        known = inverse(C[HAND:, HAND:])
+        step = -C @ (found.gradient + precision * np.append(theta.values() - prior.mean, S))
         theta, S = theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
-        e = innovations(theta, S)
         evidence = 0.5 * float(S.ravel() @ known @ S.ravel() - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
-        if not evidence > -np.log(SURE):
+        left = found.squares + step @ (2.0 * found.gradient + found.fisher @ step)
+        if not (evidence > -np.log(SURE) and left < MOST_NIS * len(series)):
             return None
         if evidence < 0.0:  # it is not removed
             break
-    if not 3.0 * (e @ e) < MOST_NIS * len(e):
-        return None
     weight = np.exp(evidence - np.logaddexp(others, evidence))
     removed = weight if weight > 0.5 else 0.0
     carried, s = C[:HAND, HAND:] @ known, S.ravel()
-    left = weight * (1.0 - removed) ** 2 + (1.0 - weight) * removed**2
-    covariance = weight * C[HAND:, HAND:] + left * np.outer(s, s)
+    apart = weight * (1.0 - removed) ** 2 + (1.0 - weight) * removed**2
+    covariance = weight * C[HAND:, HAND:] + apart * np.outer(s, s)
     return Sensitivity(removed * S, carried @ covariance @ carried.T)

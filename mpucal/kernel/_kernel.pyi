@@ -32,12 +32,12 @@ def evaluate_hand(
     r_extra: NDArray[numpy.float64] | None = None,
     jerk: NDArray[numpy.float64] | None = None,
     reset: NDArray[numpy.float64] | None = None,
+    force: NDArray[numpy.float64] | None = None,
     ends: NDArray[numpy.int64] | None = None,
 ) -> tuple[float, float, NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def trace_hand(
     theta: NDArray[numpy.float64],
     constants: NDArray[numpy.float64],
-    derivatives: bool,
     y: NDArray[numpy.float64],
     omega: NDArray[numpy.float64],
     dt: NDArray[numpy.float64],
@@ -49,7 +49,8 @@ def trace_hand(
     r_extra: NDArray[numpy.float64] | None = None,
     jerk: NDArray[numpy.float64] | None = None,
     reset: NDArray[numpy.float64] | None = None,
-) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]: ...
+    force: NDArray[numpy.float64] | None = None,
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def moments(
     b_omega: NDArray[numpy.float64],
     y: NDArray[numpy.float64],

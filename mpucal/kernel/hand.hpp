@@ -8,7 +8,8 @@
 // and V = sum of rho(e' S^-1 e) + 1/2 log det S; rho is Huber's, or redescends, and w is its weight.
 //
 // The derivatives hold the gains and weights: gradient = sum of w de' S^-1 e, Fisher matrix = sum of w de' S^-1 de. The
-// gradient's expectation is zero at the truth, since de depends on the past alone, but it is not that of V.
+// gradient's expectation is zero at the truth, since de depends on the past alone, but it is not that of V. Where the
+// series has forces, a group for each column of S, the gyroscope's sensitivity to them, follows those of theta.
 #pragma once
 #include "filter.hpp"
 
@@ -16,12 +17,15 @@ namespace mpucal {
 
 static_assert(Lanes::r % 4 == 0);
 
+constexpr int kHandGroups = groups_of(LanesUsed::hand), kGroupsOfS = 3;
+
 struct HandSeries : Series {
   const double* rate;     // rad/s at the sample, bias removed, for lever arm and delay [neither]
   const double* alpha;    // rad/s^2 at the sample
   const double* r_extra;  // (m/s^2)^2 added to R on each axis [0]
   const double* jerk;     // (m/s^3)^2/Hz, the chain's noise [0]
   const double* reset;    // m/s^2: the travel of a long rest with this standard deviation of a; below zero: no reset [none]
+  const double* force;    // m/s^2 over the step that leads to the sample: omega is less by S force, S = 0 [no S]
 };
 
 struct HandConstants : Constants {
@@ -40,7 +44,6 @@ struct HandResult {
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update
   double* motion;      // (n, 3) a before the update
-  double* rows;        // (3 n, lanes) derivatives of the whitened innovations, beside the sums alone
 };
 
 using EvaluateHand = void (*)(const HandParameters&, const HandSeries&, const HandConstants&, HandResult&);

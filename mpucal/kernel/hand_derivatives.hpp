@@ -6,8 +6,6 @@
 namespace mpucal {
 namespace {  // each instruction set has its own copy
 
-constexpr int kHandGroups = groups_of(LanesUsed::hand);
-
 // Shared coefficients of the derivatives of four steps
 struct HandCoefficients {
   Lane white[3][3], residual[3];                // sqrt(w) L^-1, and its product with e
@@ -72,10 +70,11 @@ struct HandCoefficients {
   }
 };
 
+template <int G>
 class HandDerivatives {
  public:
   HandDerivatives(const HandParameters& p, double gravity) {
-    for (int g = 0; g < kHandGroups; ++g) {
+    for (int g = 0; g < G; ++g) {
       gradient_[g] = all(0.0);
       for (auto& axis : dx_[g])
         for (Lane& lane : axis) lane = all(0.0);
@@ -88,12 +87,12 @@ class HandDerivatives {
 
   // The next `count` steps; three rows of the Fisher matrix each
   void run(const HandSteps* steps, const HandPredicted* met, const HandCoefficients* coefficients, int count,
-           Lane (*rows)[kHandGroups]) {
-    for_each<kHandGroups>([&](auto g) { run_group<g>(steps, met, coefficients, count, rows); });
+           Lane (*rows)[G]) {
+    for_each<G>([&](auto g) { run_group<g>(steps, met, coefficients, count, rows); });
   }
 
   void write(double* gradient) const {
-    for (int i = 0; i < 4 * kHandGroups; ++i) gradient[i] = at(gradient_[i / 4], i % 4);
+    for (int i = 0; i < 4 * G; ++i) gradient[i] = at(gradient_[i / 4], i % 4);
   }
 
  private:
@@ -101,7 +100,7 @@ class HandDerivatives {
 
   template <int g>
   MPUCAL_APART void run_group(const HandSteps* steps, const HandPredicted* met, const HandCoefficients* coefficients,
-                              int count, Lane (*rows)[kHandGroups]) {
+                              int count, Lane (*rows)[G]) {
     Lane gradient = gradient_[g];
     State x;
     for (int a = 0; a < 3; ++a)
@@ -163,6 +162,11 @@ class HandDerivatives {
     if constexpr (g == Lanes::b_omega / 4) add_turn(c.eta_b[t], met.x_next[t], x);
     if constexpr (g == Lanes::K / 4) add_turn(c.eta_K[t], met.x_next[t], x);
     if constexpr (g == Lanes::K / 4 + 1) add_turn(c.eta_K2[t], met.x_next[t], x);
+    if constexpr (g >= kHandGroups) {  // a column of S times its force acts like b_omega
+      Lane eta_S[3];
+      for (int a = 0; a < 3; ++a) eta_S[a] = at(four.force[g - kHandGroups], t) * c.eta_b[t][a];
+      add_turn(eta_S, met.x_next[t], x);
+    }
   }
 
   // x += n x next
@@ -175,7 +179,12 @@ class HandDerivatives {
 
   static constexpr int kTauLane = Lanes::tau % 4;
   inline static const Lane kTau{kTauLane == 0, kTauLane == 1, kTauLane == 2, kTauLane == 3};
-  Lane dx_[kHandGroups][3][kState], gradient_[kHandGroups];
+  Lane dx_[G][3][kState], gradient_[G];
+};
+template <>
+class HandDerivatives<0> {
+ public:
+  HandDerivatives(const HandParameters&, double) {}
 };
 
 }  // namespace

@@ -1,7 +1,6 @@
 // The hand's filter, compiled once for each instruction set: the including file names the function.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "hand_derivatives.hpp"
 
@@ -32,39 +31,29 @@ void trace(const HandSteps* steps, const HandPredicted* predicted, long k, int c
   }
 }
 
-// Derivatives of the samples' innovations among those of these steps
-void keep(const Lane (*rows)[kHandGroups], long k, int count, double* out) {
-  const int flat = k == 0;  // the flat mean is no sample
-  std::memcpy(out + 3 * (k + flat - 1) * 4 * kHandGroups, rows + 3 * flat, 3 * (count - flat) * sizeof *rows);
-}
-
-enum class Wanted { value, derivatives, trace };
-
-template <Wanted wanted>
+// G groups of derivatives, or none
+template <int G, bool traced = false>
 void run(const HandParameters& p, const HandSeries& series, const HandConstants& c, HandResult& result) {
-  constexpr bool derive = wanted == Wanted::derivatives;
   const long all_steps = static_cast<long>(series.n) + 1;
   Lane C[3] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
   HandSteps steps[kFours];
   HandPredicted predicted[kFours] = {};
   HandRecursion recursion(p, c);
   [[maybe_unused]] HandCoefficients coefficients[kFours];
-  [[maybe_unused]] Lane rows[3 * kBlock][kHandGroups];
-  HandDerivatives derivatives(p, c.gravity);
-  Fisher<derive ? LanesUsed::hand : 0> fisher;
+  [[maybe_unused]] Lane rows[3 * kBlock][G ? G : 1];
+  HandDerivatives<G> derivatives(p, c.gravity);
+  Fisher<G == kHandGroups ? LanesUsed::hand : 4 * G> fisher;
   [[maybe_unused]] int end = 0;
   for (long k = 0; k < all_steps; k += kBlock) {
     const int count = static_cast<int>(std::min(kBlock, all_steps - k)), fours = (count + 3) / 4;
     for (int f = 0; f < fours; ++f) steps[f].read(p, series, c, k + 4 * f, C);
-    recursion.run<wanted != Wanted::value>(steps, count, k == 0, predicted);
-    if constexpr (wanted != Wanted::value)
-      if (result.innovation) trace(steps, predicted, k, count, result);
-    if constexpr (derive) {
+    recursion.run<(G > 0 || traced)>(steps, count, k == 0, predicted);
+    if constexpr (traced) trace(steps, predicted, k, count, result);
+    if constexpr (G > 0) {
       for (int f = 0; f < fours; ++f) coefficients[f].compute(p, c.gravity, steps[f], predicted[f]);
       derivatives.run(steps, predicted, coefficients, count, rows);
       fisher.add(rows, 3 * count);
-      if (result.rows) keep(rows, k, count, result.rows);
-      constexpr long lanes = 4 * kHandGroups;
+      constexpr long lanes = 4 * G;
       for (; end < result.ends.count && result.ends.at[end] < k + count; ++end) {
         derivatives.write(result.gradient + end * lanes);
         fisher.write(result.fisher + end * lanes * lanes);
@@ -81,12 +70,14 @@ void MPUCAL_EVALUATE_HAND(const HandParameters& p, const HandSeries& given, cons
   constexpr double rest[3] = {0.0, 0.0, 0.0};
   HandSeries series = given;
   if (given.n == 0) series = HandSeries{{0, rest, rest, rest}};
-  if (result.gradient)
-    run<Wanted::derivatives>(p, series, c, result);
+  if (result.gradient && series.force)
+    run<kHandGroups + kGroupsOfS>(p, series, c, result);
+  else if (result.gradient)
+    run<kHandGroups>(p, series, c, result);
   else if (result.innovation)
-    run<Wanted::trace>(p, series, c, result);
+    run<0, true>(p, series, c, result);
   else
-    run<Wanted::value>(p, series, c, result);
+    run<0>(p, series, c, result);
 }
 
 }  // namespace mpucal

@@ -20,6 +20,7 @@ struct HandSteps : Given {
   Lane column[4][3], noise[4][3];   // [step][k] of the triangle Phi, in the places of a, b, c; of jerk Q
   Lane c_first[6];                  // C_next' diag(c) C_next
   Lane reset;                       // of the next sample
+  Lane force[kGroupsOfS];           // not read where there are none
 
   // On entry the rows of C belong to the first measurement, on return to the measurement after these.
   MPUCAL_APART void read(const HandParameters& p, const HandSeries& series, const HandConstants& constants, long k,
@@ -94,6 +95,7 @@ struct HandSteps : Given {
     chain.compute(h, constants.lam);
     const Lane jerk = samples.read(series.jerk, 0.0), zero = all(0.0);
     reset = samples.read(series.reset, -1.0);
+    if (series.force) samples.read(series.force, force);
     const auto& Phi = chain.Phi;
     for (int i = 0; i < 3; ++i) {
       transpose(zero, Phi[i], i > 0 ? Phi[i - 1] : zero, i > 1 ? Phi[i - 2] : zero, column[0][i], column[1][i],

@@ -78,14 +78,15 @@ Series make_series(const Array& y, const Array& omega, const Array& dt, const st
 
 HandSeries make_hand_series(const Series& common, const std::optional<Array>& rate, const std::optional<Array>& alpha,
                             const std::optional<Array>& r_extra, const std::optional<Array>& jerk,
-                            const std::optional<Array>& reset) {
-  HandSeries series{common, nullptr, nullptr, nullptr, nullptr, nullptr};
+                            const std::optional<Array>& reset, const std::optional<Array>& force) {
+  HandSeries series{common, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr};
   series.rate = pointer(rate, 3 * series.n, "rate");
   series.alpha = pointer(alpha, 3 * series.n, "alpha");
   if (!series.rate != !series.alpha) throw std::invalid_argument("rate and alpha come together");
   series.r_extra = pointer(r_extra, series.n, "r_extra");
   series.jerk = pointer(jerk, series.n, "jerk");
   series.reset = pointer(reset, series.n, "reset");
+  series.force = pointer(force, 3 * series.n, "force");
   return series;
 }
 
@@ -164,12 +165,12 @@ NB_MODULE(_kernel, m) {
          const Array& dt, const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
          const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
          const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset,
-         const std::optional<Indices>& ends) {
+         const std::optional<Array>& force, const std::optional<Indices>& ends) {
         const HandSeries series = make_hand_series(
-            make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset);
+            make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset, force);
         const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
-        const std::size_t p = derivatives ? 4 * groups_of(LanesUsed::hand) : 0;
+        const std::size_t p = derivatives ? 4 * (kHandGroups + (force ? kGroupsOfS : 0)) : 0;
         const std::vector<long> at = make_ends(ends, series.n);
         const std::size_t k = at.size();
         std::vector<double> gradient(k * p), fisher(k * p * p);
@@ -191,31 +192,23 @@ NB_MODULE(_kernel, m) {
       nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
       nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
       nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
-      nb::arg("ends").none() = nb::none(),
+      nb::arg("force").none() = nb::none(), nb::arg("ends").none() = nb::none(),
       "Return V, sum of squared whitened innovations, gradient and Fisher matrix of the hand's filter up to each of `ends` "
-      "(in lane order).");
+      "(in lane order; with force, groups for the columns of S follow).");
 
   m.def(
       "trace_hand",
-      [](const Array& theta, const Array& constants, bool derivatives, const Array& y, const Array& omega,
-         const Array& dt, const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
+      [](const Array& theta, const Array& constants, const Array& y, const Array& omega, const Array& dt,
+         const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
          const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
-         const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset) {
+         const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset,
+         const std::optional<Array>& force) {
         const HandSeries series = make_hand_series(
-            make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset);
+            make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset, force);
         const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
-        const std::size_t p = derivatives ? 4 * groups_of(LanesUsed::hand) : 0;
         std::vector<double> innovation(3 * series.n), gravity(3 * series.n), motion(3 * series.n);
-        std::vector<double> sums(p), sums_of_pairs(p * p), rows(3 * series.n * p);
-        const std::vector<long> at = make_ends(std::nullopt, series.n);
         HandResult result{};
-        if (derivatives) {
-          result.ends = {at.data(), 1};
-          result.gradient = sums.data();
-          result.fisher = sums_of_pairs.data();
-          result.rows = rows.data();
-        }
         result.innovation = innovation.data();
         result.gravity = gravity.data();
         result.motion = motion.data();
@@ -225,15 +218,15 @@ NB_MODULE(_kernel, m) {
         }
         const std::size_t n = series.n;
         return std::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}),
-                               give(std::move(motion), {n, 3}), give(std::move(rows), {3 * n, p}));
+                               give(std::move(motion), {n, 3}));
       },
-      nb::arg("theta"), nb::arg("constants"), nb::arg("derivatives"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
+      nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
       nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
       nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
       nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
-      "Return whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter, and "
-      "the derivatives (3 n, lanes) of the innovations.");
+      nb::arg("force").none() = nb::none(),
+      "Return whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter.");
 
   m.def(
       "moments",
