@@ -32,29 +32,19 @@ def held_back():
     return np.maximum.accumulate(stamps)
 
 
-@pytest.mark.parametrize(
-    ("stamps", "within"),
-    [
-        (late(1, 1e-3), 1e-4),
-        (late(2, 5e-3), 5e-4),
-        (in_bursts(10), 2e-3),
-        (in_bursts(32) + 2e-4 * (np.arange(N) % 32), 3e-3),
-        (polled(11.96), 1e-3),
-        (np.floor(TRUE * 100) / 100, 1e-3),
-        (np.floor(TRUE), 5e-2),
-        (held_back(), 5e-4),
-    ],
-    ids=[
-        "1 ms",
-        "5 ms",
-        "bursts of 10",
-        "bursts of 32",
-        "bursts of 11 or 12",
-        "rounded to 10 ms",
-        "rounded to 1 s",
-        "a busy computer",
-    ],
-)
+STAMPS = {
+    "1 ms": (late(1, 1e-3), 1e-4),
+    "5 ms": (late(2, 5e-3), 5e-4),
+    "bursts of 10": (in_bursts(10), 2e-3),
+    "bursts of 32": (in_bursts(32) + 2e-4 * (np.arange(N) % 32), 3e-3),
+    "bursts of 11 or 12": (polled(11.96), 1e-3),
+    "rounded to 10 ms": (np.floor(TRUE * 100) / 100, 1e-3),
+    "rounded to 1 s": (np.floor(TRUE), 5e-2),
+    "a busy computer": (held_back(), 5e-4),
+}
+
+
+@pytest.mark.parametrize(("stamps", "within"), STAMPS.values(), ids=STAMPS)
 def test_stamps_of_late_arrivals_become_even_times(stamps, within):
     found = fit_clock(stamps)
     assert found.rate_hz == pytest.approx(HZ, rel=2e-4)
@@ -88,17 +78,16 @@ def test_an_even_clock_does_not_replace_stamps_between_which_single_samples_are_
     assert np.std(off) < 1.5e-3
 
 
-@pytest.mark.parametrize(
-    "times",
-    [
-        TRUE,
-        np.round(TRUE, 3),
-        TRUE[np.random.default_rng(4).random(N) > 0.1],
-        np.cumsum((1 + np.random.default_rng(5).exponential(0.3, N)) / HZ),
-        TRUE[:50],
-    ],
-    ids=["even", "rounded to 1 ms", "some left out", "whenever a program came to it", "few"],
-)
+TIMES = {
+    "even": TRUE,
+    "rounded to 1 ms": np.round(TRUE, 3),
+    "some left out": TRUE[np.random.default_rng(4).random(N) > 0.1],
+    "whenever a program came to it": np.cumsum((1 + np.random.default_rng(5).exponential(0.3, N)) / HZ),
+    "few": TRUE[:50],
+}
+
+
+@pytest.mark.parametrize("times", TIMES.values(), ids=TIMES)
 def test_true_times_stay(times):
     found = fit_clock(times)
     assert (found.jitter_s, found.remark) == (0.0, "")

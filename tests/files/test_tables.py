@@ -483,6 +483,13 @@ def read(walk, walk_ns, tmp_path):
     return call
 
 
+def refused(path):
+    """Return the error with which a file is refused."""
+    with pytest.raises(RecordingError) as raised:
+        mpucal.load(path)
+    return raised.value
+
+
 @pytest.mark.parametrize(("spec", "utc_ns"), [("date", None), ("utc", 1759595712 * 10**9)])
 def test_a_date_without_a_zone_is_no_time_of_day(spec, utc_ns, read, walk, assert_same):
     found = read(f"time,{AXES}", f"{spec} a w")
@@ -664,9 +671,7 @@ def test_shocks_near_some_sphere_have_no_offset(table):
     directions = np.random.default_rng(4).normal(size=(1000, 3))
     acc = 35.0 * directions / np.linalg.norm(directions, axis=1)[:, None] + np.array([26, 7, 32])
     path = table("# t,ax,ay,az", np.arange(1000) / 100, acc)
-    with pytest.raises(RecordingError) as raised:
-        mpucal.load(path)
-    assert "in place of zero" not in str(raised.value)
+    assert "in place of zero" not in str(refused(path))
 
 
 @pytest.mark.parametrize("order", [[0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5], [0, 1, 2, 3, 4, 5] * 2])
@@ -682,9 +687,7 @@ def test_two_sensors_under_one_name(order, walk, assert_same, table):
 
 
 def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, table):
-    path = table("time,pA,pB,pC,MagX,MagY,MagZ", walk.t, walk.gyr, 0.6 / G * walk.acc)
-    with pytest.raises(RecordingError):
-        mpucal.load(path)
+    refused(table("time,pA,pB,pC,MagX,MagY,MagZ", walk.t, walk.gyr, 0.6 / G * walk.acc))
 
 
 def test_a_magnetic_field_as_long_as_gravity_is_not_guessed_to_be_it(walk, tmp_path):
@@ -696,27 +699,21 @@ def test_a_magnetic_field_as_long_as_gravity_is_not_guessed_to_be_it(walk, tmp_p
     assert mpucal.load(tmp_path / "walk.txt").taken.endswith(f"{BY_GRAVITY}t,ax,ay,az,gx,gy,gz.")
 
 
-def test_a_field_of_unit_length_is_no_gravity_beside_one_in_si(walk, tmp_path):
+def test_a_field_of_unit_length_is_no_gravity_beside_one_in_si(walk, table):
     """Suggest the accelerations of a vehicle, which its rates do not turn, and not the direction that they turn."""
     rng = np.random.default_rng(15)
     driven = rng.normal([0.1, -0.2, G], 2.0, walk.acc.shape)
     direction = walk.acc / np.linalg.norm(walk.acc, axis=1, keepdims=True)
-    path = tmp_path / "drive.csv"
-    np.savetxt(path, np.column_stack([walk.t, walk.gyr, driven, direction]), delimiter=",")
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(path)
-    assert refused.value.options == "--columns t,gx,gy,gz,ax,ay,az"
+    path = table("", walk.t, walk.gyr, driven, direction)
+    assert refused(path).options == "--columns t,gx,gy,gz,ax,ay,az"
     np.testing.assert_allclose(mpucal.load(path, columns="t,gx,gy,gz,ax,ay,az").acc, driven)
 
 
-def test_the_columns_that_turn_are_suggested_as_accelerations(walk, tmp_path):
+def test_the_columns_that_turn_are_suggested_as_accelerations(walk, table):
     """Suggest them after the rates, which hardly turn beside a bias of 500 deg/s and so are as constant as gravity."""
     rates = np.degrees(walk.gyr) * 16.4 + [-8000, 8000, 8400]
-    path = tmp_path / "counts.csv"
-    np.savetxt(path, 32768 + np.rint(np.column_stack([rates, walk.acc * 670])), "%d", ",")
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(path)
-    assert refused.value.options == "--columns gx,gy,gz,ax,ay,az"
+    path = table("", 32768 + np.rint(np.column_stack([rates, walk.acc * 670])))
+    assert refused(path).options == "--columns gx,gy,gz,ax,ay,az"
 
 
 def test_constant_columns_before_each_sensor_are_no_axes(walk, table):
@@ -724,9 +721,7 @@ def test_constant_columns_before_each_sensor_are_no_axes(walk, table):
     n = len(walk)
     field, fives = np.random.default_rng(3).normal([20, -30, 9], 0.3, (n, 3)), np.full(n, 5)
     path = table("", walk.t, np.full(n, 3), walk.acc[:, ::-1], np.full(n, 4), 0.001 * field, fives, field)
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(path)
-    assert refused.value.options == "--columns t,-,ax,ay,az,-,gx,gy,gz"
+    assert refused(path).options == "--columns t,-,ax,ay,az,-,gx,gy,gz"
 
 
 def test_large_whole_numbers_that_hardly_change_are_no_gravity(table):
@@ -777,13 +772,10 @@ def test_numbers_of_packets_are_no_times(walk, table):
     assert "this sample rate is that at which its rates turn gravity" in found.taken
 
 
-def test_an_order_is_suggested_in_which_accelerations_keep_their_length(walk, tmp_path):
+def test_an_order_is_suggested_in_which_accelerations_keep_their_length(walk, table):
     rates = np.random.default_rng(2).normal(size=(len(walk), 3)) ** 3
-    made = np.rint(np.column_stack([300 * rates, 4096 / G * walk.acc]))
-    np.savetxt(tmp_path / "walk.txt", made, delimiter=",", fmt="%d")
-    with pytest.raises(RecordingError) as raised:
-        mpucal.load(tmp_path / "walk.txt")
-    assert raised.value.options == "--columns gx,gy,gz,ax,ay,az"
+    path = table("", np.rint(np.column_stack([300 * rates, 4096 / G * walk.acc])))
+    assert refused(path).options == "--columns gx,gy,gz,ax,ay,az"
 
 
 def test_counts_beside_an_index_have_no_rate(read, walk):
@@ -895,12 +887,11 @@ def driven(order, acc_at_rest, spread):
 )
 def test_the_command_for_unknown_columns_works_at_once(order, said, tmp_path):
     np.savetxt(tmp_path / "drive.txt", driven(order, [0.0, 0.0, G], 6.0))
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(tmp_path / "drive.txt")
+    error = refused(tmp_path / "drive.txt")
     if said is None:
-        assert "holds no three columns as long as gravity" in str(refused.value)
+        assert "holds no three columns as long as gravity" in str(error)
         return
-    assert refused.value.options == f"--columns {said} --units acc=m/s^2"
+    assert error.options == f"--columns {said} --units acc=m/s^2"
     found = mpucal.load(tmp_path / "drive.txt", columns=said, units="acc=m/s^2")
     assert "times in s, accelerations in m/s^2 and rates" in found.taken
 
@@ -909,9 +900,7 @@ def test_a_label_before_accelerations_along_z_is_left_out(tmp_path):
     """Do not suggest z and two rates, which are as long as gravity, in place of all three axes."""
     rows = driven("label acc gyr", [0.0, 0.0, G], [6.0, 6.0, 0.5])[:, 1:]
     np.savetxt(tmp_path / "drive.txt", rows)
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(tmp_path / "drive.txt")
-    assert refused.value.options.startswith("--columns t,-,ax,ay,az,gx,gy,gz")
+    assert refused(tmp_path / "drive.txt").options.startswith("--columns t,-,ax,ay,az,gx,gy,gz")
 
 
 def test_counts_of_a_runner_have_their_range_by_their_mean(tmp_path):
@@ -919,9 +908,7 @@ def test_counts_of_a_runner_have_their_range_by_their_mean(tmp_path):
     rows[:, 4:] *= 9000
     rows[:, 0] = 100 + 20 * np.arange(900)
     np.savetxt(tmp_path / "running.csv", np.rint(rows.clip(-32768, 32767)), "%d", ",")
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(tmp_path / "running.csv")
-    assert refused.value.options == "--columns t,ax,ay,az,gx,gy,gz"
+    assert refused(tmp_path / "running.csv").options == "--columns t,ax,ay,az,gx,gy,gz"
     found = mpucal.load(tmp_path / "running.csv", columns="t,ax,ay,az,gx,gy,gz")
     assert "times in ms, accelerations in counts of ±4 g (by |a|)" in found.taken
 
@@ -1080,29 +1067,19 @@ def test_lines_that_hold_one_sensor_each(walk, walk_ns, tmp_path):
     assert "+2.00 ms after" in found.taken
 
 
-def test_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
-    """Tell a sketch that is started again from a clock that is set back a little."""
-    half = len(walk) // 2
+@pytest.mark.parametrize("name", ["time", "t"])
+def test_times_that_restart_are_an_interruption(name, walk, walk_ns, tmp_path):
+    """Tell a sketch that is started again from a clock that is set back a little, in any table and in our own."""
+    half, path = len(walk) // 2, tmp_path / "walk.csv"
     t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
     t[half + 200] -= 0.02
-    (tmp_path / "walk.csv").write_text(f"time,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
-    found = mpucal.load(tmp_path / "walk.csv", units="acc=m/s^2,gyr=rad/s")
-    assert "times in s, which begin anew once," in found.taken
+    path.write_text(f"{name},{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
+    found = mpucal.load(path, units="acc=m/s^2,gyr=rad/s" if name == "time" else "")
+    assert ("its times begin anew once" if name == "t" else "times in s, which begin anew once,") in found.taken
     np.testing.assert_array_equal(found.acc, walk.acc)
     assert np.flatnonzero(found.gap).tolist() == [half]
     assert np.diff(found.t)[half - 1] == pytest.approx(15.0, abs=0.02)
-
-
-def test_our_own_times_that_restart_are_an_interruption(walk, walk_ns, tmp_path):
-    """Read a table in our own format in the same way, and keep the interruption in an archive."""
-    half, path = len(walk) // 2, tmp_path / "walk.csv"
-    t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
-    path.write_text(f"t,{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
-    found = mpucal.load(path)
-    assert "its times begin anew once" in found.taken
-    np.testing.assert_array_equal(found.acc, walk.acc)
-    assert np.flatnonzero(found.gap).tolist() == [half]
-    assert found.interrupted == (walk.t[half - 1],)
+    assert found.interrupted == (found.t[half - 1],)
     with open_writer(tmp_path / "walk.npz", Rows.of(found), "") as write:
         write(found)
     assert mpucal.load(tmp_path / "walk.npz").interrupted == found.interrupted
@@ -1184,9 +1161,7 @@ def test_rates_called_after_the_turns_of_a_gyroscope(read, walk, assert_same):
 def test_angles_are_not_suggested_as_accelerations(names, walk, table):
     """Name no order of columns that holds angles, even if they are as long as gravity."""
     angles = np.column_stack([np.sin(walk.t), np.cos(walk.t), 0.1 * np.sin(3 * walk.t)]) * 9.81
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(table(f"time,{names}", walk.t, angles))
-    assert not refused.value.options
+    assert not refused(table(f"time,{names}", walk.t, angles)).options
 
 
 def test_times_behind_the_columns_of_a_file_called_after_a_sensor(read, walk):
@@ -1208,10 +1183,9 @@ def test_times_that_begin_anew_are_no_part_of_a_sensor(walk, tmp_path):
     rows = np.column_stack([t, np.rint([30, 16, 546] + rates / 5), np.rint(rates)])
     path = tmp_path / "board.csv"
     np.savetxt(path, rows, "%.9e", ",")
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(path)
-    assert refused.value.options == f"--columns t,{AXES.strip()}"
-    assert "begin anew once" in mpucal.load(path, columns=refused.value.options.split()[1]).taken
+    order = f"t,{AXES.strip()}"
+    assert refused(path).options == f"--columns {order}"
+    assert "begin anew once" in mpucal.load(path, columns=order).taken
     path.write_text(path.read_text().replace("e+18,", "e+18,torn", 30))
     with pytest.raises(RecordingError, match=r"line 1: column 2 is 'torn.*', which is not a number"):
         mpucal.load(path)
@@ -1333,15 +1307,14 @@ def test_increments_over_times_of_their_own(stems, intervals, per_s, walk, table
 def test_increments_that_nothing_shows_are_read_as_the_user_says(walk, table, assert_same):
     """Suggest units that fit the length of gravity, where rates do not turn it, and the order of columns."""
     path = table(f"time,{AXES.strip()}", walk.t, walk.acc / 100, 0.0 * walk.gyr)
-    with pytest.raises(RecordingError, match="gravity is not in it") as refused:
-        mpucal.load(path)
-    assert refused.value.options == "--units acc=m/s/sample,gyr=rad/sample"
-    found = mpucal.load(path, units=refused.value.options.split()[1])
+    error, units = refused(path), "acc=m/s/sample,gyr=rad/sample"
+    assert "gravity is not in it" in str(error)
+    assert error.options == f"--units {units}"
+    found = mpucal.load(path, units=units)
     np.testing.assert_allclose(found.acc, walk.acc, atol=1e-9)
     noise = np.random.default_rng(16).normal(0.0, 1e-5, walk.gyr.shape)
-    with pytest.raises(RecordingError) as refused:
-        mpucal.load(table("", walk.t, noise, walk.acc / 100))
-    assert refused.value.options == "--columns t,gx,gy,gz,ax,ay,az --units acc=m/s/sample,gyr=rad/sample"
+    advice = "--columns t,gx,gy,gz,ax,ay,az --units acc=m/s/sample,gyr=rad/sample"
+    assert refused(table("", walk.t, noise, walk.acc / 100)).options == advice
 
 
 @pytest.mark.parametrize(("per_g", "odd"), [(4096, False), (4300, False), (5420, True), (3000, True)])

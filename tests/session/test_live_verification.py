@@ -36,37 +36,24 @@ CONTRADICTION = Reason("inconsistent", "the rests contradict each other", "faste
 TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * turn)) for turn in (1.2, -1.0, 1.5)]
 
 
-@pytest.mark.parametrize(
-    ("rests", "data", "contradiction", "code", "words"),
-    [
-        ([rest(), rest(), rest()], recording(), None, "", ""),
-        ([rest(0.05), rest()], recording(), None, "verification_failed", "|a| is +0.050 m/s² off"),
-        ([rest(0.05), rest()], recording(acc_clipped=3), None, "verification_failed", "after a knock"),
-        ([rest(direction=0.06), rest()], recording(), None, "verification_failed", "the sensor moved on its mount"),
-        (TURNED, recording(), None, "verification_failed", "scale factor about z differs by 4%"),
-        ([rest(clipped=True)], recording(gyr_clipped=50), None, "gyro_clipped", "every turn went beyond"),
-        ([rest(0.05), rest()], recording(gyr_clipped=50), None, "gyro_clipped", "beyond the gyroscope's range"),
-        ([rest()], recording(warmer_c=15.0), None, "temperature_moved", "rose by 15 C"),
-        ([rest()], recording(warmer_c=-12.0), None, "temperature_moved", "fell by 12 C"),
-        ([rest()], recording(15.0, message="RAW_IMU"), None, "temperature_moved", "vehicle lay flat"),
-        ([rest()], recording(), CONTRADICTION, "inconsistent", "contradict"),
-        ([rest()], recording(acc_clipped=3), CONTRADICTION, "inconsistent", "knocked the board"),
-    ],
-    ids=[
-        "agree",
-        "length",
-        "knock",
-        "slip",
-        "scale",
-        "clipped",
-        "some clipped",
-        "warm",
-        "cold",
-        "a vehicle that heats its IMU",
-        "rests",
-        "rests after a knock",
-    ],
-)
+# rests, their recording, a contradiction of the fit, the code of the reason, and words of it
+VERIFIED = {
+    "agree": ([rest(), rest(), rest()], recording(), None, "", ""),
+    "length": ([rest(0.05), rest()], recording(), None, "verification_failed", "|a| is +0.050 m/s² off"),
+    "knock": ([rest(0.05), rest()], recording(acc_clipped=3), None, "verification_failed", "after a knock"),
+    "slip": ([rest(direction=0.06), rest()], recording(), None, "verification_failed", "the sensor moved on its mount"),
+    "scale": (TURNED, recording(), None, "verification_failed", "scale factor about z differs by 4%"),
+    "clipped": ([rest(clipped=True)], recording(gyr_clipped=50), None, "gyro_clipped", "every turn went beyond"),
+    "some clipped": ([rest(0.05), rest()], recording(gyr_clipped=50), None, "gyro_clipped", "beyond the gyroscope's"),
+    "warm": ([rest()], recording(warmer_c=15.0), None, "temperature_moved", "rose by 15 C"),
+    "cold": ([rest()], recording(warmer_c=-12.0), None, "temperature_moved", "fell by 12 C"),
+    "a vehicle": ([rest()], recording(15.0, message="RAW_IMU"), None, "temperature_moved", "vehicle lay flat"),
+    "rests": ([rest()], recording(), CONTRADICTION, "inconsistent", "contradict"),
+    "rests after a knock": ([rest()], recording(acc_clipped=3), CONTRADICTION, "inconsistent", "knocked the board"),
+}
+
+
+@pytest.mark.parametrize(("rests", "data", "contradiction", "code", "words"), VERIFIED.values(), ids=VERIFIED)
 def test_the_likeliest_reason_is_given(rests, data, contradiction, code, words):
     checked = judge_verification(rests, rests, 3, data, contradiction)
     assert checked.agrees == (code == "")

@@ -12,29 +12,19 @@ def test_the_headline_is_the_instruction(views):
     assert views["ended"].headline == "PUT IT DOWN"
 
 
-@pytest.mark.parametrize(
-    ("countdown", "headline"),
-    [
-        (Countdown(26.0, 2.0, 2.0, False), "ROLL LEFT 60"),
-        (Countdown(26.0, 1.3, 2.0, False), "HOLD 2"),
-        (Countdown(26.0, 1.3, 2.0, False, elsewhere=True), "NEW: HOLD 2"),
-        (Countdown(26.0, 1.75, 2.0, False, elsewhere=True), "ROLL LEFT 60"),
-        (Countdown(26.0, 1.3, 2.0, True), "ROLL LEFT 60"),
-        (Countdown(24.5, 0.0, 2.0, False), "HOLD"),
-        (Countdown(23.5, 0.0, 2.0, False), "ROLL LEFT 60"),
-        (Countdown(20.0, 1.3, 2.0, False), "ROLL LEFT 60"),
-    ],
-    ids=[
-        "not begun",
-        "runs",
-        "runs elsewhere",
-        "perhaps elsewhere",
-        "paused",
-        "over",
-        "over without a word",
-        "forgotten",
-    ],
-)
+COUNTDOWNS = {
+    "not begun": (Countdown(26.0, 2.0, 2.0, False), "ROLL LEFT 60"),
+    "runs": (Countdown(26.0, 1.3, 2.0, False), "HOLD 2"),
+    "runs elsewhere": (Countdown(26.0, 1.3, 2.0, False, elsewhere=True), "NEW: HOLD 2"),
+    "perhaps elsewhere": (Countdown(26.0, 1.75, 2.0, False, elsewhere=True), "ROLL LEFT 60"),
+    "paused": (Countdown(26.0, 1.3, 2.0, True), "ROLL LEFT 60"),
+    "over": (Countdown(24.5, 0.0, 2.0, False), "HOLD"),
+    "over without a word": (Countdown(23.5, 0.0, 2.0, False), "ROLL LEFT 60"),
+    "forgotten": (Countdown(20.0, 1.3, 2.0, False), "ROLL LEFT 60"),
+}
+
+
+@pytest.mark.parametrize(("countdown", "headline"), COUNTDOWNS.values(), ids=COUNTDOWNS)
 def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
     view = replace(views["turned"], now_s=26.0, countdown=countdown)
     assert view.headline == headline
