@@ -121,7 +121,7 @@ firmware -o x --flash y                             | takes one of -o DIR and --
 """
 
 
-def test_words_that_cannot_be_meant_are_2_before_anything_is_measured(mpucal, tmp_path):
+def test_contradictory_options_are_exit_code_2_before_anything_is_measured(mpucal, tmp_path):
     for line in WRONG.strip().splitlines():
         words, _, sentence = line.partition("|")
         code, said = mpucal(*shlex.split(words))
@@ -129,7 +129,7 @@ def test_words_that_cannot_be_meant_are_2_before_anything_is_measured(mpucal, tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_files_that_cannot_be_read_are_3_and_a_sentence(mpucal, tmp_path):
+def test_files_that_cannot_be_read_are_exit_code_3_and_a_sentence(mpucal, tmp_path):
     for name in ("text.mcap", "text.npz", "text.docx", "c.bin"):
         (tmp_path / name).write_text("hello")
     (tmp_path / "c.json").write_text('{"format": "other"}')
@@ -170,7 +170,7 @@ STATES = {
     ("owner", "name", "times"), [(*of, 1 + i % 2) for i, of in enumerate(STATES.values())], ids=STATES.keys()
 )
 @pytest.mark.usefixtures("uncollected")
-def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, walk, tmp_path, monkeypatch, owner, name, times):
+def test_ctrl_c_is_exit_code_4_and_the_capture_stays_whole(mpucal, walk, tmp_path, monkeypatch, owner, name, times):
     monkeypatch.setattr(owner, name, interrupted(times, getattr(owner, name)))
     code, said = mpucal("session", "--replay", walk, "-o", "board")
     assert code == 4
@@ -184,7 +184,7 @@ def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, walk, tmp_path, monkeyp
         assert (again[0], "the session was interrupted" in again[1]) == (4, times == 1)
 
 
-def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, walk, tmp_path, monkeypatch):
+def test_a_full_disk_is_exit_code_3_and_keeps_what_was_recorded(mpucal, walk, tmp_path, monkeypatch):
     def full(files):
         raise sink.OutputError(f"cannot write {min(files)} (No space left on device)", "make room")
 

@@ -40,7 +40,7 @@ def made(**change):
         pytest.param({"gap": [True]}, "gap has shape", id="one gap"),
     ],
 )
-def test_arrays_that_are_no_recording(change, says):
+def test_arrays_that_are_no_recording_are_refused(change, says):
     with pytest.raises(RecordingError, match=says) as raised:
         made(name="x.npz", **change)
     assert str(raised.value).startswith("x.npz: ")

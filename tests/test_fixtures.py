@@ -25,7 +25,7 @@ def test_a_capture_is_small_whole_and_of_this_driver(capture):
 
 
 @pytest.mark.slow
-def test_the_tool_makes_them(monkeypatch, tmp_path):
+def test_the_tool_makes_the_stored_fixtures(monkeypatch, tmp_path):
     """Make one of the sessions, in which keys are pressed; all are replayed in test_session_replay.py."""
     monkeypatch.setattr(fixtures, "SESSIONS", {MADE: fixtures.SESSIONS[MADE]})
     fixtures.main(tmp_path)

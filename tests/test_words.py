@@ -44,12 +44,12 @@ def retired(text):
     ]
 
 
-def test_the_pages():
+def test_pages_use_no_retired_word():
     found = {page.name: words for page in PAGES if (words := retired(page.read_text(encoding="utf-8")))}
     assert found == {}
 
 
-def test_the_help():
+def test_help_uses_no_retired_word():
     for words in ([], *([name] for name in COMMANDS)):
         shown = CliRunner().invoke(commands, [*words, "--help"])
         assert (shown.exit_code, retired(shown.output)) == (0, []), words
@@ -64,12 +64,12 @@ def texts(module):
     return [n.value for n in strings if " " in n.value and id(n) not in docstrings]
 
 
-def test_the_messages():
+def test_messages_use_no_retired_word():
     modules = [m for m in (PROJECT / "mpucal").rglob("*.py") if retired(m.read_text(encoding="utf-8"))]
     assert {m.name: words for m in modules if (words := retired("\n".join(texts(m))))} == {}
 
 
-def test_the_screen():
+def test_the_screen_uses_no_retired_word():
     view = View("mpucal").after(Prompt(PromptKind.ROTATE, "Turn the board: on its right edge (+X).", (1.0, 0.0, 0.0)))
     three = (0.5, 0.5, 0.5)
     view = view.after(Knowledge(0.0, three, three, three, AIMS["normal"].target, three, three, three, 0.5, None, ""))
@@ -80,7 +80,7 @@ def test_the_screen():
 
 
 @pytest.mark.slow
-def test_a_session_its_summary_and_its_report(tmp_path, capsys):
+def test_a_session_its_summary_and_its_report_use_no_retired_word(tmp_path, capsys):
     assert run(["session", "--replay", str(CAPTURE), "-o", str(tmp_path)]) == 0
     said = capsys.readouterr()
     assert "CHECK" in said.err

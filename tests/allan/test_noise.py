@@ -169,7 +169,7 @@ def test_a_file_is_read_as_it_was_written_and_no_other(found, tmp_path):
         mpucal.noise(rest(2**10).part(0, 100))
 
 
-def test_exports_take_it(found):
+def test_exports_hold_the_measured_noise(found):
     calibration = with_noise(
         mpucal.Calibration(
             np.eye(3),

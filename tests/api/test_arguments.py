@@ -56,7 +56,7 @@ def test_a_wrong_argument_is_reported_in_one_sentence(call, kind, says):
     assert str(raised.value).endswith(".") and "\n" not in str(raised.value)
 
 
-def test_a_path_does_for_a_recording():
+def test_a_path_is_accepted_as_a_recording():
     by_path, by_name = (mpucal.calibrate(path, "accel") for path in (CAPTURE, str(CAPTURE)))
     of_recording = mpucal.calibrate(mpucal.load(CAPTURE), "accel")
     assert replace(by_path, created="") == replace(by_name, created="") == replace(of_recording, created="")

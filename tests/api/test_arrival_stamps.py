@@ -27,7 +27,7 @@ def arrived(t, every_s, late_s):
     return np.maximum.accumulate(stamps + 60e-6 * (np.arange(len(t)) - np.searchsorted(stamps, stamps)))
 
 
-def test_lateness_is_no_loss(even):
+def test_late_stamps_are_no_lost_data(even):
     acc, gyr = even.acc, even.gyr * HZ / even.rate_hz
     t = np.arange(len(acc)) / HZ
     of_even = mpucal.calibrate(mpucal.Recording.from_arrays(t, acc, gyr))

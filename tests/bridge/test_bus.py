@@ -37,7 +37,7 @@ def test_without_streaming_200_hz_work_too(started, stream):
     assert len(recording) > 3.5 * 200
 
 
-def test_many_registers_and_too_many_bytes(rig):
+def test_long_reads_are_divided_and_too_long_ones_refused(rig):
     bus = rig().bus()
     whole = bus.read(0, 114).data
     assert len(whole) == 114
@@ -71,7 +71,7 @@ def test_a_host_that_was_away_catches_up_without_a_gap(started, stream):
     assert len(recording) > 3300
 
 
-def test_no_chip_or_one_at_the_other_address(rig):
+def test_a_missing_chip_is_reported_and_both_addresses_are_tried(rig):
     made = rig()
     made.chip = None
     made.line.device = made.new_bridge()

@@ -46,7 +46,7 @@ def spoil(line, to_host, to_device, shorter):
 
 @settings(max_examples=8)
 @given(to_host=faults, to_device=faults, rate_hz=st.sampled_from([200, 1000]))
-def test_spoiled_bytes(rig, stream, to_host, to_device, rate_hz):
+def test_samples_after_spoiled_bytes_are_true_and_gaps_are_marked(rig, stream, to_host, to_device, rate_hz):
     made = rig()
     driver = Driver(made.bus(), Config(rate_hz=rate_hz))
     spoil(made.line, to_host, to_device, shorter=(1, 16))
@@ -63,7 +63,7 @@ def test_spoiled_bytes(rig, stream, to_host, to_device, rate_hz):
 
 @settings(max_examples=4)
 @given(after_ms=st.integers(0, 900), boot_ms=st.sampled_from([0, 300, 2000]), rate_hz=st.sampled_from([200, 1000]))
-def test_a_reset_of_the_bridge(started, stream, after_ms, boot_ms, rate_hz):
+def test_a_reset_of_the_bridge_is_one_gap(started, stream, after_ms, boot_ms, rate_hz):
     """The bridge's clock begins anew; the chip continues."""
     made, driver = started(rate_hz=rate_hz)
     stream(driver, 0.2 + after_ms * 1e-3)
@@ -100,7 +100,7 @@ def test_a_busy_program_reads_late_what_came_in_time(started, stream):
 
 
 @pytest.mark.parametrize("chip_loses_its_supply", [False, True])
-def test_unplugged_and_plugged_in_again(started, stream, chip_loses_its_supply):
+def test_a_bridge_that_is_plugged_in_again_is_one_gap(started, stream, chip_loses_its_supply):
     made, driver = started()
     stream(driver, 0.5)
     made.line.unplugged = True
@@ -203,7 +203,7 @@ class Chatty:
     ],
     ids=["silent", "GPS", "sketch", "wrong baud", "break"],
 )
-def test_another_device(text, sentence):
+def test_a_device_that_is_no_bridge_is_named(text, sentence):
     clock = FastClock()
     line = EmulatedLine(Chatty(clock, text), clock)
     began = clock.now()

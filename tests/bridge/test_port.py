@@ -73,7 +73,7 @@ def test_a_port_that_goes_away_and_comes_back(rig, serve, stream, tmp_path, monk
     assert len(recording) > 100
 
 
-def test_two_at_once(rig, serve):
+def test_a_port_that_is_in_use_is_refused(rig, serve):
     made = rig()
     name = serve(made.line.device, made.clock).name
     first = SerialPort(name)

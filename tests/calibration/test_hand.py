@@ -205,7 +205,7 @@ def test_a_diverged_estimate_still_has_a_next_orientation(in_hand):
 
 
 @pytest.mark.parametrize(("name", "limit"), [("pose12_0", 0.008), ("rot_1", 0.07), ("pose6_0", 0.25)])
-def test_another_simulators_hands(others, name, limit):
+def test_sensors_in_another_simulators_hands_are_found(others, name, limit):
     of = others(f"simulated/{name}")
     recording = Recording.from_arrays(of["t"], of["acc"], of["gyr"], flat=(0, int(of["flat_samples"])))
     calibration = calibrate(recording, "auto", float(of["gravity"]))

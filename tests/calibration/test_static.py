@@ -102,6 +102,6 @@ def test_a_static_calibration_is_compared_and_checked_in_the_accelerometers_own_
     assert check(alone, later, days=0.0).what == "nothing"
 
 
-def test_a_session_does_not_take_it():
+def test_a_session_refuses_the_static_model():
     with pytest.raises(UsageError, match="does not take --model static"):
         open_source({"bus": "sim", "model": "static"})

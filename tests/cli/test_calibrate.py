@@ -94,7 +94,7 @@ def test_odd_units_and_time_stamps_are_corrected_with_a_message(mpucal, tmp_path
     assert json.loads(result.out)["quality"]["verdict"] in ("good", "usable")
 
 
-def test_a_session_s_folder_is_its_capture(mpucal, session):
+def test_a_folder_of_a_session_is_read_as_its_capture(mpucal, session):
     result = mpucal("calibrate", session.folder, "--json")
     assert result.code == 0
     offline, online = json.loads(result.out), json.loads((session.folder / "calibration.json").read_text())
@@ -110,7 +110,7 @@ def test_the_present_folder_is_called_by_its_name(mpucal, tmp_path):
     assert f"mpucal calibrate {tmp_path}-2" in result.out + result.err
 
 
-def test_a_folder_is_one_recording_s(mpucal, session, tmp_path):
+def test_a_folder_holds_the_results_of_one_recording(mpucal, session, tmp_path):
     """Results are not written beside the capture of another recording, nor over the results of another one."""
     np.savez(tmp_path / "walk.npz", **turning())
     np.savez(tmp_path / "other.npz", **REFUSED["never turned"][0](turning(noise=0.04)))

@@ -55,7 +55,7 @@ def test_the_shell_completes_commands_and_options(mpucal, monkeypatch):
         assert mpucal().out == f"plain,{completed}\n"
 
 
-def test_wrong_usage_is_2(mpucal):
+def test_wrong_usage_is_exit_code_2(mpucal):
     for words in ("--nonsense", "nonsense", "calibrate", "session --rate fast"):
         result = mpucal(*words.split())
         assert result.code == 2 and "Error" in result.err
@@ -69,7 +69,7 @@ def test_the_unexpected_is_a_bug_with_a_trace(mpucal, monkeypatch):
     assert "this is a bug in mpucal" in result.err
 
 
-def test_a_full_disk_behind_stdout_is_3(mpucal, tmp_path, monkeypatch):
+def test_a_full_disk_behind_stdout_is_exit_code_3(mpucal, tmp_path, monkeypatch):
     class Full(io.StringIO):
         def write(self, _text):
             raise OSError(errno.ENOSPC, "No space left on device")

@@ -88,7 +88,7 @@ TIMES = {
 
 
 @pytest.mark.parametrize("times", TIMES.values(), ids=TIMES)
-def test_true_times_stay(times):
+def test_true_times_are_not_changed(times):
     found = fit_clock(times)
     assert (found.jitter_s, found.remark) == (0.0, "")
     np.testing.assert_array_equal(found.t, times)

@@ -26,7 +26,7 @@ def test_another_folder_is_suggested_only_where_it_will_do(tmp_path):
         assert ("-o" in refused.value.remedy) is not only
 
 
-def test_new_ones_have_names_of_their_own(tmp_path):
+def test_new_folders_have_names_of_their_own(tmp_path):
     folders = [OutputFolder(tmp_path / "board", new=True) for _ in range(3)]
     assert [folder.path.name for folder in folders] == ["board", "board-2", "board-3"]
     for folder in folders:

@@ -23,6 +23,6 @@ def rows():
 
 
 @pytest.mark.parametrize(("words", "says"), list(rows()))
-def test_the_doctor_names_it(examined, words, says):
+def test_the_doctor_names_each_trouble(examined, words, says):
     told = [f"{finding.what}: {finding.remedy}" for finding in examined(words)]
     assert any(says in sentence for sentence in told), told

@@ -275,13 +275,13 @@ def test_unusable_calibrations_are_not_exported(calibration, name):
 
 
 @pytest.mark.parametrize("name", ["ardupilot", "px4"])
-def test_a_chips_calibration_is_none_of_a_vehicle(calibration, name):
+def test_a_chips_calibration_is_not_exported_to_an_autopilot(calibration, name):
     with pytest.raises(MpucalError, match="of no vehicle"):
         form(name).export(calibration)
 
 
 @pytest.mark.parametrize("name", ["c-header", "linux-iio", "arduino"])
-def test_each_says_what_temperature_and_registers_leave(calibration, name):
+def test_notes_state_the_errors_that_temperature_and_registers_leave(calibration, name):
     text, notes = form(name).export(replace(calibration, applied_in_hardware=APPLIED, **FOLLOWING))
     said = " ".join(notes)
     # these two correct the temperature themselves

@@ -68,7 +68,7 @@ LIBRARIES = {
 }
 
 
-def test_each_has_a_recipe():
+def test_each_library_has_a_recipe():
     assert RECIPES.keys() == LIBRARIES.keys()
 
 

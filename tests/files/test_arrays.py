@@ -254,7 +254,7 @@ def test_columns_of_a_data_frame_are_chosen_by_name(walk, walk_ns, assert_same, 
         ({"data": np.random.default_rng(0).normal(size=(900, 7))}, "holds no three columns as long as gravity"),
     ],
 )
-def test_arrays_that_are_no_recording(arrays, says, tmp_path):
+def test_arrays_that_are_no_recording_are_refused(arrays, says, tmp_path):
     savemat(tmp_path / "a.mat", arrays)
     with pytest.raises(RecordingError, match=says):
         mpucal.load(tmp_path / "a.mat")
@@ -276,7 +276,7 @@ def test_arrays_that_are_no_recording(arrays, says, tmp_path):
         ("a.json", b'{"values": [' + b",".join([b"[NaN,Infinity,1,2,3,4]"] * 300) + b"]}"),
     ],
 )
-def test_files_of_arrays_that_are_none(name, content, tmp_path):
+def test_damaged_files_of_arrays_are_refused(name, content, tmp_path):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(RecordingError):
         mpucal.load(tmp_path / name)

@@ -87,7 +87,7 @@ def test_a_file_without_a_dialect_is_refused_by_the_last_of_its_suffix(made_up, 
         mpucal.load(tmp_path / "a.csv")
 
 
-def test_the_page_names_each():
+def test_the_page_names_each_format():
     text = " ".join((ROOT / "docs" / "recordings.md").read_text(encoding="utf-8").split())
     read, written = readable_formats(), writable_formats()
     assert f"`mpucal calibrate`, `show` and `apply` read {read}; `apply -o` writes {written}." in text

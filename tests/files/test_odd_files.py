@@ -44,7 +44,7 @@ ONE = "repeats one sample at one time: record it again"
         (np.arange(1, N + 1) * 1e-13, "t has steps of 1e-13 s"),
     ],
 )
-def test_times_that_are_none(times, says, tmp_path):
+def test_times_that_are_no_times_are_refused(times, says, tmp_path):
     if isinstance(times, list):
         table(times).to_csv(tmp_path / "a.csv", index=False)
     else:

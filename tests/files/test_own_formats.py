@@ -110,7 +110,7 @@ def test_columns_go_by_their_names(text, tmp_path):
         pytest.param("\x89MCAP0\r\n", "names no columns of", id="no text"),
     ],
 )
-def test_tables_that_are_no_recording(text, says, tmp_path):
+def test_tables_that_are_no_recording_are_refused(text, says, tmp_path):
     (tmp_path / "made.csv").write_text(text)
     with pytest.raises(RecordingError, match=says) as raised:
         load(tmp_path / "made.csv")
@@ -157,13 +157,13 @@ def test_values_missing_from_an_archive_are_unknown(extra, flat, tmp_path):
         ({"sensor": "[1]"}, "sensor is not a JSON object"),
     ],
 )
-def test_arrays_that_are_no_recording(change, says, tmp_path):
+def test_arrays_that_are_no_recording_are_refused(change, says, tmp_path):
     np.savez(tmp_path / "a.npz", **{key: value for key, value in (SMALL | change).items() if value is not None})
     with pytest.raises(RecordingError, match=says):
         load(tmp_path / "a.npz")
 
 
-def test_files_that_are_no_archive(tmp_path):
+def test_files_that_are_no_archive_are_refused(tmp_path):
     path = tmp_path / "a.npz"
     np.savez_compressed(path, **SMALL)
     whole = path.read_bytes()

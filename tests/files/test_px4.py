@@ -83,7 +83,7 @@ def test_accelerations_that_are_later_than_rates(walk, t_us, tmp_path):
     assert len(unknown) == len(walk)
 
 
-def test_logs_that_are_none(walk, t_us, tmp_path):
+def test_files_that_are_no_log_are_refused(walk, t_us, tmp_path):
     path = ulog(tmp_path / "log.ulg", ("sensor_gyro", 0, imu(t_us, walk.gyr)))
     with pytest.raises(RecordingError, match="it has sensor_gyro: log them"):
         load(path)

@@ -556,14 +556,14 @@ def test_unread_columns_of_a_second_imu_are_reported(read, walk, assert_same):
         (parse_units, ["acc=rad/s", "speed=m/s", "g", "acc="]),
     ],
 )
-def test_hints_that_say_nothing(parse, texts):
+def test_hints_that_cannot_be_understood_are_refused(parse, texts):
     for text in texts:
         with pytest.raises(ValueError, match="is not a"):
             parse(text)
 
 
 @pytest.mark.parametrize("name", ["walk.tlog", "session", "session/capture.mcap"])
-def test_hints_for_what_needs_none(tmp_path, name):
+def test_hints_are_refused_for_files_that_need_none(tmp_path, name):
     (tmp_path / "walk.tlog").touch()
     (tmp_path / "session").mkdir()
     shutil.copy(CAPTURE, tmp_path / "session" / "capture.mcap")

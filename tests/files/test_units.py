@@ -36,7 +36,7 @@ def same(found, walk, rtol=1e-6, gyr_atol=1e-6):
         ("mm_s2", 0.001, "rad_s", 1.0),
     ],
 )
-def test_named_units(acc, mps2, gyr, rad_s, walk, ms, table):
+def test_units_in_names_are_applied(acc, mps2, gyr, rad_s, walk, ms, table):
     names = [f"a{axis}_{acc}" for axis in "xyz"] + [f"g{axis}_{gyr}" for axis in "xyz"]
     same(mpucal.load(table(f"ms,{','.join(names)}", ms, walk.acc / mps2, walk.gyr / rad_s)), walk)
 

@@ -243,7 +243,7 @@ def test_a_payload_out_of_its_limits_is_refused(bridge):
     assert bridge.chip.written == []
 
 
-def test_a_hello_that_is_none_changes_nothing(fresh):
+def test_an_invalid_hello_changes_nothing(fresh):
     for payload in (b"", b"MPUB\1", b"MPUX\1\0\0", b"MPUB\1\0", b"MPUB\1\0\x80"):
         assert [answer.status for answer in fresh.raw(wire.Hello.TYPE, payload)] == [Status.BAD_PAYLOAD], payload
         assert fresh.ask(wire.Read(0x75, 1)).status == Status.NO_HELLO

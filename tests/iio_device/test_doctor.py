@@ -8,7 +8,7 @@ from mpucal.__main__ import run
 
 
 @pytest.mark.parametrize("trigger", [(), ("--trigger", "none")], ids=["buffered", "polled"])
-def test_the_doctor_examines_it(capsys, trigger):
+def test_the_doctor_examines_a_device_of_the_kernel(capsys, trigger):
     assert run(["doctor", "--iio", "sim:hand=still", "--seconds", "4", "--json", *trigger]) == 0
     told = {finding["topic"]: finding for finding in json.loads(capsys.readouterr().out)["findings"]}
     assert {"iio:device0", "ranges", "sample rate", "losses", "at rest"} <= set(told)

@@ -104,7 +104,7 @@ def test_calibrations_that_cannot_be_merged_are_refused(others, error, says):
         merge([session(10.0, RNG), *others])
 
 
-def test_a_recording_counts_once():
+def test_a_recording_is_merged_only_once():
     """Know it by its digest, also one that was merged before, and without a digest by the numbers."""
 
     def made_of(T, digest):

@@ -73,7 +73,7 @@ def test_the_schema_describes_the_entries_of_merges_vehicles_and_noise():
         assert not unknown_keys(document, SCHEMA)
 
 
-def test_a_wrong_document_does_not(document):
+def test_wrong_documents_do_not_satisfy_the_schema(document):
     for part, key, wrong in (("accelerometer", "D", [[1, 0], [0, 1]]), ("quality", "verdict", "fine")):
         assert not VALIDATOR.is_valid(document | {part: document[part] | {key: wrong}})
     assert not VALIDATOR.is_valid(document | {"format": "mpucal.recording"})

@@ -11,7 +11,7 @@ from mpucal.result.session_files import CAPTURE
 from mpucal.session.results import save
 
 
-def test_each_one_is_free_until_it_is_there(tmp_path):
+def test_a_capture_takes_the_first_free_name(tmp_path):
     names = []
     for _ in range(3):
         path = CAPTURE.free_in(tmp_path)

@@ -25,7 +25,7 @@ def directions_of(units):
 
 
 @pytest.mark.parametrize("units", DEGENERATE.values(), ids=DEGENERATE.keys())
-def test_the_farthest_directions_mend_them(units):
+def test_directions_far_from_the_held_ones_make_them_varied(units):
     coverage = Coverage()
     for unit in units:
         coverage.paused.add(np.array(unit, float))

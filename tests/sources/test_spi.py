@@ -71,7 +71,7 @@ def opened(monkeypatch, host_time):
 @pytest.mark.parametrize(
     ("chip", "who_am_i", "data_hz"), [("mpu6500", b"\x70", 20_000_000), ("clone98", b"\x98", 8_000_000)]
 )
-def test_mode_speed_and_messages(opened, chip, who_am_i, data_hz):
+def test_messages_have_the_mode_and_speed_of_the_data_sheet(opened, chip, who_am_i, data_hz):
     bus, device = opened(f"chip={chip},hand=still")
     assert (device.path, device.mode, device.bits_per_word) == ("/dev/spidev0.0", 3, 8)
     assert bus.read(reg.WHO_AM_I, 1).data == who_am_i
@@ -88,7 +88,7 @@ def test_mode_speed_and_messages(opened, chip, who_am_i, data_hz):
     assert device.closed
 
 
-def test_a_clock_that_wires_bear_is_not_passed(opened):
+def test_a_given_clock_is_not_exceeded(opened):
     opened()
     bus = SpiBus("/dev/spidev0.0:4000000")
     bus.read(reg.WHO_AM_I, 1)

@@ -99,7 +99,7 @@ def test_a_board_without_raw_paste_is_too_old(board):
         MicroPythonPort(board(raw_paste=False))
 
 
-def test_pins_are_two(capsys):
+def test_the_pins_of_a_board_are_two(capsys):
     assert run(["show", "--serial", "/dev/ttyACM0", "--micropython=4"]) == 2
     assert "'4' is not two pins, SDA,SCL." in capsys.readouterr().err
 

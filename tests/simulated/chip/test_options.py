@@ -20,7 +20,7 @@ from mpucal.simulated.chip import open_simulated
         ("sim:noise=-1", "from 0 on"),
     ],
 )
-def test_options_that_make_no_sense(text, says):
+def test_invalid_options_are_refused(text, says):
     with pytest.raises(UsageError, match=r"^sim: ") as caught:
         open_simulated(text)
     assert str(caught.value).count(says) == 1
