@@ -61,23 +61,11 @@ def session(once):
 @pytest.fixture(scope="session")
 def flown(once):
     """Return a session on the simulated vehicle, which writes to it."""
-    words = (
-        "session",
-        "--mavlink",
-        "sim:imus=1",
-        "--rate",
-        "50",
-        "--target",
-        "quick",
-        "-o",
-        "flown",
-        "--json",
-        "--yes",
-    )
+    words = "session --mavlink sim:imus=1 --rate 50 --target quick -o flown --json --yes"
 
     def make(folder):
         with quick():
-            called(folder, *words)
+            called(folder, *words.split())
 
     folder = once("cli-flown", make)
     return SimpleNamespace(folder=folder / "flown", **json.loads((folder / "result.json").read_text()))

@@ -27,30 +27,9 @@ LONGEST_S, LONGEST_CPU_S = 900, 3600
 
 # In the order of their dependencies
 MODULES = (
-    "virtio_ring",
-    "virtio",
-    "virtio_pci_legacy_dev",
-    "virtio_pci_modern_dev",
-    "virtio_pci",
-    "netfs",
-    "fscache",
-    "9pnet",
-    "9pnet_virtio",
-    "9p",
-    "overlay",
-    "i2c-dev",
-    "i2c-mux",
-    "industrialio",
-    "kfifo_buf",
-    "industrialio-triggered-buffer",
-    "inv_sensors_timestamp",
-    "inv-mpu6050",
-    "inv-mpu6050-i2c",
-    "usb-common",
-    "usbcore",
-    "usbip-core",
-    "vhci-hcd",
-    "i2c-tiny-usb",
+    "virtio_ring virtio virtio_pci_legacy_dev virtio_pci_modern_dev virtio_pci netfs fscache 9pnet 9pnet_virtio 9p "
+    "overlay i2c-dev i2c-mux industrialio kfifo_buf industrialio-triggered-buffer inv_sensors_timestamp inv-mpu6050 "
+    "inv-mpu6050-i2c usb-common usbcore usbip-core vhci-hcd i2c-tiny-usb"
 )
 OWN = "interrupt"
 PROGRAMS = ("qemu-system-x86_64", "busybox", "dpkg-deb", "make", "gcc")
@@ -127,10 +106,10 @@ def _boot(packages: list[Path], command: str, folder: Path) -> str:
     for name in ("bin", "lower", "upper", "root", "proc", "sys", "dev", "modules"):
         (root / name).mkdir(parents=True)
     shutil.copy(str(shutil.which("busybox")), root / "bin" / "busybox")
-    for module in (*MODULES, OWN):
+    for module in (*MODULES.split(), OWN):
         shutil.copy(modules[module], root / "modules")
     init = root / "init"
-    init.write_text(INIT.format(modules=" ".join(MODULES), longest_s=LONGEST_S, command=command))
+    init.write_text(INIT.format(modules=MODULES, longest_s=LONGEST_S, command=command))
     init.chmod(0o755)
     archive, names = folder / "initramfs.cpio", "\n".join(sorted(str(p.relative_to(root)) for p in root.rglob("*")))
     with archive.open("wb") as out:
@@ -156,7 +135,7 @@ def _limit() -> None:
 
 def _unpacked(packages: list[Path], folder: Path) -> dict[str, Path]:
     """Unpack the kernel and its modules and compile our own; return the modules by name."""
-    wanted = ["./boot/vmlinuz-*", *(f"*/{module}.ko" for module in MODULES)]
+    wanted = ["./boot/vmlinuz-*", *(f"*/{module}.ko" for module in MODULES.split())]
     for package in packages:
         chosen = wanted if package.name.startswith("linux-image-") else ["./usr"]
         with subprocess.Popen(["dpkg-deb", "--fsys-tarfile", package], stdout=subprocess.PIPE) as data:
