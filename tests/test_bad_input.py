@@ -103,13 +103,16 @@ session --bus sim --tilt-only --model hand          | --tilt-only does not take 
 session --bus sim --to diary                        | 'chip'
 session --bus sim --page host:70000                 | is not an address for a page
 session --bus sim --page 8000                       | is not an address for a page
+session --serial                                    | no serial port was named
 session --resume nowhere                            | nowhere does not hold a session
 session --resume x --bus sim                        | --resume does not take --bus
 session --resume x -o y                             | --resume does not take -o
 write c.json diary --bus sim                        | 'chip'
 write c.json bridge --mavlink sim                   | --mavlink sim has no bridge
+write c.json bridge --bus sim                       | give --serial PORT
 show                                                | neither a file nor a source was given: give a file
 show x.json --bus sim                               | a file and --bus were given together
+show --serial                                       | no serial port was named
 show --bus sim --columns t,ax,ay,az,gx,gy,gz        | --columns say how a file is read, and a device was given
 check c.json                                        | neither a file nor a source was given
 check c.json walk.npz --bus sim                     | a file and --bus were given together
@@ -144,6 +147,8 @@ def test_files_that_cannot_be_read_are_exit_code_3_and_a_sentence(mpucal, tmp_pa
             code, said = mpucal(verb, name)
             assert (code, name in said) == (3, True)
     assert mpucal("session", "--bus", "sim", "-o", "text.mcap/results")[0] == 3
+    code, said = mpucal("session", "--serial", "/dev/there-is-none")
+    assert (code, "there is no serial port /dev/there-is-none" in said) == (3, True)
 
 
 def interrupted(times, function):

@@ -102,22 +102,3 @@ def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
     assert "not tried, as its memory holds other data" in tried["begin_of_0"]
     assert board.memory.slots == held
     assert "for the firmware of a bridge" in mpucal("doctor", "--bus", "sim", "--conformance").err
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "sentence"),
-    [
-        (["session", "--serial"], 2, "no serial port was named"),
-        (["session", "--serial", "/dev/there-is-none"], 3, "there is no serial port /dev/there-is-none"),
-        (["show", "--serial"], 2, "no serial port was named"),
-        (["show"], 2, "neither a file nor a source was given"),
-        (["show", "x.json", "--serial", "x"], 2, "a file and --serial were given together"),
-        (["write", str(BLOB), "bridge", "--bus", "sim"], 2, "give --serial PORT"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_wrong_words_are_one_sentence(mpucal, words, code, sentence):
-    result = mpucal(*words)
-    assert (result.code, result.out) == (code, "")
-    assert sentence in result.err
-    assert "Traceback" not in result.err

@@ -70,7 +70,7 @@ def test_the_c_header_compiled_and_run(calibration, samples, compiled, tmp_path,
     T = np.resize(TEMPERATURES_C, len(samples))
     counts = np.random.default_rng(4).integers(-32768, 32768, (len(samples), 6))
     counts[:2] = [32767, -32768] * 3, [-32768, 32767] * 3
-    run = compiled(tmp_path, name, C % range_g, *STRICT, "-Wconversion", *flags)
+    run = compiled(tmp_path, name, C % range_g, *STRICT, "-Wconversion", "-Wshadow", *flags)
     out = run(table(np.column_stack([samples, T, counts])))
     error = np.abs(out[:, :3] - calibrated.apply(samples, temperature_c=T)).max()
     assert error < FLOAT_MPS2
