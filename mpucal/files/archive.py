@@ -39,7 +39,7 @@ def load_archive(path: Path, hints: Hints = NO_HINTS) -> Recording:
         found = into
         while found.is_dir() and (only := _only_one_in(found)):
             found = only
-        if found.is_file() and found.suffix.lower() in formats.PACKED:
+        if found.is_file() and found.suffix.lower() in formats.PACKED.split():
             raise RecordingError(f"{path} holds another archive, {found.name}", "unpack it, and give what it holds")
         try:
             return formats.find_format(found, hints).read(found, hints=hints)

@@ -52,7 +52,7 @@ OF_FILE = ".table"
 SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|face|side)(?![a-z])")
 
 
-def is_folder_of_tables(path: Path) -> bool:
+def is_folder(path: Path) -> bool:
     """Return True if a folder holds a table of an accelerometer and one of a gyroscope, and no session."""
     names = {child.name for child in path.iterdir()}
     return bool(_pairs(names)) and not tables_of_sides(names) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
@@ -65,7 +65,7 @@ def tables_of_sides(names: Iterable[str]) -> list[str]:
     return [member.name for member in found] if of_sides else []
 
 
-def is_one_of_two_tables(path: Path) -> bool:
+def is_of_pair(path: Path) -> bool:
     """Return True if a file is a table of one sensor, beside that of the other."""
     try:
         found = _parse(path.name)
@@ -79,12 +79,12 @@ def is_one_of_two_tables(path: Path) -> bool:
     return table is None or not names_both(table.columns)
 
 
-def load_two_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """Return the recording in a table and the one beside it; see load_folder_of_tables."""
+def load_pair(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """Return the recording in a table and the one beside it; see load_folder."""
     return _from_folder(path.parent, path.name, hints)
 
 
-def load_folder_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
+def load_folder(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """Return the recording in a folder's tables, the first pair if there are several.
 
     Raises
