@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, wraps
-from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..data import GYRO_RANGES_DPS, Recording, Vector
+from ..data import GYRO_RANGES_DPS, Mask, Recording, Vector
 from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
 from ..rests.intervals import Intervals, RestFinder, statistics
@@ -151,12 +149,13 @@ class Evidence:
         if self.flat is None or not np.isfinite(self.recording.gyr).all():
             return 0.0
         u = start = _units(self.flat.y[None])
+        first = np.arange(self.flat.last, len(self.recording) - self._half_second, self._half_second)
+        steps, runs = self._steps(self.flat), np.stack([first, first + self._half_second], axis=1)
+        moving = lengths(statistics(steps, runs)[0]) * self._half_second > MOVING_RAD_S * WINDOW_S  # less may be drift
         largest = 0.0
-        for first in range(self.flat.last, len(self.recording) - self._half_second, self._half_second):
-            turn = self._turn(self.flat, u[0], start[0], first, first + self._half_second)
-            if np.linalg.norm(turn.steps.sum(axis=0)) > MOVING_RAD_S * WINDOW_S:  # what is less may be drift
-                u = u @ turned(-turn.steps).T
-                largest = max(largest, float(_angles(u, start)[0]))
+        for F in turned(-steps, runs[moving]):
+            u = u @ F.T
+            largest = max(largest, float(_angles(u, start)[0]))
         return largest
 
     @cached_property
@@ -180,40 +179,30 @@ class Evidence:
             if segment is None:
                 return False
             flat = flat_statistics(self.recording, segment)
-        r, (u, first) = self.recording, self._half_seconds(flat)
-        sizes = np.diff(r.t, prepend=r.t[0]) * lengths(r.gyr - flat.b_omega)
-        rotated = np.append(0.0, np.cumsum(sizes))
-        path, angle = (rotated[first + self._half_second] - rotated[first]).sum(), _angles(u[:, 0], u[:, 1]).sum()
-        if not path > CLEARLY * angle > 0.0:  # turns about the vertical exceed it, too
+        turns = self._turns_of_half_seconds(flat)
+        rotated, angles = np.append(0.0, np.cumsum(lengths(turns.steps))), _angles(turns.before, turns.after)
+        path = np.diff(rotated[turns.runs]).sum()
+        if not path > CLEARLY * angles.sum() > 0.0:  # turns about the vertical exceed it, too
             return False
-        by, miss = _least_miss(self._turns_of_half_seconds(flat), [np.eye(3), np.deg2rad(np.eye(3))])
+        by, miss = _least_miss(turns, [np.eye(3), np.deg2rad(np.eye(3))])
         # of a gravity that does not follow the board, no turn at all explains as much
-        return bool(by[0, 0] < 1.0 and CLEARLY * miss < np.median(_angles(u[:, 0], u[:, 1])))
+        return bool(by[0, 0] < 1.0 and CLEARLY * miss < np.median(angles))
 
-    def _half_seconds(self, flat: Flat) -> tuple[Vector, NDArray[np.int_]]:
-        """Return the directions of gravity (k, 2, 3) before and after turns, and the samples (k,) where these begin.
-
-        A turn lies between the middles of two neighbouring half seconds.
-        """
+    def _turns_of_half_seconds(self, flat: Flat) -> _Turns:
+        """Return turns of gravity between the middles of neighbouring half seconds."""
         n = self._half_second
         u = _units(_means(self.recording.acc[flat.last :], n))
         at = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_STEP_RAD)
-        return np.stack([u[at], u[at + 1]], axis=1), flat.last + n // 2 + at * n
+        first = flat.last + n // 2 + at * n
+        return self._turns(flat, u[at], u[at + 1], np.stack([first, first + n], axis=1))
 
-    def _turns_of_half_seconds(self, flat: Flat) -> list[_Turn]:
-        """Return turns of gravity between the middles of neighbouring half seconds."""
-        u, middles = self._half_seconds(flat)
-        return [
-            self._turn(flat, before, after, first, first + self._half_second)
-            for (before, after), first in zip(u, middles.tolist(), strict=True)
-        ]
-
-    def _turns_of_rests(self, flat: Flat) -> list[_Turn]:
-        """Return the turns from rest to rest that move gravity far, without interruption."""
-        r, runs = self.recording, self.rests
-        u, first, last = _units(statistics(r.acc, runs)[0]), runs[1:, 0], runs[:-1, 1]
-        whole = [k for k in self._far_turns if not self._is_interrupted(last[k] - 1, first[k])]
-        return [self._turn(flat, u[k], u[k + 1], last[k], first[k]) for k in whole]
+    @cached_property
+    def _turns_of_rests(self) -> _Turns:
+        """Turns from rest to rest that move gravity far, without interruption."""
+        u = _units(statistics(self.recording.acc, self.rests)[0])
+        between = np.stack([self.rests[:-1, 1], self.rests[1:, 0]], axis=1)
+        whole = np.array([k for k in self._far_turns if not self._is_interrupted(*between[k] - (1, 0))], np.intp)
+        return self._turns(self.rest, u[whole], u[whole + 1], between[whole])
 
     @cached_property
     def _far_turns(self) -> list[int]:
@@ -229,17 +218,17 @@ class Evidence:
     @property
     def turned_unrecorded(self) -> bool:
         """True if the board was turned between the parts of an interrupted recording alone."""
-        return self.flat is not None and len(self._far_turns) > 0 and not self._turns_of_rests(self.flat)
+        return self.flat is not None and len(self._far_turns) > 0 and not len(self._turns_of_rests.runs)
 
     @cached_property
     def gyro_factor(self) -> float:
         """Ratio of ranges with which rates explain how gravity turned from rest to rest, or of few, by half seconds."""
         if self.flat is None:
             return 1.0
-        turns = _measured(self._turns_of_rests(self.flat))
-        if len(turns) < FEWEST_TRANSITIONS:
-            turns = _measured(self._turns_of_half_seconds(self.flat))
-        if len(turns) < FEWEST_TRANSITIONS:
+        turns = self._turns_of_rests.measured
+        if len(turns.runs) < FEWEST_TRANSITIONS:
+            turns = self._turns_of_half_seconds(self.flat).measured
+        if len(turns.runs) < FEWEST_TRANSITIONS:
             return 1.0
         by, miss = _least_miss(turns, [ratio * np.eye(3) for ratio in RANGE_RATIOS])
         return float(by[0, 0]) if miss < MOST_MISS_RAD else 1.0
@@ -251,8 +240,8 @@ class Evidence:
         It is None where it explains none, and where the rates explain all but few turns as they are.
         """
         turns, misses = self._turns_and_misses
-        turns = [turn for turn, miss in zip(turns, misses.tolist(), strict=True) if miss > MOST_MISS_RAD]
-        if len(turns) < FEWEST_TRANSITIONS:
+        turns = turns.chosen(misses > MOST_MISS_RAD)
+        if len(turns.runs) < FEWEST_TRANSITIONS:
             return None
         rotations = [M for M in signed_permutations() if np.linalg.det(M) > 0.0]
         by, miss = _least_miss(turns, [np.eye(3), -np.eye(3), *rotations])
@@ -275,12 +264,13 @@ class Evidence:
             if np.count_nonzero(np.diff(known)) != 1 or misses[as_they_are].max() > CLEARLY * MOST_MISS_RAD:
                 return None
         first = int(np.flatnonzero(as_they_are != as_they_are[0])[0])
-        return turns[first - 1].start_s, turns[first].end_s
+        t = self.recording.t - self.recording.t[0]
+        return float(t[turns.runs[first - 1, 0] - 1]), float(t[turns.runs[first, 1] - 1])
 
     @cached_property
-    def _turns_and_misses(self) -> tuple[list[_Turn], Vector]:
+    def _turns_and_misses(self) -> tuple[_Turns, Vector]:
         """Turns from rest to rest within the gyroscope's range, and by how much the rates miss gravity after each."""
-        turns = [] if self.flat is None else _measured(self._turns_of_rests(self.flat))
+        turns = self._turns_of_rests.measured
         return turns, _misses(turns, np.eye(3))
 
     @cached_property
@@ -289,19 +279,25 @@ class Evidence:
 
         The first is that of the turns within the gyroscope's range, the second that of all turns.
         """
-        turns = [] if self.flat is None else self._turns_of_rests(self.flat)
+        if self.flat is None:
+            return 0.0, 0.0
+        turns = self._turns_of_rests
+        misses = _misses(turns, np.eye(3))
         within, of_all = (
-            _miss(these, np.eye(3)) if len(these) >= FEWEST_TRANSITIONS else 0.0 for these in (_measured(turns), turns)
+            float(np.median(these)) if len(these) >= FEWEST_TRANSITIONS else 0.0
+            for these in (misses[~turns.clipped], misses)
         )
         return within, of_all
 
-    def _turn(self, flat: Flat, before: Vector, after: Vector, first: int, last: int) -> _Turn:
-        """Return the turn whose steps end with the samples first to last - 1."""
+    def _steps(self, flat: Flat) -> Vector:
+        """Return (n, 3) rad, the gyroscope's step that ends with each sample."""
         r = self.recording
-        dt = r.t[first:last] - r.t[first - 1 : last - 1]
-        steps = dt[:, None] * (r.gyr[first:last] - flat.b_omega)
-        times = float(r.t[first - 1] - r.t[0]), float(r.t[last - 1] - r.t[0])
-        return _Turn(before, steps, after, bool(r.gyr_clipped[first:last].any()), *times)
+        return np.asarray(np.diff(r.t, prepend=r.t[0])[:, None] * (r.gyr - flat.b_omega))
+
+    def _turns(self, flat: Flat, before: Vector, after: Vector, runs: Intervals) -> _Turns:
+        """Return the turns whose steps end with the samples of runs (k, 2)."""
+        first, last = np.append(0, np.cumsum(self.recording.gyr_clipped))[runs].T
+        return _Turns(before, after, runs, last > first, self._steps(flat))
 
 
 def once(function: Callable[[Evidence], T]) -> Callable[[Evidence], T]:
@@ -318,32 +314,36 @@ def once(function: Callable[[Evidence], T]) -> Callable[[Evidence], T]:
     return kept
 
 
-class _Turn(NamedTuple):
-    """Gravity's direction before (3,) and after (3,) a turn, and the gyroscope's steps (m, 3) [rad] between them.
+class _Turns(NamedTuple):
+    """Turns: gravity's directions before and after each (k, 3), and the samples (k, 2) that end its steps.
 
-    clipped : it went beyond the gyroscope's range, so that its rates say nothing about the gyroscope.
-    start_s, end_s : times since the recording's start [s].
+    clipped : (k,) it went beyond the gyroscope's range, so that its rates say nothing about the gyroscope.
+    steps : (n, 3) rad, those of the whole recording.
     """
 
     before: Vector
-    steps: Vector
     after: Vector
-    clipped: bool
-    start_s: float
-    end_s: float
+    runs: Intervals
+    clipped: Mask
+    steps: Vector
+
+    def chosen(self, which: Mask) -> _Turns:
+        """Return some of the turns."""
+        before, after, runs, clipped, steps = self
+        return _Turns(before[which], after[which], runs[which], clipped[which], steps)
+
+    @property
+    def measured(self) -> _Turns:
+        """Turns within the gyroscope's range."""
+        return self.chosen(~self.clipped)
 
 
-def _measured(turns: list[_Turn]) -> list[_Turn]:
-    return [turn for turn in turns if not turn.clipped]
-
-
-def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
+def _least_miss(turns: _Turns, by: list[Vector]) -> tuple[Vector, float]:
     """Return which of matrices (3, 3) makes the rates miss least, the first if in doubt, and the median angle [rad]."""
     first = _miss(turns, by[0])
-    before, after = (np.array([getattr(turn, name) for turn in turns]) for name in ("before", "after"))
     # Each other matrix carries gravity to half of its turn or more from where the first one does, so that it cannot
     # miss clearly less.
-    if first + first / CLEARLY < 0.5 * np.median(_angles(before, after)):
+    if first + first / CLEARLY < 0.5 * np.median(_angles(turns.before, turns.after)):
         return by[0], first
     misses = [first, *(_miss(turns, M) for M in by[1:])]
     least = int(np.argmin(misses))
@@ -351,20 +351,14 @@ def _least_miss(turns: list[_Turn], by: list[Vector]) -> tuple[Vector, float]:
     return by[least], misses[least]
 
 
-def _miss(turns: list[_Turn], by: Vector) -> float:
+def _miss(turns: _Turns, by: Vector) -> float:
     """Return the median angle [rad] by which the rates, multiplied by (3, 3), miss gravity after the turns."""
     return float(np.median(_misses(turns, by)))
 
 
-def _misses(turns: list[_Turn], by: Vector) -> Vector:
+def _misses(turns: _Turns, by: Vector) -> Vector:
     """Return the angles (k,) [rad] by which the rates, multiplied by (3, 3), miss gravity after each turn."""
-    if not turns:
-        return np.zeros(0)
-    steps = -np.concatenate([turn.steps for turn in turns]) @ by.T
-    ends = np.cumsum([len(turn.steps) for turn in turns]).tolist()
-    F = [turned(steps[first:last]) for first, last in pairwise([0, *ends])]
-    before, after = (np.array([getattr(turn, name) for turn in turns]) for name in ("before", "after"))
-    return _angles(np.einsum("kij,kj->ki", F, before), after)
+    return _angles(np.einsum("kij,kj->ki", turned(-turns.steps @ by.T, turns.runs), turns.before), turns.after)
 
 
 def _means(values: Vector, n: int) -> Vector:

@@ -66,19 +66,21 @@ def _sinc(angle: float) -> float:
     return float(np.sin(argument)) / argument if argument else 1.0
 
 
-def turned(phi: Vector) -> Vector:
-    """Return exp([phi_n]x) ... exp([phi_1]x), (3, 3), of rotation vectors phi (n, 3) [rad]; the identity of none."""
-    return _kernel.turn(np.ascontiguousarray(phi))[0]
+def turned(phi: Vector, runs: NDArray[np.intp]) -> Vector:
+    """Return exp([phi_last-1]x) ... exp([phi_first]x), (k, 3, 3), of runs (k, 2) of vectors phi (n, 3) [rad]."""
+    return _kernel.turn(phi, runs)[0]
 
 
-def turn_by_matrix(steps: Vector, K: Vector) -> Vector:
-    """Return derivatives (3, 6) [rad] of a turn by the upper triangle of the gyroscope's symmetric matrix K.
+def turn_by_matrix(steps: Vector, K: Vector, runs: NDArray[np.intp]) -> tuple[Vector, Vector]:
+    """Return turns (k, 3, 3), and their derivatives (k, 3, 6) [rad] by the upper triangle of the gyroscope's K.
 
-    They are rotation vectors in the axes of the turn's end. steps : (n, 3) rad, of the gyroscope without K.
+    The derivatives are rotation vectors in the axes of a turn's end.
+
+    steps : (n, 3) rad, of the gyroscope without K. runs : (k, 2) of them, first and last + 1 of each turn.
     """
-    arrived = _kernel.turn(-steps @ K.T, np.ascontiguousarray(steps))[1]
-    by_K = -arrived - np.swapaxes(arrived, 1, 2) * (1.0 - np.eye(3))
-    return by_K[:, *UPPER]
+    F, arrived = _kernel.turn(-steps @ K.T, runs, steps)
+    by_K = -arrived - np.swapaxes(arrived, 2, 3) * (1.0 - np.eye(3))
+    return F, by_K[:, :, *UPPER]
 
 
 def sides_down(s: Vector) -> NDArray[np.intp]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Vector
+from ..rests.intervals import Intervals
 from .parameters import NAMES, PLACES
 from .preprocessing import Preprocessed
 from .problem import Series
@@ -50,7 +51,7 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
         return []
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
     coming, leaving = poses.forces(theta)
-    F, leaving, coming = np.array([turned(turns[span]) for span in poses.spans]), leaving[:-1], coming[1:]
+    F, leaving, coming = turned(turns, _runs(poses.spans)), leaving[:-1], coming[1:]
     # The miss is the sine of the angle between two directions, along their axis.
     carried = np.einsum("kij,kj->ki", F, leaving)
     miss = cross_rows(carried, coming) / (lengths(carried) * lengths(coming))[:, None]
@@ -140,11 +141,15 @@ def leverages(
     return np.asarray(np.clip(taken / variance, 0.0, 2.0))
 
 
+def _runs(spans: Sequence[slice]) -> Intervals:
+    return np.array([(span.start, span.stop) for span in spans], np.intp)
+
+
 def jacobians(transitions: Sequence[Transition], series: Series, theta: Theta) -> Vector:
     """Return derivatives (k, 3, p) of the misses in the order of NAMES, as the rests determine b_omega."""
-    steps = [series.dt[of.span, None] * (series.omega[of.span] - theta.b_omega) for of in transitions]
-    phi = np.array([turn_by_matrix(step, theta.K) for step in steps])
-    F, leaving, coming = (np.array([getattr(of, name) for of in transitions]) for name in ("F", "leaving", "coming"))
+    steps = series.dt[:, None] * (series.omega - theta.b_omega)
+    F, phi = turn_by_matrix(steps, theta.K, _runs([of.span for of in transitions]))
+    leaving, coming = (np.array([getattr(of, name) for of in transitions]) for name in ("leaving", "coming"))
     return miss_jacobians(F, leaving, coming, theta.inverse, phi)
 
 

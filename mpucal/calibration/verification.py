@@ -21,7 +21,7 @@ from ..result.calibration import Calibration
 from .fit import Fit
 from .hypothesis_tests import MOST_STD
 from .parameters import NAMES
-from .rotation import turn_by_matrix, turned
+from .rotation import turn_by_matrix
 from .transitions import by_accelerometer, miss_jacobians
 
 # Errors in no covariance: a mounting is not perfectly stiff, and the gyroscope's bias wanders during the turning.
@@ -95,10 +95,10 @@ def _verify(
     gyro_var = 2.0 * noise + float(np.sum(bends * bends))
     inverse, at = np.asarray(np.linalg.inv(fit.D), np.float64), [NAMES.index(name) for name in fit.names]
     leaving, s = (z - fit.b_a) @ inverse.T, (y - fit.b_a) @ inverse.T
-    F, gravities = turned(-(steps @ fit.K.T)), float(np.linalg.norm(leaving) * np.linalg.norm(s))
-    miss = np.cross(F @ leaving, s) / gravities
-    phi = turn_by_matrix(steps, fit.K)
-    of_miss = miss_jacobians(F[None], leaving[None], s[None], inverse, phi[None])[0][:, at]
+    F, phi = turn_by_matrix(steps, fit.K, np.array([[0, len(steps)]]))
+    gravities = float(np.linalg.norm(leaving) * np.linalg.norm(s))
+    miss = np.cross(F[0] @ leaving, s) / gravities
+    of_miss = miss_jacobians(F, leaving[None], s[None], inverse, phi)[0][:, at]
     up = s / np.linalg.norm(s)
     of_length = up @ by_accelerometer(inverse, s[None])[0][:, at]
     length_var = float(of_length @ fit.covariance @ of_length + (up @ inverse) ** 2 @ y_var)

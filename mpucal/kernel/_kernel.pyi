@@ -61,7 +61,7 @@ def moments(
     NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], float, float
 ]: ...
 def turn(
-    phi: NDArray[numpy.float64], x: NDArray[numpy.float64] | None = None
+    phi: NDArray[numpy.float64], runs: NDArray[numpy.int64], x: NDArray[numpy.float64] | None = None
 ) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def statistics(
     x: NDArray[numpy.float64], runs: NDArray[numpy.int64]

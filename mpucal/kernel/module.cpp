@@ -109,6 +109,17 @@ HandConstants make_hand_constants(const Array& array) {
 
 using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
+using Runs = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+// First and last + 1 of each run, which holds so many of n samples or more
+const std::int64_t* within(const Runs& runs, std::size_t n, std::int64_t least) {
+  if (runs.shape(1) != 2) throw std::invalid_argument("a run is a first sample and a last + 1");
+  for (std::size_t r = 0; r < runs.shape(0); ++r)
+    if (runs(r, 0) < 0 || runs(r, 1) < runs(r, 0) + least || static_cast<std::size_t>(runs(r, 1)) > n)
+      throw std::invalid_argument("a run is empty, or not within the samples");
+  return aligned(runs);
+}
+
 // The samples up to which sums are wanted: those given, or the last alone
 std::vector<long> make_ends(const std::optional<Indices>& given, std::size_t n) {
   std::vector<long> ends{static_cast<long>(n)};
@@ -248,25 +259,22 @@ NB_MODULE(_kernel, m) {
 
   m.def(
       "turn",
-      [](const Array& phi, const std::optional<Array>& x) {
-        const std::size_t n = phi.size() / 3;
-        Turned turned;
-        turn(pointer(phi, 3 * n, "phi"), pointer(x, 3 * n, "x"), n, turned);
-        const double *F = &turned.F[0][0], *sums = &turned.sums[0][0][0];
-        return std::make_tuple(give({F, F + 9}, {3, 3}), give({sums, sums + 27}, {3, 3, 3}));
+      [](const Array& phi, const Runs& runs, const std::optional<Array>& x) {
+        const std::size_t n = phi.size() / 3, k = runs.shape(0);
+        const std::int64_t* const ends = within(runs, n, 0);
+        std::vector<double> F(9 * k), sums(27 * k);
+        turn(pointer(phi, 3 * n, "phi"), pointer(x, 3 * n, "x"), ends, k, F.data(), sums.data());
+        return std::make_tuple(give(std::move(F), {k, 3, 3}), give(std::move(sums), {k, 3, 3, 3}));
       },
-      nb::arg("phi"), nb::arg("x").none() = nb::none(),
-      "Return the rotation of steps phi (n, 3), and sums of unit vectors times x (n, 3), rotated from each step to the end.");
+      nb::arg("phi"), nb::arg("runs"), nb::arg("x").none() = nb::none(),
+      "Return the rotation of steps phi (n, 3) in each run (k, 2), first and last + 1, and sums of unit vectors times "
+      "x (n, 3), rotated from each step to the end.");
 
   m.def(
       "statistics",
-      [](const Array& x, const nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& runs) {
+      [](const Array& x, const Runs& runs) {
         const std::size_t k = runs.shape(0);
-        const std::int64_t* const ends = aligned(runs);
-        if (runs.shape(1) != 2) throw std::invalid_argument("a run is a first sample and a last + 1");
-        for (std::size_t r = 0; r < k; ++r)
-          if (runs(r, 0) < 0 || runs(r, 1) <= runs(r, 0) || static_cast<std::size_t>(runs(r, 1)) > x.size() / 3)
-            throw std::invalid_argument("a run is empty, or not within the samples");
+        const std::int64_t* const ends = within(runs, x.size() / 3, 1);
         std::vector<double> mean(3 * k), variance(3 * k);
         statistics(aligned(x), ends, k, mean.data(), variance.data());
         return std::make_tuple(give(std::move(mean), {k, 3}), give(std::move(variance), {k, 3}));

@@ -33,20 +33,22 @@ void carry(const double (&F)[3][3], double (&M)[3][columns]) {
 
 }  // namespace
 
-void turn(const double* phi, const double* x, std::size_t n, Turned& out) {
-  out = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {}};
-  double sums[3][9] = {};
-  for (std::size_t i = 0; i < n; ++i) {
-    Turn<double> step;
-    std::copy_n(phi + 3 * i, 3, step.phi);
-    step.compute();
-    carry(step.F, out.F);
-    if (!x) continue;
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k) sums[j][3 * j + k] += x[3 * i + k];
-    carry(step.F, sums);
+void turn(const double* phi, const double* x, const std::int64_t* runs, std::size_t count, double* F, double* sums) {
+  for (std::size_t r = 0; r < count; ++r, F += 9, sums += 27) {
+    double turned[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, entered[3][9] = {};
+    for (std::int64_t i = runs[2 * r]; i < runs[2 * r + 1]; ++i) {
+      Turn<double> step;
+      std::copy_n(phi + 3 * i, 3, step.phi);
+      step.compute();
+      carry(step.F, turned);
+      if (!x) continue;
+      for (int j = 0; j < 3; ++j)
+        for (int k = 0; k < 3; ++k) entered[j][3 * j + k] += x[3 * i + k];
+      carry(step.F, entered);
+    }
+    std::memcpy(F, turned, sizeof turned);
+    std::memcpy(sums, entered, sizeof entered);
   }
-  std::memcpy(out.sums, sums, sizeof sums);
 }
 
 void statistics(const double* x, const std::int64_t* runs, std::size_t count, double* mean, double* variance) {

@@ -7,12 +7,10 @@
 
 namespace mpucal {
 
-// F = exp([phi_n]x) ... exp([phi_1]x) of steps phi (n, 3) [rad]. Where x (n, 3) is given, sums[j][k] (3,) is the sum of
-// F_n ... F_i e_j x_i[k]: vectors that enter on the way, rotated to the end. Without x it is 0.
-struct Turned {
-  double F[3][3], sums[3][3][3];  // sums: row, then j and k
-};
-void turn(const double* phi, const double* x, std::size_t n, Turned&);
+// F (runs, 3, 3) = exp([phi_last-1]x) ... exp([phi_first]x) of steps phi (n, 3) [rad] in each run, the identity of none.
+// Where x (n, 3) is given, sums[j][k] (3,) of (runs, 3, 3, 3), row, then j and k, is the sum of F_last-1 ... F_i e_j x_i[k]:
+// vectors that enter on the way, rotated to the end. Without x it is 0.
+void turn(const double* phi, const double* x, const std::int64_t* runs, std::size_t count, double* F, double* sums);
 
 // Means and variances (runs, 3) of x (n, 3) over samples first..last-1 of each run.
 void statistics(const double* x, const std::int64_t* runs, std::size_t count, double* mean, double* variance);

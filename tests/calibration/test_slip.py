@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate, estimate
-from mpucal.calibration.rotation import turned
+from mpucal.calibration.rotation import rotation
 from mpucal.calibration.slip import end_slips
 from mpucal.calibration.transitions import Transition
 from tools.lab.scenarios import faults
@@ -17,12 +17,12 @@ from tools.lab.scenarios.family import Family, drawn
 G = 9.82
 
 
-AXIS = np.array([[0.6, -0.6, 0.53]]) / np.linalg.norm([0.6, -0.6, 0.53])
+AXIS = np.array([0.6, -0.6, 0.53]) / np.linalg.norm([0.6, -0.6, 0.53])
 
 
 def slipped(recording, at_s, degrees=3.0):
     """Rotate the accelerometer against the gyroscope from `at_s` [s] on."""
-    R, after = turned(np.radians(degrees) * AXIS), recording.t >= recording.t[0] + at_s
+    R, after = rotation(np.radians(degrees) * AXIS), recording.t >= recording.t[0] + at_s
     return replace(recording, acc=np.where(after[:, None], recording.acc @ R.T, recording.acc))
 
 
@@ -51,7 +51,7 @@ def test_a_slip_too_small_to_matter_is_within_the_uncertainty_of_a_good_calibrat
     calibration = calibrate(slipped(simulated.recording, 30.0, degrees=0.1), "auto", G)
     assert calibration.verdict == "good"
     before = simulated.truth.D
-    away = [abs(calibration.D - D) / calibration.D_std for D in (before, turned(np.radians(0.1) * AXIS) @ before)]
+    away = [abs(calibration.D - D) / calibration.D_std for D in (before, rotation(np.radians(0.1) * AXIS) @ before)]
     assert np.max(away) < 4.5
 
 
@@ -92,14 +92,12 @@ def test_a_slip_in_the_last_rest_divides_it(hand, seed):
 def test_a_miss_near_the_end_that_the_next_one_undoes_is_no_slip():
     """Twenty turns that miss by chance: a rest held askew misses forth and back, and a slip once."""
     rng = np.random.default_rng(3)
-    F = [turned(rng.normal(0.0, 1.0, (1, 3))) for _ in range(20)]
+    F = [rotation(rng.normal(0.0, 1.0, 3)) for _ in range(20)]
     askew = 0.03 * np.array([0.6, -0.6, 0.53])
     for back, least, most in ((0.0, 0.9, 1.0), (1.0, 0.0, 0.1)):
         misses = rng.normal(0.0, 1e-3, (20, 3))
         misses[18] += askew
         misses[19] -= back * F[19] @ askew
-        turns = [
-            Transition(slice(0, 1), R, AXIS[0], AXIS[0], miss, 1e-6, 1e-7) for R, miss in zip(F, misses, strict=True)
-        ]
+        turns = [Transition(slice(0, 1), R, AXIS, AXIS, miss, 1e-6, 1e-7) for R, miss in zip(F, misses, strict=True)]
         ends = end_slips(turns, np.zeros(1, bool))
         assert least < ends.max() <= most

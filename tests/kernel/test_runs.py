@@ -16,15 +16,17 @@ def x():
 
 
 def test_a_turn_is_the_product_of_its_steps_and_turns_vectors_that_enter_on_the_way(x):
-    phi, entering = 0.3 * x[:100], x[100:]
+    x[:100] *= 0.3
+    phi, entering = x[:100], x[100:]
     turn, sums = np.eye(3), np.zeros((3, 3, 3))
     for step, vector in zip(Rotation.from_rotvec(phi).as_matrix(), entering, strict=True):
         sums = np.einsum("ai,ijk->ajk", step, sums + np.einsum("ij,k->ijk", np.eye(3), vector))
         turn = step @ turn
-    given, arrived = _kernel.turn(phi, entering)
-    np.testing.assert_allclose(given, turn, atol=1e-13)
-    np.testing.assert_allclose(arrived, sums, atol=1e-12)
-    np.testing.assert_array_equal(_kernel.turn(phi[:0])[0], np.eye(3))
+    given, arrived = _kernel.turn(x, np.array([[7, 7], [0, 100]]), np.roll(x, 100, axis=0))
+    np.testing.assert_allclose(given, [np.eye(3), turn], atol=1e-13)
+    np.testing.assert_allclose(arrived, [np.zeros((3, 3, 3)), sums], atol=1e-12)
+    with pytest.raises(ValueError, match="not within"):
+        _kernel.turn(x, np.array([[190, 201]]))
 
 
 def test_means_and_variances_of_runs(x):

@@ -107,7 +107,7 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
 
     def hand(n: int, rng: Rng) -> tuple[Any, ...]:
         turning = [some(n, rng, 3), some(n, rng, 3)] if rng.random() < 0.7 else [None, None]
-        return (*series(n, rng), *turning, maybe(n, rng), maybe(n, rng), maybe(n, rng))
+        return (*series(n, rng), *turning, maybe(n, rng), maybe(n, rng), maybe(n, rng), maybe(n, rng, 3))
 
     def ends(n: int, rng: Rng) -> Any:
         return np.sort(np.append(rng.integers(0, n + 1, rng.integers(0, 4)), n)) if rng.random() < 0.5 else None
@@ -124,9 +124,9 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
             (exact, constants, int(rng.choice([0, *USED.values()])), *series(n, rng), ends(n, rng))
         ),
         _kernel.evaluate_hand: lambda n, rng: (whole, of_hand, bool(rng.integers(2)), *hand(n, rng), ends(n, rng)),
-        _kernel.trace_hand: lambda n, rng: (whole, of_hand, bool(rng.integers(2)), *hand(n, rng)),
+        _kernel.trace_hand: lambda n, rng: (whole, of_hand, *hand(n, rng)),
         _kernel.moments: lambda n, rng: (np.zeros(3), *series(n, rng)[:4]),
-        _kernel.turn: lambda n, rng: (some(n, rng, 3), maybe(n, rng, 3)),
+        _kernel.turn: lambda n, rng: (some(n, rng, 3), runs(n, rng), maybe(n, rng, 3)),
         _kernel.statistics: lambda n, rng: (some(n, rng, 3), runs(n, rng)),
         _kernel.moving_mean: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
         _kernel.moving_statistics: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),

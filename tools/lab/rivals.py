@@ -78,7 +78,8 @@ class Rests:
         for k, ((_, a), (b, _)) in enumerate(pairwise(self.runs.tolist())):
             if r.t[b] - r.t[a - 1] <= LONGEST_MOVE_S:
                 rate = r.gyr[a - 1 : b] - self.b_omega[k : k + 2].mean(0)
-                moves.append((k, turned(-np.diff(r.t[a - 1 : b + 1])[:, None] * rate)))
+                steps = -np.diff(r.t[a - 1 : b + 1])[:, None] * rate
+                moves.append((k, turned(steps, np.array([[0, len(steps)]]))[0]))
         return moves
 
 
