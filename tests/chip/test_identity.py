@@ -12,8 +12,6 @@ from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.errors import ChipError
 
-FILLING = {reg.FIFO_EN: reg.FIFO_EN_FRAME}
-
 
 @pytest.mark.parametrize(
     ("chip", "who_am_i", "behaves"),

@@ -1,7 +1,5 @@
 """Fixtures that call the command line as a person does."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

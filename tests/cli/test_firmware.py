@@ -1,7 +1,5 @@
 """`mpucal firmware`: the library in a folder, and the board by avrdude."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

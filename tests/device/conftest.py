@@ -1,7 +1,5 @@
 """Fixtures: /dev/i2c-1 with a simulated chip, for the installed command and for the tools of Linux."""
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 import json

@@ -1,7 +1,5 @@
 """A calibration like a real one, samples, and a compiler."""
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The recipes of docs/boards.md: each compiled or run against the calls of the library it is for, restated here."""
 
-from __future__ import annotations
-
 import re
 import struct
 import sys

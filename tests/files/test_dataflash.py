@@ -1,7 +1,5 @@
 """ArduPilot's dataflash logs become recordings of every IMU, and what is damaged is refused in a sentence."""
 
-from __future__ import annotations
-
 import struct
 from typing import ClassVar
 

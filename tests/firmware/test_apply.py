@@ -1,7 +1,5 @@
 """Header mpucal_apply.h against the Python codec and NumPy: golden vectors, random blobs, float32 rounding."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

@@ -1,7 +1,5 @@
 """Rules of firmware_protocol.md, held by both bridges: the core of the firmware, and the program for MicroPython."""
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import json

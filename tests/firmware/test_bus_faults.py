@@ -1,7 +1,5 @@
 """Faults of a chip that does not answer or holds the bus, and of a processor that hangs, on firmware and sketch."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

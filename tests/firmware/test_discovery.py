@@ -1,7 +1,5 @@
 """Built as the Arduino IDE and arduino-cli build, who find a library by an include that fails: what a sketch holds."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

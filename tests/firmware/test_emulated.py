@@ -1,7 +1,5 @@
 """Real firmware on an emulated ATmega328P, in its own time: registers, streams, blobs, power."""
 
-from __future__ import annotations
-
 import re
 from contextlib import suppress
 from dataclasses import replace

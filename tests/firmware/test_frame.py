@@ -1,7 +1,5 @@
 """The core's frames against the Python codec's, golden vectors, and chance."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

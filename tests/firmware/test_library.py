@@ -1,7 +1,5 @@
 """The Arduino library: it compiles with the stock options of each board, and says what Arduino's rules ask."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Storage of a blob in a file of LittleFS, which loses power at every step."""
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import replace
 from pathlib import Path

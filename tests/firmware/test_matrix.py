@@ -1,7 +1,5 @@
 """The portable core and header for each processor, with every warning an error."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

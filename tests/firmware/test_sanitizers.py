@@ -1,7 +1,5 @@
 """Tests of the core with AddressSanitizer and UBSan compiled into it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Blob slots: one of the two is valid at any moment, even if the power fails."""
 
-from __future__ import annotations
-
 import ctypes
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stream of the core: the rules under FRAMES in firmware_protocol.md, one by one."""
 
-from __future__ import annotations
-
 import pytest
 
 from mpucal.bridge import messages as wire

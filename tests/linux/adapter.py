@@ -3,8 +3,6 @@
 Source: Linux Documentation/usb/usbip_protocol.rst; drivers/i2c/busses/i2c-tiny-usb.c for its requests.
 """
 
-from __future__ import annotations
-
 import json
 import socket
 import struct

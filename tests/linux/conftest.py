@@ -4,8 +4,6 @@ The guest's clock counts the instructions that it executes, a nanosecond each (-
 do not depend on the speed or load of the host; limits are in the guest's time and in the host's processor time.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource

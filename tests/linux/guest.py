@@ -1,7 +1,5 @@
 """Program in the kernel that conftest.py boots: mpucal's commands, reported in lines of JSON, with files in OUT."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

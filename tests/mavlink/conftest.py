@@ -1,7 +1,5 @@
 """Fixtures: a link over simulated time, packets of a vehicle, and a link to the simulated vehicle."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """A real result: the replayed session's recording, its calibration.json, and the page that goes with them."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tremor of a hand at rest, compared with integrals of its autocovariance and recordings that follow it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy

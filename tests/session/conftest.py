@@ -1,7 +1,5 @@
 """A board that is laid down, turned and shaken, as samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Fixtures: a session's outputs, the views that they lead to, and a keyboard."""
 
-from __future__ import annotations
-
 import math
 import os
 

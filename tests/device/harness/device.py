@@ -8,8 +8,6 @@ to the chip, {"seen": FILE} writes the messages on SPI to a file; each is answer
 the time, see clock.c.
 """
 
-from __future__ import annotations
-
 import json
 import mmap
 import sys

@@ -3,8 +3,6 @@
 Source: Linux include/uapi/linux/spi/spidev.h and spi.h, drivers/spi/spidev.c.
 """
 
-from __future__ import annotations
-
 import errno
 import struct
 from dataclasses import dataclass, field

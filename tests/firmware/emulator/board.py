@@ -1,7 +1,5 @@
 """Emulated Arduino Uno with a chip on its I2C bus. It knows no firmware, no protocol and no real time."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """Line to an emulated board in the board's own time: the board runs while its host waits."""
 
-from __future__ import annotations
-
 from mpucal.bridge.port import Chunk
 
 STEP_S = 0.000_25

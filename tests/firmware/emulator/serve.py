@@ -3,8 +3,6 @@
 python tests/firmware/emulator/serve.py mpucal/firmware/build/mpucal_bridge.elf eeprom.bin sim:seed=1
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

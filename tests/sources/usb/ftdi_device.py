@@ -3,8 +3,6 @@
 pyftdi takes `get_backend` of the module that UsbTools.BACKENDS names.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 from usb.backend import IBackend

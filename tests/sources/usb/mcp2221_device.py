@@ -1,7 +1,5 @@
 """An MCP2221 as the module `hid`: reports of 64 bytes (Microchip DS20005565), and a chip on its I2C bus."""
 
-from __future__ import annotations
-
 from EasyMCP2221 import Constants as c  # noqa: N813 - so many of them
 
 SPEED_TAKEN, NACK = 0x20, c.I2C_ST_WRADDRL_NACK_STOP

@@ -1,7 +1,5 @@
 """Chip on USB adapters: the two real libraries on simulated USB layers."""
 
-from __future__ import annotations
-
 import sys
 import time
 from functools import partial

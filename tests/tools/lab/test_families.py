@@ -1,7 +1,5 @@
 """The families: their world obeys physics, and no verdict on a small set of them is false."""
 
-from __future__ import annotations
-
 from itertools import accumulate
 from operator import mul
 
