@@ -57,29 +57,6 @@ def test_a_transfer_fails_as_linux_would_tell_it(name, kind, number, over):
             bus.read(reg.WHO_AM_I, 1)
 
 
-@pytest.mark.parametrize(
-    ("name", "gaps", "lost_s"),
-    [
-        ("nack", 0, 0.0),
-        ("timeout", 0, 0.0),
-        ("overflow", 1, 2.1),
-        ("brownout", 1, 0.7),
-        ("frozen", 1, 2.0),
-        ("slip", 1, 0.2),
-        ("clock", 0, 0.0),
-    ],
-)
-def test_a_passing_fault_is_a_gap_at_most(name, gaps, lost_s):
-    recording, error = measured(suffering(Fault(name, 2.5)), Config(rate_hz=100), 6.0)
-    assert error is None
-    assert gaps <= recording.gap.sum() <= 2 * gaps
-    lost = np.diff(numbers(recording)) != 1
-    if name != "brownout":  # whose sample clock begins anew
-        assert lost.tolist() == recording.gap[1:].tolist()
-    assert np.diff(recording.t).max() < 0.03 + lost_s
-    assert np.diff(recording.t).min() > 0
-
-
 # No driver can notice these.
 UNSEEN = {"low_byte", "high_bit"}
 places = st.builds(
