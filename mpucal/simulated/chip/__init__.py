@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ...chip.config import Config
 from ...data import STANDARD_GRAVITY_MPS2, Vector
-from ...session.plan import Plan
 from ...sources.chip import OpenedChip
 from ...sources.kind import Request
 from ...sources.table import whole_number
@@ -76,17 +76,15 @@ def _truth(options: ChipOptions, gravity: float) -> SensorTruth:
 LONG_POLL_S = 0.25
 
 
-def with_long_polls(plan: Plan, real_time: bool) -> Plan:
-    """Return the plan with longer times between polls, unless the simulation runs in real time."""
-    config = plan.config
-    polled = replace(config, poll_s=min(LONG_POLL_S, config.longest_s))
-    return plan if real_time else replace(plan, config=polled)
+def with_long_polls(config: Config, real_time: bool) -> Config:
+    """Return the configuration with longer times between polls, unless the simulation runs in real time."""
+    return config if real_time else replace(config, poll_s=min(LONG_POLL_S, config.longest_s))
 
 
 def open_source(request: Request) -> OpenedChip:
     """Open the chip that `sim:key=value,...` describes, in the gravity of the plan; see open_simulated."""
     bus = open_simulated(request.value, request.plan.gravity, request.values.get("seed"))
-    plan = with_long_polls(request.plan, bus.real_time)
+    plan = replace(request.plan, config=with_long_polls(request.plan.config, bus.real_time))
     live, words = bus.real_time, request.words
     return OpenedChip(bus, plan, (bus.hear,), bus.truth_document, words=words, real_time=live, own_process=live)
 

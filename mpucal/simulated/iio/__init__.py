@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from ...iio.driver import Devices
@@ -20,7 +21,7 @@ def open_source(request: Request) -> OpenedIio:
     files: Any = SimulatedFiles(bus)
     return OpenedIio(
         files,
-        with_long_polls(request.plan, bus.real_time),
+        replace(request.plan, config=with_long_polls(request.plan.config, bus.real_time)),
         (bus.hear,),
         bus.truth_document,
         words=request.words,

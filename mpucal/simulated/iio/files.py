@@ -24,7 +24,7 @@ from ...data import Samples
 from ...iio.attributes import ACCEL, AXES, GYRO, MPU_SCALES, PRINTED_SCALES, TEMP, TIMESTAMP, FrameLayout, ScanElement
 from ...iio.setup import TRIGGERS
 from ...iio_device.source import file_error
-from ..chip import SimulatedBus
+from ..chip import SimulatedBus, with_long_polls
 
 RANGES = {ACCEL: ACCEL_RANGES_G, GYRO: GYRO_RANGES_DPS}
 SETTINGS = ("buffer/enable", "sampling_frequency", *(f"{kind}_scale" for kind in RANGES))
@@ -127,7 +127,8 @@ class SimulatedFiles(Bus):
             first = next(iter(self._devices.values()))
             ranges = {kind: device.range(kind) for device in self._devices.values() for kind in device.kinds}
             config = Config(ranges[ACCEL], ranges[GYRO], float(first.texts["sampling_frequency"]))
-            self._driver = Driver(self._bus, config, "the simulated kernel")
+            polled = with_long_polls(config, self._bus.real_time)
+            self._driver = Driver(self._bus, polled, "the simulated kernel")
             self._driver.start()
             if self._written is not None:
                 # mpucal's driver resets the chip; the kernel's does not.
