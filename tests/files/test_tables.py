@@ -1236,15 +1236,9 @@ def coarse(stored_calibration):
     return made, mpucal.calibrate(made)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("EuRoC", "SensorLog", "poses in TUM's style", "counts without a sign", "zeros and a second header"),
-        *("WitMotion", "a spreadsheet's own names", "lines of JSON", "times of day with points", "late"),
-    ],
-)
-def test_one_recording_in_ten_forms_gives_one_calibration(name, coarse, tmp_path):
-    """Round counts of 8192 for 1 g, and stamps that arrive 3 ms late on average, too."""
+@pytest.mark.parametrize("name", ["counts without a sign", "a spreadsheet's own names", "late"])
+def test_one_recording_in_rounded_and_late_forms_gives_one_calibration(name, coarse, tmp_path):
+    """Round counts of 8192 for 1 g, round times to seconds, and take stamps that arrive 3 ms late on average."""
     made, calibration = coarse
     form = FORMS.get(name) or Form(f"time,{AXES}", "t a w", says="its times are arrival stamps")
     late = np.random.default_rng(19).exponential(0.003, len(made)) * (name == "late")
