@@ -50,7 +50,12 @@ def with_option(words: Sequence[str], option: str, value: str) -> list[str]:
 
 
 def amended(words: Sequence[str], options: str, without: str) -> list[str]:
-    """Return the words of a command line with other `options`, and without an option, which may name its value."""
+    """Return the words of a command line with `options` changed or added, and without the option `without`.
+
+    Parameters
+    ----------
+    options : options with their values, as text. without : an option, or an option and the value that it must have.
+    """
     option, _, value = without.partition(" ")
     for i, word in enumerate(words):
         name, joined, given = word.partition("=")

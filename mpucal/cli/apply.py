@@ -90,7 +90,7 @@ class _Totals:
         self.samples += len(before)
         complete = is_complete(after.acc, after.gyr)
         self.lack += len(before) - int(complete.sum())
-        # The magnitudes take as long as all the rest.
+        # To compute the magnitudes takes as long as all the rest.
         if magnitudes:
             self._before += float(np.linalg.norm(before.acc[complete], axis=1).sum())
             self._after += float(np.linalg.norm(after.acc[complete], axis=1).sum())

@@ -31,7 +31,9 @@ REPORTS, HINTS = "reports", "hints.txt"
 @click.command("batch", epilog=EXAMPLE)
 @click.argument("files", metavar="FILE|GLOB|URL...", nargs=-1, required=True)
 @output_option("folder", "DIR", "Folder for the results.", required=True)
-@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes on this machine; default: one a core.")
+@click.option(
+    "--workers", metavar="N", type=click.IntRange(1), help="Processes on this machine; default: one for each core."
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://HOST:PORT.")
 @click.option("--reports", is_flag=True, help="Write a report of each recording, linked from the page.")
 @click.option(

@@ -84,8 +84,8 @@ def command(
 
     A sensor is checked in half a minute: lay the board flat, then hold it in three orientations. A recording is
     checked by the rests in it. If only the biases have changed, -o writes an updated calibration. Exit code 0: still
-    good; 5: drifted, remounted or another sensor; 4: it cannot be told, and why; 6: with -o, CALIBRATION was damaged or
-    changed after it was saved.
+    good; 5: drifted, remounted or another sensor; 4: cannot be told, for the reason that is printed; 6: with -o,
+    CALIBRATION was damaged or changed after it was saved.
     """
     kinds = check_input(file, options, "check")
     if page is not None and file is not None:

@@ -38,7 +38,7 @@ def duration(seconds: float) -> str:
 
 
 def ask_in_doubt(question: str, yes: bool) -> None:
-    """Ask about an objection; raise WriteBackError unless a person agrees, also with `yes` or without a person."""
+    """Ask about an objection; raise WriteBackError unless a person agrees: `yes` is no agreement."""
     objection = question.partition(". ")[0]
     if yes or not sys.stdin.isatty():
         raise WriteBackError(f"nothing was changed: {objection}", "repeat the session, or `mpucal write` it as it is")
@@ -132,5 +132,5 @@ def load_trusted(path: Path, force: bool) -> Calibration:
 
 
 def at_gravity_of(calibration: Calibration | None, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a source's options with the gravity of a calibration: a simulated chip is examined where it was made."""
+    """Return a source's options with the gravity of a calibration: a simulated chip is to feel the same one."""
     return {**options, "gravity": STANDARD_GRAVITY_MPS2 if calibration is None else calibration.gravity}

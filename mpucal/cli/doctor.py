@@ -27,9 +27,7 @@ EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus si
 @source_options("doctor")
 @json_option("Print only the findings, as JSON.")
 @click.option("--seconds", type=Finite(2.0), default=10.0, show_default=True, help="Time to observe the samples [s].")
-@click.option(
-    "--conformance", is_flag=True, help="Examine a bridge's firmware (--serial) alone, by the protocol's talks."
-)
+@click.option("--conformance", is_flag=True, help="Compare only a bridge's firmware (--serial) with the protocol.")
 def command(as_json: bool, seconds: float, conformance: bool, **options: Any) -> int:
     """Examine what is on a bus, which chip it really is and whether it works as specified; for a bug report.
 

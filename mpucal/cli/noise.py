@@ -87,7 +87,7 @@ def _measure_source(options: dict[str, Any], seconds: float | None) -> tuple[Noi
         # The result so far is kept, whatever ends the measurement.
         try:
             sensor = measuring.source.start()
-            # In five runs of a second a person puts the board down.
+            # A person needs five runs, of a second each, to put the board down.
             skipped = 0 if options["replay"] else 5
             if skipped:
                 put_down(source.listeners, say, speak_of(PUT_DOWN, usual_board(source.origin)))

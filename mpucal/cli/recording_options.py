@@ -37,9 +37,11 @@ _MOST = click.option(
 )
 # hint: its option
 _OPTIONS = {
-    "topic": Option("topic", "Topic of a bag; two, the accelerometer's first: ONE,OTHER.", "NAME"),
+    "topic": Option("topic", "Topic of a bag, or two topics, the accelerometer's first: ONE,OTHER.", "NAME"),
     "sensor": Option(
-        "sensor", "Sensor to read of a table of several: what its lines or columns call it, such as 0x69 or IMU2.", "ID"
+        "sensor",
+        "Sensor to read from a table of several, by its name in the lines or columns, such as 0x69 or IMU2.",
+        "ID",
     ),
     "columns": Option(
         "columns",
@@ -53,7 +55,7 @@ _OPTIONS = {
     "rate_hz": Option("rate", "Rate of samples without times [Hz].", "HZ", ABOVE_ZERO),
     "span": Option(
         "span",
-        "Read this part of a recording alone: s since its first sample; one may be left out.",
+        "Read only this part of a recording, in s since its first sample; FROM or TO may be left out.",
         "FROM:TO",
         parse_span,
     ),

@@ -24,13 +24,13 @@ from ..sources.table import matching_kinds
 from . import amended, typed_words, with_option
 
 OUTPUT, NO_MEASUREMENT = "-o", frozenset({"--replay", "--resume"})
-# A chip's range by the code of the reason that a larger one prevents.
+# For each reason that a larger range of the chip prevents: the range's option, its field of Sensor, and its values.
 RANGES = {
     "gyro_clipped": ("--gyro-range", "gyro_range_dps", GYRO_RANGES_DPS),
     "accel_clipped": ("--accel-range", "accel_range_g", ACCEL_RANGES_G),
 }
 
-# Option in a remedy, with its value, which is no placeholder in capitals.
+# Option in a remedy with its value; a placeholder in capitals is no value.
 REMEDY_OPTION = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
 
 # For a terminal of 80 columns.
@@ -109,14 +109,14 @@ def next_steps(
 
 
 def _follow_the_remedy(again: str, recording: Path | None) -> str:
-    """Return what precedes the command `again`: a command without `recording` names one that is still to be made."""
+    """Return the words before the command `again`; if it does not read `recording`, a new one is to be made first."""
     words = shlex.split(again)
     made = recording is None or words[1:2] == ["session"] or any(Path(word) == recording for word in words)
     return f"follow the remedy above{'' if made else ' in a new recording'}"
 
 
 def use_in_device(calibration: Calibration, folder: Path) -> str:
-    """Return how the calibration in `folder` comes into its device, or why it cannot."""
+    """Return how to write the calibration in `folder` to its device, or why that is not possible."""
     autopilot = calibration.extra.get(AUTOPILOT)
     if autopilot is None:
         return f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)"
@@ -130,10 +130,9 @@ def command_again(
 ) -> str:
     """Return the command line that was typed, as it is for another measurement; empty if it is the same.
 
-    The results get a free name, and so does `recording`, unless a remedy says how to read it. A range at whose end the
-    chip was is replaced by the next larger one. A replay and a resumed session cannot be measured again: a new session
-    can, on the same source if that is known by the options `source` (see Request.words). An interrupted session is
-    continued.
+    The results get a free name, and so does `recording`, unless a remedy says how to read it. A range that clipped the
+    data is replaced by the next larger one. A replay and a resumed session cannot be measured again: a new session can,
+    on the same source if that is known by the options `source` (see Request.words). An interrupted session continues.
     """
     if recording is not None and is_unfinished(recording):
         return f"mpucal {shlex.join(['session', '--resume', str(recording)])}"

@@ -18,7 +18,7 @@ from ..origin import Origin
 from ..rests.limits import ENOUGH_ORIENTATIONS, LEAST_TURN_RAD
 from .events import Direction, Target
 
-# A direction that was only passed is disturbed by the hand's accelerations: so many count as one pause.
+# The hand's accelerations disturb a direction that was only passed: this number of passes counts as one pause.
 PASSES_OF_A_PAUSE = 4
 # Rests nearer to one another count as one.
 SAME_RAD = math.radians(2.0)
@@ -134,14 +134,15 @@ AIMS: Mapping[str, Aim] = {
     NORMAL: Aim(Target(0.1, 0.05, 1.0), least=ENOUGH_ORIENTATIONS, longest_s=120.0, verify=3),
     BEST: Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
 }
-# Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up, each a
-# quarter turn from the last, about another axis. They show what its parameters hold best, biases and scale factors. One
-# more, tilted, gives with the gyroscope the angles between the axes. One new orientation verifies a first calibration
-# that is good; one with reservations, of which a slip may be the cause, is verified as often as a board's quickest.
+# Directions that point down on the sides of a vehicle: level, left side, nose down, back, right side, nose up. Each is
+# a quarter turn from the one before, about another axis. They determine best what a vehicle's parameters hold: biases
+# and scale factors. The last direction is tilted: with the gyroscope it gives the angles between the axes. One new
+# orientation verifies a first calibration that is good. One with reservations may come from a slip: it is verified by
+# as many orientations as the quickest calibration of a board.
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
 VERIFY_GOOD = 1
-# Its parameters hold no angles between the axes, which need only be so well known that the biases are.
+# A vehicle's parameters hold no angles between the axes: they need only be known well enough for the biases.
 STRICTER, LOOSER = 0.7, 6.0
 
 
@@ -153,7 +154,7 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     of_board = aim.target
     std = Target(of_board.gain_pct, of_board.misalignment_deg * LOOSER, of_board.bias_mg * STRICTER)
     aim = replace(aim, target=std, flat_s=SHORTEST_FLAT_S, by_sides=True)
-    # Whoever wants the best takes the time for it.
+    # The best target may take a board's time.
     return aim if target == BEST else replace(aim, least=len(SIDES), verify=VERIFY_GOOD)
 
 

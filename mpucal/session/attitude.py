@@ -21,7 +21,7 @@ STEP_S = 0.04
 STILL_S, MOVING_S = 0.2, 2.0
 # Limit of that correction: before the first rest, a turning board may have been taken for one at rest.
 CORRECT_RAD_S = math.radians(60.0)
-# Until the end of the flat rest, a board at rest is turned about the vertical towards straight, at most so fast.
+# Until the flat rest ends, the attitude of a board at rest turns about the vertical to straight, at most at this rate.
 STRAIGHTEN_RAD_S = math.radians(30.0)
 
 

@@ -115,9 +115,9 @@ class Checked(Event):
 
     Attributes
     ----------
-    verifications : one for each orientation. agrees : None where too little was shown to tell.
+    verifications : one for each orientation. agrees : None where the orientations show too little to decide.
     reason : the likeliest cause, where they do not agree.
-    doubtful : True if another calibration, with these orientations, and one more orientation may tell.
+    doubtful : True if it may be decided by one more orientation, and a new calibration that uses these.
     """
 
     verifications: tuple[Verification, ...]

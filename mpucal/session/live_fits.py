@@ -188,7 +188,7 @@ class SampleStore:
 
     Parameters
     ----------
-    sensor : its rate decides over how many samples to average.
+    sensor : its rate determines how many samples are averaged.
     """
 
     def __init__(self, sensor: Sensor) -> None:

@@ -22,10 +22,10 @@ from ..result.keys import Quality
 from .events import Checked, Verification, triple
 from .rotate import REST_S
 
-# A shorter turn shows too little of a scale factor error to blame one.
+# A shorter turn shows too little of a scale factor error to find one by it.
 LONG_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
-# The reason that asks for more orientations, and those beside which they do not help.
+# The reason that more orientations remove, and the reasons beside which they do not help.
 FEW = "few_orientations"
 CONTRADICTIONS = KINDS[FEW].explained_by
 MUCH_CLIPPED = 0.002
@@ -62,8 +62,8 @@ def judge_verification(
 ) -> Checked:
     """Return whether the rests agree with the first calibration, and the likeliest reason where they do not.
 
-    With fewer than `of` unseen orientations nothing counts as verified, although nothing speaks against it; nor if they
-    could not have shown an error for which a calibration is refused.
+    A calibration that nothing speaks against is not verified either if fewer than `of` orientations are unseen, or if
+    they could not have shown an error for which a calibration is refused.
 
     Parameters
     ----------

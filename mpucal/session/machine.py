@@ -75,7 +75,7 @@ class Machine:
         return [speak_of(output, self._plan.board) for output in outputs]
 
     def _react(self, event: events.Event, begins: bool) -> Sequence[events.Output]:
-        """Return the outputs for an event, which begins the state that it led to, or not."""
+        """Return the outputs for an event; `begins` : it begins the state that it leads to."""
         match event:
             case events.Measured(samples):
                 return self._measured(samples) if len(samples) else []
@@ -93,7 +93,7 @@ class Machine:
             case events.Enough() if self.state in MEASURING:
                 return self._dispatch(self._step.enough())
             case events.Redo() if begins:
-                # Its samples are dropped, those of the flat rest are kept.
+                # The samples of the turning are dropped, those of the flat rest are kept.
                 again = events.Decision("the turning starts again; what was turned so far is discarded")
                 return [again, events.Forget(self._flat_samples, self._samples)]
             case events.Resumed():

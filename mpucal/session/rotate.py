@@ -17,17 +17,17 @@ from .plan import Plan
 from .step import ENOUGH, HAND_WINDOW_S, HOLD_S, MEANT_RAD, PATIENCE_S, WAIT_S, Pause, PoseStep
 
 PASS_WINDOW_S = 0.1
-# Least length of a pause. A fit uses shorter rests, too. A vehicle that is where it was asked to be stays there
-# until the next side is named.
+# Least length of a pause, and of a rest that a fit uses. A vehicle on the requested side stays on it until the next
+# side is named, so a rest is enough there.
 PAUSE_S, REST_S = 1.0, 0.5
-# Nine tilts may be asked for; a sloppy hand makes this many different ones of them.
+# At most nine tilts can be asked for; a careless hand reaches at least this number of different ones.
 TILTS = 6
 # Beyond these the hand's own acceleration hides the direction of gravity [m/s^2].
 LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
 # Least interval of the fits and of the progress.
 KNOW_EVERY_S = REPORT_EVERY_S = 1.0
-# Interval of the fits while no new orientation is seen: such a fit tells little that is new.
+# Interval of the fits while no new orientation is seen, which change the estimate little.
 SHOW_EVERY_S = 5.0
 # The time that is left is estimated from the pace of at least this number of orientations. When fewer than this number
 # are left, the estimate also needs the information so far: at least the share LEAST_KNOWN of what the target needs.
@@ -155,7 +155,7 @@ class Rotate(PoseStep):
             self._new_s = pause.t_s
             outputs.append(events.Seen(pause.t_s, len(self._coverage.paused), events.down_of(pause.acc), paused=True))
         if ends and (side := self._next_side()) is not None:
-            # It is known without a fit.
+            # The next side of a vehicle is known without a fit.
             self._advised_run, self._prompted_s, self.prompt = pause.run, pause.t_s, self._prompt_for(side)
             outputs += [pause.held(self._held[1]), self.prompt]
         elif ends and not self._requested:
@@ -189,7 +189,7 @@ class Rotate(PoseStep):
             return text
         if number < least:
             return f"{text} (bars full; more sides confirm them)"
-        return text if self._coverage.varied else f"{text} (bars full, but all too much alike)"
+        return text if self._coverage.varied else f"{text} (bars full, but too similar)"
 
     def _estimate_left_s(self, t_s: float) -> float | None:
         """Return the time until the end of the verification, at the pace of the orientations so far; None: unknown.

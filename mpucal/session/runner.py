@@ -77,7 +77,7 @@ class Runner:
             while self._dialogue.measuring:
                 self._step()
         except Abandoned:
-            # A replay that is stopped by its viewer went on when it was recorded.
+            # Where a viewer stops a replay, the recorded session went on: its capture holds no stop.
             with suppress(CaptureError):
                 self._stop_source()
             raise
@@ -108,7 +108,7 @@ class Runner:
             self._poll()
             self._source.forget()
         else:
-            # A sensor ended it by its silence, or a replay by its end.
+            # The sensor was silent for too long, or a replay has ended.
             if not self._ended:
                 self._stop_source()
                 raise SourceError(self._dialogue.decision.why, "check the wiring, and record again")

@@ -79,7 +79,7 @@ USE_TEXTS = {
 
 @dataclass(frozen=True)
 class Pause:
-    """The board has been still in one orientation for `seconds`; `run` numbers the stillnesses.
+    """The board has been still in one orientation for `seconds`, in the stillness number `run`.
 
     Attributes
     ----------

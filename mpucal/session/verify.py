@@ -103,7 +103,7 @@ class Verify(NewPoses):
         self._requested = False  # the first calibration
         self._more = MOST_MORE
         self._doubt: events.Checked | None = None
-        self._known = 0  # new orientations that the first calibration holds, once it is computed again
+        self._known = 0  # new orientations that a first calibration has used that was computed again
         self._now_s = 0.0
 
     def begin(self) -> list[events.Output]:
@@ -120,7 +120,7 @@ class Verify(NewPoses):
         waits = self._closed
         outputs: events.Outputs = [*self._take(sightings)]
         if not self._requested and t_s - self._begun_s >= WAIT_S:
-            # Nobody moves at once: the first calibration is to have as much as possible of the last rest.
+            # A person needs a moment to move: the first calibration uses as much as possible of the last rest.
             self._requested = True
             outputs.append(events.RequestFit(events.FitKind.TRY, TRY_WAIT_S))
         if waits:
@@ -139,7 +139,7 @@ class Verify(NewPoses):
         return [*outputs, events.Finished(not_shown.what)]
 
     def answer(self, event: events.Answer) -> events.Outputs:
-        """Take the first calibration, or its comparison with the new orientations; the rotation's come too late."""
+        """Take the first calibration, or its comparison with new orientations; ignore late answers to the rotation."""
         match event:
             case events.Tried():
                 return self._tried(event)
@@ -239,7 +239,7 @@ class CheckPoses(NewPoses):
         return [*outputs, *self._remind(t_s, self._prompted_s, "no new orientation for a while")]
 
     def _next(self) -> events.Prompt:
-        """See NewPoses; the axis that differs most from all those shown: a bias shows along either way."""
+        """See NewPoses; the axis that differs most from all those shown, in either direction, as both show a bias."""
         along = -self._directions @ self._seen.units.T
         down = self._directions[int((np.abs(along).max(1) + OTHER_WAY * along.max(1)).argmin())]
         text = f"Orientation {self._number + 1} of {self._of}: {{}}, or any other new one, then hold it still for 2 s."

@@ -296,7 +296,7 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
         ),
         (
             [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))],
-            ", but all too much alike",
+            ", but too similar",
         ),
     ],
     ids=["faces", "tilts about one axis"],

@@ -82,8 +82,8 @@ def test_a_low_screen_shows_the_words_without_a_picture(views):
             "xxxxxxxxxO  9 of 10, about 10 s more (bars full; more sides confirm them).",
         ),
         (
-            Progress(25.0, 10.0, 10.0, "12 orientations, of at least 10 (bars full, but all too much alike)"),
-            "xxxxxxxxxx  12 orientations, of at least 10 (bars full, but all too",
+            Progress(25.0, 10.0, 10.0, "12 orientations, of at least 10 (bars full, but too similar)"),
+            "xxxxxxxxxx  12 orientations, of at least 10 (bars full, but too similar).",
         ),
     ],
     ids=["count", "reason", "long"],
