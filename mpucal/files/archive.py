@@ -11,7 +11,7 @@ from ..data import Recording
 from ..errors import RecordingError
 from . import formats
 from .hints import NO_HINTS, Hints
-from .reading import DAMAGED_ZIP, LONGEST_LINE, check_size, reading
+from .reading import DAMAGED_ZIP, LONGEST_LINE, check_size, whole
 
 
 def is_archive(path: Path) -> bool:
@@ -31,11 +31,8 @@ def load_archive(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     with TemporaryDirectory() as folder:
         into = Path(folder) / path.name
-        try:
-            with reading(path):
-                _unpack(path, into)
-        except DAMAGED_ZIP as error:
-            raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
+        with whole(path, "archive", "export the recording again", DAMAGED_ZIP):
+            _unpack(path, into)
         found = into
         while found.is_dir() and (only := _only_one_in(found)):
             found = only

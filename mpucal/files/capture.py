@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from pkgutil import resolve_name
 from tempfile import TemporaryFile
@@ -145,44 +145,33 @@ def _recorder(paths: Sequence[Path]) -> tuple[Recorder, bool]:
     return CHIP, events
 
 
-@dataclass
-class _Piece:
-    """Consecutive runs without a gap: the first without its frames, and the number of frames."""
-
-    head: Run
-    frames: int
-
-
 class Spool:
     """Store of frames in a temporary file, which is deleted with it."""
 
     def __init__(self) -> None:
         self.frames = 0
-        self._pieces: list[_Piece] = []
+        # the first of consecutive runs without a gap, without its frames, and their number of frames
+        self._pieces: list[tuple[Run, int]] = []
         self._file = TemporaryFile()  # noqa: SIM115 - closed with the spool
         finalize(self, self._file.close)
 
     def add(self, runs: Sequence[Run]) -> None:
         """Append runs."""
         for run in runs:
+            head, count = self._pieces[-1] if self._pieces else (run, 0)
+            if not count or run.gap or (run.segment, run.first) != (head.segment, head.first + count):
+                head, count = replace(run, frames=run.frames[:0]), 0
+                self._pieces.append((head, count))
+            self._pieces[-1] = head, count + len(run.frames)
             self._file.write(run.frames.tobytes())
             self.frames += len(run.frames)
-            if not self._continues(run):
-                self._pieces.append(_Piece(replace(run, frames=run.frames[:0]), 0))
-            self._pieces[-1].frames += len(run.frames)
 
     def runs(self) -> Iterator[Run]:
         """Yield all frames, in runs of at most RUN."""
         self._file.seek(0)
-        for piece in self._pieces:
-            words, first = piece.head.frames.shape[1], piece.head.first
-            for at in range(0, piece.frames, RUN):
-                count = min(RUN, piece.frames - at)
-                frames = np.frombuffer(self._file.read(2 * words * count), np.int16).reshape(count, words)
-                yield Run(piece.head.segment, first + at, frames, gap=piece.head.gap and at == 0)
-
-    def _continues(self, run: Run) -> bool:
-        if not self._pieces or run.gap:
-            return False
-        last = self._pieces[-1]
-        return (last.head.segment, last.head.first + last.frames) == (run.segment, run.first)
+        for head, count in self._pieces:
+            words = head.frames.shape[1]
+            for at in range(0, count, RUN):
+                data = self._file.read(2 * words * min(RUN, count - at))
+                frames = np.frombuffer(data, np.int16).reshape(-1, words)
+                yield Run(head.segment, head.first + at, frames, gap=head.gap and at == 0)

@@ -8,11 +8,10 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from io import StringIO
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
@@ -57,11 +56,11 @@ def csv_rows(path: Path) -> Rows:
     first = StringIO(text, newline="").readline()
     header = [name.strip().lower() for name in next(csv.reader([first]), [])]
     begin = len(begun) - len(text.removeprefix(first).encode())
-    table = _Table(path, begin, header, _column_places(header, path))
-    others = ignored_sensors(header, [c for c in parse_header(header) if c.name in table.places])
+    places = _column_places(header, path)
+    others = ignored_sensors(header, [c for c in parse_header(header) if c.name in places])
     interrupted: list[float] = []
     return Rows(
-        check_runs(_go_on(table.runs(), interrupted), path.name),
+        check_runs(_go_on(_runs(path, begin, header, places), interrupted), path.name),
         name=path.name,
         utc_ns=_utc_ns(header, second),
         taken=f"{path.name}: {others}." if others else None,
@@ -112,42 +111,32 @@ def _column_places(header: list[str], path: Path) -> dict[str, int]:
     return {name: header.index(name) for name in wanted}
 
 
-@dataclass(frozen=True)
-class _Table:
-    """The lines of a table from byte `begin` on; `places` maps column name to cell."""
-
-    path: Path
-    begin: int
-    header: list[str]
-    places: dict[str, int]
-
-    def runs(self) -> Iterator[Samples]:
-        """Yield the samples, a block of lines at a time."""
-        with reading(self.path), self.path.open("rb") as file:
-            file.seek(self.begin)
-            line = 1
-            for block in _blocks(file, self.path):
-                values = numbers(block, len(self.header), list(self.places.values()))
-                values = self._parse_slowly(block, line) if values is None else values
-                line += block.count(b"\n")
-                if len(values):
-                    yield _samples(values, sure=TEMPERATURE in self.places)
-
-    def _parse_slowly(self, block: bytes, before: int) -> Vector:
-        """Return (n, 7 or 8) numbers of lines of which some lack cells, or hold what only Python reads.
-
-        Raises
-        ------
-        RecordingError : too many cells are not numbers; the message names a line, of which `before` are above.
-        """
-        table = read_table(decode_text(block, self.path.name), str(self.path), self.header, 0, ",")
-        table = replace(table, lines=[before + line for line in table.lines])
-        values = table.numbers([Column(name, place, "") for name, place in self.places.items()])
-        return np.asarray(values[~np.isnan(values).all(axis=1)])
+def _runs(path: Path, begin: int, header: list[str], places: dict[str, int]) -> Iterator[Samples]:
+    """Yield the samples in the lines from byte `begin` on, a block at a time; `places` maps column name to cell."""
+    line = 1
+    for block in _blocks(path, begin):
+        values = numbers(block, len(header), list(places.values()))
+        values = _parse_slowly(block, path, header, places, line) if values is None else values
+        line += block.count(b"\n")
+        if len(values):
+            yield _samples(values, sure=TEMPERATURE in places)
 
 
-def _blocks(file: IO[bytes], path: Path) -> Iterator[bytes]:
-    """Yield whole lines, some BLOCK bytes at a time."""
+def _parse_slowly(block: bytes, path: Path, header: list[str], places: dict[str, int], above: int) -> Vector:
+    """Return (n, 7 or 8) numbers of lines of which some lack cells, or hold what only Python reads.
+
+    Raises
+    ------
+    RecordingError : too many cells are not numbers; the message names a line, of which so many are `above` the block.
+    """
+    table = read_table(decode_text(block, path.name), str(path), header, 0, ",")
+    table = replace(table, lines=[above + line for line in table.lines])
+    values = table.numbers([Column(name, place, "") for name, place in places.items()])
+    return np.asarray(values[~np.isnan(values).all(axis=1)])
+
+
+def _blocks(path: Path, begin: int) -> Iterator[bytes]:
+    """Yield whole lines from byte `begin` on, some BLOCK bytes at a time."""
 
     def next_lines() -> bytes:
         block = file.read(BLOCK) + file.readline(LONGEST_LINE)
@@ -155,11 +144,13 @@ def _blocks(file: IO[bytes], path: Path) -> Iterator[bytes]:
             raise RecordingError(f"{path} holds a line of more than {LONGEST_LINE >> 20} MB", "record it again")
         return block
 
-    while block := next_lines():
-        # a line break within quotation marks does not end a line
-        while block.count(b'"') % 2 and len(block) <= BLOCK + LONGEST_LINE and (more := next_lines()):
-            block += more
-        yield block
+    with reading(path), path.open("rb") as file:
+        file.seek(begin)
+        while block := next_lines():
+            # a line break within quotation marks does not end a line
+            while block.count(b'"') % 2 and len(block) <= BLOCK + LONGEST_LINE and (more := next_lines()):
+                block += more
+            yield block
 
 
 def _samples(values: Vector, sure: bool) -> Samples:

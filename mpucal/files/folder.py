@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import shlex
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -88,20 +87,19 @@ def load_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     known = all(part.utc_ns is not None for part in parts)
     if known:
         parts = [parts[at] for at in np.argsort(begins_ns, kind="stable")]
-    joined: list[Recording] = []
-    end = 0.0
+    joined: list[Samples] = []
+    interrupted: list[float] = []
+    first, end = parts[0], 0.0
     for part in parts:
-        shift = ((part.utc_ns or 0) - (parts[0].utc_ns or 0)) * 1e-9
+        shift = ((part.utc_ns or 0) - (first.utc_ns or 0)) * 1e-9
         # times of day that overlap cannot be of one sensor's clock
         if not known or part.t[0] + shift <= end:
             shift = end + GAP_S * bool(joined) - float(part.t[0])
-        joined.append(replace(part, t=part.t + shift, interrupted=tuple(at + shift for at in part.interrupted)))
+        joined.append(replace(part, t=part.t + shift))
         end = float(joined[-1].t[-1])
-    whole = Samples.joined([*joined])
+        interrupted += [*(at + shift for at in part.interrupted), end]
+    whole = Samples.joined(joined)
     whole.gap[np.cumsum([len(part) for part in parts])[:-1]] = True
-    ends = (float(part.t[-1]) for part in joined[:-1])
-    interrupted = (*chain.from_iterable(part.interrupted for part in joined), *ends)
-    first = parts[0]
     taken = (
         f"{name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
         f" {', '.join(read)}. {first.taken or ''}"
@@ -109,7 +107,7 @@ def load_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     if failed:
         taken += f" Left out were {', '.join(failed)} ({next(iter(failed.values())).what})."
     facts: dict[str, Any] = {"sensor": first.sensor, "name": name, "utc_ns": first.utc_ns, "taken": taken.strip()}
-    return Recording(**vars(whole), **facts, interrupted=interrupted)
+    return Recording(**vars(whole), **facts, interrupted=tuple(interrupted[:-1]))
 
 
 def _read_each(files: list[Path], hints: Hints) -> tuple[dict[str, Recording], dict[str, RecordingError]]:
@@ -138,10 +136,9 @@ def _read_alike(files: list[Path], read: dict[str, Recording], hints: Hints) -> 
 
 def _recordings(path: Path) -> list[Path]:
     files = sorted(child for child in path.iterdir() if child.is_file())
-    if {file.name for file in files} & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(
-        files
-    ) > MOST_FILES:
+    names = {file.name for file in files}
+    if names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(files) > MOST_FILES:
         return []
-    sides = tables_of_sides(file.name for file in files)
+    sides = tables_of_sides(names)
     found = [file for file in files if file.name in sides or (not sides and file.suffix.lower() in SUFFIXES)]
     return [file for file in found if formats.recognise(file) is not None]

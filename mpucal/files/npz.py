@@ -23,7 +23,7 @@ from ..data import Samples, Sensor
 from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ..strict_json import parse_json
-from .reading import DAMAGED_ZIP, check_size, reading
+from .reading import DAMAGED_ZIP, check_size, whole
 from .rows import Rows, Write, check_runs, describe, make_recording, shown_units, to_si
 from .tables.times import plausible_utc_ns
 
@@ -74,16 +74,13 @@ def npz_rows(path: Path) -> Rows:
 @contextmanager
 def _open_archive(path: Path) -> Iterator[Any]:
     """Open an archive; an error of the block becomes a RecordingError."""
-    try:
-        with reading(path), path.open("rb") as file:
-            if not zipfile.is_zipfile(file):
-                raise RecordingError(f"{path} is not a whole NumPy archive", _REMEDY)
-            file.seek(0)
-            # no pickles: a recording must not run code
-            with np.load(file, allow_pickle=False) as archive:
-                yield archive
-    except DAMAGED as error:
-        raise RecordingError(f"{path} is not a whole NumPy archive ({error})", _REMEDY) from error
+    with whole(path, "NumPy archive", _REMEDY, DAMAGED), path.open("rb") as file:
+        if not zipfile.is_zipfile(file):
+            raise RecordingError(f"{path} is not a whole NumPy archive", _REMEDY)
+        file.seek(0)
+        # no pickles: a recording must not run code
+        with np.load(file, allow_pickle=False) as archive:
+            yield archive
 
 
 def _flat(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:

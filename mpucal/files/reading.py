@@ -18,7 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..errors import RecordingError
+from ..errors import MpucalError, RecordingError
 
 MOST_MB = 512
 VARIABLE = "MPUCAL_MOST_MB"
@@ -101,6 +101,18 @@ def reading(path: Path) -> Iterator[None]:
         raise RecordingError(
             f"cannot read {path} ({error.strerror or error})", "check the path and its permissions"
         ) from error
+
+
+@contextmanager
+def whole(path: Path, what: str, remedy: str, errors: tuple[type[Exception], ...]) -> Iterator[None]:
+    """Turn an OSError or one of `errors` of the block, but mpucal's own, into a RecordingError that names `path`."""
+    try:
+        with reading(path):
+            yield
+    except MpucalError:
+        raise
+    except errors as error:
+        raise RecordingError(f"{path} is not a whole {what} ({error})", remedy) from error
 
 
 def first_bytes(path: Path, count: int = SNIFFED) -> bytes:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +29,11 @@ from .tables.cells import since_first
 from .tables.shown_units import acceleration_unit
 from .tables.streams import join_streams
 from .tables.times import Stream
-from .tables.units import COUNTS
 
 IMU_OF_ROS1 = "sensor_msgs/Imu"
 REMEDY = "give a bag with sensor_msgs/Imu"
+# quantity -> field of the message, and what it is
+_FIELDS = {"acc": ("linear_acceleration", "acceleration"), "gyr": ("angular_velocity", "rate")}
 
 
 def is_folder_of_ros(path: Path) -> bool:
@@ -114,7 +115,8 @@ def _chosen(name: str, connections: Iterable[Any], all_topics: Iterable[str], hi
         return asked
     if not there:
         raise RecordingError(f"{name} holds no {IMU}; its topics are {', '.join(all_topics) or 'none'}", REMEDY)
-    apart = [[topic for topic in there if word in topic and other not in topic] for word, other in _WORDS]
+    words = (("accel", "gyro"), ("gyro", "accel"))
+    apart = [[topic for topic in there if word in topic and other not in topic] for word, other in words]
     if len(there) == 2 and all(len(of) == 1 for of in apart):
         return [apart[0][0], apart[1][0]]
     if len(there) > 1:
@@ -122,54 +124,45 @@ def _chosen(name: str, connections: Iterable[Any], all_topics: Iterable[str], hi
     return there
 
 
-_WORDS = (("accel", "gyro"), ("gyro", "accel"))
-
-
-@dataclass
 class _Messages:
     """Messages of one topic."""
 
-    stamps: list[int] = field(default_factory=list)
-    received: list[int] = field(default_factory=list)
-    acc: list[tuple[float, float, float]] = field(default_factory=list)
-    gyr: list[tuple[float, float, float]] = field(default_factory=list)
-    measured: dict[str, bool] = field(default_factory=lambda: {"acc": True, "gyr": True})
+    def __init__(self) -> None:
+        self._stamps: list[int] = []
+        self._received: list[int] = []
+        self._values: dict[str, list[tuple[float, float, float]]] = {of: [] for of in _FIELDS}
+        self._not_measured: set[str] = set()
 
     def add(self, message: Any, t_ns: int) -> None:
-        stamp, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
-        self.stamps.append(stamp.sec * S + stamp.nanosec)
-        self.received.append(t_ns)
-        self.acc.append((a.x, a.y, a.z))
-        self.gyr.append((w.x, w.y, w.z))
-        self.measured["acc"] &= message.linear_acceleration_covariance[0] != NOT_MEASURED
-        self.measured["gyr"] &= message.angular_velocity_covariance[0] != NOT_MEASURED
+        self._stamps.append(message.header.stamp.sec * S + message.header.stamp.nanosec)
+        self._received.append(t_ns)
+        for of, (field, _) in _FIELDS.items():
+            value = getattr(message, field)
+            self._values[of].append((value.x, value.y, value.z))
+            if getattr(message, f"{field}_covariance")[0] == NOT_MEASURED:
+                self._not_measured.add(of)
 
     @property
     def is_stamped(self) -> bool:
-        return any(self.stamps)
+        return any(self._stamps)
 
     def stream(self, quantity: str, name: str) -> Stream:
         """Return the samples of a quantity."""
-        times = self.stamps if self.is_stamped else self.received
+        times = self._stamps if self.is_stamped else self._received
         if times and max(times) >> 63:
             raise RecordingError(f"{name} holds impossible times", "give the bag as it was recorded")
-        values = np.array(getattr(self, quantity), float).reshape(-1, 3)
-        values[~np.isfinite(values)] = np.nan
-        if not self.measured[quantity]:
+        if quantity in self._not_measured:
             raise RecordingError(
-                f"{name}: by their covariances, the messages hold no {_NAMES[quantity]}",
+                f"{name}: by their covariances, the messages hold no {_FIELDS[quantity][1]}",
                 "name the topics of the accelerometer and of the gyroscope with --topic ONE,OTHER",
             )
-        unit = "rad/s"
-        if quantity == "acc":
-            whole = values[np.isfinite(values).all(axis=1)]
-            seen = acceleration_unit(whole) if len(whole) else ""
-            unit = seen if seen and seen != COUNTS else "m/s^2"
         ticks, origin = since_first(np.array(times, np.int64))
-        return Stream(ticks, values, origin, "ns", unit)
-
-
-_NAMES = {"acc": "acceleration", "gyr": "rate"}
+        stream = Stream(ticks, np.array(self._values[quantity], float).reshape(-1, 3), origin, "ns", "rad/s")
+        stream.values[~np.isfinite(stream.values)] = np.nan
+        if quantity == "acc":
+            seen = stream.complete.any() and acceleration_unit(stream.values[stream.complete])
+            stream = replace(stream, unit=seen or "m/s^2")
+        return stream
 
 
 def _read_done(path: Path) -> str:

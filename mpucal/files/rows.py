@@ -17,6 +17,8 @@ from .tables.times import how_often
 from .tables.units import QUANTITIES
 
 SI = {"acc": "m/s^2", "gyr": "rad/s"}
+# attributes of rows that are those of a recording
+_KNOWN = ("sensor", "flat", "autopilot", "recovered", "name", "utc_ns", "taken")
 S = TypeVar("S", bound=Samples)
 
 
@@ -52,19 +54,9 @@ class Rows:
     @classmethod
     def of(cls, recording: Recording, done: str = "") -> Rows:
         """Return the rows of a recording in memory."""
-        return cls(
-            (recording.part(first, first + RUN) for first in range(0, len(recording), RUN)),
-            recording.sensor,
-            recording.flat,
-            recording.autopilot,
-            recording.recovered,
-            recording.name,
-            len(recording.others),
-            done,
-            utc_ns=recording.utc_ns,
-            taken=recording.taken,
-            interrupted=[*recording.interrupted],
-        )
+        runs = (recording.part(first, first + RUN) for first in range(0, len(recording), RUN))
+        known = {key: getattr(recording, key) for key in _KNOWN}
+        return cls(runs, **known, others=len(recording.others), done=done, interrupted=[*recording.interrupted])
 
     def recording(self) -> Recording:
         """Return the whole recording, checked; a plain one has even times and SI units."""
@@ -75,8 +67,8 @@ class Rows:
             remarks += [describe(self.name, found)]
         taken = " ".join(filter(None, remarks)) or None
         whole = make_recording(**vars(samples), flat=self.flat, sensor=self.sensor, name=self.name, taken=taken)
-        known: dict[str, Any] = {"utc_ns": self.utc_ns, "interrupted": tuple(self.interrupted)}
-        return replace(whole, autopilot=self.autopilot, recovered=self.recovered, **known)
+        known = {key: getattr(self, key) for key in ("autopilot", "recovered", "utc_ns")}
+        return replace(whole, **known, interrupted=tuple(self.interrupted))
 
     def notes(self) -> list[str]:
         """Return sentences on the samples, when the runs have been read."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Iterable
-from contextlib import redirect_stdout
+from contextlib import AbstractContextManager, redirect_stdout
 from io import BufferedReader, FileIO, StringIO
 from pathlib import Path
 from typing import Any
@@ -23,13 +23,12 @@ from ..data import Recording, Vector
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
 from .npz import DAMAGED
-from .reading import import_extra, reading
+from .reading import import_extra, whole
 from .tables.cells import since_first
 from .tables.streams import join_streams
 from .tables.times import Stream
 
 COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
-_DAMAGE = (*DAMAGED, struct.error)
 
 
 class _PastTheEnd(BufferedReader):
@@ -59,47 +58,39 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
     RecordingError : it cannot be read, or holds no such topics.
     """
     reader = import_extra("pyulog", "px4", path)
-    try:
-        # pyulog prints damage to stdout, which is for results
-        with reading(path), _PastTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
-            log = reader.ULog(file, [COMBINED, ACCEL, GYRO])
-    except RecordingError:
-        raise
-    except Exception as error:
-        # pyulog raises bare Exceptions, too
-        raise _damage_error(path, error) from error
-    topics = {(data.name, data.multi_id): data.data for data in log.data_list}
     if hints.topic not in (None, COMBINED, ACCEL):
         raise RecordingError(f"{path.name} is read from {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
-    raw = (ACCEL, 0) in topics and (GYRO, 0) in topics
-    damage = "it is damaged, and its whole part was read" if log.file_corruption else ""
-    try:
-        fast = raw and all(_is_fast(topics[name, 0]) for name in (ACCEL, GYRO))
-        if raw and (hints.topic == ACCEL or (hints.topic is None and (fast or (COMBINED, 0) not in topics))):
-            acc, gyr = (_stream(topics[n, 0], "xyz", unit) for n, unit in ((ACCEL, "m/s^2"), (GYRO, "rad/s")))
-            others = sum(name == ACCEL for name, _ in topics) - 1
+    # pyulog raises bare Exceptions, too, and prints damage to stdout, which is for results
+    with _whole(path, (Exception,)), _PastTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
+        log = reader.ULog(file, [COMBINED, ACCEL, GYRO])
+    topics = {data.name: data.data for data in log.data_list if data.multi_id == 0}
+    with _whole(path, (*DAMAGED, struct.error)):
+        raw = {ACCEL, GYRO} <= topics.keys()
+        fast = raw and all(_is_fast(topics[name]) for name in (ACCEL, GYRO))
+        topic = hints.topic or (ACCEL if fast or COMBINED not in topics else COMBINED)
+        if topic == ACCEL and raw:
+            acc, gyr = _stream(topics[ACCEL], "xyz", "m/s^2"), _stream(topics[GYRO], "xyz", "rad/s")
+            others = sum(data.name == ACCEL for data in log.data_list) - 1
             more = f"{others} more accelerometers are in it" if others else ""
-            remark = f"from {ACCEL} and {GYRO}, the first of each"
-            return join_streams(acc, gyr, hints, path.name, remarks=[remark, more, damage])
-        if (COMBINED, 0) in topics and hints.topic != ACCEL:
-            combined = topics[COMBINED, 0]
-            names = [f"accelerometer_m_s2[{axis}]" for axis in range(3)]
-            acc = _stream(combined, names, "m/s^2", _later_us(combined))
+            remarks = [f"from {ACCEL} and {GYRO}, the first of each", more]
+        elif topic == COMBINED and COMBINED in topics:
+            combined = topics[COMBINED]
+            acc = _stream(combined, [f"accelerometer_m_s2[{axis}]" for axis in range(3)], "m/s^2", _later_us(combined))
             gyr = _stream(combined, [f"gyro_rad[{axis}]" for axis in range(3)], "rad/s")
             slow = f"{ACCEL} is logged too slowly" if raw and not fast else ""
-            remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
-            return join_streams(acc, gyr, hints, path.name, remarks=[remark, slow, damage])
-    except _DAMAGE as error:
-        raise _damage_error(path, error) from error
-    has = ", ".join(sorted({name for name, _ in topics})) or "none of them"
-    raise RecordingError(
-        f"{path.name} holds no {hints.topic or f'{ACCEL} with {GYRO}, and no {COMBINED}'}: it has {has}",
-        "log them, with SDLOG_PROFILE",
-    )
+            remarks = [f"from {COMBINED}, which PX4 has corrected by its parameters already", slow]
+        else:
+            has = ", ".join(sorted({data.name for data in log.data_list})) or "none of them"
+            raise RecordingError(
+                f"{path.name} holds no {hints.topic or f'{ACCEL} with {GYRO}, and no {COMBINED}'}: it has {has}",
+                "log them, with SDLOG_PROFILE",
+            )
+        remarks.append("it is damaged, and its whole part was read" if log.file_corruption else "")
+        return join_streams(acc, gyr, hints, path.name, remarks=remarks)
 
 
-def _damage_error(path: Path, error: Exception) -> RecordingError:
-    return RecordingError(f"{path} is not a whole log of PX4 ({error})", "fetch it from the vehicle again")
+def _whole(path: Path, errors: tuple[type[Exception], ...]) -> AbstractContextManager[None]:
+    return whole(path, "log of PX4", "fetch it from the vehicle again", errors)
 
 
 def _is_fast(data: Any) -> bool:

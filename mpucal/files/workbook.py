@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element, ParseError, iterparse
 from ..data import Recording
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
-from .reading import DAMAGED_ZIP, MEMORY_PER_TEXT, check_size, reading
+from .reading import DAMAGED_ZIP, MEMORY_PER_TEXT, check_size, whole
 from .tables.load import find_any_table, is_table_of_sensors, table_of_text
 from .tables.names import ACC, GYR, first_triple
 from .tables.phone import is_pair, recording_of_tables
@@ -24,6 +24,7 @@ from .tables.table import Table
 
 _SHEET = re.compile(r"xl/worksheets/sheet(\d{1,4})\.xml").fullmatch
 _STRINGS, _BOOK, _RELATIONS = "xl/sharedStrings.xml", "xl/workbook.xml", "xl/_rels/workbook.xml.rels"
+_REMEDY = "save its sheet as .csv"
 
 
 def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -33,14 +34,11 @@ def load_workbook(path: Path, hints: Hints = NO_HINTS) -> Recording:
     ------
     RecordingError : it cannot be read, or does not say all that is needed; the message names what is missing.
     """
-    try:
-        with reading(path), zipfile.ZipFile(path) as archive:
-            check_size(path, MEMORY_PER_TEXT * sum(member.file_size for member in archive.infolist()))
-            sheets = dict(_sheets(archive))
-    except (*DAMAGED_ZIP, LookupError, ParseError) as error:
-        raise RecordingError(f"{path} is not a whole workbook ({error})", "save its sheet as .csv") from error
+    with whole(path, "workbook", _REMEDY, (*DAMAGED_ZIP, LookupError, ParseError)), zipfile.ZipFile(path) as archive:
+        check_size(path, MEMORY_PER_TEXT * sum(member.file_size for member in archive.infolist()))
+        sheets = dict(_sheets(archive))
     if not sheets:
-        raise RecordingError(f"{path} holds no xl/worksheets/sheet1.xml", "save its sheet as .csv")
+        raise RecordingError(f"{path} holds no xl/worksheets/sheet1.xml", _REMEDY)
     texts = [*sheets.values()]
     chosen = next((text for text in texts if is_table_of_sensors(text, path.name)), None)
     if chosen is None and not hints.columns and is_pair(tables := _tables(sheets)):

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clocks.stamps import FEWEST
+from ..hints import ROLES
 from .guess import is_clock
 from .names import axes_of, names_both, parse_header
-from .several import INSTANCE
+from .several import INSTANCE, MOST_SENSORS
 from .table import Table
 from .text import stated_rate_hz
 
@@ -40,20 +40,20 @@ def table_of_labels(name: str, arrays: Arrays) -> Table | None:
 
 
 def _columns(arrays: Arrays) -> dict[str, NDArray[Any]]:
-    """Return name -> (n,) for the arrays of the largest number of samples; FEWEST columns or more are samples."""
+    """Return name -> (n,) for the arrays of the largest number of samples, of which a matrix has more than columns."""
     tables = {}
     for name, array in arrays.items():
         if array.dtype.kind in "iufMmU" and 0 < np.squeeze(array).ndim <= 2:
             table = np.squeeze(array)
             table = table[:, None] if table.ndim == 1 else table
-            tables[name] = table.T if table.shape[0] < FEWEST <= table.shape[1] else table
+            tables[name] = table.T if 0 < table.shape[0] < table.shape[1] else table
     if not tables:
         return {}
     sensors = {name: table for name, table in tables.items() if table.shape[1] == 3 and axes_of(name)}
     n = max(len(table) for table in (sensors or tables).values())
     found: dict[str, NDArray[Any]] = {}
     for name, table in tables.items():
-        if len(table) == n and table.shape[1] < FEWEST:
+        if len(table) == n and table.shape[1] <= MOST_SENSORS * len(ROLES[1:]):
             names = axes_of(name) if name in sensors else [f"{name}({i + 1})" for i in range(table.shape[1])]
             names = [name] if table.shape[1] == 1 else names
             found |= dict(zip(names, table.T, strict=True))

@@ -16,23 +16,8 @@ import numpy as np
 from ...clocks.stamps import FEWEST, sample_period
 from ...data import ACCEL_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..hints import NO_HINTS, ROLES, Hints
-from .shown_units import (
-    ANY_HZ,
-    EXPLAINED,
-    FASTEST_HZ,
-    acceleration_unit,
-    are_counts,
-    are_increments,
-    counts_per_g,
-    gyro_unit,
-    is_gravity,
-    mean_acceleration_unit,
-    seem_counts,
-    time_unit,
-    to_signed,
-    turning,
-    typical_size,
-)
+from . import shown_units as units
+from .table import are_many
 from .units import OF_INCREMENTS, QUANTITIES
 
 # place -> (n,)
@@ -64,7 +49,7 @@ def guess_columns(of: Columns, hints: Hints) -> dict[str, int]:
         turned = {pair: _turned(of, pair, t, any_rate=at is None) for pair in pairs}
         # rates turn a magnetic field, too, which in gauss is about half as long as gravity in g
         for size in (_is_in_si, _is_about_one_g, _has_size, len):
-            alike = [pair for pair in pairs if turned[pair] >= EXPLAINED and size(_stacked(of, pair[:3]))]
+            alike = [pair for pair in pairs if turned[pair] >= units.EXPLAINED and size(_stacked(of, pair[:3]))]
             best = max((turned[pair] for pair in alike), default=0.0)
             found = next((pair for pair in alike if turned[pair] >= best - CORRELATION_MARGIN), None)
             if found is not None and not _has_rival(of, found):
@@ -90,7 +75,7 @@ def side_by_side(of: Columns) -> list[dict[str, int]]:
     turned = {pair: _turned(of, pair, t, any_rate=not clocks) for pair in pairs}
     found: list[Places] = []
     for pair in sorted(turned, key=turned.__getitem__, reverse=True):
-        if turned[pair] >= EXPLAINED and not any({*pair} & {*other} for other in found):
+        if turned[pair] >= units.EXPLAINED and not any({*pair} & {*other} for other in found):
             found.append(pair)
     return [dict(zip(ROLES[1:], pair, strict=True)) for pair in sorted(found, key=min)]
 
@@ -104,7 +89,7 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     ----------
     arrays : place -> the array of which it is a column; a triple is of one.
     """
-    increasing = [place for place in of if _hardly_decreases(of[place])]
+    increasing = [place for place in of if increases(of[place])]
     clocks = clocks or [place for place in increasing if is_even_clock(of[place]) or _begins_anew(of[place])]
     places = [place for place in of if place not in {*clocks, *increasing}]
     vary = [place for place in places if np.ptp(of[place]) > 0.0]
@@ -129,7 +114,7 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     others.sort(key=lambda triple: _least(triples[triple]) - _turning(t, values, triples[triple]))
     found = [place for triple in (acc, *others[:1]) for place in triple]
     roles = dict(zip(ROLES[1:], found, strict=False)) | dict(zip("t", clocks, strict=False))
-    return roles, OF_INCREMENTS if increments else "" if _has_size(values) else mean_acceleration_unit(values)
+    return roles, OF_INCREMENTS if increments else "" if _has_size(values) else units.mean_acceleration_unit(values)
 
 
 def _sized_triples(
@@ -141,15 +126,12 @@ def _sized_triples(
     """
     of_arrays = (_triples([*group]) for _, group in groupby(places, arrays.get))
     triples = {triple: _stacked(of, triple) for group in of_arrays for triple in group}
-    sized = [triple for triple, a in triples.items() if are_counts(a) or mean_acceleration_unit(a)]
+    sized = [triple for triple, a in triples.items() if units.are_counts(a) or units.mean_acceleration_unit(a)]
     steady = [triple for triple in sized if _keeps_size(triples[triple]) and all(np.ptp(of[at]) > 0.0 for at in triple)]
-    counts = [a for a in map(triples.__getitem__, steady) if seem_counts(a) and _least(a) > 1.0 - MOST_SCATTER]
+    counts = [a for a in map(triples.__getitem__, steady) if units.seem_counts(a) and _least(a) > 1.0 - MOST_SCATTER]
     most = max(map(_spread, counts), default=0.0)
-    return (
-        triples,
-        sized,
-        next((triple for triple in steady if SPREAD_RATIO * _spread(triples[triple]) >= most), ()),
-    )
+    first = next((triple for triple in steady if SPREAD_RATIO * _spread(triples[triple]) >= most), ())
+    return triples, sized, first
 
 
 def _triples(places: Sequence[int]) -> list[tuple[int, ...]]:
@@ -159,7 +141,7 @@ def _triples(places: Sequence[int]) -> list[tuple[int, ...]]:
 
 def _stacked(of: Columns, places: Sequence[int]) -> Vector:
     """Return columns as (n, k) numbers, counts with their sign."""
-    return to_signed(np.column_stack([of[place] for place in places]))
+    return units.to_signed(np.column_stack([of[place] for place in places]))
 
 
 def _least(values: Vector) -> float:
@@ -175,22 +157,22 @@ def _spread(values: Vector) -> float:
 
 
 def _turning(t: Vector, acc: Vector, rates: Vector) -> float:
-    """Return how well (n, 3) rates, of which the bias may be large, explain the turning of gravity; see turning."""
-    return turning(t, acc, rates - np.median(rates, axis=0))[1]
+    """Return how well (n, 3) rates, whose bias may be large, explain the turning of gravity; see units.turning."""
+    return units.turning(t, acc, rates - np.median(rates, axis=0))[1]
 
 
 def _is_one_g(acc: Vector) -> bool:
     """Return True if (n, 3) numbers are nearly 1 g long in m/s^2, g or counts of 16 bits, and vary."""
-    size, scatter = typical_size(acc)
-    units = [QUANTITIES["acc"]["m/s^2"] / STANDARD_GRAVITY_MPS2, 1.0]
-    if size > 0.0 and are_counts(acc):
-        units = [1.0 / counts_per_g(size)] if size < ACCEL_COUNTS else []
-    return 0.0 < scatter < ONE_G * size and any(abs(size * si - 1.0) < ONE_G for si in units)
+    size, scatter = units.typical_size(acc)
+    g_of_units = [QUANTITIES["acc"]["m/s^2"] / STANDARD_GRAVITY_MPS2, 1.0]
+    if size > 0.0 and units.are_counts(acc):
+        g_of_units = [1.0 / units.counts_per_g(size)] if size < ACCEL_COUNTS else []
+    return 0.0 < scatter < ONE_G * size and any(abs(size * g - 1.0) < ONE_G for g in g_of_units)
 
 
 def _is_in_si(acc: Vector) -> bool:
     """Return True if (n, 3) numbers are about 1 g long in m/s^2."""
-    return acceleration_unit(acc) == "m/s^2" and is_gravity(typical_size(acc)[0])
+    return units.acceleration_unit(acc) == "m/s^2" and units.is_gravity(units.typical_size(acc)[0])
 
 
 def _has_rival(of: Columns, pair: Places) -> bool:
@@ -202,37 +184,41 @@ def _has_rival(of: Columns, pair: Places) -> bool:
 
 def _is_about_one_g(acc: Vector) -> bool:
     """Return True if (n, 3) numbers are counts, or about 1 g long in the unit that they show."""
-    size, unit = typical_size(acc)[0], acceleration_unit(acc)
-    return are_counts(acc) or (unit != "" and is_gravity(size * QUANTITIES["acc"][unit]))
+    size, unit = units.typical_size(acc)[0], units.acceleration_unit(acc)
+    return units.are_counts(acc) or (unit != "" and units.is_gravity(size * QUANTITIES["acc"][unit]))
 
 
 def _has_size(acc: Vector) -> bool:
     """Return True if (n, 3) numbers are as large as gravity in some unit, or counts."""
-    return are_counts(acc) or bool(acceleration_unit(acc))
+    return units.are_counts(acc) or bool(units.acceleration_unit(acc))
 
 
 def _keeps_size(values: Vector) -> bool:
     """Return True if (n, 3) numbers vary, and keep their length as gravity does."""
-    size, scatter = typical_size(values)
+    size, scatter = units.typical_size(values)
     return 0.0 < scatter <= MOST_SCATTER * size
 
 
 def is_clock(column: Vector) -> bool:
     """Return True if (n,) numbers increase, and do not only repeat."""
+    return _advances(column) and bool((np.diff(column[np.isfinite(column)]) >= 0).all())
+
+
+def _advances(column: Vector) -> bool:
+    """Return True if more than one of a hundred (n,) numbers is larger than the one before."""
     steps = np.diff(column[np.isfinite(column)])
-    return len(steps) > 0 and bool((steps >= 0).all() and (steps > 0).mean() > 0.01)
+    return len(steps) > 0 and bool((steps > 0).mean() > 0.01)
 
 
-def _hardly_decreases(column: Vector) -> bool:
-    """Return True if (n,) numbers are a clock's, which may begin anew."""
-    steps = np.diff(column)
-    few_back = int(np.count_nonzero(steps < 0)) * FEWEST <= len(steps)
-    return len(steps) > 0 and few_back and bool((steps > 0).mean() > 0.01)
+def increases(column: Vector) -> bool:
+    """Return True if (n,) numbers are a clock's, which may begin anew: they hardly ever decrease."""
+    return sample_period(column) > 0.0 and not are_many(int(np.count_nonzero(np.diff(column) < 0)), column[1:])
 
 
 def _begins_anew(column: Vector) -> bool:
     """Return True if (n,) numbers of a clock, by their step, are those of several recordings."""
-    return bool((np.diff(column) < 0).any() and time_unit(sample_period(column)))
+    again = _advances(column) and bool((np.diff(column) < 0).any())
+    return again and bool(units.time_unit(sample_period(column)))
 
 
 def is_index(column: Vector) -> bool:
@@ -245,15 +231,16 @@ def is_even_clock(column: Vector) -> bool:
     if not is_clock(column) or is_index(column):
         return False
     correlation = float(np.corrcoef(column, np.arange(len(column)))[0, 1])
-    return correlation > LEAST_CORRELATION and bool(time_unit(sample_period(column)))
+    return correlation > LEAST_CORRELATION and bool(units.time_unit(sample_period(column)))
 
 
 def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
     step = 0.0 if clock is None else sample_period(clock)
     # a clock may stand still
     if clock is None or not step:
-        return np.arange(n) / (hints.rate_hz or ANY_HZ)
-    si = next((si for si in QUANTITIES["t"].values() if 1 / FASTEST_HZ <= step * si <= 1.0), 1.0 / ANY_HZ / step)
+        return np.arange(n) / (hints.rate_hz or units.ANY_HZ)
+    likely = (si for si in QUANTITIES["t"].values() if 1 / units.FASTEST_HZ <= step * si <= 1.0)
+    si = next(likely, 1.0 / units.ANY_HZ / step)
     return np.asarray((clock - clock[0]) * si)
 
 
@@ -270,11 +257,7 @@ def _turned(of: Columns, pair: Sequence[int], t: Vector, *, any_rate: bool) -> f
     # a place, whose numbers hardly change, is no rate about one axis
     if _spread(gyr) * FEWEST < 1.0:
         return 0.0
-    factor, correlation = turning(t, acc, gyr)
-    of_a_unit = (
-        any_rate
-        or are_counts(gyr)
-        or gyro_unit(factor)
-        or are_increments(t, acc, gyr, 1 / (sample_period(t) or math.inf))
-    )
+    factor, correlation = units.turning(t, acc, gyr)
+    of_a_unit = any_rate or units.are_counts(gyr) or bool(units.gyro_unit(factor))
+    of_a_unit = of_a_unit or units.are_increments(t, acc, gyr, 1 / (sample_period(t) or math.inf))
     return correlation if factor > 0.0 and of_a_unit else 0.0

@@ -208,4 +208,4 @@ def pivot(table: Table) -> Table | None:
         [str(time), *(each.get(name, "") for name in header)] for time, at_once in records.items() for each in at_once
     ]
     made = table_of_rows(table.name, [clocks[0].name or TIME, *header], rows, [*range(1, len(rows) + 1)])
-    return replace(made, remarks=(*table.remarks, "its lines of one time were joined"))
+    return replace(made, remarks=table.remarks).noted("its lines of one time were joined")

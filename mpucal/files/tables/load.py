@@ -17,7 +17,7 @@ from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import MEMORY_PER_TEXT, SNIFFED, check_size, first_bytes, reading
 from .cells import LOOKED_AT, OF_DAY, Kind
 from .columns import find_columns
-from .guess import is_clock, is_index
+from .guess import increases, is_clock, is_index
 from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
 from .names import (
     ACC,
@@ -33,7 +33,7 @@ from .names import (
     parse_axis_name,
     with_sensor,
 )
-from .sensor import increases, interval_column, is_weak, sensor_stream
+from .sensor import interval_column, is_weak, sensor_stream
 from .several import NAMES_SENSORS, of_one_beginning, of_one_place, of_one_sensor, of_one_turn, turns
 from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts
 from .streams import index_with_gravity, join_streams
@@ -251,7 +251,7 @@ def _oldest_first(table: Table) -> Table:
         if not rises and any(sure):
             said = "its lines are the newest first, and were read from the last to the first"
             cells = [of[::-1] for of in table.cells]
-            return replace(table, cells=cells, lines=table.lines[::-1], remarks=(*table.remarks, said))
+            return table.noted(said, cells=cells, lines=table.lines[::-1])
     return table
 
 

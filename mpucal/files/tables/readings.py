@@ -100,11 +100,10 @@ def accelerations(
             + f", or {of_g} if these are in {near or 'g'}" * bool(of_g),
             increments or (of_g if likely else ""),
         )
-    likely = units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
-    likely = likely or not (values == np.rint(values)).all()
-    seen = hints.units.get("acc", (likely_whole or seen if said or likely else "") or said)
-    likely = size <= units.LARGEST_OF_SI
-    unit = resolve_unit(name, "acc", said, seen, f"the median |a| of {size:.4g}", likely=likely)
+    sure = said or not whole or units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
+    seen = hints.units.get("acc", (likely_whole or seen if sure else "") or said)
+    evidence = f"the median |a| of {size:.4g}"
+    unit = resolve_unit(name, "acc", said, seen, evidence, likely=size <= units.LARGEST_OF_SI)
     return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}{OR_MG if likely_whole not in ('', 'mg') else ''}")
 
 

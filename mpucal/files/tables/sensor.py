@@ -9,10 +9,9 @@ from decimal import Decimal
 
 import numpy as np
 
-from ...clocks.stamps import FEWEST, sample_period
 from ...data import Mask, Vector
 from ..reading import MOST_ODD
-from .guess import is_index
+from .guess import increases, is_index
 from .names import BY_A_WORD, CHOSEN, INTERVALS, STEMS, TIME, Column, plausible_celsius
 from .shown_units import time_unit
 from .table import Table, are_many
@@ -108,9 +107,3 @@ def _intervals(since: Vector, first: float, clock: Column) -> Vector | None:
 def is_weak(clock: Column) -> bool:
     """Return True for a column that may be no clock: `t` may be a temperature."""
     return clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() in ("t", "ts"))
-
-
-def increases(ticks: Vector) -> bool:
-    """Return True if times hardly ever decrease, other than a temperature that is called t."""
-    steps = np.diff(ticks)
-    return sample_period(ticks) > 0.0 and bool(np.count_nonzero(steps < 0) * FEWEST <= len(steps))

@@ -12,8 +12,7 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from ...clocks.stamps import FEWEST
 from ...data import Vector
 from ...errors import RecordingError
-from .cells import Cells, Kind, is_number, parse_cell
+from .cells import Cells, Kind, is_number, with_point
 from .columns import measured
 from .guess import MOST_COLUMNS, side_by_side
 from .names import ACC, GYR, WITHOUT_GRAVITY, Column, axes_of, first_triple, names_both, parse_column_name, parse_header
@@ -92,8 +91,7 @@ def of_one_place(table: Table, sensor: str | None = None) -> Table:
         for of, name in zip(split, table.header, strict=True)
     ]
     more = f" ({CHOOSES} of {', '.join(found)})" if len(found) > 1 else ""
-    said = f"of its columns, those called {chosen} were read{more}"
-    return replace(table, header=header, remarks=(*table.remarks, said), chosen=True)
+    return table.noted(f"of its columns, those called {chosen} were read{more}", header=header, chosen=True)
 
 
 def _of_one_side(table: Table, sensor: str | None) -> Table:
@@ -107,7 +105,7 @@ def _of_one_side(table: Table, sensor: str | None) -> Table:
     own = {place: role for role, place in sensors[chosen].items()}
     said = f"{len(sensors)} sensors are side by side, of which number {chosen} was read ({CHOOSES})"
     header = [own.get(at, "" if at in others else table.name_of(at)) for at in range(len(table.cells))]
-    return replace(table, header=header, remarks=(*table.remarks, said), chosen=True)
+    return table.noted(said, header=header, chosen=True)
 
 
 def _choose(sensors: Sequence[str], sensor: str | None, name: str) -> str:
@@ -176,14 +174,10 @@ def lines_of_sensors(text: str) -> Mapping[str, str]:
     if len(sensors) < 2 or 2 * turns < len(named):
         return {}
     follow = {above for above, name in pairwise(names) if above and not name}
-    of, owners = "", []
-    for name in names:
-        of = name or (of if follow >= {*sensors} else "")
-        owners.append(of)
-    return {
-        sensor: "\n".join(line for line, owner in zip(lines, owners, strict=True) if owner in ("", sensor))
-        for sensor in sensors
-    }
+    if follow >= {*sensors}:
+        names = [*accumulate(names, lambda above, name: name or above, initial="")][1:]
+    owned = [*zip(lines, names, strict=True)]
+    return {sensor: "\n".join(line for line, owner in owned if owner in ("", sensor)) for sensor in sensors}
 
 
 def of_one_beginning(
@@ -195,11 +189,8 @@ def of_one_beginning(
     if len(tables) < 2:
         return None
     chosen = _choose([*tables], sensor, name)
-    said = (
-        f"its lines begin with several sensors' names ({', '.join(tables)}), of which {_which(chosen, tables)} was read"
-    )
-    table = tables[chosen]
-    return replace(table, remarks=(*table.remarks, f"{said} ({CHOOSES})"), chosen=True)
+    said = f"its lines begin with several sensors' names ({', '.join(tables)}), of which {_which(chosen, tables)}"
+    return tables[chosen].noted(f"{said} was read ({CHOOSES})", chosen=True)
 
 
 def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
@@ -221,7 +212,9 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
         words = _words(cells)
         of_words = {word: number for number, word in enumerate(dict.fromkeys(filter(str.strip, words)))}
         # numbers of sensors are whole
-        if not 1 < len(of_words) <= MOST_SENSORS or any(is_number(w, False) and _has_fraction(w) for w in of_words):
+        if not 1 < len(of_words) <= MOST_SENSORS or any(
+            is_number(w, False) and float(with_point(w)) % 1.0 for w in of_words
+        ):
             continue
         sensors = np.array([of_words.get(word, -1) for word in words])
         first = sensors == 0
@@ -232,8 +225,7 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
             chosen = _choose([*of_words], sensor, table.name)
             called, which = name or f"column {place + 1}", _which(chosen, of_words)
             said = f"its lines are of several sensors ({called}: {', '.join(of_words)}), of which {which} was read"
-            part = table.part(sensors == of_words[chosen])
-            return replace(part, remarks=(*table.remarks, f"{said} ({CHOOSES})"), chosen=True)
+            return table.part(sensors == of_words[chosen]).noted(f"{said} ({CHOOSES})", chosen=True)
     return table
 
 
@@ -248,16 +240,12 @@ def of_one_turn(table: Table, acc: Sequence[Column], sensor: str | None) -> Tabl
     if count > 1:
         numbers = [str(number) for number in range(1, count + 1)]
         if sensor is None:
-            options = f"--sensor {numbers[0]}"
             what = f"{table.name}: its lines are of {count} sensors by turns, and nothing names them"
-            raise RecordingError(
-                what, f"choose one with --sensor {' or '.join(numbers)}, by its place among them", options
-            )
+            remedy = f"choose one with --sensor {' or '.join(numbers)}, by its place among them"
+            raise RecordingError(what, remedy, f"--sensor {numbers[0]}")
         chosen = int(_choose(numbers, sensor, table.name))
-        said = f"of the {count} sensors that take turns, number {chosen} was read"
-        return replace(
-            table.part(np.arange(len(table)) % count == chosen - 1), remarks=(*table.remarks, said), chosen=True
-        )
+        part = table.part(np.arange(len(table)) % count == chosen - 1)
+        return part.noted(f"of the {count} sensors that take turns, number {chosen} was read", chosen=True)
     if sensor is not None and not table.chosen:
         raise RecordingError(f"{table.name}: nothing tells several sensors apart", "leave out --sensor")
     return table
@@ -319,15 +307,13 @@ def _take_turns(table: Table, place: int, sensors: NDArray[np.int_]) -> bool:
 
 def _come_together(table: Table, sensors: NDArray[np.int_]) -> bool:
     """Return True if the lines of all `sensors` (n,) come soon one after the other, and then no line for longer."""
-    steps = np.zeros(0)
     # damaged times are told where they are read
     with suppress(RecordingError):
         for clock in table.clocks(table.columns)[:1]:
             steps = np.diff(table.times(clock, np.ones(len(table), bool))[0])
-    if not len(steps):
-        return False
-    usual = sorted(float(np.median(steps[sensors[1:] == each])) for each in np.unique(sensors[1:]))
-    return len(usual) > 1 and usual[-1] > FARTHER * usual[-2] >= 0.0
+            usual = sorted(float(np.median(steps[sensors[1:] == each])) for each in np.unique(sensors[1:]))
+            return len(usual) > 1 and usual[-1] > FARTHER * usual[-2] >= 0.0
+    return False
 
 
 def _lie_apart(values: Vector, sensors: NDArray[np.int_]) -> bool:
@@ -345,8 +331,3 @@ def _lie_apart(values: Vector, sensors: NDArray[np.int_]) -> bool:
         for of, where in ((values, changes), (values[order], again))
     )
     return int(np.count_nonzero(apart > FARTHER * alone)) >= FEWEST_COLUMNS
-
-
-def _has_fraction(cell: str) -> bool:
-    number = parse_cell(cell)
-    return number != number.to_integral_value()

@@ -63,8 +63,13 @@ def time_unit(step: float, said: str = "") -> str:
     """
     if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= LONGEST_STEP_S:
         return said
-    of = QUANTITIES["t"]
-    return next((unit for unit in SHOWN["t"] if 1 / FASTEST_HZ <= step * of[unit] <= 1 / SLOWEST_HZ), "")
+    return _first_unit("t", "", step, 1 / FASTEST_HZ, 1 / SLOWEST_HZ)
+
+
+def _first_unit(quantity: str, said: str, value: float, least: float, most: float) -> str:
+    """Return the first unit in which a value is within limits in SI: `said`, or one that samples show; or empty."""
+    likely = {unit: value * QUANTITIES[quantity][unit] for unit in (*filter(None, [said]), *SHOWN[quantity])}
+    return next((unit for unit, si in likely.items() if least <= si <= most), "")
 
 
 def acceleration_unit(acc: Vector, said: str = "") -> str:
@@ -77,9 +82,7 @@ def acceleration_unit(acc: Vector, said: str = "") -> str:
     size, scatter = typical_size(acc)
     if scatter > SCATTER * size:
         return ""
-    units = (*filter(None, [said]), *SHOWN["acc"])
-    of_g = {unit: size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2 for unit in units}
-    return next((unit for unit, ratio in of_g.items() if 1 / MOST_OF_G <= ratio <= MOST_OF_G), "")
+    return _first_unit("acc", said, size, STANDARD_GRAVITY_MPS2 / MOST_OF_G, STANDARD_GRAVITY_MPS2 * MOST_OF_G)
 
 
 def mean_acceleration_unit(values: Vector) -> str:
@@ -236,8 +239,7 @@ def is_gravity(size_mps2: float) -> bool:
 
 def gyro_unit(factor: float | None, said: str = "") -> str:
     """Return the unit of rates with this rate_factor, first the one `said` by the file; empty if there is none."""
-    units = {unit: QUANTITIES["gyr"][unit] for unit in (*filter(None, [said]), *SHOWN["gyr"])}
-    return next((u for u, si in units.items() if factor and 1 / MOST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
+    return _first_unit("gyr", said, 1 / abs(factor), 1 / MOST_TURNED, MOST_TURNED) if factor else ""
 
 
 def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:

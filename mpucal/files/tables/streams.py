@@ -124,13 +124,11 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
 
 def _with_rate(acc: Stream, gyr: Stream, hints: Hints) -> tuple[Hints, str]:
     """Return the hints with the rate of samples without times, None if nothing shows it, and a remark on it."""
-    rate_hz = hints.rate_hz or acc.rate_hz
-    if rate_hz is not None:
-        return replace(hints, rate_hz=rate_hz), ""
-    alike = np.array_equal(acc.number, gyr.number)
-    hints = replace(hints, rate_hz=_rate_hz(acc, gyr, hints) if alike else None)
-    of = "assumed, as nothing shows it (--rate HZ)" if hints.rate_hz is None else "that at which its rates turn gravity"
-    return hints, f"this sample rate is {of}"
+    if (said_hz := hints.rate_hz or acc.rate_hz) is not None:
+        return replace(hints, rate_hz=said_hz), ""
+    rate_hz = _rate_hz(acc, gyr, hints) if np.array_equal(acc.number, gyr.number) else None
+    of = "assumed, as nothing shows it (--rate HZ)" if rate_hz is None else "that at which its rates turn gravity"
+    return replace(hints, rate_hz=rate_hz), f"this sample rate is {of}"
 
 
 def _of_increments(

@@ -107,6 +107,10 @@ class Table:
         cells = [of[kept] if isinstance(of, np.ndarray) else [of[at] for at in places] for of in self.cells]
         return replace(self, cells=cells, lines=[self.lines[at] for at in places] if self.lines else ())
 
+    def noted(self, remark: str, **changes: Any) -> Table:
+        """Return the table with changes, and a further remark on how it was read."""
+        return replace(self, remarks=(*self.remarks, remark), **changes)
+
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """Return (n, k) numbers; NaN where a cell is empty, or is one of a few damaged ones.
 
@@ -227,7 +231,7 @@ def with_lists_apart(table: Table) -> Table:
         raise RecordingError(f"{table.name}: its cells hold lists of different lengths", "write a line for each sample")
     lines, *cells = (np.repeat(of, [*chain(*counts)]).tolist() for of in (table.lines, *table.cells))
     cells = [[*chain(*lists[at])] if at in lists else of for at, of in enumerate(cells)]
-    return replace(table, cells=cells, lines=lines, remarks=(*table.remarks, "its cells hold lists of samples"))
+    return table.noted("its cells hold lists of samples", cells=cells, lines=lines)
 
 
 def axes_of_lists(header: Sequence[str], cells: Sequence[str]) -> list[list[str]]:
