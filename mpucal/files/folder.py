@@ -55,12 +55,12 @@ def _find_session(folder: Path) -> tuple[formats.Format, list[Path]]:
     raise RecordingError(f"the folder {folder} holds {none} and no other recording", remedy)
 
 
-def holds_recordings(path: Path) -> bool:
+def holds_parts(path: Path) -> bool:
     """Return True if a folder holds recordings, and no session."""
     return len(_recordings(path)) > 0
 
 
-def load_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
+def load_parts(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """Return the recordings in a folder as one, in the order of their times of day, or else of their names.
 
     Raises

@@ -97,6 +97,7 @@ PACKED = ".zip .gz"
 _TEXTS = ".csv .txt .log .tsv"
 _BAG: dict[str, Any] = {"load": ".ros:load_bag", "rows": ".ros:bag_rows", "hinted": True}
 _ARRAYS: dict[str, Any] = {"load": ".arrays:load_arrays", "hinted": True}
+_PAIR: dict[str, Any] = {"load": ".tables.phone:load_tables", "hinted": True}
 _ANY: dict[str, Any] = {"hinted": True, "fallback": True}
 FORMATS = (
     Format(".mcap", "a bag of ROS 2", recognises=".mcap:is_mcap_of_ros", **_BAG),
@@ -108,11 +109,7 @@ FORMATS = (
     Format(".ulg", "a log of PX4", ".ulog:load_ulog", hinted=True),
     Format(".db3", "a bag of ROS 2", **_BAG),
     Format(".bag", "a bag of ROS 1", **_BAG),
-    Format(
-        *(f"{_TEXTS} .mat .npy .json .parquet", "a phone's tables"),
-        *(".tables.phone:load_pair", ".tables.phone:is_of_pair"),
-        hinted=True,
-    ),
+    Format(f"{_TEXTS} .mat .npy .json .parquet", "a phone's tables", recognises=".tables.phone:is_of_pair", **_PAIR),
     Format(".npz", "another program's archive of NumPy", recognises=".arrays:is_of_others", **_ARRAYS),
     Format(".npy", "an array of NumPy", **_ARRAYS),
     Format(".mat", "a file of MATLAB", **_ARRAYS),
@@ -126,16 +123,8 @@ FORMATS = (
     Format(PACKED, "an archive of recordings", ".archive:load_archive", ".archive:is_archive", hinted=True),
     Format(".mcap", "sensor_msgs/Imu for ROS 2 and Foxglove", writer=".imu:imu_file"),
     Format(FOLDER, "the folder of a bag", recognises=".ros:is_folder_of_ros", **_BAG),
-    Format(
-        FOLDER, "the folder of a phone's tables", ".tables.phone:load_folder", ".tables.phone:is_folder", hinted=True
-    ),
-    Format(
-        FOLDER,
-        "a folder of recordings of one sensor",
-        ".folder:load_recordings",
-        ".folder:holds_recordings",
-        hinted=True,
-    ),
+    Format(FOLDER, "the folder of a phone's tables", recognises=".tables.phone:is_folder", **_PAIR),
+    Format(FOLDER, "a folder of recordings of one sensor", ".folder:load_parts", ".folder:holds_parts", hinted=True),
     Format(FOLDER, "the folder of a session", ".folder:load_folder", rows=".folder:folder_rows"),
 )
 

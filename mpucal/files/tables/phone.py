@@ -79,34 +79,26 @@ def is_of_pair(path: Path) -> bool:
     return table is None or not names_both(table.columns)
 
 
-def load_pair(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """Return the recording in a table and the one beside it; see load_folder."""
-    return _from_folder(path.parent, path.name, hints)
-
-
-def load_folder(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """Return the recording in a folder's tables, the first pair if there are several.
+def load_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """Return the recording in a table and the one beside it; or in a folder's tables, the first pair if several are.
 
     Raises
     ------
     RecordingError : a table cannot be read, or the two do not make a recording.
     """
-    return _from_folder(path, "", hints)
-
-
-def _from_folder(path: Path, wanted: str, hints: Hints) -> Recording:
-    with reading(path):
-        files = sorted(child for child in (*path.iterdir(), *path.glob("meta/time.csv")) if child.is_file())
-        names = [child.relative_to(path).as_posix() for child in files]
+    folder, wanted = (path, "") if path.is_dir() else (path.parent, path.name)
+    with reading(folder):
+        files = sorted(child for child in (*folder.iterdir(), *folder.glob("meta/time.csv")) if child.is_file())
+        names = [child.relative_to(folder).as_posix() for child in files]
 
         def read(name: str) -> bytes | Table | None:
-            file = path / name
+            file = folder / name
             if holds_arrays(file):
                 return table_of_arrays(name, read_arrays(file))
-            check_size(path, MEMORY_PER_TEXT * file.stat().st_size)
+            check_size(folder, MEMORY_PER_TEXT * file.stat().st_size)
             return file.read_bytes()
 
-        return _recording(wanted or path.name, names, read, wanted, hints)
+        return _recording(path.name, names, read, wanted, hints)
 
 
 def is_pair(tables: Mapping[str, Table]) -> bool:
