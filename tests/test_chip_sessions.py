@@ -57,7 +57,7 @@ def with_faults(words):
 @settings(max_examples=1)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_no_pair_of_faults_makes_a_wrong_calibration_good(number, seed):
-    """Each fault strikes a recorded chip, beside another one; what is calibrated afterwards is true, or refused."""
+    """Two faults affect a recorded chip together; what is calibrated afterwards is true, or refused."""
     rng = np.random.default_rng([seed, number])
     faults = [Fault(name, round(float(rng.uniform(0.0, RECORDED_S)), 2)) for name in FAULTS[number::HALF]]
     done = with_faults(f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}")

@@ -45,7 +45,7 @@ class FaultKind:
     seconds : its duration. again_s : time until it repeats.
     errno : error of every transfer meanwhile. takes_s : duration of such a transfer.
     flips : bits of the bytes that arrive are flipped meanwhile. pause_s : time for which the host does nothing.
-    strike : called with the chip, begin [ns] and end [ns], or with the vehicle.
+    begin : called as it begins, with the chip, this time and the end [ns], or with the vehicle.
     share : of the packets or bytes that it affects.
     spoils : makes bytes of a byte on a serial line and a number from 1 to 255, which varies the damage.
     mishap : change of the sensor.
@@ -63,7 +63,7 @@ class FaultKind:
     takes_s: float = 0.0
     flips: bool = False
     pause_s: float = 0.0
-    strike: Callable[..., None] | None = None
+    begin: Callable[..., None] | None = None
     share: float = 0.0
     spoils: Callable[[int, int], bytes] | None = None
     mishap: Change | None = None
@@ -93,20 +93,20 @@ _ROWS = (
               seconds=0.5, errno=ETIMEDOUT, takes_s=0.1),
     FaultKind("overflow", BUS, "the host sleeps for 2 s", pause_s=2.0),
     FaultKind("brownout", CHIP, "the chip resets, and is gone for 50 ms", seconds=0.05, errno=EREMOTEIO,
-              strike=lambda chip, t_ns, _: chip.reset(t_ns)),
+              begin=lambda chip, t_ns, _: chip.reset(t_ns)),
     FaultKind("stuck", BUS, "a wire stays low from then on", seconds=math.inf, errno=ETIMEDOUT, takes_s=0.1),
     FaultKind("unplugged", BUS, "a wire is pulled, for good", seconds=math.inf, errno=EREMOTEIO),
     FaultKind("bitflips", BUS, "for 0.5 s one byte in 200 arrives with a bit flipped, in either direction",
               seconds=0.5, flips=True, share=1 / 200),
     FaultKind("clock", CHIP, "the sample clock runs 1 % faster from then on",
-              strike=lambda chip, t_ns, _: chip.change_speed(1.01, t_ns)),
+              begin=lambda chip, t_ns, _: chip.change_speed(1.01, t_ns)),
     FaultKind("frozen", CHIP, "for 1 s the sensor repeats itself", seconds=1.0,
-              strike=lambda chip, _, end_ns: chip.freeze(end_ns)),
-    FaultKind("slip", CHIP, "the FIFO loses a byte", strike=lambda chip, t_ns, _: chip.lose_fifo_byte(t_ns)),
+              begin=lambda chip, _, end_ns: chip.freeze(end_ns)),
+    FaultKind("slip", CHIP, "the FIFO loses a byte", begin=lambda chip, t_ns, _: chip.lose_fifo_byte(t_ns)),
     FaultKind("low_byte", CHIP, "the low byte of the accelerometer's x stays 0 from then on",
-              strike=lambda chip, *_: chip.clear_bits(0, 0xFF)),
+              begin=lambda chip, *_: chip.clear_bits(0, 0xFF)),
     FaultKind("high_bit", CHIP, "bit 12 of the accelerometer's y stays 0 from then on",
-              strike=lambda chip, *_: chip.clear_bits(1, 1 << 12)),
+              begin=lambda chip, *_: chip.clear_bits(1, 1 << 12)),
     FaultKind("bit_errors", BUS, "from then on one byte in 2,000 arrives with a bit flipped, in either direction",
               seconds=math.inf, flips=True, share=1 / 2000),
     ALWAYS("nacks", DEFECT, "one transfer in fifty is not acknowledged",
@@ -131,14 +131,14 @@ _ROWS = (
     FaultKind("knock", HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=knock),
     FaultKind("zero_step", HAND, "the accelerometer's bias steps by 10 mg on x", mishap=zero_step),
     FaultKind("warming", HAND, "the chip warms by 15 °C within 40 s, and its biases follow", mishap=warming),
-    FaultKind("arm", VEHICLE, "it is armed", strike=lambda vehicle: vehicle.arm()),
-    FaultKind("reboot", VEHICLE, "it boots anew, and is silent for 2 s", strike=lambda vehicle: vehicle.reboot()),
-    FaultKind("silence", VEHICLE, "it sends and hears nothing any more", strike=lambda vehicle: vehicle.fall_silent()),
+    FaultKind("arm", VEHICLE, "it is armed", begin=lambda vehicle: vehicle.arm()),
+    FaultKind("reboot", VEHICLE, "it boots anew, and is silent for 2 s", begin=lambda vehicle: vehicle.reboot()),
+    FaultKind("silence", VEHICLE, "it sends and hears nothing any more", begin=lambda vehicle: vehicle.fall_silent()),
     FaultKind("second_station", VEHICLE,
               "another station asks for 4 Hz of everything, every 15 s, as a MAVProxy at its default does",
-              again_s=15.0, strike=lambda vehicle: vehicle.obey_second_station()),
+              again_s=15.0, begin=lambda vehicle: vehicle.obey_second_station()),
     FaultKind("autocal", VEHICLE, "a PX4 with SENS_IMU_AUTOCAL commits the accelerometer offsets that it learnt",
-              strike=lambda vehicle: vehicle.learn_offsets()),
+              begin=lambda vehicle: vehicle.learn_offsets()),
     ALWAYS("phantom", VEHICLE, "IMUs that an ArduPilot does not have are sent as zeros"),
     ALWAYS("loss", LINK, "one packet in five is lost", share=0.2),
     ALWAYS("reorder", LINK, "one packet in ten is overtaken by three others", share=0.1),

@@ -106,14 +106,14 @@ def test_hammering_that_swings_by_whole_steps_is_no_stuck_bit(counted):
 
 
 def test_blows_of_half_the_range_are_no_stuck_sign(counted):
-    def struck(acc, gyr):
+    def with_blows(acc, gyr):
         at, rng = np.arange(25), np.random.default_rng(2)
         acc[:, 0] = np.abs(acc[:, 0])
         for first in range(500, len(acc) - 25, 100):
             ring = rng.uniform(18000, 26000) * np.exp(-at / 2.0) * np.sin(1.9 * (at + rng.uniform()))
             acc[first : first + 25, 0] = np.minimum(acc[first : first + 25, 0] + ring.astype(int), 32767)
 
-    assert against(counted(spoil=struck)) is None
+    assert against(counted(spoil=with_blows)) is None
 
 
 @pytest.mark.parametrize(("bits", "verdict"), [(3, "usable"), (8, "refused")])

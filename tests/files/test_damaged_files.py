@@ -54,7 +54,7 @@ def files(walk, write_bag, tmp_path_factory):
 
 
 SUFFIXES = [".csv", ".tsv", ".json", ".jsonl", ".parquet", ".txt", ".zip", ".mcap", ".db3", ".bag"]
-# what befalls a file: cut, bytes changed, a piece twice, a piece gone, a piece of text put in
+# damage of a file: cut, bytes changed, a piece twice, a piece gone, a piece of text put in
 PLACES = st.floats(0, 1, exclude_max=True)
 DAMAGE = st.one_of(
     st.tuples(st.just("cut"), PLACES, st.just(b"")),

@@ -51,9 +51,9 @@ def measured(word):
 @pytest.mark.parametrize(("name", "least"), [("loose", 1.0), ("knock", 0.3), ("warming", 0.01)])
 def test_faults_of_the_hand_affect_chip_and_vehicle(name, least):
     assert np.linalg.norm(measured(f",fault={name}@0") - measured("")) > least
-    plain, struck = (
+    plain, disturbed = (
         SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still" + word)) for word in ("", f",fault={name}@0")
     )
-    for vehicle in (plain, struck):
+    for vehicle in (plain, disturbed):
         vehicle.run_until(13_000_000)
-    assert np.linalg.norm(struck.firmware.corrected[0, 0] - plain.firmware.corrected[0, 0]) > least / 2
+    assert np.linalg.norm(disturbed.firmware.corrected[0, 0] - plain.firmware.corrected[0, 0]) > least / 2

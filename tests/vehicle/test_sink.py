@@ -45,18 +45,18 @@ REFUSED = {"verdict": "refused", "reasons": []}
 
 
 class Flying(SimulatedTransport):
-    """The simulated vehicle, where `befall` sees each PARAM_SET that is sent, and may swallow it."""
+    """The simulated vehicle, where `on_set` sees each PARAM_SET that is sent, and may swallow it."""
 
     def __init__(self, vehicle):
         super().__init__(vehicle)
-        self.vehicle, self.sets, self.befall = vehicle, 0, lambda number, message: True
+        self.vehicle, self.sets, self.on_set = vehicle, 0, lambda number, message: True
         self._parser = Parser(dialect().MAVLink(None))
 
     def send(self, data, address):
         for packet in self._parser.datagram(data):
             if packet.message.get_type() == "PARAM_SET":
                 self.sets += 1
-                if not self.befall(self.sets, packet.message):
+                if not self.on_set(self.sets, packet.message):
                     return
         super().send(data, address)
 
@@ -337,38 +337,38 @@ def test_px4_uses_what_it_stores_though_the_change_is_small():
     np.testing.assert_allclose(vehicle.firmware.correction(0)[0], offset)
 
 
-def strike(transport, number, fault):
+def at_set(transport, number, fault):
     """Call `fault` with the nth PARAM_SET, before the vehicle has it."""
 
-    def befall(count, message):
+    def on_set(count, message):
         if count == number:
             fault(message)
         return True
 
-    transport.befall = befall
+    transport.on_set = on_set
 
 
 def lose(transport, number):
     """Lose the nth PARAM_SET and five more."""
-    transport.befall = lambda count, message: not number <= count < number + 6
+    transport.on_set = lambda count, message: not number <= count < number + 6
 
 
 def arm(transport, number):
     """Arm the vehicle at the nth PARAM_SET."""
-    strike(transport, number, lambda message: setattr(transport.vehicle.firmware, "armed", True))
+    at_set(transport, number, lambda message: setattr(transport.vehicle.firmware, "armed", True))
 
 
 def refuse(transport, number):
     """Refuse the next new parameter from the nth PARAM_SET on."""
     seen, names = set(), []
 
-    def befall(count, message):
+    def on_set(count, message):
         if count >= number and not names and message.param_id not in seen:
             names.append(message.param_id)
         seen.add(message.param_id)
         return message.param_id not in names
 
-    transport.befall = befall
+    transport.on_set = on_set
 
 
 def spoil(transport, number):
@@ -379,17 +379,17 @@ def spoil(transport, number):
         other = next(name for name in stored(transport.vehicle) if name[:8] == message.param_id[:8])
         store[other] = float(store[other]) + 0.3
 
-    strike(transport, number, change_other)
+    at_set(transport, number, change_other)
 
 
 def vanish(transport, number):
     """Silence the vehicle for good at the nth PARAM_SET."""
-    strike(transport, number, lambda message: transport.vehicle.fall_silent())
+    at_set(transport, number, lambda message: transport.vehicle.fall_silent())
 
 
 def reboot(transport, number):
     """Reboot the vehicle at the nth PARAM_SET."""
-    strike(transport, number, lambda message: transport.vehicle.reboot())
+    at_set(transport, number, lambda message: transport.vehicle.reboot())
 
 
 @settings(max_examples=10)
@@ -470,14 +470,14 @@ def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, numbers = stored(vehicle), []
 
-    def befall(count, message):
+    def on_set(count, message):
         numbers.append(count)
         # the second one comes while the old parameters are put back
         if (count in (4, 6) and name != "SIGINT") or count == 4:
             os.kill(os.getpid(), getattr(signal, name))
         return True
 
-    transport.befall = befall
+    transport.on_set = on_set
     journal = Journal(tmp_path / "note.json")
     sink = AutopilotSink(link, journal=journal)
     before = signal.getsignal(getattr(signal, name))
@@ -496,11 +496,11 @@ def test_the_next_write_after_a_kill_restores_the_old_parameters(firmware, numbe
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, journal = stored(vehicle), Journal(tmp_path / "note.json")
     calibration = calibration_of(vehicle)
-    strike(transport, number, kill)
+    at_set(transport, number, kill)
     with pytest.raises(Killed):
         AutopilotSink(link, journal=journal).write(calibration)
     assert journal.interrupted() is not None
-    transport.befall = lambda count, message: True
+    transport.on_set = lambda count, message: True
     assert (stored(vehicle) == old) is (number == 1)
     said = AutopilotSink(link, journal=journal).recover()
     assert stored(vehicle) == old
@@ -512,7 +512,7 @@ def test_the_next_write_after_a_kill_restores_the_old_parameters(firmware, numbe
 def test_parameters_of_an_interrupted_write_are_not_restored_to_another_vehicle(tmp_path):
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     journal = Journal(tmp_path / "note.json")
-    strike(transport, 3, kill)
+    at_set(transport, 3, kill)
     with pytest.raises(Killed):
         AutopilotSink(link, journal=journal).write(calibration_of(vehicle))
     other, sets, link = vehicle_of("ardupilot", ",imus=1,seed=9,INS_ACCOFFS_X=0.7")

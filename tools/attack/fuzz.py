@@ -6,7 +6,7 @@
 Each target of fuzz_targets.py has a corpus of the fixtures, of files that are made here, or of one in a dialect
 of lab/dialects.py, as rosbags, pyulog, pandas and others write it, and gets bytes of it that are damaged as in
 lab/campaign_recordings.py, cut, joined, or with one piece in the place of another's. A line counts its executions.
-What it should not have raised is printed with the seed that makes it again (--first SEED --seconds 0 TARGET).
+An unexpected exception is printed with the seed that repeats it (--first SEED --seconds 0 TARGET).
 
 Guided, libFuzzer keeps what reaches new branches of mpucal in build/fuzz/TARGET, goes on from there the next time, and
 says how many branches were reached. Half of the mutants are those of above. What was wrong is kept in

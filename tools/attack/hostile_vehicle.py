@@ -10,9 +10,9 @@ sends a thousand packets a second of the vehicle's time from the lock on, the ot
 any time, some from before the lock on.
 
 Of a stranger, and against signing, the calibration must be the undisturbed one to the bit, and be written. Always
-wrong is an exit code that says nothing, a trace, a hang, no sentence, a file in part, a parameter set that is neither
-the vehicle's own value nor that of calibration.json, and a calibration that promises what it does not hold, where no
-samples were forged. Exit code 1 where a run was wrong.
+wrong is an undocumented exit code, a traceback, a hang, a failure without a sentence, an incomplete file, a parameter
+that is set to neither the vehicle's own value nor that of calibration.json, and, where no samples were forged, a
+calibration with larger errors than it claims. Exit code 1: a run was wrong.
 """
 
 from __future__ import annotations

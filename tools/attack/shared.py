@@ -2,11 +2,10 @@
 
     python -m tools.attack shared --pairs 40 --eights 10 --ended 8
 
-A race forks so many processes, which begin together: sessions and recordings of a simulated chip into one -o, and into
-none. Ending sends KILL, TERM, HUP or ALRM to a batch and to a session at any time, and counts the processes that are
-left of it after ten seconds. It is judged whether one process at most ends well for each capture that is there, whether
-each capture is whole and the results beside it are its own, and whether all others end with a sentence. Exit code 1
-where one was not so.
+A race forks several processes, which begin together: sessions and recordings of a simulated chip with the same -o, or
+without -o. At most one process may succeed for each capture that is there, each capture must be whole and the results
+beside it its own, and all other processes must end with a sentence. Ending sends KILL, TERM, HUP or ALRM to a batch and
+to a session at any time, and none of its processes may be left after ten seconds. Exit code 1: a rule was broken.
 """
 
 from __future__ import annotations

@@ -5,11 +5,12 @@
 syscalls.c is preloaded: it counts what a command asks of the files below a folder (open, read, write, fsync,
 close, rename, unlink, mkdir, chmod, stat, opendir, mmap). The command runs again and again, and each time one of its
 calls fails, with an error that such a call may have. Calls that repeat (the same call, of the same file) are a kind:
-its first, second, middle and last are failed; with --each, every one; with --most, so many of these. Then one
+its first, second, middle and last are failed; with --each, every one; with --most, at most N of these. Then one
 allocation of 4 kB or more gets no memory, or all from one on do not: the first and the last, and so many drawn by the
-seed. Sessions are quick ones. Wrong is: a trace or a crash, an exit code that is not documented, no sentence, a file
-that is neither the old one nor the new one, whole; a recording that is gone, a device that holds something else than
-before while nothing says so. Crashes of NumPy, some of whose loops use a buffer that they did not get, are counted.
+seed. Sessions are quick ones. Wrong is: a traceback or a crash, an undocumented exit code, a failure without a
+sentence, a file that is neither the whole old one nor the whole new one, a recording that is gone, a device whose
+content has changed while nothing says so. Crashes of NumPy, some of whose loops use a buffer that they did not get,
+are counted.
 
 Its calls are also replayed into a model of a disk (disk_model.py), and the power is cut after calls of each
 kind: each file must be old or new, what was synced be there, and a note of a write as long as its device is between.

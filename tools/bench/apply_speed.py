@@ -48,5 +48,5 @@ def main(
                     f" {count / done.cpu_s / 1e6:.2f} a second of the processor's,"
                     f" {size / 1e6 / done.cpu_s:.0f} MB read in it, {done.peak_mb} MB of memory at most"
                 )
-    # last, as a process that is started counts the memory of this one as its own
+    # last: a started process counts the memory of this one as its own
     print(f"NumPy's formula on arrays in memory: {in_memory() / 1e6:.1f} million samples a second of the processor's")

@@ -5,9 +5,9 @@ python -m tools.bench loop_gap --seconds 60 --load 20 --rate 1000 --chip mpu6500
 python -m tools.bench loop_gap --seconds 60 --load 20 --source serial --ordinary
 
 `mpucal session` on a simulated sensor at a person's pace, on a terminal of its own and with a page that one client
-reads and another one has stopped reading, beside `load` endless loops of the same priority. Each loop is a session of
-the kernel's own, as the programs of so many services are: loops of one session would count as one program to a kernel
-that schedules by sessions. The capture shows the times of the reads, and the samples that are missing. An MPU-6050's
+reads and another one has stopped reading, beside `load` endless loops of the same priority. Each loop is a kernel
+session of its own, as the programs of different services are: a kernel that schedules by sessions would count loops of
+one session as one program. The capture shows the times of the reads, and the samples that are missing. An MPU-6050's
 FIFO holds 0.36 s at 200 Hz and 73 ms at 1 kHz. Behind a serial bridge, a read's time is that of its bytes' arrival.
 """
 

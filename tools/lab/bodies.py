@@ -1,4 +1,4 @@
-"""Body of a vehicle in the simulated hand, whose sensors a simulator of an autopilot's own measures."""
+"""Body of a vehicle in the simulated hand, for an autopilot's own simulator, which reads its sensors."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""Thousands of sessions that faults strike, and of damaged recordings, each judged against the simulated truth.
+"""Thousands of sessions with faults, and of damaged recordings, each judged against the simulated truth.
 
     python -m tools.lab campaign --sessions 1000
     python -m tools.lab campaign --recordings 10000
-    python -m tools.lab campaign --case 739000123.4 --keep /tmp/struck
+    python -m tools.lab campaign --case 739000123.4 --keep /tmp/faults
 
-Each session suffers one to four faults, drawn by the seed, of all kinds of campaign_worlds.py, to the end of the whole
-command, files and exit code included. Recordings are damaged as in campaign_recordings.py, and calibrated. Wrong is: a
-good or usable calibration that is farther from the truth than it claims, a trace, a hang, an exit code that does not
-fit, no sentence, a file in part. A table counts verdicts by kind of fault; a wrong case comes with the command that
-repeats it. Seeds begin with the day's number. Exit code 1 where one was wrong.
+Each session suffers one to four faults, drawn by the seed, of all kinds of campaign_worlds.py. It runs as a whole
+command, to its files and its exit code. Recordings are damaged as in campaign_recordings.py, and calibrated. A case is
+wrong with a good or usable calibration that is farther from the truth than it claims, a traceback, a hang, an exit code
+that does not fit, a failure without a sentence, or an incomplete file. A table counts verdicts by kind of fault; a
+wrong case comes with the command that repeats it. Seeds begin with the day's number. Exit code 1: a case was wrong.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Case(NamedTuple):
 
     number: int
     k: int
-    blows: tuple[TimedFault, ...] = ()
+    faults: tuple[TimedFault, ...] = ()
 
 
 def kind_of(number: int) -> tuple[str, str]:
@@ -68,8 +68,8 @@ def drawn(number: int, k: int) -> Case:
     rng = np.random.default_rng([number, k])
     world, target = kind_of(number)
     names, last_s = rng.choice(KINDS[world], rng.integers(1, 5)).tolist(), LAST_S[target]
-    blows = [TimedFault(name, round(float(rng.uniform(0.0, last_s)), 2), int(rng.integers(1 << 31))) for name in names]
-    return Case(number, k, tuple(sorted(blows, key=lambda blow: blow.at_s)))
+    faults = [TimedFault(name, round(float(rng.uniform(0.0, last_s)), 2), int(rng.integers(1 << 31))) for name in names]
+    return Case(number, k, tuple(sorted(faults, key=lambda fault: fault.at_s)))
 
 
 def words(number: int) -> list[str]:
@@ -85,18 +85,18 @@ def words(number: int) -> list[str]:
     return ["session", *source, *to, "--target", target, "-o", FOLDER, "--yes"]
 
 
-def suffer(case: Case, world: World) -> int:
-    """Run a session that the faults strike from the first on; return its exit code."""
+def run_with_faults(case: Case, world: World) -> int:
+    """Run a session in which the faults begin at their times; return its exit code."""
 
     def begin() -> None:
         BEGUN.touch()
-        world.begin_faults(case.blows)
+        world.begin_faults(case.faults)
 
     os.environ["XDG_STATE_HOME"] = str(Path("state").resolve())
     if case.k % PICTURES:
         render = results.render
         results.render = lambda calibration, _: render(calibration)
-    world.at(case.blows[0].at_s, begin)
+    world.at(case.faults[0].at_s, begin)
     with world.opened(), quick():
         return run(words(case.number))
 
@@ -104,10 +104,10 @@ def suffer(case: Case, world: World) -> int:
 def of_session(case: Case, here: Path) -> Row:
     """Run a session with faults in a process of its own, and judge it."""
     world = World(kind_of(case.number)[0])
-    done = Child(partial(suffer, case, world), here, here / "err").go().wait()
-    blows = case.blows if (here / BEGUN).exists() else ()
-    row = judge_files(f"{case.number}.{case.k}", here, done, blows, world)
-    if blows and row.recorded and done.code not in (0, 5):
+    done = Child(partial(run_with_faults, case, world), here, here / "err").go().wait()
+    faults = case.faults if (here / BEGUN).exists() else ()
+    row = judge_files(f"{case.number}.{case.k}", here, done, faults, world)
+    if faults and row.recorded and done.code not in (0, 5):
         # a session that failed leaves a recording or nothing
         (here / "after").mkdir()
         again = partial(run, ["calibrate", FOLDER, "-o", "after/board"])
@@ -145,14 +145,14 @@ def scenarios(
 
 def line(row: Row) -> str:
     """Return what was wrong with the command that repeats it; empty if nothing was."""
-    again = f"python -m tools.lab campaign --case {row.case} --keep /tmp/struck"
+    again = f"python -m tools.lab campaign --case {row.case} --keep /tmp/faults"
     return "\n".join([shown(row), *(f"    WRONG {wrong}: {again}" for wrong in row.wrong)]) if row.wrong else ""
 
 
 def shown(row: Row) -> str:
     """Return how a case ended, in a few lines."""
     errors = f"error {row.error:.4f} m/s^2, {row.claims:.2f} claims, an element {row.farthest:.2f} off"
-    return f"{row.world} {' '.join(row.blows) or 'no fault'}: exit {row.code} {row.verdict}\n    {errors}; {row.said}"
+    return f"{row.world} {' '.join(row.faults) or 'no fault'}: exit {row.code} {row.verdict}\n    {errors}; {row.said}"
 
 
 def largest(name: str) -> Column:
@@ -173,15 +173,15 @@ COLUMNS: dict[str, Column] = {
 
 def report(found: list[Row]) -> int:
     """Print by kind of fault, alone or with others, the exits and the largest error of those that were not refused."""
-    struck, kinds = [row for row in found if row.blows], dict[tuple[str, str], list[Row]]()
-    for row in struck:
-        for name in {blow.partition("@")[0] for blow in row.blows}:
+    with_faults, kinds = [row for row in found if row.faults], dict[tuple[str, str], list[Row]]()
+    for row in with_faults:
+        for name in {fault.partition("@")[0] for fault in row.faults}:
             kinds.setdefault((row.world, name), []).append(row)
     show(table(dict(sorted(kinds.items())), COLUMNS))
     if len(found) == 1:
         print(shown(found[0]))
-    cpu_s, wrong = sum(row.cpu_s for row in struck), sum(bool(row.wrong) for row in found)
-    print(f"{len(struck)} struck of {len(found)} in {cpu_s:.0f} s of processor time: {wrong} wrong")
+    cpu_s, wrong = sum(row.cpu_s for row in with_faults), sum(bool(row.wrong) for row in found)
+    print(f"{len(with_faults)} with faults of {len(found)} in {cpu_s:.0f} s of processor time: {wrong} wrong")
     return int(wrong > 0)
 
 

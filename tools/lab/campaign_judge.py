@@ -1,4 +1,4 @@
-"""Judgement of what a command left that was struck: files, exit code, and the calibration against the truth."""
+"""Judgement of a command with faults: its files, its exit code, and its calibration against the truth."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ WITH_RESULT = (0, 5, 6)
 FOLDER = "board"
 
 
-def judge_files(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any) -> Row:
+def judge_files(case: str, place: Path, done: Ended, faults: Sequence[Any], world: Any) -> Row:
     """Judge a command that ran in `place` and left its files in `board`; `recorded`: a capture is there.
 
-    world : has a `kind`, and gives the `truths` of its sensor by the faults that struck.
+    world : has a `kind`, and gives the `truths` of its sensor with these faults.
     """
-    names, folder = {str(blow).partition("@")[0] for blow in blows}, place / FOLDER
+    names, folder = {str(fault).partition("@")[0] for fault in faults}, place / FOLDER
     # a killed process, or one whose stderr was full, prints nothing
     killed = (-9,) if "killed" in names else ()
     silent = (*CODES, *killed) if "deaf" in names else (0, 5, *killed)
@@ -34,11 +34,11 @@ def judge_files(case: str, place: Path, done: Ended, blows: Sequence[Any], world
     wrong += [*_unfit(done.code, document, names), *partial_files(folder, done.code)]
     row = judgement()
     try:
-        row = judged(Calibration.load(document), *world.truths(blows, folder))
+        row = judged(Calibration.load(document), *world.truths(faults, folder))
     except MpucalError as error:
         wrong += [str(error)] if document.exists() else []
     wrong += [f"called {row.verdict}"] if row.false else []
-    vars(row).update(case=case, world=world.kind, blows=tuple(map(str, blows)), wrong=wrong)
+    vars(row).update(case=case, world=world.kind, faults=tuple(map(str, faults)), wrong=wrong)
     recorded = folder.exists() and bool(captures_in(folder))
     vars(row).update(cpu_s=done.cpu_s, code=done.code, said=done.last, recorded=recorded)
     return row

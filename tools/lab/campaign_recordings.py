@@ -204,6 +204,6 @@ def of_recording(case: Damaged, here: Path) -> Row:
     """Damage a recording, calibrate and judge it."""
     kinds, data = damaged(case.path, case.number)
     (here / FOLDER).mkdir()
-    (file := here / f"struck.{case.kind}").write_bytes(data)
+    (file := here / f"damaged.{case.kind}").write_bytes(data)
     done = Child(partial(calibrated, file), here, here / "err").go().wait()
     return judge_files(f"r{case.number}", here, done, kinds, case)

@@ -1,4 +1,4 @@
-"""Simulated worlds in which faults strike at any instant: the chip, its bus, the line, the vehicle, or the process.
+"""Simulated worlds in which faults begin at any time: the chip, its bus, the line, the vehicle, or the process.
 
 A world is `--bus sim`, the same chip behind the emulated bridge, or `--mavlink sim`. Whenever its time goes on,
 `World.reach` hears of it.
@@ -101,23 +101,23 @@ class World:
         ):
             yield
 
-    def begin_faults(self, blows: Sequence[TimedFault]) -> None:
+    def begin_faults(self, faults: Sequence[TimedFault]) -> None:
         """Begin these faults, each at its time."""
         if self.bus is not None:
-            self.bus.begin_faults(_faults(blows), blows[0].number)
-            self.bus._motion.mishaps = (*self.bus._motion.mishaps, *_befallen(blows))
+            self.bus.begin_faults(_faults(faults), faults[0].number)
+            self.bus._motion.mishaps = (*self.bus._motion.mishaps, *_sensor_faults(faults))
         else:
-            self.transport.begin_faults(_faults(blows))
-        for blow in blows:
-            if blow.name in (*PROCESS, *CLOCK, *SERIAL):
-                self.at(blow.at_s, lambda blow=blow: self._strike(blow))
+            self.transport.begin_faults(_faults(faults))
+        for fault in faults:
+            if fault.name in (*PROCESS, *CLOCK, *SERIAL):
+                self.at(fault.at_s, lambda fault=fault: self._begin(fault))
 
-    def truths(self, blows: Sequence[TimedFault], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
+    def truths(self, faults: Sequence[TimedFault], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the values of (D, b_a) that count as true: before and after each fault, and amid slow ones."""
         document = json.loads((folder / "truth.json").read_text())
         D, b_a = np.array(document["D"], float), np.array(document["b_a"], float)
         maps = []
-        for mishap in _befallen(blows):
+        for mishap in _sensor_faults(faults):
             times = mishap.begun_s + np.array([-1.0, 10.0, 20.0, 30.0, 1000.0])
             maps.append([_affine(mishap, t) for t in times])
         found = []
@@ -128,22 +128,22 @@ class World:
             found.append((D @ A, b_a + D @ c))
         return found
 
-    def _strike(self, blow: TimedFault) -> None:
-        if blow.name in SIGNALS:
-            os.kill(os.getpid(), SIGNALS[blow.name])
-        elif blow.name == "disk_full":
+    def _begin(self, fault: TimedFault) -> None:
+        if fault.name in SIGNALS:
+            os.kill(os.getpid(), SIGNALS[fault.name])
+        elif fault.name == "disk_full":
             # no file may grow beyond this, as on a full disk; messages on stderr go to a file, too, and get their room
-            room = max(blow.number % ROOM_BYTES, os.fstat(2).st_size + SAID_BYTES)
+            room = max(fault.number % ROOM_BYTES, os.fstat(2).st_size + SAID_BYTES)
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
-        elif blow.name == "deaf":
+        elif fault.name == "deaf":
             os.dup2(os.open("/dev/full", os.O_WRONLY), 2)
-        elif blow.name in CLOCK and self.bus is not None:
-            self.bus._clock.spend(round(PAUSES_S[blow.name] * 1e9))
-        elif blow.name in SERIAL and self.line is not None:
-            rng = np.random.default_rng(blow.number)
+        elif fault.name in CLOCK and self.bus is not None:
+            self.bus._clock.spend(round(PAUSES_S[fault.name] * 1e9))
+        elif fault.name in SERIAL and self.line is not None:
+            rng = np.random.default_rng(fault.number)
             places = rng.integers(0, WITHIN_BYTES, SPOILT_BYTES)
-            spoilt = [(int(at), blow.name, int(rng.integers(1, 256))) for at in places]
+            spoilt = [(int(at), fault.name, int(rng.integers(1, 256))) for at in places]
             if rng.random() < 0.5:
                 self.line.to_host = LineFaults(spoilt)
             else:
@@ -205,22 +205,22 @@ class HookedTransport(SimulatedTransport):
         self._line = PacketLine(faults, vehicle.options.seed)
 
 
-def _faults(blows: Sequence[TimedFault]) -> list[Fault]:
+def _faults(faults: Sequence[TimedFault]) -> list[Fault]:
     """Return those that the simulation's table of faults has."""
-    known = [blow for blow in blows if blow.name in SIMULATED]
-    return [Fault(blow.name, blow.at_s if SIMULATED[blow.name].timed else 0.0) for blow in known]
+    known = [fault for fault in faults if fault.name in SIMULATED]
+    return [Fault(fault.name, fault.at_s if SIMULATED[fault.name].timed else 0.0) for fault in known]
 
 
-def _befallen(blows: Sequence[TimedFault]) -> list[Mishap]:
+def _sensor_faults(faults: Sequence[TimedFault]) -> list[Mishap]:
     """Return the faults of the sensor; a vehicle has none."""
-    return [*begin_mishaps(_faults(blows)), *(_step(blow) for blow in blows if blow.name == STEP)]
+    return [*begin_mishaps(_faults(faults)), *(_step(fault) for fault in faults if fault.name == STEP)]
 
 
-def _step(blow: TimedFault) -> Mishap:
-    rng = np.random.default_rng(blow.number)
+def _step(fault: TimedFault) -> Mishap:
+    rng = np.random.default_rng(fault.number)
     direction = rng.normal(size=3)
     size = np.exp(rng.uniform(*np.log(STEP_MG))) / MG_PER_MPS2
-    return Mishap(partial(zero_step, step_mps2=direction / np.linalg.norm(direction) * size), blow.at_s)
+    return Mishap(partial(zero_step, step_mps2=direction / np.linalg.norm(direction) * size), fault.at_s)
 
 
 def _affine(mishap: Mishap, t_s: float) -> tuple[np.ndarray, np.ndarray]:

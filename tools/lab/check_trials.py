@@ -1,12 +1,12 @@
 """`mpucal check` on simulated pairs of a calibration and a check with known truth.
 
-python -m tools.lab check_trials --seeds 504                     what is told against what happened, each as often
+python -m tools.lab check_trials --seeds 504                     results by what happened, all events equally often
 python -m tools.lab check_trials --only nothing --seeds 2000     false alarms
 
 A pair is an MPU-6050 in a trembling hand: twelve poses make the calibration, a flat rest and the three orientations
 that are asked for, each missed by some degrees, the check; with `--any` any three. Every sensor also ages by five days,
-as `mpucal.recheck.drift` says of an unchanged one, and its rests and turns err by what `mpucal.recheck.observed` says
-that no mounting and no gyroscope is better than.
+as `mpucal.recheck.drift` says of an unchanged one. Its rests and turns have the errors that `mpucal.recheck.observed`
+assumes of every mounting and every gyroscope.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def told_as(rows: Sequence[Row]) -> str:
 
 
 def shares_of_p(rows: Sequence[Row]) -> str:
-    """Return the shares of the checks with a probability below 0.1 and 0.5 in %: as many, if nothing happened."""
+    """Return the shares in % of the checks with a probability below 0.1 and 0.5: 10 and 50 % if nothing happened."""
     p = np.array([row.probability for row in rows if row.probability is not None])
     return ", ".join(f"{100.0 * np.mean(p < limit):.1f}" for limit in (0.1, 0.5))
 

@@ -1,4 +1,4 @@
-"""A session's samples in the dialects of other programs, written by their own writers, read, and calibrated.
+"""A session's samples in the formats of other programs, written by their own writers, read, and calibrated.
 
 python -m tools.lab dialects                      a row for each, as docs/recordings.md has them
 python -m tools.lab dialects --only '*ROS*'

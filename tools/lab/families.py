@@ -1,4 +1,4 @@
-"""Is a verdict true? Simulated hands and sensors of many kinds, calibrated and compared with what they are.
+"""Are verdicts true? Simulated hands and sensors of many kinds, calibrated and compared with their truth.
 
 python -m tools.lab families --seeds 0:6
 python -m tools.lab families --families 'poses*;continuous' --seeds 0:33 --jobs 2 --json families.json
@@ -61,7 +61,7 @@ def of_seed(item: tuple[str, int], *, model: str = "auto") -> Row:
 
 
 def row(worth: Row) -> Row:
-    """Return a judgement, of which a good verdict is false if the error is large, too."""
+    """Return a judgement; a good verdict is false also if the error alone is large."""
     worth.false |= worth.verdict == GOOD and not worth.error <= GOOD_MPS2
     return worth
 

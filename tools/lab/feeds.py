@@ -53,7 +53,7 @@ def open_recorded(
 ) -> SimulatedBus:
     """Return a simulated MPU-6050 that serves the int16 counts (n, 3) of a recording, then raises EndOfCapture.
 
-    The driver must set it as it was; its sample clock is `rate_error_ppm` faster than `rate_hz`.
+    The driver must give it the settings of the recording; its sample clock is `rate_error_ppm` faster than `rate_hz`.
     """
     feed = RecordedFeed(np.array([acc_counts, gyr_counts]), (rate_hz, accel_range_g, gyro_range_dps))
     return SimulatedBus(Chip(MODELS["mpu6050"], feed, rate_error_ppm), FastClock())

@@ -1,4 +1,4 @@
-"""Trial of the guidance of a session by simulated hands of every kind, and by one that only follows the words.
+"""Trial of a session's guidance: simulated hands of every kind, and one that only follows the words.
 
 python -m tools.lab guidance_trials --seeds 20
 python -m tools.lab guidance_trials --seeds 20 --hand wandering

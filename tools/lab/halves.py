@@ -16,8 +16,8 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
     """Return both halves of a recording, each of which begins at rest.
 
     The cut is in the middle of the rest nearest to the middle. Where the board rests only at the start and at the end,
-    it is in the middle, and the second half is read backwards: gravity and accelerations are the same then, rates are
-    reversed.
+    the cut is in the middle, and the second half is read backwards: gravity and accelerations are the same then, rates
+    are reversed.
 
     Raises
     ------

@@ -57,7 +57,7 @@ def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: fl
 
     One of the rests alone is in the sensor's own axes, and so are the truths then.
 
-    gravity : that D is in units of [m/s^2]; None: what the calibration was told.
+    gravity : the one that scales D [m/s^2]; None: the one that the calibration was given.
     """
     gravity = gravity or float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
     if calibration.fit.get("model") == "static":

@@ -1,4 +1,4 @@
-"""Monte Carlo simulations: an MPU-6050 by hand and the paper's sensors (sections 4.3 and 4.4), beside what is wanted.
+"""Monte Carlo simulations: an MPU-6050 by hand and the paper's sensors (sections 4.3 and 4.4), and required errors.
 
 python -m tools.lab monte_carlo --seeds 60
 python -m tools.lab monte_carlo --scenes '12 poses;continuous' --model hand --seeds 60 --json poses.json

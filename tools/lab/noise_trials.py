@@ -1,4 +1,4 @@
-"""`mpucal noise` on simulated noise of known coefficients: what is found against what is true, and its intervals.
+"""`mpucal noise` on simulated noise of known coefficients: its errors, and how often its intervals hold the truth.
 
 python -m tools.lab noise_trials                        four kinds of axes, an hour at 100 Hz, 20 times
 python -m tools.lab noise_trials --hours 3 --seeds 100

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PATIENCE_NS, LISTEN_NS = 600 * S, S // 5
 # level, left, right, nose down, nose up, back
 ORDER = SIDES[[0, 1, 4, 2, 5, 3]]
-# A person presses the key once the vehicle rests as it should.
+# A person presses the key once the vehicle rests on the requested side.
 HELD_S, NEAR = 1.0, 0.97
 PUT_DOWN_S = 5.0
 # What ArduPilot reports in place of a side.

@@ -1,4 +1,4 @@
-"""The filters in plain NumPy, a step at a time: slow, short, and the oracle of the kernel's tests.
+"""The filters in plain NumPy, one step at a time: slow and short. The kernel's tests compare with them.
 
 Derivatives are those of complex steps: each filter runs for theta + i STEP e_k, for all parameters k at once, and the
 imaginary part of what it gives, divided by STEP, is exact to the last digits. No derivative is written down.

@@ -103,7 +103,7 @@ def ellipsoid(rests: Rests, gravity: float) -> Estimate:
         z = y @ T.T
         length = np.linalg.norm(z, axis=1)
         unit = z / length[:, None]
-        # in units of g, T's columns and b's are alike
+        # in units of g, the columns of T and of b are of one size
         J = np.hstack([unit[:, upper[0]] * y[:, upper[1]] / gravity, -unit @ T])
         condition = float(np.linalg.cond(J))
         if not condition < WORST_CONDITION:

@@ -1,4 +1,4 @@
-"""Recordings of other people: the try at which each is read, its verdict, |a| of its rests, and if its halves agree.
+"""Recordings of other people: tries until each is read, its verdict, |a| of its rests, and if its halves agree.
 
 python -m tools.lab strangers recordings/*.csv folder/
 

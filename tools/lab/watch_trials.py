@@ -1,11 +1,11 @@
-"""`mpucal stream --watch` over hours of simulated use: how often it warns of a sound sensor, and when of a changed one.
+"""`mpucal stream --watch` over hours of simulated use: false warnings, and the time until a change is reported.
 
-python -m tools.lab watch_trials --only nothing --seeds 20 --hours 1       warnings that are none
-python -m tools.lab watch_trials --seeds 40 --hours 0.5                    how long until a bias step is told
+python -m tools.lab watch_trials --only nothing --seeds 20 --hours 1       false warnings
+python -m tools.lab watch_trials --seeds 40 --hours 0.5                    time until a bias step is reported
 
 Each minute a hand takes an MPU-6050 from a table, holds it in six or eight orientations, turns it without a pause, or
 turns it while it walks, and puts it down again; it trembles all the while. The calibration is one by twelve poses five
-days before, as in tools/lab/check_trials.py, and each rest's mounting gives in by as much as there.
+days before, as in tools/lab/check_trials.py, and the mounting bends in each rest by as much as there.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ class FaultInjector:
         """
         while due := self._schedule.due(self._clock.now()):
             for fault in due:
-                self._strike(fault)
+                self._begin_fault(fault)
         for kind in self._active(self._failing):
             if kind.errno is not None and (not kind.share or self._rng.random() < kind.share):
                 self._clock.spend(round(kind.takes_s * 1e9))
@@ -118,12 +118,12 @@ class FaultInjector:
         """Return each fault as in an option."""
         return [str(fault) for fault in self._faults]
 
-    def _strike(self, fault: Fault) -> None:
+    def _begin_fault(self, fault: Fault) -> None:
         self._clock.spend(round(fault.kind.pause_s * 1e9))
-        if fault.kind.strike is not None:
+        if fault.kind.begin is not None:
             now_ns = self._clock.now()
             end_ns = max(fault.end_ns, now_ns) if math.isfinite(fault.end_ns) else now_ns
-            fault.kind.strike(self._chip, now_ns, round(end_ns))
+            fault.kind.begin(self._chip, now_ns, round(end_ns))
 
     def _active(self, faults: Sequence[Fault]) -> list[FaultKind]:
         """Return the kinds of those of `faults` that last now."""

@@ -158,8 +158,8 @@ class SimulatedVehicle:
         self.firmware.sense(self.imus, ticks - 1)
         self._now_us += ticks * tick_us
         for fault in self._schedule.due(self._now_us * US):
-            if fault.kind.strike is not None:
-                fault.kind.strike(self)
+            if fault.kind.begin is not None:
+                fault.kind.begin(self)
         self.firmware.sense(self.imus, 1)
         if self._now_us < self._silent_until_us:
             return

@@ -1,4 +1,4 @@
-"""Motions of a board besides its turns: the hand that holds it, and what that hand stands in.
+"""Motions of a board besides its turns: of the hand that holds it, and of the place, such as a boat or an elevator.
 
 Each of the latter is a function of the course and a generator: (n, 3) m/s^2 of the pivot in the world, z up, and (n, 3)
 rad/s in the body; 0.0 for none.

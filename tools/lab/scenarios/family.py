@@ -42,7 +42,7 @@ class Family:
     name : without a semicolon. wanted : of the verdicts; a false one is never right.
     motion : how the board is turned. hand : what holds it. around : what moves it besides.
     chip, sampling : the sensor and how it is sampled.
-    faults, digits, timing : what befalls values, words and their delivery, in this order each.
+    faults, digits, timing : faults of values, of words and of their delivery, each in this order.
     told_gravity : m/s^2, what the calibration is told; None: the truth.
     flat_known : the recording says which samples lay flat; otherwise that is to be found.
     lying_deg : how far from level the flat segment lies at most. temperature_c : that it records at first.
@@ -120,7 +120,7 @@ def simulate(family: Family, rng: Rng, truth: SensorTruth | None = None) -> Simu
 
 
 def _delivered(family: Family, readings: Readings, rngs: Sequence[Rng]) -> tuple[Recording, NDArray[np.intp], Readings]:
-    """Return the recording of readings that faults befall, which of them it holds, and these readings."""
+    """Return the recording of readings after all faults, which of them it holds, and these readings."""
     of_faults, of_digits, of_timing = rngs
     for fault in family.faults:
         readings = fault(readings, of_faults)

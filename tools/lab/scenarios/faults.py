@@ -1,9 +1,10 @@
 """Errors of a sensor besides D, b_a, K and b_omega, their changes while it is turned, and damage on the way to a file.
 
 Faults are functions of the readings, in SI units, and a generator, and give the readings so spoilt. Where D or b_a
-moves, what is compared as the truth is its mean over the recording after the flat segment. What befalls 16-bit words
-takes and gives (n, 6) int32: the accelerometer's x, y, z, then the gyroscope's. What befalls times takes the nominal
-times (n,) [s] of the samples, and gives the times (m,) that are written and which samples (m,) they stand beside.
+moves, what is compared as the truth is its mean over the recording after the flat segment. A fault of 16-bit words
+takes and gives (n, 6) int32: the accelerometer's x, y, z, then the gyroscope's. A fault of times takes the nominal
+times (n,) [s] of the samples, and gives the times (m,) that are written, and the numbers (m,) of the samples beside
+them.
 """
 
 from __future__ import annotations
@@ -119,8 +120,10 @@ def cross_clipped(readings: Readings, rng: Rng, mps2: float = 1.0) -> Readings:
 
 
 def hobby(readings: Readings, rng: Rng, smooth: float = 1.0, dead_dps: float = 0.0) -> Readings:
-    """Do as sketches do before they print: average the accelerometer over 1 / smooth samples, and take gyroscope rates
-    below dead_dps, about the mean of the flat segment, for none.
+    """Do as sketches do before they print: smooth the accelerometer, and remove small rates.
+
+    smooth : accelerations are averaged over 1 / smooth samples. dead_dps : rates nearer than this to the mean of the
+    flat segment are set to it.
     """
     acc, flat = readings.acc, readings.t < 0.3 * FLAT_S
     acc = acc[:1] + scipy.signal.lfilter([smooth], [1.0, smooth - 1.0], acc - acc[:1], axis=0)

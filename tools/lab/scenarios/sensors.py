@@ -1,4 +1,4 @@
-"""Sensors drawn: those of the paper's section 4.3, an MPU-6050 as they are sold, any chip; and how they are sampled."""
+"""Sensors drawn: those of the paper's section 4.3, an MPU-6050 as it is sold, any chip; and how they are sampled."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 What is compared as the truth is D and b_a as drawn, in the body frame in which K is symmetric. Where b_a or D moves
 (steps, slips, warmth, stress), it is the mean over the recording after the flat segment; of a nonlinear sensor, the
-slope at zero; where a calibration names an unlikely gravity, D in units of it. What befalls words and times was
-reported by owners of such chips; sources stand beside those rows.
+slope at zero; where a calibration names an unlikely gravity, D in units of it. Faults of
+words and times are those that owners of such chips have reported; sources stand beside those rows.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .family import PLAIN, SHARP, Family
 from .sensors import Chip, Sampling
 
 TREMBLING = Hand(tremor_mps2=0.12, tremor_rad_s=math.radians(0.6))
-# what turns about the sensor itself, and shakes nothing
+# a hand that turns the sensor about itself, and does not shake
 STEADY = Hand(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=0.0)
 QUIET = Chip(accel_noise_ug=1.0, gyro_noise_dps=1e-4, bits=0, name=None)
 PHONE = Chip(0.01, 0.005, 0.5, 30.0, 0.01, 0.005, 1.0, 150.0, 0.004, 8.0, 1000.0, name=None)
