@@ -80,7 +80,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exempt what all tests share from garbage collection: a tenth of a run would go into looking at it again."""
+    """Exempt what all tests share from garbage collection, which would take a tenth of a run."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000)

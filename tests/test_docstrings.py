@@ -1,4 +1,4 @@
-"""Docstrings as CONTRIBUTING.md asks for: a verb or a noun first, a first sentence that is taken in at once."""
+"""Docstrings as CONTRIBUTING.md asks for: a verb or a noun first, and a short first sentence."""
 
 import ast
 import re

@@ -1,4 +1,4 @@
-"""The table of reasons: whole, used, the only way to make one; and each can be seen as its page says."""
+"""The table of reasons: complete, each used, the only source of reasons; and each can be caused as its page says."""
 
 import ast
 import json

@@ -107,7 +107,7 @@ row.compute_digest = lambda path: os._exit(1) if path.stem == "deadly" else comp
 # if the worker died during an answer, the client lost its scheduler in one run of all tests in eight
 @pytest.mark.slow
 def test_a_recording_that_kills_workers_is_told_from_the_others_of_its_task(tmp_path):
-    """Several recordings make a task; each is tried alone after that."""
+    """A task holds several recordings; if its worker is killed, each of them is tried alone."""
     paths = [f"/none/{i}.mcap" for i in range(100)]
     paths[40] = "/none/deadly.mcap"
     journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
@@ -124,7 +124,7 @@ def test_a_recording_that_kills_workers_is_told_from_the_others_of_its_task(tmp_
 
 @pytest.mark.slow  # the gate tests workers that are killed while they start
 def test_a_worker_that_comes_back_late_is_waited_for():
-    """Wait longer than dask does by default, which is 0 s here."""
+    """Wait for a killed worker to be started again, though the time limit of dask is 0 s here."""
     with changed({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
         (first,) = client.run(os.getpid).values()
         os.kill(first, signal.SIGKILL)
@@ -188,7 +188,7 @@ def test_a_url_that_nothing_can_read_says_what_is_lacking(monkeypatch):
 
 
 def test_the_page_names_what_is_odd(tmp_path):
-    """Made-up boards, each calibrated twice within its standard deviations: one far off, one refused."""
+    """Calibrate each of some made-up boards twice: one is far from the others, one is refused."""
     rng, rows = np.random.default_rng(3), []
     for board in range(200):
         b_a = rng.normal(0.0, 0.1, 3) + (2.0 if board == 77 else 0.0)

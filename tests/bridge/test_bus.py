@@ -96,7 +96,7 @@ def test_a_chip_that_is_disconnected_during_a_stream(started, stream):
 
 
 def test_during_a_stream_only_int_enable_is_requested(started, stream):
-    """FRAMES contain the overflow of INT_STATUS; a read of it would clear the flag for the bridge."""
+    """FRAMES hold the overflow flag of INT_STATUS, which a read by the host would clear for the bridge."""
     made, driver = started()
     made.line.written.clear()
     stream(driver, 2)

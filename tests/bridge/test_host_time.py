@@ -67,7 +67,7 @@ def test_the_rate_is_known_and_corrected_and_the_doctor_says_how_far_it_is_off(r
 
 
 def test_frames_in_step_with_an_adapters_bursts_do_no_harm(recorded):
-    """Four looks of 20 ms take as long as five bursts of 16 ms: each is later by as much as the chip is slow."""
+    """Four polls of 20 ms take as long as five bursts of 16 ms: delays vary as slowly as the chip is off."""
     recording, _ = recorded(30, 0, burst_ms=16, rate_error_ppm=-130)
     sensor = recording.sensor
     assert sensor.clock_std < 20e-6

@@ -174,7 +174,7 @@ def test_a_move_that_the_gyroscope_did_not_see_hardly_counts(in_hand, move):
 
 
 def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
-    """Compare the trace of J C J', for a C of one parameter, with central differences of the miss."""
+    """Compare the trace of J C J', for a C of one parameter's variance, with central differences of the miss."""
     prepared, truth = preprocess(in_hand.recording, in_hand.recording.flat, G), in_hand.truth
     u = in_hand.specific_force[0] / G
     theta = replace(Theta.start(truth.D, truth.b_a, prepared.flat.b_omega, u), K=truth.K)

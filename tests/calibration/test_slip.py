@@ -90,7 +90,7 @@ def test_a_slip_in_the_last_rest_divides_it(hand, seed):
 
 
 def test_a_miss_near_the_end_that_the_next_one_undoes_is_no_slip():
-    """Twenty turns that miss by chance: a rest held askew misses forth and back, and a slip once."""
+    """Simulate twenty turns with random misses: a rest held askew causes two opposite misses, and a slip one."""
     rng = np.random.default_rng(3)
     F = [rotation(rng.normal(0.0, 1.0, 3)) for _ in range(20)]
     askew = 0.03 * np.array([0.6, -0.6, 0.53])

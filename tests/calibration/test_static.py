@@ -56,7 +56,7 @@ def test_the_static_model_is_an_ellipsoid_through_the_rests(hand):
     ids=["usual errors", "errors beyond the data sheet's"],
 )
 def test_six_faces_that_were_joined_give_biases_and_scale_factors(diagonal, b_a):
-    """Find them with a gyroscope that missed the turns between, and without it, also where the model is asked for."""
+    """Estimate them without the turns between the faces: with and without rates, and with the model given."""
     rng = np.random.default_rng(7)
     D = np.diag(diagonal)
     n = 300

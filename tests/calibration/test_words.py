@@ -124,7 +124,7 @@ def test_an_axis_coarser_than_the_calibrations_uncertainty_is_refused(counted, b
 
 
 def test_single_faces_that_were_joined_are_not_accused():
-    """A bit is the same in all six by chance, and no value between two faces was passed."""
+    """A bit may be the same on all six faces by chance, as the values between two faces are missing."""
     faces = np.repeat([[60, -8100, 250], [6200, 400, 300], [-7900, 500, 200], [80, 8200, 350], [90, 70, 8300]], 400, 0)
     acc = (faces + np.rint(20.0 * np.random.default_rng(4).standard_normal(faces.shape))) * LSB
     gap = np.arange(len(faces)) % 400 == 0
@@ -181,7 +181,7 @@ def test_other_words_stay_as_they_are(sound, change):
 
 
 def test_words_of_a_resting_axis_are_decoded_like_the_others(sound):
-    """Infer from the others how a constant axis, which shows nothing, was read."""
+    """A constant axis does not show how its words were read: infer it from the other axes."""
     resting = replace(sound, acc=np.column_stack([sound.acc[:, :2], np.full(len(sound), 8000 * LSB + 0xC0 * LSB)]))
     corrected, _, axes = decode(read_signed(resting))
     assert axes.startswith("the accelerometer's x, y, z")

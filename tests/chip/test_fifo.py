@@ -80,7 +80,7 @@ def test_a_frame_that_may_be_flipped_waits_for_the_next():
 
 @given(st.lists(st.integers(0, 6), min_size=1, max_size=20), st.integers(1, 9))
 def test_samples_do_not_depend_on_how_polls_cut_them(sizes, equal):
-    """Deliver up to nine equal frames, too, and those of a die that warms up."""
+    """Use up to nine equal frames, and frames of a die that warms up."""
     frames = [(i // equal, 0, 8192, -2000 + 100 * (i // equal), 0, 0, 0) for i in range(sum(sizes))]
     decoder, at = fresh(frames_before=0), 0
     for n, size in enumerate(sizes):

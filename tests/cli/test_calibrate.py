@@ -133,7 +133,7 @@ def test_a_folder_holds_the_results_of_one_recording(mpucal, session, tmp_path):
 
 
 def test_an_updated_calibration_is_not_written_beside_a_capture(mpucal, session):
-    """The capture may even be that which the calibration was made from."""
+    """Refuse it even beside the capture that the calibration was made from."""
     calibration = session.folder / "calibration.json"
     copy, words = Path("copy.json"), ("check", "copy.json", session.folder / "capture.mcap")
     copy.write_bytes(calibration.read_bytes())

@@ -36,7 +36,7 @@ def joined(write_capture, folder, names):
 
 
 def test_a_resumed_session_has_the_bits_of_an_unbroken_one(mpucal, stopped_at, write_capture, tmp_path):
-    """The session is killed while flat, and stopped with Ctrl-C while rotating: no reason against its result."""
+    """Kill the session while flat, and stop it with Ctrl-C while rotating: its result gets no reason for that."""
     folder = tmp_path / "board"
     words = ("--bus", "sim", "--rate", "25", "--target", "quick", "-o", "board", "--name", "Bench 7")
     killed_s = came_to_s(stopped_at(tmp_path, ("flat", 50), signal.SIGKILL, *WORDS, *words).err)

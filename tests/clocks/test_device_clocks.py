@@ -69,7 +69,7 @@ def shown(t_ns, start_us=0):
     latency_ms=st.lists(st.floats(1, 30), min_size=20, max_size=20),
 )
 def test_counter_wraps_are_counted_over_pauses(start_us, pauses_s, fast_ppm, latency_ms):
-    """Half an hour of silence and a resonator that is 0.5 % off are allowed; a wrap takes 71 minutes."""
+    """A counter wraps after 71 minutes: allow half an hour of silence, and a resonator that is 0.5 % off."""
     clock, true_ns, first = BridgeClock(), 0, None
     for pause_s, late_ms in zip(pauses_s, latency_ms, strict=False):
         true_ns += round(pause_s * S)

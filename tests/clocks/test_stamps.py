@@ -10,22 +10,22 @@ TRUE = np.arange(N) / HZ
 
 
 def late(seed, s):
-    """Stamps that are late by so much on average."""
+    """Stamps that are late by this time on average."""
     return np.maximum.accumulate(TRUE + np.random.default_rng(seed).exponential(s, N))
 
 
 def in_bursts(size):
-    """Samples that arrive with the last of so many."""
+    """Stamps of samples that arrive in bursts of `size`, with the last one."""
     return TRUE[np.minimum((np.arange(N) // size + 1) * size - 1, N - 1)]
 
 
 def polled(size):
-    """Samples that are read when a timer expires, which is hardly in step with them."""
+    """Stamps of samples that are read when a timer of `size` sample periods expires."""
     return np.ceil(np.arange(N) / size) * size / HZ
 
 
 def held_back():
-    """A computer that is busy for 0.3 s now and then."""
+    """Stamps of a computer that is busy for 0.3 s now and then."""
     stamps = late(1, 1e-3)
     for first in range(500, N - 500, 1000):
         stamps[first : first + 60] = np.maximum(stamps[first : first + 60], stamps[first + 60])
@@ -71,7 +71,7 @@ def test_lost_samples_are_gaps_at_their_places():
 
 @pytest.mark.parametrize("missing", [0.02, 0.05])
 def test_an_even_clock_does_not_replace_stamps_between_which_single_samples_are_missing(missing):
-    """An even clock would ignore them, and err by tens of ms."""
+    """An even clock would ignore the missing samples, and be wrong by tens of ms."""
     rng = np.random.default_rng(6)
     there = rng.random(N) > missing
     off = fit_clock(np.maximum.accumulate(TRUE + 1e-3 * rng.standard_normal(N))[there]).t - TRUE[there]

@@ -54,7 +54,7 @@ def test_obstacles_are_reported_with_their_remedy(sound, adapter, topic, words):
 
 
 def test_the_tools_of_linux_find_the_chip_and_a_kernels_driver(sound):
-    """Judges of the mocked adapter, too."""
+    """Examine the mocked adapter by i2c-tools: they judge the mock, too."""
     table = sound.run("i2cdetect", "-y", "-r", "1").out.splitlines()[1:]
     assert {cell for row in table for cell in row.partition(":")[2].split()} - {"--"} == {"68"}
     assert sound.run("i2cget", "-y", "1", "0x68", "0x75").out.strip() == "0x68"

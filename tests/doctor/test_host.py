@@ -86,7 +86,7 @@ def test_a_chip_on_another_bus_is_found(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(("driver", "mark", "says"), [("rtc-ds1307", Mark.NOTE, "0x69"), ("mpu", Mark.BAD, "unbind")])
 def test_a_driver_that_holds_the_address(monkeypatch, tmp_path, driver, mark, says):
-    """A clock keeps its driver: the chip gets the other address."""
+    """Advise the chip's other address beside a clock's driver, and to unbind a driver of the MPU."""
     device = tmp_path / "bus" / "i2c" / "devices" / "1-0068"
     device.mkdir(parents=True)
     (device / "driver").symlink_to(tmp_path / "bus" / "i2c" / "drivers" / driver)

@@ -9,7 +9,7 @@ from mpucal.files import open_rows
 
 @pytest.mark.parametrize("ending", [".csv", ".npz"])
 def test_a_recording_by_radio_is_the_one_by_wire_also_in_runs(ending, walk, table, tmp_path):
-    """Estimate the clock as `calibrate` does and as `apply` does: with a gap at each step no rest would be found."""
+    """Estimate the clock as `calibrate` does and as `apply` does, without a gap at each late stamp."""
     # in bursts of four as well, each with one stamp
     last = np.minimum((np.arange(len(walk)) // 4 + 1) * 4 - 1, len(walk) - 1)
     stamps = np.maximum.accumulate(walk.t + np.random.default_rng(6).exponential(4e-3, len(walk)))[last]

@@ -44,7 +44,7 @@ def sensor_logger(folder, walk, ns, metadata=None, sign=1):
 
 
 def metawear(folder, walk, ns):
-    """Call the tables by a word of longer names, beside one without gravity."""
+    """Name the tables by a word within longer names, beside one without gravity."""
     for name, values, unit in (("Accelerometer", walk.acc / G, "g"), ("Gyroscope", np.degrees(walk.gyr), "deg/s")):
         columns = [f"{axis}-axis ({unit})" for axis in "xyz"]
         put(folder, f"MetaWear_C8_{name}_100.000Hz_1.4.4.csv", ns / 1e6, values, columns, "epoch (ms)")
@@ -222,7 +222,7 @@ def test_files_of_a_folder_are_one_recording_and_others_are_left_out(walk, tmp_p
 
 
 def test_a_side_with_a_large_bias_has_the_columns_of_the_others(tmp_path):
-    """Read it, whose length of gravity shows no columns, and leave out a table of another unit."""
+    """Read its columns as in the other files, as |a| does not show them; leave out a table of another unit."""
     rng = np.random.default_rng(4)
     for name, side in (("x_up", [1.07, 0, 0]), ("y_up", [0, 1, 0]), ("z_up", [0, 0, 1]), ("places", [900, 1, 5])):
         values = [*(np.array(side) * 16384 / (1 if side[0] < 2 else 16384)), 90, -70, 30]
@@ -241,7 +241,7 @@ def test_the_one_recording_among_other_tables_is_named(walk, tmp_path):
 
 
 def test_packed_recordings_are_read_as_what_is_in_them(walk, table, assert_same, tmp_path):
-    """Read a file, and a folder of our own tables, beside what others add; name the file that cannot be read."""
+    """Read a packed file and a packed folder, with files that systems add; name a file that cannot be read."""
     content = table("t,ax,ay,az,gx,gy,gz", walk.t, walk.acc, walk.gyr).read_bytes()
     (tmp_path / "walk.csv.gz").write_bytes(gzip.compress(content))
     (tmp_path / "cut.csv.gz").write_bytes(gzip.compress(content)[:-9])

@@ -104,7 +104,7 @@ def test_reads_what_was_written_in_the_order_in_which_it_happened(path, records,
 
 
 def test_other_programs_read_it(path, monkeypatch):
-    """The library's own reader, by index, and Protocol Buffers' own: what a viewer of MCAP files does."""
+    """Read it by the reader of the library mcap, with its index, and by Protocol Buffers, as a viewer of files does."""
     failed = Transaction("read", 0x38, 3, b"", 2_000_000_001, Failure("NoAnswer", "no answer of 0x68", "wire it"))
     heard = [replace(each, host_ns=each.t_ns + 7_000_000_000 - i) for i, each in enumerate(polls(200, fifo=14))]
     records = [*heard[:101], failed, *heard[101:], SessionEvent("key", 5_000_000_000, {"key": "enough"})]
@@ -262,7 +262,7 @@ CAPTURES = sorted(FIXTURES.glob("*/*.mcap"))
 
 @pytest.mark.parametrize("capture", CAPTURES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_many_accesses_at_once_are_decoded_as_one_by_one(capture, path, monkeypatch):
-    """Stored captures, those of faults among them, against a new file of the same records.
+    """Decode stored captures, some with faults, and new files of the same records.
 
     Of a session's, the first 700 records, in which there are events, rest and motion.
     """

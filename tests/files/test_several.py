@@ -43,14 +43,14 @@ def test_lines_of_several_sensors_in_turn(header, labels, called, walk, assert_s
 
 
 def test_lines_of_one_sensor_after_the_other(walk, assert_same, tmp_path):
-    """Read the first, and no interruption where the times of the next begin."""
+    """Read the first, without an interruption where the times of the next sensor begin."""
     write(tmp_path / "boards.csv", walk, f"sensor_id,t,{AXES}\n", ("a", "b"), order="board")
     assert_same(mpucal.load(tmp_path / "boards.csv"), walk, 1e-9, 1e-9, 1e-9)
 
 
 @pytest.mark.parametrize("name", ["gait", "sensor"])
 def test_a_column_that_tells_no_sensors_apart(name, walk, assert_same, tmp_path):
-    """Read all lines where a column alternates on its own, or where the lines of one word lack a sensor."""
+    """Read all lines if a column alternates by itself, or if the lines with one of its words lack a sensor."""
     words = np.where(np.arange(len(walk)) % 2, "swing", "stance")
     rows = zip(words.tolist(), walk.t.tolist(), walk.acc.tolist(), walk.gyr.tolist(), strict=True)
     text = f"{name},time,{AXES}\n"
@@ -67,7 +67,7 @@ def test_a_column_that_tells_no_sensors_apart(name, walk, assert_same, tmp_path)
     ("name", "place"), [("Accel{}_{}", "right leg"), ("{1}_acc_{0}", "chest"), ("acc.{1}.{0}", "left")]
 )
 def test_columns_of_several_places(name, place, walk, assert_same, table):
-    """Read the first IMU, whose columns another's precede, and mix no sensors of two."""
+    """Read the IMU of the first column, with another's columns among its own, and do not mix the two."""
     of_place = [
         [
             name.replace("Accel", word).replace("acc", word).format(axis, at)
@@ -187,7 +187,7 @@ def test_columns_of_a_numbered_imu(name, words, second, walk, assert_same, table
 
 @pytest.mark.parametrize(("name", "late"), [("id", 0.0005), ("id", 0.005), ("foot", 0.0), ("foot", 0.0003)])
 def test_lines_of_two_sensors_that_read_alike(name, late, walk, assert_same, tmp_path):
-    """Read one of two that lie alike, by a column of text that may be called so, or as their lines come together."""
+    """Read one of two in the same orientation, by a column called id, or as their lines come together."""
     lines = (
         f"{word},{t + late * (word == 'right')!r},{','.join(map(repr, [*a.tolist(), *w.tolist()]))}\n"
         for t, a, w in zip(walk.t.tolist(), walk.acc, walk.gyr, strict=True)
@@ -202,7 +202,7 @@ def test_lines_of_two_sensors_that_read_alike(name, late, walk, assert_same, tmp
 
 
 def test_a_word_that_the_user_calls_a_sensor(walk, assert_same, tmp_path):
-    """Read the lines of a word in any column of text, which follow each other."""
+    """Read the lines with the given word in a column of text, which are in one piece."""
     write(tmp_path / "boards.csv", walk, f"trial,time,{AXES}\n", ("a", "b"), order="board")
     assert_same(mpucal.load(tmp_path / "boards.csv", sensor="a"), walk, 1e-9, 1e-9, 1e-9)
 

@@ -628,7 +628,7 @@ def test_counts_of_an_analog_accelerometer_have_an_offset(read, walk):
 
 
 def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, table):
-    """Fit a sphere to neither: any few points lie on one."""
+    """Fit no sphere to them, as any few points lie on one."""
     noise = np.random.default_rng(1).uniform(-0.1, 0.1, size=(len(walk), 3))
     faces = np.repeat(G * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]]), 100, axis=0)
     for name, acc in (("rest", noise + np.array([0, 0, G])), ("faces", faces + noise[: len(faces)])):
@@ -638,7 +638,7 @@ def test_noise_of_a_rest_and_few_orientations_have_no_offset(walk, table):
 
 @pytest.mark.parametrize("centre", [[1.65, 1.65, 1.65], [0.0, 1.2, 0.6]])
 def test_a_shifted_zero_is_reported_at_any_place(centre, walk, table):
-    """Say it of volts, and of a zero that is only 1.3 g away."""
+    """Report it for volts, and for a zero that is only 1.3 g away."""
     acc = walk.acc / G * (0.3 if centre[0] else 1.0) + np.array(centre)
     for header in ("time,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z", "t,ax,ay,az,gx,gy,gz"):
         path = table(header, walk.t, acc, walk.gyr)
@@ -648,7 +648,7 @@ def test_a_shifted_zero_is_reported_at_any_place(centre, walk, table):
 
 
 def test_lengths_that_vary_about_any_point_have_no_offset(table):
-    """Say no zero elsewhere of an aeroplane that pulls up and rolls, wherever the centre of its sphere is."""
+    """Report no shifted zero for an aeroplane that pulls up and rolls, wherever its sphere's centre is."""
     k = np.arange(6000)
     slow, faster, pull = np.sin(k / 300), np.sin(k / 170), 1.0 + 0.35 * np.abs(np.sin(k / 250))
     shaken = np.random.default_rng(3).normal(0.0, 0.4, (6000, 3))
@@ -667,7 +667,7 @@ def test_the_numbers_of_frames_are_no_rates(table):
 
 
 def test_shocks_near_some_sphere_have_no_offset(table):
-    """Refuse what scatters too much, without a zero that none has."""
+    """Refuse readings that scatter too much, and report no shifted zero."""
     directions = np.random.default_rng(4).normal(size=(1000, 3))
     acc = 35.0 * directions / np.linalg.norm(directions, axis=1)[:, None] + np.array([26, 7, 32])
     path = table("# t,ax,ay,az", np.arange(1000) / 100, acc)
@@ -691,7 +691,7 @@ def test_a_magnetic_field_is_not_guessed_to_be_gravity(walk, table):
 
 
 def test_a_magnetic_field_as_long_as_gravity_is_not_guessed_to_be_it(walk, tmp_path):
-    """Read a shaken board, whose field in gauss the rates turn more nearly than its accelerations."""
+    """Read a shaken board, where the rates fit the turning of the field in gauss better than that of gravity."""
     rng = np.random.default_rng(11)
     shaken, field = walk.acc / G + rng.normal(0.0, 0.3, walk.acc.shape), 0.55 * walk.acc / G
     made = np.column_stack([walk.t, shaken, np.degrees(walk.gyr), field])
@@ -700,7 +700,7 @@ def test_a_magnetic_field_as_long_as_gravity_is_not_guessed_to_be_it(walk, tmp_p
 
 
 def test_a_field_of_unit_length_is_no_gravity_beside_one_in_si(walk, table):
-    """Suggest the accelerations of a vehicle, which its rates do not turn, and not the direction that they turn."""
+    """Suggest a vehicle's accelerations, though its rates fit the turning of the unit vector beside them better."""
     rng = np.random.default_rng(15)
     driven = rng.normal([0.1, -0.2, G], 2.0, walk.acc.shape)
     direction = walk.acc / np.linalg.norm(walk.acc, axis=1, keepdims=True)
@@ -710,14 +710,14 @@ def test_a_field_of_unit_length_is_no_gravity_beside_one_in_si(walk, table):
 
 
 def test_the_columns_that_turn_are_suggested_as_accelerations(walk, table):
-    """Suggest them after the rates, which hardly turn beside a bias of 500 deg/s and so are as constant as gravity."""
+    """Suggest them after rates with a bias of 500 deg/s, which are as constant in length as gravity."""
     rates = np.degrees(walk.gyr) * 16.4 + [-8000, 8000, 8400]
     path = table("", 32768 + np.rint(np.column_stack([rates, walk.acc * 670])))
     assert refused(path).options == "--columns gx,gy,gz,ax,ay,az"
 
 
 def test_constant_columns_before_each_sensor_are_no_axes(walk, table):
-    """Suggest none of the numbers by which an app tells its sensors apart, beside a board that hardly turned."""
+    """Do not suggest the constant sensor numbers of an app as an axis, although the board hardly turned."""
     n = len(walk)
     field, fives = np.random.default_rng(3).normal([20, -30, 9], 0.3, (n, 3)), np.full(n, 5)
     path = table("", walk.t, np.full(n, 3), walk.acc[:, ::-1], np.full(n, 4), 0.001 * field, fives, field)
@@ -742,7 +742,7 @@ def test_rates_of_known_names_stay_beside_guessed_accelerations(table):
 
 
 def test_accelerometer_and_gyroscope_are_of_one_sensor_where_names_repeat(walk, assert_same, table):
-    """Read the gyroscope of the accelerometer that shows gravity, and mix no axes where a name is there twice."""
+    """Read the gyroscope beside the accelerometer that shows gravity, and mix no axes of equal names."""
     names = AXES.strip().split(",")
     header = f"sensor,{','.join(['left'] * 6 + ['right'] * 6)}\naxis,{','.join(names * 2)}"
     assert_same(mpucal.load(table(header, walk.t, 0.01 * walk.acc, -walk.gyr, walk.acc, walk.gyr)), walk)
@@ -779,7 +779,7 @@ def test_an_order_is_suggested_in_which_accelerations_keep_their_length(walk, ta
 
 
 def test_counts_beside_an_index_have_no_rate(read, walk):
-    """Take no index for milliseconds: any range of counts would fit these."""
+    """Do not take an index for milliseconds, since some range of counts would always fit it."""
     found = read("", "i 10.0 counts")
     assert np.isnan(found.gyr).all()
     assert "this sample rate is assumed" in found.taken
@@ -1069,7 +1069,7 @@ def test_lines_that_hold_one_sensor_each(walk, walk_ns, tmp_path):
 
 @pytest.mark.parametrize("name", ["time", "t"])
 def test_times_that_restart_are_an_interruption(name, walk, walk_ns, tmp_path):
-    """Tell a sketch that is started again from a clock that is set back a little, in any table and in our own."""
+    """Tell a restarted sketch from a clock that is set back a little, in our own tables and in others."""
     half, path = len(walk) // 2, tmp_path / "walk.csv"
     t = np.where(np.arange(len(walk)) < half, walk.t, walk.t - walk.t[half])
     t[half + 200] -= 0.02
@@ -1103,7 +1103,7 @@ def test_lines_of_which_the_newest_is_the_first(name, walk, walk_ns, tmp_path, a
 
 @pytest.mark.parametrize(("name", "per_s", "even"), [("dt", 1, True), ("dt", 1e3, False), ("delta_us", 1e6, False)])
 def test_steps_between_samples_are_summed(name, per_s, even, walk, table):
-    """Read times since the sample before, in a column that is called so; the first of them may be 0."""
+    """Read a column of times since the sample before, by its name; the first time may be 0."""
     dt = np.random.default_rng(18).uniform(0.008, 0.012, len(walk))
     dt = np.full(len(walk), 0.01) if even else dt / dt.mean() / 100
     found = mpucal.load(table(f"{name},{AXES.strip()}", per_s * dt * (np.arange(len(dt)) > 0), walk.acc, walk.gyr))
@@ -1129,14 +1129,14 @@ def test_a_column_beside_the_times_does_not_change_them(names, columns, walk, ta
 
 
 def test_times_that_are_not_read_are_named(walk, table):
-    """Say so of times that no unit fits, which the turning of gravity replaces."""
+    """Say that times which fit no unit are not read; the turning of gravity gives the rate."""
     t = np.arange(len(walk)) % 7
     found = mpucal.load(table(f"t,{AXES.strip()}", t, walk.acc, walk.gyr))
     assert "its column t was not read as the time" in found.taken
 
 
 def test_our_own_times_that_came_late_lie_between_their_neighbours(walk, walk_ns, tmp_path):
-    """Read them a run at a time, as `mpucal apply` does, as in any other table."""
+    """Read our own table a run at a time, as `mpucal apply` does, with the same times."""
     t = walk.t.copy()
     t[[100, 900]] -= 0.02
     path = tmp_path / "walk.csv"
@@ -1177,7 +1177,7 @@ def test_names_of_other_languages(names, read, walk, assert_same):
 
 
 def test_times_that_begin_anew_are_no_part_of_a_sensor(walk, tmp_path):
-    """Suggest the order in which they are the time, of a board that shows nothing else; name lines that are damaged."""
+    """Suggest an order of columns in which they are the time; name damaged lines."""
     t = 1.7e18 + 1e7 * (np.arange(len(walk)) % 800)
     rates = 5 * np.sin(0.1 * np.arange(len(walk)))[:, None] * [1, -1, 2]
     rows = np.column_stack([t, np.rint([30, 16, 546] + rates / 5), np.rint(rates)])
@@ -1192,7 +1192,7 @@ def test_times_that_begin_anew_are_no_part_of_a_sensor(walk, tmp_path):
 
 
 def test_times_of_day_that_go_back_are_no_counter_that_overflows(read, walk):
-    """Refuse fractions of a second whose first zeros were not written, whichever way the times are named."""
+    """Refuse times whose fractions of a second lack their leading zeros, under any name."""
     order = {"columns": "t,ax,ay,az,gx,gy,gz"}
     for head, hints in ((f"time,{AXES}", {}), ("", order)):
         with pytest.raises(RecordingError, match="time does not increase at sample"):
@@ -1207,7 +1207,7 @@ def test_fractions_of_a_second_are_no_milliseconds(read, walk):
 
 
 def test_times_of_day_show_their_unit_at_any_rate(walk, walk_ns, table):
-    """Read ms since 1970 that lie 0.3 s apart, which would be 3 kHz in us."""
+    """Read times in ms since 1970 with steps of 0.3 s, which taken for us would be 3 kHz."""
     ms = (walk_ns[0] // 10**6) + 300 * np.arange(len(walk))
     found = mpucal.load(table(f"time,{AXES.strip()}", ms, walk.acc, walk.gyr / 30))
     np.testing.assert_allclose(found.t, 0.3 * np.arange(len(walk)))
@@ -1270,7 +1270,7 @@ def test_recordings_without_rates_serve_all_that_needs_no_rate(stored_calibratio
 @pytest.mark.parametrize("names", ["dvx,dvy,dvz,dthetax,dthetay,dthetaz", "delta_velocity[0],[1],[2]", ""])
 @pytest.mark.parametrize("unit", ["rad", "deg"])
 def test_increments_of_velocity_and_angle_are_rates_times_the_period(names, unit, walk, table, assert_same):
-    """Read what an integrating sensor gives for each sample, under its names or as gravity shows it."""
+    """Read the increments of an integrating sensor, by their names or by the length of gravity."""
     if names.startswith("delta"):
         names = ",".join(f"delta_{of}[{axis}]" for of in ("velocity", "angle") for axis in range(3))
     angles = (np.degrees(walk.gyr) if unit == "deg" else walk.gyr) / 100
@@ -1333,7 +1333,7 @@ def test_lists_in_cells(lists, walk, tmp_path, assert_same):
 
 
 def test_each_part_of_times_that_begin_anew_has_its_own_clock(walk, table):
-    """Estimate the clock behind arrival stamps of a part by its own stamps: one ran 5 % faster."""
+    """Estimate the clock of each part by the arrival stamps of that part; one ran 5 % faster."""
     half, late = len(walk) // 2, np.random.default_rng(3).exponential(0.004, len(walk))
     period = np.repeat([0.01, 0.0095], half)
     t = np.concatenate([np.arange(half) * 0.01, np.arange(half) * 0.0095])
@@ -1346,7 +1346,7 @@ def test_each_part_of_times_that_begin_anew_has_its_own_clock(walk, table):
 
 
 def test_lists_beside_the_axes_are_no_samples(walk, tmp_path, assert_same):
-    """Leave the covariances alone that a bag's messages have in a table."""
+    """Do not read the covariances that messages of a bag have in a table."""
     rows = ([*row, [-1.0] * 9, [0.01] * 9] for row in np.column_stack([walk.t, walk.acc, walk.gyr]).tolist())
     with (tmp_path / "imu.csv").open("w", newline="") as file:
         csv.writer(file).writerows([["time", *AXES.strip().split(","), "acc_covariance", "gyr_covariance"], *rows])

@@ -50,7 +50,7 @@ def test_units_in_names_are_applied(acc, mps2, gyr, rad_s, walk, ms, table):
     ],
 )
 def test_whole_numbers_of_decimal_units(mps2, rad_s, says, walk, ms, table):
-    """Tell them from counts, and name the units that |a| cannot tell from these."""
+    """Tell them from counts, and name the units with nearly the same |a|."""
     found = mpucal.load(table(HEADER, ms, np.rint(walk.acc / mps2), np.rint(walk.gyr / rad_s)))
     assert re.search(says, found.taken), found.taken
     same(found, walk, TWO_PERCENT, rad_s)

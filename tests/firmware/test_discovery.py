@@ -1,4 +1,4 @@
-"""Built as the Arduino IDE and arduino-cli build, who find a library by an include that fails: what a sketch holds."""
+"""Build as the Arduino IDE does, which finds a library by an include that fails; judge what a sketch then holds."""
 
 import subprocess
 from pathlib import Path

@@ -15,7 +15,7 @@ OLD = Path(__file__).parents[2] / "fixtures" / "vectors" / "blob_measured.bin"
 
 @pytest.mark.parametrize("core", ["ESP32", pytest.param("ESP8266", marks=pytest.mark.slow)])
 def test_a_loss_of_power_leaves_the_old_blob_or_the_new_one(core, tmp_path, need):
-    """Storing a blob, and nothing else, formats a flash without a file system."""
+    """Format a flash without a file system only when a blob is stored."""
     need("gcc", "g++")
     (tmp_path / "new.bin").write_bytes(replace(Blob.decode(OLD.read_bytes()), b_a=(1.0, 2.0, 3.0)).encode())
     flags = ["-Wall", "-Wextra", "-Werror", f"-D{core}", f"-I{HERE}", f"-I{SOURCES}"]

@@ -104,7 +104,7 @@ def test_a_buffer_that_stays_empty_names_the_interrupt(tree):
 
 
 def test_attributes_are_restored_as_the_files_are_closed(tree):
-    """The kernel keeps the buffer of a reader that went away, and would refuse the next reader."""
+    """The kernel keeps the buffer enabled after a reader has gone, and would refuse the next reader."""
     calibbias = tree / "in_accel_x_calibbias"
     calibbias.write_text("5\n")
     before = {path: path.read_text().strip() for path in tree.rglob("*") if path.is_file()}

@@ -7,6 +7,6 @@ pytestmark = pytest.mark.kernel
 
 
 def test_a_session_of_two_devices_reports_the_error_of_their_times(guest, near):
-    """The timer in place of INT wires keeps no chip's phase: stamps differ by what either FIFO holds."""
+    """A timer in place of INT wires keeps no chip's phase, so stamps differ by the samples that a FIFO holds."""
     quality = near(guest).quality
     assert quality["verdict"] == "good" or "clock_off" in [reason["code"] for reason in quality["reasons"]]

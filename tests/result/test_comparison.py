@@ -46,7 +46,7 @@ def test_one_sensor_is_called_the_same_as_often_as_promised():
 
 @pytest.mark.parametrize(("model", "least", "most"), [("hand", 0.0, 0.01), ("accel", 0.01, 0.05)])
 def test_deviations_that_few_turns_tell_count_as_such(model, least, most):
-    """The deviations of a hand's calibration are estimates themselves, by a dozen numbers."""
+    """The standard deviations of a hand's calibration are estimated from a dozen turns, and so uncertain."""
     rng = np.random.default_rng(9)
 
     def by_hand():

@@ -87,7 +87,7 @@ def vehicle_of(firmware, words=""):
 
 @pytest.fixture(autouse=True)
 def brief(monkeypatch):
-    """Looks at streams at rest for a fifth of the time, where how long they are looked at decides nothing."""
+    """Shorten the observation of streams at rest to a fifth, in tests that do not depend on its length."""
     monkeypatch.setattr(rest_monitor, "WINDOW_NS", rest_monitor.WINDOW_NS // 5)
     monkeypatch.setattr(rest_monitor, "FEWEST", rest_monitor.FEWEST // 5)
 

@@ -22,7 +22,7 @@ RAW_PASTE, WINDOW = b"\x05A\x01", 128
 
 @pytest.fixture(scope="session")
 def micropython(once, need):
-    """The folder of MicroPython for node, which npm installs beneath build/; it is asked for once in a run."""
+    """Folder of MicroPython for node, which npm installs below build/, once in a run."""
     need("node", "npm")
     folder = ROOT / "build" / "node"
     package = folder / "node_modules" / PACKAGE

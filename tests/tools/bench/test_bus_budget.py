@@ -7,7 +7,7 @@ SHARES = {200: 0.08, 1000: 0.35}
 
 @pytest.mark.parametrize("number", range(4))
 def test_the_bus_suffices_and_no_sample_is_lost(number):
-    """The simulated chip's processor time is in it, so that is only printed."""
+    """The share of a processor is only printed, as it includes the simulated chip's."""
     model, rate_hz, late_s = budget.BUDGETS[number]
     recording, of_bus, _ = budget.run(model, rate_hz, 5.0, late_s)
     assert of_bus <= SHARES[rate_hz]

@@ -62,7 +62,7 @@ def test_the_session_and_the_recording_have_the_same_rests(name):
 
 @pytest.mark.slow
 def test_rests_agree_in_nearly_all_families():
-    """The others are turned slowly and evenly, carried, or slip on their mount."""
+    """Name the other families: turned slowly and evenly, carried, or slipping on the mount."""
     found = [agree(name, seed) for name in FAMILIES for seed in range(6)]
     known = [one for one in found if one is not None]
     assert len(known) > 500
