@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpucal import load
-from mpucal.calibration import calibrate, estimate
+from mpucal.calibration import calibrate, estimate, paper
 from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
 from mpucal.calibration.rotation import rotation
@@ -356,7 +356,8 @@ def test_refusing_reasons_come_first(bases):
     assert (verdict, list(reasons)) == ("refused", ["left_handed", "data_lost"])
 
 
-def test_algorithm_1_does_not_always_settle():
+def test_an_estimate_that_has_not_settled_is_refused(monkeypatch):
+    monkeypatch.setattr(paper, "MAX_ITERATIONS", 2)
     recording = paper_scenario(17, rate_hz=10).recording
     verdict, reasons = judged(recording, "paper")
     assert verdict == "refused"
