@@ -199,6 +199,17 @@ def chromium():
         browser.close()
 
 
+@pytest.fixture(scope="module")
+def page(chromium):
+    """A page that keeps what it fetched."""
+    context = chromium.new_context(reduced_motion="reduce")
+    page = context.new_page()
+    page.fetched = []
+    page.on("request", lambda asked: page.fetched.append(asked.url))
+    yield page
+    context.close()
+
+
 @pytest.fixture(scope="session")
 def save():
     """Write a recording into a file, in the format of its suffix."""

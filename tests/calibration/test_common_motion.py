@@ -7,6 +7,7 @@ import pytest
 
 from mpucal.calibration import calibrate_all
 from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
+from tools.lab.judge import judged
 
 D = np.array([[1.01, 0.002, -0.003], [0.001, 0.985, 0.002], [-0.002, 0.003, 1.02]])
 B_A = np.array([0.31, -0.22, 0.17])
@@ -40,11 +41,6 @@ def together(run, other):
     return calibrate_all(replace(run.recording, others=(other,)), gravity=G)
 
 
-def z_scores(calibration):
-    off, std = np.append(calibration.D - D, calibration.b_a - B_A), np.append(calibration.D_std, calibration.b_a_std)
-    return off / std
-
-
 @pytest.fixture(scope="module")
 def runs(hand):
     return [hand(seed, "pose12") for seed in range(2)]
@@ -55,7 +51,7 @@ def test_the_second_sensor_is_determined_as_well_as_the_first(runs):
     for first, other in pairs:
         assert other.verdict == "good"
         assert other.magnitude_std < 1.02 * first.magnitude_std
-    z = [z_scores(other) for _, other in pairs]
+    z = [judged(other, (D, B_A)).z for _, other in pairs]
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 

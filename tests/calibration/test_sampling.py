@@ -6,6 +6,7 @@ import numpy as np
 
 from mpucal.calibration import calibrate
 from mpucal.data import Recording
+from tools.lab.judge import judged
 from tools.lab.scenarios.body import attitudes, specific_force
 
 G = 9.82
@@ -39,17 +40,12 @@ def on_a_turntable(seed, slam=False):
     return replace(recording, sensor=replace(recording.sensor, steps=STEPS, message="RAW_IMU"))
 
 
-def z_scores(calibration):
-    off, std = np.append(calibration.D - D, calibration.b_a - B_A), np.append(calibration.D_std, calibration.b_a_std)
-    return off / std
-
-
 def test_parameters_are_as_uncertain_as_rounding_leaves_them():
-    z = np.array([z_scores(calibrate(on_a_turntable(seed), gravity=G)) for seed in range(6)])
+    z = np.array([judged(calibrate(on_a_turntable(seed), gravity=G), (D, B_A)).z for seed in range(6)])
     assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.3
 
 
 def test_a_turn_between_few_samples_is_no_change_of_the_sensor():
     calibrations = [calibrate(on_a_turntable(seed, slam=True), gravity=G) for seed in range(4)]
     assert {calibration.verdict for calibration in calibrations} == {"good"}
-    assert 0.4 < np.sqrt(np.mean(np.square([z_scores(calibration) for calibration in calibrations]))) < 1.3
+    assert 0.4 < np.sqrt(np.mean(np.square([judged(calibration, (D, B_A)).z for calibration in calibrations]))) < 1.3

@@ -202,7 +202,7 @@ def device(clock, loaded):
 
 
 @pytest.fixture(scope="module")
-def device_of_module(clock, loaded):
-    """Makes a device that the tests of a module share."""
+def sound(clock, loaded):
+    """A device without faults, which the tests of a module share; a test that changes it restores it."""
     with _devices(clock, loaded) as make:
-        yield make
+        yield make("sim:seed=3")

@@ -14,12 +14,6 @@ def examined(mocked, *words):
     return result, {finding["topic"]: finding for finding in json.loads(result.out)["findings"]} if words else {}
 
 
-@pytest.fixture(scope="module")
-def sound(device_of_module):
-    """A device without faults; a test that changes it restores it."""
-    return device_of_module("sim:seed=3")
-
-
 def test_a_chip_under_another_name_is_recognised_and_a_correction_in_it_noticed(device):
     mocked = device("sim:chip=clone98,who_am_i=0x68")
     mocked.tell(registers={str(0x77): "1234"})

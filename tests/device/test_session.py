@@ -12,12 +12,6 @@ from mpucal.data import STANDARD_GRAVITY_MPS2
 NODE, UPTIME_S = "/dev/i2c-1", 900
 
 
-@pytest.fixture(scope="module")
-def sound(device_of_module):
-    """A device without faults; a test that changes it restores it."""
-    return device_of_module()
-
-
 def calibration(b_a):
     return Calibration(np.eye(3), np.array(b_a), quality={"verdict": "good", "reasons": []})
 

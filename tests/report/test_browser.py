@@ -21,17 +21,12 @@ LOOK = """width => {
 
 
 @pytest.fixture(scope="module")
-def page(chromium, result, tmp_path_factory):
-    """The page as a browser opens it; it keeps what it fetched."""
+def page(page, result, tmp_path_factory):
+    """The report in a browser."""
     path = tmp_path_factory.mktemp("browser") / "report.html"
     path.write_text(result.html, encoding="utf-8")
-    context = chromium.new_context()
-    page = context.new_page()
-    page.fetched = []
-    page.on("request", lambda asked: page.fetched.append(asked.url))
     page.goto(path.as_uri())
-    yield page
-    context.close()
+    return page
 
 
 @pytest.fixture

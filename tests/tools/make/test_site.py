@@ -26,17 +26,6 @@ def site(once):
     return once("site", lambda folder: built(folder, "false"))
 
 
-@pytest.fixture(scope="module")
-def page(chromium):
-    """A page that keeps what it fetched."""
-    context = chromium.new_context(reduced_motion="reduce")
-    page = context.new_page()
-    page.fetched = []
-    page.on("request", lambda asked: page.fetched.append(asked.url))
-    yield page
-    context.close()
-
-
 def from_elsewhere(page):
     return [url for url in page.fetched if not url.startswith(("file:", "data:"))]
 
