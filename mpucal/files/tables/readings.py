@@ -24,6 +24,9 @@ from .times import Stream
 from .units import COUNTS, OF_BNO055, OF_INCREMENTS, QUANTITIES, resolve_unit
 
 OF_COUNTS = "in counts of"
+# unit of whole rates -> those of whole accelerations of some 1000 for 1 g; empty: unknown
+MG_OR_CM = ("mg", "cm/s^2")
+BESIDE = {COUNTS: (COUNTS,), "mdeg/s": ("mg",), "": (*MG_OR_CM, COUNTS)}
 # largest |log| of the ratio to 1 g in mm/s^2 (8192 counts are farther) or counts, or to tenths or hundredths of deg/s
 NEAR_LOG = 0.08
 # remarks on a unit that |a| alone shows
@@ -73,7 +76,7 @@ def accelerations(
         )
     size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
     whole = not said and units.are_counts(values)
-    likely_whole = _whole_unit(size, beside or "") if whole and seen == "mg" else ""
+    likely_whole = _whole_units(size, beside or "")[0] if whole and seen == "mg" else ""
     unclear = not seen or hints.accel_range_g or likely_whole == COUNTS
     if whole and _away(size, "mm/s^2") < NEAR_LOG and beside != COUNTS and not hints.accel_range_g:
         by = "(by |a|; if these are in 0.1 mg or counts, give --units acc=mg/10 or acc=counts)"
@@ -108,21 +111,14 @@ def accelerations(
 
 
 def _away(size: float, unit: str) -> float:
-    """Return |log| of the ratio of an acceleration to 1 g in a unit."""
-    return abs(math.log(size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2)) if size else math.inf
+    """Return |log| of the ratio of an acceleration to 1 g in a unit, or in the counts that are nearest."""
+    of_g = size / units.counts_per_g(size) if unit == COUNTS else size * QUANTITIES["acc"][unit] / STANDARD_GRAVITY_MPS2
+    return abs(math.log(of_g)) if size else math.inf
 
 
-def _mg_or_cm(size: float) -> list[str]:
-    """Return mg and cm/s^2, first the one in which an acceleration is nearer to 1 g."""
-    return sorted(("mg", "cm/s^2"), key=lambda unit: _away(size, unit))
-
-
-def _whole_unit(size: float, beside: str) -> str:
-    """Return the unit of whole numbers of some 1000 for 1 g: the nearest of those that occur beside such rates."""
-    if beside in (COUNTS, "mdeg/s"):
-        return COUNTS if beside == COUNTS else "mg"
-    nearest = _mg_or_cm(size)[0]
-    return COUNTS if not beside and abs(math.log(size / units.counts_per_g(size))) < _away(size, nearest) else nearest
+def _whole_units(size: float, beside: str) -> list[str]:
+    """Return the units of whole numbers of some 1000 for 1 g that occur beside such rates, the nearest first."""
+    return sorted(BESIDE.get(beside, MG_OR_CM), key=lambda unit: _away(size, unit))
 
 
 def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str) -> Reading:
@@ -138,7 +134,7 @@ def _scaled_counts(values: Vector, hints: Hints, name: str, size: float, by: str
             "give the --accel-range that the sensor had, or --units acc=counts if it was this one",
             f"--accel-range {ACCEL_COUNTS / per_g:g}" if hints.accel_range_g else "",
         )
-    if abs(math.log(size / per_g)) > NEAR_LOG:
+    if _away(size, COUNTS) > NEAR_LOG:
         by = f" (the nearest by |a|: 1 g is {size:.4g} counts, which fits no usual range)"
     by = "" if hints.accel_range_g else by
     return Reading.of(values, scale, f"{OF_COUNTS} ±{range_g:g} g{by}", counts=True)
@@ -177,7 +173,7 @@ class Rates:
         of = min(decimal, key=decimal.__getitem__)
         if decimal[of] > NEAR_LOG:
             return None
-        likely, other = _mg_or_cm(units.typical_size(self._acc)[0])
+        likely, other = _whole_units(units.typical_size(self._acc)[0], of)
         return {"acc": likely, "gyr": of}, f"|a| suggests these units, or else --units acc={other},gyr={of}"
 
     def read(self, *, beside_counts: bool) -> Reading:
