@@ -262,6 +262,25 @@ def mpucal(capsys, tmp_path, monkeypatch):
     return call
 
 
+@pytest.fixture(scope="session")
+def check_numbered():
+    """Check that a recording of a numbered feed has only its samples, in order, and a gap wherever some are missing."""
+    import numpy as np
+
+    from tools.lab.feeds import numbers
+
+    def check(recording, gaps=None):
+        np.testing.assert_array_equal(recording.gyr, np.broadcast_to(recording.gyr[0], recording.gyr.shape))
+        assert (recording.acc[:, 1:] == recording.acc[0, 1:]).all()
+        steps = np.diff(numbers(recording))
+        assert (steps >= 1).all()
+        assert recording.gap[1:].tolist() == (steps != 1).tolist()
+        assert (np.diff(recording.t) > 0).all()
+        assert gaps is None or recording.gap.sum() == gaps
+
+    return check
+
+
 @pytest.fixture
 def walk(once):
     """A capture of twenty seconds, which a session goes through to its end."""

@@ -9,31 +9,28 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer
-from tools.lab.feeds import numbers
 
 MS = 1_000_000
 
 
 @pytest.mark.parametrize(("model", "rate_hz", "latency_ms"), [("mpu6050", 50, 16), ("mpu6500", 1000, 1)])
-def test_the_driver_loses_nothing(started, stream, model, rate_hz, latency_ms):
+def test_the_driver_loses_nothing(started, stream, model, rate_hz, latency_ms, check_numbered):
     """An FTDI adapter holds bytes back for 16 ms by default."""
     made, driver = started(model, latency_ms * MS, rate_hz=rate_hz)
     stream(driver, 3)
     driver.stop()
     made.opened.close()
     recording = driver.recording()
-    assert not recording.gap.any()
-    assert set(np.diff(numbers(recording))) == {1}
+    check_numbered(recording, gaps=0)
     assert len(recording) > 2.8 * rate_hz
     assert recording.sensor.rate_hz == pytest.approx(rate_hz * 1.0025, rel=300e-6)
 
 
-def test_without_streaming_200_hz_work_too(started, stream):
+def test_without_streaming_200_hz_work_too(started, stream, check_numbered):
     _, driver = started(latency_ns=16 * MS, features=Feature(0))
     stream(driver, 4)
     recording = driver.recording()
-    assert not recording.gap.any()
-    assert set(np.diff(numbers(recording))) == {1}
+    check_numbered(recording, gaps=0)
     assert len(recording) > 3.5 * 200
 
 
@@ -57,7 +54,7 @@ def test_a_fifo_started_without_a_reset_is_not_read_ahead(rig):
     assert bus.read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW
 
 
-def test_a_host_that_was_away_catches_up_without_a_gap(started, stream):
+def test_a_host_that_was_away_catches_up_without_a_gap(started, stream, check_numbered):
     """The chip's FIFO holds 73 ms at 1 kHz, but the host's buffer is larger."""
     made, driver = started(rate_hz=1000)
     stream(driver, 0.5)
@@ -66,8 +63,7 @@ def test_a_host_that_was_away_catches_up_without_a_gap(started, stream):
         made.line._step()
     stream(driver, 3)
     recording = driver.recording()
-    assert not recording.gap.any()
-    assert set(np.diff(numbers(recording))) == {1}
+    check_numbered(recording, gaps=0)
     assert len(recording) > 3300
 
 
@@ -109,7 +105,7 @@ def test_during_a_stream_only_int_enable_is_requested(started, stream):
     [({"burst_ns": 450 * MS}, 0.0), ({"latency_ns": 300 * MS}, 0.02)],
     ids=["bursts of 0.45 s", "300 ms, and 2 % of the packets sent again"],
 )
-def test_a_line_that_delays_replies_makes_no_gap(rig, stream, how, lost):
+def test_a_line_that_delays_replies_makes_no_gap(rig, stream, how, lost, check_numbered):
     made, remarks = rig(line=how), []
     rng, free_ns = np.random.default_rng(1), [0]
     step, coming = made.line._step, made.line._coming
@@ -127,8 +123,7 @@ def test_a_line_that_delays_replies_makes_no_gap(rig, stream, how, lost):
     driver.start()
     stream(driver, 6)
     recording = driver.recording()
-    assert recording.gap.sum() == 0
-    assert set(np.diff(numbers(recording))) == {1}
+    check_numbered(recording, gaps=0)
     assert len(recording) > 900
     driver.stop()
     assert not any("failed" in sentence for sentence in remarks)

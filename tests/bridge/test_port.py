@@ -6,7 +6,6 @@ import os
 import socket
 from pathlib import Path
 
-import numpy as np
 import pytest
 import serial
 from serial.tools import list_ports
@@ -19,7 +18,6 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, UsageError
 from mpucal.sources.chip import CAN_FORK
-from tools.lab.feeds import numbers
 
 
 @pytest.mark.parametrize(
@@ -37,7 +35,7 @@ def test_a_port_and_its_rate(text, name, bauds):
 
 
 @pytest.mark.parametrize("can_fork", [True, False], ids=["process", "thread"])
-def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream, monkeypatch, can_fork):
+def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream, monkeypatch, can_fork, check_numbered):
     monkeypatch.setattr("mpucal.bridge.port.CAN_FORK", can_fork and CAN_FORK)
     made = rig()
     bus = BridgeBus(SerialPort(serve(made.line.device, made.clock).name))
@@ -47,8 +45,7 @@ def test_the_driver_runs_through_the_real_pyserial(rig, serve, stream, monkeypat
     driver.stop()
     bus.close()
     recording = driver.recording()
-    assert not recording.gap.any()
-    assert set(np.diff(numbers(recording))) == {1}
+    check_numbered(recording, gaps=0)
     # The bridge's time goes on while this process waits for a processor.
     assert len(recording) > 100
 
