@@ -89,8 +89,8 @@ def _without_zeros(recording: Recording) -> Recording:
 
     Between others they are interpolated. Rates of zero before all others are those of a gyroscope that began later.
     """
-    moves = np.any(recording.gyr, axis=1)
-    read = moves | np.any(recording.acc, axis=1)
+    moves = lengths(recording.gyr) != 0.0
+    read = moves | (lengths(recording.acc) != 0.0)
     late = _late_rates(recording, moves, read)
     if not read.any() or (read.all() and not late):
         return recording
