@@ -20,7 +20,7 @@ from .parameters import ACCELEROMETER, HAND, PLACES
 from .poses import POSE_MPS2
 from .preprocessing import CORRELATION_S, jerk_density
 from .problem import Problem, Series
-from .rotation import cross, shortest_turn
+from .rotation import cross_rows, lengths, shortest_turn
 
 # These describe how a person turns the board to an orientation, and holds it there.
 MOVE_S, REST_S = 1.6, 2.0
@@ -44,7 +44,7 @@ def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector)
     if not len(there):  # an estimate that diverged knows no directions
         return 0
     seconds = np.maximum(MOVE_S, angle[there] / FAST_RAD_S)
-    moves = _moves(known, s, directions[there], seconds.tolist())
+    moves = _moves(known, s, directions[there], seconds)
     begin = replace(known.theta, u=s / np.linalg.norm(s))
     F = _without_pose(np.array([evaluate(move, begin, HAND).fisher for move in moves]))
     then, now = _criterion(known.H + F, wanted), _criterion(known.H, wanted)
@@ -66,39 +66,34 @@ def _without_pose(F: Vector) -> Vector:
     return np.asarray(F)
 
 
-def _moves(known: InterimEstimate, s: Vector, directions: Vector, seconds: list[float]) -> Iterator[Problem]:
+def _moves(known: InterimEstimate, s: Vector, directions: Vector, seconds: Vector) -> Iterator[Problem]:
     """Yield for each of `directions` (k, 3) a rest with gravity s (3,), the shortest turn there, and a rest."""
     problem, theta = known.problem, known.theta
     dt = float(np.median(problem.series.dt))
-    rest = max(round(REST_S / dt), 2)
-    rates = np.linalg.inv(theta.K)
-    moving_noise = (1.0 + 2.0 * CORRELATION_S / dt) * known.sigma**2
+    rest, moves = max(round(REST_S / dt), 2), np.maximum(np.rint(seconds / dt).astype(np.intp), 2)
+    turns = np.array([shortest_turn(s / np.linalg.norm(s), -down) for down in directions])
+    angle = lengths(turns)
+    # In the body's axes, s turns against the body, in the plane perpendicular to the turn.
+    across = cross_rows(turns / angle[:, None], s)
+    number = np.arange(1, moves.max() + rest + 1)
+    moving, share = number <= moves[:, None], angle[:, None] * np.minimum(number / moves[:, None], 1.0)
+    path = np.cos(share)[:, :, None] * s + np.sin(share)[:, :, None] * across[:, None]
+    omega = np.where(moving[:, :, None], (-turns / (moves * dt)[:, None])[:, None], 0.0)
+    speed2 = (angle / (moves * dt)) ** 2
+    moving_noise = (1.0 + 2.0 * CORRELATION_S / dt) * known.sigma**2 * speed2 / (speed2 + MOVING_RAD_S**2)
+    reset = np.full(moving.shape, -1.0)
+    reset[:, 0], reset[range(len(moves)), moves] = 0.0, SWAY_MPS2
+    every = Series(
+        y=path @ theta.D.T + theta.b_a,
+        omega=omega @ np.linalg.inv(theta.K).T + theta.b_omega,
+        dt=np.full(moving.shape, dt),
+        rate=omega,
+        alpha=np.zeros_like(omega),
+        r_extra=np.where(moving, moving_noise[:, None], POSE_MPS2**2 * rest),
+        jerk=np.where(moving, 0.0, jerk_density(SWAY_MPS2, problem.lam)),
+        reset=reset,
+    )
     flat = replace(problem.flat, first=0, last=rest, y=theta.D @ s + theta.b_a)
-    for down, each_s in zip(directions, seconds, strict=True):
-        move = max(round(each_s / dt), 2)
-        turn = shortest_turn(s / np.linalg.norm(s), -down)
-        # In the body's axes, s turns against the body, in the plane perpendicular to the turn.
-        angle = float(np.linalg.norm(turn))
-        across = cross(turn / angle) @ s
-        share = angle * np.minimum(np.arange(1, move + rest + 1) / move, 1.0)[:, None]
-        path = np.cos(share) * s + np.sin(share) * across
-        omega = np.zeros((move + rest, 3))
-        omega[:move] = -turn / (move * dt)
-        speed2 = (angle / (move * dt)) ** 2
-        r_extra = np.full(move + rest, POSE_MPS2**2 * rest)
-        r_extra[:move] = moving_noise * speed2 / (speed2 + MOVING_RAD_S**2)
-        jerk = np.zeros(move + rest)
-        jerk[move:] = jerk_density(SWAY_MPS2, problem.lam)
-        reset = np.full(move + rest, -1.0)
-        reset[0], reset[move] = 0.0, SWAY_MPS2
-        series = Series(
-            y=path @ theta.D.T + theta.b_a,
-            omega=omega @ rates.T + theta.b_omega,
-            dt=np.full(move + rest, dt),
-            rate=omega,
-            alpha=np.zeros_like(omega),
-            r_extra=r_extra,
-            jerk=jerk,
-            reset=reset,
-        )
-        yield replace(problem, series=series, flat=flat)
+    given = {name: values for name, values in vars(every).items() if values is not None}
+    for k, n in enumerate((moves + rest).tolist()):
+        yield replace(problem, series=Series(**{name: values[k, :n] for name, values in given.items()}), flat=flat)
