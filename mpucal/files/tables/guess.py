@@ -89,7 +89,7 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     ----------
     arrays : place -> the array of which it is a column; a triple is of one.
     """
-    increasing = [place for place in of if increases(of[place])]
+    increasing = [place for place, column in of.items() if increases(column) and _advances(column)]
     clocks = clocks or [place for place in increasing if is_even_clock(of[place]) or _begins_anew(of[place])]
     places = [place for place in of if place not in {*clocks, *increasing}]
     vary = [place for place in places if np.ptp(of[place]) > 0.0]
@@ -205,7 +205,7 @@ def is_clock(column: Vector) -> bool:
 
 
 def _advances(column: Vector) -> bool:
-    """Return True if more than one of a hundred (n,) numbers is larger than the one before."""
+    """Return True if more than one of a hundred (n,) numbers is larger than the one before, unlike a rate at rest."""
     steps = np.diff(column[np.isfinite(column)])
     return len(steps) > 0 and bool((steps > 0).mean() > 0.01)
 
@@ -217,8 +217,7 @@ def increases(column: Vector) -> bool:
 
 def _begins_anew(column: Vector) -> bool:
     """Return True if (n,) numbers of a clock, by their step, are those of several recordings."""
-    again = _advances(column) and bool((np.diff(column) < 0).any())
-    return again and bool(units.time_unit(sample_period(column)))
+    return bool((np.diff(column) < 0).any() and units.time_unit(sample_period(column)))
 
 
 def is_index(column: Vector) -> bool:
