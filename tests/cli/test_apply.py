@@ -122,8 +122,9 @@ def test_b_a_follows_the_temperature(mpucal, session, calibration):
 
 
 @pytest.mark.parametrize("ending", [".npz", ".csv", ".mcap"])
-def test_calibrated_recordings_are_refused(mpucal, session, calibration, ending):
-    mpucal("apply", "c.json", session.folder, "-o", f"out{ending}")
+def test_calibrated_recordings_are_refused(mpucal, save, session, calibration, ending):
+    save(load(session.folder).part(0, 500), "in.npz")
+    mpucal("apply", "c.json", "in.npz", "-o", f"out{ending}")
     again = mpucal("apply", "c.json", f"out{ending}", "-o", "twice.npz")
     assert again.code == 2
     why = "as its column calibrated_by_mpucal says" if ending == ".csv" else "calibrated with c.json of"
