@@ -88,7 +88,7 @@ def find_sensitivity(
         left = found.squares + step @ (2.0 * found.gradient + found.fisher @ step)
         if not (evidence > -np.log(SURE) and left < MOST_NIS * len(series)):
             return None
-        if evidence < 0.0:  # it is not removed
+        if evidence < others:  # it is not removed
             break
     weight = np.exp(evidence - np.logaddexp(others, evidence))
     removed = weight if weight > 0.5 else 0.0
