@@ -12,22 +12,10 @@ import numpy as np
 from ...data import Vector
 from ...errors import RecordingError
 from ..hints import ROLES, Hints
+from . import names
 from .cells import Kind
 from .guess import MOST_COLUMNS, guess_columns, is_even_clock, likely_columns
-from .names import (
-    ACC,
-    CHOSEN,
-    COUNTER,
-    ESTIMATED,
-    GYR,
-    TEMPERATURE,
-    TIME,
-    WITHOUT_GRAVITY,
-    Column,
-    first_triple,
-    names_both,
-    parse_column_name,
-)
+from .names import ACC, GYR, TEMPERATURE, TIME, Column, first_triple, names_both
 from .shown_units import LARGEST_NUMBER
 from .table import Table
 
@@ -53,7 +41,7 @@ def find_columns(table: Table, hints: Hints) -> tuple[list[Column], str]:
     hints = replace(hints, rate_hz=hints.rate_hz or table.rate_hz)
     if not (named and (clocks or hints.rate_hz)):
         of = measured(table)
-        counts = [at for at in of if COUNTER.search(table.name_of(at)) and not np.any(of[at] % 1.0)]
+        counts = [at for at in of if names.COUNTER.search(table.name_of(at)) and not np.any(of[at] % 1.0)]
         even = [at for at in of if is_even_clock(of[at]) and at not in counts]
         if named:
             columns = [*columns, *(Column(table.header[place], place, TIME) for place in even[:1])]
@@ -90,10 +78,10 @@ def columns_by_hint(table: Table, roles: Mapping[str, str | int]) -> list[Column
                 f"name one of {', '.join(named) or f'its {count} columns by their number from 1'} with --columns",
             )
         name = header[place] if header else role
-        known = parse_column_name(name, place)
+        known = names.parse_column_name(name, place)
         quantity = TIME if role == "t" else ACC if role[0] == "a" else GYR
         unit = known.unit if known and known.quantity == quantity else ""
-        found.append(Column(name, place, quantity, "xyz".find(role[-1]) if role != "t" else 0, unit, CHOSEN))
+        found.append(Column(name, place, quantity, "xyz".find(role[-1]) if role != "t" else 0, unit, names.CHOSEN))
     return found
 
 
@@ -108,7 +96,7 @@ def measured(table: Table) -> dict[int, Vector]:
 
 
 def _measured_places(table: Table) -> list[int]:
-    return [place for place in table.places(Kind.NUMBER) if not ESTIMATED.search(table.name_of(place))]
+    return [place for place in table.places(Kind.NUMBER) if not names.ESTIMATED.search(table.name_of(place))]
 
 
 def _order(roles: Mapping[str, int]) -> str:
@@ -118,13 +106,13 @@ def _order(roles: Mapping[str, int]) -> str:
 
 
 def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
-    names = ", ".join(name.strip() for name in table.header if name.strip()) or "unnamed"
-    if without := [name.strip() for name in table.header if WITHOUT_GRAVITY.match(name)]:
+    held = ", ".join(name.strip() for name in table.header if name.strip()) or "unnamed"
+    if without := [name.strip() for name in table.header if names.WITHOUT_GRAVITY.match(name)]:
         what = f"{table.name} holds accelerations without gravity ({', '.join(without)}), and no others"
         return RecordingError(what, _GIVE_VALUES)
     if first_triple(columns, GYR):
         return RecordingError(
-            f"{table.name} holds no columns of an accelerometer; its columns are {names}",
+            f"{table.name} holds no columns of an accelerometer; its columns are {held}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
         )
     # name(1), name(2) and so on are of a matrix
@@ -134,7 +122,7 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
     named = sum(bool(table.name_of(place)) and place not in arrays for place in of) > MOST_COLUMNS
     likely = ({}, "") if named else likely_columns(of, [clock.place for clock in table.clocks(columns)], arrays)
     if likely is None or len(_measured_places(table)) < len("xyz"):
-        what = f"{table.name} holds no three columns as long as gravity; its columns are {names}"
+        what = f"{table.name} holds no three columns as long as gravity; its columns are {held}"
         return RecordingError(what, _GIVE_VALUES)
     roles, unit = likely
     if not roles:
@@ -142,7 +130,7 @@ def _missing_sensors(table: Table, columns: Sequence[Column]) -> RecordingError:
         table.numbers([Column("", place, "") for place in table.places(Kind.NUMBER)])
     options = f"--columns {_order(roles)}" + (f" --units acc={unit}" if unit else "") if roles else ""
     return RecordingError(
-        f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are {names}",
+        f"{table.name} holds no columns that are known by their names or by how gravity turns; its columns are {held}",
         f"name its columns in their order with {options or NAMED_BY_ORDER}, and - for one to leave out",
         options,
     )

@@ -15,24 +15,12 @@ from ...data import Recording, Vector
 from ...errors import RecordingError
 from ..hints import NO_HINTS, ROLES, Hints
 from ..reading import MEMORY_PER_TEXT, SNIFFED, check_size, first_bytes, reading
+from . import names
 from .cells import LOOKED_AT, OF_DAY, Kind
 from .columns import find_columns
 from .guess import increases, is_clock, is_index
 from .labelled import dataflash_text_table, labelled_table, marked_table, pivot
-from .names import (
-    ACC,
-    GYR,
-    TEMPERATURE,
-    TIME,
-    Column,
-    axes_of,
-    axis_triples,
-    first_triple,
-    ignored_sensors,
-    names_both,
-    parse_axis_name,
-    with_sensor,
-)
+from .names import ACC, GYR, TIME, Column, first_triple, names_both
 from .sensor import interval_column, is_weak, sensor_stream
 from .several import NAMES_SENSORS, of_one_beginning, of_one_place, of_one_sensor, of_one_turn, turns
 from .shown_units import acceleration_unit, likely_rate_hz, offset, seem_counts
@@ -173,24 +161,24 @@ def with_sensor_of_file(table: Table) -> Table:
     ------
     RecordingError : it is Sensor Logger's table of accelerations without gravity.
     """
-    header, of_file = table.header, axes_of(Path(table.name).stem)
+    header, of_file = table.header, names.axes_of(Path(table.name).stem)
     if OF_SENSOR_LOGGER in header and Path(table.name).stem.lower() == LINEAR:
         raise RecordingError(
             f"{table.name} is of Sensor Logger, which writes accelerations without gravity into that table",
             "record its Total Acceleration or the uncalibrated accelerometer, and give the folder",
         )
-    axes = [parse_axis_name(name) for name in header]
+    axes = [names.parse_axis_name(name) for name in header]
     if not header and len(table) and STAMP(",".join(cells[0] for cells in table.cells)):
         header = ["stamp.sec", "stamp.nanosec", *[""] * (len(table.cells) - 2)]
     elif any(axes):
         units = {axis[1] for axis in axes if axis}
         shown = [of for of in (ACC, GYR) if units & set(QUANTITIES[of])] + [axis[:-1] for axis in of_file[:1]]
-        header = with_sensor(header, shown[0]) if shown else header
+        header = names.with_sensor(header, shown[0]) if shown else header
     elif of_file and len(places := table.places(Kind.NUMBER)) in (3, 4) and not table.of_sensors:
         first, last = table.numbers([Column("", places[at], "") for at in (0, -1)]).T
         order = [*of_file, "time"] if len(places) == 4 and is_clock(last) > is_clock(first) else ["time", *of_file]
-        names = dict(zip(places, order[-len(places) :], strict=True))
-        header = [names.get(at, table.name_of(at)) for at in range(len(table.cells))]
+        called = dict(zip(places, order[-len(places) :], strict=True))
+        header = [called.get(at, table.name_of(at)) for at in range(len(table.cells))]
     return replace(table, header=header)
 
 
@@ -209,8 +197,8 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
         hints = replace(hints, accel_range_g=ranges[0], gyro_range_dps=ranges[1])
     columns, guess_remark = find_columns(table, hints)
     table = of_one_turn(table, first_triple(columns, ACC), hints.sensor)
-    accelerometers, gyroscopes = axis_triples(columns, ACC), axis_triples(columns, GYR)
-    warm = [column for column in columns if column.quantity == TEMPERATURE]
+    accelerometers, gyroscopes = names.axis_triples(columns, ACC), names.axis_triples(columns, GYR)
+    warm = [column for column in columns if column.quantity == names.TEMPERATURE]
     # a rate beside columns without a time says that the times are wrong
     at = () if hints.columns and hints.rate_hz and "t" not in hints.columns else table.clocks(columns)
     streams = [sensor_stream(table, at, of, warm) for of in accelerometers]
@@ -223,11 +211,11 @@ def recording_from_table(table: Table, hints: Hints) -> Recording:
     several = len(accelerometers) > 1
     remarks = [
         f"the accelerometer is {', '.join(column.name.strip() for column in acc)}" if several else "",
-        FLIPPED if acc[0].sign_flipped else ios_remark,
+        FLIPPED if acc[0].stem in names.FLIPPED_STEMS else ios_remark,
         *table.remarks,
         "the ranges are those that MPU6050::initialize() sets" if ranges else "",
         guess_remark,
-        "" if hints.columns or table.chosen else ignored_sensors(table.header, columns),
+        "" if hints.columns or table.chosen else names.ignored_sensors(table.header, columns),
         "accelerations are increments over a sample, by their own times" if interval_column(table, acc[0]) else "",
         *(f"its column {c.name.strip()} was not read as the time" for c in at[:1] if a.ticks is None),
     ]

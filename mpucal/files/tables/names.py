@@ -124,9 +124,7 @@ class Column:
     quantity : TIME, NANOSECONDS, ACC, GYR or TEMPERATURE. axis : 0, 1, 2 of ACC and GYR.
     unit : the one in its name, or else its program's; empty where neither is known.
     rank : order of preference among columns of the same quantity.
-    clock_of : ACC or GYR where it is the clock of that sensor alone.
-    sign_flipped : accelerations have the opposite sign, as on iOS.
-    of_increments : it holds increments over a sample.
+    stem : the one in STEMS by which it is known; empty if it is known otherwise.
     """
 
     name: str
@@ -135,9 +133,7 @@ class Column:
     axis: int = 0
     unit: str = ""
     rank: int = 0
-    clock_of: str = ""
-    sign_flipped: bool = False
-    of_increments: bool = False
+    stem: str = ""
 
 
 # a log names them on each line
@@ -181,14 +177,10 @@ def _match_stem(name: str, place: int, text: str, axis: int, unit: str) -> Colum
         for quantity, stems in STEMS.items():
             of_axes = quantity in (ACC, GYR)
             for stem, at in _split_axis(word, axis) if of_axes else [(word, axis)]:
-                increments = stem in INCREMENTS
-                unit_of = PER_SAMPLE.get(unit, unit) if increments else unit
+                unit_of = PER_SAMPLE.get(unit, unit) if stem in INCREMENTS else unit
                 if stem in stems and unit_of in UNITS[quantity] and of_axes == (at >= 0):
-                    rank, clock_of = list(stems).index(stem), SENSOR_CLOCKS.get(stem, "")
-                    flipped = stem in FLIPPED_STEMS
-                    return Column(
-                        name, place, quantity, at, unit_of or stems[stem], rank, clock_of, flipped, increments
-                    )
+                    rank = list(stems).index(stem)
+                    return Column(name, place, quantity, at, unit_of or stems[stem], rank, stem)
     return None
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from ...data import Mask, Vector
 from ..reading import MOST_ODD
+from . import names
 from .guess import increases, is_index
-from .names import BY_A_WORD, CHOSEN, INTERVALS, STEMS, TIME, Column, plausible_celsius
+from .names import TIME, Column
 from .shown_units import time_unit
 from .table import Table, are_many
 from .times import Stream
@@ -27,7 +28,7 @@ def sensor_stream(
     Lines without any number are those of another sensor if they are many, or hold cells that the others lack.
     """
     values = table.numbers(axes)
-    values = -values if axes[0].sign_flipped else values
+    values = -values if axes[0].stem in names.FLIPPED_STEMS else values
     interval = interval_column(table, axes[0])
     if interval is not None:
         dt = table.numbers([interval])
@@ -37,8 +38,9 @@ def sensor_stream(
     others = int(np.count_nonzero(empty)) > MOST_ODD * len(values) or _are_of_others(table, empty)
     units = {column.unit for column in axes}
     kept, timed, steps = np.asarray(~empty | (not others)), None, None
-    of_sensor = [clock for clock in clocks if clock.clock_of in ("", axes[0].quantity)]
-    for clock in sorted(of_sensor, key=lambda c: (not c.clock_of, c.rank, c.rank == BY_A_WORD and not c.unit)):
+    of_sensor = [clock for clock in clocks if names.SENSOR_CLOCKS.get(clock.stem, axes[0].quantity) == axes[0].quantity]
+    of_sensor.sort(key=lambda c: (c.stem not in names.SENSOR_CLOCKS, c.rank, c.rank == names.BY_A_WORD and not c.unit))
+    for clock in of_sensor:
         has = kept if others else ~empty | table.has(clock)
         found = table.times(clock, has)
         steps = _intervals(found[0], float(found[1]), clock)
@@ -57,12 +59,12 @@ def sensor_stream(
         time_unit,
         (units.pop() if len(units) == 1 else "") or table.units.get(axes[0].quantity, ""),
         places=None if others and timed else np.flatnonzero(kept),
-        temperature_c=plausible_celsius(table.numbers(warm[:1])[kept, 0]) if warm else None,
+        temperature_c=names.plausible_celsius(table.numbers(warm[:1])[kept, 0]) if warm else None,
         lost=0 if others else int((~kept).sum()),
         rate_hz=table.rate_hz,
         # xacc and xgyro of MAVLink are in mg and mrad/s
         whole_unit="" if axes[0].name.strip().lower().startswith("x") else OF_BNO055[axes[0].quantity],
-        of_increments=axes[0].of_increments and interval is None,
+        of_increments=axes[0].stem in names.INCREMENTS and interval is None,
         summed=steps is not None and timed is not None,
     )
 
@@ -74,7 +76,7 @@ def interval_column(table: Table, axis: Column) -> Column | None:
     """
     plain = [re.sub(r"[\W_]", "", name.lower()) for name in (axis.name, *table.header)]
     place = next((plain.index(of) - 1 for of in (f"{plain[0][:-1]}dt", f"{plain[0][:-1]}t") if of in plain), None)
-    if place is None or not axis.of_increments:
+    if place is None or axis.stem not in names.INCREMENTS:
         return None
     column = Column(table.header[place], place, TIME)
     known = table.numbers([column])
@@ -95,8 +97,7 @@ def _intervals(since: Vector, first: float, clock: Column) -> Vector | None:
     The column is called after steps, and its numbers, given as times since the `first`, do not grow. A damaged step is
     replaced by the usual one.
     """
-    named = 0 <= clock.rank < BY_A_WORD and [*STEMS[TIME]][clock.rank] in INTERVALS.split()
-    if not named or not len(since) or not np.isfinite(first):
+    if clock.stem not in names.INTERVALS.split() or not len(since) or not np.isfinite(first):
         return None
     steps = since + first
     usual, bad = float(np.nanmedian(steps)), ~(steps > 0.0)
@@ -106,4 +107,4 @@ def _intervals(since: Vector, first: float, clock: Column) -> Vector | None:
 
 def is_weak(clock: Column) -> bool:
     """Return True for a column that may be no clock: `t` may be a temperature."""
-    return clock.rank == BY_A_WORD or (clock.rank != CHOSEN and clock.name.strip().lower() in ("t", "ts"))
+    return clock.rank == names.BY_A_WORD or (clock.rank != names.CHOSEN and clock.name.strip().lower() in ("t", "ts"))
