@@ -41,7 +41,7 @@ from .parameters import HAND
 from .preprocessing import Preprocessed, find_rests, prepare
 from .problem import Problem
 from .scores import ends_of, parts_of
-from .slip import end_slips, find_slip, slip_squares
+from .slip import find_slip
 from .theta import Prior, Theta
 from .transitions import (
     Transition,
@@ -151,11 +151,10 @@ def _fit_samples(search: _Search) -> HandFit:
         iterations += minimum.iterations
     transitions = transitions_of(fine, minimum.theta)
     spoilt = (fine.recording.gap | fine.recording.gyr_clipped)[fine.flat.last :]
-    slip = find_slip(transitions, fine.problem.series, minimum.theta, spoilt)
+    slip, slipped = find_slip(transitions, fine, minimum.theta, spoilt)
     # What looks like a slip may be another change: all are weighed by the noise that a slip would leave.
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
-    slipped = end_slips(transitions, spoilt) @ np.reshape([slip_squares(each, fit.D) for each in transitions], (-1, 12))
     return HandFit(replace(fit, slip=slip, slipped=slipped), minimum, noise, search, fine)
 
 

@@ -1,13 +1,14 @@
 """Hypotheses about what happened while the board was turned, each weighed by its evidence.
 
 Under a hypothesis, a quantity has three numbers delta_k beside theta in each group of the recording's parts: the
-accelerometer's bias, its scale factors, its mount, or the gyroscope's bias, by stretches of time or by the sides that
-were down. They are made of x ~ N(0, q):
+accelerometer's bias, its scale factors, its mount, or the gyroscope's bias. A group is a stretch of time. They are made
+of x ~ N(0, q):
 
     step    one x, from some time on, or growing evenly
     walk    an x for each stretch, and delta_k is the sum of those so far
     pulse   one x, in one stretch: a knock, or the board taken up and put down
-    each    an x for each group: an effect that no model has, such as a pivot that swings, or a nonlinear sensor
+    each    an x for each group: an effect that no model has, such as a pivot that swings
+    reading two x, by which the error of each axis grows with the square and the cube of its reading
 
 To second order the parts' scores are enough. With theta eliminated the quadratic form of x is S + I/q, and by the
 eigenvalues of S and the components c of the scores
@@ -30,32 +31,25 @@ from itertools import groupby
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..data import Recording, Vector
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..rests.flat import Flat
 from .parameters import PLACES
 from .parts import Parts
 from .rotation import cross
 
-What = Literal["accelerometer", "scale", "mount", "gyroscope"]
+What = Literal["accelerometer", "scale", "mount", "gyroscope", "linearity"]
 Kind = Literal["change", "time", "side"]
 # stretches of time by shape: a change is looked for in each, and the others have numbers in each
-GROUPS = {"step": 48, "walk": 16, "pulse": 48, "each": 16}
+GROUPS = {"step": 48, "walk": 16, "pulse": 48, "each": 16, "reading": 96}
 
 
 class Hypothesis(NamedTuple):
-    """Hypothesis: the quantity, how it is distributed, if over the sides instead of stretches of time, how often."""
+    """Hypothesis: the quantity, how it is distributed, and how often."""
 
     what: What
-    shape: Literal["step", "walk", "pulse", "each"]
-    by_side: bool = False
+    shape: Literal["step", "walk", "pulse", "each", "reading"]
     prior: float = 1.0
-
-    @property
-    def groups(self) -> int | None:
-        """Number of stretches of time; None of sides."""
-        return None if self.by_side else GROUPS[self.shape]
 
     @property
     def is_change(self) -> bool:
@@ -65,14 +59,14 @@ class Hypothesis(NamedTuple):
     @property
     def kind(self) -> Kind:
         """Kind of the hypothesis, for messages: a change is one of the accelerometer."""
-        if self.by_side:
+        if self.shape == "reading":
             return "side"
         return "change" if self.is_change and self.what != "gyroscope" else "time"
 
 
 # Every gyroscope's bias walks, and few step or drift steadily.
 RARELY = 0.1
-# Those of one shape over the same groups are beside each other, and computed together.
+# Those of one shape are beside each other, and computed together.
 HYPOTHESES = (
     Hypothesis("accelerometer", "step"),
     Hypothesis("scale", "step"),
@@ -84,12 +78,13 @@ HYPOTHESES = (
     Hypothesis("accelerometer", "each"),
     Hypothesis("scale", "each"),
     Hypothesis("mount", "each"),
-    Hypothesis("accelerometer", "each", by_side=True),
-    Hypothesis("scale", "each", by_side=True),
+    Hypothesis("linearity", "reading"),
 )
 CHANGES = tuple(each for each in HYPOTHESES if each.is_change)
 # Standard deviations of x are tried from a 10,000th of these up to them: m/s^2, 1, rad, rad/s.
-LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1, "gyroscope": 0.03}
+LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1, "gyroscope": 0.03, "linearity": 0.1}
+# m/s^2 at 1 g, of the square and the cube: a tenth of what a data sheet allows (0.5 % of 2 g)
+NONLINEARITY_MPS2 = 0.005
 VARIANCES = 10.0 ** np.arange(-8.0, 0.1, 0.5)
 # Odds above which something is said to have happened, against nothing and against what else it may be.
 SURE = 100.0
@@ -108,10 +103,10 @@ class Explanation(NamedTuple):
     ----------
     hypothesis : which one. evidence : log of its evidence as a multiple of that of nothing.
     delta : (k, 3) by group, m/s^2, 1, rad or rad/s, at the likeliest q and time.
-    start, end : (k,) s after the flat segment, of the groups; of sides, the first and last time that each was down.
+    start, end : (k,) s after the flat segment, of the groups.
     aways : (m, p) rms distances of the estimate from the parameters, if it is true; of a change, by group.
     shift : (1 + k, p) parameters less the estimate, before the first group and in each, at the likeliest q and time.
-    freed : (p,) share of itself by which the variance of the estimate grows, if x is estimated too.
+    freed : (p,) share of itself by which the variance of the estimate grows, if x is estimated too, at the likeliest q.
     weight : probability among all hypotheses and nothing.
     is_sure : True for a change of the accelerometer against which all else is unlikely.
     is_possible : True if something surely happened, and this explains it, or nearly as much of it as the likeliest one.
@@ -191,12 +186,11 @@ def explain(parts: Parts | None, D: Vector, found: list[Explanation]) -> list[Ex
 
 def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Explanation]:
     """Return what each hypothesis says, weighed against the others and nothing, the likeliest first."""
-    groups = {number: _Groups.of(parts, number) for number in {each.groups for each in hypotheses}}
+    groups = {number: _Groups.of(parts, number) for number in {GROUPS[each.shape] for each in hypotheses}}
     found = [
         each
-        for (_, number), alike in groupby(hypotheses, key=lambda each: (each.shape, each.groups))
-        if len(groups[number].start) > 1
-        for each in _explain(list(alike), groups[number], parts, D)
+        for shape, alike in groupby(hypotheses, key=lambda each: each.shape)
+        for each in _explain(list(alike), groups[GROUPS[shape]], parts, D)
     ]
     total = float(np.logaddexp.reduce([0.0, *(each.log_share for each in found)]))  # with nothing, whose share is 1
     found = [each._replace(weight=float(np.exp(each.log_share - total))) for each in found]
@@ -214,7 +208,7 @@ def _weigh(hypotheses: Sequence[Hypothesis], parts: Parts, D: Vector) -> list[Ex
 
 def _without(parts: Parts, known: Explanation) -> Parts:
     """Return the parts with their scores at the parameters that an explanation gives each of them."""
-    shift = known.shift[1 + np.unique(_group(parts, known.hypothesis.groups), return_inverse=True)[1]]
+    shift = known.shift[1 + parts.by_time(GROUPS[known.hypothesis.shape])]
     moved = np.einsum("kpq,kq->kp", parts.fisher, shift)
     besides = parts.H - parts.fisher.sum(axis=0)  # of the prior and the flat mean
     return replace(
@@ -235,25 +229,22 @@ def remove_change(recording: Recording, flat: Flat, change: Explanation) -> Reco
 
 
 class _Groups(NamedTuple):
-    """Gradients (k, p) and Fisher matrices (k, p, p) of groups of parts, and their times [s after the flat segment]."""
+    """Groups of parts: gradients (k, p), Fisher matrices (k, p, p), times (k,), and readings (1 + k, 3) as of Parts."""
 
     gradient: Vector
     fisher: Vector
+    reading: Vector
     start: Vector
     end: Vector
 
     @classmethod
-    def of(cls, parts: Parts, groups: int | None) -> _Groups:
-        """Group the parts by so many stretches of time, or by sides."""
-        group = _group(parts, groups)
+    def of(cls, parts: Parts, groups: int) -> _Groups:
+        """Group the parts by so many stretches of time."""
+        group = parts.by_time(groups)
         first = np.unique(group, return_index=True)[1]
-        last = len(group) - 1 - np.unique(group[::-1], return_index=True)[1]
-        return cls(*parts.grouped(group), parts.start[first], parts.end[last])
-
-
-def _group(parts: Parts, groups: int | None) -> NDArray[np.intp]:
-    """Return (k,) the group of each part, in so many stretches of time, or by sides."""
-    return parts.side if groups is None else parts.by_time(min(groups, len(parts)))
+        last = np.append(first[1:], len(parts)) - 1
+        reading = parts.reading[np.append(0, 1 + first)]
+        return cls(*parts.grouped(group), reading, parts.start[first], parts.end[last])
 
 
 class _Likelihood(NamedTuple):
@@ -261,40 +252,45 @@ class _Likelihood(NamedTuple):
 
     Attributes
     ----------
-    eigenvalues, scores : (h, m, d) of h hypotheses. follow : (h, m, d, p), by which theta follows -x.
+    eigenvalues, scores : (h, m, d) of h hypotheses. strays : (h, m, d, p), by which the estimate strays from theta.
     U : (h, m, r, 3, d) eigenvectors, of r numbers of each axis.
     """
 
     eigenvalues: Vector
     scores: Vector
-    follow: Vector
+    strays: Vector
     U: Vector
 
     @classmethod
     def of(cls, B: Vector, shapes: Vector, groups: _Groups, parts: Parts) -> _Likelihood:
         """Eliminate theta from the parts' scores.
 
-        B : (h, p, 3) derivatives of the parameters. shapes : (m, k, r) weights of r numbers of each axis in k groups.
+        B : (h, p, 3) derivatives of the parameters. shapes : (m, 1 + k, r, 1 or 3), see _shapes.
         """
-        (h, p, _), (m, k, r) = B.shape, shapes.shape
-        weights = shapes.swapaxes(1, 2)
-        pairs, weights = (weights[:, :, None] * weights[:, None]).reshape(-1, k), weights.reshape(-1, k)
-        across = (groups.fisher.reshape(-1, p) @ np.hstack(list(B))).reshape(k, p, h, 3).transpose(2, 0, 3, 1)
-        own = across.reshape(h, -1, p) @ B  # (h, 3 k, 3)
-        across = (weights @ across.reshape(h, k, -1)).reshape(h, m, 3 * r, p)
+        # The flat segment is in no group: its parameters are eliminated, and the groups' are relative to them.
+        flat, shapes = shapes[:, 0], shapes[:, 1:] - shapes[:, :1]
+        (h, p, _), (m, k, r, axes) = B.shape, shapes.shape
+        weights = shapes.transpose(3, 0, 2, 1).reshape(axes, m * r, k)
+        pairs = weights.reshape(axes, 1, m, r, 1, k) * weights.reshape(1, axes, m, 1, r, k)
+        across = (groups.fisher.reshape(-1, p) @ np.hstack(list(B))).reshape(k, p, h, 3).transpose(2, 3, 0, 1)
+        own = (across @ B[:, None]).transpose(0, 1, 3, 2)[..., None]  # (h, 3, 3, k, 1)
+        across = (weights @ across).reshape(h, 3, m, r, p).transpose(0, 2, 3, 1, 4).reshape(h, m, 3 * r, p)
         follow = across @ parts.covariance
-        S = (pairs @ own.reshape(h, k, 9)).reshape(h, m, r, r, 3, 3).swapaxes(3, 4).reshape(h, m, 3 * r, 3 * r)
+        S = (pairs.reshape(axes, axes, -1, k) @ own).reshape(h, 3, 3, m, r, r)
+        S = S.transpose(0, 3, 4, 1, 5, 2).reshape(h, m, 3 * r, 3 * r)
         eigenvalues, U = np.linalg.eigh(S - follow @ across.swapaxes(2, 3))
         U *= (eigenvalues > UNSEEN * eigenvalues.max(axis=(1, 2), keepdims=True))[:, :, None]
-        of_x = follow @ parts.left - (weights @ (groups.gradient @ B)).reshape(h, m, 3 * r)
-        scores, follow = (of_x[:, :, None] @ U)[:, :, 0], U.swapaxes(2, 3) @ follow
-        return cls(np.maximum(eigenvalues, 0.0), scores, follow, U.reshape(h, m, r, 3, -1))
+        of_groups = weights @ (groups.gradient @ B).swapaxes(1, 2)[..., None]  # (h, 3, m r, 1)
+        of_x = follow @ parts.left - of_groups.reshape(h, 3, m, r).transpose(0, 2, 3, 1).reshape(h, m, 3 * r)
+        scores = (of_x[:, :, None] @ U)[:, :, 0]
+        follow += (flat[:, :, :, None] * B.swapaxes(1, 2)[:, None, None]).reshape(follow.shape)
+        return cls(np.maximum(eigenvalues, 0.0), scores, U.swapaxes(2, 3) @ follow, U.reshape(h, m, r, 3, -1))
 
 
 def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vector) -> list[Explanation]:
-    """Return what hypotheses of one shape over the same groups say."""
+    """Return what hypotheses of one shape say."""
     B = np.array([_directions(each.what, D, len(parts.H)) for each in alike])
-    shapes = _shapes(alike[0].shape, 0.5 * (groups.start + groups.end))
+    shapes = _shapes(alike[0].shape, groups)
     likelihood = _Likelihood.of(B, shapes, groups, parts)
     q = np.outer([LARGEST[each.what] ** 2 for each in alike], VARIANCES)[:, None, :, None]
     # (h, m, q, d): by hypothesis, by shape, by variance, by component
@@ -309,13 +305,14 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
     weighed = p[..., None] * x
     squares = weighed.swapaxes(2, 3) @ x
     np.einsum("hmdd->hmd", squares)[:] += np.einsum("hmq,hmqd->hmd", p, variance)
-    # The estimate strays by x times a basis (h, m, a, d, p): by -follow, and where the sensor is another one in each
-    # group by what the shapes weigh there. Its mean products need no array of every shape in every group.
-    basis, weights = -likelihood.follow[:, :, None], np.ones((len(shapes), 1, 1))
+    # The estimate strays by x times a basis (h, m, a, d, p), and less by what the shapes weigh in a group where the
+    # sensor is another one. Its mean products need no array of every shape in every group.
+    basis, weights = -likelihood.strays[:, :, None], np.ones((len(shapes), 1, 1))
     if alike[0].is_change:
         of_x = likelihood.U.swapaxes(3, 4) @ B.swapaxes(1, 2)[:, None, None]
         basis = np.concatenate([basis, of_x], axis=2)
-        weights = np.concatenate([np.ones((*shapes.shape[:2], 1)), shapes], axis=2)
+        of_groups = shapes[:, 1:, :, 0]  # the axes change alike
+        weights = np.concatenate([np.ones((*of_groups.shape[:2], 1)), of_groups], axis=2)
     products = np.einsum("hmadp,hmbdp->hmabp", basis, squares[:, :, None] @ basis)
     pairs = (weights[:, :, :, None] * weights[:, :, None]).swapaxes(0, 1)
     away2 = pairs.reshape(len(pairs), -1) @ products.reshape(len(alike), -1, products.shape[-1])
@@ -323,13 +320,22 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
     found = []
     for k, (hypothesis, of) in enumerate(zip(alike, log_p, strict=True)):
         m, best = divmod(int(of.argmax()), of.shape[1])
-        likeliest, follow = x[k, m, best], likelihood.follow[k, m]
-        delta = shapes[m] @ (likelihood.U[k, m] @ likeliest)
-        shift = np.vstack([np.zeros(3), delta]) @ B[k].T - likeliest @ follow
-        freed = variance[k, m, best] @ follow**2 / np.diag(parts.covariance)
+        likeliest, strays = x[k, m, best], likelihood.strays[k, m]
+        delta = np.sum(shapes[m] * (likelihood.U[k, m] @ likeliest), axis=1)
+        shift = delta @ B[k].T - likeliest @ strays
+        freed = variance[k, m, best] @ strays**2 / np.diag(parts.covariance)
         times = groups.start, groups.end
-        found.append(Explanation(hypothesis, float(evidence[k]), delta, *times, away[k], shift, freed))
+        found.append(Explanation(hypothesis, float(evidence[k]), delta[1:], *times, away[k], shift, freed))
     return found
+
+
+def nonlinearity(parts: Parts, D: Vector) -> Vector:
+    """Return (p,) variances of the estimate by a nonlinearity of NONLINEARITY_MPS2 that the parts do not show."""
+    groups = _Groups.of(parts, GROUPS["reading"])
+    B = _directions("linearity", D, len(parts.H))[None]
+    likelihood = _Likelihood.of(B, _shapes("reading", groups), groups, parts)
+    variance = 1.0 / (likelihood.eigenvalues + NONLINEARITY_MPS2**-2.0)
+    return np.asarray((variance[:, :, None] @ likelihood.strays**2).ravel())
 
 
 def _directions(what: What, D: Vector, p: int) -> Vector:
@@ -344,14 +350,22 @@ def _directions(what: What, D: Vector, p: int) -> Vector:
     return B
 
 
-def _shapes(shape: str, middles: Vector) -> Vector:
-    """Return (m, k, r) weights of r numbers in k groups; of steps and pulses, m of them with one number each."""
-    k = len(middles)
+def _shapes(shape: str, groups: _Groups) -> Vector:
+    """Return (m, 1 + k, r, 1 or 3) weights of r numbers in the flat segment and in k groups, by axis where they differ.
+
+    Of steps and pulses there are m, with one number each.
+    """
+    k = len(groups.start)
+    if shape == "reading":
+        u = groups.reading / STANDARD_GRAVITY_MPS2
+        # Over all directions, these have no linear part: theta is the best linear sensor.
+        return np.stack([u**2 - 1.0 / 3.0, u**3 - 0.6 * u], axis=1)[None]
+    at = np.arange(k + 1)
     if shape == "step":
-        return np.vstack([np.tri(k).T[1:], middles / middles[-1]])[:, :, None]
-    if shape == "pulse":
-        # The flat segment comes before the first group: with it, theta is what all others have.
-        at = np.arange(k + 1)
-        within = np.vstack([(at >= at[:, None]) & (at < at[:, None] + width) for width in PULSES]).astype(np.float64)
-        return np.asarray((within[:, 1:] - within[:, :1])[:, :, None])
-    return np.asarray((np.tri(k) if shape == "walk" else np.eye(k))[None])
+        middles = groups.start + groups.end
+        weights = np.vstack([at >= at[2:, None], np.append(0.0, middles / middles[-1])])[:, :, None]
+    elif shape == "pulse":
+        weights = np.vstack([(at >= at[:, None]) & (at < at[:, None] + width) for width in PULSES])[:, :, None]
+    else:
+        weights = (np.tri(k + 1)[:, 1:] if shape == "walk" else np.eye(k + 1)[:, 1:])[None]
+    return np.asarray(weights[..., None], np.float64)

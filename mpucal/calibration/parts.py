@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from .normal_equations import inverse
+from .rotation import sides_down
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Parts:
     gradient : (k, p) and fisher : (k, p, p), the share of each part in those of V, by the estimated parameters.
     H : (p, p) Fisher matrix of all parts, the prior and the flat mean. left : (p,) gradient of them, which a minimiser
         leaves at nearly 0.
-    start, end : (k,) s after the flat segment. side : (k,) 0 to 5, the body's axis nearest to gravity, with its sign.
+    start, end : (k,) s after the flat segment.
+    reading : (1 + k, 3) m/s^2, mean readings without b_a, of the flat segment and of the parts.
     """
 
     gradient: Vector
@@ -34,10 +36,15 @@ class Parts:
     left: Vector
     start: Vector
     end: Vector
-    side: NDArray[np.intp]
+    reading: Vector
 
     def __len__(self) -> int:
-        return len(self.side)
+        return len(self.start)
+
+    @cached_property
+    def side(self) -> NDArray[np.intp]:
+        """Side (k,) that was down, 0 to 5: the accelerometer's axis nearest to gravity, with its sign."""
+        return sides_down(self.reading[1:])
 
     @cached_property
     def covariance(self) -> Vector:
@@ -50,5 +57,5 @@ class Parts:
         return of @ self.gradient, np.tensordot(of, self.fisher, 1)
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
-        """Return (k,) the group of each part, in `groups` stretches of time."""
-        return np.arange(len(self)) * groups // len(self)
+        """Return (k,) the group of each part, in `groups` stretches of time, or as many as there are parts."""
+        return np.arange(len(self)) * min(groups, len(self)) // len(self)

@@ -9,7 +9,6 @@ from .levenberg_marquardt import Minimum
 from .likelihood import evaluate, part_scores
 from .parts import Parts
 from .problem import Problem
-from .rotation import sides_down
 from .theta import Prior
 
 MOST_PARTS, FEWEST_SAMPLES = 96, 16
@@ -47,5 +46,5 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
         left[free],
         t[starts],
         t[ends],
-        sides_down((mean - theta.b_a) @ theta.inverse.T),
+        np.vstack([problem.flat.y, mean]) - theta.b_a,
     )

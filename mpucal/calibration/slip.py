@@ -16,13 +16,18 @@ from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from ..data import Mask, Vector
+from ..rests.intervals import SHORTEST_S, statistics
+from ..rests.tremor import SWAY_PER_S, level_rests, mean_variance, tremor_variance
 from .hypotheses import SURE
 from .parameters import PLACES
+from .poses import POSE_MPS2
+from .preprocessing import Preprocessed
 from .problem import Series
 from .rotation import cross, lengths
 from .theta import Theta
 from .transitions import (
     DEGREES_OF_FREEDOM,
+    FEWEST_TRANSITIONS,
     REWEIGHTED,
     Transition,
     jacobians,
@@ -44,20 +49,31 @@ class Slip(NamedTuple):
     near_end: bool = False
 
 
-def find_slip(transitions: Sequence[Transition], series: Series, theta: Theta, spoilt: Mask) -> Slip | None:
+def find_slip(
+    transitions: Sequence[Transition], prepared: Preprocessed, theta: Theta, spoilt: Mask
+) -> tuple[Slip | None, Vector]:
+    """Return the slip that surely happened, or None, and mean squares (12,) of what D and b_a change by at the ends.
+
+    Near the ends, a miss that is not by chance is taken for a slip. spoilt : see end_slips.
+    """
+    t = np.concatenate([[0.0], np.cumsum(prepared.problem.series.dt)])
+    ends = [*zip(end_slips(transitions, spoilt).tolist(), transitions, strict=True), *_at_rest(prepared, theta, spoilt)]
+    squares = sum((chance * slip_squares(each, theta.D) for chance, each in ends), np.zeros(12))
+    probability, slipped = max(ends, key=lambda end: end[0], default=(0.0, None))
+    if slipped is not None and probability > 0.5:
+        left = [each._replace(miss=np.zeros(3)) if each is slipped else each for each in transitions]
+        return Slip(_times(t, slipped), slipped.miss, left, near_end=True), squares
+    return _between_rests(transitions, prepared.problem.series, theta, t), squares
+
+
+def _between_rests(transitions: Sequence[Transition], series: Series, theta: Theta, t: Vector) -> Slip | None:
     """Return the slip that explains the misses of transitions between rests under theta, or None.
 
-    K is estimated anew with it, and without, since a K that was estimated without it hides much of it. Near the ends,
-    a miss that is not by chance is taken for one. spoilt : see end_slips.
+    K is estimated anew with it, and without, since a K that was estimated without it hides much of it.
     """
     k, (n, p) = len(transitions), _numbers(transitions)
     if n <= p:
         return None
-    t = np.concatenate([[0.0], np.cumsum(series.dt)])
-    probability = end_slips(transitions, spoilt)
-    if probability[lost := int(probability.argmax())] > 0.5:
-        without = [each if i != lost else each._replace(miss=np.zeros(3)) for i, each in enumerate(transitions)]
-        return Slip(_times(t, transitions[lost]), transitions[lost].miss, without, near_end=True)
     # The cost of three numbers more, and of so many times; few misses are explained by anything.
     cost = (math.log(SURE) + 1.5 * math.log(n) + math.log(k)) * n / (n - p)
     misses, known = (np.array([getattr(each, name) for each in transitions]) for name in ("miss", "variance"))
@@ -88,11 +104,35 @@ def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
     n, p = _numbers(transitions)
     ends = [i for i in (0, 1, k - 2, k - 1) if n > p and not spoilt[transitions[i].span].any()]
     if ends:
-        known, misses = np.array([each.variance for each in transitions]), _lasting(transitions)
-        nu = DEGREES_OF_FREEDOM
-        chance = (likely_scale(misses, known)[1][ends] * nu / (nu + 2.0)) ** (0.5 * nu)
-        probability[ends] = 1.0 / (1.0 + SURE * len(ends) * chance)
+        known = np.array([each.variance for each in transitions])
+        probability[ends] = _probability(_lasting(transitions), known, ends)
     return probability
+
+
+def _at_rest(prepared: Preprocessed, theta: Theta, spoilt: Mask) -> list[tuple[float, Transition]]:
+    """Return the probability of a slip within the last rest, and what it would be; nothing if rests are too few.
+
+    The gyroscope tells how the board turned as it rested. From the first half of a rest to the second, gravity misses
+    that by as much as the hand sways, in the last rest as in the others. spoilt : see end_slips.
+    """
+    recording, flat, runs = prepared.recording, prepared.flat, prepared.runs
+    # each half is long enough for a rest
+    runs = runs[(runs[:, 0] > flat.last) & (runs[:, 1] - runs[:, 0] >= 2.0 * SHORTEST_S * recording.rate_hz)]
+    if len(runs) < FEWEST_TRANSITIONS or spoilt[slice(*(runs[-1] - flat.last))].any():
+        return []
+    acc, middle = level_rests(recording.acc, recording, flat, runs), runs.sum(axis=1) // 2
+    leaving, coming = (
+        (statistics(acc, half)[0] - theta.b_a) @ theta.inverse.T
+        for half in (np.column_stack([runs[:, 0], middle]), np.column_stack([middle, runs[:, 1]]))
+    )
+    misses = np.cross(leaving, coming) / (lengths(leaving) * lengths(coming))[:, None]
+    n = (runs[:, 1] - runs[:, 0]).astype(np.float64) / 2.0
+    sway = np.median(tremor_variance(statistics(acc, runs)[1], flat.Sigma_a))
+    of_mean = POSE_MPS2**2 + flat.Sigma_a.mean() / n + sway * mean_variance(SWAY_PER_S * n / recording.rate_hz)
+    known = 2.0 * of_mean / prepared.problem.gravity**2
+    span = slice(*(runs[-1] - flat.last).tolist())
+    within = Transition(span, np.eye(3), leaving[-1], coming[-1], misses[-1], float(known[-1]), 0.0)
+    return [(float(_probability(misses, known, [len(runs) - 1])[0]), within)]
 
 
 def slip_squares(transition: Transition, D: Vector) -> Vector:
@@ -103,6 +143,16 @@ def slip_squares(transition: Transition, D: Vector) -> Vector:
     seen = D @ cross(transition.miss)
     unseen = D @ cross(transition.coming / norm(transition.coming)) * norm(transition.miss) / math.sqrt(2.0)
     return np.append(seen**2 + unseen**2, (seen @ transition.coming) ** 2)
+
+
+def _probability(misses: Vector, known: Vector, ends: Sequence[int]) -> Vector:
+    """Return probabilities (m,) that slips make the misses number `ends` of all misses (k, 3), and not chance.
+
+    known : (k,) their variances, but for a common scale.
+    """
+    nu = DEGREES_OF_FREEDOM
+    chance = (likely_scale(misses, known)[1][ends] * nu / (nu + 2.0)) ** (0.5 * nu)
+    return np.asarray(1.0 / (1.0 + SURE * len(ends) * chance))
 
 
 def _lasting(transitions: Sequence[Transition]) -> Vector:

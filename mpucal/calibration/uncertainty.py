@@ -16,7 +16,7 @@ import numpy as np
 from ..data import Vector
 from ..result.blob import is_invertible
 from .fit import Fit
-from .hypotheses import Explanation, Kind
+from .hypotheses import Explanation, Kind, nonlinearity
 from .parameters import ACCELEROMETER
 from .rotation import fibonacci_sphere
 
@@ -139,14 +139,15 @@ def claim_uncertainty(
         return None
     # over the sphere, the square of each element of s is gravity^2 / 3 in the mean, and their products are 0
     rms = partial(_rms, np.repeat([gravity / 3.0**0.5, 1.0], [9, 3])[:, None] * _errors_of(fit.D))
-    model = floored = rms(fit.covariance)
+    covariance = fit.covariance + np.diag(nonlinearity(fit.parts, fit.D))  # no sensor is perfectly linear
+    model = floored = rms(covariance)
     if freed.any():
         known = np.diag(fit.parts.covariance)[ACCELEROMETER]
         floored = float(np.hypot(model * rms(np.diag((1.0 + freed) * known)) / rms(np.diag(known)), FLOOR_MPS2))
     if len(np.unique(fit.parts.side)) < FEWEST_SIDES:
         floored *= UNCOMPARED
     errors = [each.weight**0.5 * rms(np.diag(each.away**2)) for each in explanations]
-    return UncertaintyClaim(fit.covariance, model, floored, explanations, errors, fit.slipped)
+    return UncertaintyClaim(covariance, model, floored, explanations, errors, fit.slipped)
 
 
 def is_usable(fit: Fit) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import calibrate, estimate
+from mpucal.calibration import calibrate, estimate, hypotheses
 from mpucal.calibration.hypotheses import (
     HYPOTHESES,
     LARGEST,
@@ -23,6 +23,7 @@ from mpucal.calibration.parameters import PLACES
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.quality import judge
 from mpucal.calibration.uncertainty import UncertaintyClaim, propagate
+from mpucal.data import STANDARD_GRAVITY_MPS2
 from tools.lab.families import of_seed
 from tools.lab.judge import judged, sph_rms
 
@@ -80,15 +81,22 @@ def test_a_step_of_the_gyroscopes_bias_between_rests_leaves_the_claim_true(seed)
     assert not of_seed(("gyro step poses", seed)).false
 
 
-def test_a_nonlinear_sensor_is_claimed_by_its_sides(hand):
-    made = hand(3, "continuous")
-    s = made.recording.acc
-    fit = calibrate(replace(made.recording, acc=s + 0.005 * s**2 / (2.0 * G)), gravity=G)
+@pytest.mark.parametrize(("seed", "motion"), [(3, "continuous"), (1, "pose12"), (5, "pose12")])
+def test_a_nonlinear_sensor_is_claimed_by_its_readings(hand, seed, motion):
+    """A square of 2.5 mg at 1 g, less the linear sensor that is nearest to it; it is no bias that moved."""
+    made = hand(seed, motion)
+    bent = made.recording.acc + 0.025 * ((made.recording.acc / G) ** 2 - 1.0 / 3.0)
+    fit = calibrate(replace(made.recording, acc=bent), gravity=G)
+    assert {reason["code"] for reason in fit.quality["reasons"]} <= {"few_orientations"}
     assert sph_rms(made.truth, fit.D, fit.b_a) < 3.0 * fit.quality["error_std"]["rms"]
     assert judged(fit, (made.truth.D, made.truth.b_a)).farthest < 4.0
 
 
 # ---- the evidence, compared with the joint Gaussian
+
+
+# m/s^2 without b_a, of the flat segment and up to 48 parts
+READINGS = G * (np.array([0.0, 0.0, 1.0]) + np.random.default_rng(5).uniform(-0.5, 0.5, (49, 3)))
 
 
 def linear_parts():
@@ -106,49 +114,56 @@ def linear_parts():
     gradient = -np.einsum("kmp,km->kp", A, y - A @ theta)
     t = np.arange(k, dtype=float)
     left = gradient.sum(0) + prior @ theta
-    parts = Parts(gradient, np.einsum("kmp,kmq->kpq", A, A), H, left, t, t + 1.0, np.zeros(k, np.intp))
+    parts = Parts(gradient, np.einsum("kmp,kmq->kpq", A, A), H, left, t, t + 1.0, READINGS[: 1 + k])
     return A, y, parts
 
 
-@pytest.mark.parametrize("shape", ["walk", "each", "step", "pulse"])
-def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
+@pytest.mark.parametrize("shape", ["walk", "each", "step", "pulse", "reading"])
+def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape, monkeypatch):
     """Compare with the posteriors of theta and x together, for all variances and, of a step or pulse, all times."""
     A, y, parts = linear_parts()
     k, m, p = A.shape
     (told,) = _explain([Hypothesis("accelerometer", shape)], _Groups.of(parts, 5), parts, np.eye(3))
-    windows = [[float(i <= j < i + width) for j in range(k + 1)] for width in (1, 2, 3) for i in range(k + 1)]
+    windows = [[[float(i <= j < i + width)] for j in range(k + 1)] for width in (1, 2, 3) for i in range(k + 1)]
+    u = READINGS[: 1 + k] / STANDARD_GRAVITY_MPS2
+    # weights of the numbers in the flat segment and in each part, by axis
     shapes = {
-        "walk": [np.tri(k)],
-        "each": [np.eye(k)],
-        "step": [np.array([[float(j >= i)] for j in range(k)]) for i in range(1, k)]
-        + [(np.arange(k) + 0.5)[:, None] / 4.5],
-        # a pulse in the flat segment shifts all other parts
-        "pulse": [np.array([[inside - window[0]] for inside in window[1:]]) for window in windows],
+        "walk": [np.vstack([np.zeros(k), np.tri(k)])[:, :, None]],
+        "each": [np.vstack([np.zeros(k), np.eye(k)])[:, :, None]],
+        "step": [(np.arange(k + 1) >= i)[:, None, None] for i in range(2, k + 1)]
+        + [np.append(0.0, (np.arange(k) + 0.5) / 4.5)[:, None, None]],
+        "pulse": [np.array(window)[:, :, None] for window in windows],
+        "reading": [np.stack([u**2 - 1.0 / 3.0, u**3 - 3.0 / 5.0 * u], axis=1)],
     }[shape]
     design, y = A.reshape(k * m, p), y.ravel()
     B = np.zeros((p, 3))
     B[PLACES["b_a"]] = np.eye(3)
     minimum = np.linalg.solve(parts.H, design.T @ y)
     logs, squares, freed = [], [], []
-    for of in shapes:
+    for of in (each * np.ones(3) for each in shapes):
         for q in LARGEST["accelerometer"] ** 2 * VARIANCES:
-            # by the normal equations of theta and x
-            of_x = np.einsum("ks,kmi->kmsi", of, A[:, :, PLACES["b_a"]]).reshape(k * m, -1)
+            # by the normal equations of x and the parameters in the flat segment, which is in no part
+            of_x = np.einsum("ksi,kmi->kmsi", of[1:] - of[0], A[:, :, PLACES["b_a"]]).reshape(k * m, -1)
             both = np.hstack([design, of_x])
             covariance = np.linalg.inv(both.T @ both + np.diag(np.r_[np.ones(p), np.full(of_x.shape[1], 1.0 / q)]))
             mean = covariance @ both.T @ y
-            # a changed sensor is another one in each group
-            of_groups = of if shape in ("step", "walk") else np.zeros((1, of.shape[1]))
-            to = np.array([np.hstack([np.eye(p), np.kron(of_group, B)]) for of_group in of_groups])
+            # a changed sensor is another one in each group; what a pulse or a curve adds is not the sensor's
+            of_groups = of[1:] if shape in ("step", "walk") else -of[:1]
+            to = np.array([np.hstack([np.eye(p), *(B * numbers for numbers in of_group)]) for of_group in of_groups])
             variance = np.diagonal(to @ covariance @ to.swapaxes(1, 2), axis1=1, axis2=2)
             squares.append(variance - np.diag(parts.covariance) + (to @ mean - minimum) ** 2)
-            freed.append(np.diag(covariance)[:p] / np.diag(parts.covariance) - 1.0)
+            of_flat = to[0] if shape in ("pulse", "reading") else np.eye(*to[0].shape)
+            freed.append(np.diag(of_flat @ covariance @ of_flat.T) / np.diag(parts.covariance) - 1.0)
             marginal = np.eye(k * m) + design @ design.T + q * of_x @ of_x.T
             logs.append(-0.5 * (np.linalg.slogdet(marginal)[1] + y @ np.linalg.solve(marginal, y)))
     without = np.eye(k * m) + design @ design.T
     none = -0.5 * (np.linalg.slogdet(without)[1] + y @ np.linalg.solve(without, y))
     assert told.evidence == pytest.approx(np.logaddexp.reduce(logs) - none - np.log(len(logs)), rel=1e-6, abs=1e-9)
     np.testing.assert_allclose(told.freed, freed[int(np.argmax(logs))], rtol=1e-6, atol=1e-12)
+    if shape == "reading":  # of a known size, an unseen nonlinearity adds as much
+        monkeypatch.setattr(hypotheses, "NONLINEARITY_MPS2", LARGEST["accelerometer"])
+        unseen = hypotheses.nonlinearity(parts, np.eye(3)) / np.diag(parts.covariance)
+        np.testing.assert_allclose(unseen, freed[-1], rtol=1e-6)
     weights = np.exp(np.array(logs) - max(logs))
     expected = np.tensordot(weights, squares, 1) / weights.sum()
     np.testing.assert_allclose(told.aways**2, expected, rtol=1e-6)
@@ -161,8 +176,7 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape):
 
 def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
     found = rank(linear_parts()[-1], np.eye(3))
-    # All parts are of one side: hypotheses on sides are not compared.
-    assert {each.hypothesis for each in found} == {each for each in HYPOTHESES if not each.by_side}
+    assert {each.hypothesis for each in found} == set(HYPOTHESES)
     priors = np.array([each.hypothesis.prior for each in found])
     odds = np.exp([each.evidence for each in found]) * priors / sum(each.prior for each in HYPOTHESES)
     np.testing.assert_allclose([each.weight for each in found], odds / (1.0 + odds.sum()))
@@ -222,7 +236,7 @@ def test_a_small_drift_is_found_beside_a_large_one():
     H = H_k.sum(0) + np.eye(p)
     gradient = np.einsum("kpq,q->kp", H_k, np.linalg.solve(H, score.sum(0))) - score
     t = np.arange(k, dtype=float)
-    parts = Parts(gradient, H_k, H, gradient.sum(0), t, t + 1.0, np.zeros(k, np.intp))
+    parts = Parts(gradient, H_k, H, gradient.sum(0), t, t + 1.0, READINGS[: 1 + k])
     first, second = explain(parts, np.eye(3), rank(parts, np.eye(3)))[:2]
     assert (first.hypothesis.what, second.hypothesis.what) == ("gyroscope", "accelerometer")
     assert min(first.weight, second.weight) > 0.99

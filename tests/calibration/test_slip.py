@@ -89,6 +89,16 @@ def test_a_slip_in_the_last_rest_divides_it(hand, seed):
     )
 
 
+@pytest.mark.parametrize("seed", [1, 2, 6, 8])
+def test_a_small_slip_in_the_last_rest_is_reported(hand, seed):
+    """Slip by 1 deg, as little as a hand sways, but a hand's sway shows in the rates."""
+    made = hand(seed, "pose12")
+    recording = made.recording
+    assert calibrate(recording, gravity=made.truth.gravity).verdict == "good"
+    calibration = calibrate(slipped(recording, recording.t[-1] - recording.t[0] - 1.0, 1.0), gravity=made.truth.gravity)
+    assert [reason["code"] for reason in calibration.quality["reasons"]] == ["inconsistent"]
+
+
 def test_a_miss_near_the_end_that_the_next_one_undoes_is_no_slip():
     """Simulate twenty turns with random misses: a rest held askew causes two opposite misses, and a slip one."""
     rng = np.random.default_rng(3)

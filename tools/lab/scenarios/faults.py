@@ -58,9 +58,14 @@ Fault = Callable[[Readings, Rng], Readings]
 
 
 def nonlinear(readings: Readings, rng: Rng, share: float = 0.005) -> Readings:
-    """Bend each axis by up to `share` of full scale at full scale, as its square; the truth is the slope at zero."""
-    bend = share * rng.uniform(-1.0, 1.0, 3) / readings.ranges[0]
-    return replace(readings, acc=readings.acc + bend * readings.acc**2)
+    """Bend each axis by up to `share` of full scale at full scale, as its square.
+
+    The truth is the linear sensor that is nearest over all directions of gravity.
+    """
+    bend, truth = share * rng.uniform(-1.0, 1.0, 3) / readings.ranges[0], readings.truth
+    D = truth.D * (1.0 + 2.0 * bend * truth.b_a)[:, None]
+    b_a = truth.b_a + bend * (truth.b_a**2 + truth.gravity**2 / 3.0 * np.sum(truth.D**2, axis=1))
+    return replace(readings, acc=readings.acc + bend * readings.acc**2, truth=replace(truth, D=D, b_a=b_a))
 
 
 def gyro_nonlinear(readings: Readings, rng: Rng, share: float = 0.002) -> Readings:

@@ -2,7 +2,7 @@
 
 What is compared as the truth is D and b_a as drawn, in the body frame in which K is symmetric. Where b_a or D moves
 (steps, slips, warmth, stress), it is the mean over the recording after the flat segment; of a nonlinear sensor, the
-slope at zero; where a calibration names an unlikely gravity, D in units of it. Faults of
+linear one nearest to it; where a calibration names an unlikely gravity, D in units of it. Faults of
 words and times are those that owners of such chips have reported; sources stand beside those rows.
 """
 
