@@ -82,7 +82,6 @@ _SHARP = (
     but(CONTINUOUS, "quiet continuous", hand=STEADY, chip=QUIET),
     but(BENCH, "quiet bench", hand=STEADY, chip=QUIET),
     but(TURNTABLE, "quiet turntable", chip=QUIET),
-    but(TURNTABLE, "turntable whose acceleration the gyroscope feels", faults=(faults.gyro_feels,)),
     VEHICLE,
     but(VEHICLE, "vehicle reset at the end", faults=(partial(faults.gyro_moves, drift_dps=0.08), faults.teleport)),
 )
@@ -115,6 +114,7 @@ _SENSORS = (
     but(POSES, "nonlinear poses", faults=(faults.nonlinear,)),
     but(BENCH, "nonlinear bench", faults=(faults.nonlinear,)),
     but(BENCH, "gyro nonlinear bench", faults=(faults.gyro_nonlinear,)),
+    but(TURNTABLE, "turntable whose acceleration the gyroscope feels", faults=(faults.gyro_feels,)),
     but(POSES, "g-sensitivity poses", faults=(faults.sense_of_gravity,)),
     but(BENCH, "g-sensitivity bench", faults=(faults.sense_of_gravity,)),
     but(POSES, "hysteresis poses", faults=(faults.hysteresis,)),
