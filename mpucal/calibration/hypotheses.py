@@ -279,19 +279,24 @@ class _Likelihood(NamedTuple):
         S = (pairs.reshape(axes, axes, -1, k) @ own).reshape(h, 3, 3, m, r, r)
         S = S.transpose(0, 3, 4, 1, 5, 2).reshape(h, m, 3 * r, 3 * r)
         eigenvalues, U = np.linalg.eigh(S - follow @ across.swapaxes(2, 3))
-        U *= (eigenvalues > UNSEEN * eigenvalues.max(axis=(1, 2), keepdims=True))[:, :, None]
         of_groups = weights @ (groups.gradient @ B).swapaxes(1, 2)[..., None]  # (h, 3, m r, 1)
         of_x = follow @ parts.left - of_groups.reshape(h, 3, m, r).transpose(0, 2, 3, 1).reshape(h, m, 3 * r)
         scores = (of_x[:, :, None] @ U)[:, :, 0]
         follow += (flat[:, :, :, None] * B.swapaxes(1, 2)[:, None, None]).reshape(follow.shape)
         return cls(np.maximum(eigenvalues, 0.0), scores, U.swapaxes(2, 3) @ follow, U.reshape(h, m, r, 3, -1))
 
+    def seen(self) -> _Likelihood:
+        """Return it without the directions of x of which the parts say next to nothing."""
+        eigenvalues, scores, strays, U = self
+        is_seen = eigenvalues > UNSEEN * eigenvalues.max(axis=(1, 2), keepdims=True)
+        return _Likelihood(eigenvalues, scores * is_seen, strays * is_seen[..., None], U * is_seen[:, :, None, None])
+
 
 def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vector) -> list[Explanation]:
     """Return what hypotheses of one shape say."""
     B = np.array([_directions(each.what, D, len(parts.H)) for each in alike])
     shapes = _shapes(alike[0].shape, groups)
-    likelihood = _Likelihood.of(B, shapes, groups, parts)
+    likelihood = _Likelihood.of(B, shapes, groups, parts).seen()
     q = np.outer([LARGEST[each.what] ** 2 for each in alike], VARIANCES)[:, None, :, None]
     # (h, m, q, d): by hypothesis, by shape, by variance, by component
     eigenvalues, c = likelihood.eigenvalues[:, :, None], likelihood.scores[:, :, None]

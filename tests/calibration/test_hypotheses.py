@@ -174,6 +174,20 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape, m
     np.testing.assert_allclose(likely, expected.max(axis=0) if changed else expected.mean(axis=0), rtol=1e-6)
 
 
+def test_faces_of_a_cube_do_not_show_a_cube_of_the_readings():
+    """Measure D and b_a on six faces, in known directions: the cube passes for a scale factor, the square is seen."""
+    faces = STANDARD_GRAVITY_MPS2 * np.vstack([np.eye(3), -np.eye(3)])
+    A = np.array([np.hstack([np.kron(np.eye(3), s), np.eye(3)]) for s in faces]) / 1e-5
+    fisher = np.einsum("kmp,kmq->kpq", A, A)
+    k, p = len(A), A.shape[2]
+    t, gradient = np.arange(k, dtype=float), np.zeros((k, p))
+    parts = Parts(gradient, fisher, fisher.sum(0) + np.eye(p), np.zeros(p), t, t + 1.0, np.vstack([faces[2], faces]))
+    std = np.sqrt(hypotheses.nonlinearity(parts, np.eye(3)))
+    cube = (1.0 - 3.0 / 5.0) * hypotheses.NONLINEARITY_MPS2 / STANDARD_GRAVITY_MPS2
+    np.testing.assert_allclose(std[[0, 4, 8]], cube, rtol=1e-3)
+    assert np.delete(std, [0, 4, 8]).max() < 0.02 * cube
+
+
 def test_all_hypotheses_and_nothing_are_weighed_against_each_other():
     found = rank(linear_parts()[-1], np.eye(3))
     assert {each.hypothesis for each in found} == set(HYPOTHESES)
