@@ -1,8 +1,9 @@
-"""Slip of the mount between two rests: from then on, all transitions contradict the gyroscope in one way.
+"""Slip of the mount between two rests, or within the last: from then on, gravity contradicts the gyroscope in one way.
 
 A miss between rests that the gyroscope's noise does not explain is taken for an error of the gyroscope, and the fit
 becomes unsure of everything. A mount that slipped leaves a pattern: rotations delta of the accelerometer against the
-gyroscope, one before and one after, explain all misses. They do where the likelihood says so, by the BIC.
+gyroscope, one before and one after, explain all misses. They do where the likelihood says so, by the BIC. In a rest the
+gyroscope hardly errs: a slip shows as a turn of gravity between its halves, which no other rest has.
 """
 
 from __future__ import annotations
