@@ -89,6 +89,12 @@ class Problem:
         given = {f.name: x[:n] for f in fields(Series) if (x := getattr(self.series, f.name)) is not None}
         return replace(self, series=Series(**given))
 
+    def with_forces(self) -> Problem:
+        """Return the problem with the forces for derivatives by the gyroscope's sensitivity to acceleration."""
+        flat = self.flat.y
+        y = np.vstack([flat, self.series.y])
+        return replace(self, series=replace(self.series, force=0.5 * (y[1:] + y[:-1]) - flat))
+
     def constants(self) -> Vector:
         """Return the exact filter's constants: gravity, Sigma_a, Sigma_omega, the flat mean, its count."""
         flat = self.flat

@@ -64,13 +64,13 @@ def find_sensitivity(
     prepared = prepare(thin, at, RestFinder(thin, rest).typical(), gravity)
     if prepared.rests_often and gyroscope_change(explanations) is None:  # a machine's slow turns pass for rests
         return None
-    problem, prior = replace(prepared.white(0.0), huber=np.inf), prepared.prior()
+    problem, prior = replace(prepared.white(0.0), huber=np.inf).with_forces(), prepared.prior()
     series = problem.series
-    y = np.vstack([rest.y, series.y])
-    force = 0.5 * (y[1:] + y[:-1]) - rest.y
+    assert series.force is not None
+    force = series.force
 
     def at_sensitivity(theta: Theta, S: Vector) -> Evaluation:
-        less = replace(series, omega=series.omega - force @ S.T, force=force)
+        less = replace(series, omega=series.omega - force @ S.T)
         return evaluate(replace(problem, series=less), theta, SENSITIVE)
 
     up = np.linalg.solve(fit.D, flat.y - fit.b_a)
