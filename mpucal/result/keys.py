@@ -101,7 +101,7 @@ class ErrorStd(TypedDict):
     direction_deg: ReadOnly[Annotated[Number, "of the direction, deg"]]
     model: ReadOnly[Annotated[Number, "part of the model's own uncertainty, m/s^2"]]
     time: ReadOnly[Annotated[Number, "part of effects of time, m/s^2"]]
-    side: ReadOnly[Annotated[Number, "part of effects of the side that is down, m/s^2"]]
+    side: ReadOnly[Annotated[Number, "part of a nonlinear accelerometer, m/s^2"]]
     change: ReadOnly[Annotated[Number, "part of a change of the sensor, m/s^2"]]
     decided_by: ReadOnly[Annotated[Literal["model", "time", "side", "change"] | None, "the largest part"]]
 
