@@ -23,7 +23,7 @@ from .rotation import fibonacci_sphere
 # Nothing is known better than this where a change of the gyroscope's bias was removed: it is interpolated linearly.
 FLOOR_MPS2 = 5e-5
 MOST_NIS = 5.0  # NIS of a model that explains the data; 3 is expected
-# The model's uncertainty is multiplied by this where too few sides were down for a comparison of them.
+# The model's uncertainty is multiplied by this where so few sides were down that they hardly show what it lacks.
 UNCOMPARED = 2.0
 FEWEST_SIDES = 4
 
@@ -78,8 +78,8 @@ class UncertaintyClaim:
     Attributes
     ----------
     covariance : (p, p) of the model. model : m/s^2, the error by it, rms over all directions.
-    floored : m/s^2, `model` enlarged by changes of the gyroscope's bias that were removed, and where too few sides were
-        down for a comparison of them.
+    floored : m/s^2, `model` enlarged by changes of the gyroscope's bias that were removed, and where few sides
+        were down.
     explanations : what may have happened besides, the likeliest first. errors : (n,) m/s^2, what each adds.
     slipped : (12,) variances of D and b_a by slips of the mount near the ends, which no explanation holds.
     """
