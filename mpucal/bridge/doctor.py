@@ -1,4 +1,4 @@
-"""Examination of a bridge: what it can do, how fast its line is, and its firmware, by golden talks."""
+"""Examination of a bridge: what it can do, how fast its line is, and its firmware, by golden exchanges."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .link import REPLY_NS, STORE_NS, Link
 from .messages import MAGIC, REPLY_BIT, BlobErase, BlobState, Feature, Frames, Hello, Read, Reply, Status
 from .port import Port
 
-TALKS = Path(__file__).with_name("talks.json")
+EXCHANGES = Path(__file__).with_name("exchanges.json")
 # A reply's payload begins with status and t_us; HELLO_REPLY continues with magic, major, minor and address.
 BODY_AT = Reply.FORMAT.size
 MAJOR_AT = BODY_AT + len(MAGIC)
@@ -27,60 +27,60 @@ ADDRESS_AT = MAJOR_AT + 2
 # Silence after which nothing more is on its way.
 QUIET_NS = 100 * MS
 
-Talk = Mapping[str, Any]
+Exchange = Mapping[str, Any]
 
 
-def talks() -> dict[str, Talk]:
-    """Read the golden talks by name, as `python -m tools.make vectors` writes them.
+def exchanges() -> dict[str, Exchange]:
+    """Read the golden exchanges by name, as `python -m tools.make vectors` writes them.
 
-    Each names the rule that is `settled` and what it `needs` of a bridge ("chip", "stream"; "blob": an empty store).
-    Its exchanges are in `talk`: bytes of the `host`, and the reply or replies of the `bridge`.
+    Each names the rule that is `rule` and what it `needs` of a bridge ("chip", "stream"; "blob": an empty store).
+    Each of its `steps` holds bytes of the `host`, and the reply or replies of the `bridge`.
     """
-    golden: dict[str, Talk] = json.loads(TALKS.read_text(encoding="utf-8"))
+    golden: dict[str, Exchange] = json.loads(EXCHANGES.read_text(encoding="utf-8"))
     return golden
 
 
-def expected_replies(exchange: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the replies to an exchange's requests, in order."""
-    bridge = exchange["bridge"]
+def expected_replies(step: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the replies to a step's requests, in order."""
+    bridge = step["bridge"]
     return bridge if isinstance(bridge, list) else [bridge] * (bridge is not None)
 
 
-def find_difference(exchange: Mapping[str, Any], received: Sequence[Frame], exact: bool = True) -> str:
+def find_difference(step: Mapping[str, Any], received: Sequence[Frame], exact: bool = True) -> str:
     """Describe the first difference from the golden replies; empty: none.
 
     Parameters
     ----------
-    received : frames from the bridge. exact : True if the chip is the one of the talks, False for any chip.
+    received : frames from the bridge. exact : True if the chip is the one of the exchanges, False for any chip.
     """
-    wanted, got = expected_replies(exchange), [frame for frame in received if frame.type != Frames.TYPE]
+    wanted, got = expected_replies(step), [frame for frame in received if frame.type != Frames.TYPE]
     if len(got) != len(wanted):
-        return f"{len(got)} replies to {exchange['host']}, not {len(wanted)}"
+        return f"{len(got)} replies to {step['host']}, not {len(wanted)}"
     for frame, reply in zip(got, wanted, strict=True):
         payload = bytes.fromhex(reply["payload"])
         if (frame.type, frame.seq) != (reply["type"], reply["seq"]):
-            return f"a reply of type 0x{frame.type:02x} and seq {frame.seq} to {exchange['host']}"
+            return f"a reply of type 0x{frame.type:02x} and seq {frame.seq} to {step['host']}"
         if frame.payload[:1] != payload[:1]:
             status = f"status {int.from_bytes(frame.payload[:1], 'big')} ({_status_name(frame.payload)})"
-            return f"{status} in the reply to {exchange['host']}, not {payload[0]} ({_status_name(payload)})"
+            return f"{status} in the reply to {step['host']}, not {payload[0]} ({_status_name(payload)})"
         if payload[0] == Status.OK and not _matches(frame, payload, exact):
-            return f"{frame.payload.hex()} in the reply to {exchange['host']}, not {payload.hex()}"
+            return f"{frame.payload.hex()} in the reply to {step['host']}, not {payload.hex()}"
     return ""
 
 
-def run_talk(port: Port, talk: Talk, patience_ns: int) -> str:
-    """Run a talk with the greeted bridge on `port`, and describe the first difference; empty: none.
+def run_exchange(port: Port, exchange: Exchange, patience_ns: int) -> str:
+    """Run an exchange with the greeted bridge on `port`, and describe the first difference; empty: none.
 
     Parameters
     ----------
     patience_ns : time allowed for a reply.
     """
     _receive(port, 0, QUIET_NS)
-    for exchange in talk["talk"]:
-        port.write(b"\0" + bytes.fromhex(exchange["host"]))
-        wanted = len(expected_replies(exchange))
+    for step in exchange["steps"]:
+        port.write(b"\0" + bytes.fromhex(step["host"]))
+        wanted = len(expected_replies(step))
         received = _receive(port, wanted, patience_ns if wanted else QUIET_NS)
-        difference = find_difference(exchange, received, exact=False)
+        difference = find_difference(step, received, exact=False)
         if difference:
             return difference
     return ""
@@ -115,7 +115,7 @@ def _status_name(payload: bytes) -> str:
         return "unknown"
 
 
-REMEDY = "firmware_protocol.md has the rule; `python -m tools.make vectors` writes the talks"
+REMEDY = "firmware_protocol.md has the rule; `python -m tools.make vectors` writes the exchanges"
 
 
 def examine_bridge(bus: BridgeBus) -> Iterator[Finding]:
@@ -149,7 +149,7 @@ def examine_bridge(bus: BridgeBus) -> Iterator[Finding]:
 
 
 def examine_conformance(link: Link) -> Iterator[Finding]:
-    """Run each talk that this bridge can hold, over an open link; a stored calibration is not overwritten.
+    """Run the exchanges that this bridge has the features for; a stored calibration is not overwritten.
 
     Raises
     ------
@@ -161,26 +161,26 @@ def examine_conformance(link: Link) -> Iterator[Finding]:
     if hello.features & Feature.OCCUPIED:
         why["blob"] = "its memory holds other data, which is kept"
     elif hello.features & Feature.BLOB:
-        # The talks about storing would overwrite a stored calibration.
+        # The exchanges about storing would overwrite a stored calibration.
         has["blob"] = link.ask(BlobState())[0][-1].reply.status == Status.NO_BLOB
         why["blob"] = "it stores a calibration, which is kept"
-    for name, talk in talks().items():
-        lacks = [why[need] for need in talk["needs"] if not has[need]]
+    for name, exchange in exchanges().items():
+        lacks = [why[need] for need in exchange["needs"] if not has[need]]
         if lacks:
-            yield Finding(name, Mark.UNKNOWN, f"not tried, as {lacks[0]}: {talk['settled']}")
+            yield Finding(name, Mark.UNKNOWN, f"not tried, as {lacks[0]}: {exchange['rule']}")
         else:
-            yield _run_talk(link, name, talk)
+            yield _run_exchange(link, name, exchange)
 
 
-def _run_talk(link: Link, name: str, talk: Talk) -> Finding:
-    stores = "blob" in talk["needs"]
-    # A talk before may have left another address.
+def _run_exchange(link: Link, name: str, exchange: Exchange) -> Finding:
+    stores = "blob" in exchange["needs"]
+    # An exchange before may have left another address.
     link.greet()
-    differs = run_talk(link.port, talk, (STORE_NS if stores else REPLY_NS) + link.latency.most_ns)
+    differs = run_exchange(link.port, exchange, (STORE_NS if stores else REPLY_NS) + link.latency.most_ns)
     link.greet()
     if stores:
         link.ask(BlobErase())
-    what = f"{differs}; the rule is: {talk['settled']}" if differs else talk["settled"]
+    what = f"{differs}; the rule is: {exchange['rule']}" if differs else exchange["rule"]
     return Finding.check(name, not differs, what, REMEDY, {}, Mark.BAD)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from mpucal import bridge
 from mpucal.bridge.bus import BridgeBus
-from mpucal.bridge.doctor import examine_bridge_and_chip, talks
+from mpucal.bridge.doctor import examine_bridge_and_chip, exchanges
 from mpucal.chip.config import Config
 from mpucal.doctor.finding import Mark
 from mpucal.errors import BusError, OutputError
@@ -93,7 +93,7 @@ def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
     told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
     assert told.code == 0, told.out
     assert {finding["topic"]: finding["mark"] for finding in json.loads(told.out)["findings"]} == dict.fromkeys(
-        talks(), "ok"
+        exchanges(), "ok"
     )
     board.memory.slots[0] = b"another sketch's"
     held = list(board.memory.slots)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mpucal.bridge import board
 from mpucal.bridge import messages as wire
-from mpucal.bridge.doctor import examine_conformance, find_difference, talks
+from mpucal.bridge.doctor import examine_conformance, exchanges, find_difference
 from mpucal.bridge.frame import Deframer, Frame
 from mpucal.bridge.messages import Status
 from mpucal.bridge.store import BlobStore
@@ -138,11 +138,11 @@ def bridge(fresh):
     return fresh
 
 
-def test_answers_as_the_golden_talks_say(fresh):
-    for name, talk in talks().items():
+def test_answers_as_the_golden_exchanges_say(fresh):
+    for name, exchange in exchanges().items():
         fresh.ask(wire.Hello())
-        for each in talk["talk"]:
-            assert find_difference(each, fresh.frames(bytes.fromhex(each["host"]))) == "", name
+        for step in exchange["steps"]:
+            assert find_difference(step, fresh.frames(bytes.fromhex(step["host"]))) == "", name
         fresh.ask(wire.Hello())
         fresh.ask(wire.BlobErase())
 
@@ -410,11 +410,12 @@ def test_the_core_answers_any_bytes_with_replies_alone_and_keeps_its_blob(told, 
     assert asking.stored() in (BLOB, None)
 
 
-def test_the_package_holds_the_golden_talks():
-    assert talks() == {path.stem[5:]: json.loads(path.read_text()) for path in VECTORS.glob("talk_*.json")}
+def test_the_package_holds_the_golden_exchanges():
+    files = VECTORS.glob("exchange_*.json")
+    assert exchanges() == {path.stem.removeprefix("exchange_"): json.loads(path.read_text()) for path in files}
 
 
-EXCHANGE = json.loads((VECTORS / "talk_fifo_count.json").read_text())["talk"][0]
+STEP = json.loads((VECTORS / "exchange_fifo_count.json").read_text())["steps"][0]
 
 
 @pytest.mark.parametrize(
@@ -427,19 +428,19 @@ EXCHANGE = json.loads((VECTORS / "talk_fifo_count.json").read_text())["talk"][0]
     ],
 )
 def test_another_answer_is_described(said, words):
-    assert re.search(words, find_difference(EXCHANGE, said))
+    assert re.search(words, find_difference(STEP, said))
 
 
-def test_the_build_for_an_uno_has_all_talks(switch_on, greeted):
+def test_the_build_for_an_uno_has_all_exchanges(switch_on, greeted):
     """The examination of `mpucal doctor --conformance` works with any chip, and erases what it stores."""
     link = greeted(switch_on()[1])
     found = list(examine_conformance(link))
     assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
-    assert {finding.topic for finding in found} == talks().keys()
+    assert {finding.topic for finding in found} == exchanges().keys()
     BlobStore(link).write(BLOB)
     # the stored blob is kept
     left_out = {finding.topic for finding in examine_conformance(link) if finding.mark is Mark.UNKNOWN}
-    assert left_out == {name for name, talk in talks().items() if "blob" in talk["needs"]}
+    assert left_out == {name for name, exchange in exchanges().items() if "blob" in exchange["needs"]}
     assert BlobStore(link).read().data == BLOB
 
 

@@ -55,8 +55,8 @@ def seeds() -> list[bytes]:
         chunks = [wire.BlobData(at, blob[at : at + 32]) for at in range(0, len(blob), 32)]
         commit = wire.BlobCommit(len(blob), int.from_bytes(blob[-4:], "little"))
         asked.append([wire.BlobBegin(len(blob)), *chunks, commit, wire.BlobState(), wire.BlobRead(0, 56)])
-    talks = [hello + b"".join(map(request, several)) + looks for several in asked]
-    return [*talks, *(piece(BLOB, blob) for blob in blobs if len(blob) < 256)]
+    exchanges = [hello + b"".join(map(request, several)) + looks for several in asked]
+    return [*exchanges, *(piece(BLOB, blob) for blob in blobs if len(blob) < 256)]
 
 
 def main(*, seconds: int = 60, first: int = TODAY) -> int:

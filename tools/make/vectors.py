@@ -1,9 +1,9 @@
 """Write the golden vectors of firmware_protocol.md: python -m tools.make vectors [FOLDER].
 
-Each blob_*.bin lies beside a blob_*.json that says what a reader must find in it, or why it must refuse it. Each
-line_*.bin is what goes over a serial line, and the line_*.json beside it says which frames a receiver must find. Each
-talk_*.json is what a host asks of a bridge, and what that must answer; clock_*.json is what a narrow clock shows, and
-the 32 bits that the bridge must make of it.
+The blob_*.json beside each blob_*.bin says what a reader must find in it, or why it must refuse it. Each line_*.bin
+holds bytes on a serial line, and the line_*.json beside it the frames that a receiver must find. Each exchange_*.json
+holds requests of a host and the replies of the bridge; clock_*.json the values that a narrow clock shows, and the 32
+bits that the bridge must make of them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from mpucal.bridge import messages as wire
-from mpucal.bridge.doctor import TALKS as TALKS_FILE
+from mpucal.bridge.doctor import EXCHANGES as EXCHANGES_FILE
 from mpucal.bridge.frame import Frame, stuff
 from mpucal.data import GYRO_COUNTS
 from mpucal.result.blob import Blob
@@ -267,7 +267,7 @@ MACROS = {
 
 
 def exchanged(text: str) -> tuple[Frame, Frame | None]:
-    """Return the request and the reply of a line of a talk; the reply's t_us is 0."""
+    """Return the request and the reply of a line of an exchange; the reply's t_us is 0."""
     asked, _, answered = text.partition(" > ")
     kind, seq, *payload = asked.split()
     request = Frame(int(kind, 16), int(seq), bytes.fromhex("".join(payload)))
@@ -278,22 +278,22 @@ def exchanged(text: str) -> tuple[Frame, Frame | None]:
     return request, Frame(request.type | wire.REPLY_BIT, request.seq, reply)
 
 
-def talk(settled: str, needs: list[str], lines: list[str]) -> dict[str, Any]:
-    """Return a talk's JSON: requests as bytes on the line, and replies as frames; a list where several are due."""
+def exchange(rule: str, needs: list[str], lines: list[str]) -> dict[str, Any]:
+    """Return an exchange's JSON: requests as bytes on the line, and replies as frames; a list where several are due."""
     said: list[dict[str, Any]] = []
     for line in lines:
         pairs = [exchanged(text) for text in line.split(" & ")]
         answers = [plain_frame(reply) for _, reply in pairs if reply is not None]
         host = b"".join(request.encode() for request, _ in pairs)
         said.append({"host": host.hex(), "bridge": answers if len(pairs) > 1 else next(iter(answers), None)})
-    return {"settled": settled, "needs": needs, "talk": said}
+    return {"rule": rule, "needs": needs, "steps": said}
 
 
-def talks() -> dict[str, dict[str, Any]]:
-    """Return the talks' JSON by name."""
-    rows = tomllib.loads(Path(__file__).with_name("talks.toml").read_text(encoding="utf-8"))
+def exchanges() -> dict[str, dict[str, Any]]:
+    """Return the exchanges' JSON by name."""
+    rows = tomllib.loads(Path(__file__).with_name("exchanges.toml").read_text(encoding="utf-8"))
     return {
-        name: talk(row["settled"], row["needs"], "\n".join(row["lines"]).format_map(MACROS).splitlines())
+        name: exchange(row["rule"], row["needs"], "\n".join(row["lines"]).format_map(MACROS).splitlines())
         for name, row in rows.items()
     }
 
@@ -303,7 +303,7 @@ def clock(bits: int) -> dict[str, Any]:
     # steps a little shorter than its period
     passed_us = [i * (2**bits - 3) for i in range(6)]
     return {
-        "settled": "a clock that is narrower than 32 bits is extended to them",
+        "rule": "a clock that is narrower than 32 bits is extended to them",
         "bits": bits,
         "shows": [us % 2**bits for us in passed_us],
         "t_us": [(2**32 - 2 ** (bits + 1) + us) % 2**32 for us in passed_us],
@@ -328,8 +328,8 @@ def write(folder: Path) -> None:
         for name, (data, content) in made.items():
             (folder / f"{prefix}_{name}.bin").write_bytes(data)
             (folder / f"{prefix}_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
-    for name, content in talks().items():
-        (folder / f"talk_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    for name, content in exchanges().items():
+        (folder / f"exchange_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
     for bits in CLOCK_BITS:
         (folder / f"clock_{bits}_bits.json").write_text(json.dumps(clock(bits), indent=2) + "\n")
     for name, generations in SLOTS.items():
@@ -341,7 +341,7 @@ def write(folder: Path) -> None:
 
 
 def main(folder: Path = FOLDER) -> None:
-    """Write them into FOLDER and the talks into the package, too; or all into the folder that is named."""
+    """Write them into FOLDER and the exchanges into the package, too; or all into the folder that is named."""
     write(folder)
     if folder == FOLDER:
-        TALKS_FILE.write_text(json.dumps(talks(), indent=1) + "\n")
+        EXCHANGES_FILE.write_text(json.dumps(exchanges(), indent=1) + "\n")

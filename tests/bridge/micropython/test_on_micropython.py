@@ -10,7 +10,7 @@ import pytest
 from mpucal.__main__ import run
 from mpucal.bridge import micropython as pasting
 from mpucal.bridge.bus import BridgeBus
-from mpucal.bridge.doctor import examine_conformance, talks
+from mpucal.bridge.doctor import examine_conformance, exchanges
 from mpucal.bridge.link import Link
 from mpucal.bridge.micropython import PROGRAM, MicroPythonPort, minify
 from mpucal.bridge.store import BlobStore
@@ -73,7 +73,7 @@ def test_the_board_conforms_to_the_protocol(board, rig):
     link.greet()
     found = list(examine_conformance(link))
     assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
-    assert {finding.topic for finding in found} == talks().keys()
+    assert {finding.topic for finding in found} == exchanges().keys()
 
 
 def test_a_bridge_that_a_killed_host_left_is_ended(board, rig):
