@@ -16,7 +16,6 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
-from ..rests.gyro_drift import SENSITIVITY_SD
 from ..rests.windows import noise_ratio
 from .bias_changes import without_changes
 from .downsampling import SEARCH_HZ, blocks, downsampled, means
@@ -36,9 +35,9 @@ from .hand_noise import (
 from .hypotheses import CHANGES, Explanation, gyroscope_change, rank, remove_change
 from .hypothesis_tests import WALD_99, undetermined, wald
 from .initial_estimate import initialise, perfect
-from .levenberg_marquardt import ROUGHLY, Minimum, minimise
+from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import evaluate, value
-from .parameters import HAND, SENSITIVE
+from .parameters import HAND
 from .preprocessing import Preprocessed, find_rests, prepare
 from .problem import Problem
 from .scores import ends_of, parts_of
@@ -184,18 +183,7 @@ def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed
     if transitions:  # one that begins as the flat segment ends may be there alone
         variance = miss_variances(transitions, float(leverage.mean()))
         problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
-    return replace(minimum, H=_beside_sensitivity(problem, minimum.theta, prior))
-
-
-def _beside_sensitivity(problem: Problem, theta: Theta, prior: Prior) -> Vector:
-    """Return the Fisher matrix (p, p) with the prior's, with the gyroscope's sensitivity to acceleration eliminated.
-
-    The data sheet's tolerance is the prior of these nine numbers, of which the rests in a hand seldom show enough.
-    """
-    precision = np.append(prior.precision, np.full(SENSITIVE - HAND, SENSITIVITY_SD**-2))
-    F = evaluate(problem.with_forces(), theta, SENSITIVE).fisher + np.diag(precision)
-    across = F[:HAND, HAND:]
-    return np.asarray(F[:HAND, :HAND] - across @ np.linalg.solve(F[HAND:, HAND:], across.T))
+    return replace(minimum, H=information(problem, minimum.theta, prior))
 
 
 def _with_transition_noise(problem: Problem, prepared: Preprocessed, theta: Theta) -> Problem:

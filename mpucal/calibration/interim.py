@@ -15,12 +15,14 @@ from ..data import Recording, Vector
 from ..rests.flat import Flat
 from .downsampling import SEARCH_HZ, downsampled
 from .hand_noise import CALM_MPS2, FIRST_MPS2, PIVOT_MPS2, WHITE_MPS2, most_likely_sigma
+from .hypotheses import nonlinearity
 from .initial_estimate import initialise
 from .levenberg_marquardt import ROUGHLY, Minimum, information, minimise
 from .likelihood import value
 from .parameters import ACCELEROMETER, HAND, PLACES
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
 from .problem import Problem
+from .scores import ends_of, parts_of
 from .theta import Prior, Theta
 
 MOST_ITERATIONS = 4
@@ -88,14 +90,17 @@ def interim_estimate(
         sigma = most_likely_sigma(prepared.white, WHITE_MPS2, theta, FIRST_MPS2)
     problem = prepared.white(sigma, CORRELATION_S)
     minimum = _minimum(problem, theta, prior)
-    H = minimum.H
+    admitted = problem
     if not prepared.rests_often:
         # With few rests the estimate depends on the hand's travel, of which little is known: admit more of it.
         pivots = partial(prepared.pivot, floor=FLOOR_MPS2)
         pivot = most_likely_sigma(pivots, PIVOT_MPS2, minimum.theta, PIVOT_MPS2[0])
-        doubt = prepared.pivot(DOUBT * pivot, FLOOR_MPS2)
-        H = information(doubt, minimum.theta, prior)
-    covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
+        admitted = prepared.pivot(DOUBT * pivot, FLOOR_MPS2)
+    H = information(admitted, minimum.theta, prior)
+    covariance, parts = replace(minimum, H=H).covariance(), parts_of(problem, minimum, prior)
+    if parts is not None:
+        covariance += np.diag(nonlinearity(parts, minimum.theta.D))
+    covariance = covariance[ACCELEROMETER, ACCELEROMETER]
     sigma = most_likely_sigma(prepared.white, CALM_MPS2, minimum.theta, max(sigma, CALM_MPS2[0]))
     return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged, compared)
 
@@ -110,4 +115,5 @@ def _starts(prepared: Preprocessed) -> tuple[Theta, ...]:
 
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:
     # The next orientation depends on H, which is therefore evaluated at the estimate itself.
-    return minimise(problem, theta, HAND, prior, until=ROUGHLY, most=MOST_ITERATIONS, frozen=True, unseen=0.0)
+    search = partial(minimise, until=ROUGHLY, most=MOST_ITERATIONS, frozen=True, unseen=0.0)
+    return search(problem, theta, HAND, prior, ends=ends_of(problem))

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Mask, Vector
+from ..rests.gyro_drift import SENSITIVITY_SD
 from .fit import Fit
 from .likelihood import Evaluation, evaluate
 from .normal_equations import inverse, solve
-from .parameters import HAND, NAMES, PLACES
+from .parameters import HAND, NAMES, PLACES, SENSITIVE
 from .parts import Parts
 from .problem import Problem
 from .theta import Prior, Theta
@@ -169,5 +170,12 @@ class _At:
 
 
 def information(problem: Problem, theta: Theta, prior: Prior) -> Vector:
-    """Return the Fisher matrix (p, p) of the hand's filter over all parameters, with the prior's."""
-    return np.asarray(evaluate(problem, theta, HAND).fisher + np.diag(prior.precision))
+    """Return the Fisher matrix (p, p) of the hand's filter over all parameters, with the prior's.
+
+    The gyroscope's sensitivity to acceleration is eliminated. The data sheet's tolerance is the prior of these nine
+    numbers, of which the rests in a hand seldom show enough.
+    """
+    precision = np.append(prior.precision, np.full(SENSITIVE - HAND, SENSITIVITY_SD**-2))
+    F = evaluate(problem.with_forces(), theta, SENSITIVE).fisher + np.diag(precision)
+    across = F[:HAND, HAND:]
+    return np.asarray(F[:HAND, :HAND] - across @ np.linalg.solve(F[HAND:, HAND:], across.T))
