@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from numbers import Real
 from operator import index
 from os import PathLike
@@ -13,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import ArraysError, RecordingError, WrongType, WrongValue
+from .errors import ArraysError, RecordingError, SourceError, WrongType, WrongValue
 
 # s: limits of times and their steps, within which no product overflows
 SHORTEST_S, LONGEST_S = 1e-12, 1e18
@@ -207,6 +209,15 @@ def check_regular(path: Path) -> Path:
     return path
 
 
+@contextmanager
+def reading(path: Path, kind: type[SourceError] = RecordingError) -> Iterator[None]:
+    """Turn an OSError of the block into an error of this kind that names `path`."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"cannot read {path} ({error.strerror or error})", "check the path and its permissions") from error
+
+
 def read_limited(path: Path, most: int) -> bytes:
     """Return the bytes of a file that is not longer than `most`.
 
@@ -214,11 +225,8 @@ def read_limited(path: Path, most: int) -> bytes:
     ------
     RecordingError : it cannot be read, is not a file, or is longer.
     """
-    try:
-        with check_regular(path).open("rb") as file:
-            data = file.read(most + 1)
-    except OSError as error:
-        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
+    with reading(path), check_regular(path).open("rb") as file:
+        data = file.read(most + 1)
     if len(data) > most:
         raise RecordingError(
             f"{path} is longer than {most >> 20} MB" if most >> 20 else f"{path} is longer than {most} bytes",

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..arguments import check_regular
+from ..arguments import check_regular, reading
 from ..errors import RecordingError, UsageError
 
 
@@ -73,7 +73,7 @@ def compute_digest(path: Path) -> str:
     """
     digest = hashlib.sha256()
     check_regular(path)
-    try:
+    with reading(path):
         files = [path]
         if path.is_dir():
             files = sorted(each for each in path.rglob("*") if each.is_file())
@@ -81,8 +81,6 @@ def compute_digest(path: Path) -> str:
         for each in files:
             with each.open("rb") as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())
-    except OSError as error:
-        raise RecordingError(f"cannot read {path} ({error.strerror or error})", "check the path") from error
     return digest.hexdigest()
 
 

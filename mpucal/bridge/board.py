@@ -11,9 +11,8 @@ import struct
 import sys
 import time
 
-from ..chip.registers import FIFO_COUNT_H, FIFO_R_W, INT_FIFO_OFLOW, INT_STATUS
+from ..chip.registers import ADDRESSES, FIFO_COUNT_H, FIFO_R_W, INT_FIFO_OFLOW, INT_STATUS
 from ..result.blob import MAX_LENGTH
-from ..sources.host_bus import ADDRESSES
 from .frame import MAX_ENCODED
 from .messages import MAGIC, MAX_BATCH, MAX_BURST, MAX_LOOK, MAX_READ, MAX_WRITE, REPLY_BIT, Feature, Status
 

@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from ..rests.flat import QUIETEST_ACC_MPS2, UNVARIED
+from ..result.error_model import nearest_rotation
 from .evidence import Evidence
 from .fit import Fit
 from .hypothesis_tests import most_chi2
 from .parameters import ACCELEROMETER, BY_NAME, MODELS, PLACES
 from .preprocessing import HUBER, smoothed_rates
-from .rotation import cross, nearest_rotation
+from .rotation import cross
 from .sampling import STAYS_S
 from .transitions import REWEIGHTED
 from .uncertainty import UncertaintyClaim

@@ -106,12 +106,6 @@ def _cross_product(a: Vector, b: Vector) -> Vector:
     return np.array([a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x])
 
 
-def nearest_rotation(matrix: Vector) -> Vector:
-    """Return the orthogonal matrix (3, 3) nearest to a matrix (3, 3)."""
-    U, _, Vt = np.linalg.svd(matrix)
-    return np.asarray(U @ Vt)
-
-
 @cache
 def signed_permutations() -> list[Vector]:
     """Return all (3, 3) that map axes to axes, with either sign."""

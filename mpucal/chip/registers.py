@@ -13,6 +13,10 @@ from .. import data
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
+# I2C addresses: with AD0 low, and with AD0 high; and those that I2C does not reserve
+ADDRESSES = (0x68, 0x69)
+USABLE_ADDRESSES = range(0x08, 0x78)
+
 # The factory's self-test codes: three bytes each on a 6500, four packed bytes on a 6050.
 SELF_TEST_GYRO: Final = 0x00
 SELF_TEST_ACCEL: Final = 0x0D

@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from ..sources.host_bus import ADDRESSES, transfer_error
+from ..chip.registers import ADDRESSES, USABLE_ADDRESSES
+from ..sources.host_bus import transfer_error
 from ..sources.i2c import found_chips
 from ..sources.usb_i2c import I2C_HZ, adapters
 from .finding import Finding, Mark
 
 SYS = Path("/sys")
-# The others are reserved.
-USABLE = range(0x08, 0x78)
 # These addresses are EEPROMs', which a quick write could upset; a read could upset devices at the others.
 READ_ONLY = (*range(0x30, 0x38), *range(0x50, 0x60))
 # One slow device holds the bus for a while; a wire that stays low times out at every address, a second each.
@@ -130,7 +129,7 @@ def _addresses(path: str) -> Iterator[Finding]:
         can_i2c = bool(bus.funcs & smbus2.I2cFunc.I2C)
         found = _probe_all(bus)
     except TimeoutError as error:
-        yield Finding.failed("on the bus", transfer_error(error, path, USABLE.start))
+        yield Finding.failed("on the bus", transfer_error(error, path, USABLE_ADDRESSES.start))
         return
     finally:
         bus.close()
@@ -147,7 +146,7 @@ def _addresses(path: str) -> Iterator[Finding]:
 def _probe_all(bus: Any) -> dict[int, str]:
     """Return the answer of each address that answers; TimeoutError if a wire is held low."""
     found, held = {}, 0
-    for address in USABLE:
+    for address in USABLE_ADDRESSES:
         try:
             answer = _probe(bus, address)
         except TimeoutError:

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import reading
 from ..clocks import S
 from ..errors import RecordingError
 from .matlab import is_matlab, read_matlab_arrays
 from .npz import DAMAGED
-from .reading import MEMORY_PER_TEXT, check_size, import_extra, reading
+from .reading import MEMORY_PER_TEXT, check_size, import_extra
 from .tables.cells import is_number
 from .tables.times import UTC_NS
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import reading
 from ..clocks import S
 from ..clocks.stamps import FEWEST
 from ..data import Samples, Vector
@@ -22,7 +23,7 @@ from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ._text import lines, numbers
 from .hints import ROLES
-from .reading import LONGEST_LINE, reading
+from .reading import LONGEST_LINE
 from .rows import Rows, Write, check_runs
 from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
 from .tables.text import decode_text, read_table

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import reading
 from ..data import Recording, Samples
 from ..errors import RecordingError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
 from . import formats
 from .hints import NO_HINTS, Hints, parse_columns
-from .reading import reading
 from .rows import Rows
 from .tables.phone import tables_of_sides
 from .tables.times import GAP_S

@@ -18,7 +18,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from zstandard import ZstdError, frame_content_size
 
-from ..arguments import check_regular
+from ..arguments import check_regular, reading
 from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import SessionEvent
@@ -100,13 +100,8 @@ class CaptureReader:
 
     def blocks(self) -> Generator[Block]:
         """Yield the records, register accesses by the block as in the file."""
-        try:
-            with check_regular(self._path).open("rb") as file:
-                yield from self._blocks(file)
-        except OSError as error:
-            raise CaptureError(
-                f"cannot read {self._path} ({error.strerror})", "check the path and its permissions"
-            ) from error
+        with reading(self._path, CaptureError), check_regular(self._path).open("rb") as file:
+            yield from self._blocks(file)
 
     def _blocks(self, file: IO[bytes]) -> Iterator[Block]:
         size = os.fstat(file.fileno()).st_size

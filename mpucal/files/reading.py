@@ -18,6 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from ..arguments import reading
 from ..errors import MpucalError, RecordingError
 
 MOST_MB = 512
@@ -90,17 +91,6 @@ def _limited() -> Iterator[None]:
             resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
             stack.callback(resource.setrlimit, resource.RLIMIT_DATA, (before, hard))
         yield
-
-
-@contextmanager
-def reading(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block into a RecordingError that names `path`."""
-    try:
-        yield
-    except OSError as error:
-        raise RecordingError(
-            f"cannot read {path} ({error.strerror or error})", "check the path and its permissions"
-        ) from error
 
 
 @contextmanager

@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import reading
 from ..data import Recording
 from ..errors import RecordingError, UsageError
 from .dataflash import is_dataflash
 from .hints import NO_HINTS, ROLES, Hints
-from .reading import MEMORY_PER_TEXT, MOST_ODD, SNIFFED, check_size, reading
+from .reading import MEMORY_PER_TEXT, MOST_ODD, SNIFFED, check_size
 from .tables.columns import measured
 from .tables.guess import is_clock, is_even_clock, side_by_side
 from .tables.load import recording_from_table

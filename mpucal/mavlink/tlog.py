@@ -9,6 +9,7 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import NamedTuple
 
+from ..arguments import reading
 from ..clocks import US
 from ..errors import CaptureError
 from .dialect import BEGINNING, HEADER, LONGEST, packet_length
@@ -51,19 +52,14 @@ class TlogFile:
 
     def __iter__(self) -> Iterator[RawPacket]:
         whole = size = 0
-        try:
-            with self._path.open("rb") as file:
-                size = os.fstat(file.fileno()).st_size
-                # An empty file cannot be mapped.
-                if size:
-                    with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
-                        for record in _records(data):
-                            whole += STAMP.size + len(record.data)
-                            yield record
-        except OSError as error:
-            raise CaptureError(
-                f"cannot read {self._path} ({error.strerror})", "check the path and its permissions"
-            ) from error
+        with reading(self._path, CaptureError), self._path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            # An empty file cannot be mapped.
+            if size:
+                with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+                    for record in _records(data):
+                        whole += STAMP.size + len(record.data)
+                        yield record
         if not whole:
             raise CaptureError(f"{self._path} holds no MAVLink packet", "give a .tlog that a ground station recorded")
         if lost := size - whole:

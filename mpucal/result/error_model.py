@@ -87,11 +87,17 @@ def error_before(D: Vector, b: Vector, gravity: float) -> float:
     return float(np.sqrt(gravity**2 / 3.0 * np.sum((D - np.eye(3)) ** 2) + np.sum(b**2)))
 
 
+def nearest_rotation(M: NDArray[np.floating[Any]]) -> Vector:
+    """Return the orthogonal matrix (3, 3) nearest to M (3, 3): U V^T of M = U S V^T."""
+    U, _, Vt = np.linalg.svd(M)
+    return np.asarray(U @ Vt)
+
+
 def to_body_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector, Vector]:
-    """Return D Q^T, the symmetric Q K, and Q, where K = U S V^T and Q = V U^T."""
-    U, S, Vt = np.linalg.svd(K)
-    Q, symmetric = Vt.T @ U.T, Vt.T @ np.diag(S) @ Vt
-    return np.asarray(D @ Q.T), np.asarray((symmetric + symmetric.T) / 2), np.asarray(Q)
+    """Return D Q^T, the symmetric Q K, and Q, the inverse of the rotation nearest to K."""
+    Q = nearest_rotation(K).T
+    symmetric = Q @ K
+    return np.asarray(D @ Q.T), np.asarray((symmetric + symmetric.T) / 2), Q
 
 
 def sensor_axes(M: Vector) -> Vector:
@@ -99,5 +105,4 @@ def sensor_axes(M: Vector) -> Vector:
 
     Its diagonal holds the scale factors of a sensor whose axes are swapped, mirrored or turned against the body's.
     """
-    U, S, _ = np.linalg.svd(M)
-    return np.asarray((U * S) @ U.T)
+    return np.asarray(M @ nearest_rotation(M).T)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from functools import cache
 from typing import Annotated, Any, ClassVar, Self, get_origin, get_type_hints
 
 from ..errors import UsageError, did_you_mean
-from ..sources.table import whole_number
+from ..sources.table import number, whole_number
 from .faults import Fault, Where, fault_kinds
 
 FAULT = "fault"
@@ -73,13 +72,6 @@ def _value(key: str, text: str, parser: Parser) -> Any:
     except (ValueError, KeyError):
         nearly = did_you_mean(text.partition("@")[0], re.findall(r"[a-z]\w\w+", expected))
         raise UsageError(f"sim: {key}={text} is not {expected}", f"correct it, or leave it out{nearly}") from None
-
-
-def number(text: str) -> float:
-    """Parse a finite number; raise ValueError otherwise."""
-    if not math.isfinite(value := float(text)):
-        raise ValueError(text)
-    return value
 
 
 def at_least(lowest: float) -> Parser:

@@ -17,7 +17,7 @@ from ..chip.driver import TIMED_READS
 from ..chip.families import PARTS
 from ..chip.losses import Loss
 from ..chip.port import TRIES
-from ..chip.registers import FIFO_R_W
+from ..chip.registers import ADDRESSES, FIFO_R_W
 from ..errors import BusError, BusHeld, LateRead, NoAnswer
 
 DEVICES = Path("/dev")
@@ -113,10 +113,6 @@ def other_buses() -> str:
     if buses:
         return f"use one of {', '.join(buses)}"
     return "enable I2C (on a Raspberry Pi: `sudo raspi-config nonint do_i2c 0`) and load `i2c-dev`"
-
-
-# With AD0 low, and with AD0 high.
-ADDRESSES = (0x68, 0x69)
 
 
 # Excess over the shortest read: two samples at 1 kHz, and more than a transfer varies by.

@@ -15,11 +15,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..chip.families import PARTS
-from ..chip.registers import WHO_AM_I
+from ..chip.registers import ADDRESSES, WHO_AM_I
 from ..errors import BusError
 from .chip import OpenedChip
 from .host_bus import (
-    ADDRESSES,
     DEVICES,
     RegisterBus,
     converting,

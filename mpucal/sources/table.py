@@ -6,13 +6,14 @@ kind is opened.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..chip.config import Config
-from ..chip.registers import ACCEL_RANGES_G, DLPF_CODES, GYRO_RANGES_DPS, MAX_RATE_HZ
+from ..chip.registers import ACCEL_RANGES_G, DLPF_CODES, GYRO_RANGES_DPS, MAX_RATE_HZ, USABLE_ADDRESSES
 from ..origin import Origin
 from .kind import Option, SourceKind
 
@@ -44,11 +45,13 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
 
 
 def number(text: str) -> float:
-    """Parse a number."""
+    """Parse a finite number."""
     try:
-        return float(text)
+        if math.isfinite(value := float(text)):
+            return value
     except ValueError:
-        raise ValueError(f"{text!r} is not a number.") from None
+        pass
+    raise ValueError(f"{text!r} is not a number.")
 
 
 def pins(text: str) -> tuple[int | str, ...]:
@@ -66,7 +69,12 @@ SERIAL = Option("serial", metavar="PORT[:BAUD]", bare="")
 MAVLINK = Option("mavlink", metavar="URL")
 REPLAY = Option("replay", metavar="FILE", parse=Path)
 
-ADDRESS = Option("address", "I2C address; by default 0x68, then 0x69.", "ADDRESS", whole_number(0, 0x7F))
+ADDRESS = Option(
+    "address",
+    "I2C address; by default 0x68, then 0x69.",
+    "ADDRESS",
+    whole_number(USABLE_ADDRESSES[0], USABLE_ADDRESSES[-1]),
+)
 TRIGGER = Option("trigger", "Trigger of the buffer; by default its own; none: poll instead.", "NAME")
 MICROPYTHON = Option(
     "micropython",

@@ -11,11 +11,11 @@ from ...data import MOST_CLOCK_PPM, Mask, Vector
 from ...origin import Origin
 from ...reasons import Reason, reason
 from ...result.correlation import UPPER
-from ...result.error_model import sensor_axes
+from ...result.error_model import nearest_rotation, sensor_axes
 from ..evidence import Evidence, once
 from ..hypothesis_tests import MOST_STD
 from ..parameters import BY_NAME
-from ..rotation import nearest_rotation, signed_permutations
+from ..rotation import signed_permutations
 from ..transitions import MOST_MISS_RAD
 from .estimate import GOOD_RMS_MPS2, USABLE_RMS_MPS2, exchange, inconsistent, likely_slip
 

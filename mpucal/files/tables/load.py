@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arguments import reading
 from ...clocks.stamps import FEWEST
 from ...data import Recording, Vector
 from ...errors import RecordingError
 from ..hints import NO_HINTS, ROLES, Hints
-from ..reading import MEMORY_PER_TEXT, SNIFFED, check_size, first_bytes, reading
+from ..reading import MEMORY_PER_TEXT, SNIFFED, check_size, first_bytes
 from . import names
 from .cells import LOOKED_AT, OF_DAY, Kind
 from .columns import find_columns

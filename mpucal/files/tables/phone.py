@@ -21,13 +21,14 @@ from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
+from ...arguments import reading
 from ...clocks import S
 from ...data import Recording
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..array_files import holds_arrays, read_arrays
 from ..hints import NO_HINTS, Hints
-from ..reading import MEMORY_PER_TEXT, check_size, first_bytes, reading
+from ..reading import MEMORY_PER_TEXT, check_size, first_bytes
 from .array_table import table_of_arrays
 from .columns import columns_by_hint
 from .load import FLIPPED, find_any_table, with_sensor_of_file

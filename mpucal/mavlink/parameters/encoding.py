@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arguments import reading
 from ...errors import RecordingError
 from ..dialect import HEADER, Message
 from ..firmwares import PX4
@@ -140,13 +141,12 @@ def read_parameters_file(path: Path) -> dict[str, float]:
     RecordingError : it cannot be read, or is neither.
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        with reading(path):
+            lines = path.read_text(encoding="utf-8").splitlines()
         rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip() and not line.startswith("#")]
         # QGroundControl's rows have vehicle and component before, and the type after.
         pairs = [row[2:4] or row for row in rows]
         return {name: as_float32(float(value)) for name, value in pairs}
-    except OSError as error:
-        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
     except ValueError as error:
         raise RecordingError(f"{path} is not a parameter file ({error})", "give a .param or .params file") from error
 

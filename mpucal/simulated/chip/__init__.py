@@ -11,13 +11,13 @@ from ...chip.config import Config
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...sources.chip import OpenedChip
 from ...sources.kind import Request
-from ...sources.table import whole_number
+from ...sources.table import number, whole_number
 from ...sources.usb_i2c import I2C_HZ
 from ..disturbance import ARMS, USUAL_ARM
 from ..faults import OF_CHIP, Fault, Where, begin_mishaps
 from ..hands import HANDS
 from ..motion import Motion
-from ..option_text import SimulationOptions, at_least, faults, number, one_of, whole
+from ..option_text import SimulationOptions, at_least, faults, one_of, whole
 from ..sensor import Feed, SensorFeed, SensorTruth
 from .bus import CLOCKS, FaultInjector, SimulatedBus, SimulatedClock
 from .chip import Chip

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from ...chip.access import Reply
+from ...chip.registers import ADDRESSES
 from ...mavlink.texts import Prompt
-from ...sources.host_bus import ADDRESSES, transfer_error
+from ...sources.host_bus import transfer_error
 from ...sources.usb_i2c import I2C_HZ
 from ..faults import Fault, FaultKind, Schedule
 from ..motion import Motion
