@@ -61,7 +61,8 @@ class NoiseMeter:
                 continue
             follows = not samples.gap[a]
             # by axis, so that the sums over time run along memory
-            values = np.vstack([samples.acc[a:b].T, samples.gyr[a:b].T])
+            columns = np.vstack([samples.acc[a:b].T, samples.gyr[a:b].T, samples.temperature_c[a:b]])
+            values = columns[:6]
             if not np.isfinite(values).all():
                 raise RecordingError(
                     "the recording was read without rates",
@@ -69,7 +70,7 @@ class NoiseMeter:
                 )
             self._octaves.add(values, follows)
             self._spectrum.add(values, follows)
-            self._trace.add(np.vstack([values, samples.temperature_c[a:b]]))
+            self._trace.add(columns)
             self._gaps_s += 0.0 if follows else float(samples.t[a]) - self._last_s
             self._last_s = float(samples.t[b - 1])
 

@@ -140,6 +140,7 @@ def _products(sizes: Vector, samples: int) -> Vector:
     sine2 = np.sin(np.pi * f) ** 2
     S = np.stack([np.ones(len(f)), 1.0 / (2.0 * np.pi * f), 1.0 / (4.0 * sine2), 4.0 * sine2])
     H = 2.0 * np.sin(np.pi * np.outer(sizes, f)) ** 4 / (sizes[:, None] ** 2 * sine2)
-    weighted = S[:, None] * H * np.sqrt(2.0 * np.gradient(f))
+    weighted = (S[:, None] * H * np.sqrt(2.0 * np.gradient(f))).reshape(-1, len(f))
     of = np.maximum(samples - 2.0 * sizes + 1.0, 1.0)
-    return np.asarray(2.0 * np.einsum("aif,bjf->abij", weighted, weighted, optimize=True) / np.sqrt(np.outer(of, of)))
+    products = (weighted @ weighted.T).reshape(len(S), len(sizes), len(S), len(sizes)).swapaxes(1, 2)
+    return np.asarray(2.0 * products / np.sqrt(np.outer(of, of)))

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
+from ..kernel import _kernel
 from ..rests.limits import OF_NORMAL
 
 # distances in samples; beyond the last, which many blocks make a tau
@@ -30,34 +31,25 @@ class _Level:
     """Level of blocks of one length: differences of their means at each distance, and means of pairs."""
 
     def __init__(self, axes: int, distances: tuple[int, ...]) -> None:
-        self.distances = distances
+        self.distances = np.array(distances)
         self.sums = np.zeros((len(distances), axes))
         self.counts = np.zeros(len(distances))
-        self._tail, self._odd = np.zeros((axes, 0)), np.zeros((axes, 0))
+        self._tail, self._is_odd = np.zeros((axes, 0)), False
 
     def interrupt(self) -> None:
         """Reset after a gap."""
-        self._tail, self._odd = self._tail[:, :0], self._odd[:, :0]
+        self._tail, self._is_odd = self._tail[:, :0], False
 
     def add(self, blocks: Vector) -> Vector:
         """Add block means (axes, n); return the means of pairs."""
-        sums = z = np.concatenate([self._tail, blocks], axis=1)
-        for n in _FIRST:
-            # sums: of n blocks each, one at every block
-            new = min(blocks.shape[1], z.shape[1] - 2 * n + 1)
-            if new <= 0:
-                break
-            if n in self.distances:
-                d = sums[:, -new:] - sums[:, -new - n : -n]
-                i = self.distances.index(n)
-                self.sums[i] += np.einsum("ij,ij->i", d, d) / n**2
-                self.counts[i] += new
-            sums = sums[:, n:] + sums[:, :-n]
-        self._tail = z[:, max(z.shape[1] - 2 * _FIRST[-1] + 1, 0) :]
-        pairs = np.concatenate([self._odd, blocks], axis=1)
-        even = pairs.shape[1] // 2 * 2
-        self._odd = pairs[:, even:]
-        return np.asarray(0.5 * (pairs[:, :even:2] + pairs[:, 1:even:2]))
+        z, new = np.concatenate([self._tail, blocks], axis=1), blocks.shape[1]
+        self.sums += _kernel.squared_differences(z, new, self.distances).T / self.distances[:, None] ** 2
+        self.counts += np.minimum(np.maximum(z.shape[1] - 2 * self.distances + 1, 0), new)
+        first = self._tail.shape[1] - self._is_odd
+        self._is_odd = bool((z.shape[1] - first) % 2)
+        self._tail = z[:, max(z.shape[1] - 2 * _FIRST[-1] + 1, 0) :].copy()
+        last = z.shape[1] - self._is_odd
+        return np.asarray(0.5 * (z[:, first:last:2] + z[:, first + 1 : last : 2]))
 
 
 class Octaves:
@@ -93,7 +85,7 @@ class Octaves:
 
     def variances(self) -> tuple[Vector, Vector, Vector]:
         """Return tau (k,) in samples, Allan variance (k, axes), and number of differences (k,)."""
-        sizes = np.concatenate([np.array(level.distances) * 2**at for at, level in enumerate(self._levels)])
+        sizes = np.concatenate([level.distances * 2**at for at, level in enumerate(self._levels)])
         sums = np.concatenate([level.sums for level in self._levels])
         counts = np.concatenate([level.counts for level in self._levels])
         seen = counts > 0

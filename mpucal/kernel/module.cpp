@@ -315,6 +315,23 @@ NB_MODULE(_kernel, m) {
       "Return variances (n, 3) of the noise of x (n, 3), by fourth differences over up to `half` samples on both sides.");
 
   m.def(
+      "squared_differences",
+      [](const nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>& x, std::size_t fresh,
+         const Indices& spans) {
+        const std::size_t rows = x.shape(0), n = x.shape(1), count = spans.size();
+        std::vector<std::size_t> m(aligned(spans), aligned(spans) + count);
+        for (std::size_t i = 0; i < count; ++i)
+          if (m[i] == 0 || m[i] & (m[i] - 1) || (i && m[i] <= m[i - 1]) || m[i] > 1 << 20)
+            throw std::invalid_argument("spans are not ascending powers of two up to 2^20");
+        std::vector<double> squares(rows * count);
+        for (std::size_t row = 0; row < rows && count; ++row)
+          squared_differences(aligned(x) + row * n, n, fresh, m, squares.data() + row * count);
+        return give(std::move(squares), {rows, count});
+      },
+      nb::arg("x"), nb::arg("fresh"), nb::arg("spans"),
+      "Return sums (rows, k) of squares, by which sums over spans (k,) of x (rows, n) differ from those before.");
+
+  m.def(
       "mean_rates",
       [](const Array& rate, const Array& bias, const Array& dt) {
         const std::size_t n = dt.size(), samples = rate.size() / 3;

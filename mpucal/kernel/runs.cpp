@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <vector>
 
 #include "rotation.hpp"
@@ -21,6 +22,8 @@ constexpr double kSquares = 70.0;
 // A spike exceeds so much, and so many times the departures of its neighbours from theirs; its neighbours differ by less
 // than this share of it.
 constexpr double kLeastSpike[2] = {0.3, 0.15}, kSpikes = 8.0, kReturns = 0.25;  // m/s^2, rad/s
+
+double square(double x) { return x * x; }
 
 // M = F M, column by column
 template <std::size_t columns>
@@ -108,6 +111,32 @@ void noise_variance(const double* x, std::size_t n, std::size_t half, double* va
     squares[i + 6] = d * d / kSquares;
   }
   moving_mean(squares.data(), n, 3, half, variance);
+}
+
+void squared_differences(const double* x, std::size_t n, std::size_t fresh, const std::vector<std::size_t>& spans,
+                         double* squares) {
+  // Sums side by side, which a compiler turns into vectors, and as many new elements at a time as stay in the cache.
+  constexpr std::size_t kLanes = 8, kPart = 1024;
+  const std::size_t before = 2 * spans.back() - 1;
+  std::vector<double> sums(std::min(before + kPart, n));
+  for (std::size_t first = n - std::min(fresh, n), last; first < n; first = last) {
+    last = std::min(first + kPart, n);
+    const std::size_t begin = first > before ? first - before : 0, size = last - begin;
+    std::copy(x + begin, x + last, sums.begin());
+    auto span = spans.begin();
+    for (std::size_t m = 1; span != spans.end() && 2 * m <= size; m *= 2) {
+      if (m == *span) {
+        const std::size_t count = std::min(last - first, size - 2 * m + 1);
+        const double *const later = sums.data() + (size - m + 1 - count), *const earlier = later - m;
+        double lanes[kLanes] = {};
+        for (std::size_t i = 0; i < count / kLanes * kLanes; i += kLanes)
+          for (std::size_t l = 0; l < kLanes; ++l) lanes[l] += square(later[i + l] - earlier[i + l]);
+        for (std::size_t i = count / kLanes * kLanes; i < count; ++i) lanes[0] += square(later[i] - earlier[i]);
+        squares[span++ - spans.begin()] += std::accumulate(lanes, lanes + kLanes, 0.0);
+      }
+      for (std::size_t i = 0; i + 2 * m <= size; ++i) sums[i] += sums[i + m];
+    }
+  }
 }
 
 void mean_rates(const double* rate, std::size_t samples, const double bias[3], const double* dt, std::size_t n,

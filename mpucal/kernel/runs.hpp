@@ -1,5 +1,5 @@
 // Functions of runs of samples without a filter: products of rotations, means and variances, moving ones, mean rates,
-// noise, spikes.
+// noise, differences of sums, spikes.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -23,6 +23,11 @@ void moving_statistics(const double* x, std::size_t n, std::size_t size, double*
 
 // Fourth differences of x (n, 3), squared, as variances (n, 3) of white noise: moving means as those above.
 void noise_variance(const double* x, std::size_t n, std::size_t half, double* variance);
+
+// For each span of m elements of x (n,), of powers of two that ascend: the sum of the squares by which the sum over m
+// differs from the sum over the m before, of those that end with the last `fresh` elements; added to squares (spans,).
+void squared_differences(const double* x, std::size_t n, std::size_t fresh, const std::vector<std::size_t>& spans,
+                         double* squares);
 
 // The rotation vectors (n, 3) of the steps that lead to the last n of `samples` rates [rad/s], each over its time dt.
 void mean_rates(const double* rate, std::size_t samples, const double bias[3], const double* dt, std::size_t n,

@@ -56,6 +56,19 @@ def test_moving_statistics_are_of_whole_windows(x, size):
             _kernel.moving_statistics(x, wrong)
 
 
+@pytest.mark.parametrize("fresh", [0, 7, 1100, 2000])
+def test_squared_differences_are_of_sums_that_end_with_the_last_elements(x, fresh):
+    x, spans = np.tile(x, (8, 1)), np.array([1, 4, 64])
+    n, wanted = len(x), np.zeros((3, 3))
+    for i, m in enumerate(spans):
+        for last in range(max(2 * m, n - fresh + 1), n + 1):
+            wanted[:, i] += (x[last - m : last].sum(0) - x[last - 2 * m : last - m].sum(0)) ** 2
+    np.testing.assert_allclose(_kernel.squared_differences(x.T.copy(), fresh, spans), wanted, rtol=1e-12)
+    for wrong in ([0], [3], [2, 1], [1 << 21], [-1]):
+        with pytest.raises(ValueError, match="powers of two"):
+            _kernel.squared_differences(x, fresh, np.array(wrong))
+
+
 def test_the_noise_is_that_of_fourth_differences(x):
     squares = np.zeros_like(x)
     squares[2:-2] = np.diff(x, 4, axis=0) ** 2 / 70.0

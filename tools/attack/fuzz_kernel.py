@@ -130,6 +130,7 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
         _kernel.statistics: lambda n, rng: (some(n, rng, 3), runs(n, rng)),
         _kernel.moving_mean: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
         _kernel.moving_statistics: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
+        _kernel.squared_differences: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80)), np.array([1, 16])),
         _kernel.mean_rates: lambda n, rng: (some(n + 1, rng, 3), np.zeros(3), some(n, rng)),
         _kernel.noise_variance: lambda n, rng: (some(n, rng, 3), int(rng.integers(0, 80))),
         _kernel.spikes: lambda n, rng: (some(n, rng, 3), some(n, rng, 3)),
