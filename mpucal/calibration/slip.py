@@ -35,6 +35,8 @@ from .transitions import (
     likely_scale,
 )
 
+NEAR_ENDS = 5  # places: the first and the last two transitions, and the last rest
+
 
 class Slip(NamedTuple):
     """Slip of the mount.
@@ -95,9 +97,8 @@ def _between_rests(transitions: Sequence[Transition], series: Series, theta: The
 def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
     """Return probabilities (k,) of a slip in each transition; 0 but for the first and last two.
 
-    There a slip looks like a turn that the gyroscope lost, and leaves no pattern. One of SURE recordings has one there.
-    Without one, a miss as large has the chance that Student's t gives, in each of these transitions. What the next
-    transition undoes is an error of the rest between them.
+    There a slip looks like a turn that the gyroscope lost, and leaves no pattern. What the next transition undoes is an
+    error of the rest between them.
 
     spoilt : (n,) True for samples whose rates are lost or clipped; the transitions that have some are left out.
     """
@@ -114,13 +115,14 @@ def _at_rest(prepared: Preprocessed, theta: Theta, spoilt: Mask) -> list[tuple[f
     """Return the probability of a slip within the last rest, and what it would be; nothing if rests are too few.
 
     The gyroscope tells how the board turned as it rested. From the first half of a rest to the second, gravity misses
-    that by as much as the hand sways, in the last rest as in the others. spoilt : see end_slips.
+    that by as much as the hand sways, in the last rest as in so long a part of the others. spoilt : see end_slips.
     """
     recording, flat, runs = prepared.recording, prepared.flat, prepared.runs
     # each half is long enough for a rest
     runs = runs[(runs[:, 0] > flat.last) & (runs[:, 1] - runs[:, 0] >= 2.0 * SHORTEST_S * recording.rate_hz)]
     if len(runs) < FEWEST_TRANSITIONS or spoilt[slice(*(runs[-1] - flat.last))].any():
         return []
+    runs[:, 1] = np.minimum(runs[:, 1], runs[:, 0] + runs[-1, 1] - runs[-1, 0])
     acc, middle = level_rests(recording.acc, recording, flat, runs), runs.sum(axis=1) // 2
     leaving, coming = (
         (statistics(acc, half)[0] - theta.b_a) @ theta.inverse.T
@@ -149,11 +151,12 @@ def slip_squares(transition: Transition, D: Vector) -> Vector:
 def _probability(misses: Vector, known: Vector, ends: Sequence[int]) -> Vector:
     """Return probabilities (m,) that slips make the misses number `ends` of all misses (k, 3), and not chance.
 
-    known : (k,) their variances, but for a common scale.
+    One of SURE recordings has a slip near its ends. Without one, a miss as large has the chance that Student's t gives,
+    in each of these places. known : (k,) their variances, but for a common scale.
     """
     nu = DEGREES_OF_FREEDOM
     chance = (likely_scale(misses, known)[1][ends] * nu / (nu + 2.0)) ** (0.5 * nu)
-    return np.asarray(1.0 / (1.0 + SURE * len(ends) * chance))
+    return np.asarray(1.0 / (1.0 + SURE * NEAR_ENDS * chance))
 
 
 def _lasting(transitions: Sequence[Transition]) -> Vector:
