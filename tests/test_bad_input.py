@@ -75,7 +75,7 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
 WRONG = """
 session --bus sim --gravity -9.81                   | '-9.81' is not a local gravity
 session --bus sim --gravity nan                     | 'nan' is not a local gravity
-session --bus sim --gravity 981                     | In cm/s² it is `mpucal session --bus sim --gravity 9.81`.
+session --bus sim --gravity 981                     | In cm/s^2 it is `mpucal session --bus sim --gravity 9.81`.
 session --bus sim --gravity 1                       | `mpucal session --bus sim --gravity 9.80665`. To use
 calibrate walk.npz --gravity much                   | 'much' is not a local gravity
 session --bus sim --address 0x68                    | --bus sim does not take --address

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..arguments import check_regular, reading
 from ..errors import RecordingError, UsageError
+from ..result.session_files import captures_in
 
 
 def expand(words: Iterable[str]) -> list[str]:
@@ -76,8 +77,7 @@ def compute_digest(path: Path) -> str:
     with reading(path):
         files = [path]
         if path.is_dir():
-            files = sorted(each for each in path.rglob("*") if each.is_file())
-            files = [each for each in files if each.stem.startswith("capture")] or files
+            files = captures_in(path) or sorted(each for each in path.rglob("*") if each.is_file())
         for each in files:
             with each.open("rb") as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())

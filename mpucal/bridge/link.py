@@ -205,7 +205,7 @@ class Link:
             for each in (*flying, *self._posted):
                 if each.is_answered_by(frame, reply):
                     if reply.status == wire.Status.NO_HELLO:
-                        # The bridge's clock began anew, and this time does not belong to it.
+                        # The bridge's clock restarted, and this time does not belong to it.
                         raise LinkLost(f"the bridge on {self.port.name} was reset", "check its cable and supply")
                     if each.sent == 1 and not each.answers and not isinstance(each.request, STORING):
                         self.latency.add(chunk.t_ns - each.sent_ns)

@@ -67,7 +67,8 @@ class BridgeSink(Sink):
         """Store the blob, read it back, compare, and have the firmware validate it; see Sink."""
         new = _encode(calibration)
         with nothing_written():
-            self._check_chip(calibration)
+            if how := other_who_am_i(calibration.sensor.who_am_i, self._store.who_am_i()):
+                raise WriteBackError(f"nothing was written to {self.where}: {how}", THIS_CHIP)
             old = self._store.read()
         try:
             if self._store.occupied:
@@ -87,10 +88,6 @@ class BridgeSink(Sink):
                 f" CRC-32 {held.crc:08x}), read back and validated by its firmware",
             ),
         )
-
-    def _check_chip(self, calibration: Calibration) -> None:
-        if how := other_who_am_i(calibration.sensor.who_am_i, self._store.who_am_i()):
-            raise WriteBackError(f"nothing was written to {self.where}: {how}", THIS_CHIP)
 
     def _read_after(self, error: BusError, old: StoredBlob | None, new: bytes) -> StoredBlob:
         """Return the content of the memory after `error` if it is the new blob.

@@ -17,7 +17,7 @@ from ..rests.flat import Flat
 # x_0 comes from the uncalibrated mean, which misalignment and a bias of 1 m/s^2 tilt by about 10 deg.
 P_0_RAD = np.radians(10.0)
 
-# The innovations of so many samples are held at a time, which bounds the memory for a long recording.
+# The innovations of this many samples are held at a time, which bounds the memory for a long recording.
 BLOCK = 4096
 
 

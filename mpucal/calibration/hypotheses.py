@@ -239,7 +239,7 @@ class _Groups(NamedTuple):
 
     @classmethod
     def of(cls, parts: Parts, groups: int) -> _Groups:
-        """Group the parts by so many stretches of time."""
+        """Group the parts into this many stretches of time."""
         group = parts.by_time(groups)
         first = np.unique(group, return_index=True)[1]
         last = np.append(first[1:], len(parts)) - 1

@@ -20,7 +20,7 @@ from .theta import Theta
 REFINEMENTS = 3
 # The ridge keeps the equations solvable for a board that hardly turned; a second of data outweighs it.
 RIDGE = 1e-9
-STRETCHES = 4  # so many of the longest stretches between gaps are tried
+STRETCHES = 4  # this many of the longest stretches between gaps are tried
 
 
 def initialise(problem: Problem, b_omega: Vector) -> Theta:

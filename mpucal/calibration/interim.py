@@ -33,7 +33,7 @@ D_SD, B_A_SD_MPS2 = 0.5, 5.0
 # A search that settled is compared with other starts when the recording has grown by this factor since.
 GROWN = 1.25
 
-# The covariance admits so many times a pivot's travel: more than a calibration's, which compares its parts as well.
+# The covariance allows this many times a pivot's travel: more than a calibration's, which compares its parts as well.
 DOUBT = 9.0
 
 

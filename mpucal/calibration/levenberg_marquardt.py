@@ -23,10 +23,10 @@ from .theta import Prior, Theta
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 ROUGHLY = 0.05  # the decrement at which a search on block means ends
-# Below so many times the decrement that ends a search, a whole step leaves nearly nothing of it, and is not evaluated.
+# Below this many times the decrement that ends a search, a whole step leaves nearly nothing of it: not evaluated.
 LAST = 30.0
 MOST_ITERATIONS = 60
-# A trial that leaves less than this share of the decrement is progress. After so many without any the search has
+# A trial that leaves less than this share of the decrement is progress. After this many without any the search has
 # failed, as in a valley without an end: turns so slow that the gyroscope's noise loses gravity. Estimates that converge
 # make some within 5 trials.
 PROGRESS, MOST_IN_VAIN = 0.5, 10

@@ -27,7 +27,7 @@ class Series:
     rate, alpha : (n, 3) rad/s, rad/s^2 at the sample, for lever arm and delay [neither].
     r_extra : (n,) (m/s^2)^2 added to the noise of every axis [0].
     jerk : (n,) (m/s^3)^2/Hz, spectral density of the hand's jerk over the step that leads to the sample [0].
-    reset : (n,) m/s^2, not below zero where the hand comes to rest or leaves it: its travel begins anew as in a long
+    reset : (n,) m/s^2, not below zero where the hand comes to rest or leaves it: its travel begins again as in a long
         rest, with this standard deviation of its acceleration [nowhere].
     force : (n, 3) m/s^2 over the step that leads to the sample, less that of the flat segment, for the derivatives by
         the gyroscope's sensitivity S to it [none].

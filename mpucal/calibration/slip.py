@@ -72,7 +72,7 @@ def find_slip(
 def _between_rests(transitions: Sequence[Transition], series: Series, theta: Theta, t: Vector) -> Slip | None:
     """Return the slip that explains the misses of transitions between rests under theta, or None.
 
-    K is estimated anew with it, and without, since a K that was estimated without it hides much of it.
+    K is estimated again with it, and without, since a K that was estimated without it hides much of it.
     """
     k, (n, p) = len(transitions), _numbers(transitions)
     if n <= p:

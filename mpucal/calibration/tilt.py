@@ -24,7 +24,7 @@ from .problem import Problem
 from .static import BIAS_SD_MPS2
 from .theta import Theta
 
-# Of each element of D: a breakout is mounted askew by some degrees, which adds to the data sheet's +-2 % across axes.
+# Of each element of D: a breakout is mounted tilted by some degrees, which adds to the data sheet's +-2 % across axes.
 D_SD = 0.025
 # The largest tilt that is asked for, and a little more.
 CONE_RAD = np.deg2rad(35.0)

@@ -21,7 +21,7 @@ from ._flips import until_jumps
 
 Counts = NDArray[np.int16]
 
-# A count is near the mean of its neighbours within so many median differences, and so many counts more.
+# A count is near the mean of its neighbours within this many median differences, and this many counts more.
 NEAR_MEDIANS, NEAR_COUNTS = 6.0, 8.0
 # Median difference [counts] of consecutive samples of a sensor in the hand.
 INITIAL_MEDIAN = 30.0

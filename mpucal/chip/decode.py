@@ -151,10 +151,10 @@ class Decoder:
         """Decode the leading ordinary polls of the accesses first..last-1; return the number of their accesses."""
         if self.fifo is None or accesses.frames.shape[1] != reg.FRAME_WORDS:
             return 0
-        looks, reads, checks = (np.arange(first + i, last, ACCESSES_A_POLL) for i in range(ACCESSES_A_POLL))
+        counts, reads, checks = (np.arange(first + i, last, ACCESSES_A_POLL) for i in range(ACCESSES_A_POLL))
         frames = accesses.frames[accesses.begin[reads[0]] : accesses.end[reads[-1]]]
         lengths = accesses.end[reads] - accesses.begin[reads]
-        polls = self.fifo.accept_plain_polls(accesses.t_ns[looks], frames, lengths)
+        polls = self.fifo.accept_plain_polls(accesses.t_ns[counts], frames, lengths)
         timed = checks[:polls][accesses.has_host_ns[checks[:polls]]]
         if len(timed):
             self.fifo.add_clock_pairs(accesses.t_ns[timed], accesses.host_ns[timed])
@@ -188,11 +188,11 @@ def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
     n = len(accesses) - ACCESSES_A_POLL + 1
     if n < 1 or accesses.failures:
         return []
-    look, read, check = (slice(i, n + i) for i in range(ACCESSES_A_POLL))
+    count, read, check = (slice(i, n + i) for i in range(ACCESSES_A_POLL))
     register, moved = accesses.register, accesses.moved
-    whole = (register[look] == reg.FIFO_COUNT_H) & (moved[look] == 2) & (register[read] == reg.FIFO_R_W)
+    whole = (register[count] == reg.FIFO_COUNT_H) & (moved[count] == 2) & (register[read] == reg.FIFO_R_W)
     whole &= (register[check] == reg.INT_ENABLE) & (moved[check] == reg.INT_STATUS - reg.INT_ENABLE + 1)
-    whole &= accesses.framed[read] & ~accesses.write[look] & ~accesses.write[check]
+    whole &= accesses.framed[read] & ~accesses.write[count] & ~accesses.write[check]
     at = np.flatnonzero(whole)
     counts, checks = accesses.begin[at], accesses.begin[at + 2]
     counted = accesses.data[counts].astype(np.int64) << 8 | accesses.data[counts + 1]

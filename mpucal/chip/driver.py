@@ -38,7 +38,7 @@ LONGEST_POLL_NS = 500_000_000
 # Longer than the chip takes to write a frame, and no whole number of sample intervals.
 FRAME_WRITTEN_NS = 300_000
 
-# An overflow drops the oldest bytes: a FIFO that is so many frames short of full may have lost the alignment.
+# An overflow drops the oldest bytes: a FIFO that is this many frames short of full may have lost the alignment.
 SPARE_FRAMES = 3
 # Share of the samples; jerks of a hand pass for flipped bits four times in ten thousand.
 MAX_REPAIRED_SHARE = 0.001

@@ -67,7 +67,7 @@ class FifoDecoder:
         self.accepted = self._temperature_sum = 0
         self._temperature: int | None = None
         self._read = 0
-        self._look: tuple[int, int] | None = None
+        self._counted: tuple[int, int] | None = None
         self._odd_bytes = 0
         self._pending = bytearray()
         self._last_t_s: float | None = None
@@ -92,7 +92,7 @@ class FifoDecoder:
         """Begin a poll: the FIFO held `count_bytes` at `t_ns`."""
         frames, self._odd_bytes = divmod(count_bytes, reg.FRAME_BYTES)
         self._pending.clear()
-        self._look = (t_ns, self._read + frames)
+        self._counted = (t_ns, self._read + frames)
 
     def add_bytes(self, data: bytes) -> None:
         """Add bytes that were read from the FIFO."""
@@ -104,16 +104,16 @@ class FifoDecoder:
         Equal frames at the end are held back until a different one follows them, and a last frame in which a bit may be
         flipped until the next one. `lost`: the chip was reset meanwhile.
         """
-        data, look = bytes(self._pending), self._look
+        data, counted = bytes(self._pending), self._counted
         self._pending.clear()
-        self._look = None
+        self._counted = None
         if lost:
             return Loss.RESET
         if overflow:
             return Loss.OVERFLOW
         if self._odd_bytes or len(data) % reg.FRAME_BYTES:
             return Loss.MISALIGNED
-        if look is not None and isinstance(self._clock, PolledClock) and self._clock.is_late(look[0]):
+        if counted is not None and isinstance(self._clock, PolledClock) and self._clock.is_late(counted[0]):
             return Loss.LATE
         frames = np.frombuffer(data, ">i2").reshape(-1, reg.FRAME_WORDS).astype(np.int16)
         kept = self._flips.repair(frames[max(DROPPED_FRAMES - self._read, 0) :], self._waiting)
@@ -124,19 +124,19 @@ class FifoDecoder:
         longest, last = _equal_frames(kept)
         if longest >= self._stuck_frames:
             return Loss.STUCK
-        if look is not None:
-            self._clock.add(*np.array([look]).T)
+        if counted is not None:
+            self._clock.add(*np.array([counted]).T)
         self._accept(kept, last)
         return None
 
-    def accept_plain_polls(self, looks_ns: Whole, frames: Counts, lengths: Whole) -> int:
+    def accept_plain_polls(self, counted_ns: Whole, frames: Counts, lengths: Whole) -> int:
         """Accept leading polls that need no checks, and return their number; `finish_poll` takes the next one.
 
         The FIFO did not overflow in any of them.
 
         Parameters
         ----------
-        looks_ns : (k,) when each poll counted the FIFO. lengths : (k,) frames of each, one at least.
+        counted_ns : (k,) when each poll counted the FIFO. lengths : (k,) frames of each, one at least.
         frames : (n, words) of all of them.
         """
         if self._read <= DROPPED_FRAMES or len(self._waiting) or self._odd_bytes:
@@ -148,7 +148,7 @@ class FifoDecoder:
         if not plain:
             return 0
         kept = frames[: ends[plain - 1]]
-        self._clock.add(looks_ns[:plain], self._read + ends[:plain])
+        self._clock.add(counted_ns[:plain], self._read + ends[:plain])
         self._read += len(kept)
         self._accept(kept, 1)
         return plain
@@ -173,7 +173,7 @@ class FifoDecoder:
     def reset(self) -> None:
         """Discard what was in the FIFO, which was emptied: a frame begins at the next byte."""
         self._pending.clear()
-        self._look = None
+        self._counted = None
         self._waiting = self._waiting[:0]
         self._flips.reset()
         self._clock.begin_segment()

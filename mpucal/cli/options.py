@@ -13,6 +13,7 @@ from click.core import ParameterSource
 from ..arguments import LEAST_GRAVITY_MPS2, LEAST_ON_EARTH_MPS2, MOST_GRAVITY_MPS2, MOST_ON_EARTH_MPS2
 from ..calibration import MODELS
 from ..data import STANDARD_GRAVITY_MPS2
+from ..files.tables.units import QUANTITIES
 from ..sources.kind import Option
 from . import typed_words, with_option
 from .common import Decorator, together
@@ -82,11 +83,10 @@ def check_gravity(gravity: float, anyway: bool) -> None:
     """Raise UsageError for a gravity outside the range found on Earth, before a person turns a board."""
     if anyway or LEAST_ON_EARTH_MPS2 <= gravity <= MOST_ON_EARTH_MPS2:
         return
-    units = {"cm/s²": 0.01, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1e3, "ft/s²": 0.3048}
     suggestions = [
-        f" In {unit} it is `mpucal {shlex.join(with_option(typed_words(), '--gravity', f'{gravity * factor:.6g}'))}`."
-        for unit, factor in units.items()
-        if LEAST_ON_EARTH_MPS2 <= gravity * factor <= MOST_ON_EARTH_MPS2
+        f" In {unit} it is `mpucal {shlex.join(with_option(typed_words(), '--gravity', f'{si:.6g}'))}`."
+        for unit, size in QUANTITIES["acc"].items()
+        if LEAST_ON_EARTH_MPS2 <= (si := gravity * size) <= MOST_ON_EARTH_MPS2
     ]
     raise click.UsageError(
         f"no place on Earth has a gravity of {gravity:g} m/s² ({LEAST_ON_EARTH_MPS2:g} to {MOST_ON_EARTH_MPS2:g})."

@@ -7,7 +7,7 @@ delayed. With priors of the rate's error and of its drift, the parabola
     host(t) - t = a_k + b (t - t_m) + c (t - t_m)^2
 
 goes through those, b the rate error in the middle of the recording, with an a_k for each run k of pairs: one ends
-where a clock began anew, and where the bus was silent, since a bridge may have been reset then. A group's least delay
+where a clock restarted, and where the bus was silent, since a bridge may have been reset then. A group's least delay
 varies as the distance of its two least delays does (Renyi's spacings), or as the residuals do where these are larger.
 
 Only replies to requests serve, made at times that are not in step with anything: data that a bridge sends by itself
@@ -34,10 +34,11 @@ GROUPS, LEAST_IN_GROUP, ITERATIONS = 6, 3, 6
 MAX_RATE_ERROR = 0.03
 # Delays scatter by at least the time between two reads of its line by a bridge.
 LEAST_SCATTER_S = 20e-6
-# A clock began anew if host - bus moves by more than this and what the rate may be off.
+# A clock restarted if host - bus moves by more than this and what the rate may be off.
 LEAP_S = 0.5
 ADAPTER_DELAY_S = 0.05
-# A silence is longer than both this time and so many usual intervals of pairs. A lost bridge is given up after 0.25 s.
+# A silence is longer than both this time and this many usual intervals of pairs. A lost bridge is given up after
+# 0.25 s.
 SILENCE_S, SILENCE_INTERVALS = 0.2, 4.0
 # Pairs kept of a stream of days, and the growth of their number until the next estimate of the rate.
 MAX_PAIRS, REFIT_GROWTH = 20_000, 1.1

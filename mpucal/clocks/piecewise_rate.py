@@ -16,7 +16,7 @@ from . import UNIFORM
 
 # A break must explain this many times the residual variance. Chance alone, over all places, stays below 30.
 LEAST_BREAK_RATIO = 100.0
-# Two slopes differ if they do by so many standard deviations.
+# Two slopes are different if they differ by this many standard deviations.
 DIFFERENT_SLOPE_STDS = 8.0
 # Points on either side of a break, and time [s].
 LEAST_POINTS, LEAST_S = 20, 2.0

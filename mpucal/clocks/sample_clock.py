@@ -1,7 +1,7 @@
 """Sample clock: the time of each sample, by regression of the sample index on the bus's clock.
 
 The chip samples with a clock of its own, up to 1 % off. Only the number of samples that it had taken by the time of
-each look is known. A look at `taken` samples finds the newest half an interval old on average, so
+each observation is known. An observation at `taken` samples finds the newest half an interval old on average, so
 
     taken_j - 1/2 = rate (t_j - t_0),        t_i = t_0 + i / rate,
 
@@ -55,7 +55,7 @@ def poll_phase(n: int) -> float:
 
 @dataclass
 class _Segment:
-    """Looks at one run of samples, and sums over them: integers, so that they are exact."""
+    """Observations of one run of samples, and sums over them: integers, so that they are exact."""
 
     origin_ns: int = 0
     n: int = 0
@@ -63,14 +63,14 @@ class _Segment:
     taken: int = 0
     tt: int = 0
     t_taken: int = 0
-    looks_ns: array[int] = field(default_factory=lambda: array("q"))
-    looked: array[int] = field(default_factory=lambda: array("q"))
+    observed_ns: array[int] = field(default_factory=lambda: array("q"))
+    observed: array[int] = field(default_factory=lambda: array("q"))
 
     def add(self, t_ns: list[int], taken: list[int]) -> None:
         self.origin_ns = self.origin_ns if self.n else t_ns[0]
         t = [each - self.origin_ns for each in t_ns]
-        self.looks_ns.extend(t_ns)
-        self.looked.extend(taken)
+        self.observed_ns.extend(t_ns)
+        self.observed.extend(taken)
         self.n += len(t)
         self.t += sum(t)
         self.taken += sum(taken)
@@ -79,12 +79,12 @@ class _Segment:
 
     @property
     def t_mean_s(self) -> float:
-        """Mean time of the looks; NaN without any."""
+        """Mean time of the observations; NaN without any."""
         return self.origin_ns * NS + self.t / self.n * NS if self.n else math.nan
 
     @property
     def taken_mean(self) -> float:
-        """Mean number of samples taken at the looks; NaN without any."""
+        """Mean number of samples taken at the observations; NaN without any."""
         return self.taken / self.n if self.n else math.nan
 
     @property
@@ -99,7 +99,7 @@ class _Segment:
 
 
 class SampleClock:
-    """Times of samples in seconds of the bus's clock, refined by every look.
+    """Times of samples in seconds of the bus's clock, refined by every observation.
 
     Parameters
     ----------
@@ -126,14 +126,14 @@ class SampleClock:
         self._segments.append(_Segment())
 
     def forget(self) -> None:
-        """Forget all segments except the current one, and the single looks of that."""
+        """Forget all segments except the current one, and the single observations of that."""
         self._forgotten += len(self._segments[:-1])
         self._segments = self._segments[-1:]
         for each in self._segments:
-            del each.looks_ns[:], each.looked[:]
+            del each.observed_ns[:], each.observed[:]
 
     def add(self, t_ns: Whole, taken: Whole) -> None:
-        """Add one or more looks: at `t_ns` (n,) the chip had taken `taken` (n,) samples of the current segment."""
+        """Add observations: at `t_ns` (n,) the chip had taken `taken` (n,) samples of the current segment."""
         self._segments[-1].add(t_ns.tolist(), taken.tolist())
 
     @property
@@ -145,19 +145,19 @@ class SampleClock:
         return (product + prior * self._nominal_hz) / (spread + prior)
 
     def times_s(self, segment: Whole, index: Whole) -> Vector:
-        """Return the times (n,) of samples `index` (n,), from 0 in their `segment` (n,), which must have looks."""
+        """Return the times (n,) of samples `index` (n,), from 0 in their observed `segment` (n,)."""
         segment = segment - self._forgotten
         t_mean_s = np.array([s.t_mean_s for s in self._segments])
         taken_mean = np.array([s.taken_mean for s in self._segments])
         return np.asarray(t_mean_s[segment] + (index + 0.5 - taken_mean[segment]) / self.rate_hz, np.float64)
 
     def final(self) -> Times:
-        """Return `times_s` by all looks, with a rate for each piece of a clock whose rate changed."""
+        """Return `times_s` by all observations, with a rate for each piece of a clock whose rate changed."""
         pieces = [
             (number, line)
             for number, each in enumerate(self._segments, self._forgotten)
-            if each.looks_ns
-            for line in fit_lines(np.array(each.looks_ns) * NS, np.array(each.looked, np.float64))
+            if each.observed_ns
+            for line in fit_lines(np.array(each.observed_ns) * NS, np.array(each.observed, np.float64))
         ]
         rates_hz = merge_equal_slopes([line for _, line in pieces], self._nominal_hz, RATE_TOLERANCE)
         begins = np.array([number * SEGMENT_STRIDE + line.first for number, line in pieces])
@@ -179,7 +179,7 @@ def make_increasing(t_s: Vector, step_s: float) -> Vector:
 
 
 class PolledClock(SampleClock):
-    """Times of samples that are read one by one: each look is the read of one sample, which has its time."""
+    """Times of samples that are read one by one: each observation is the read of one sample, which has its time."""
 
     def __init__(self, nominal_hz: float) -> None:
         super().__init__(nominal_hz)
@@ -197,7 +197,7 @@ class PolledClock(SampleClock):
 
     def is_late(self, t_ns: int) -> bool:
         """Return True if samples were missed before one that is read at `t_ns`; two samples are needed for the rate."""
-        reads_ns = self._segments[-1].looks_ns
+        reads_ns = self._segments[-1].observed_ns
         known = bool(reads_ns and self._steps_and_time()[0])
         return known and t_ns - reads_ns[-1] > GAP_INTERVALS / self.rate_hz / NS
 
@@ -210,7 +210,7 @@ class PolledClock(SampleClock):
     def times_s(self, segment: Whole, index: Whole) -> Vector:
         """Return the times (n,) of samples `index` (n,), from 0 in their `segment` (n,)."""
         places = zip((segment - self._forgotten).tolist(), index.tolist(), strict=True)
-        return np.array([self._segments[at].looks_ns[i] for at, i in places]) * NS
+        return np.array([self._segments[at].observed_ns[i] for at, i in places]) * NS
 
     def final(self) -> Times:
         """Return `times_s`: later reads do not improve the times."""
@@ -218,7 +218,7 @@ class PolledClock(SampleClock):
 
     def _steps_and_time(self) -> tuple[int, int]:
         """Return the number of steps from sample to sample so far, and the ns that they took, without the gaps."""
-        reads_ns = self._segments[-1].looks_ns if self._segments else ()
+        reads_ns = self._segments[-1].observed_ns if self._segments else ()
         if not reads_ns:
             return self._past_steps, self._past_ns
         return self._past_steps + len(reads_ns) - 1, self._past_ns + reads_ns[-1] - reads_ns[0]

@@ -26,7 +26,7 @@ from .sample_clock import GAP_INTERVALS, NS, SampleClock, make_increasing
 FEWEST = 100
 # the lowest sample rate that can be calibrated
 SLOWEST_HZ = 5.0
-# times of a slow logger may be so many seconds apart; those of any sensor in milliseconds are farther apart
+# times of a slow logger may be this many seconds apart; those of any sensor in milliseconds are farther apart
 LONGEST_STEP_S = 2.0
 # periods: steps that vary by less are a clock's own
 MOST_UNEVEN = 0.1

@@ -13,7 +13,7 @@ from ..errors import RecordingError
 from .formats import find_format, written_format
 from .hints import NO_HINTS, Hints
 from .reading import limit_memory
-from .rows import Rows, Write, arrival_clock, cut_span, describe, drop_incomplete, shown_units, to_si, with_times
+from .rows import Rows, Write, arrival_clock, cut_span, drop_incomplete, shown_units, with_times
 
 
 def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
@@ -57,12 +57,10 @@ def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
         rows = found.read_rows(path, hints=hints)
     if rows.plain:
         # read before: its last samples may show the units of its first, and all stamps the clock
-        units = shown_units(found.read_rows(path, hints=hints).runs, rows.sensor)
-        clock = arrival_clock(found.read_rows(path, hints=hints).runs, rows.sensor)
-        said = rows.taken, describe(rows.name, units), clock.describe(rows.name) if clock else ""
-        taken = " ".join(filter(None, said)) or None
-        runs = with_times(rows.runs, clock) if clock else rows.runs
-        rows = replace(rows, runs=(to_si(samples, units) for samples in runs), taken=taken)
+        rows = rows.in_si(shown_units(found.read_rows(path, hints=hints).runs, rows.sensor))
+        if clock := arrival_clock(found.read_rows(path, hints=hints).runs, rows.sensor):
+            taken = " ".join(filter(None, (rows.taken, clock.describe(rows.name))))
+            rows = replace(rows, runs=with_times(rows.runs, clock), taken=taken)
     return rows if hints.span is None else replace(rows, runs=cut_span(rows.runs, hints.span, rows.name))
 
 

@@ -25,7 +25,7 @@ from ._text import lines, numbers
 from .hints import ROLES
 from .reading import LONGEST_LINE
 from .rows import Rows, Write, check_runs
-from .tables.names import COLDEST_C, WARMEST_C, Column, ignored_sensors, parse_header
+from .tables.names import Column, ignored_sensors, parse_header, plausible_celsius
 from .tables.text import decode_text, read_table
 from .tables.times import GAP_S, go_on, in_order, plausible_utc_ns
 
@@ -72,22 +72,22 @@ def csv_rows(path: Path) -> Rows:
 
 
 def _go_on(runs: Iterator[Samples], interrupted: list[float]) -> Iterator[Samples]:
-    """Yield the runs with times that continue where a logger began anew, and add when it did to `interrupted`.
+    """Yield the runs with times that continue where a logger restarted, and add when it did to `interrupted`.
 
     A sample that came late gets a time between its neighbours'.
     """
     count, back, last, end, shift = 0, 0, -np.inf, -np.inf, 0.0
     for samples in runs:
         back += int(np.count_nonzero(np.diff(samples.t, prepend=last) < 0.0))
-        t, anew = go_on(samples.t, last)
+        t, restarts = go_on(samples.t, last)
         count, last, t = count + len(t), float(samples.t[-1]), t + shift
         shift = float(t[-1]) - last
         t = in_order(t, np.arange(len(t)), end) if back and np.isfinite(t).all() else t
         end = float(t[-1])
-        before = np.append(t[:1] - GAP_S, t[:-1])[anew]
+        before = np.append(t[:1] - GAP_S, t[:-1])[restarts]
         interrupted += before.tolist()
         # other times are in no order
-        yield replace(samples, t=t, gap=samples.gap | anew) if back * FEWEST <= count else samples
+        yield replace(samples, t=t, gap=samples.gap | restarts) if back * FEWEST <= count else samples
 
 
 def _utc_ns(header: list[str], second: bytes) -> int | None:
@@ -128,7 +128,7 @@ def _parse_slowly(block: bytes, path: Path, header: list[str], places: dict[str,
 
     Raises
     ------
-    RecordingError : too many cells are not numbers; the message names a line, of which so many are `above` the block.
+    RecordingError : too many cells are not numbers; the message names a line; `above` lines are before the block.
     """
     table = read_table(decode_text(block, path.name), str(path), header, 0, ",")
     table = replace(table, lines=[above + line for line in table.lines])
@@ -158,9 +158,9 @@ def _samples(values: Vector, sure: bool) -> Samples:
     n = len(values)
     warm = np.full(n, np.nan)
     if values.shape[1] > len(ROLES):
-        # under another name than temperature_c it may be counts or Kelvin
         given = values[:, len(ROLES)]
-        warm = np.where(sure | (given > COLDEST_C) & (given < WARMEST_C), given, np.nan)
+        known = given if sure else plausible_celsius(given)
+        warm = warm if known is None else known
     no = np.zeros(n, bool)
     return Samples(values[:, 0], values[:, 1:4], values[:, 4:7], warm, no, no, no)
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import reading
 from ..data import Recording, Samples
 from ..errors import RecordingError
-from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
+from ..result.session_files import DOCUMENT, captures_in
 from . import formats
 from .hints import NO_HINTS, Hints, parse_columns
 from .rows import Rows
@@ -27,7 +27,7 @@ from .tables.times import GAP_S
 # what is said of a recording whose columns have no names
 GUESSED = re.compile(r"(?P<unit>accelerations in [^(,;]+).*guessed from [a-z ]+: --columns (?P<order>[\w,-]+)")
 # of files that may be such recordings
-SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet", ".json", ".jsonl")
+SUFFIXES = (*formats.TABLES.split(), ".npz", ".jsonl")
 MOST_FILES = 500
 
 
@@ -136,9 +136,8 @@ def _read_alike(files: list[Path], read: dict[str, Recording], hints: Hints) -> 
 
 def _recordings(path: Path) -> list[Path]:
     files = sorted(child for child in path.iterdir() if child.is_file())
-    names = {file.name for file in files}
-    if names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(files) > MOST_FILES:
+    if captures_in(path) or (path / DOCUMENT.name).exists() or len(files) > MOST_FILES:
         return []
-    sides = tables_of_sides(names)
+    sides = tables_of_sides(file.name for file in files)
     found = [file for file in files if file.name in sides or (not sides and file.suffix.lower() in SUFFIXES)]
     return [file for file in found if formats.recognise(file) is not None]

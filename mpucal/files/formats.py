@@ -95,6 +95,7 @@ def _function(name: str) -> Any:
 
 PACKED = ".zip .gz"
 _TEXTS = ".csv .txt .log .tsv"
+TABLES = f"{_TEXTS} .mat .npy .json .parquet"
 _BAG: dict[str, Any] = {"load": ".ros:load_bag", "rows": ".ros:bag_rows", "hinted": True}
 _ARRAYS: dict[str, Any] = {"load": ".arrays:load_arrays", "hinted": True}
 _PAIR: dict[str, Any] = {"load": ".tables.phone:load_tables", "hinted": True}
@@ -109,7 +110,7 @@ FORMATS = (
     Format(".ulg", "a log of PX4", ".ulog:load_ulog", hinted=True),
     Format(".db3", "a bag of ROS 2", **_BAG),
     Format(".bag", "a bag of ROS 1", **_BAG),
-    Format(f"{_TEXTS} .mat .npy .json .parquet", "a phone's tables", recognises=".tables.phone:is_of_pair", **_PAIR),
+    Format(TABLES, "a phone's tables", recognises=".tables.phone:is_of_pair", **_PAIR),
     Format(".npz", "another program's archive of NumPy", recognises=".arrays:is_of_others", **_ARRAYS),
     Format(".npy", "an array of NumPy", **_ARRAYS),
     Format(".mat", "a file of MATLAB", **_ARRAYS),

@@ -24,7 +24,7 @@ from ..disk.atomic import atomic_file
 from ..errors import RecordingError
 from ..strict_json import parse_json
 from .reading import DAMAGED_ZIP, check_size, whole
-from .rows import Rows, Write, check_runs, describe, make_recording, shown_units, to_si
+from .rows import Rows, Write, check_runs, make_recording, shown_units
 from .tables.times import plausible_utc_ns
 
 NEEDED = ("t", "acc", "gyr")
@@ -61,11 +61,10 @@ def npz_rows(path: Path) -> Rows:
     sensor, flat = _sensor(arrays, path), _flat(arrays, path)
     whole = make_recording(**columns, temperature_c=warm, flat=flat, sensor=sensor, name=path.name)
     units, utc_ns = shown_units([whole], sensor), np.asarray(arrays.get(UTC, np.nan))
-    rows = Rows.of(to_si(whole, units), str(arrays.get(DONE, "")))
+    rows = Rows.of(whole, str(arrays.get(DONE, ""))).in_si(units)
     return replace(
         rows,
         runs=check_runs(rows.runs, path.name),
-        taken=" ".join(filter(None, (whole.taken, describe(path.name, units)))) or None,
         interrupted=interrupted,
         utc_ns=plausible_utc_ns(int(utc_ns)) if utc_ns.shape == () and utc_ns.dtype.kind in "iu" else None,
     )

@@ -1,6 +1,6 @@
 """Protocol Buffers' wire format, as far as a capture needs it: arrays from packed integers, and back.
 
-A field is a key, `number << 3 | wire type`, and a varint (type 0) or a length and so many bytes (type 2). A varint has
+A field is a key, `number << 3 | wire type`, and a varint (type 0) or a length and as many bytes (type 2). A varint has
 seven bits per byte, the lowest first; the eighth bit is set in all bytes but the last. Signed integers (sint) are
 zigzag: 0, -1, 1, -2. `packed.cpp` packs and unpacks them.
 

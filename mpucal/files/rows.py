@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -70,12 +70,17 @@ class Rows:
         known = {key: getattr(self, key) for key in ("autopilot", "recovered", "utc_ns")}
         return replace(whole, **known, interrupted=tuple(self.interrupted))
 
+    def in_si(self, units: Mapping[str, str]) -> Self:
+        """Return the rows with samples in SI units that were in `units`, and a sentence on those."""
+        taken = " ".join(filter(None, (self.taken, describe(self.name, units)))) or None
+        return replace(self, runs=(to_si(samples, units) for samples in self.runs), taken=taken)
+
     def notes(self) -> list[str]:
         """Return sentences on the samples, when the runs have been read."""
         said = [f"{describe_done(self.name, self.done)}."] if self.done else []
         if self.plain and self.interrupted:
             said += [
-                f"{self.name}: its times begin anew {how_often(len(self.interrupted))}, and go on there after a gap."
+                f"{self.name}: its times restart {how_often(len(self.interrupted))}, and continue there after a gap."
             ]
         return said
 

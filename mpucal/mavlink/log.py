@@ -38,7 +38,7 @@ class Log:
     Parameters
     ----------
     over_reboots : join the parts before and after a reboot; otherwise the longest is taken, as an autopilot estimates
-        its gyroscope's bias anew at each start.
+        its gyroscope's bias again at each start.
 
     Attributes
     ----------

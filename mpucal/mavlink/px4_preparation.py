@@ -45,7 +45,7 @@ class Preparation:
         if not self._has_ids():
             self._assign_ids()
         if read_parameters(self._link, (AUTOCAL,)).get(AUTOCAL):
-            # Noted before it is set: if the answer is lost, it may be 0 all the same.
+            # Noted before it is set: if the answer is lost, it may be 0 nevertheless.
             self._paused = True
             set_parameter(self._link, AUTOCAL, 0, INT32)
             self._say(f"{AUTOCAL} is 0 during the session, and 1 again after it: PX4 learns no offsets meanwhile.")

@@ -25,7 +25,7 @@ SILENT_NS = 4 * S
 # A reboot takes less, and so do most losses of a link.
 BACK_NS = 30 * S
 LOOK_NS = S
-# The operator is told of a loss of this share, once so many packets were sent.
+# A loss of this share is reported to the operator, once this many packets were sent.
 LOSS_SHARE, LOSS_AFTER = 0.05, 2000
 
 
@@ -114,7 +114,7 @@ class VehicleSource:
 
         Raises
         ------
-        EndOfCapture : a replay holds no more. LinkError : the vehicle fell silent for good, or the link broke.
+        EndOfCapture : a replay holds no more. LinkError : the vehicle stays silent, or the link broke.
         """
         if self._pause_ns:
             self._say(f"Reading paused for {self._pause_ns / S:.0f} s (process or computer suspended).")

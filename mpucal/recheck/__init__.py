@@ -36,7 +36,7 @@ NEAR_LOG_ODDS = 3.0
 LEAST_P_VALUE = 1e-6
 VERDICTS = {"mount": REMOUNTED, "another sensor": ANOTHER_SENSOR}
 REPEAT = "lay the board flat for 10 s, then hold it for 2 s in three orientations 20 deg or more apart"
-CALIBRATE_AGAIN = "calibrate it anew, with `mpucal session`"
+CALIBRATE_AGAIN = "calibrate it again, with `mpucal session`"
 
 
 def check(calibration: Calibration, recording: Recording, days: float | None = None) -> CheckResult:

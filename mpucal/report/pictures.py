@@ -33,13 +33,14 @@ COVERAGE = (
 
 def gallery(track: Track) -> Mapping[str, str]:
     """Return the figures by name; empty if the recording lacks the data."""
+    fastest_dps = float(np.degrees(np.abs(track.recording.gyr).max()))
     drawn = {
         "residuals": (residuals(track), RESIDUALS),
         "magnitude": (magnitude(track), MAGNITUDE),
         "sphere": (sphere(track), SPHERE),
         "innovations": (innovations(track), _about_innovations(track)),
         "coverage": (coverage(track), COVERAGE),
-        "rates": (rates(track), _about_rates(track)),
+        "rates": (rates(track), f"Fastest: {fastest_dps:.0f} deg/s. Rates beyond the range are clipped."),
         "temperature": (temperature(track), ""),
     }
     origin = track.calibration.sensor.origin
@@ -61,11 +62,6 @@ def _about_innovations(track: Track) -> str:
         f"{' and '.join(rms)} for each axis. At rest it should be noise around zero; while the board moves it is "
         "mostly the acceleration of the hand."
     )
-
-
-def _about_rates(track: Track) -> str:
-    fastest = float(np.degrees(np.abs(track.recording.gyr).max()))
-    return f"Fastest: {fastest:.0f} deg/s. Rates beyond the range are clipped."
 
 
 def residuals(track: Track) -> str:

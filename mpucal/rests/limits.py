@@ -38,7 +38,7 @@ class Limits:
     gyro_step, acc_step : distance of its means from those of the rest before it, beyond its spread.
     gyro_mean : mean rate less the gyroscope's bias, where that is known [rad/s]: a turn at a constant rate has no
         spread, only a mean.
-    vibration : a window whose variance is less than so many times that of its noise vibrates, and is not moved.
+    vibration : a window whose variance is less than this many times that of its noise vibrates, and is not moved.
     """
 
     gyro_sd: float

@@ -126,7 +126,7 @@ def like_chip(chip: str | None) -> str:
 
 
 def limit_of(count: int, freedom: float = math.inf) -> float:
-    """Return the limit of |z| of each of so many numbers, by Šidák's correction, so that CONFIDENCE holds for all.
+    """Return the limit of |z| of each of this many numbers, by Šidák's correction, so that CONFIDENCE holds for all.
 
     freedom : degrees of freedom of the standard deviations, for Student's t.
     """

@@ -142,8 +142,6 @@ AIMS: Mapping[str, Aim] = {
 SIDES: Vector = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 1)], np.float64)
 SIDES /= np.linalg.norm(SIDES, axis=1, keepdims=True)
 VERIFY_GOOD = 1
-# A vehicle's parameters hold no angles between the axes: they need only be known well enough for the biases.
-STRICTER, LOOSER = 0.7, 6.0
 
 
 def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
@@ -152,7 +150,8 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     if sensor is None or sensor.origin is not Origin.VEHICLE:
         return aim
     of_board = aim.target
-    std = Target(of_board.gain_pct, of_board.misalignment_deg * LOOSER, of_board.bias_mg * STRICTER)
+    # Its parameters hold no angles between the axes: they need only be known well enough for the biases.
+    std = Target(of_board.gain_pct, 6.0 * of_board.misalignment_deg, 0.7 * of_board.bias_mg)
     aim = replace(aim, target=std, flat_s=SHORTEST_FLAT_S, by_sides=True)
     # The best target may take a board's time.
     return aim if target == BEST else replace(aim, least=len(SIDES), verify=VERIFY_GOOD)

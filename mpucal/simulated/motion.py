@@ -29,7 +29,7 @@ from .legs import STEP_HZ, STEP_S, Leg, steps
 AHEAD_S = 0.9 * REACTION_S[0]
 
 SINES = 12
-# A sum of sines is computed for so many steps at once, whose phases differ from those of the first by fixed angles.
+# A sum of sines is computed for this many steps at once, whose phases differ from those of the first by fixed angles.
 BLOCK = 128
 
 

@@ -38,7 +38,7 @@ from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.lay_flat import STAND, put_down
 from ..sinks.kind import Applied, Confirm, Device, Say, Sink, decline
-from ..sinks.old_state import interrupting, nothing_written
+from ..sinks.old_state import check_accepted, interrupting, nothing_written
 from ..sinks.table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 from .source import OpenedVehicle
 
@@ -175,6 +175,7 @@ class AutopilotSink(Sink):
     def write(self, calibration: Calibration) -> Applied:
         """Set each parameter, read all back, and verify their effect in the streams; see Sink."""
         # One that may not be written is refused before the vehicle is asked for anything.
+        check_accepted(calibration)
         plan_changes(calibration, self._firmware)
         calibration = self._turned(calibration)
         possible = plan_changes(calibration, self._firmware)
@@ -362,9 +363,7 @@ def _level_clause(level: Level, words: str) -> str:
     listed = " and ".join(f"{name} from {old:.2f} to {new:.2f} deg" for name, old, new in changes)
     doubt = ""
     if np.abs(level.wanted_deg[:2]).max() > MOST_DEG:
-        doubt = (
-            ", more than a board is mounted askew: check what it calls level, and calibrate its level before it flies"
-        )
+        doubt = ", a large tilt for a board: check what it calls level, and calibrate its level before it flies"
     return f"{words} ({listed}, read back){doubt}"
 
 

@@ -64,7 +64,7 @@ def test_samples_after_spoiled_bytes_are_true_and_gaps_are_marked(rig, stream, t
 @settings(max_examples=4)
 @given(after_ms=st.integers(0, 900), boot_ms=st.sampled_from([0, 300, 2000]), rate_hz=st.sampled_from([200, 1000]))
 def test_a_reset_of_the_bridge_is_one_gap(started, stream, after_ms, boot_ms, rate_hz):
-    """The bridge's clock begins anew; the chip continues."""
+    """The bridge's clock restarts; the chip continues."""
     made, driver = started(rate_hz=rate_hz)
     stream(driver, 0.2 + after_ms * 1e-3)
     ahead_ns = driver.now_ns() - made.clock.now()

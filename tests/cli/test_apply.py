@@ -139,7 +139,7 @@ def test_a_table_whose_times_begin_anew_is_applied_to(mpucal, save, session, cal
     t = recording.t - np.where(np.arange(len(recording)) < half, recording.t[0], recording.t[half])
     save(replace(recording, t=t, utc_ns=None), "in.csv")
     done = mpucal("apply", "c.json", "in.csv", "-o", "out.csv")
-    assert (done.code, "its times begin anew once" in done.err) == (0, True), done.err
+    assert (done.code, "its times restart once" in done.err) == (0, True), done.err
     read, out = load("in.csv"), load("out.csv")
     np.testing.assert_array_equal(read.t, out.t)
     np.testing.assert_allclose(out.acc, formula(recording)[0], atol=1e-12)

@@ -157,7 +157,9 @@ def test_lines_by_turns_that_nothing_names(name, walk, assert_same, tmp_path):
     """Refuse them, under our own names of columns, too; the option in the message reads the first."""
     path = tmp_path / "boards.csv"
     path.write_text(f"{name},{AXES}\n" + lines_of_two(walk, lambda _, of, t: f"{t!r},{','.join(map(repr, of))}\n"))
-    with pytest.raises(RecordingError, match=r"of 2 sensors by turns, .* choose one with --sensor 1 or 2") as refused:
+    with pytest.raises(
+        RecordingError, match=r"2 sensors that take turns, .* choose one with --sensor 1 or 2"
+    ) as refused:
         mpucal.load(path)
     assert refused.value.options == "--sensor 1"
     assert_same(mpucal.load(path, sensor="1"), walk, 1e-9, 1e-9, 1e-9)

@@ -1075,7 +1075,7 @@ def test_times_that_restart_are_an_interruption(name, walk, walk_ns, tmp_path):
     t[half + 200] -= 0.02
     path.write_text(f"{name},{AXES}" + lines(",", "t a w", replace(walk, t=t), walk_ns))
     found = mpucal.load(path, units="acc=m/s^2,gyr=rad/s" if name == "time" else "")
-    assert ("its times begin anew once" if name == "t" else "times in s, which begin anew once,") in found.taken
+    assert ("its times restart once" if name == "t" else "times in s, which restart once,") in found.taken
     np.testing.assert_array_equal(found.acc, walk.acc)
     assert np.flatnonzero(found.gap).tolist() == [half]
     assert np.diff(found.t)[half - 1] == pytest.approx(15.0, abs=0.02)
@@ -1185,7 +1185,7 @@ def test_times_that_begin_anew_are_no_part_of_a_sensor(walk, tmp_path):
     np.savetxt(path, rows, "%.9e", ",")
     order = f"t,{AXES.strip()}"
     assert refused(path).options == f"--columns {order}"
-    assert "begin anew once" in mpucal.load(path, columns=order).taken
+    assert "restart once" in mpucal.load(path, columns=order).taken
     path.write_text(path.read_text().replace("e+18,", "e+18,torn", 30))
     with pytest.raises(RecordingError, match=r"line 1: column 2 is 'torn.*', which is not a number"):
         mpucal.load(path)

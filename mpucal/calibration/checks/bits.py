@@ -53,7 +53,7 @@ def _stuck(e: Evidence, words: Words | None, sensor: str, unit: str, most: float
         return None
     stuck, first = _stuck_bits(words.counts, e.recording.gap)
     low = _low_bits(stuck, first, words.lsb)
-    # a single bit is told from one that lacks, among the low ones, all below it
+    # a single bit differs from one that lacks, among the low ones, all below it
     one = np.argwhere(stuck & ~np.logical_and.accumulate(stuck, axis=0))
     if low is None and len(one):
         bit, axis = map(int, one[-1])

@@ -61,7 +61,7 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
         unit, said = f"a unit about {e.gravity / acc:.4g} times as large", "UNIT"
         return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=unit, said=said)
     if 0.9 * e.gravity < acc / e.gravity < 1.1 * e.gravity:
-        unit, said = "m/s^2, and to have been converted from g all the same", "m/s^2"
+        unit, said = "m/s^2, and to have been converted from g nevertheless", "m/s^2"
         return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=unit, said=said)
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
     return reason(
@@ -79,7 +79,7 @@ def same_magnitude(e: Evidence) -> Reason | None:
 
 
 def two_sensors(e: Evidence) -> Reason | None:
-    """Find readings of two sensors by turns: every other one differs by the same amount all along the rest."""
+    """Find readings of two sensors that take turns: every other one differs by the same amount all along the rest."""
     readings = np.hstack([e.recording.acc, e.recording.gyr])[e.rest.first : e.rest.last]
     size = len(readings) // (2 * FEWEST_SAMPLES)
     if not size:

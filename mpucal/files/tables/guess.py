@@ -90,7 +90,7 @@ def likely_columns(of: Columns, clocks: Sequence[int], arrays: Mapping[int, str]
     arrays : place -> the array of which it is a column; a triple is of one.
     """
     increasing = [place for place, column in of.items() if increases(column) and _advances(column)]
-    clocks = clocks or [place for place in increasing if is_even_clock(of[place]) or _begins_anew(of[place])]
+    clocks = clocks or [place for place in increasing if is_even_clock(of[place]) or _restarts(of[place])]
     places = [place for place in of if place not in {*clocks, *increasing}]
     vary = [place for place in places if np.ptp(of[place]) > 0.0]
     # other columns may be before theirs, such as a label that never changes
@@ -211,11 +211,11 @@ def _advances(column: Vector) -> bool:
 
 
 def increases(column: Vector) -> bool:
-    """Return True if (n,) numbers are a clock's, which may begin anew: they hardly ever decrease."""
+    """Return True if (n,) numbers are a clock's, which may restart: they hardly ever decrease."""
     return sample_period(column) > 0.0 and not are_many(int(np.count_nonzero(np.diff(column) < 0)), column[1:])
 
 
-def _begins_anew(column: Vector) -> bool:
+def _restarts(column: Vector) -> bool:
     """Return True if (n,) numbers of a clock, by their step, are those of several recordings."""
     return bool((np.diff(column) < 0).any() and units.time_unit(sample_period(column)))
 

@@ -229,7 +229,7 @@ def _oldest_first(table: Table) -> Table:
         return table
     # the part of the file that was read may end within a line
     some = np.isin(np.arange(len(table)), np.linspace(0, len(table) - 2, LOOKED_AT).astype(int))
-    # damaged times are told where all are read
+    # damaged times are reported where all are read
     with suppress(RecordingError):
         clocks, whole = table.clocks(table.columns), np.ones(len(table), bool)
         steps = [np.diff(table.part(some).times(clock, whole[some])[0]) for clock in clocks]

@@ -25,26 +25,26 @@ from ...arguments import reading
 from ...clocks import S
 from ...data import Recording
 from ...errors import RecordingError
-from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
+from ...result.session_files import captures_in
 from ..array_files import holds_arrays, read_arrays
+from ..formats import TABLES
 from ..hints import NO_HINTS, Hints
 from ..reading import MEMORY_PER_TEXT, check_size, first_bytes
 from .array_table import table_of_arrays
 from .columns import columns_by_hint
-from .load import FLIPPED, find_any_table, with_sensor_of_file
-from .names import ACC, GYR, HYPHEN, TIME, first_triple, names_both, with_sensor
+from .load import FLIPPED, find_any_table, is_table_of_sensors, with_sensor_of_file
+from .names import ACC, GYR, HYPHEN, TIME, first_triple, with_sensor
 from .sensor import sensor_stream
 from .shown_units import acceleration_unit, seem_counts
 from .streams import join_streams
 from .table import Table
-from .text import decode_text, find_named_table
+from .text import decode_text
 from .times import Stream, how_often
 
 # names of a sensor's tables, the one nearest to the sensor's own output first
 _OF_ACC = "accelerometeruncalibrated accelerometer acceleration totalacceleration acc accel acce accm alpha"
 _OF_GYR = "gyroscopeuncalibrated gyroscope gyro gyr gyrm rotationrate angularvelocity omega"
 NAMES = {ACC: _OF_ACC.split(), GYR: _OF_GYR.split()}
-SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".mat", ".npy", ".json", ".parquet")
 # letters of the longest of the words that are no app's
 SHORT = len("accel")
 METADATA, TIMES_OF_DAY = "metadata.csv", "meta/time.csv"
@@ -56,7 +56,7 @@ SIDE = re.compile(r"(?<![a-z])(?:[xyz]|up|down|left|right|top|bottom|front|back|
 def is_folder(path: Path) -> bool:
     """Return True if a folder holds a table of an accelerometer and one of a gyroscope, and no session."""
     names = {child.name for child in path.iterdir()}
-    return bool(_pairs(names)) and not tables_of_sides(names) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
+    return bool(_pairs(names)) and not tables_of_sides(names) and not captures_in(path)
 
 
 def tables_of_sides(names: Iterable[str]) -> list[str]:
@@ -74,10 +74,9 @@ def is_of_pair(path: Path) -> bool:
         if found is None or {of.quantity for of in beside if of and of.rest == found.rest} != {ACC, GYR}:
             return False
         text = "" if holds_arrays(path) else decode_text(first_bytes(path), path.name)
-        table = find_named_table(text, path.name)
+        return not is_table_of_sensors(text, path.name)
     except (OSError, RecordingError):
         return False
-    return table is None or not names_both(table.columns)
 
 
 def load_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -131,7 +130,7 @@ class _Member(NamedTuple):
 def _parse(name: str) -> _Member | None:
     """Return the table of that name; None for other files."""
     path = Path(name)
-    if path.suffix.lower() not in (*SUFFIXES, OF_FILE) or "meta" in path.parts[:-1] or path.name.startswith("."):
+    if path.suffix.lower() not in (*TABLES.split(), OF_FILE) or "meta" in path.parts[:-1] or path.name.startswith("."):
         return None
     stem = re.sub(HYPHEN, "-", path.stem)
     words = re.findall("[a-z]+", re.sub("(?<=[a-z])(?=[A-Z])", " ", stem).lower())
@@ -166,7 +165,7 @@ def _recording(
     def stream_of(quantity: str) -> tuple[str, Stream]:
         """Return the first table that can be read, of an accelerometer with gravity if there is one."""
         found: list[tuple[str, Stream]] = []
-        # beside accel.csv, gyro.csv is rather meant than gyroscope.csv
+        # gyro.csv is more likely the partner of accel.csv than gyroscope.csv is
         alike = sorted(pair, key=lambda member: wanted != "" and member.is_short != chosen.is_short)
         members = [member.name for member in alike if member.quantity == quantity]
         for member in members:

@@ -230,7 +230,7 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
 
 
 def of_one_turn(table: Table, acc: Sequence[Column], sensor: str | None) -> Table:
-    """Return the lines of one sensor, if several take turns that no column tells apart; else the same table.
+    """Return the lines of one sensor, if several take turns, and no column names them; else the same table.
 
     Raises
     ------
@@ -240,7 +240,7 @@ def of_one_turn(table: Table, acc: Sequence[Column], sensor: str | None) -> Tabl
     if count > 1:
         numbers = [str(number) for number in range(1, count + 1)]
         if sensor is None:
-            what = f"{table.name}: its lines are of {count} sensors by turns, and nothing names them"
+            what = f"{table.name}: its lines are of {count} sensors that take turns, and nothing names them"
             remedy = f"choose one with --sensor {' or '.join(numbers)}, by its place among them"
             raise RecordingError(what, remedy, f"--sensor {numbers[0]}")
         chosen = int(_choose(numbers, sensor, table.name))
@@ -307,7 +307,7 @@ def _take_turns(table: Table, place: int, sensors: NDArray[np.int_]) -> bool:
 
 def _come_together(table: Table, sensors: NDArray[np.int_]) -> bool:
     """Return True if the lines of all `sensors` (n,) come soon one after the other, and then no line for longer."""
-    # damaged times are told where they are read
+    # damaged times are reported where they are read
     with suppress(RecordingError):
         for clock in table.clocks(table.columns)[:1]:
             steps = np.diff(table.times(clock, np.ones(len(table), bool))[0])

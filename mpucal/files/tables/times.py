@@ -20,8 +20,8 @@ from .units import DAYS, QUANTITIES, resolve_unit
 
 # s between two files, or parts of one, without a common clock: longer than the gaps that a bus leaves
 GAP_S = 15.0
-# s by which times go back where a logger began anew; a sample that was merely delayed is less late
-ANEW_S = 1.0
+# s by which times go back where a logger restarted; a sample that was merely delayed is less late
+RESTART_S = 1.0
 # of counters of ms or us in a microcontroller, and the most usual steps from before an overflow to after it
 COUNTER_BITS, OVERFLOW_STEPS = (16, 32), 100.0
 # ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
@@ -119,24 +119,24 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}", likely=step > 0.0)
     t, said = ticks * QUANTITIES["t"][unit], f"times in {unit}"
     back, (on, begins) = np.flatnonzero(np.diff(t) < 0) + 1, go_on(t)
-    anew = np.flatnonzero(begins)
+    restarts = np.flatnonzero(begins)
     alike = stream.origin == first.origin and np.array_equal(stream.ticks, first.ticks)
-    if len(back) * FEWEST > len(t) or (len(anew) and not alike):
+    if len(back) * FEWEST > len(t) or (len(restarts) and not alike):
         at = int(back[0])
         raise RecordingError(
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
     said += ", summed from the steps between samples" if stream.summed else ""
-    said += f", which begin anew {how_often(len(anew))}" if len(anew) else ""
+    said += f", which restart {how_often(len(restarts))}" if len(restarts) else ""
     said += f", whose counter overflows {how_often(wraps)}" if wraps else ""
     on = in_order(on, stream.number)
-    parts = np.split(np.arange(len(on)), anew)
+    parts = np.split(np.arange(len(on)), restarts)
     return join_clocks([fit_clock(on[part], stream.number[part]) for part in parts]), said
 
 
 def go_on(t: Vector, last: float = -math.inf) -> tuple[Vector, Mask]:
-    """Return times (n,) that go on after a gap where they begin anew, and True where they do.
+    """Return times (n,) that continue after a gap where they restart, and True where they do.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def go_on(t: Vector, last: float = -math.inf) -> tuple[Vector, Mask]:
     """
     steps = np.diff(t, prepend=last)
     # after a single damaged time, the next goes on
-    begins = np.asarray((steps < -ANEW_S) & (np.append(t[1:], -math.inf) < t - steps))
+    begins = np.asarray((steps < -RESTART_S) & (np.append(t[1:], -math.inf) < t - steps))
     return t + np.cumsum(np.where(begins, GAP_S - steps, 0.0)), begins
 
 

@@ -11,7 +11,7 @@ from ..dialect import Message
 from ..firmwares import EKF2_IMU_CTRL, FILTERS, PX4
 from ..link import Link
 from ..requests import ask
-from .encoding import REAL32, as_float32, decode_parameter, error_name, name_bytes, to_wire
+from .encoding import ERRORS, REAL32, as_float32, decode_parameter, name_bytes, to_wire
 from .mounting import BOARD_ANGLES, BOARD_ROTATION, CUSTOM_ANGLES, ORIENTATION
 from .slots import all_slots
 
@@ -99,7 +99,7 @@ def set_parameter(link: Link, name: str, value: float, kind: int = REAL32) -> No
     def refusal(received: Message) -> str | None:
         """Return the reason of a refusal, "" of a confirmation; ArduPilot echoes earlier values before it."""
         if received.get_type() == "PARAM_ERROR" and received.param_id == name:
-            return error_name(received.error)
+            return ERRORS.get(received.error, f"error {received.error}")
         parameter = decode_parameter(received, bytewise)
         return "" if parameter is not None and (parameter.name, parameter.value) == (name, wanted) else None
 

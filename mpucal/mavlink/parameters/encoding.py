@@ -108,11 +108,6 @@ def name_bytes(name: str) -> bytes:
     return name.encode("ascii")[:16]
 
 
-def error_name(number: int) -> str:
-    """Return the meaning of a MAV_PARAM_ERROR in words."""
-    return ERRORS.get(number, f"error {number}")
-
-
 def parameters_text(
     firmware: str,
     values: Mapping[str, float],

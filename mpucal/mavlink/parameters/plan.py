@@ -73,11 +73,8 @@ def plan_changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
 
     Raises
     ------
-    WriteBackError : the calibration is refused, of no vehicle, of another firmware, or beyond the firmware's limits.
+    WriteBackError : the calibration is of no vehicle, of another firmware, or beyond the firmware's limits.
     """
-    # A config blob has no verdict; a refused calibration has no blob.
-    if calibration.quality.get("verdict") == REFUSED:
-        raise WriteBackError(f"{NOTHING}: the calibration was refused", "repeat the session")
     of_first = calibration.extra.get(AUTOPILOT)
     if not of_first:
         raise WriteBackError(f"{NOTHING}: the calibration is of no vehicle", "give one made with --mavlink")

@@ -130,7 +130,7 @@ class ArduPilot(Firmware):
             message = self.highres_imu(t_us, np.zeros(3), np.zeros(3))
             message.temperature = 41.0  # the barometer's
             return message
-        if message_id in SCALED_IMUS[self.options.imus :] and self.options.has_fault("phantom"):
+        if message_id in SCALED_IMUS[self.options.imus :] and "phantom" in (fault.name for fault in self.options.fault):
             return self.scaled_imu(SCALED_IMUS.index(message_id), t_us, [0] * 10)
         return super().message(message_id, t_us)
 

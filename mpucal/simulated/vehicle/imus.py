@@ -57,7 +57,7 @@ class Imus:
         self._motion.hear(ReceivedPrompt(str(prompt.kind), None if down is None else to_hand_axes(down)), t_s)
 
     def restart(self) -> None:
-        """Estimate the gyroscopes' biases anew, as an autopilot does, which leaves a little of each."""
+        """Estimate the gyroscopes' biases again, as an autopilot does, which leaves a little of each."""
         for imu, true in enumerate(self.truths):
             left = self._rng.normal(0.0, GYRO_BIAS_ANEW_RAD_S, 3)
             self._responses[imu] = replace(true, b_omega=true.b_omega + left).response(self._setting)

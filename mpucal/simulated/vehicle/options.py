@@ -54,7 +54,3 @@ class VehicleOptions(SimulationOptions):
     refuse: Annotated[str | None, (str, "a parameter's name")] = None
     parameters: Mapping[str, float] = field(default_factory=dict)
     REST = "parameters"
-
-    def has_fault(self, name: str) -> bool:
-        """Return True if the options name this fault."""
-        return any(fault.name == name for fault in self.fault)

@@ -295,7 +295,7 @@ class SimulatedVehicle:
             self._send_value(name)
 
     def fall_silent(self) -> None:
-        """Stop sending and receiving for good."""
+        """Stop sending and receiving until the end."""
         self._silent_until_us = math.inf
 
     def obey_second_station(self) -> None:
