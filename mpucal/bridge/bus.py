@@ -162,7 +162,7 @@ class BridgeBus:
         # Prepared before the request: the first frames may come together with its reply.
         self._ahead = ReadAhead(self.link.seq_of(len(before)))
         try:
-            # So many frames fill one message.
+            # This many frames fill one message.
             batch = wire.MAX_READ // reg.FRAME_BYTES
             answers = self._ask(*before, wire.Stream(reg.FRAME_BYTES, batch))
         except BusError:

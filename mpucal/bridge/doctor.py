@@ -33,8 +33,8 @@ Exchange = Mapping[str, Any]
 def exchanges() -> dict[str, Exchange]:
     """Read the golden exchanges by name, as `python -m tools.make vectors` writes them.
 
-    Each names the rule that is `rule` and what it `needs` of a bridge ("chip", "stream"; "blob": an empty store).
-    Each of its `steps` holds bytes of the `host`, and the reply or replies of the `bridge`.
+    Of each, `rule` says what it tests, and `needs` the features of a bridge: chip, stream, blob (an empty store).
+    Each of its `steps` holds the bytes of the `host` and the reply or replies of the `bridge`.
     """
     golden: dict[str, Exchange] = json.loads(EXCHANGES.read_text(encoding="utf-8"))
     return golden

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from ..data import RUN, STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..result import keys
 from ..result.calibration import Calibration, unknown
+from ..result.clock import iso_utc
 from ..result.correlation import correlation_of, standard_deviations
 from .common_motion import beside_first
 from .estimation import MODELS, estimate
@@ -84,7 +84,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         "fit": _fit_document(evidence, chosen),
         "quality": judge(evidence),
         "sensor": recording.sensor,
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "created": iso_utc(),
         "noise_std": unknown(3) if flat is None else np.sqrt(flat.Sigma_a),
         "gyro_noise_std": np.sqrt(flat.Sigma_omega) if flat is not None and gyroscope_known else unknown(3),
     }

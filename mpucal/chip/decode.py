@@ -21,7 +21,7 @@ from .losses import Loss
 
 Words = tuple[int, int, int]
 
-# A poll is three accesses: count, bytes, flags. So many polls are checked together, and those after one that is not
+# A poll is three accesses: count, bytes, flags. This many polls are checked together, and those after one that is not
 # ordinary are checked again.
 ACCESSES_A_POLL, POLLS_AT_ONCE = 3, 512
 

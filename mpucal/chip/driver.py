@@ -29,7 +29,7 @@ from .setup import configure, is_configured, probe, read_identity, reset, restar
 
 DRIVER_VERSION = 6
 
-# The driver gives up after so long without a valid sample.
+# The driver gives up after this time without a valid sample.
 DEAD_NS = 2_000_000_000
 # A longer poll counts as this long: a host that slept says nothing about the chip. It is also the time-out of an
 # adapter on a bus that is held: no reply brings the time that it took.

@@ -19,8 +19,9 @@ from ..batch.row import Settings
 from ..disk.atomic import write_atomically
 from ..disk.output_folder import OutputFolder
 from ..errors import SourceError, UsageError
+from ..result.clock import duration
 from . import amended, typed_words
-from .common import PATH, PROGRESS_S, duration, output_option, say
+from .common import PATH, PROGRESS_S, output_option, say
 from .options import fit_options
 from .recording_options import hint_options, hint_words, make_hints, read_hints_file
 

@@ -30,13 +30,6 @@ def say_done(clauses: Sequence[str], err: bool = False) -> None:
     click.echo(f"Done: {told}.", err=err)
 
 
-def duration(seconds: float) -> str:
-    """Return a time in s, min or h."""
-    if seconds < 100.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.1f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
-
-
 def ask_in_doubt(question: str, yes: bool) -> None:
     """Ask about an objection; raise WriteBackError unless a person agrees: `yes` is no agreement."""
     objection = question.partition(". ")[0]

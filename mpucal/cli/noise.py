@@ -20,14 +20,14 @@ from ..errors import EndOfCapture, RecordingError, SourceError
 from ..files import open_rows
 from ..files.rows import drop_incomplete
 from ..report.noise import render, summary
-from ..result.clock import iso_utc
+from ..result.clock import duration, iso_utc
 from ..result.noise import Noise
 from ..session.boards import speak_of, usual_board
 from ..session.lay_flat import PUT_DOWN, put_down
 from ..session.ports import Source, polled
 from ..session.results import save
 from ..sources.opening import open_source
-from .common import PATH, PROGRESS_S, duration, json_option, output_option, say
+from .common import PATH, PROGRESS_S, json_option, output_option, say
 from .options import ABOVE_ZERO, given_options
 from .recording_options import given_hints, hint_options, say_interpretation
 from .source_options import check_input, check_source, source_options

@@ -26,7 +26,7 @@ from ..sources.kind import NAME
 from ..sources.opened_source import OpenedSource
 from ..sources.opening import check_resume_options, open_source
 from ..sources.table import matching_kinds
-from ..terminal.console import Console
+from ..terminal.console import Console, sentence
 from ..terminal.hangup import logging_after_hangup
 from .common import PATH, json_option, output_option, say, yes_option
 from .destination import session_sink_options, write_back
@@ -107,7 +107,7 @@ def command(
         announcements = [] if json_events else [announce_sinks(kinds, no_write), warn_unset()]
         if resume is None:
             cut_off = interrupted_writes(check_source(click.get_current_context()), options)
-            announcements += [f"{left[:1].upper()}{left[1:]}." for left in cut_off]
+            announcements += map(sentence, cut_off)
         announcement = " ".join(filter(None, announcements))
         recording, calibration, paths = _run(source, into, person, announcement, name)
         files = [into.capture, *paths]

@@ -17,6 +17,7 @@ from ..files import load
 from ..files.formats import readable_formats, recognise
 from ..files.hints import Hints
 from ..files.reading import first_bytes
+from ..mavlink.parameters.slots import all_slots
 from ..rests.flat import find_flat
 from ..result.blob import MAGIC, Blob
 from ..result.calibration import Calibration
@@ -156,10 +157,10 @@ def _device_page(facts: Mapping[str, Any]) -> str:
 
 
 def _vehicle_rows(facts: Mapping[str, Any]) -> dict[str, str]:
-    values = {name: value for name, value in facts["parameters"].items() if "OFF" in name or "SCAL" in name}
-    corrected = [name for name, value in values.items() if value != ("SCAL" in name) and not name.startswith("SENS")]
+    values, slots = facts["parameters"], all_slots(facts["firmware"])
+    corrected = [name for of in slots for name in of.names if values.get(name, name in of.scale) != (name in of.scale)]
     holds = f"a correction in {len(corrected)} parameters" if corrected else "no correction of its accelerometers"
-    return {"holds": holds, **{name: f"{value:.8g}" for name, value in facts["parameters"].items()}}
+    return {"holds": holds, **{name: f"{value:.8g}" for name, value in values.items()}}
 
 
 def _chip_rows(facts: Mapping[str, Any]) -> dict[str, str]:

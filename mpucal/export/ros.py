@@ -22,6 +22,7 @@ import numpy as np
 from ..data import Vector
 from ..errors import WriteBackError
 from ..result.calibration import Calibration
+from ..result.clock import duration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from ..result.noise import WALK as RANDOM_WALK
 from .losses import heading
@@ -84,7 +85,7 @@ def _noise_notes(calibration: Calibration) -> tuple[str, ...]:
     unsure = [
         f"{sensor}_random_walk" for sensor in (ACCELEROMETER, GYROSCOPE) if RANDOM_WALK in known[sensor]["at_most"]
     ]
-    note = f"Its noise is from a rest of {known['seconds'] / 3600.0:.2f} h."
+    note = f"Its noise is from a rest of {duration(known['seconds'])}."
     return (f"{note} Not significant, and given as upper limits: {', '.join(unsure)}." if unsure else note,)
 
 

@@ -19,7 +19,7 @@ namespace mpucal {
 static_assert(Lanes::D == 0 && Lanes::b_a == 3);
 static_assert(Lanes::b_omega % 4 == 0 && Lanes::K % 4 == 1);
 
-// Number of groups of four for so many lanes
+// Number of groups of four for this many lanes
 constexpr int groups_of(int lanes) { return (lanes + 3) / 4; }
 
 // Input series of the filter, (n,) or (n, 3) row by row; a null pointer means the value in brackets.

@@ -7,7 +7,7 @@
 namespace mpucal {
 namespace {  // each instruction set has its own copy
 
-// Lower triangle of the matrix over so many lanes, filled up to G groups
+// Lower triangle of the matrix over this many lanes, filled up to G groups
 template <int used>
 class Fisher {
   static constexpr int G = groups_of(used);

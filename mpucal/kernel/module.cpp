@@ -111,7 +111,7 @@ using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::d
 
 using Runs = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-// First and last + 1 of each run, which holds so many of n samples or more
+// First and last + 1 of each run, which holds `least` of n samples or more
 const std::int64_t* within(const Runs& runs, std::size_t n, std::int64_t least) {
   if (runs.shape(1) != 2) throw std::invalid_argument("a run is a first sample and a last + 1");
   for (std::size_t r = 0; r < runs.shape(0); ++r)
@@ -127,6 +127,14 @@ std::vector<long> make_ends(const std::optional<Indices>& given, std::size_t n) 
   if (!std::is_sorted(ends.begin(), ends.end()) || ends.empty() || ends.front() < 0 || ends.back() != static_cast<long>(n))
     throw std::invalid_argument("ends do not ascend to the number of samples");
   return ends;
+}
+
+auto optional(const char* name) { return nb::arg(name).none() = nb::none(); }
+
+template <typename Function>
+void without_gil(Function function) {
+  const nb::gil_scoped_release release;
+  function();
 }
 
 void check(int lanes) {
@@ -157,16 +165,12 @@ NB_MODULE(_kernel, m) {
         result.ends = {at.data(), static_cast<int>(k)};
         result.gradient = gradient.data();
         result.fisher = fisher.data();
-        {
-          nb::gil_scoped_release release;
-          evaluate(parameters, series, values, lanes, result);
-        }
+        without_gil([&] { evaluate(parameters, series, values, lanes, result); });
         return std::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
                                give(std::move(fisher), {k, p, p}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("lanes"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
-      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
-      nb::arg("q_extra").none() = nb::none(), nb::arg("ends").none() = nb::none(),
+      optional("r_scale"), optional("q_scale"), optional("q_extra"), optional("ends"),
       "Return V, sum of e' S^-1 e over the samples, gradient and Fisher matrix up to each of `ends`, by default the last sample "
       "(in lane order; empty for lanes = 0).");
 
@@ -191,19 +195,13 @@ NB_MODULE(_kernel, m) {
           result.gradient = gradient.data();
           result.fisher = fisher.data();
         }
-        {
-          nb::gil_scoped_release release;
-          evaluate_hand(parameters, series, values, result);
-        }
+        without_gil([&] { evaluate_hand(parameters, series, values, result); });
         return std::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
                                give(std::move(fisher), {k, p, p}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("derivatives"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
-      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
-      nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
-      nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
-      nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
-      nb::arg("force").none() = nb::none(), nb::arg("ends").none() = nb::none(),
+      optional("r_scale"), optional("q_scale"), optional("q_extra"), optional("rate"), optional("alpha"),
+      optional("r_extra"), optional("jerk"), optional("reset"), optional("force"), optional("ends"),
       "Return V, sum of squared whitened innovations, gradient and Fisher matrix of the hand's filter up to each of `ends` "
       "(in lane order; with force, groups for the columns of S follow).");
 
@@ -223,20 +221,14 @@ NB_MODULE(_kernel, m) {
         result.innovation = innovation.data();
         result.gravity = gravity.data();
         result.motion = motion.data();
-        {
-          nb::gil_scoped_release release;
-          evaluate_hand(parameters, series, values, result);
-        }
+        without_gil([&] { evaluate_hand(parameters, series, values, result); });
         const std::size_t n = series.n;
         return std::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}),
                                give(std::move(motion), {n, 3}));
       },
-      nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
-      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
-      nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
-      nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
-      nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
-      nb::arg("force").none() = nb::none(),
+      nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), optional("r_scale"),
+      optional("q_scale"), optional("q_extra"), optional("rate"), optional("alpha"), optional("r_extra"),
+      optional("jerk"), optional("reset"), optional("force"),
       "Return whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter.");
 
   m.def(
@@ -246,15 +238,12 @@ NB_MODULE(_kernel, m) {
         const Series series = make_series(y, omega, dt, r_scale, {}, {});
         const double* bias = pointer(b_omega, 3, "b_omega");
         Moments sums;
-        {
-          nb::gil_scoped_release release;
-          moments(series, bias, sums);
-        }
+        without_gil([&] { moments(series, bias, sums); });
         auto copy = [](const double* p, std::size_t n) { return std::vector<double>(p, p + n); };
         return std::make_tuple(give(copy(&sums.CC[0][0], 81), {9, 9}), give(copy(&sums.yC[0][0], 27), {3, 9}),
                                give(copy(sums.C, 9), {9}), give(copy(sums.y, 3), {3}), sums.yy, sums.n);
       },
-      nb::arg("b_omega"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), nb::arg("r_scale").none() = nb::none(),
+      nb::arg("b_omega"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), optional("r_scale"),
       "Return sums of C C', y C', C, y, y y and the count, C_t the rotation since the start.");
 
   m.def(
@@ -266,7 +255,7 @@ NB_MODULE(_kernel, m) {
         turn(pointer(phi, 3 * n, "phi"), pointer(x, 3 * n, "x"), ends, k, F.data(), sums.data());
         return std::make_tuple(give(std::move(F), {k, 3, 3}), give(std::move(sums), {k, 3, 3, 3}));
       },
-      nb::arg("phi"), nb::arg("runs"), nb::arg("x").none() = nb::none(),
+      nb::arg("phi"), nb::arg("runs"), optional("x"),
       "Return the rotation of steps phi (n, 3) in each run (k, 2), first and last + 1, and sums of unit vectors times "
       "x (n, 3), rotated from each step to the end.");
 
@@ -279,7 +268,8 @@ NB_MODULE(_kernel, m) {
         statistics(aligned(x), ends, k, mean.data(), variance.data());
         return std::make_tuple(give(std::move(mean), {k, 3}), give(std::move(variance), {k, 3}));
       },
-      nb::arg("x"), nb::arg("runs"), "Return means and variances (k, 3) of x (n, 3) over runs (k, 2), first and last + 1.");
+      nb::arg("x"), nb::arg("runs"),
+      "Return means and variances (k, 3) of x (n, 3) over runs (k, 2), first and last + 1.");
 
   m.def(
       "moving_mean",

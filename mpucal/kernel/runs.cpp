@@ -19,7 +19,7 @@ constexpr double kChord = 0.05;
 // A fourth difference has the coefficients 1, -4, 6, -4, 1, whose squares have this sum.
 constexpr double kSquares = 70.0;
 
-// A spike exceeds so much, and so many times the departures of its neighbours from theirs; its neighbours differ by less
+// A spike exceeds this much, and this many times the departures of its neighbours from theirs; its neighbours differ by less
 // than this share of it.
 constexpr double kLeastSpike[2] = {0.3, 0.15}, kSpikes = 8.0, kReturns = 0.25;  // m/s^2, rad/s
 

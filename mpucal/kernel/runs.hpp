@@ -18,7 +18,7 @@ void statistics(const double* x, const std::int64_t* runs, std::size_t count, do
 // Means (n, columns) of x (n, columns) over samples i - half..i + half, as far as they exist.
 void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_t half, double* mean);
 
-// Means and variances (3, n - size + 1) of x (n, 3) over all windows of so many samples.
+// Means and variances (3, n - size + 1) of x (n, 3) over all windows of `size` samples.
 void moving_statistics(const double* x, std::size_t n, std::size_t size, double* mean, double* variance);
 
 // Fourth differences of x (n, 3), squared, as variances (n, 3) of white noise: moving means as those above.

@@ -28,7 +28,7 @@ SEQUENCE = 256
 # which is reported as such.
 LATE = 32
 SILENCE_NS = S
-# No network has so many vehicles.
+# No network has more vehicles.
 MOST_SENDERS = 64
 # Largest number of pieces without a packet in PATIENCE_NS; more are a flood. A piece is a datagram, or as many bytes
 # of a serial line as the longest packet has. A bad link brings fewer; a line of 921,600 Bd that is read at another rate

@@ -26,7 +26,7 @@ from .segments import ALTERING, SETTLED_US, find_recorrection, join_segments
 from .stream_buffers import Row, Segment
 from .tlog import RawPacket
 
-# Firmwares make names of these characters; none has so many parameters.
+# Firmwares make names of these characters; none has more parameters.
 NAME = re.compile(r"\w{1,16}", re.ASCII)
 MOST_PARAMETERS = 4096
 IMU_MESSAGES = frozenset(MESSAGE_ID.values())

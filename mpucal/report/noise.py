@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .. import __version__
+from ..result.clock import duration
 from ..result.error_model import MG_PER_MPS2
 from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise, axes_of
 from .elements import document, figure, paragraph, section, table
@@ -51,9 +52,7 @@ def summary(noise: Noise) -> str:
         lines += [f"  {name:<30}" + "".join(f"{cell:>31}" for cell in cells) for name, cells in rows(noise, sensor)]
         comparison = _data_sheet(noise, sensor)
         lines += [f"  {comparison}", ""] if comparison else [""]
-    lines.append(
-        f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 60.0:.1f} min. In brackets: 95 %."
-    )
+    lines.append(f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {duration(noise.seconds)}. In brackets: 95 %.")
     return "\n".join(lines)
 
 
@@ -70,7 +69,7 @@ def render(noise: Noise) -> str:
     beside = ", and the data sheet's white noise" if noise.data_sheet else ""
     caption = f"Overlapping Allan deviation; thin lines: 95 % interval{beside}."
     suspicious = "".join(paragraph(f"{row['message']}.") for row in noise.suspicious)
-    about = f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 3600.0:.2f} h."
+    about = f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {duration(noise.seconds)}."
     name = noise.sensor.chip or "a sensor"
     body = (
         section("Suspicious", suspicious),

@@ -1,4 +1,4 @@
-"""Time of day for files and their names."""
+"""Time of day for files and their names, and durations as text."""
 
 from __future__ import annotations
 
@@ -21,3 +21,10 @@ def iso_utc() -> str:
 def file_stamp() -> str:
     """Return the date and time of day in UTC as a part of a file name."""
     return datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+
+
+def duration(seconds: float) -> str:
+    """Return a time in s, min or h."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.1f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"

@@ -188,7 +188,7 @@ def test_exports_hold_the_measured_noise(found):
             line.strip().split(": ") for line in text.splitlines() if "noise_density" in line and "#" not in line
         )
         assert float(values["accelerometer_noise_density"]) == pytest.approx(TRUE["white_noise"], rel=0.02)
-        assert any("a rest of 0.36 h" in note for note in notes)
+        assert any("a rest of 21." in note for note in notes)
     text, _ = form("ros").export(calibration)
     row = next(line for line in text.splitlines() if line.startswith("angular_velocity_covariance"))
     assert json.loads(row.split(": ")[1])[0] == pytest.approx(TRUE["white_noise"] ** 2 * RATE_HZ, rel=0.05)

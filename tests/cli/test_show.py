@@ -194,6 +194,11 @@ def test_a_vehicles_parameters_are_shown(mpucal):
     assert "INS_ACCOFFS_X" in mpucal("show", "--mavlink", "sim").out
 
 
+@pytest.mark.parametrize(("name", "holds"), [("CAL_ACC0_XOFF", "a correction in"), ("CAL_GYRO0_XOFF", "no correction")])
+def test_a_correction_of_a_vehicles_accelerometers_is_named(name, holds, mpucal):
+    assert f"{holds} " in mpucal("show", "--mavlink", f"sim:firmware=px4,{name}=0.01").out
+
+
 def test_calibrations_at_three_temperatures_differ_and_are_merged(mpucal, session):
     made = Calibration.load(session.folder / "calibration.json")
     for number, name in enumerate(("cold", "warm", "hot")):
