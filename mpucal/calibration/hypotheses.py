@@ -244,7 +244,7 @@ class _Groups(NamedTuple):
         first = np.unique(group, return_index=True)[1]
         last = np.append(first[1:], len(parts)) - 1
         reading = parts.reading[np.append(0, 1 + first)]
-        return cls(*parts.grouped(group), reading, parts.start[first], parts.end[last])
+        return cls(*parts.grouped(first), reading, parts.start[first], parts.end[last])
 
 
 class _Likelihood(NamedTuple):

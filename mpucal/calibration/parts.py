@@ -51,10 +51,9 @@ class Parts:
         """Covariance (p, p) of the estimate, by the model."""
         return inverse(self.H)
 
-    def grouped(self, groups: NDArray[np.intp]) -> tuple[Vector, Vector]:
-        """Return gradients (m, p) and Fisher matrices (m, p, p) of groups; `groups` (k,) is the group of each part."""
-        of = np.equal.outer(np.unique(groups), groups).astype(np.float64)
-        return of @ self.gradient, np.tensordot(of, self.fisher, 1)
+    def grouped(self, first: NDArray[np.intp]) -> tuple[Vector, Vector]:
+        """Return gradients (m, p) and Fisher matrices (m, p, p) of groups, each from part first[i] (m,) to the next's."""
+        return np.add.reduceat(self.gradient, first), np.add.reduceat(self.fisher, first)
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
         """Return (k,) the group of each part, in `groups` stretches of time, or as many as there are parts."""

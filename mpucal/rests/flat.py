@@ -162,6 +162,5 @@ def _steps(values: Vector) -> Vector:
     A thousand samples are enough: where nearly all values differ there are no visible steps.
     """
     steps = np.diff(np.sort(values[:: max(len(values) // 1000, 1)].T))
-    steps[np.count_nonzero(steps, axis=1) >= VISIBLE] = 0.0
-    smallest = np.min(steps, axis=1, where=steps > 0.0, initial=np.inf)
-    return np.where(np.isfinite(smallest), smallest, 0.0)
+    rising = [of[of > 0.0] for of in steps]
+    return np.array([of.min() if 0 < len(of) < VISIBLE else 0.0 for of in rising])

@@ -172,5 +172,6 @@ def _windows(recording: Recording, n: int) -> Spreads | None:
 
 def true_runs(mask: Mask) -> Intervals:
     """Return (k, 2) first and last + 1 of the runs of True."""
-    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
-    return np.asarray(np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)], axis=1))
+    edged = np.zeros(len(mask) + 2, bool)
+    edged[1:-1] = mask
+    return np.flatnonzero(edged[1:] != edged[:-1]).reshape(-1, 2)
