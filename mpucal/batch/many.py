@@ -30,7 +30,7 @@ DASK_CONFIG = {
     # A worker that died is restarted after seconds, on a busy machine after minutes. By default dask gives it up in
     # 15 s, which would leave its tasks undone.
     "distributed.deploy.lost-worker-timeout": "1 hour",
-    # By default workers sample their own stacks, and return memory to the system after each array: a fifth of their time.
+    # By default workers sample their own stacks, and return the memory of each array: a fifth of their time.
     "distributed.worker.profile.enabled": False,
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
 }

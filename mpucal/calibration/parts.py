@@ -52,7 +52,7 @@ class Parts:
         return inverse(self.H)
 
     def grouped(self, first: NDArray[np.intp]) -> tuple[Vector, Vector]:
-        """Return gradients (m, p) and Fisher matrices (m, p, p) of groups, each from part first[i] (m,) to the next's."""
+        """Return gradients (m, p) and Fisher matrices (m, p, p) of groups that begin with the parts `first` (m,)."""
         return np.add.reduceat(self.gradient, first), np.add.reduceat(self.fisher, first)
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
