@@ -13,12 +13,12 @@ import pyarrow.parquet as pq
 from ..data import Vector
 from ..report.elements import document, escape, figure, paragraph, section, table
 from ..report.figure import BEFORE, Axes, X, Y, Z
+from ..result.calibration import GOOD, REFUSED, USABLE
 from .fleet import OUTLIER_STD, Parameter, parameters, repeatability, repeated_sensors
 
 PAGE = "fleet.html"
 # rows of a table on the page; results.csv has all
 MOST_ROWS = 200
-VERDICTS = ("good", "usable", "refused")
 Columns = Mapping[str, Sequence[Any]]
 
 
@@ -46,7 +46,7 @@ def make_page(results: Path) -> tuple[str, str]:
 def _sentence(columns: Columns) -> str:
     counts = Counter(columns["verdict"])
     unread = sum(error is not None for error in columns["error"])
-    verdicts = [f"{counts[verdict]} {verdict}" for verdict in VERDICTS]
+    verdicts = [f"{counts[verdict]} {verdict}" for verdict in (GOOD, USABLE, REFUSED)]
     return f"Of {len(columns['path'])} recordings, {', '.join(verdicts)}, {unread} could not be read."
 
 

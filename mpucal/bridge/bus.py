@@ -17,11 +17,12 @@ from ..chip.driver import STATUS_BYTES
 from ..clocks import MS
 from ..clocks.sample_clock import poll_phase
 from ..errors import BusError, NoAnswer
+from ..sources.host_bus import WIRES
 from . import messages as wire
 from .chip_state import CONTROLS, ChipState
 from .link import Link, LinkLost
 from .port import Port
-from .port_errors import WIRES, no_reply, request_failed
+from .port_errors import no_reply, request_failed
 from .read_ahead import ReadAhead
 from .requests import Answer
 

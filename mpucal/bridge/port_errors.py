@@ -8,11 +8,10 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from ..errors import BusError, LinkError
-from ..sources.host_bus import device_error
+from ..sources.host_bus import WIRES, device_error
 from .messages import Status
 
 AUTOPILOT = re.compile("ardupilot|px4", re.IGNORECASE)
-WIRES = "check the chip's supply, SDA, SCL and AD0"
 
 # Text at the right rate is all printable; at a wrong rate hardly more than a third of the bytes are.
 PRINTABLE = 0.9

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..chip.registers import ADDRESSES, USABLE_ADDRESSES
-from ..sources.host_bus import transfer_error
+from ..sources.host_bus import WIRES, transfer_error
 from ..sources.i2c import found_chips
 from ..sources.usb_i2c import I2C_HZ, adapters
 from .finding import Finding, Mark
@@ -138,7 +138,7 @@ def _addresses(path: str) -> Iterator[Finding]:
     words = [f"0x{address:02x}{_guess(address, answer)}" for address, answer in found.items()]
     ours = any(address in ADDRESSES for address in found)
     elsewhere = [] if ours else [other for other, _ in found_chips(Path(path).parent) if other != path]
-    remedy = f"it is on another bus: give --bus {elsewhere[0]}" if elsewhere else "check VCC, GND, SDA, SCL and AD0"
+    remedy = f"it is on another bus: give --bus {elsewhere[0]}" if elsewhere else WIRES
     data = {"addresses": sorted(found), "smbus_only": not can_i2c, "elsewhere": elsewhere}
     yield Finding.check("on the bus", ours, "; ".join(words) or "nothing answers", remedy, data, Mark.BAD)
 

@@ -25,11 +25,11 @@ from ._text import lines, numbers
 from .hints import ROLES
 from .reading import LONGEST_LINE
 from .rows import Rows, Write, check_runs
-from .tables.names import Column, ignored_sensors, parse_header, plausible_celsius
+from .tables.names import TEMPERATURE, Column, ignored_sensors, parse_header, plausible_celsius
 from .tables.text import decode_text, read_table
 from .tables.times import GAP_S, go_on, in_order, plausible_utc_ns
 
-TEMPERATURE, UTC = "temperature_c", "utc_s"
+UTC = "utc_s"
 # 1 on each line of samples that mpucal calibrated
 CALIBRATED = "calibrated_by_mpucal"
 ALL = (*ROLES, TEMPERATURE)

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from typing import NamedTuple
 
+from ..session.events import Key
+
 PAGE_FILES = {
     "": ("page.html", "text/html; charset=utf-8"),
     "page.css": ("page.css", "text/css; charset=utf-8"),
@@ -20,7 +22,6 @@ PAGE_FILES = {
     "board.js": ("board.js", "text/javascript; charset=utf-8"),
     "sound.js": ("sound.js", "text/javascript; charset=utf-8"),
 }
-KEYS = ("enough", "redo", "abort")
 
 
 class Allowed(NamedTuple):
@@ -59,7 +60,7 @@ class RequestFilter:
         if not hmac.compare_digest(token.encode(), self.token.encode()) or not slash or not target.startswith("/"):
             return HTTPStatus.NOT_FOUND
         kind, _, rest = name.partition("/")
-        if method == "POST" and self.keys and kind == "keys" and rest in KEYS:
+        if method == "POST" and self.keys and kind == "keys" and rest in tuple(Key):
             own = all(origin == f"http://{self.host}" for origin in origins)
             return Allowed(kind, rest) if own else HTTPStatus.FORBIDDEN
         if method != "GET":

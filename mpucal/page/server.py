@@ -24,6 +24,7 @@ from shutil import copyfileobj
 from socketserver import TCPServer
 from typing import Any
 
+from ..result.session_files import REPORT
 from .requests import PAGE_FILES, Allowed, RequestFilter
 
 CLIENTS = 4
@@ -53,7 +54,6 @@ PAGE_POLICY = (
 )
 # The report contains its style and pictures, and no script.
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
-REPORT = "report.html"
 
 
 class Server(ThreadingHTTPServer):
@@ -225,7 +225,7 @@ class Handler(BaseHTTPRequestHandler):
             return
         with file:
             kind = {"Content-Type": "application/octet-stream", "Content-Disposition": "attachment"}
-            if name == REPORT:
+            if name == REPORT.name:
                 kind = {"Content-Type": "text/html; charset=utf-8", "Content-Security-Policy": REPORT_POLICY}
             self._begin(HTTPStatus.OK, kind)
             copyfileobj(file, self.wfile)

@@ -86,7 +86,7 @@ def test_a_chip_that_is_disconnected_during_a_stream(started, stream):
         raise NoAnswer("nothing acknowledges", "look")
 
     made.chip.read = made.chip.write = nothing
-    with pytest.raises(NoAnswer, match="the chip no longer answers the bridge on the emulated line: check the chip's"):
+    with pytest.raises(NoAnswer, match="the chip no longer answers the bridge on the emulated line: check VCC"):
         stream(driver, 5)
     assert len(driver.recording()) > 80
 

@@ -4,14 +4,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.page.address import Address, lan_host, parse_address, qr_code
-from mpucal.page.requests import KEYS, PAGE_FILES, Allowed, RequestFilter
+from mpucal.page.requests import PAGE_FILES, Allowed, RequestFilter
+from mpucal.session.events import Key
 
 HOST, TOKEN = "127.0.0.1:8000", "c2VjcmV0LXRva2VuLTEyOA"
 RESULTS = {"report.html", "calibration.json"}
 LOOKS = {*PAGE_FILES, "events", *(f"results/{name}" for name in RESULTS)}
 OTHERS = ["", "..", ".", "%2e%2e", "results", "capture.mcap", "keys", "etc/passwd", "é", "\0", "?", "#"]
 PARTS = st.sampled_from(
-    [*OTHERS, TOKEN, TOKEN[:-1], TOKEN.swapcase(), f"{TOKEN}x", "events", "page.js", *RESULTS, *KEYS]
+    [*OTHERS, TOKEN, TOKEN[:-1], TOKEN.swapcase(), f"{TOKEN}x", "events", "page.js", *RESULTS, *Key]
 )
 TARGETS = st.one_of(
     st.lists(PARTS, max_size=6).map("/".join),
@@ -30,7 +31,7 @@ ORIGINS = st.lists(st.sampled_from([f"http://{HOST}", "http://evil.example", "nu
 def test_only_requests_with_host_and_token_are_allowed(method, target, hosts, origins, keys):
     request = RequestFilter(HOST, TOKEN, keys).check(method, target, hosts, origins, RESULTS)
     looks = method == "GET" and target in {f"/{TOKEN}/{name}" for name in LOOKS}
-    presses = keys and method == "POST" and target in {f"/{TOKEN}/keys/{key}" for key in KEYS}
+    presses = keys and method == "POST" and target in {f"/{TOKEN}/keys/{key}" for key in Key}
     own = all(origin == f"http://{HOST}" for origin in origins)
     assert isinstance(request, Allowed) == (hosts == [HOST] and (looks or (presses and own)))
 
