@@ -248,16 +248,17 @@ def once(tmp_path_factory):
 
 @pytest.fixture
 def mpucal(capsys, tmp_path, monkeypatch):
-    """The command, in this process and in an empty folder: its exit code and what it printed."""
+    """The command, in this process and in an empty folder: its exit code, which must be `code` if given, and output."""
     from mpucal.__main__ import run
 
     monkeypatch.chdir(tmp_path)
 
-    def call(*words):
+    def call(*words, code=None):
         capsys.readouterr()
-        code = run([str(word) for word in words])
+        found = run([str(word) for word in words])
         out, err = capsys.readouterr()
-        return SimpleNamespace(code=code, out=out, err=err)
+        assert code in (None, found), err
+        return SimpleNamespace(code=found, out=out, err=err)
 
     return call
 

@@ -140,8 +140,8 @@ def test_the_command_writes_a_table_and_a_page(client, captures, tmp_path, capsy
     monkeypatch.chdir(tmp_path)
     words = ["batch", str(tmp_path / "line-3" / "*.mcap"), "-o", "fleet", "--model", "accel", "--reports"]
     assert call([*words, "--scheduler", client.scheduler.address]) == 0
-    told = capsys.readouterr()
-    assert re.search(r"4 of 4, .* a second, 1 unreadable", told.err)
+    printed = capsys.readouterr()
+    assert re.search(r"4 of 4, .* a second, 1 unreadable", printed.err)
     columns = pq.read_table("fleet/results.parquet").to_pydict()
     with Path("fleet/results.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

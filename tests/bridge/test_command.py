@@ -36,34 +36,29 @@ def board(monkeypatch):
 
 
 def test_a_recording(board, mpucal):
-    recorded = mpucal("record", "--serial", board.name, "-o", "board.mcap", "--seconds", "1", "--rate", "1000")
-    assert recorded.code == 0, recorded.err
+    mpucal("record", "--serial", board.name, "-o", "board.mcap", "--seconds", "1", "--rate", "1000", code=0)
     shown = json.loads(mpucal("show", "board.mcap", "--json").out)
     assert (shown["gaps"], shown["samples"] > 900) == (0, True)
 
 
 def test_a_capture_without_its_suffix_is_refused_at_once(board, mpucal, tmp_path):
-    refused = mpucal("record", "--serial", board.name, "-o", "plain", "--seconds", "1")
-    assert refused.code == OutputError.exit_code
+    refused = mpucal("record", "--serial", board.name, "-o", "plain", "--seconds", "1", code=OutputError.exit_code)
     assert "plain does not end with .mcap" in refused.err
     assert not (tmp_path / "plain").exists()
 
 
 def test_into_the_memory_and_back(board, mpucal, tmp_path):
-    nothing = mpucal("show", "--serial", board.name)
-    assert nothing.code == BusError.exit_code
+    nothing = mpucal("show", "--serial", board.name, code=BusError.exit_code)
     assert f"the bridge on {board.name} stores no calibration: store one: mpucal write" in nothing.err
     made = Calibration.load(BLOB)
     made.save("calibration.json")
     board.memory.slots[0] = b"another sketch's"
-    stored = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "--yes")
-    assert stored.code == 0, stored.err
+    stored = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "--yes", code=0)
     assert "holds other data, perhaps another sketch's or file system's, which a write overwrites" in stored.err
     assert "as its blob number 1 (212 bytes, CRC-32 " in stored.out
     # another bridge with the same memory: the power was off
     board.line.device = EmulatedBridge(board.chip, board.clock.now, board.memory)
-    shown = mpucal("show", "--serial", board.name, "--json")
-    assert shown.code == 0, shown.err
+    shown = mpucal("show", "--serial", board.name, "--json", code=0)
     kept = json.loads(shown.out)["accelerometer"]
     assert (kept["D"], kept["b_a"]) == (made.D.tolist(), made.b_a.tolist())
     shown = mpucal("show", "--serial", board.name)
@@ -90,15 +85,14 @@ def test_the_doctor_tells_bridge_and_chip():
 
 
 def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
-    told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
-    assert told.code == 0, told.out
-    assert {finding["topic"]: finding["mark"] for finding in json.loads(told.out)["findings"]} == dict.fromkeys(
+    done = mpucal("doctor", "--serial", board.name, "--conformance", "--json", code=0)
+    assert {finding["topic"]: finding["mark"] for finding in json.loads(done.out)["findings"]} == dict.fromkeys(
         exchanges(), "ok"
     )
     board.memory.slots[0] = b"another sketch's"
     held = list(board.memory.slots)
-    told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
-    tried = {finding["topic"]: finding["what"] for finding in json.loads(told.out)["findings"]}
+    done = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
+    tried = {finding["topic"]: finding["what"] for finding in json.loads(done.out)["findings"]}
     assert "not tried, as its memory holds other data" in tried["begin_of_0"]
     assert board.memory.slots == held
     assert "for the firmware of a bridge" in mpucal("doctor", "--bus", "sim", "--conformance").err

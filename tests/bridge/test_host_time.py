@@ -61,9 +61,9 @@ def test_the_rate_is_known_and_corrected_and_the_doctor_says_how_far_it_is_off(r
     true_hz = 200 * (1 + 2500e-6)
     assert sensor.rate_hz == pytest.approx(true_hz, rel=4 * sensor.clock_std + 20e-6)
     assert recording.rate_hz == pytest.approx(true_hz, rel=100e-6)
-    told = {finding.topic: finding for finding in examine_stream(recording, 200.0, 20.0, None, "")}
-    assert (told["bridge's clock"].mark, told["bridge's clock"].data["ppm"]) == (Mark.NOTE, sensor.clock_ppm)
-    assert told["sample rate"].data["rate_hz"] == sensor.rate_hz
+    findings = {finding.topic: finding for finding in examine_stream(recording, 200.0, 20.0, None, "")}
+    assert (findings["bridge's clock"].mark, findings["bridge's clock"].data["ppm"]) == (Mark.NOTE, sensor.clock_ppm)
+    assert findings["sample rate"].data["rate_hz"] == sensor.rate_hz
 
 
 def test_frames_in_step_with_an_adapters_bursts_do_no_harm(recorded):

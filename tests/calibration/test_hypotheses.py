@@ -123,7 +123,7 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape, m
     """Compare with the posteriors of theta and x together, for all variances and, of a step or pulse, all times."""
     A, y, parts = linear_parts()
     k, m, p = A.shape
-    (told,) = _explain([Hypothesis("accelerometer", shape)], _Groups.of(parts, 5), parts, np.eye(3))
+    (explained,) = _explain([Hypothesis("accelerometer", shape)], _Groups.of(parts, 5), parts, np.eye(3))
     windows = [[[float(i <= j < i + width)] for j in range(k + 1)] for width in (1, 2, 3) for i in range(k + 1)]
     u = READINGS[: 1 + k] / STANDARD_GRAVITY_MPS2
     # weights of the numbers in the flat segment and in each part, by axis
@@ -158,19 +158,19 @@ def test_evidence_distance_and_variance_are_those_of_the_joint_gaussian(shape, m
             logs.append(-0.5 * (np.linalg.slogdet(marginal)[1] + y @ np.linalg.solve(marginal, y)))
     without = np.eye(k * m) + design @ design.T
     none = -0.5 * (np.linalg.slogdet(without)[1] + y @ np.linalg.solve(without, y))
-    assert told.evidence == pytest.approx(np.logaddexp.reduce(logs) - none - np.log(len(logs)), rel=1e-6, abs=1e-9)
-    np.testing.assert_allclose(told.freed, freed[int(np.argmax(logs))], rtol=1e-6, atol=1e-12)
+    assert explained.evidence == pytest.approx(np.logaddexp.reduce(logs) - none - np.log(len(logs)), rel=1e-6, abs=1e-9)
+    np.testing.assert_allclose(explained.freed, freed[int(np.argmax(logs))], rtol=1e-6, atol=1e-12)
     if shape == "reading":  # of a known size, an unseen nonlinearity adds as much
         monkeypatch.setattr(hypotheses, "NONLINEARITY_MPS2", LARGEST["accelerometer"])
         unseen = hypotheses.nonlinearity(parts, np.eye(3)) / np.diag(parts.covariance)
         np.testing.assert_allclose(unseen, freed[-1], rtol=1e-6)
     weights = np.exp(np.array(logs) - max(logs))
     expected = np.tensordot(weights, squares, 1) / weights.sum()
-    np.testing.assert_allclose(told.aways**2, expected, rtol=1e-6)
-    unlikely = told._replace(is_possible=True, weight=0.4).away ** 2
+    np.testing.assert_allclose(explained.aways**2, expected, rtol=1e-6)
+    unlikely = explained._replace(is_possible=True, weight=0.4).away ** 2
     np.testing.assert_allclose(unlikely, expected.mean(axis=0), rtol=1e-6)
-    changed = told.hypothesis.kind == "change"
-    likely = told._replace(is_possible=True, weight=0.6).away ** 2
+    changed = explained.hypothesis.kind == "change"
+    likely = explained._replace(is_possible=True, weight=0.6).away ** 2
     np.testing.assert_allclose(likely, expected.max(axis=0) if changed else expected.mean(axis=0), rtol=1e-6)
 
 

@@ -44,8 +44,7 @@ def test_a_real_recording_comes_out_as_the_formula_says(mpucal, calibration, sha
 
 @pytest.mark.parametrize(("name", "ending"), [("c.json", ".csv"), ("c.bin", ".npz")])
 def test_a_capture_goes_into_every_kind(mpucal, session, calibration, name, ending):
-    done = mpucal("apply", name, session.folder, "-o", f"out{ending}", "--json")
-    assert done.code == 0, done.err
+    done = mpucal("apply", name, session.folder, "-o", f"out{ending}", "--json", code=0)
     recording, out = load(session.folder), load(f"out{ending}")
     acc, gyr = formula(recording)
     exact = 1e-12 if name == "c.json" else 1e-5
@@ -61,8 +60,7 @@ def test_a_table_goes_to_stdout(mpucal, save, session, calibration, tmp_path):
     save(recording, "dated.csv")
     save(replace(recording, utc_ns=None), "in.csv")
     assert "time of day" not in mpucal("apply", "c.json", "dated.csv").err
-    done = mpucal("apply", "c.json", "in.csv")
-    assert done.code == 0
+    done = mpucal("apply", "c.json", "in.csv", code=0)
     assert "in.csv holds no time of day" in done.err
     (tmp_path / "out.csv").write_text(done.out)
     np.testing.assert_allclose(load("out.csv").acc, formula(recording)[0], atol=1e-12)
@@ -85,8 +83,7 @@ def test_missing_numbers_stay_missing_in_every_format(mpucal, session, calibrati
     rows[1207, 2] = rows[1300, 1:] = np.nan
     path = Path(f"in{ending}")
     FORMS[ending](*((path, rows) if ending == ".npy" else (rows, path)))
-    done = mpucal("apply", "c.json", path, "-o", "out.npz")
-    assert done.code == 0, done.err
+    done = mpucal("apply", "c.json", path, "-o", "out.npz", code=0)
     assert f"{len(rows)} samples, 2 of which lack a number" in done.out
     with np.load("out.npz") as out:
         assert np.flatnonzero(np.isnan(out["acc"]).any(1)).tolist() == [1207, 1300]
@@ -125,8 +122,7 @@ def test_b_a_follows_the_temperature(mpucal, session, calibration):
 def test_calibrated_recordings_are_refused(mpucal, save, session, calibration, ending):
     save(load(session.folder).part(0, 500), "in.npz")
     mpucal("apply", "c.json", "in.npz", "-o", f"out{ending}")
-    again = mpucal("apply", "c.json", f"out{ending}", "-o", "twice.npz")
-    assert again.code == 2
+    again = mpucal("apply", "c.json", f"out{ending}", "-o", "twice.npz", code=2)
     why = "as its column calibrated_by_mpucal says" if ending == ".csv" else "calibrated with c.json of"
     assert f"calibrated already ({why}" in again.err
     assert "a new calibration is of the errors that are left" in mpucal("show", f"out{ending}").err
@@ -161,8 +157,7 @@ def test_a_calibration_that_does_not_belong(mpucal, session, calibration, change
     sensor = replace(recording.sensor, **{k: changes.pop(k) for k in ("who_am_i", "accel_offsets") if k in changes})
     registers_differ = sensor.accel_offsets != recording.sensor.accel_offsets
     replace(calibration, sensor=sensor, **changes).save("other.json")
-    done = mpucal("apply", "other.json", session.folder, "-o", "out.npz")
-    assert done.code == code, done.err
+    done = mpucal("apply", "other.json", session.folder, "-o", "out.npz", code=code)
     assert says in done.err
     if code == 0:
         # The part of b_a that the registers subtract is not subtracted again; after a reset they subtract nothing.

@@ -16,19 +16,31 @@ def calibration(session):
 
 
 def test_check_of_a_recording(mpucal, session, calibration):
-    told = mpucal("check", calibration, session.folder)
-    assert (told.code, told.out.split(":")[0]) == (0, "Still good")
+    done = mpucal("check", calibration, session.folder)
+    assert (done.code, done.out.split(":")[0]) == (0, "Still good")
     document = json.loads(mpucal("check", calibration, session.folder, "--json").out)
     assert (document["format"], document["verdict"], document["what"]) == ("mpucal.check", "still good", "nothing")
 
 
 def test_check_of_a_sensor_takes_half_a_minute_and_updates_its_biases(mpucal, calibration, tmp_path):
-    told = mpucal(
-        "check", calibration, "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "today", "--to", "chip", "--yes"
+    done = mpucal(
+        "check",
+        calibration,
+        "--bus",
+        "sim",
+        "--seed",
+        "3",
+        "--rate",
+        "100",
+        "-o",
+        "today",
+        "--to",
+        "chip",
+        "--yes",
+        code=0,
     )
-    assert told.code == 0, told.err
-    assert "held 3 of 3" in told.err
-    assert "Done: the offset registers" in told.out
+    assert "held 3 of 3" in done.err
+    assert "Done: the offset registers" in done.out
     written = {path.name for path in (tmp_path / "today").iterdir()}
     assert {"capture.mcap", "check.json", "calibration.json", "calibration.bin"} <= written
     seconds = json.loads((tmp_path / "today" / "check.json").read_text())["seconds"]
@@ -39,7 +51,7 @@ def test_check_of_a_sensor_takes_half_a_minute_and_updates_its_biases(mpucal, ca
     assert document["updated_from"][0]["b_a"] == Calibration.load(calibration).b_a.tolist()
     # The capture is a recording, and can be replayed.
     for words in (("today/capture.mcap",), ("--replay", "today/capture.mcap")):
-        assert mpucal("check", calibration, *words).out.splitlines()[0] == told.out.splitlines()[0]
+        assert mpucal("check", calibration, *words).out.splitlines()[0] == done.out.splitlines()[0]
 
 
 def test_an_altered_calibration_is_used_only_with_force_and_its_outputs_name_it(mpucal, session, spoilt, tmp_path):
@@ -59,7 +71,6 @@ def test_an_altered_calibration_is_used_only_with_force_and_its_outputs_name_it(
 
 
 def test_check_refuses_another_sensor(mpucal, calibration, tmp_path):
-    told = mpucal("check", calibration, "--bus", "sim", "--seed", "4", "--rate", "100", "-o", "other", "--yes")
-    assert told.code == 5
-    assert told.out.startswith("Another sensor: its offset registers hold")
+    done = mpucal("check", calibration, "--bus", "sim", "--seed", "4", "--rate", "100", "-o", "other", "--yes", code=5)
+    assert done.out.startswith("Another sensor: its offset registers hold")
     assert not (tmp_path / "other" / "calibration.json").exists()

@@ -42,8 +42,7 @@ def test_each_command_has_help_with_an_example_that_is_understood(mpucal):
 
 
 def test_a_misspelt_command_has_no_help(mpucal):
-    result = mpucal("help", "sesion")
-    assert result.code == 2
+    result = mpucal("help", "sesion", code=2)
     assert "did you mean session?" in result.err
 
 
@@ -63,8 +62,7 @@ def test_wrong_usage_is_exit_code_2(mpucal):
 
 def test_the_unexpected_is_a_bug_with_a_trace(mpucal, monkeypatch):
     monkeypatch.setattr("mpucal.cli.show.load", lambda *_: 1 / 0)
-    result = mpucal("show", "some.npz")
-    assert result.code == 1
+    result = mpucal("show", "some.npz", code=1)
     assert "ZeroDivisionError" in result.err
     assert "this is a bug in mpucal" in result.err
 
@@ -76,8 +74,7 @@ def test_a_full_disk_behind_stdout_is_exit_code_3(mpucal, tmp_path, monkeypatch)
 
     Calibration(np.eye(3), np.zeros(3)).save("c.json")
     monkeypatch.setattr(sys, "stdout", Full())
-    result = mpucal("show", "c.json")
-    assert result.code == 3
+    result = mpucal("show", "c.json", code=3)
     assert result.err == "mpucal: the output cannot be written (No space left on device): free space there.\n"
 
 
@@ -94,7 +91,6 @@ def test_errors_of_the_computer_are_exit_code_3(mpucal, monkeypatch, error, said
         raise error
 
     monkeypatch.setattr("mpucal.cli.show.load", refused)
-    result = mpucal("show", "some.npz")
-    assert result.code == 3
+    result = mpucal("show", "some.npz", code=3)
     assert result.err.startswith(f"mpucal: {said}")
     assert result.err.count("\n") == 1

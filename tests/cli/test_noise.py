@@ -21,10 +21,9 @@ def lying(save, tmp_path):
 
 
 def test_noise_of_a_recording_is_used_by_other_commands(mpucal, session, lying, tmp_path):
-    told = mpucal("noise", "lying.npz", "-o", "noise")
-    assert told.code == 0, told.err
-    assert "white noise, ug/√Hz" in told.out
-    assert "data sheet:" in told.out
+    done = mpucal("noise", "lying.npz", "-o", "noise", code=0)
+    assert "white noise, ug/√Hz" in done.out
+    assert "data sheet:" in done.out
     page = (tmp_path / "noise" / "noise.html").read_text()
     assert "<h1>Noise of MPU-6050</h1>" in page
     document = json.loads((tmp_path / "noise" / "noise.json").read_text())
@@ -32,8 +31,7 @@ def test_noise_of_a_recording_is_used_by_other_commands(mpucal, session, lying, 
     assert document["accelerometer"]["white_noise"]["value"] == pytest.approx([2e-3] * 3, rel=0.05)
 
     calibration = session.folder / "calibration.json"
-    exported = mpucal("export", calibration, "--to", "kalibr", "--noise", "noise/noise.json")
-    assert exported.code == 0, exported.err
+    exported = mpucal("export", calibration, "--to", "kalibr", "--noise", "noise/noise.json", code=0)
     density = next(line for line in exported.out.splitlines() if line.startswith("gyroscope_noise_density"))
     assert float(density.split(": ")[1]) == pytest.approx(1e-4, rel=0.05)
 
@@ -43,10 +41,9 @@ def test_noise_of_a_recording_is_used_by_other_commands(mpucal, session, lying, 
 
 
 def test_noise_of_a_sensor_over_hours(mpucal):
-    told = mpucal("noise", "--bus", "sim", "--rate", "100", "--hours", "0.01", "--json")
-    assert told.code == 0, told.err
-    assert "let go of it" in told.err
-    document = json.loads(told.out)
+    done = mpucal("noise", "--bus", "sim", "--rate", "100", "--hours", "0.01", "--json", code=0)
+    assert "let go of it" in done.err
+    document = json.loads(done.out)
     assert 36.0 <= document["seconds"] < 38.0
     # The trembling hand has put the board down before.
     assert document["suspicious"] == []
@@ -58,10 +55,9 @@ def test_noise_of_a_sensor_over_hours(mpucal):
 
 
 def test_noise_of_a_vehicle_asks_for_a_vehicle_to_be_put_down(mpucal):
-    told = mpucal("noise", "--mavlink", "sim:imus=1", "--hours", "0.003", "--json")
-    assert told.code == 0, told.err
-    assert "Put the vehicle on a firm surface" in told.err
-    assert "board" not in told.err
+    done = mpucal("noise", "--mavlink", "sim:imus=1", "--hours", "0.003", "--json", code=0)
+    assert "Put the vehicle on a firm surface" in done.err
+    assert "board" not in done.err
 
 
 def test_noise_after_ctrl_c_is_that_of_the_samples_so_far(mpucal, monkeypatch):
@@ -76,14 +72,12 @@ def test_noise_after_ctrl_c_is_that_of_the_samples_so_far(mpucal, monkeypatch):
             raise KeyboardInterrupt
 
     monkeypatch.setattr(NoiseMeter, "add", interrupted)
-    told = mpucal("noise", "--bus", "sim:hand=still", "--rate", "100", "--json")
-    assert told.code == 0, told.err
-    assert json.loads(told.out)["samples"] == sum(calls)
+    done = mpucal("noise", "--bus", "sim:hand=still", "--rate", "100", "--json", code=0)
+    assert json.loads(done.out)["samples"] == sum(calls)
 
 
 def test_noise_of_a_sensor_that_fails_is_that_of_the_samples_so_far(mpucal):
-    told = mpucal("noise", "--bus", "sim:hand=still,fault=unplugged@20", "--rate", "100", "--json")
-    assert told.code == 3
-    assert 10.0 < json.loads(told.out)["seconds"] < 20.0
-    assert "mpucal: nothing answers at 0x68" in told.err
-    assert "; the noise is that of the 1" in told.err
+    done = mpucal("noise", "--bus", "sim:hand=still,fault=unplugged@20", "--rate", "100", "--json", code=3)
+    assert 10.0 < json.loads(done.out)["seconds"] < 20.0
+    assert "mpucal: nothing answers at 0x68" in done.err
+    assert "; the noise is that of the 1" in done.err

@@ -48,8 +48,7 @@ def test_a_session_without_a_source_lists_the_connected_ones_as_commands(mpucal,
     monkeypatch.setattr("mpucal.sources.i2c.found_chips", lambda: [("/dev/i2c-1", "MPU-6050 at 0x68")])
     monkeypatch.setattr("mpucal.bridge.port_errors.ports", lambda: ports)
     monkeypatch.setattr("mpucal.iio_device.source.SYSFS", tmp_path)
-    result = mpucal("session", "-o", "board 7")
-    assert result.code == 2
+    result = mpucal("session", "-o", "board 7", code=2)
     found = [line.partition("  ") for line in result.err.replace("\n  ", "\n").splitlines()[1:-1]]
     assert [(command, what.strip()) for command, _, what in found] == [
         ("mpucal session -o 'board 7' --bus /dev/i2c-1", "MPU-6050 at 0x68"),
@@ -86,8 +85,7 @@ def test_no_folder_is_left_if_nothing_answered_or_the_page_is_refused(mpucal, tm
 )
 def test_a_capture_with_another_head_is_not_replayed(mpucal, session, tmp_path, rewritten, head, sentence):
     capture = read_capture(session.folder / "capture.mcap")
-    result = mpucal("session", "--replay", rewritten(capture, tmp_path / "odd.mcap", **head))
-    assert result.code == 3
+    result = mpucal("session", "--replay", rewritten(capture, tmp_path / "odd.mcap", **head), code=3)
     assert sentence in result.err
     assert "`mpucal calibrate`" in result.err
 
@@ -95,8 +93,7 @@ def test_a_capture_with_another_head_is_not_replayed(mpucal, session, tmp_path, 
 def test_a_capture_cut_short_while_rotating_is_refused_with_reasons_and_without_a_blob(mpucal, session, tmp_path):
     data = (session.folder / "capture.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: int(0.3 * len(data))])
-    result = mpucal("session", "--replay", "cut.mcap", "-o", "board")
-    assert result.code == 5
+    result = mpucal("session", "--replay", "cut.mcap", "-o", "board", code=5)
     assert "cut.mcap" in result.err
     assert "the source ended" in result.err
     assert result.out.startswith("The calibration is refused:\n  - ")
@@ -114,8 +111,7 @@ def test_a_recording_is_calibrated_and_replayed_later_unless_accesses_are_left_u
     assert mpucal("record", "--bus", "sim", "--seconds", "1", "-o", walk).code == 3
     capture = read_capture(walk)
     last = [record for record in capture.records if isinstance(record, Transaction)][-1]
-    longer = mpucal("session", "--replay", rewritten(capture, tmp_path / "long.mcap", [*capture.records, last]))
-    assert longer.code == 3
+    longer = mpucal("session", "--replay", rewritten(capture, tmp_path / "long.mcap", [*capture.records, last]), code=3)
     assert "before the last 1 accesses of its capture" in longer.err
 
 
@@ -131,15 +127,13 @@ def test_a_folder_renamed_and_a_capture_truncated_during_a_session(mpucal, walk,
     monkeypatch.setattr(Runner, "calibrate", meddled)
     words = ("session", "--replay", walk, "--yes", "-o", "board")
     meddle = lambda: Path("board").rename("seven")  # noqa: E731
-    renamed = mpucal(*words)
-    assert renamed.code == 5, renamed.err
+    renamed = mpucal(*words, code=5)
     assert str(tmp_path / "seven" / "report.html") in renamed.out
     assert {path.name for path in tmp_path.iterdir()} == {"seven"}
     assert {"capture.mcap", "calibration.json", "report.html"} <= {path.name for path in Path("seven").iterdir()}
 
     meddle = lambda: os.truncate("board/capture.mcap", 1000)  # noqa: E731
-    cut = mpucal(*words)
-    assert cut.code == 3
+    cut = mpucal(*words, code=3)
     assert "board/capture.mcap was shortened or overwritten by another program" in cut.err
     assert "is kept in board/capture.mcap, and the results in board" in cut.err
 
@@ -147,8 +141,7 @@ def test_a_folder_renamed_and_a_capture_truncated_during_a_session(mpucal, walk,
 def test_a_nearly_full_disk_is_refused_before_the_board_is_lifted(mpucal, tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr("mpucal.session.results.shutil.disk_usage", lambda path: usage._replace(free=1_500_000))
-    result = mpucal("session", "--bus", "sim", "-o", tmp_path / "board")
-    assert result.code == OutputError.exit_code
+    result = mpucal("session", "--bus", "sim", "-o", tmp_path / "board", code=OutputError.exit_code)
     assert "only 1.5 MB are free" in result.err
     assert "Lay the board flat" not in result.err
     assert not (tmp_path / "board").exists()

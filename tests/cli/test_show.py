@@ -27,8 +27,7 @@ FAULTS = Path(__file__).parents[2] / "fixtures" / "faults"
 )
 def test_a_file_that_is_no_json_is_told_in_words(mpucal, content, said, tmp_path):
     (tmp_path / "notes.json").write_bytes(content)
-    done = mpucal("show", tmp_path / "notes.json")
-    assert done.code == 3
+    done = mpucal("show", tmp_path / "notes.json", code=3)
     assert f"holds no calibration ({said}" in done.err
 
 
@@ -129,8 +128,7 @@ def test_the_command_for_another_measurement_is_never_the_same_one(tmp_path, mon
 def test_a_refused_part_of_a_session_is_to_be_continued(mpucal, tmp_path):
     (tmp_path / "board 7").mkdir()
     shutil.copy(FAULTS / "unplugged.mcap", tmp_path / "board 7" / "capture.mcap")
-    refused = mpucal("calibrate", tmp_path / "board 7")
-    assert refused.code == 5
+    refused = mpucal("calibrate", tmp_path / "board 7", code=5)
     assert refused.out.endswith(f"follow the remedy above, and run\n  mpucal session --resume '{tmp_path}/board 7'\n")
 
 
@@ -154,22 +152,19 @@ def test_the_folder_of_a_calibration_without_a_recording_is_told_how_to_show_it(
     folder = tmp_path / "of results"
     folder.mkdir()
     calibration().save(folder / "calibration.json")
-    result = mpucal("show", folder)
-    assert result.code == 3
+    result = mpucal("show", folder, code=3)
     assert f"`mpucal show '{folder}/calibration.json'` shows the calibration in it" in result.err
 
 
 def test_shows_a_calibration(mpucal, session):
     for name in ("calibration.json", "calibration.bin"):
-        result = mpucal("show", session.folder / name)
-        assert result.code == 0
+        result = mpucal("show", session.folder / name, code=0)
         assert all(words in result.out for words in ("a calibration of", "bias, mg", "inv(D)"))
         assert ("The calibration is" in result.out) == name.endswith("json")
 
 
 def test_shows_a_capture(mpucal, session):
-    result = mpucal("show", session.folder)
-    assert result.code == 0
+    result = mpucal("show", session.folder, code=0)
     assert "MPU-6050, ±4 g, ±500 deg/s" in result.out
     assert "lies flat" in result.out
     facts = json.loads(mpucal("show", session.folder / "capture.mcap", "--json").out)
@@ -208,8 +203,7 @@ def test_calibrations_at_three_temperatures_differ_and_are_merged(mpucal, sessio
     different = mpucal("diff", "cold.json", "hot.json")
     assert (different.code, different.out[:10]) == (0, "Different:")
     assert json.loads(mpucal("diff", "cold.json", "hot.json", "--json").out)["same"] is False
-    merged = mpucal("merge", "cold.json", "warm.json", "hot.json", "-o", "merged")
-    assert merged.code == 0, merged.err
+    merged = mpucal("merge", "cold.json", "warm.json", "hot.json", "-o", "merged", code=0)
     assert "b_a changes by (+0.102, +0.102, +0.102) mg/°C" in merged.out
     assert Calibration.load("merged/calibration.json").b_a_slope == pytest.approx([1e-3] * 3, abs=1e-6)
     shown = mpucal("show", "merged/calibration.json").out

@@ -94,10 +94,10 @@ def test_rests_that_contradict_the_calibration_are_reported_once(mpucal, session
     replace(calibration, b_a=calibration.b_a + np.array([0.0, 0.0, 0.3])).save("wrong.json")
     words = ("stream", "--bus", "sim:seed=3,hand=still", "--rate", "25", "--seconds", "30", "--watch", "--apply")
     assert "contradict" not in mpucal(*words, session.folder).err
-    told = mpucal(*words, "wrong.json")
-    assert (told.code, told.err.count("rests contradict the calibration (|a| is wrong by up to")) == (0, 1)
-    assert told.out.count("\n") > 700
+    done = mpucal(*words, "wrong.json")
+    assert (done.code, done.err.count("rests contradict the calibration (|a| is wrong by up to")) == (0, 1)
+    assert done.out.count("\n") > 700
     (event,) = map(json.loads, mpucal(*words, "wrong.json", "--json-events").err.splitlines())
     assert (event["event"], event["code"]) == ("caution", "accelerometer_contradicted")
     assert 0.0 < event["t_s"] < 30.0
-    assert f"{event['what']}: {event['do']}" in told.err
+    assert f"{event['what']}: {event['do']}" in done.err

@@ -19,8 +19,7 @@ def calibrated(session):
 
 
 def test_the_written_calibration_states_what_the_chip_subtracts(mpucal, calibrated, tmp_path):
-    written = mpucal("write", calibrated, "chip", "--bus", "sim:seed=3", "-o", tmp_path, "--json")
-    assert written.code == 0, written.err
+    written = mpucal("write", calibrated, "chip", "--bus", "sim:seed=3", "-o", tmp_path, "--json", code=0)
     b_a = json.loads(calibrated.read_text())["accelerometer"]["b_a"]
     assert json.loads(written.out)["applied_in_hardware"]["b_a"] == pytest.approx(b_a, abs=0.006)
     left = {path.name for path in tmp_path.iterdir()}
@@ -43,8 +42,7 @@ def test_numbers_that_changed_since_are_written_only_by_force(mpucal, spoilt, tm
 
 
 def test_a_refusal_is_exit_code_6_and_says_what_the_chip_holds(mpucal, calibrated, tmp_path):
-    result = mpucal("write", calibrated, "chip", "--bus", "sim:seed=4", "-o", tmp_path)
-    assert result.code == 6
+    result = mpucal("write", calibrated, "chip", "--bus", "sim:seed=4", "-o", tmp_path, code=6)
     assert "the old state of the offset registers is restored" in result.err
     assert not (tmp_path / "calibration-on-chip.json").exists()
 

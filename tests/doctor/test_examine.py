@@ -41,13 +41,13 @@ def findings(bus):
     ],
 )
 def test_a_sound_chip_has_no_fault(topics, chip, place, genuine):
-    told = topics(f"chip={chip}")
-    assert [topic for topic, finding in told.items() if finding.mark is Mark.BAD] == []
-    assert told["offset registers"].data["place"] == place
-    assert (told["genuine?"].mark is Mark.OK) is genuine
-    assert told["bus speed"].data["achieved_hz"] == pytest.approx(400_000, rel=0.01)
+    by_topic = topics(f"chip={chip}")
+    assert [topic for topic, finding in by_topic.items() if finding.mark is Mark.BAD] == []
+    assert by_topic["offset registers"].data["place"] == place
+    assert (by_topic["genuine?"].mark is Mark.OK) is genuine
+    assert by_topic["bus speed"].data["achieved_hz"] == pytest.approx(400_000, rel=0.01)
     if "rate_error_ppm" in chip:
-        assert told["sample rate"].data["rate_hz"] == pytest.approx(200 * 0.993, rel=1e-3)
+        assert by_topic["sample rate"].data["rate_hz"] == pytest.approx(200 * 0.993, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -69,40 +69,40 @@ def test_a_sound_chip_has_no_fault(topics, chip, place, genuine):
     ],
 )
 def test_each_fault_is_found(topics, keys, topic, mark):
-    told = topics(keys)
-    assert told[topic].mark is mark
-    assert told[topic].remedy
+    by_topic = topics(keys)
+    assert by_topic[topic].mark is mark
+    assert by_topic[topic].remedy
 
 
 def test_a_board_that_is_never_put_down_costs_one_wait(topics):
-    told = topics("hand=restless")
-    assert "the board moves" in told["offset registers"].what
+    by_topic = topics("hand=restless")
+    assert "the board moves" in by_topic["offset registers"].what
     # What such a board shows says nothing about the chip.
-    assert (told["self test"].mark, told["self test"].what) == (Mark.UNKNOWN, "the board moved")
-    assert (told["genuine?"].mark, told["genuine?"].what) == (Mark.UNKNOWN, "undecided: the board moved")
-    assert "stuck bits" not in told
-    assert PATIENCE * READS < told["transfers"].data["transfers"] < 1.5 * PATIENCE * READS
+    assert (by_topic["self test"].mark, by_topic["self test"].what) == (Mark.UNKNOWN, "the board moved")
+    assert (by_topic["genuine?"].mark, by_topic["genuine?"].what) == (Mark.UNKNOWN, "undecided: the board moved")
+    assert "stuck bits" not in by_topic
+    assert PATIENCE * READS < by_topic["transfers"].data["transfers"] < 1.5 * PATIENCE * READS
 
 
 def test_a_board_that_is_put_down_late_is_examined():
     bus = open_simulated("sim:hand=still", seed=51)
-    told = {}
+    by_topic = {}
     for finding in examine(bus, Config(), 3.0):
         # The finding of the chip comes after the wait.
         if finding.topic == "chip":
             bus.hear(Prompt(PromptKind.REST, ""))
-        told[finding.topic] = finding
-    assert told["transfers"].data["transfers"] > PATIENCE * READS
-    assert told["offset registers"].mark is Mark.OK
+        by_topic[finding.topic] = finding
+    assert by_topic["transfers"].data["transfers"] > PATIENCE * READS
+    assert by_topic["offset registers"].mark is Mark.OK
 
 
 def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing(topics):
-    told = topics("fault=nacks")
-    counted = told["transfers"].data
+    by_topic = topics("fault=nacks")
+    counted = by_topic["transfers"].data
     assert counted["errors"] == {"not acknowledged": pytest.approx(counted["transfers"] / 50, rel=0.5)}
     assert 0 < counted["retries"] <= counted["errors"]["not acknowledged"]
-    assert "genuine?" in told
-    assert "100 kHz" in told["transfers"].remedy
+    assert "genuine?" in by_topic
+    assert "100 kHz" in by_topic["transfers"].remedy
 
 
 def test_an_axis_that_dies_midway_is_named_and_one_that_rarely_changes_is_not():
@@ -119,16 +119,16 @@ def test_an_axis_that_dies_midway_is_named_and_one_that_rarely_changes_is_not():
 
 
 def test_stuck_bits_of_a_revision_c_are_found_at_half_the_scale(topics):
-    told = topics("chip=mpu6050c,fault=high_bit@0")
-    assert told["stuck bits"].what == "bit 12 of accelerometer y does not move"
+    by_topic = topics("chip=mpu6050c,fault=high_bit@0")
+    assert by_topic["stuck bits"].what == "bit 12 of accelerometer y does not move"
 
 
 @pytest.mark.parametrize("at_s", [0, 6])
 def test_an_unplugged_chip_ends_the_examination_with_a_finding(topics, at_s):
-    told = topics(f"fault=unplugged@{at_s}")
-    assert list(told.values())[-1].mark is Mark.BAD
-    assert "nothing answers" in list(told.values())[-1].what
-    assert "genuine?" not in told
+    by_topic = topics(f"fault=unplugged@{at_s}")
+    assert list(by_topic.values())[-1].mark is Mark.BAD
+    assert "nothing answers" in list(by_topic.values())[-1].what
+    assert "genuine?" not in by_topic
 
 
 def test_a_correction_is_still_there_afterwards():
@@ -151,7 +151,7 @@ def test_page_and_document_hold_every_finding():
 @pytest.mark.parametrize("at_s", [7.72, 11.91])
 def test_a_reset_during_the_examination_is_not_called_a_defect(at_s):
     """Each reset falls into the self test, or into the measurement with shifted offset registers."""
-    told = findings(open_simulated(f"sim:chip=mpu6050,fault=brownout@{at_s}"))
-    assert "lost its settings" in told["broken off"].what
-    assert "supply" in told["broken off"].remedy
-    assert not {"dead axis", "stuck bits"} & {topic for topic, found in told.items() if found.mark is Mark.BAD}
+    by_topic = findings(open_simulated(f"sim:chip=mpu6050,fault=brownout@{at_s}"))
+    assert "lost its settings" in by_topic["broken off"].what
+    assert "supply" in by_topic["broken off"].remedy
+    assert not {"dead axis", "stuck bits"} & {topic for topic, found in by_topic.items() if found.mark is Mark.BAD}

@@ -24,5 +24,5 @@ def rows():
 
 @pytest.mark.parametrize(("words", "says"), list(rows()))
 def test_the_doctor_names_each_trouble(examined, words, says):
-    told = [f"{finding.what}: {finding.remedy}" for finding in examined(words)]
-    assert any(says in sentence for sentence in told), told
+    sentences = [f"{finding.what}: {finding.remedy}" for finding in examined(words)]
+    assert any(says in sentence for sentence in sentences), sentences

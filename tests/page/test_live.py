@@ -26,10 +26,10 @@ def test_the_values_are_those_that_are_printed(tmp_path, tab):
         url = it.stderr.readline().split()[-1]
         with closing(urllib.request.urlopen(f"{url}events", timeout=20.0)) as events:
             tab.goto(url)
-            told = [json.loads(line[5:]) for line in events if line.startswith(b"data:")]
+            changes = [json.loads(line[5:]) for line in events if line.startswith(b"data:")]
         tab.wait_for_selector("text=The stream has ended.")
     rows = [json.loads(line) for line in (tmp_path / "out").read_text().splitlines()]
-    shown = [one["live"]["acc"] for one in told if "live" in one]
+    shown = [one["live"]["acc"] for one in changes if "live" in one]
     printed = np.array([row["a"] for row in rows])
     assert len(shown) > 4
     np.testing.assert_allclose(np.mean(shown, axis=0), printed.mean(axis=0), atol=0.1)

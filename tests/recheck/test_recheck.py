@@ -89,9 +89,9 @@ def test_noise_that_grew_is_named(sensor, words):
         sensor=replace(CALIBRATION.sensor, rate_hz=quiet.sensor.rate_hz),
     )
     assert mpucal.check(known, noisier(1.2, sensor), days=1.0).what == "nothing"
-    told = mpucal.check(known, noisier(3.0, sensor), days=1.0)
-    assert (told.verdict, told.what, told.only_biases) == ("drifted", "noise", False)
-    assert words in told.message
+    checked = mpucal.check(known, noisier(3.0, sensor), days=1.0)
+    assert (checked.verdict, checked.what, checked.only_biases) == ("drifted", "noise", False)
+    assert words in checked.message
 
 
 def test_a_hand_that_trembles_on_the_first_rest_is_no_noise():
@@ -110,10 +110,10 @@ def test_values_are_printed_to_the_second_digit_of_their_uncertainties():
 def test_a_new_bias_is_estimated_and_its_history_kept():
     truth = HAPPENED["bias"][0]
     recording = shown(truth)
-    told = mpucal.check(CALIBRATION, recording, days=1.0)
-    bias = told.changes["bias"]
+    checked = mpucal.check(CALIBRATION, recording, days=1.0)
+    bias = checked.changes["bias"]
     assert np.all(np.abs(np.array(bias.value) - [0, 10, 0]) < 4 * np.array(bias.std))
-    after = update_biases(CALIBRATION, told, recording, "2026-01-02T00:00:00+00:00")
+    after = update_biases(CALIBRATION, checked, recording, "2026-01-02T00:00:00+00:00")
     np.testing.assert_array_equal(after.D, CALIBRATION.D)
     np.testing.assert_allclose(after.b_a, truth.b_a, atol=4 * after.b_a_std.max())
     assert mpucal.check(after, shown(truth, seed=8), days=0.0).verdict == "still good"
@@ -142,9 +142,9 @@ def test_a_known_b_a_of_t_is_not_called_a_drift():
 def test_too_few_orientations_allow_no_verdict():
     recording = shown(TRUTH)
     still = recording.part(0, round(9.0 * recording.rate_hz))
-    told = mpucal.check(CALIBRATION, still, days=1.0)
-    assert (told.verdict, told.exit_code) == ("cannot be told", 4)
-    assert "1 of the 4 orientations" in told.message
+    checked = mpucal.check(CALIBRATION, still, days=1.0)
+    assert (checked.verdict, checked.exit_code) == ("cannot be told", 4)
+    assert "1 of the 4 orientations" in checked.message
     moving = recording.part(len(recording) - 50, len(recording))
     assert mpucal.check(CALIBRATION, moving).verdict == "cannot be told"
 

@@ -48,15 +48,15 @@ def test_an_accepted_rest_is_found_by_the_verification(tremor_dps, hertz, holds_
     recording, starts = held_in_a_hand(np.radians(tremor_dps), hertz, holds_s, seed)
     watch, pauses = MotionWatch(Sensor()), PauseDetector()
     watch.begin(np.zeros(3))
-    told = {}
+    paused = {}
     for first in range(recording.flat[1], len(recording), 20):
         watch.add(recording.part(first, first + 20))
         for pause in pauses.add(watch.sightings):
             if pause.seconds >= HOLD_S:
-                told[pause.run] = pause.t_s
+                paused[pause.run] = pause.t_s
     runs = RestFinder(recording, flat_statistics(recording, recording.flat)).any_hand()
     long = recording.t[runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * RATE_HZ]]
-    for t_s in told.values():
-        assert any(first <= t_s <= last + HOLD_S for first, last in long), (told, long)
+    for t_s in paused.values():
+        assert any(first <= t_s <= last + HOLD_S for first, last in long), (paused, long)
     # Enough holds must be accepted; the first one teaches the tremor of a hand that trembles strongly.
-    assert len(told) >= len(starts) - (tremor_dps > 3.0)
+    assert len(paused) >= len(starts) - (tremor_dps > 3.0)

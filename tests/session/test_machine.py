@@ -393,8 +393,8 @@ def test_a_doubt_that_new_orientations_do_not_share_is_decided_by_one_more(board
     assert [request.kind for request in verifying.of(events.RequestFit)].count(events.FitKind.TRY) == 2
     assert verifying.state is State.CALIBRATE
     assert verifying.machine.checked == then
-    told = [(each.number, each.of, each.text) for each in verifying.of(events.Verification)]
-    assert told == [(4, 4, "new orientation 4 of 4: |a| error")] * len(then.verifications)
+    counted = [(each.number, each.of, each.text) for each in verifying.of(events.Verification)]
+    assert counted == [(4, 4, "new orientation 4 of 4: |a| error")] * len(then.verifications)
 
 
 def test_a_doubt_stands_where_nobody_holds_one_more_orientation(board, verifying):

@@ -23,7 +23,7 @@ FROM_HAND = np.diag([1.0, -1.0, -1.0])
 BLOCK = 40
 # Autopilots estimate the gyroscope's bias at each start; this share, up to 0.6 deg/s, is left by warming.
 GYRO_BIAS_LEFT = 0.12
-GYRO_BIAS_ANEW_RAD_S = 5e-4
+GYRO_BIAS_AT_START_RAD_S = 5e-4
 
 
 class Imus:
@@ -59,7 +59,7 @@ class Imus:
     def restart(self) -> None:
         """Estimate the gyroscopes' biases again, as an autopilot does, which leaves a little of each."""
         for imu, true in enumerate(self.truths):
-            left = self._rng.normal(0.0, GYRO_BIAS_ANEW_RAD_S, 3)
+            left = self._rng.normal(0.0, GYRO_BIAS_AT_START_RAD_S, 3)
             self._responses[imu] = replace(true, b_omega=true.b_omega + left).response(self._setting)
 
     def next(self) -> Vector:
