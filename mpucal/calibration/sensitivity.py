@@ -20,13 +20,14 @@ from ..rests.intervals import RestFinder
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import PASSES
-from .hypotheses import SURE, Explanation, gyroscope_change
-from .likelihood import Evaluation, evaluate
+from .hypotheses import SURE, Explanation, gyroscope_change, rank
+from .likelihood import evaluate, part_scores
+from .model_selection import HOPELESS_NIS
 from .normal_equations import inverse
 from .parameters import HAND, NAMES, SENSITIVE
 from .preprocessing import prepare
+from .scores import ends_of, with_times
 from .theta import Theta
-from .uncertainty import MOST_NIS
 
 
 class Sensitivity(NamedTuple):
@@ -65,34 +66,41 @@ def find_sensitivity(
     if prepared.rests_often and gyroscope_change(explanations) is None:  # a machine's slow turns pass for rests
         return None
     problem, prior = replace(prepared.white(0.0), huber=np.inf).with_forces(), prepared.prior()
-    series = problem.series
+    series, ends = problem.series, ends_of(problem)
     assert series.force is not None
-    force = series.force
-
-    def at_sensitivity(theta: Theta, S: Vector) -> Evaluation:
-        less = replace(series, omega=series.omega - force @ S.T)
-        return evaluate(replace(problem, series=less), theta, SENSITIVE)
-
+    if ends is None:
+        return None
     up = np.linalg.solve(fit.D, flat.y - fit.b_a)
     start = Theta.start(fit.D, fit.b_a, fit.b_omega, up / np.linalg.norm(up))
     theta, S = replace(start, K=fit.K, tau=fit.delay_s), np.zeros((3, 3))
     precision = np.append(prior.precision, np.full(9, SENSITIVITY_SD**-2))
     others = np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)])  # nothing's share is 1
     for _ in range(PASSES):
-        found = at_sensitivity(theta, S)
-        C = inverse(found.fisher + np.diag(precision))
-        known = inverse(C[HAND:, HAND:])
+        less = replace(problem, series=replace(series, omega=series.omega - series.force @ S.T))
+        found = evaluate(less, theta, SENSITIVE, ends)
+        H = found.fisher + np.diag(precision)
+        C = inverse(H)
         step = -C @ (found.gradient + precision * np.append(theta.values() - prior.mean, S))
-        theta, S = theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
-        evidence = 0.5 * float(S.ravel() @ known @ S.ravel() - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
-        left = found.squares + step @ (2.0 * found.gradient + found.fisher @ step)
-        if not (evidence > -np.log(SURE) and left < MOST_NIS * len(series)):
+        before, theta, S = theta, theta.moved(step[:HAND]), S + step[HAND:].reshape(3, 3)
+        known, s = inverse(C[HAND:, HAND:]), S.ravel()
+        evidence = 0.5 * float(s @ known @ s - np.linalg.slogdet(SENSITIVITY_SD**2 * known)[1])
+        if not evidence > -np.log(SURE):
             return None
-        if evidence < others:  # it is not removed
-            break
+    left = found.squares + step @ (2.0 * found.gradient + found.fisher @ step)
+    assert found.to_ends is not None
+    # The gyroscope's bias may change besides.
+    scores = part_scores(less, before, SENSITIVE, found.to_ends).moved(step)
+    beside = rank(with_times(less, theta, scores, H, np.zeros(SENSITIVE)), theta.D)
+    evidence += np.logaddexp.reduce([0.0, *(each.log_share for each in beside)])
+    change, freed = gyroscope_change(beside), np.ones(SENSITIVE - HAND)
+    if change is not None:
+        s, freed = s + change.shift[0, HAND:], np.sqrt(1.0 + change.freed[HAND:])
+        left -= 2.0 * change.evidence
+    if not left < HOPELESS_NIS * len(series):
+        return None
     weight = np.exp(evidence - np.logaddexp(others, evidence))
     removed = weight if weight > 0.5 else 0.0
-    carried, s = C[:HAND, HAND:] @ known, S.ravel()
+    carried = C[:HAND, HAND:] @ known
     apart = weight * (1.0 - removed) ** 2 + (1.0 - weight) * removed**2
-    covariance = weight * C[HAND:, HAND:] + apart * np.outer(s, s)
-    return Sensitivity(removed * S, carried @ covariance @ carried.T)
+    covariance = weight * C[HAND:, HAND:] * np.outer(freed, freed) + apart * np.outer(s, s)
+    return Sensitivity(removed * s.reshape(3, 3), carried @ covariance @ carried.T)

@@ -1,4 +1,4 @@
-"""Slip of the mount between two rests, or within the last: from then on, gravity contradicts the gyroscope in one way.
+"""Slip of the mount between two rests, or within one of the last: from then on, gravity contradicts the gyroscope.
 
 A miss between rests that the gyroscope's noise does not explain is taken for an error of the gyroscope, and the fit
 becomes unsure of everything. A mount that slipped leaves a pattern: rotations delta of the accelerometer against the
@@ -35,7 +35,7 @@ from .transitions import (
     likely_scale,
 )
 
-NEAR_ENDS = 5  # places: the first and the last two transitions, and the last rest
+NEAR_ENDS = 6  # places: the first and the last two transitions, and the last two rests
 
 
 class Slip(NamedTuple):
@@ -112,30 +112,34 @@ def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
 
 
 def _at_rest(prepared: Preprocessed, theta: Theta, spoilt: Mask) -> list[tuple[float, Transition]]:
-    """Return the probability of a slip within the last rest, and what it would be; nothing if rests are too few.
+    """Return probabilities of a slip within the last two rests, and what it would be; nothing if rests are too few.
 
     The gyroscope tells how the board turned as it rested. From the first half of a rest to the second, gravity misses
-    that by as much as the hand sways, in the last rest as in so long a part of the others. spoilt : see end_slips.
+    that by as much as the hand sways, in these rests as in so long a part of the others. spoilt : see end_slips.
     """
     recording, flat, runs = prepared.recording, prepared.flat, prepared.runs
     # each half is long enough for a rest
     runs = runs[(runs[:, 0] > flat.last) & (runs[:, 1] - runs[:, 0] >= 2.0 * SHORTEST_S * recording.rate_hz)]
-    if len(runs) < FEWEST_TRANSITIONS or spoilt[slice(*(runs[-1] - flat.last))].any():
+    if len(runs) < FEWEST_TRANSITIONS:
         return []
-    runs[:, 1] = np.minimum(runs[:, 1], runs[:, 0] + runs[-1, 1] - runs[-1, 0])
-    acc, middle = level_rests(recording.acc, recording, flat, runs), runs.sum(axis=1) // 2
-    leaving, coming = (
-        (statistics(acc, half)[0] - theta.b_a) @ theta.inverse.T
-        for half in (np.column_stack([runs[:, 0], middle]), np.column_stack([middle, runs[:, 1]]))
-    )
-    misses = np.cross(leaving, coming) / (lengths(leaving) * lengths(coming))[:, None]
-    n = (runs[:, 1] - runs[:, 0]).astype(np.float64) / 2.0
+    acc, found = level_rests(recording.acc, recording, flat, runs), []
     sway = np.median(tremor_variance(statistics(acc, runs)[1], flat.Sigma_a))
-    of_mean = POSE_MPS2**2 + flat.Sigma_a.mean() / n + sway * mean_variance(SWAY_PER_S * n / recording.rate_hz)
-    known = 2.0 * of_mean / prepared.problem.gravity**2
-    span = slice(*(runs[-1] - flat.last).tolist())
-    within = Transition(span, np.eye(3), leaving[-1], coming[-1], misses[-1], float(known[-1]), 0.0)
-    return [(float(_probability(misses, known, [len(runs) - 1])[0]), within)]
+    for at in (-2, -1):
+        span, first = slice(*(runs[at] - flat.last).tolist()), runs[:, 0]
+        last = np.minimum(runs[:, 1], first + runs[at, 1] - runs[at, 0])
+        middle = (first + last) // 2
+        leaving, coming = (
+            (statistics(acc, np.column_stack(half))[0] - theta.b_a) @ theta.inverse.T
+            for half in ((first, middle), (middle, last))
+        )
+        misses = np.cross(leaving, coming) / (lengths(leaving) * lengths(coming))[:, None]
+        n = 0.5 * (last - first)
+        of_mean = POSE_MPS2**2 + flat.Sigma_a.mean() / n + sway * mean_variance(SWAY_PER_S * n / recording.rate_hz)
+        known = 2.0 * of_mean / prepared.problem.gravity**2
+        within = Transition(span, np.eye(3), leaving[at], coming[at], misses[at], float(known[at]), 0.0)
+        if not spoilt[span].any():
+            found.append((float(_probability(misses, known, [at])[0]), within))
+    return found
 
 
 def slip_squares(transition: Transition, D: Vector) -> Vector:
