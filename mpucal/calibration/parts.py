@@ -53,7 +53,12 @@ class Parts:
 
     def grouped(self, first: NDArray[np.intp]) -> tuple[Vector, Vector]:
         """Return gradients (m, p) and Fisher matrices (m, p, p) of groups that begin with the parts `first` (m,)."""
-        return np.add.reduceat(self.gradient, first), np.add.reduceat(self.fisher, first)
+        gradient, fisher, size = self.gradient[first], self.fisher[first], np.diff(first, append=len(self))
+        for k in range(1, size.max()):  # a fifth of the time of NumPy's reduceat
+            more = size > k
+            gradient[more] += self.gradient[first[more] + k]
+            fisher[more] += self.fisher[first[more] + k]
+        return gradient, fisher
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
         """Return (k,) the group of each part, in `groups` stretches of time, or as many as there are parts."""
