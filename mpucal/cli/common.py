@@ -26,8 +26,8 @@ def say(text: str) -> None:
 
 def say_done(clauses: Sequence[str], err: bool = False) -> None:
     """Print what was done, a line for each clause, on stdout or on stderr."""
-    told = ";\n  ".join(clauses)
-    click.echo(f"Done: {told}.", err=err)
+    listed = ";\n  ".join(clauses)
+    click.echo(f"Done: {listed}.", err=err)
 
 
 def ask_in_doubt(question: str, yes: bool) -> None:

@@ -139,9 +139,9 @@ def command_again(
     typed = typed_words()
     words = _session_words(source) if NO_MEASUREMENT.intersection(typed) else list(typed)
     reasons = calibration.quality.get("reasons", ())
-    said = REMEDY_OPTION.search(" ".join(reason.get("remedy", "") for reason in reasons))
-    if recording is not None and said:
-        words = amended(words, said[1], "")
+    suggested = REMEDY_OPTION.search(" ".join(reason.get("remedy", "") for reason in reasons))
+    if recording is not None and suggested:
+        words = amended(words, suggested[1], "")
     elif recording is not None:
         free = str(free_name(recording.parent / recording.stem, recording.suffix))
         words = [free if Path(word) == recording else word for word in words]

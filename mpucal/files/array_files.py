@@ -47,9 +47,9 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     except DAMAGED as error:
         # NumPy takes unknown bytes for pickled objects, and advises to load these, which would run code
         pickled = "pickle" in str(error)
-        said = "damaged, or pickled Python objects" if pickled else error
+        why = "damaged, or pickled Python objects" if pickled else error
         remedy = NAME_ARRAYS if pickled else "it is cut short or damaged: copy or export it again"
-        raise RecordingError(f"{path} is not a whole file of arrays ({said})", remedy) from error
+        raise RecordingError(f"{path} is not a whole file of arrays ({why})", remedy) from error
 
 
 def _read_numpy(path: Path) -> Arrays:

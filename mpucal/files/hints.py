@@ -74,8 +74,8 @@ def parse_units(text: str) -> Mapping[str, str]:
     """
     found = {}
     for item in text.split(","):
-        quantity, _, said = (word.strip() for word in item.partition("="))
-        unit = find_unit(said)
+        quantity, _, unit = (word.strip() for word in item.partition("="))
+        unit = find_unit(unit)
         if PER_SAMPLE.get(unit, unit) not in QUANTITIES.get(quantity, ()):
             known = "; ".join(f"{name} in {', '.join(units)}" for name, units in QUANTITIES.items())
             raise ValueError(f"{item!r} is not a unit: {known}")

@@ -195,8 +195,8 @@ def _records(reader: StreamReader) -> Iterator[McapRecord]:
         if not isinstance(record, Chunk):
             yield record
             continue
-        said = frame_content_size(record.data) if record.compression == "zstd" else 0
-        if max(record.uncompressed_size, said) > LONGEST_CHUNK:
+        size = frame_content_size(record.data) if record.compression == "zstd" else 0
+        if max(record.uncompressed_size, size) > LONGEST_CHUNK:
             raise RecordLengthLimitExceeded(Opcode.CHUNK, record.uncompressed_size, LONGEST_CHUNK)
         yield from breakup_chunk(record, validate_crc=True)
 

@@ -70,8 +70,8 @@ def _tables(name: str, data: NDArray[np.uint8]) -> Iterator[Table]:
             numbers = np.ascontiguousarray(of_type).view(kind).astype(float).T
             # the unit of whole numbers that increase is unknown
             columns = [of for of in numbers if not is_clock(of) or ("f" in kind and is_even_clock(of))]
-            said = f"it holds records of {size} bytes, of numbers of {what}"
-            yield Table(name, [f"field {i + 1}" for i in range(len(columns))], columns, remarks=(said,))
+            remark = f"it holds records of {size} bytes, of numbers of {what}"
+            yield Table(name, [f"field {i + 1}" for i in range(len(columns))], columns, remarks=(remark,))
 
 
 def _rows(data: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:

@@ -77,12 +77,12 @@ class Rows:
 
     def notes(self) -> list[str]:
         """Return sentences on the samples, when the runs have been read."""
-        said = [f"{describe_done(self.name, self.done)}."] if self.done else []
+        remarks = [f"{describe_done(self.name, self.done)}."] if self.done else []
         if self.plain and self.interrupted:
-            said += [
+            remarks += [
                 f"{self.name}: its times restart {how_often(len(self.interrupted))}, and continue there after a gap."
             ]
-        return said
+        return remarks
 
 
 Write = Callable[[Samples], None]
@@ -101,8 +101,8 @@ def describe_done(name: str, done: str) -> str:
 
 def describe(name: str, units: Mapping[str, str]) -> str:
     """Return a sentence on units that are not SI; empty if all are."""
-    said = "; ".join(f"{key} was read in {unit}, which its values suggest" for key, unit in units.items() if unit)
-    return f"{name}: {said}." if said else ""
+    listed = "; ".join(f"{key} was read in {unit}, which its values suggest" for key, unit in units.items() if unit)
+    return f"{name}: {listed}." if listed else ""
 
 
 def arrival_clock(runs: Iterator[Samples], sensor: Sensor) -> Clock | None:

@@ -99,12 +99,12 @@ class Axes:
         """Return the axes with their numbers and labels."""
         (left, right), (bottom, top) = self.place(np.array(self._x), np.array(self._y))
         marks = [line(np.array([left, left, right]), np.array([top, bottom, bottom]), INK)]
-        for value, said in ticks(*self._x):
+        for value, label in ticks(*self._x):
             (x, *_), _y = self.place(np.array([value]), np.array([0.0]))
-            marks.append(text(x, bottom + 13.0, said))
-        for value, said in ticks(*self._y):
+            marks.append(text(x, bottom + 13.0, label))
+        for value, label in ticks(*self._y):
             _x, (y, *_) = self.place(np.array([0.0]), np.array([value]))
-            marks.append(text(left - 5.0, y + 4.0, said, "end"))
+            marks.append(text(left - 5.0, y + 4.0, label, "end"))
             marks.append(line(np.array([left - 3.0, left]), np.array([y, y]), INK))
         x_label, y_label = self._labels
         return "".join(marks) + text(right, HEIGHT - 4.0, x_label, "end") + text(2.0, 12.0, y_label, "start")

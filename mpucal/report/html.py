@@ -94,8 +94,8 @@ def _verdict(calibration: Calibration, recording: Recording | None) -> str:
     )
     listed = f'<ul id="reasons">\n{reasons}</ul>\n' if reasons else ""
     recovered = paragraph(recording.recovered, note=True) if recording and recording.recovered else ""
-    said = f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n'
-    return f"{said}{listed}{sections.next_step(calibration)}{recovered}"
+    headline = f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n'
+    return f"{headline}{listed}{sections.next_step(calibration)}{recovered}"
 
 
 def _magnitudes(track: Track | None) -> str:

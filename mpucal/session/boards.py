@@ -82,8 +82,8 @@ def speak_of(output: T, board: str) -> T:
     if board != VEHICLE:
         return output
     texts = {f.name: getattr(output, f.name) for f in fields(output)}
-    said: dict[str, Any] = {k: name_thing(text, Origin.VEHICLE) for k, text in texts.items() if type(text) is str}
-    return replace(output, **said)
+    renamed: dict[str, Any] = {k: name_thing(text, Origin.VEHICLE) for k, text in texts.items() if type(text) is str}
+    return replace(output, **renamed)
 
 
 def describe(down: Direction, board: str) -> str:

@@ -186,9 +186,9 @@ class TurnGuide:
         reach = math.sin(KEPT_RAD) / max(math.sin(missing), 1e-9)
         most = math.asin(reach) if reach < 1.0 else math.pi
         self._heading = shortest + min(max(aside, -most), most)
-        told = self._heading if missing > math.pi / 2.0 else shortest
-        if new or abs(_wrapped(told - _angle(self._word_index))) > WORDS_KEPT_RAD:
-            self._word_index = _nearest(told)
+        shown = self._heading if missing > math.pi / 2.0 else shortest
+        if new or abs(_wrapped(shown - _angle(self._word_index))) > WORDS_KEPT_RAD:
+            self._word_index = _nearest(shown)
 
 
 def _nearest(heading: float) -> int:

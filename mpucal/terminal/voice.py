@@ -65,7 +65,7 @@ class Voice:
 
     def __init__(self) -> None:
         self.said: Announcement | None = None
-        self._moment = self._told = Moment.CONNECTING
+        self._moment = self._spoken = Moment.CONNECTING
         self._since_s = self._t_s = 0.0
         self._held: Held | None = None
         self._caution: Caution | None = None
@@ -104,28 +104,28 @@ class Voice:
         return self._moment not in (Moment.COUNTING, Moment.DECIDED) and lasts_s >= SETTLED_S
 
     def _instruct(self, view: View) -> None:
-        tone = Tone.WRONG if self._told is Moment.COUNTING else Tone.NONE
+        tone = Tone.WRONG if self._spoken is Moment.COUNTING else Tone.NONE
         match self._moment:
-            case Moment.COUNTING if self._told is Moment.NEAR:
+            case Moment.COUNTING if self._spoken is Moment.NEAR:
                 self._say("", Tone.HOLD)
-            case Moment.COUNTING if self._told is not Moment.COUNTING and (
-                self._told is not Moment.TURN or self._quiet_s >= SETTLED_S
+            case Moment.COUNTING if self._spoken is not Moment.COUNTING and (
+                self._spoken is not Moment.TURN or self._quiet_s >= SETTLED_S
             ):
                 self._say(view.confirming or in_words(view), Tone.HOLD)
             case Moment.TURN if view.meter is not None and view.meter.turn and view.waiting is None:
-                due = self._told is not Moment.TURN or view.prompt is not self._prompt or self._quiet_s >= SAY_AGAIN_S
+                due = self._spoken is not Moment.TURN or view.prompt is not self._prompt or self._quiet_s >= SAY_AGAIN_S
                 # The words on the last orientation are not interrupted.
-                first = self._told is Moment.DECIDED and self._quiet_s >= SETTLED_S
-                first = first or self._told in (Moment.CONNECTING, Moment.STEP)
+                first = self._spoken is Moment.DECIDED and self._quiet_s >= SETTLED_S
+                first = first or self._spoken in (Moment.CONNECTING, Moment.STEP)
                 if due and (first or self._is_settled):
                     self._prompt = view.prompt
                     self._say(view.meter.turn.replace(" deg ", " degrees "), tone)
-            case Moment.NEAR if self._told is not Moment.NEAR and self._is_settled:
+            case Moment.NEAR if self._spoken is not Moment.NEAR and self._is_settled:
                 self._say("Hold it still", tone)
             case Moment.STEP if view.prompt is not None and view.prompt is not self._prompt:
                 self._prompt = view.prompt
                 self._say(view.prompt.text, Tone.NONE)
 
     def _say(self, words: str, tone: Tone) -> None:
-        self._told = self._moment
+        self._spoken = self._moment
         self.said = Announcement(0 if self.said is None else self.said.number + 1, self._t_s, words, tone)

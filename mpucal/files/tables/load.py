@@ -238,9 +238,9 @@ def _oldest_first(table: Table) -> Table:
         # a temperature that falls stays for many lines
         sure = (not is_weak(clock) or (np.diff(table.times(clock, whole)[0]) < 0.0).all() for clock in fall)
         if not rises and any(sure):
-            said = "its lines are the newest first, and were read from the last to the first"
+            remark = "its lines are the newest first, and were read from the last to the first"
             cells = [of[::-1] for of in table.cells]
-            return table.noted(said, cells=cells, lines=table.lines[::-1])
+            return table.noted(remark, cells=cells, lines=table.lines[::-1])
     return table
 
 

@@ -41,25 +41,25 @@ class Reading:
 
     Attributes
     ----------
-    values : (n, 3) m/s^2 or rad/s. said : how they were read. clipped : (n,) True where one is at the end of its range.
+    values : (n, 3) m/s^2 or rad/s. how : how they were read. clipped : (n,) True where one is at the end of its range.
     """
 
     values: Vector
-    said: str
+    how: str
     clipped: Mask
 
     @classmethod
-    def of(cls, values: Vector, scale: float, said: str, *, counts: bool = False) -> Reading:
+    def of(cls, values: Vector, scale: float, how: str, *, counts: bool = False) -> Reading:
         """Return values times `scale`; counts of 16 bits are clipped at their ends."""
         ends = (values >= ACCEL_COUNTS - 1) | (values <= -ACCEL_COUNTS)
         counts = counts and bool(np.abs(values).max() <= ACCEL_COUNTS)
-        return cls(values * scale, said, np.asarray(ends.any(axis=1) & counts))
+        return cls(values * scale, how, np.asarray(ends.any(axis=1) & counts))
 
 
 def accelerations(
-    values: Vector, said: str, hints: Hints, name: str, *, beside: str | None = None, rate_hz: float = math.inf
+    values: Vector, named: str, hints: Hints, name: str, *, beside: str | None = None, rate_hz: float = math.inf
 ) -> Reading:
-    """Return (n, 3) accelerations, in the unit `said` by the file, in SI units.
+    """Return (n, 3) accelerations, in the unit that the file names (`named`), in SI units.
 
     Parameters
     ----------
@@ -67,25 +67,25 @@ def accelerations(
         None if that is not known.
     rate_hz : of the samples, of which these may be increments.
     """
-    said = hints.units.get("acc", said)
+    named = hints.units.get("acc", named)
     if "acc" not in hints.units and (centre := units.offset(values)) is not None:
         raise RecordingError(
             f"{name}: the accelerations turn about {', '.join(f'{at:.4g}' for at in centre)} in place of zero",
             "subtract from each axis what its converter gives at 0 g, such as half of its range, or name the unit with"
             " --units acc=UNIT if zero is right",
         )
-    size, seen = units.typical_size(values)[0], units.acceleration_unit(values, said)
-    whole = not said and units.are_counts(values)
+    size, seen = units.typical_size(values)[0], units.acceleration_unit(values, named)
+    whole = not named and units.are_counts(values)
     likely_whole = _whole_units(size, beside or "")[0] if whole and seen == "mg" else ""
     unclear = not seen or hints.accel_range_g or likely_whole == COUNTS
     if whole and _away(size, "mm/s^2") < NEAR_LOG and beside != COUNTS and not hints.accel_range_g:
         by = "(by |a|; if these are in 0.1 mg or counts, give --units acc=mg/10 or acc=counts)"
         return Reading.of(values, QUANTITIES["acc"]["mm/s^2"], f"in mm/s^2 {by}")
-    if said == COUNTS or (whole and unclear):
+    if named == COUNTS or (whole and unclear):
         return _scaled_counts(values, hints, name, size, OR_MG if likely_whole and not beside else BY_SIZE)
     at_rest = units.quietest(values)
-    near = "" if seen or said else units.mean_acceleration_unit(values) or units.acceleration_unit(at_rest)
-    lacks_gravity = not seen and size * QUANTITIES["acc"].get(said, 1.0) < STANDARD_GRAVITY_MPS2 / units.MOST_OF_G
+    near = "" if seen or named else units.mean_acceleration_unit(values) or units.acceleration_unit(at_rest)
+    lacks_gravity = not seen and size * QUANTITIES["acc"].get(named, 1.0) < STANDARD_GRAVITY_MPS2 / units.MOST_OF_G
     if near and (beside != "" or not lacks_gravity):
         raise RecordingError(
             f"{name}: |a| varies too much to show its unit; on average, or at rest, it would be gravity in {near}",
@@ -94,19 +94,19 @@ def accelerations(
         )
     if lacks_gravity:
         increments = f"--units acc={OF_INCREMENTS}" if units.is_gravity(size * rate_hz) else ""
-        likely = not said and units.is_gravity(size * QUANTITIES["acc"]["g"])
+        likely = not named and units.is_gravity(size * QUANTITIES["acc"]["g"])
         of_g = f"--units acc={near or 'g'}" if near or likely else ""
         raise RecordingError(
-            f"{name}: the median |a| is only {f'{size:.3g} {said}'.strip()}, so gravity is not in it",
+            f"{name}: the median |a| is only {f'{size:.3g} {named}'.strip()}, so gravity is not in it",
             "give the accelerometer's own values, not the linear acceleration computed from them"
             + f", or {increments} (or deg/sample) if these are increments of velocity and angle" * bool(increments)
             + f", or {of_g} if these are in {near or 'g'}" * bool(of_g),
             increments or (of_g if likely else ""),
         )
-    sure = said or not whole or units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
-    seen = hints.units.get("acc", (likely_whole or seen if sure else "") or said)
+    sure = named or not whole or units.is_gravity(size * QUANTITIES["acc"].get(seen, 0.0))
+    seen = hints.units.get("acc", (likely_whole or seen if sure else "") or named)
     evidence = f"the median |a| of {size:.4g}"
-    unit = resolve_unit(name, "acc", said, seen, evidence, likely=size <= units.LARGEST_OF_SI)
+    unit = resolve_unit(name, "acc", named, seen, evidence, likely=size <= units.LARGEST_OF_SI)
     return Reading.of(values, QUANTITIES["acc"][unit], f"in {unit}{OR_MG if likely_whole not in ('', 'mg') else ''}")
 
 
@@ -150,10 +150,10 @@ class Rates:
 
     def __init__(self, t: Vector, acc: Vector, values: Vector, stream: Stream, hints: Hints, name: str) -> None:
         self._t, self._acc, self._values, self._hints, self._name = t, acc, values, hints, name
-        self._said = hints.units.get("gyr", stream.unit)
+        self._named = hints.units.get("gyr", stream.unit)
         self._factor = units.rate_factor(t, acc, values)
-        self._seen = hints.units.get("gyr", units.gyro_unit(self._factor, self._said))
-        self._whole = not self._said and units.are_counts(stream.values[stream.complete])
+        self._seen = hints.units.get("gyr", units.gyro_unit(self._factor, self._named))
+        self._whole = not self._named and units.are_counts(stream.values[stream.complete])
 
     @property
     def shown(self) -> str:
@@ -180,21 +180,21 @@ class Rates:
         """Return them in SI units; `beside_counts` if the accelerations are counts."""
         counted = self.shown == COUNTS or beside_counts or self._hints.gyro_range_dps is not None
         of_counts = self._whole and counted
-        if self._said == COUNTS or of_counts:
+        if self._named == COUNTS or of_counts:
             return self._counts()
-        said, seen, factor = self._said, self._seen, self._factor
-        at_rest = "" if said or seen or factor else units.resting_gyro_unit(self._t, self._acc, self._values)
+        named, seen, factor = self._named, self._seen, self._factor
+        at_rest = "" if named or seen or factor else units.resting_gyro_unit(self._t, self._acc, self._values)
         if at_rest:
             by = "(by their noise and bias, as gravity hardly turns)"
             return Reading.of(self._values, QUANTITIES["gyr"][at_rest], f"rates in {at_rest} {by}")
-        if not said and not seen and not (factor and self._hints.rate_hz):
+        if not named and not seen and not (factor and self._hints.rate_hz):
             return self._left_out("their unit (--units gyr=UNIT)")
         if factor and not seen:
             known = [unit for unit in QUANTITIES["gyr"] if unit != COUNTS]
-            of = said or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))
+            of = named or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))
             remedy = f"their unit with --units {' or '.join(f'gyr={unit}' for unit in known)}"
             raise self._wrong(factor / QUANTITIES["gyr"][of], of, remedy, f"--units gyr={of}")
-        unit = resolve_unit(self._name, "gyr", said, seen, "the turning of gravity")
+        unit = resolve_unit(self._name, "gyr", named, seen, "the turning of gravity")
         return Reading.of(self._values, QUANTITIES["gyr"][unit], f"rates in {unit}{self._sign_remark()}")
 
     def _counts(self) -> Reading:

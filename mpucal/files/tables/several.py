@@ -103,9 +103,9 @@ def _of_one_side(table: Table, sensor: str | None) -> Table:
     chosen = _choose([*sensors], sensor, table.name)
     others = {place for roles in sensors.values() for place in roles.values()}
     own = {place: role for role, place in sensors[chosen].items()}
-    said = f"{len(sensors)} sensors are side by side, of which number {chosen} was read ({CHOOSES})"
+    remark = f"{len(sensors)} sensors are side by side, of which number {chosen} was read ({CHOOSES})"
     header = [own.get(at, "" if at in others else table.name_of(at)) for at in range(len(table.cells))]
-    return table.noted(said, header=header, chosen=True)
+    return table.noted(remark, header=header, chosen=True)
 
 
 def _choose(sensors: Sequence[str], sensor: str | None, name: str) -> str:
@@ -189,8 +189,8 @@ def of_one_beginning(
     if len(tables) < 2:
         return None
     chosen = _choose([*tables], sensor, name)
-    said = f"its lines begin with several sensors' names ({', '.join(tables)}), of which {_which(chosen, tables)}"
-    return tables[chosen].noted(f"{said} was read ({CHOOSES})", chosen=True)
+    remark = f"its lines begin with several sensors' names ({', '.join(tables)}), of which {_which(chosen, tables)}"
+    return tables[chosen].noted(f"{remark} was read ({CHOOSES})", chosen=True)
 
 
 def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
@@ -224,8 +224,8 @@ def of_one_sensor(table: Table, sensor: str | None = None) -> Table:
         if whole and (named or _take_turns(table, place, sensors)):
             chosen = _choose([*of_words], sensor, table.name)
             called, which = name or f"column {place + 1}", _which(chosen, of_words)
-            said = f"its lines are of several sensors ({called}: {', '.join(of_words)}), of which {which} was read"
-            return table.part(sensors == of_words[chosen]).noted(f"{said} ({CHOOSES})", chosen=True)
+            remark = f"its lines are of several sensors ({called}: {', '.join(of_words)}), of which {which} was read"
+            return table.part(sensors == of_words[chosen]).noted(f"{remark} ({CHOOSES})", chosen=True)
     return table
 
 

@@ -56,33 +56,33 @@ LEAST_TURNS = 30
 TURN_S, EXPLAINED = 0.2, 0.5
 
 
-def time_unit(step: float, said: str = "") -> str:
-    """Return the unit of times that lie `step` apart: `said` if plausible, else by the sample rate; or empty.
+def time_unit(step: float, named: str = "") -> str:
+    """Return the unit of times that lie `step` apart: `named` if plausible, else by the sample rate; or empty.
 
     A recording in a named unit is read even if it is too slow to calibrate.
     """
-    if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= LONGEST_STEP_S:
-        return said
+    if named and 1 / FASTEST_HZ <= step * QUANTITIES["t"][named] <= LONGEST_STEP_S:
+        return named
     return _first_unit("t", "", step, 1 / FASTEST_HZ, 1 / SLOWEST_HZ)
 
 
-def _first_unit(quantity: str, said: str, value: float, least: float, most: float) -> str:
-    """Return the first unit in which a value is within limits in SI: `said`, or one that samples show; or empty."""
-    likely = {unit: value * QUANTITIES[quantity][unit] for unit in (*filter(None, [said]), *SHOWN[quantity])}
+def _first_unit(quantity: str, named: str, value: float, least: float, most: float) -> str:
+    """Return the first unit in which a value is within limits in SI: `named`, or one that samples show; or empty."""
+    likely = {unit: value * QUANTITIES[quantity][unit] for unit in (*filter(None, [named]), *SHOWN[quantity])}
     return next((unit for unit, si in likely.items() if least <= si <= most), "")
 
 
-def acceleration_unit(acc: Vector, said: str = "") -> str:
+def acceleration_unit(acc: Vector, named: str = "") -> str:
     """Return the unit in which the median of (n, 3) accelerations is gravity; empty if none is.
 
-    The unit `said` by the file is tried first. Without gravity, |a| of a hand scatters by more than half of its median.
+    `named`, the unit in the file, is tried first. Without gravity, |a| of a hand scatters by more than half its median.
     """
     if not (np.abs(acc) < LARGEST_NUMBER).all():
         return ""
     size, scatter = typical_size(acc)
     if scatter > SCATTER * size:
         return ""
-    return _first_unit("acc", said, size, STANDARD_GRAVITY_MPS2 / MOST_OF_G, STANDARD_GRAVITY_MPS2 * MOST_OF_G)
+    return _first_unit("acc", named, size, STANDARD_GRAVITY_MPS2 / MOST_OF_G, STANDARD_GRAVITY_MPS2 * MOST_OF_G)
 
 
 def mean_acceleration_unit(values: Vector) -> str:
@@ -237,9 +237,9 @@ def is_gravity(size_mps2: float) -> bool:
     return 1 / MOST_LIKELY <= size_mps2 / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
 
 
-def gyro_unit(factor: float | None, said: str = "") -> str:
-    """Return the unit of rates with this rate_factor, first the one `said` by the file; empty if there is none."""
-    return _first_unit("gyr", said, 1 / abs(factor), 1 / MOST_TURNED, MOST_TURNED) if factor else ""
+def gyro_unit(factor: float | None, named: str = "") -> str:
+    """Return the unit of rates with this rate_factor, first `named`, the one in the file; empty if there is none."""
+    return _first_unit("gyr", named, 1 / abs(factor), 1 / MOST_TURNED, MOST_TURNED) if factor else ""
 
 
 def resting_gyro_unit(t: Vector, acc: Vector, gyr: Vector) -> str:

@@ -86,11 +86,11 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
             rate_of = Rates(t[complete], values, rates, gyr, hints, name)
             remarks = [*remarks, whole[1]]
         a = accelerations(values, acc.unit, hints, name, beside=rate_of.shown, rate_hz=clock.rate_hz)
-        w = rate_of.read(beside_counts=a.said.startswith(OF_COUNTS))
+        w = rate_of.read(beside_counts=a.how.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
     repeated, lost = int((~new[0]).sum()), max(acc.lost, gyr.lost)
-    said = [
-        f"{name} was read with {of_times}, accelerations {a.said} and {w.said}",
+    remarks = [
+        f"{name} was read with {of_times}, accelerations {a.how} and {w.how}",
         of_rate,
         "these are increments over a sample, times its rate" if any(by_sample) else "",
         *remarks,
@@ -117,7 +117,7 @@ def join_streams(acc: Stream, gyr: Stream | None, hints: Hints, name: str, remar
         ),
         name=name,
         utc_ns=times.utc_ns(acc, of_t),
-        taken="; ".join(filter(None, said)) + ".",
+        taken="; ".join(filter(None, remarks)) + ".",
         interrupted=clock.interrupted,
     )
 

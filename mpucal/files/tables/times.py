@@ -117,7 +117,7 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
     slow = "s" if step > 1 / SLOWEST_HZ and (ticks != np.rint(ticks)).any() else ""
     seen = hints.units.get("t", units.time_unit(step, named or _unit_of_date(stream.origin) or slow))
     unit = resolve_unit(name, "t", named, seen, f"the step of {step:g}", likely=step > 0.0)
-    t, said = ticks * QUANTITIES["t"][unit], f"times in {unit}"
+    t, how = ticks * QUANTITIES["t"][unit], f"times in {unit}"
     back, (on, begins) = np.flatnonzero(np.diff(t) < 0) + 1, go_on(t)
     restarts = np.flatnonzero(begins)
     alike = stream.origin == first.origin and np.array_equal(stream.ticks, first.ticks)
@@ -127,12 +127,12 @@ def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
-    said += ", summed from the steps between samples" if stream.summed else ""
-    said += f", which restart {how_often(len(restarts))}" if len(restarts) else ""
-    said += f", whose counter overflows {how_often(wraps)}" if wraps else ""
+    how += ", summed from the steps between samples" if stream.summed else ""
+    how += f", which restart {how_often(len(restarts))}" if len(restarts) else ""
+    how += f", whose counter overflows {how_often(wraps)}" if wraps else ""
     on = in_order(on, stream.number)
     parts = np.split(np.arange(len(on)), restarts)
-    return join_clocks([fit_clock(on[part], stream.number[part]) for part in parts]), said
+    return join_clocks([fit_clock(on[part], stream.number[part]) for part in parts]), how
 
 
 def go_on(t: Vector, last: float = -math.inf) -> tuple[Vector, Mask]:
@@ -220,9 +220,9 @@ def interpolate_rates(
     after = np.clip(np.searchsorted(t_gyr, at), 1, len(t_gyr) - 1)
     gap = are_gaps(np.flatnonzero(complete)) | clock.gap[complete]
     nearest = np.minimum(np.abs(at - t_gyr[after - 1]), np.abs(t_gyr[after] - at))
-    said = (
+    remark = (
         f"the rates were interpolated to the times of the accelerations, from which their own lie"
         f" {1e3 * float(np.median(nearest)):.2f} ms apart in the median (the gyroscope begins"
         f" {1e3 * (t_gyr[0] - t[0]):+.2f} ms after the accelerometer)"
     )
-    return kept, values, gap[after], said
+    return kept, values, gap[after], remark

@@ -70,25 +70,25 @@ def find_unit(text: str) -> str:
     return _NAMES.get(text.strip().lower().translate(_PLAIN), "")
 
 
-def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str, *, likely: bool = True) -> str:
+def resolve_unit(name: str, quantity: str, named: str, seen: str, evidence: str, *, likely: bool = True) -> str:
     """Return the unit that was named, or else the one that the samples show.
 
     Parameters
     ----------
-    said, seen : these units; empty if unknown. evidence : the observation behind `seen`, for the message.
+    named, seen : these units; empty if unknown. evidence : the observation behind `seen`, for the message.
     likely : whether the unit that most programs write is one to try.
 
     Raises
     ------
     RecordingError : both are unknown, or they differ.
     """
-    if said and seen and said != seen:
+    if named and seen and named != seen:
         raise RecordingError(
-            f"{name}: {quantity} is said to be in {said}, but {evidence} suggests {seen}",
-            f"choose one with --units {quantity}={said} or --units {quantity}={seen}",
+            f"{name}: {quantity} is said to be in {named}, but {evidence} suggests {seen}",
+            f"choose one with --units {quantity}={named} or --units {quantity}={seen}",
             f"--units {quantity}={seen}",
         )
-    if not said and not seen:
+    if not named and not seen:
         usual, known = LIKELY[quantity], ", ".join(unit for unit in QUANTITIES[quantity] if unit != LIKELY[quantity])
         raise RecordingError(
             f"{name}: the unit of {quantity} is not known, and {evidence} fits none",
@@ -97,4 +97,4 @@ def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str, 
             else f"convert it to {usual}, or name it with --units {quantity}=UNIT, one of {known}",
             f"--units {quantity}={usual}" if likely else "",
         )
-    return said or seen
+    return named or seen
