@@ -138,17 +138,7 @@ struct Coefficients {
       for (int b = 0; b < 3; ++b) J[a][b] = steps.dt * J[a][b];
     multiply(J, p.K, JK);
     turn_round(JK, eta_b);
-    if constexpr (G > Lanes::K / 4 + 1) {
-      const Lane (&rate)[3] = steps.rate;
-      for (int a = 0; a < 3; ++a) {
-        const Lane xx = J[a][0] * rate[0], yy = J[a][1] * rate[1], zz = J[a][2] * rate[2], zero = all(0.0);
-        const Lane xy = madd(J[a][0], rate[1], J[a][1] * rate[0]);
-        const Lane xz = madd(J[a][0], rate[2], J[a][2] * rate[0]);
-        const Lane yz = madd(J[a][1], rate[2], J[a][2] * rate[1]);
-        transpose(zero, zero - xx, zero - xy, zero - xz, eta_K[0][a], eta_K[1][a], eta_K[2][a], eta_K[3][a]);
-        transpose(zero - yy, zero - yz, zero - zz, zero, eta_K2[0][a], eta_K2[1][a], eta_K2[2][a], eta_K2[3][a]);
-      }
-    }
+    if constexpr (G > Lanes::K / 4 + 1) turn_by_K(J, steps.rate, eta_K, eta_K2);
   }
 };
 

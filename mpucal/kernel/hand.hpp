@@ -34,13 +34,8 @@ struct HandConstants : Constants {
   double lam;    // 1/s, the chain's poles
 };
 
-// Output: V and squares, and where their pointers are not null, sums of the derivatives, and the course of the samples.
-struct HandResult {
-  double V;
-  double squares;      // sum of e' S^-1 e over the n samples
-  Ends ends;
-  double* gradient;    // (ends, lanes), filled up to whole groups: of the samples before each end
-  double* fisher;      // (ends, lanes, lanes), as the gradient
+// Output; where the pointers are not null, sums of the derivatives, and the course of the samples.
+struct HandResult : Result {
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update
   double* motion;      // (n, 3) a before the update

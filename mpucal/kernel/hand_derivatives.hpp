@@ -58,15 +58,7 @@ struct HandCoefficients {
       }
     multiply(CJ, p.K, CJK);
     turn_round(CJK, eta_b);
-    const Lane(&rate)[3] = steps.rate, zero = all(0.0);
-    for (int a = 0; a < 3; ++a) {
-      const Lane xx = CJ[a][0] * rate[0], yy = CJ[a][1] * rate[1], zz = CJ[a][2] * rate[2];
-      const Lane xy = madd(CJ[a][0], rate[1], CJ[a][1] * rate[0]);
-      const Lane xz = madd(CJ[a][0], rate[2], CJ[a][2] * rate[0]);
-      const Lane yz = madd(CJ[a][1], rate[2], CJ[a][2] * rate[1]);
-      transpose(zero, zero - xx, zero - xy, zero - xz, eta_K[0][a], eta_K[1][a], eta_K[2][a], eta_K[3][a]);
-      transpose(zero - yy, zero - yz, zero - zz, zero, eta_K2[0][a], eta_K2[1][a], eta_K2[2][a], eta_K2[3][a]);
-    }
+    turn_by_K(CJ, steps.rate, eta_K, eta_K2);
   }
 };
 

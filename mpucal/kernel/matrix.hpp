@@ -132,5 +132,18 @@ MPUCAL_INLINE void turn_round(const Lane (&x)[3][3], Lane (&out)[4][3]) {
   for (int a = 0; a < 3; ++a) transpose(x[a][0], x[a][1], x[a][2], all(0.0), out[0][a], out[1][a], out[2][a], out[3][a]);
 }
 
+// J dK rate for each element of K, a vector for each step: of K_xx to K_xz in lanes 1 to 3, then of K_yy to K_zz
+MPUCAL_INLINE void turn_by_K(const Lane (&J)[3][3], const Lane (&rate)[3], Lane (&x_row)[4][3], Lane (&others)[4][3]) {
+  const Lane zero = all(0.0);
+  for (int a = 0; a < 3; ++a) {
+    const Lane xx = J[a][0] * rate[0], yy = J[a][1] * rate[1], zz = J[a][2] * rate[2];
+    const Lane xy = madd(J[a][0], rate[1], J[a][1] * rate[0]);
+    const Lane xz = madd(J[a][0], rate[2], J[a][2] * rate[0]);
+    const Lane yz = madd(J[a][1], rate[2], J[a][2] * rate[1]);
+    transpose(zero, zero - xx, zero - xy, zero - xz, x_row[0][a], x_row[1][a], x_row[2][a], x_row[3][a]);
+    transpose(zero - yy, zero - yz, zero - zz, zero, others[0][a], others[1][a], others[2][a], others[3][a]);
+  }
+}
+
 }  // namespace
 }  // namespace mpucal
