@@ -53,19 +53,20 @@ def _smoothed(t: Vector, mean: Vector, force: Vector, variance: Vector) -> tuple
     """
     k, q = len(t), RANDOM_WALKS[:, None]
     values = np.concatenate([mean[:, :, None], np.broadcast_to(force[:, None], (k, 3, 3))], axis=2)[:, :, None]
-    m, m_before = np.empty((2, k, 3, len(q), 4))
-    P, P_before = np.empty((2, k, 3, len(q), 1))
-    white, cost = np.zeros((k, 3, len(q), 4)), np.zeros((3, len(q)))
+    m, P = np.empty((k, 3, len(q), 4)), np.empty((k, 3, len(q), 1))
+    P_before, S = np.empty((2, k - 1, 3, len(q), 1))
     m[0], P[0] = values[0], variance[0, :, None, None]
+    walked = np.diff(t)[:, None, None, None] * q
     for i in range(1, k):
-        m_before[i], P_before[i] = m[i - 1], P[i - 1] + q * (t[i] - t[i - 1])
-        S = P_before[i] + variance[i, :, None, None]
-        gain, e = P_before[i] / S, values[i] - m_before[i]
-        cost += np.log(S)[:, :, 0]
-        white[i] = e / np.sqrt(S)
-        m[i], P[i] = m_before[i] + gain * e, (1.0 - gain) * P_before[i]
+        before = P_before[i - 1] = P[i - 1] + walked[i - 1]
+        S[i - 1] = before + variance[i, :, None, None]
+        gain = before / S[i - 1]
+        m[i], P[i] = m[i - 1] + gain * (values[i] - m[i - 1]), (1.0 - gain) * before
+    white = (values[1:] - m[:-1]) / np.sqrt(S)
+    cost = np.log(S)[..., 0].sum(axis=0)
+    back, filtered = P[:-1] / P_before, m.copy()
     for i in range(k - 2, -1, -1):
-        m[i] += P[i] / P_before[i + 1] * (m[i + 1] - m_before[i + 1])
+        m[i] += back[i] * (m[i + 1] - filtered[i])
     products = np.einsum("kaqi,kaqj->aqij", white, white)
     cost += products[:, :, 0, 0]
     c, N = products[:, :, 1:, 0], products[:, :, 1:, 1:] + np.eye(3) / SENSITIVITY_SD**2
