@@ -25,7 +25,7 @@ PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
 # A pivot travels farther than a bounded position of one lambda. The covariance admits that it comes back more slowly
 # [1/s], since a sway as slow as the turns looks like gravity.
-FARTHER, SLOWLY_PER_S = 1.8, 2.0
+FARTHER, SLOWLY_PER_S = 1.8, 2.5
 
 
 @dataclass(frozen=True)
