@@ -35,7 +35,8 @@ from .transitions import (
     likely_scale,
 )
 
-NEAR_ENDS = 6  # places: the first and the last two transitions, and the last two rests
+# Odds against a slip in each of six places: the first and the last two transitions, and the last two rests.
+ODDS_AGAINST = 400.0
 
 
 class Slip(NamedTuple):
@@ -155,12 +156,12 @@ def slip_squares(transition: Transition, D: Vector) -> Vector:
 def _probability(misses: Vector, known: Vector, ends: Sequence[int]) -> Vector:
     """Return probabilities (m,) that slips make the misses number `ends` of all misses (k, 3), and not chance.
 
-    One of SURE recordings has a slip near its ends. Without one, a miss as large has the chance that Student's t gives,
-    in each of these places. known : (k,) their variances, but for a common scale.
+    Without a slip, a miss as large has the chance that Student's t gives. known : (k,) their variances, but for a
+    common scale.
     """
     nu = DEGREES_OF_FREEDOM
     chance = (likely_scale(misses, known)[1][ends] * nu / (nu + 2.0)) ** (0.5 * nu)
-    return np.asarray(1.0 / (1.0 + SURE * NEAR_ENDS * chance))
+    return np.asarray(1.0 / (1.0 + ODDS_AGAINST * chance))
 
 
 def _lasting(transitions: Sequence[Transition]) -> Vector:
