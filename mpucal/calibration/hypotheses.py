@@ -83,7 +83,7 @@ HYPOTHESES = (
 CHANGES = tuple(each for each in HYPOTHESES if each.is_change)
 # Standard deviations of x are tried from a 10,000th of these up to them: m/s^2, 1, rad, rad/s.
 LARGEST: dict[What, float] = {"accelerometer": 0.3, "scale": 0.01, "mount": 0.1, "gyroscope": 0.03, "linearity": 0.1}
-# m/s^2 at 1 g, of the square and the cube: a tenth of what a data sheet allows (0.5 % of 2 g)
+# m/s^2 at 1 g, of the square and the cube: a tenth of what a data sheet allows (0.5 %)
 NONLINEARITY_MPS2 = 0.005
 VARIANCES = 10.0 ** np.arange(-8.0, 0.1, 0.5)
 # Odds above which something is said to have happened, against nothing and against what else it may be.

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Mask, Vector
-from ..rests.gyro_drift import SENSITIVITY_SD
 from .fit import Fit
 from .likelihood import Evaluation, evaluate
 from .normal_equations import inverse, solve
@@ -175,7 +174,6 @@ def information(problem: Problem, theta: Theta, prior: Prior) -> Vector:
     The gyroscope's sensitivity to acceleration is eliminated. The data sheet's tolerance is the prior of these nine
     numbers, of which the rests in a hand seldom show enough.
     """
-    precision = np.append(prior.precision, np.full(SENSITIVE - HAND, SENSITIVITY_SD**-2))
-    F = evaluate(problem.with_forces(), theta, SENSITIVE).fisher + np.diag(precision)
+    F = evaluate(problem.with_forces(), theta, SENSITIVE).fisher + np.diag(prior.precision_with_sensitivity)
     across = F[:HAND, HAND:]
     return np.asarray(F[:HAND, :HAND] - across @ np.linalg.solve(F[HAND:, HAND:], across.T))

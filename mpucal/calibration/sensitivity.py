@@ -73,7 +73,7 @@ def find_sensitivity(
     up = np.linalg.solve(fit.D, flat.y - fit.b_a)
     start = Theta.start(fit.D, fit.b_a, fit.b_omega, up / np.linalg.norm(up))
     theta, S = replace(start, K=fit.K, tau=fit.delay_s), np.zeros((3, 3))
-    precision = np.append(prior.precision, np.full(9, SENSITIVITY_SD**-2))
+    precision = prior.precision_with_sensitivity
     others = np.logaddexp.reduce([0.0, *(each.log_share for each in explanations)])  # nothing's share is 1
     for _ in range(PASSES):
         less = replace(problem, series=replace(series, omega=series.omega - series.force @ S.T))

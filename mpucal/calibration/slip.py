@@ -35,9 +35,6 @@ from .transitions import (
     likely_scale,
 )
 
-# Odds against a slip in each of six places: the first and the last two transitions, and the last two rests.
-ODDS_AGAINST = 400.0
-
 
 class Slip(NamedTuple):
     """Slip of the mount.
@@ -103,13 +100,11 @@ def end_slips(transitions: Sequence[Transition], spoilt: Mask) -> Vector:
 
     spoilt : (n,) True for samples whose rates are lost or clipped; the transitions that have some are left out.
     """
-    k, probability = len(transitions), np.zeros(len(transitions))
     n, p = _numbers(transitions)
-    ends = [i for i in (0, 1, k - 2, k - 1) if n > p and not spoilt[transitions[i].span].any()]
-    if ends:
-        known = np.array([each.variance for each in transitions])
-        probability[ends] = _probability(_lasting(transitions), known, ends)
-    return probability
+    if n <= p:
+        return np.zeros(len(transitions))
+    known = np.array([each.variance for each in transitions])
+    return _probability(_lasting(transitions), known) * [not spoilt[each.span].any() for each in transitions]
 
 
 def _at_rest(prepared: Preprocessed, theta: Theta, spoilt: Mask) -> list[tuple[float, Transition]]:
@@ -139,7 +134,7 @@ def _at_rest(prepared: Preprocessed, theta: Theta, spoilt: Mask) -> list[tuple[f
         known = 2.0 * of_mean / prepared.problem.gravity**2
         within = Transition(span, np.eye(3), leaving[at], coming[at], misses[at], float(known[at]), 0.0)
         if not spoilt[span].any():
-            found.append((float(_probability(misses, known, [at])[0]), within))
+            found.append((float(_probability(misses, known)[at]), within))
     return found
 
 
@@ -153,15 +148,17 @@ def slip_squares(transition: Transition, D: Vector) -> Vector:
     return np.append(seen**2 + unseen**2, (seen @ transition.coming) ** 2)
 
 
-def _probability(misses: Vector, known: Vector, ends: Sequence[int]) -> Vector:
-    """Return probabilities (m,) that slips make the misses number `ends` of all misses (k, 3), and not chance.
+def _probability(misses: Vector, known: Vector) -> Vector:
+    """Return probabilities (k,) that slips make misses (k, 3), and not chance; 0 but for the first and last two.
 
-    Without a slip, a miss as large has the chance that Student's t gives. known : (k,) their variances, but for a
-    common scale.
+    One of SURE recordings has a slip in one of these four places. Without one, a miss as large has the chance that
+    Student's t gives. known : (k,) their variances, but for a common scale.
     """
-    nu = DEGREES_OF_FREEDOM
+    nu, probability = DEGREES_OF_FREEDOM, np.zeros(len(misses))
+    ends = [0, 1, len(misses) - 2, len(misses) - 1]
     chance = (likely_scale(misses, known)[1][ends] * nu / (nu + 2.0)) ** (0.5 * nu)
-    return np.asarray(1.0 / (1.0 + ODDS_AGAINST * chance))
+    probability[ends] = 1.0 / (1.0 + SURE * len(ends) * chance)
+    return probability
 
 
 def _lasting(transitions: Sequence[Transition]) -> Vector:

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..data import Sensor, Vector
 from ..rests.flat import Flat
+from ..rests.gyro_drift import SENSITIVITY_SD
 from ..result.correlation import UPPER
-from .parameters import BY_NAME, NAMES, PLACES, TABLE, Form, Parameter, estimated
+from .parameters import BY_NAME, HAND, NAMES, PLACES, SENSITIVE, TABLE, Form, Parameter, estimated
 from .rotation import tangents
 
 EXACT = estimated("imu")  # parameters of the exact filter
@@ -137,6 +138,11 @@ class Prior:
         known = {row.name: (np.array(row.mean), np.array(row.sd)) for row in TABLE if row.sd}
         known["tau"] = (np.array(sensor.accel_lag_s), np.array(BY_NAME["tau"].sd))
         return cls.of(b_omega=(flat.b_omega, flat.b_omega_std), **known, **more)
+
+    @property
+    def precision_with_sensitivity(self) -> Vector:
+        """Precisions (p + 9,) with those of the gyroscope's sensitivity to acceleration, by the data sheet."""
+        return np.append(self.precision, np.full(SENSITIVE - HAND, SENSITIVITY_SD**-2))
 
     def cost(self, theta: Theta) -> float:
         """Return the sum of precision (x - mean)^2 / 2 at theta, which adds to V."""

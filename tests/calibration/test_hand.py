@@ -201,6 +201,16 @@ def test_a_diverged_estimate_still_has_a_next_orientation(in_hand):
     assert next_orientation(diverged, np.ones(12), np.vstack([np.eye(3), -np.eye(3)])) == 0
 
 
+@pytest.mark.parametrize("seed", [1, 6, 7])
+def test_a_session_knows_what_its_calibration_will_say_that_it_knows(hand, seed):
+    recording = hand(seed, "pose12").recording
+    known = interim_estimate(recording, flat_statistics(recording, find_flat(recording)), G)
+    calibration = calibrate(recording, gravity=G)
+    ratios = np.append(calibration.D_std / known.D_std, calibration.b_a_std / known.b_a_std)
+    assert ratios.min() > 0.9
+    assert ratios.max() < 1.3
+
+
 # ---- recordings of others
 
 

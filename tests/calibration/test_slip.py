@@ -99,6 +99,16 @@ def test_a_small_slip_in_the_last_rest_is_reported(hand, seed):
     assert [reason["code"] for reason in calibration.quality["reasons"]] == ["inconsistent"]
 
 
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_small_slip_in_the_last_rest_but_one_is_reported_with_its_time(hand, seed):
+    """Slip by 1 deg in the middle of the rest from 44 s to 46 s: the turns before and after it show half each."""
+    made = hand(seed, "pose12")
+    (reason,) = calibrate(slipped(made.recording, 45.4, 1.0), gravity=made.truth.gravity).quality["reasons"]
+    begin, end = map(float, re.findall(r"(\d+) s", reason["message"])[:2])
+    assert reason["code"] == "inconsistent"
+    assert begin < 45.4 < end < begin + 4.0
+
+
 def test_a_miss_near_the_end_that_the_next_one_undoes_is_no_slip():
     """Simulate twenty turns with random misses: a rest held askew causes two opposite misses, and a slip one."""
     rng = np.random.default_rng(3)
