@@ -37,8 +37,8 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
         except ValueError:
             raise ValueError(f"{text!r} is not a whole number.") from None
         if number < least or (most is not None and number > most):
-            allowed = f"{least} or more" if most is None else f"{least} to {most}"
-            raise ValueError(f"{text} is not {allowed}.")
+            low, high = (f"{of:#04x}" if "x" in text.lower() and of is not None else of for of in (least, most))
+            raise ValueError(f"{text} is not {low} or more." if most is None else f"{text} is not {low} to {high}.")
         return number
 
     return parse

@@ -7,7 +7,7 @@ import pytest
 from mpucal.errors import UsageError
 from mpucal.origin import Origin
 from mpucal.sources.opening import check_source
-from mpucal.sources.table import SOURCES, kinds_for
+from mpucal.sources.table import ADDRESS, SOURCES, kinds_for
 
 IDS = [kind.flag for kind in SOURCES]
 
@@ -49,3 +49,9 @@ def test_options_refuse_meaningless_text():
     for name, text in {"bus": "", "address": "0x80", "seed": "-1", "system": "0", "dlpf": "7", "rate": "fast"}.items():
         with pytest.raises(ValueError, match=r"\.$"):
             options[name].parse(text)
+
+
+@pytest.mark.parametrize(("text", "limits"), [("0x03", "0x08 to 0x77"), ("120", "8 to 119")])
+def test_a_reserved_address_is_refused_in_the_base_that_was_typed(text, limits):
+    with pytest.raises(ValueError, match=f"{text} is not {limits}"):
+        ADDRESS.parse(text)
