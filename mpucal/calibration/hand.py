@@ -31,6 +31,7 @@ from .hand_noise import (
     Noise,
     most_likely_sigma,
     remove_tremor,
+    vibration_sigma,
 )
 from .hypotheses import CHANGES, Explanation, gyroscope_change, rank, remove_change
 from .hypothesis_tests import WALD_99, undetermined, wald
@@ -141,10 +142,13 @@ def _fit_samples(search: _Search) -> HandFit:
     fine = fine.with_rates_by(theta.K)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand's noise
         noise = Noise("white", most_likely_sigma(fine.white, CALM_MPS2, theta, noise.sigma))
-    problem = _with_transition_noise(noise.problem(fine), fine, theta)
+    problem, minimum = _settle(fine, noise, theta)
+    iterations, vibration = search.iterations + minimum.iterations, vibration_sigma(fine, noise, minimum)
+    if vibration > 0.0:
+        fine = fine.vibrating(vibration)
+        problem, minimum = _settle(fine, noise, theta)
+        iterations += minimum.iterations
     prior = fine.prior()
-    minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
-    iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99 and not undetermined(minimum.covariance()):
         trusted = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
@@ -156,6 +160,12 @@ def _fit_samples(search: _Search) -> HandFit:
     weighed = _with_each_variance(problem, minimum, transitions if slip is None else slip.transitions)
     fit = replace(minimum, iterations=iterations).as_fit(parts=parts_of(*weighed, prior))
     return HandFit(replace(fit, slip=slip, slipped=slipped), minimum, noise, search, fine)
+
+
+def _settle(fine: Preprocessed, noise: Noise, theta: Theta) -> tuple[Problem, Minimum]:
+    """Return the problem of all samples and its minimum, from the theta at which a rough search ended."""
+    problem = _with_transition_noise(noise.problem(fine), fine, theta)
+    return problem, minimise(problem, theta, HAND, fine.prior(), frozen=True, ends=ends_of(problem))
 
 
 def _with_honest_information(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
@@ -236,6 +246,10 @@ class _Search:
         self.trembles = False
         self._prior = self.prepared.prior()
         self.theta, self.noise = self._run(begin)
+        vibration = vibration_sigma(self.prepared, self.noise, self._last[1])
+        if vibration > 0.0:
+            self.prepared, self.trembles = scales.rough.vibrating(vibration), False
+            self.theta, self.noise = self._run(begin)
 
     def cost(self) -> float:
         """Return the cost function (8) where the search ended."""

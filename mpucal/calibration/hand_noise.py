@@ -9,13 +9,17 @@ from typing import Literal
 
 import numpy as np
 
+from ..data import Vector
 from ..rests.tremor import low_pass
-from .likelihood import value
+from ..rests.windows import WINDOW_S
+from .levenberg_marquardt import Minimum
+from .likelihood import trace, value
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed
 from .problem import Problem
 from .rotation import lengths
 from .theta import Theta
 from .transitions import REWEIGHTED
+from .uncertainty import MOST_NIS
 
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 FIRST_MPS2 = WHITE_MPS2[4]  # sigma at which a search begins: a board that goes from rest to rest is in a hand
@@ -62,6 +66,25 @@ def most_likely_sigma(
         if at != first:
             break
     return sigmas[at]
+
+
+def vibration_sigma(prepared: Preprocessed, noise: Noise, minimum: Minimum) -> float:
+    """Return the least sigma [m/s^2] of a vibration that explains the innovations at a minimum; 0 if there is none.
+
+    Jerks make some innovations large, and a change of the sensor all of half a second. A vibration makes most of them
+    large, with either sign. It has no tails: with a smaller sigma, a likelihood that allows for tails takes its peaks
+    for outliers, and the estimate follows those of one side.
+    """
+    n = max(round(WINDOW_S * prepared.recording.rate_hz), 2)
+
+    def squares(sigma: float) -> Vector:
+        innovation = trace(noise.problem(prepared.vibrating(sigma)), minimum.theta).innovation
+        windows = innovation[: len(innovation) // n * n].reshape(-1, n, 3)
+        return np.asarray(np.sum((windows - np.median(windows, axis=1, keepdims=True)) ** 2, axis=2))
+
+    if not (minimum.nis > MOST_NIS and np.median(squares(0.0)) > MOST_NIS):
+        return 0.0
+    return next((sigma for sigma in WHITE_MPS2 if squares(sigma).mean() < 3.0), WHITE_MPS2[-1])  # as of white noise
 
 
 def remove_tremor(prepared: Preprocessed) -> Preprocessed:

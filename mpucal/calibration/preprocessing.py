@@ -76,6 +76,10 @@ class Preprocessed:
         white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
         return replace(self._with(jerk=jerk, r_extra=self.pose + white), lam=lam)
 
+    def vibrating(self, sigma: float) -> Preprocessed:
+        """Return the recording with a vibration of sigma [m/s^2] on every axis."""
+        return replace(self, pose=self.pose + sigma**2)
+
     def with_rates_by(self, K: Vector) -> Preprocessed:
         """Return the recording with the rates and angular accelerations of the lever arm corrected by K (3, 3)."""
         series = self.problem.series

@@ -1,6 +1,7 @@
 """Estimator for a hand, on simulated hands with a known truth, on another simulator's, and on real sensors."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,11 +18,13 @@ from mpucal.data import Recording
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.judge import sph_rms
+from tools.lab.judge import judged, sph_rms
 from tools.lab.scenarios.around import Hand
-from tools.lab.scenarios.family import simulate
+from tools.lab.scenarios.course import arcs
+from tools.lab.scenarios.family import drawn, simulate
 from tools.lab.scenarios.recordings import SCENES
 from tools.lab.scenarios.sensors import Sampling
+from tools.lab.scenarios.table import FAMILIES
 
 G = 9.82
 
@@ -86,6 +89,20 @@ def test_a_perfect_gyroscope_keeps_its_matrix_where_all_of_it_is_known(hand):
     fit = fitted(hand(0, "calm jerks", rate_hz=200).recording)
     np.testing.assert_array_equal(fit.K, np.eye(3))
     assert not set(K_NAMES) & set(fit.names)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_the_vibration_of_a_machine_averages_out(seed):
+    """Turn the board without a pause, with a motor of 17 Hz from 3 s on, whose peaks were taken for outliers."""
+    made = drawn(replace(FAMILIES["quiet turntable"], motion=partial(arcs, count=10)), seed)
+    r, truth = made.recording, made.truth
+    t = r.t - r.t[find_flat(r)[1]]
+    motor = np.sqrt(2.0) * np.clip(t - 3.0, 0.0, 1.0) * np.sin(2.0 * np.pi * 17.0 * t)
+    axis = np.array([0.6, -0.64, 0.48])
+    calibration = calibrate(replace(r, acc=r.acc + np.outer(motor, axis)), "auto", truth.gravity)
+    assert calibration.verdict == "good"
+    assert np.abs(calibration.b_a - truth.b_a).max() < 0.003
+    assert judged(calibration, (truth.D, truth.b_a)).farthest < 4.0
 
 
 def test_k_stays_where_two_of_its_elements_are_unknown(ideal):
