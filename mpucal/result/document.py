@@ -16,7 +16,7 @@ import math
 import re
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -188,20 +188,20 @@ def _array(values: Any, shape: tuple[int, ...]) -> Vector:
 
 
 def plain(value: Any) -> Any:
-    """Return a value of JSON types: a dataclass as its fields, NaN and infinities as None."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return plain(asdict(value))
+    """Return a value of JSON types: a dataclass or named tuple as its fields, NaN and infinities as None."""
+    if value is None or isinstance(value, str | int):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in fields(value)}
+    elif hasattr(value, "_asdict"):
+        value = value._asdict()
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return plain(value.tolist()) if isinstance(value, np.ndarray | np.generic) else value
 
 
 _IS: Mapping[str, Callable[[Any], bool]] = {

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from ..origin import Origin, name_thing
@@ -81,9 +81,8 @@ def speak_of(output: T, board: str) -> T:
     """Return a session's output, which speaks of a board, in the words for `board`."""
     if board != VEHICLE:
         return output
-    texts = {f.name: getattr(output, f.name) for f in fields(output)}
-    renamed: dict[str, Any] = {k: name_thing(text, Origin.VEHICLE) for k, text in texts.items() if type(text) is str}
-    return replace(output, **renamed)
+    words: Any = (name_thing(each, Origin.VEHICLE) if type(each) is str else each for each in output)
+    return type(output)(*words)
 
 
 def describe(down: Direction, board: str) -> str:

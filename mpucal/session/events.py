@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,83 +34,64 @@ class Key(StrEnum):
     ABORT = "abort"
 
 
-class Event:
-    """Input of the state machine."""
-
-
-class End(Event):
-    """Event that a step derives from the samples, and that ends it; it comes last in the step's outputs."""
-
-
 # Events from outside: the source, the person and the fits.
 
 
-@dataclass(frozen=True)
-class Connected(Event):
+class Connected(NamedTuple):
     """The sensor answered and measures."""
 
     sensor: Sensor
 
 
-@dataclass(frozen=True)
-class Measured(Event):
+class Measured(NamedTuple):
     """Samples arrived; they carry the session's time."""
 
     samples: Samples
 
 
-@dataclass(frozen=True)
-class Tick(Event):
+class Tick(NamedTuple):
     """The source was polled at `t_s`, on the clock of the samples' times."""
 
     t_s: float
 
 
-@dataclass(frozen=True)
-class Enough(Event):
+class Enough(NamedTuple):
     """The person says to go on now."""
 
 
-@dataclass(frozen=True)
-class Abort(Event):
+class Abort(NamedTuple):
     """The person wants to stop."""
 
 
-@dataclass(frozen=True)
-class SourceEnded(Event):
+class SourceEnded(NamedTuple):
     """The source delivers no more samples: `why` is what failed, or None at the end of a recording."""
 
     why: str | None = None
 
 
-@dataclass(frozen=True)
-class Redo(Event):
+class Redo(NamedTuple):
     """The person wants to turn the board again, without laying it flat again."""
 
 
-@dataclass(frozen=True)
-class Resumed(Event):
+class Resumed(NamedTuple):
     """The source resumed; the board's motion in between is unknown."""
 
 
-@dataclass(frozen=True)
-class Learnt(Event):
+class Learnt(NamedTuple):
     """The uncertainties were computed, as requested; with `advice`, also the orientation that helps most."""
 
     knowledge: Knowledge
     advice: bool
 
 
-@dataclass(frozen=True)
-class Tried(Event):
+class Tried(NamedTuple):
     """The first calibration, from the turning alone, was computed: its verdict, and the likeliest reason against it."""
 
     verdict: str
     reason: Reason | None = None
 
 
-@dataclass(frozen=True)
-class Checked(Event):
+class Checked(NamedTuple):
     """The first calibration was compared with the new orientations.
 
     Attributes
@@ -129,22 +110,19 @@ class Checked(Event):
 Answer = Learnt | Tried | Checked
 
 
-@dataclass(frozen=True)
-class Fitted(Event):
+class Fitted(NamedTuple):
     """The final calibration was computed; its verdict is good, usable or refused."""
 
     verdict: str
 
 
-@dataclass(frozen=True)
-class Written(Event):
+class Written(NamedTuple):
     """The results are in their files."""
 
     names: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Rested(End):
+class Rested(NamedTuple):
     """The board lay still for long enough; `acc` [m/s^2] and `gyr` [rad/s] are the means meanwhile."""
 
     still_s: float
@@ -152,27 +130,28 @@ class Rested(End):
     gyr: Direction
 
 
-@dataclass(frozen=True)
-class Turned(End):
+class Turned(NamedTuple):
     """The turning has ended; the verification follows."""
 
     why: str
 
 
-@dataclass(frozen=True)
-class Finished(End):
+class Finished(NamedTuple):
     """The measuring has ended; the final calibration follows."""
 
     why: str
 
 
-@dataclass(frozen=True)
-class Stopped(End):
+class Stopped(NamedTuple):
     """The session cannot go on; `why` says what happened, `remedy` what to do next."""
 
     why: str
     remedy: str
 
+
+# Events that a step derives from the samples, and that end it.
+End = Rested | Turned | Finished | Stopped
+Event = Connected | Measured | Tick | Enough | Abort | SourceEnded | Redo | Resumed | Answer | Fitted | Written | End
 
 # Outputs.
 
@@ -187,8 +166,7 @@ class PromptKind(StrEnum):
     REST = "rest"
 
 
-@dataclass(frozen=True)
-class Prompt:
+class Prompt(NamedTuple):
     """An instruction to the person, valid until the next one.
 
     Attributes
@@ -202,8 +180,7 @@ class Prompt:
     down: Direction | None = None
 
 
-@dataclass(frozen=True)
-class Progress:
+class Progress(NamedTuple):
     """Progress of the present step: `done` of `of`, and as text; `t_s` is the session's time.
 
     left_s : estimate of the time until the verification ends; None where it is unknown.
@@ -216,8 +193,7 @@ class Progress:
     left_s: float | None = None
 
 
-@dataclass(frozen=True)
-class Meter:
+class Meter(NamedTuple):
     """The board's motion at this moment, four times a second, for the picture and the needle.
 
     Attributes
@@ -247,8 +223,7 @@ class Meter:
     wanted: Quaternion | None = None
 
 
-@dataclass(frozen=True)
-class Countdown:
+class Countdown(NamedTuple):
     """Time for which the board must still be held; `paused` while a bump disturbs it.
 
     It starts over (`remaining_s` is `of_s` again) only if the board was moved. `elsewhere`: the board is not in the
@@ -270,8 +245,7 @@ class Use(StrEnum):
     SEEN = "seen"
 
 
-@dataclass(frozen=True)
-class Held:
+class Held(NamedTuple):
     """The board was held for long enough in one orientation.
 
     Attributes
@@ -285,8 +259,7 @@ class Held:
     text: str
 
 
-@dataclass(frozen=True)
-class Caution:
+class Caution(NamedTuple):
     """A warning: `what` is wrong, and what to `do` about it now, one line each.
 
     `code` is its kind: moved, trembling, too_fast, clipped, data_lost, not_turned, seen_already, doubtful, knocked,
@@ -299,8 +272,7 @@ class Caution:
     do: str
 
 
-@dataclass(frozen=True)
-class Seen:
+class Seen(NamedTuple):
     """The board has shown a new orientation, number `number`; the flat one is number 1.
 
     Attributes
@@ -314,8 +286,7 @@ class Seen:
     paused: bool
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """Standard uncertainties (1 sigma) to reach: of scale factor error, misalignment and bias."""
 
     gain_pct: float
@@ -323,8 +294,7 @@ class Target:
     bias_mg: float
 
 
-@dataclass(frozen=True)
-class Knowledge:
+class Knowledge(NamedTuple):
     """Standard uncertainties of the accelerometer's parameters so far, after each orientation, or five seconds.
 
     Attributes
@@ -353,8 +323,7 @@ class Knowledge:
     doubt: str = ""
 
 
-@dataclass(frozen=True)
-class Verification:
+class Verification(NamedTuple):
     """The check of a calibration in one orientation that its fit had not seen.
 
     Attributes
@@ -378,8 +347,7 @@ class Verification:
     text: str
 
 
-@dataclass(frozen=True)
-class Decision:
+class Decision(NamedTuple):
     """The session went to its next state, or ended: `why`, and what to do next if it ended early."""
 
     why: str
@@ -395,8 +363,7 @@ class FitKind(StrEnum):
     CHECK = "check"
 
 
-@dataclass(frozen=True)
-class RequestFit:
+class RequestFit(NamedTuple):
     """Command to the session's owner: compute this fit of all samples so far; answer after `wait_s` of samples more.
 
     The answer always comes after the same number of samples, and is waited for if necessary, so that a replay equals
@@ -409,8 +376,7 @@ class RequestFit:
     of: int = 0
 
 
-@dataclass(frozen=True)
-class Forget:
+class Forget(NamedTuple):
     """Command to the session's owner: drop samples number first..last-1, and mark a gap before the next one."""
 
     first: int

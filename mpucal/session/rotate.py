@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -97,7 +96,7 @@ class Rotate(PoseStep):
             return outputs
         if advice and self._held is not None:
             # The output goes out now, so it has the time of the last samples and not that of the pause.
-            outputs.append(replace(self._held[0].held(self._held[1]), t_s=self._t_s))
+            outputs.append(self._held[0].held(self._held[1])._replace(t_s=self._t_s))
         if self._is_enough():
             # Tilts leave some parameters at their prior: the target does not apply to them.
             what = "enough tilts seen" if self._plan.tilt_only else "target reached"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -112,7 +112,7 @@ class Pause:
         """Return the countdown, if the orientation is of use."""
         if self.countdown is None or use is events.Use.SEEN:
             return []
-        return [replace(self.countdown, elsewhere=use is events.Use.USEFUL)]
+        return [self.countdown._replace(elsewhere=use is events.Use.USEFUL)]
 
 
 class PoseStep(Step):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -178,7 +177,7 @@ class Verify(NewPoses):
             return verification
         number, of = verification.number + self._known, verification.of + self._known
         text = verification.text.replace(f"{verification.number} of {verification.of}", f"{number} of {of}", 1)
-        return replace(verification, number=number, of=of, text=text)
+        return verification._replace(number=number, of=of, text=text)
 
     def _end(self, checked: events.Checked) -> events.Outputs:
         """Return the result of the verification."""

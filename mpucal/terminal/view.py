@@ -240,7 +240,7 @@ class View:
         meter = self.meter
         if meter is not None and prompt.kind not in TURNING:
             # There may be no further meter.
-            meter = replace(meter, missing_deg=None, turn="", wanted=None)
+            meter = meter._replace(missing_deg=None, turn="", wanted=None)
         view = replace(self, prompt=prompt, meter=meter)
         # The headline still shows that the last orientation was taken, although the next step has begun.
         held = self.held if prompt.kind in TURNING else None

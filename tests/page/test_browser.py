@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 
 import pytest
 
@@ -46,7 +45,7 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
     # Half a turn ends alike both ways round: the mark points where the words say.
     for words, degrees in (("tip it away from you", 0), ("tip it toward you", 180)):
         turned_over = {"t_s": 20.0, "missing_deg": 179.0, "wanted": (0.0, 1.0, 0.0, 0.0)}
-        view = view.after(replace(view.meter, turn=f"180 deg more, {words}", **turned_over))
+        view = view.after(view.meter._replace(turn=f"180 deg more, {words}", **turned_over))
         show()
         tab.wait_for_function(MARKED, arg=f"rotate({degrees})")
     against = Reason("few_orientations", "too few orientations", "turn it more", refuse=True)

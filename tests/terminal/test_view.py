@@ -32,10 +32,10 @@ def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
 
 def test_a_countdown_ends_when_the_board_moves_or_the_orientation_is_decided(views):
     counting = replace(views["turned"], now_s=26.0, countdown=Countdown(26.0, 1.3, 2.0, False))
-    bumped = counting.after(replace(counting.meter, t_s=26.2, still=False))
+    bumped = counting.after(counting.meter._replace(t_s=26.2, still=False))
     assert bumped.headline == "HOLD 2"
-    assert bumped.after(replace(counting.meter, t_s=26.5, still=False)).headline == "ROLL LEFT 60"
-    assert counting.after(replace(counting.meter, t_s=26.2, still=True)).headline == "HOLD 2"
+    assert bumped.after(counting.meter._replace(t_s=26.5, still=False)).headline == "ROLL LEFT 60"
+    assert counting.after(counting.meter._replace(t_s=26.2, still=True)).headline == "HOLD 2"
     assert counting.after(Held(26.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken")).headline == "TAKEN"
 
 

@@ -1,6 +1,5 @@
 """The voice: one sentence at a time, and none that is out of date within a second."""
 
-from dataclasses import replace
 
 from mpucal.session.events import Caution, Countdown, Held, Meter, Prompt, PromptKind, Use
 from mpucal.terminal.view import View
@@ -64,7 +63,7 @@ def test_a_hold_is_turn_hold_taken_and_nothing_between():
 
 def test_a_bump_in_a_hold_is_not_called_wrong_and_an_abandoned_hold_is():
     begun = [SIDE, left(1.0), meter(2.1, 20.0, still=True), Countdown(2.3, 0.75, 1.25, False, elsewhere=True)]
-    bump = [*begun, left(2.8, 20), replace(left(3.0, 20), still=True), Countdown(3.0, 0.5, 1.25, False, elsewhere=True)]
+    bump = [*begun, left(2.8, 20), left(3.0, 20)._replace(still=True), Countdown(3.0, 0.5, 1.25, False, elsewhere=True)]
     assert spoken(*bump)[2:] == [(2.3, Tone.HOLD, "New: hold still")]
     away = [*begun, left(2.8, 20), left(3.3, 40), left(4.4, 40)]
     assert spoken(*away)[3:] == [(4.4, Tone.WRONG, "40 degrees more, roll it to the left")]
