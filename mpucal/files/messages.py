@@ -81,11 +81,11 @@ def encode_accesses(a: Accesses) -> bytes:
         "register": protobuf.pack_varints(a.register),
         "count": protobuf.pack_varints(a.count),
         "moved": protobuf.pack_varints(a.moved),
-        "step_ns": protobuf.pack_varints(protobuf.zigzag(np.diff(a.t_ns, prepend=0))),
-        "heard_ns": protobuf.pack_varints(protobuf.zigzag(np.diff(ahead, prepend=0))),
+        "step_ns": protobuf.pack_varints(protobuf.steps(a.t_ns)),
+        "heard_ns": protobuf.pack_varints(protobuf.steps(ahead)),
         "data": a.data.tobytes(),
         "frame_words": a.frames.shape[1],
-        "words": protobuf.pack_varints(protobuf.zigzag(np.diff(a.frames, axis=0, prepend=np.int16(0)).ravel())),
+        "words": protobuf.pack_varints(protobuf.steps(a.frames)),
     }
     message = b"".join(protobuf.field(number, columns[name]) for number, name in _NAMES.items() if columns.get(name))
     for number, failure in a.failures.items():

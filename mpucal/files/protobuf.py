@@ -10,6 +10,7 @@ Source: https://protobuf.dev/programming-guides/encoding, and descriptor.proto f
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ from ._packed import frames, packed, unpacked
 Columns = NDArray[np.uint64]
 
 VARINT, BYTES = 0, 2
-__all__ = ["field", "fields", "frames", "pack_varints", "schema", "unpacked", "unzigzag", "zigzag"]
+__all__ = ["field", "fields", "frames", "pack_varints", "schema", "steps", "unpacked", "unzigzag", "zigzag"]
 
 # descriptor.proto: types and labels of fields
 TYPES = {"uint64": 4, "string": 9, "message": 11, "bytes": 12, "uint32": 13, "sint32": 17, "sint64": 18}
@@ -56,6 +57,13 @@ def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
 def pack_varints(values: ArrayLike) -> bytes:
     """Encode (n,) whole numbers >= 0 as consecutive varints."""
     return packed(np.ascontiguousarray(values, np.uint64))
+
+
+def steps(values: NDArray[Any]) -> Columns:
+    """Return the zigzag numbers (n,) of the steps from one of (n,) numbers to the next, from 0 to the first."""
+    step = values.copy()
+    step[1:] -= values[:-1]
+    return zigzag(step.ravel())
 
 
 def zigzag(values: ArrayLike) -> Columns:
