@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from contextlib import suppress
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import subprocess
 
 # NumPy's libraries read these as they are loaded. Matrices are small here: a second thread would wait for the first,
 # and take its core from the loop that reads the sensor.
@@ -19,6 +22,8 @@ def start_beside(module: str) -> subprocess.Popen[bytes]:
     ----------
     module : its name, for `python -m`.
     """
+    import subprocess  # noqa: PLC0415 - a tenth of the start of a command that starts no process
+
     return subprocess.Popen(
         [sys.executable, "-P", "-m", module],
         stdin=subprocess.PIPE,
