@@ -137,6 +137,7 @@ def ready() -> None:
     for module in pkgutil.walk_packages(mpucal.__path__, "mpucal."):
         with suppress(ImportError):
             import_module(module.name)
+    import_module("numpy.ma")  # as NumPy's median does
     dialect()
     gc.freeze()
 
@@ -145,7 +146,7 @@ def ready() -> None:
 def quick(sync: bool = False) -> Iterator[None]:
     """Reduce the work of sessions while the block runs: chips are polled, and fits made, as seldom as possible.
 
-    sync : captures are synced to the disk, by a thread, which does not go on in a forked process.
+    sync : files are synced to the disk, captures by a thread, which does not go on in a forked process.
     """
     period_s = property(lambda config: min(POLL_S, config.longest_s))
     unsynced = patch.object(SyncThread, "__init__", lambda self, _file: setattr(self, "close", lambda: None))
@@ -154,4 +155,5 @@ def quick(sync: bool = False) -> Iterator[None]:
         stack.enter_context(patch.object(rotate, "KNOW_EVERY_S", KNOW_EVERY_S))
         if not sync:
             stack.enter_context(unsynced)
+            stack.enter_context(patch.object(os, "fsync", lambda _handle: None))
         yield
