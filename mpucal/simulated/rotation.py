@@ -16,7 +16,7 @@ def product(p: Vector, q: Vector) -> Vector:
         return np.asarray(q @ np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]))
     pw, px, py, pz = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
     qw, qx, qy, qz = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    pq = np.empty(np.broadcast_shapes(p.shape, q.shape))
+    pq = np.empty(np.broadcast_shapes(p.shape, q.shape), order="F")
     pq[..., 0] = pw * qw - px * qx - py * qy - pz * qz
     pq[..., 1] = pw * qx + px * qw + py * qz - pz * qy
     pq[..., 2] = pw * qy - px * qz + py * qw + pz * qx
@@ -28,7 +28,7 @@ def exp(turn_rad: Vector) -> Vector:
     """Return the quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
     half = 0.5 * np.asarray(turn_rad)
     angle = np.maximum(_norm(half), sys.float_info.min)  # not 0, by which nothing can be divided
-    q = np.empty((*half.shape[:-1], 4))
+    q = np.empty((*half.shape[:-1], 4), order="F")
     q[..., 0] = np.cos(angle)
     q[..., 1:] = half * (np.sin(angle) / angle)[..., None]
     return q
@@ -73,4 +73,8 @@ def running_product(start: Vector, steps: Vector) -> Vector:
 def up_in_board(q: Vector) -> Vector:
     """Return the world's up in the board's axes: (..., 3), the last row of R(q)."""
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z), axis=-1)
+    up = np.empty((*q.shape[:-1], 3), order="F")
+    up[..., 0] = 2 * (x * z - w * y)
+    up[..., 1] = 2 * (y * z + w * x)
+    up[..., 2] = w * w - x * x - y * y + z * z
+    return up
