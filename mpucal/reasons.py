@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Required, Self, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Required, Self, TypedDict
 
 from .origin import Origin, name_thing
 
@@ -69,8 +69,7 @@ class Reason:
         return {"code": self.code, "message": self.message, "remedy": self.remedy}
 
 
-@dataclass(frozen=True)
-class Sentence:
+class Sentence(NamedTuple):
     """Sentence of a reason, with {places} for numbers; `refuse` is None if the check decides.
 
     divides : the sensor is not the same before {begin} and after {end}, and a part of the recording may do.
@@ -82,8 +81,7 @@ class Sentence:
     divides: bool = False
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """Kind of reasons, with one code; its attributes are those of reasons.toml, with `sentences` by their names."""
 
     meaning: str

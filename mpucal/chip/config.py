@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 from ..data import Sensor
 from ..errors import ChipError, RecordingError, UsageError
@@ -15,8 +15,7 @@ from . import registers as reg
 from .families import MPU6050, Part
 
 
-@dataclass(frozen=True)
-class Settings:
+class Settings(NamedTuple):
     """Settings on which the meaning of a FIFO frame depends.
 
     Attributes

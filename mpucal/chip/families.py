@@ -8,7 +8,7 @@ Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ..errors import ChipError
 from . import registers as reg
@@ -17,8 +17,7 @@ from . import registers as reg
 FIFO_SLACK_BYTES = 16
 
 
-@dataclass(frozen=True)
-class Family:
+class Family(NamedTuple):
     """Family of chips that the driver treats alike.
 
     Attributes
@@ -88,8 +87,7 @@ class Family:
         return 1e-3 * self.accel_lag_ms[dlpf_cfg] if dlpf_cfg < len(self.accel_lag_ms) else 0.0
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """Part that can be bought.
 
     Attributes
@@ -157,8 +155,7 @@ MPU6500 = Family(
     zero_g_drift="±1.5 mg/°C",
 )
 
-MPU6880 = replace(
-    MPU6500,
+MPU6880 = MPU6500._replace(
     name="MPU-6880",
     source="Linux 6.1, inv_mpu_core.c",
     parts=((0x78, "MPU-6880"),),
@@ -168,8 +165,7 @@ MPU6880 = replace(
     zero_g_drift="",
 )
 
-ICM20689 = replace(
-    MPU6500,
+ICM20689 = MPU6500._replace(
     name="ICM-20689",
     source="DS-000143 (ICM-20689); Linux 6.1, inv_mpu_core.c",
     parts=(
@@ -188,8 +184,7 @@ ICM20689 = replace(
     zero_g_drift="",
 )
 
-ICM20690 = replace(
-    ICM20689,
+ICM20690 = ICM20689._replace(
     name="ICM-20690",
     source="Linux 6.1, inv_mpu_core.c: INV_ICM20690_GYRO_CONFIG_FSR_SHIFT, fifo_size",
     parts=((0x20, "ICM-20690"),),
@@ -197,8 +192,7 @@ ICM20690 = replace(
     gyro_range_shift=2,
 )
 
-ICM20602 = replace(
-    ICM20689,
+ICM20602 = ICM20689._replace(
     name="ICM-20602",
     source="DS-000176 (ICM-20602), register 35; PX4's ICM-20602 driver",
     parts=((0x12, "ICM-20602"), (0x11, "ICM-20600")),
@@ -208,8 +202,7 @@ ICM20602 = replace(
     has_i2c_if=True,
 )
 
-MPU6886 = replace(
-    ICM20602,
+MPU6886 = ICM20602._replace(
     name="MPU-6886",
     source="M5Stack's MPU6886 driver; data sheet DS-000193",
     parts=((0x19, "MPU-6886"),),

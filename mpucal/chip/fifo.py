@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,8 +36,7 @@ STUCK_FRAMES, STUCK_S = 10, 0.05
 LEAST_STEP = 0.1
 
 
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """Consecutive frames (n, 7) from number `first` of `segment` on; `gap`: samples are missing before them."""
 
     segment: int

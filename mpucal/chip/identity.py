@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -64,10 +63,10 @@ class Behaviour:
         fifo_bytes = self._fifo_bytes.get(False)
         if fifo_bytes is None:
             return part_of(who_am_i)
-        part = replace(self._part_by_behaviour(who_am_i, fifo_bytes), wide_fifo_bytes=self._wide_bytes(fifo_bytes))
+        part = self._part_by_behaviour(who_am_i, fifo_bytes)._replace(wide_fifo_bytes=self._wide_bytes(fifo_bytes))
         revision = part.family.half_range_revision
         sensitivity = accel_sensitivity(float(np.median(self._magnitudes_g or 1.0))) if revision else 1.0
-        return part if sensitivity == 1.0 else replace(part, chip=part.chip + revision, accel_sensitivity=sensitivity)
+        return part if sensitivity == 1.0 else part._replace(chip=part.chip + revision, accel_sensitivity=sensitivity)
 
     def _wide_bytes(self, fifo_bytes: int) -> int | None:
         """Return the size of the FIFO with FIFO_SIZE set if it is larger, else None."""
@@ -114,7 +113,7 @@ def accel_sensitivity(magnitude_g: float) -> float:
 
 
 def _with_fifo(part: Part, fifo_bytes: int) -> Part:
-    return replace(part, family=replace(part.family, fifo_bytes=fifo_bytes))
+    return part._replace(family=part.family._replace(fifo_bytes=fifo_bytes))
 
 
 def describe_mismatch(sensor: Sensor) -> str | None:

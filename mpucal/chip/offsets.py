@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -34,8 +33,7 @@ WORD = np.iinfo(np.int16)
 RESTORE_WAITS_NS = tuple(1_000_000 * 4**i for i in range(7))
 
 
-@dataclass(frozen=True)
-class OffsetRegisters:
+class OffsetRegisters(NamedTuple):
     """Bytes from the first offset register to the last, so that one transfer writes the three axes.
 
     Attributes
@@ -146,8 +144,7 @@ TOLERANCE = 0.1
 MOTION_G = 0.006
 
 
-@dataclass(frozen=True)
-class OffsetResponse:
+class OffsetResponse(NamedTuple):
     """Effect of the offset registers.
 
     Attributes

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +34,7 @@ def source_options(name: str, settings: bool = True) -> Decorator:
     declared = []
     for option in unique(kind.option for kind in SOURCES):
         forms = [kind.forms for kind in taken if kind.option is option]
-        declared.append(option_of(replace(option, help=_sentence(", or ".join(forms))), hidden=not forms))
+        declared.append(option_of(option._replace(help=_sentence(", or ".join(forms))), hidden=not forms))
     declared += map(option_of, unique(belonging))
     return together(*declared)
 

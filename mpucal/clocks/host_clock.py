@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +44,7 @@ SILENCE_S, SILENCE_INTERVALS = 0.2, 4.0
 MAX_PAIRS, REFIT_GROWTH = 20_000, 1.1
 
 
-@dataclass(frozen=True)
-class ClockFit:
+class ClockFit(NamedTuple):
     """Parabola under the pairs.
 
     Attributes

@@ -6,8 +6,8 @@ the points on either side of it are searched in the same way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ DIFFERENT_SLOPE_STDS = 8.0
 LEAST_POINTS, LEAST_S = 20, 2.0
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """Line of one piece.
 
     Attributes

@@ -160,7 +160,7 @@ class Spool:
         for run in runs:
             head, count = self._pieces[-1] if self._pieces else (run, 0)
             if not count or run.gap or (run.segment, run.first) != (head.segment, head.first + count):
-                head, count = replace(run, frames=run.frames[:0]), 0
+                head, count = run._replace(frames=run.frames[:0]), 0
                 self._pieces.append((head, count))
             self._pieces[-1] = head, count + len(run.frames)
             self._file.write(run.frames.tobytes())

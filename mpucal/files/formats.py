@@ -9,10 +9,9 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..arguments import check_regular
 from ..data import Recording
@@ -25,8 +24,7 @@ from .rows import Rows, Write
 FOLDER, ANY_TEXT = "/", ".txt"
 
 
-@dataclass(frozen=True)
-class Format:
+class Format(NamedTuple):
     """A format of recording files; its functions are named "package.module:function", or empty if there is none.
 
     A name that begins with a point is of this package.

@@ -8,9 +8,8 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Generator, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any, NamedTuple, cast
 
 from mcap.exceptions import McapError, RecordLengthLimitExceeded
 from mcap.opcode import Opcode
@@ -47,8 +46,7 @@ _DAMAGED_BYTES = (McapError, CRCValidationError, ZstdError, struct.error, Unicod
 _DAMAGE = (*_DAMAGED_BYTES, OverflowError, MemoryError)
 
 
-@dataclass(frozen=True)
-class Capture:
+class Capture(NamedTuple):
     """Content of a capture file.
 
     Attributes

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..chip.config import Config, RateOnlyConfig
 from ..chip.driver import DRIVER_VERSION
@@ -16,8 +15,7 @@ from ..mavlink import MAVLINK_VERSION
 DRIVER = "driver"
 
 
-@dataclass(frozen=True)
-class Recorder:
+class Recorder(NamedTuple):
     """Driver that records captures.
 
     Attributes

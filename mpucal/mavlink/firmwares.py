@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from .dialect import Message, dialect
 from .imu import DATAFLASH, HIGHRES, RAW, SCALED
@@ -45,8 +45,7 @@ def accel_lag_s(parameters: Mapping[str, float]) -> float:
     return delays[0] - delays[1] if len(delays) == len(FILTERS) else 0.0
 
 
-@dataclass(frozen=True)
-class Vehicle:
+class Vehicle(NamedTuple):
     """Sender of an autopilot's HEARTBEAT.
 
     Attributes

@@ -7,7 +7,6 @@ milli-g and mrad/s, which ArduPilot and PX4 truncate toward zero.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..arguments import LARGEST
@@ -47,8 +46,7 @@ class Stream(NamedTuple):
         return 1000 if self.name in SCALED else 1
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """Content of one IMU message.
 
     Attributes

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -185,7 +184,7 @@ class Link:
         for arrived in self._arrivals(until_ns):
             if self._seeking and self._is_same_vehicle(arrived):
                 self._seeking = False
-                self._vehicle = replace(self.vehicle, address=arrived.address)
+                self._vehicle = self.vehicle._replace(address=arrived.address)
                 self._transport.restrict(arrived.address)
             vehicle = self.vehicle
             if arrived.address != vehicle.address:
@@ -236,7 +235,7 @@ class Link:
     def _is_same_vehicle(self, arrived: _AddressedPacket) -> bool:
         """Return True for the vehicle's HEARTBEAT, whatever its port."""
         sender = vehicle_of(arrived.address, arrived.packet.message)
-        return sender is not None and replace(sender, address=self.vehicle.address) == self.vehicle
+        return sender is not None and sender._replace(address=self.vehicle.address) == self.vehicle
 
     def _arrivals(self, until_ns: int) -> Iterator[_AddressedPacket]:
         while True:

@@ -110,7 +110,7 @@ class Log:
         if content.stream == Stream(RAW, 1):
             self._own_c = content.temperature_c
         elif content.stream == Stream(HIGHRES, 1) and self.firmware != PX4:
-            return replace(content, temperature_c=self._own_c)
+            return content._replace(temperature_c=self._own_c)
         return content
 
     def _under_first(self, row: Row) -> Row | None:
@@ -123,7 +123,7 @@ class Log:
         if back is None:
             return row
         acc, gyr = back.acc(np.array(content.acc)).tolist(), back.gyr(np.array(content.gyr)).tolist()
-        return Row(row.t_us, replace(content, acc=tuple(acc), gyr=tuple(gyr)))
+        return Row(row.t_us, content._replace(acc=tuple(acc), gyr=tuple(gyr)))
 
     def forget(self) -> None:
         """Drop all readings so far, and go on under the same parameters."""

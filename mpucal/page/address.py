@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from io import StringIO
+from typing import NamedTuple
 
 LOOPBACK, LAN = "127.0.0.1", "lan"
 _ALL_INTERFACES = ("0.0.0.0", "::")
 
 
-@dataclass(frozen=True)
-class Address:
+class Address(NamedTuple):
     """Address to listen on, and the host's name in the page's address.
 
     Attributes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ AXES = error_model.AXES
 UNKNOWN = 100.0
 
 
-@dataclass(frozen=True)
-class ParameterRow:
+class ParameterRow(NamedTuple):
     """Row of numbers of one kind for the axes x, y and z, NaN if unknown.
 
     Attributes

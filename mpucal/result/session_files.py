@@ -6,13 +6,12 @@ The table in docs/session.md has the same rows. A sink's files are in the sink's
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from itertools import count, takewhile
 from pathlib import Path
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class SessionFile:
+class SessionFile(NamedTuple):
     """A file of a session's folder.
 
     Attributes

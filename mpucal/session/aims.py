@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,8 +109,7 @@ UNSEEN_TILT_RAD = math.radians(10.0)
 FLAT_S, SHORTEST_FLAT_S = 10.0, 2.0
 
 
-@dataclass(frozen=True)
-class Aim:
+class Aim(NamedTuple):
     """Conditions for the end of each step, and the number of verifications.
 
     Attributes
@@ -152,9 +151,9 @@ def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
     of_board = aim.target
     # Its parameters hold no angles between the axes: they need only be known well enough for the biases.
     std = Target(of_board.gain_pct, 6.0 * of_board.misalignment_deg, 0.7 * of_board.bias_mg)
-    aim = replace(aim, target=std, flat_s=SHORTEST_FLAT_S, by_sides=True)
+    aim = aim._replace(target=std, flat_s=SHORTEST_FLAT_S, by_sides=True)
     # The best target may take a board's time.
-    return aim if target == BEST else replace(aim, least=len(SIDES), verify=VERIFY_GOOD)
+    return aim if target == BEST else aim._replace(least=len(SIDES), verify=VERIFY_GOOD)
 
 
 def unseen_rad(tilt_only: bool) -> float:

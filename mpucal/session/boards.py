@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from ..origin import Origin, name_thing
 from ..rests.limits import LEAST_TURN_RAD
@@ -24,8 +23,7 @@ LIES = math.cos(LEAST_TURN_RAD)
 TILTED = 0.15
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """Words for a kind of board.
 
     Attributes

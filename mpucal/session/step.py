@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,8 +77,7 @@ USE_TEXTS = {
 }
 
 
-@dataclass(frozen=True)
-class Pause:
+class Pause(NamedTuple):
     """The board has been still in one orientation for `seconds`, in the stillness number `run`.
 
     Attributes

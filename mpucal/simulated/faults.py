@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from enum import StrEnum
 from errno import EREMOTEIO, ETIMEDOUT
 from functools import partial
-from typing import Self
+from typing import NamedTuple, Self
 
 from ..chip.fifo import ACCEL, GYRO, TEMPERATURE
 from ..chip.registers import FIFO_COUNT_H, FIFO_R_W
@@ -34,8 +33,7 @@ OF_CHIP = (Where.BUS, Where.CHIP)
 OF_VEHICLE = (Where.VEHICLE, Where.LINK)
 
 
-@dataclass(frozen=True)
-class FaultKind:
+class FaultKind(NamedTuple):
     """A row of the table; a field that is not given has no effect.
 
     Attributes
@@ -158,8 +156,7 @@ def fault_kinds(*where: Where) -> dict[str, FaultKind]:
     return {name: kind for name, kind in FAULTS.items() if kind.where in where}
 
 
-@dataclass(frozen=True)
-class Fault:
+class Fault(NamedTuple):
     """A fault by its name in FAULTS, which begins at `at_s` of its world's clock; 0 if it is not timed."""
 
     name: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ TURN_RAD = (math.radians(50.0), math.radians(130.0))
 ON_THE_TABLE, IN_THE_HAND = 0.0, 1.0
 
 
-@dataclass(frozen=True)
-class Stance:
+class Stance(NamedTuple):
     """State of the board at the end of a leg: step of the 2 kHz clock, attitude quaternion (4,), grip 0..1."""
 
     step: int
@@ -33,8 +32,7 @@ class Stance:
     grip: float
 
 
-@dataclass(frozen=True)
-class Manner:
+class Manner(NamedTuple):
     """Manner of a hand.
 
     Attributes

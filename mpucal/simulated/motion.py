@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -74,8 +73,7 @@ class BandNoise:
         return np.asarray((weights @ self._waves).reshape(3, -1)[:, :n].T)
 
 
-@dataclass(frozen=True)
-class Jerk:
+class Jerk(NamedTuple):
     """A jerk: half a sine of `peak_mps2` (3,) that starts at `start_s`."""
 
     start_s: float

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..chip.families import MPU6050, MPU6500
 from ..data import ACCEL_COUNTS, STANDARD_GRAVITY_MPS2, Vector, mps2_per_count, rad_s_per_count
+from ..result.document import plain
 from ..result.error_model import to_body_frame
 from .motion import Motion
 
@@ -19,8 +19,7 @@ FULL_SCALE = int(ACCEL_COUNTS)
 TEMPERATURE_NOISE_C = 0.02
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(NamedTuple):
     """Settings of the chip.
 
     Attributes
@@ -51,8 +50,7 @@ class Setting:
         return rad_s_per_count(self.gyro_range_dps)
 
 
-@dataclass(frozen=True)
-class SensorResponse:
+class SensorResponse(NamedTuple):
     """Response in counts: (f, w) times `matrix` (6, 7) + `offset` (7,) + noise of standard deviation `noise` (7,)."""
 
     matrix: Vector
@@ -75,8 +73,7 @@ class SensorResponse:
         return np.minimum(np.maximum(np.rint(noisy), -FULL_SCALE), FULL_SCALE - 1).astype(np.int16)
 
 
-@dataclass(frozen=True)
-class SensorTruth:
+class SensorTruth(NamedTuple):
     """A sensor's true parameters.
 
     Attributes
@@ -151,12 +148,12 @@ class SensorTruth:
 
     def document(self) -> dict[str, Any]:
         """Return the truth in plain JSON types, in m/s^2, rad/s and the symmetric frame."""
-        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in self.__dict__.items()}
+        return {key: plain(value) for key, value in self._asdict().items()}
 
     def symmetric(self) -> tuple[Self, Vector]:
         """Return this sensor in the body frame in which K is symmetric, and Q, the rotation to that frame."""
         D, K, Q = to_body_frame(self.D, self.K)
-        return replace(self, D=D, K=K), Q
+        return self._replace(D=D, K=K), Q
 
 
 def density(std: Vector, rate_hz: float) -> Vector:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import WriteBackError
 from ..result.session_files import DOCUMENT, SessionFile
@@ -54,8 +54,7 @@ class Device:
     values: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class SinkKind:
+class SinkKind(NamedTuple):
     """Kind of sink: one row of the table.
 
     Attributes
@@ -99,8 +98,7 @@ class SinkKind:
         return (*self.kept, SessionFile(name, f"the calibration that applies after a write to {self.where}"))
 
 
-@dataclass(frozen=True)
-class Applied:
+class Applied(NamedTuple):
     """Result of a write.
 
     Attributes

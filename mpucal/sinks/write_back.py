@@ -54,7 +54,7 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
     entry = {"to": kind.name, "where": sink.where, "what": applied.what, "at": iso_utc()}
     extra = {**applied.calibration.extra, WRITTEN: [*applied.calibration.extra.get(WRITTEN, ()), entry]}
     try:
-        return replace(applied, calibration=record(kind, replace(applied.calibration, extra=extra)))
+        return applied._replace(calibration=record(kind, replace(applied.calibration, extra=extra)))
     except (OutputError, MemoryError) as cause:
         error = (
             cause if isinstance(cause, OutputError) else OutputError(NO_MEMORY, "end other programs, and start again")

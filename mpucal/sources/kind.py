@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..origin import Origin
 
@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 NAME = "name"
 
 
-@dataclass(frozen=True)
-class Option:
+class Option(NamedTuple):
     """Option of the command line.
 
     Attributes
@@ -45,8 +44,7 @@ class Option:
         return [self.flag] if value == self.bare else [self.flag, str(value)]
 
 
-@dataclass(frozen=True)
-class SourceKind:
+class SourceKind(NamedTuple):
     """Kind of source: one row of the table.
 
     Attributes

@@ -8,8 +8,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import Any, Protocol, TextIO
+from typing import Any, NamedTuple, Protocol, TextIO
 
 from ..report.units import UNKNOWN
 from ..result.document import plain
@@ -149,8 +148,7 @@ class JsonLines(Lines):
         super().say(json.dumps({"event": name, **fields}, allow_nan=False))
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(NamedTuple):
     """Parameters of one kind, for x, y and z: progress 0..1, standard uncertainties (1 sigma), and their target."""
 
     name: str

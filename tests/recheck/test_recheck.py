@@ -53,10 +53,10 @@ def noisier(factor, sensor="acc", seed=7):
 
 HAPPENED = {
     "nothing": (TRUTH, "still good", "nothing"),
-    "bias": (replace(TRUTH, b_a=TRUTH.b_a + TEN_MG), "drifted", "bias"),
-    "scale": (replace(TRUTH, D=TRUTH.D @ np.diag([1.0, 1.0, 1.02])), "drifted", "scale"),
-    "mount": (replace(TRUTH, D=TRUTH.D @ rotation(np.radians([0.8, 0.6, 0.0]))), "remounted", "mount"),
-    "gyroscope": (replace(TRUTH, b_omega=TRUTH.b_omega + np.radians([0, 6, 0])), "drifted", "gyroscope's bias"),
+    "bias": (TRUTH._replace(b_a=TRUTH.b_a + TEN_MG), "drifted", "bias"),
+    "scale": (TRUTH._replace(D=TRUTH.D @ np.diag([1.0, 1.0, 1.02])), "drifted", "scale"),
+    "mount": (TRUTH._replace(D=TRUTH.D @ rotation(np.radians([0.8, 0.6, 0.0]))), "remounted", "mount"),
+    "gyroscope": (TRUTH._replace(b_omega=TRUTH.b_omega + np.radians([0, 6, 0])), "drifted", "gyroscope's bias"),
     "another": (hand_sensor(np.random.default_rng(9)), "another sensor", "another sensor"),
 }
 
@@ -124,18 +124,18 @@ def test_a_new_bias_is_estimated_and_its_history_kept():
 
 
 def test_a_change_of_temperature_explains_what_the_data_sheet_allows_and_no_more():
-    warm = replace(TRUTH, b_a=TRUTH.b_a + 0.8 * TEN_MG)
+    warm = TRUTH._replace(b_a=TRUTH.b_a + 0.8 * TEN_MG)
     explained = mpucal.check(CALIBRATION, shown(warm, temperature_c=45.0), days=1.0)
     assert explained.verdict == "drifted"
     assert explained.temperature_explains
-    hot = replace(TRUTH, b_a=TRUTH.b_a + 8.0 * TEN_MG)
+    hot = TRUTH._replace(b_a=TRUTH.b_a + 8.0 * TEN_MG)
     assert mpucal.check(CALIBRATION, shown(hot, temperature_c=30.0), days=1.0).temperature_explains is False
 
 
 def test_a_known_b_a_of_t_is_not_called_a_drift():
     slope = 0.05 * TEN_MG
     known = replace(CALIBRATION, b_a_slope=slope, b_a_slope_std=np.zeros(3), temperature_range_c=np.array([0.0, 60.0]))
-    warm = replace(TRUTH, b_a=TRUTH.b_a + 20.0 * slope)
+    warm = TRUTH._replace(b_a=TRUTH.b_a + 20.0 * slope)
     assert mpucal.check(known, shown(warm, temperature_c=45.0), days=1.0).verdict == "still good"
 
 
@@ -221,10 +221,10 @@ def test_a_monitor_is_silent_about_a_right_calibration():
 
 
 def test_a_monitor_reports_once_a_bias_that_moved():
-    said, _ = monitored(replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 12.0, 0.0]) / MG_PER_MPS2))
+    said, _ = monitored(TRUTH._replace(b_a=TRUTH.b_a + np.array([0.0, 12.0, 0.0]) / MG_PER_MPS2))
     assert len(said) == 1
     assert abs(float(said[0].what.split("up to ")[1].split(" mg")[0])) == pytest.approx(12.0, abs=4.0)
-    said, _ = monitored(replace(TRUTH, b_omega=TRUTH.b_omega + np.radians([0.0, 3.0, 0.0])))
+    said, _ = monitored(TRUTH._replace(b_omega=TRUTH.b_omega + np.radians([0.0, 3.0, 0.0])))
     assert "the rate is up to 3" in said[0].what
 
 

@@ -52,9 +52,9 @@ class Board:
     """
 
     def __init__(self, model="mpu6050", offsets="2048", who_am_i=None, feed=None, trim=TRIM):
-        self.model = replace(MODELS[model], **OFFSETS[offsets])
+        self.model = MODELS[model]._replace(**OFFSETS[offsets])
         if who_am_i is not None:
-            self.model = replace(self.model, who_am_i=who_am_i)
+            self.model = self.model._replace(who_am_i=who_am_i)
         self.chip = Chip(self.model, feed or AtRest(), 0.0, FactoryTrim(trim))
         self.inner = SimulatedBus(self.chip, FastClock())
         self.accesses, self.fails = 0, {}

@@ -125,7 +125,7 @@ def test_a_failure_leaves_the_old_or_the_new_state_and_files_that_agree(tmp_path
 
 
 def test_a_place_that_cannot_be_restored_says_what_it_keeps_and_takes_calibrations_alone(tmp_path):
-    sink, kind = Registers(set()), replace(KIND, effect=Effect.NONE)
+    sink, kind = Registers(set()), KIND._replace(effect=Effect.NONE)
     sink.put_back = partial(Sink.put_back, sink)
     with pytest.raises(WriteBackError, match="old is not a calibration"):
         put_back(kind, sink, tmp_path / "old", tmp_path, print)

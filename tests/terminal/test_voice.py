@@ -1,6 +1,5 @@
 """The voice: one sentence at a time, and none that is out of date within a second."""
 
-
 from mpucal.session.events import Caution, Countdown, Held, Meter, Prompt, PromptKind, Use
 from mpucal.terminal.view import View
 from mpucal.terminal.voice import Tone, Voice

@@ -449,7 +449,7 @@ def test_an_imu_that_would_not_become_better_keeps_its_parameters():
 
 def test_parameters_within_the_dead_band_of_px4_are_reported_as_kept():
     vehicle, _, link = vehicle_of("px4")
-    vehicle.imus.truths = (vehicle.imus.truths[0], replace(vehicle.imus.truths[1], D=np.eye(3), b_a=np.full(3, 0.004)))
+    vehicle.imus.truths = (vehicle.imus.truths[0], vehicle.imus.truths[1]._replace(D=np.eye(3), b_a=np.full(3, 0.004)))
     calibration = calibration_of(vehicle)
     applied = AutopilotSink(link).write(calibration)
     assert "has the new parameters of IMU 1, read back" in applied.what

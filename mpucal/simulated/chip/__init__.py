@@ -49,9 +49,9 @@ def open_simulated(
     of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
     hand, mishaps = HANDS[options.hand](of_hand), begin_mishaps(options.fault)
     motion = Motion(hand, of_motion, gravity, mishaps, ARMS[options.arm])
-    model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
+    model = MODELS[options.chip]._replace(**OFFSETS[options.offsets])
     if options.who_am_i is not None:
-        model = replace(model, who_am_i=options.who_am_i)
+        model = model._replace(who_am_i=options.who_am_i)
     factory = FactoryTrim.draw(of_trim, model.family)
     chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, factory)
     clock = clock or CLOCKS[options.pace]()
@@ -64,9 +64,8 @@ def _truth(options: ChipOptions, gravity: float) -> SensorTruth:
     drawn = SensorTruth.draw(options.seed, options.chip, gravity)
     values = {key: getattr(options, key) for key in ("D", "b_a", "K", "b_omega", "rate_error_ppm", "temperature_c")}
     given: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
-    truth, _ = replace(drawn, **given).symmetric()
-    return replace(
-        truth,
+    truth, _ = drawn._replace(**given).symmetric()
+    return truth._replace(
         accel_noise_density=truth.accel_noise_density * options.noise,
         gyro_noise_density=truth.gyro_noise_density * options.noise,
     )

@@ -6,8 +6,7 @@ means 2620 * 1.01^(c - 1) counts at the smallest full scale (also in Linux' driv
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -19,8 +18,7 @@ Three = tuple[float, ...]
 Codes = tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class FactoryTrim:
+class FactoryTrim(NamedTuple):
     """Factory settings of one piece.
 
     Attributes
@@ -74,8 +72,7 @@ class FactoryTrim:
         return [*bytes_, x << 4 | y << 2 | z]
 
 
-@dataclass(frozen=True)
-class Model:
+class Model(NamedTuple):
     """Kind of chip; without deviations it is the first part of its family.
 
     Attributes
@@ -156,7 +153,7 @@ MODELS = {
     model.name: model
     for model in (
         _MPU6050,
-        replace(_MPU6050, name="mpu6050c", accel_sensitivity=0.5),
+        _MPU6050._replace(name="mpu6050c", accel_sensitivity=0.5),
         Model("mpu6500", MPU6500),
         Model("mpu6500_512", MPU6500, fifo_grows=False),
         Model("mpu9250", MPU6500, who_am_i=0x71),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,7 @@ class Imus:
         """Estimate the gyroscopes' biases again, as an autopilot does, which leaves a little of each."""
         for imu, true in enumerate(self.truths):
             left = self._rng.normal(0.0, GYRO_BIAS_AT_START_RAD_S, 3)
-            self._responses[imu] = replace(true, b_omega=true.b_omega + left).response(self._setting)
+            self._responses[imu] = true._replace(b_omega=true.b_omega + left).response(self._setting)
 
     def next(self) -> Vector:
         """Return the next samples (BLOCK, imus, 2, 3): specific force [m/s^2] and rate [rad/s] in the sensors' axes."""
@@ -80,8 +79,7 @@ class Imus:
         mounting : R_b, if it is not that of the board alone.
         """
         R, true = self._rotation if mounting is None else mounting, self.truths[number]
-        stream = replace(
-            true,
+        stream = true._replace(
             D=R @ np.diag(scale) @ true.D @ R.T,
             b_a=R @ (scale * (true.b_a - offset)),
             K=R @ true.K @ R.T,
@@ -104,4 +102,4 @@ def to_hand_axes(down: Direction) -> Direction:
 def _truth(seed: int, number: int, gravity: float) -> SensorTruth:
     """Draw the errors of IMU `number`; the chips on an autopilot are of the newer kind."""
     drawn = SensorTruth.draw(seed + 1000 * number, "mpu6500", gravity)
-    return replace(drawn, b_omega=drawn.b_omega * GYRO_BIAS_LEFT, rate_error_ppm=0.0)
+    return drawn._replace(b_omega=drawn.b_omega * GYRO_BIAS_LEFT, rate_error_ppm=0.0)

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 
 from mpucal.session.events import Countdown, Meter, Progress, Prompt, PromptKind
@@ -24,8 +22,8 @@ def test_wrong_guidance_is_counted():
         Prompt(PromptKind.ROTATE, "One.", (1.0, 0.0, 0.0)),
         meter,
         Countdown(0.1, 1.0, 1.25, False),
-        replace(meter, t_s=0.25),
-        replace(meter, t_s=0.5, attitude=far, wanted=far),
+        meter._replace(t_s=0.25),
+        meter._replace(t_s=0.5, attitude=far, wanted=far),
         Prompt(PromptKind.ROTATE, "Another.", (0.0, 1.0, 0.0)),
         Prompt(PromptKind.ROTATE, "A third.", (0.0, 0.0, 1.0)),
         Progress(0.6, 12.0, 10.0, "orientation 12 of 10"),
