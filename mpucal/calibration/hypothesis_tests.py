@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,11 +51,27 @@ def undetermined(covariance: Vector) -> tuple[str, ...]:
     return tuple(name for name, is_known in zip(K.names, known, strict=True) if not is_known)
 
 
-def find_lever_arm(problem: Problem, recording: Recording, flat: Flat, minimum: Minimum, prior: Prior) -> Vector | None:
-    """Return the lever arm r (3,) [m] that the data likely show; None where the sensor turns in place.
+class HandEffects(NamedTuple):
+    """Effects of the parameters that only a hand's model estimates on an estimate by another model.
 
-    The statistic is g' S^-1 g: g is the gradient by r at r = 0 and S its information, both less what the parameters of
-    the estimate take of them. S^-1 g is the first step to r.
+    Attributes
+    ----------
+    r : (3,) m, the lever arm that the data likely show; None where the sensor turns in place.
+    shift : (p,) of the estimate, by the likeliest delay tau. covariance : (p, p) that an unknown tau adds to it.
+    """
+
+    r: Vector | None
+    shift: Vector
+    covariance: Vector
+
+
+def find_hand_effects(
+    problem: Problem, recording: Recording, flat: Flat, minimum: Minimum, prior: Prior
+) -> HandEffects:
+    """Return the lever arm r that the data likely show, and what the delay tau changes.
+
+    The statistic of r is g' S^-1 g: g is the gradient by r at r = 0 and S its information, both less what the
+    parameters of the estimate take of them. S^-1 g is the first step to r, and to tau likewise.
 
     Parameters
     ----------
@@ -62,15 +79,25 @@ def find_lever_arm(problem: Problem, recording: Recording, flat: Flat, minimum: 
     """
     n = len(problem.series)
     rate, alpha = smoothed_rates(recording, flat)
-    of_a_hand = replace(
+    series = replace(
         problem.series, rate=rate, alpha=alpha, reset=np.full(n, -1.0), jerk=np.zeros(n), r_extra=np.zeros(n)
     )
-    at = evaluate(replace(problem, series=of_a_hand), minimum.theta, HAND)
-    r, others = np.arange(HAND)[PLACES["r"]], np.flatnonzero(minimum.free)
+    at = evaluate(replace(problem, series=series), minimum.theta, HAND)
+    others = np.flatnonzero(minimum.free)
     H = at.fisher[np.ix_(others, others)] + np.diag(prior.precision[others])
-    taken = np.linalg.solve(H, at.fisher[np.ix_(others, r)])
-    S = at.fisher[np.ix_(r, r)] - at.fisher[np.ix_(r, others)] @ taken
-    g = at.gradient[r] - taken.T @ at.gradient[others]
+
+    def beside(name: str) -> tuple[Vector, Vector, Vector]:
+        """Return S, g and what the parameters take of them."""
+        places = np.arange(HAND)[PLACES[name]]
+        taken = np.linalg.solve(H, at.fisher[np.ix_(others, places)])
+        S = at.fisher[np.ix_(places, places)] - at.fisher[np.ix_(places, others)] @ taken
+        return S, at.gradient[places] - taken.T @ at.gradient[others], taken
+
+    S, g, _ = beside("r")
     step = np.linalg.lstsq(S, g, rcond=None)[0]
-    is_likely = g @ step > most_chi2(len(r), RARE_STD) and np.linalg.norm(step) > LEAST_LEVER_M
-    return np.asarray(-step) if is_likely else None
+    is_likely = g @ step > most_chi2(len(step), RARE_STD) and np.linalg.norm(step) > LEAST_LEVER_M
+    S, g, taken = beside("tau")
+    tau, precision = prior.mean[PLACES["tau"]], prior.precision[PLACES["tau"]]
+    variance = 1.0 / (S + precision)
+    shift = -taken @ (variance @ (precision * tau - g))
+    return HandEffects(np.asarray(-step) if is_likely else None, shift, taken @ variance @ taken.T)

@@ -19,7 +19,7 @@ from ..rests.flat import Flat, flat_statistics
 from .downsampling import SEARCH_HZ, downsampled
 from .fit import Fit
 from .hand import PASSES, HandFit, fit_hand
-from .hypothesis_tests import MOST_STD, WALD_99, find_lever_arm, undetermined, wald
+from .hypothesis_tests import MOST_STD, WALD_99, HandEffects, find_hand_effects, undetermined, wald
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, ROUGHLY, Minimum, minimise
 from .likelihood import evaluate
@@ -130,18 +130,21 @@ class InPlaceFits:
             if minimum.nis < self._most_nis:
                 if parameters == ACCEL:
                     minimum = self._fit_matrix(minimum, errors) or minimum
-                r = find_lever_arm(_with_errors(self._thin, errors), *self._means, minimum, self._prior)
-                if r is not None:
-                    return f"the data show a lever arm of {1e3 * np.linalg.norm(r):.0f} mm"
-                return self._chosen(minimum, errors)
+                hand = find_hand_effects(_with_errors(self._thin, errors), *self._means, minimum, self._prior)
+                if hand.r is not None:
+                    return f"the data show a lever arm of {1e3 * np.linalg.norm(hand.r):.0f} mm"
+                return self._chosen(minimum, errors, hand)
         return f"white noise does not explain the data (innovations {least:.0f}, expected 3)"
 
-    def _chosen(self, minimum: Minimum, errors: Errors) -> ModelChoice:
+    def _chosen(self, minimum: Minimum, errors: Errors, hand: HandEffects) -> ModelChoice:
         perfect = len(minimum.free) == ACCEL
         noise = "white noise" if errors == NO_ERRORS else "white noise with small errors of the sensors"
         gyroscope = "a perfect gyroscope explain" if perfect else "a gyroscope that is not perfect explain"
         why = f"{noise} and {gyroscope} the data (innovations {minimum.nis:.1f}, expected 3)"
-        return ModelChoice(self._as_fit(minimum, errors), "accel" if perfect else "imu", why)
+        fit, at = self._as_fit(minimum, errors), minimum.theta.moved(hand.shift)
+        covariance = fit.covariance + hand.covariance
+        fit = replace(fit, D=at.D, b_a=at.b_a, b_omega=at.b_omega, K=at.K, covariance=covariance)
+        return ModelChoice(fit, "accel" if perfect else "imu", why)
 
     def _errors_may_explain(self) -> bool:
         """Return True if errors of the largest size could explain the data."""
