@@ -91,7 +91,7 @@ def find_hand_effects(
         places = np.arange(HAND)[PLACES[name]]
         taken = np.linalg.solve(H, at.fisher[np.ix_(others, places)])
         S = at.fisher[np.ix_(places, places)] - at.fisher[np.ix_(places, others)] @ taken
-        return S, at.gradient[places] - taken.T @ at.gradient[others], taken
+        return S, at.gradient[places] - taken.T @ at.gradient[others], np.asarray(taken)
 
     S, g, _ = beside("r")
     step = np.linalg.lstsq(S, g, rcond=None)[0]
