@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from .bit_flips import BitFlipFilter, Counts
 from .config import Settings
 from .losses import Loss
 
-FULL_SCALE_COUNT = np.iinfo(np.int16).max
+FULL_SCALE_COUNT = int(np.iinfo(np.int16).max)
 # columns of a frame
 ACCEL, TEMPERATURE, GYRO = slice(0, 3), 3, slice(4, 7)
 
@@ -262,18 +263,18 @@ class FifoDecoder:
         frames = np.concatenate([run.frames for run in runs])
         settings, n = self.settings, len(frames)
         gap = np.zeros(n, bool)
-        gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
+        gap[[*accumulate((len(run.frames) for run in runs[:-1]), initial=0)]] = [run.gap for run in runs]
         segment = np.concatenate([np.full(len(run.frames), run.segment) for run in runs])
         index = np.concatenate([np.arange(run.first, run.first + len(run.frames)) for run in runs])
-        accel, gyro = frames[:, ACCEL], frames[:, GYRO]
+        at_end = (frames >= FULL_SCALE_COUNT) | (frames <= -FULL_SCALE_COUNT)
         return Samples(
             t=make_increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz),
-            acc=accel * settings.mps2_per_lsb,
-            gyr=gyro * reg.rad_s_per_lsb(settings.fs_sel),
+            acc=frames[:, ACCEL] * settings.mps2_per_lsb,
+            gyr=frames[:, GYRO] * reg.rad_s_per_lsb(settings.fs_sel),
             temperature_c=self._celsius(frames[:, TEMPERATURE]),
             gap=gap,
-            acc_clipped=_clipped(accel),
-            gyr_clipped=_clipped(gyro),
+            acc_clipped=at_end[:, 0] | at_end[:, 1] | at_end[:, 2],
+            gyr_clipped=at_end[:, 4] | at_end[:, 5] | at_end[:, 6],
         )
 
     def _celsius(self, counts: Any) -> Any:
@@ -284,12 +285,6 @@ class FifoDecoder:
     def _mean_c(self) -> float:
         """Mean temperature of all frames."""
         return float(self._celsius(self._temperature_sum / self.accepted))
-
-
-def _clipped(counts: Counts) -> Mask:
-    """Return (n,) True if one of the counts (n, 3) is at either end of int16."""
-    at_end = (counts >= FULL_SCALE_COUNT) | (counts <= -FULL_SCALE_COUNT)
-    return np.asarray(at_end[:, 0] | at_end[:, 1] | at_end[:, 2])
 
 
 def _equal_frames(frames: Counts) -> tuple[int, int]:
