@@ -91,10 +91,20 @@ class Hand:
             obeyed = max(obeyed, self._prompts[-1][0])
         self._prompts.append((obeyed, prompt))
 
-    def leg(self, stance: Stance) -> Leg:
-        """Return the leg that `stance` is in, a new one if the last has ended."""
+    @property
+    def has_prompts(self) -> bool:
+        """True if it will obey a prompt that it has heard."""
+        return bool(self._prompts)
+
+    def cut(self) -> Leg:
+        """Cut the present leg where the next prompt is obeyed, if there is one, and return it."""
         if self._prompts:
             self._leg = self._leg.cut(self._prompts[0][0])
+        return self._leg
+
+    def leg(self, stance: Stance) -> Leg:
+        """Return the leg that `stance` is in, a new one if the last has ended."""
+        self.cut()
         while self._leg.last <= stance.step:
             self._obey(stance.step)
             self._leg = self._next(stance)

@@ -22,9 +22,9 @@ from .disturbance import (
     point_acceleration,
 )
 from .hand import REACTION_S, Hand, Stance
-from .legs import STEP_HZ, STEP_S, Leg, steps
+from .legs import STEP_HZ, STEP_S, Hold, Leg, steps
 
-# Shorter than any reaction: a prompt never changes motion that has been computed.
+# Shorter than any reaction: of the motion that has been computed, a prompt changes only a pause.
 AHEAD_S = 0.9 * REACTION_S[0]
 
 SINES = 12
@@ -142,8 +142,13 @@ class Motion:
         self._attitudes = self._shaken(self._stance.attitude[None], 0, np.ones(1))
 
     def hear(self, prompt: Prompt, t_s: float) -> None:
-        """Pass a prompt to the hand at `t_s`."""
+        """Pass a prompt to the hand at `t_s`; the rest of a pause that it ends is computed again."""
+        had_prompts = self._hand.has_prompts
         self._hand.hear(prompt, t_s)
+        if not had_prompts and (last := self._hand.cut().last) < self._stance.step:
+            self._stance = self._stance._replace(step=last)
+            nodes = last - self._first + 1
+            self._sums, self._attitudes = self._sums[:nodes], self._attitudes[:nodes]
 
     def means(self, edges_s: Vector, force_late_s: float = 0.0) -> tuple[Vector, Vector]:
         """Return mean specific force (n, 3) [m/s^2] and rate (n, 3) [rad/s] between (n + 1,) increasing times [s].
@@ -204,9 +209,14 @@ class Motion:
         self._attitudes = self._attitudes[nodes:]
 
     def _next_steps(self) -> tuple[Vector, Vector]:
-        """Return force and rate (n, 6) of the next AHEAD_S, or until a leg ends, and the attitudes (n, 4)."""
+        """Return force and rate (n, 6) of the next AHEAD_S, or until a leg ends, and the attitudes (n, 4).
+
+        A leg that cannot be cut is computed to its end, and so is a pause, unless a prompt is known to cut it.
+        """
         leg = self._hand.leg(self._stance)
-        first, last = self._stance.step, min(leg.last, self._stance.step + steps(AHEAD_S))
+        first = self._stance.step
+        whole = leg.cut(first) is leg or (isinstance(leg, Hold) and not self._hand.has_prompts)
+        last = leg.last if whole else min(leg.last, first + steps(AHEAD_S))
         nodes = np.arange(first, last + 1, dtype=float)
         turns, grip = leg.turns(nodes), leg.grip(nodes)
         planned = leg.attitudes(self._stance.attitude, turns)
@@ -246,8 +256,10 @@ class Motion:
             push += shaken * grip[1:, None]
         if effort.any():
             push += self._sway.at(first, len(t_s)) * effort
-            for _ in range(self._jerk_rng.poisson(self._disturbance.jerks_per_s * len(t_s) * STEP_S)):
-                self._jerks.append(Jerk.draw(self._jerk_rng, float(self._jerk_rng.uniform(t_s[0], t_s[-1]))))
+            for begin in range(0, len(t_s), steps(AHEAD_S)):
+                part_s = t_s[begin : begin + steps(AHEAD_S)]
+                for _ in range(self._jerk_rng.poisson(self._disturbance.jerks_per_s * len(part_s) * STEP_S)):
+                    self._jerks.append(Jerk.draw(self._jerk_rng, float(self._jerk_rng.uniform(part_s[0], part_s[-1]))))
         for jerk in self._jerks:
             push += jerk.at(t_s)
         self._jerks = [jerk for jerk in self._jerks if jerk.end_s > t_s[-1]]
