@@ -11,7 +11,7 @@ from ..chip.families import part_named
 from ..data import RUN, STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from ..origin import name_thing
-from ..result.comparison import WARMER_C
+from ..result.comparison import TOLD_APART_C
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
 from .model import fit_coefficients
 from .trace import Octaves, Spectrum, Trace, find_steps, find_turn
@@ -148,7 +148,7 @@ class NoiseMeter:
             moved = name_thing("the board was moved, or its bias jumped", self._sensor.origin)
             found.append({"code": "step", "message": f"{what}: {moved}"})
         T = course[:, 6]
-        if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > WARMER_C:
+        if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > TOLD_APART_C:
             found.append({"code": "temperature", "message": _temperature_sentence(course[np.isfinite(T)])})
         return found
 

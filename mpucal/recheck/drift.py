@@ -16,7 +16,7 @@ import numpy as np
 
 from ..data import Vector
 from ..result.calibration import Calibration
-from ..result.comparison import BIAS_MG_PER_C, WARMER_C, like_chip
+from ..result.comparison import BIAS_MG_PER_C, TOLD_APART_C, like_chip
 from ..result.correlation import UPPER, standard_deviations
 from ..result.error_model import MG_PER_MPS2
 from .observed import BETA, CALIBRATED, DELTA, NOISE, PARAMETERS, E, G
@@ -140,6 +140,6 @@ def temperature_covariance(calibration: Calibration, change_c: float) -> Vector:
 def hypotheses(calibration: Calibration, change_c: float | None) -> dict[str, tuple[float, Vector]]:
     """Return the prior probability of each hypothesis and the covariance (23, 23) that it adds to theta."""
     all_ = {name: (prior, spread.covariance()) for name, (prior, spread) in HYPOTHESES.items()}
-    if change_c is not None and abs(change_c) >= WARMER_C:
+    if change_c is not None and abs(change_c) >= TOLD_APART_C:
         all_[TEMPERATURE] = TEMPERATURE_PRIOR, temperature_covariance(calibration, change_c)
     return all_

@@ -21,8 +21,8 @@ FREEDOM_OF_A_HAND = 12.0
 # Factor by which the uncertainties of a calibration with reservations may be too small. Halves of a real recording with
 # this verdict, of an unchanged sensor, were 1.1 times as far apart as two good ones may be, and there are worse ones.
 RESERVED = 2.0
-# a smaller change of temperature is within the thermometer's error, or that of a chip that warms unevenly
-WARMER_C = 2.0
+# two temperatures that are nearer may be one: a thermometer errs by as much, and a chip warms unevenly
+TOLD_APART_C = 2.0
 # change of the bias with the temperature, by the data sheet of the chip or of the one that it is like
 BIAS_MG_PER_C = {"MPU-6050": 0.5, "MPU-6500": 1.0}
 # a covariance covers chance alone: a smaller improvement does not count
@@ -180,7 +180,7 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
             " differ by that, or these are two chips."
         )
     warm = [c.sensor.temperature_c for c in (a, b)]
-    if warm[0] is not None and warm[1] is not None and abs(warm[1] - warm[0]) >= WARMER_C:
+    if warm[0] is not None and warm[1] is not None and abs(warm[1] - warm[0]) >= TOLD_APART_C:
         like = like_chip(a.sensor.chip)
         remarks.append(
             f"A was measured at {warm[0]:.1f} °C and B at {warm[1]:.1f} °C: the bias of an {like} changes by about"

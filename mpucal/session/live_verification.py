@@ -24,7 +24,8 @@ from .rotate import REST_S
 
 # A shorter turn shows too little of a scale factor error to find one by it.
 LONG_TURN_RAD = np.deg2rad(40.0)
-WARMER_C = 8.0
+# A first calibration is not of a chip whose temperature has changed by more since it lay flat.
+MOST_CHANGE_C = 8.0
 # The reason that more orientations remove, and the reasons beside which they do not help.
 FEW = "few_orientations"
 CONTRADICTIONS = KINDS[FEW].explained_by
@@ -93,7 +94,7 @@ def _find_reason(
 ) -> Reason | None:
     """Return the reason that explains most of the disagreement; None where there is none."""
     warmer = _temperature_change_c(recording)
-    if abs(warmer) > WARMER_C:
+    if abs(warmer) > MOST_CHANGE_C:
         how = "rose" if warmer > 0 else "fell"
         if recording.sensor.origin is Origin.VEHICLE:
             return reason("temperature_moved", "of_vehicle_since_flat", how=how, change=abs(warmer))
