@@ -35,11 +35,8 @@ REMEDY_OPTION = re.compile(r"\bsay (--[a-z-]+ [^\s;A-Z]+?)(?=[\s;.]|,\s|$)")
 
 # For a terminal of 80 columns.
 WIDTH = 79
-SENTENCES = {
-    GOOD: "{} is good.",
-    USABLE: "{} is usable, with reservations:",
-    REFUSED: "{} is refused:",
-}
+# what follows the verdict
+ENDINGS = {GOOD: ".", USABLE: ", with reservations:", REFUSED: ":"}
 
 
 def summary(calibration: Calibration) -> str:
@@ -67,7 +64,7 @@ def _verdict(what: str, quality: Mapping[str, Any]) -> list[str]:
     if "verdict" not in quality:
         return []
     return [
-        SENTENCES[quality["verdict"]].format(what),
+        f"{what} is {quality['verdict']}{ENDINGS[quality['verdict']]}",
         *(
             textwrap.fill(f"  - {each['message']}.", WIDTH, subsequent_indent="    ")
             for each in quality.get("reasons", ())

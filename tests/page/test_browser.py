@@ -52,7 +52,7 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
     show(verdict="refused", reasons=[against.document()])
     tab.wait_for_selector("#reasons li")
     assert tab.inner_text("#reasons") == "Too few orientations. Turn it more."
-    assert tab.inner_text("#headline") == "The calibration was refused."
+    assert tab.inner_text("#headline") == "The calibration is refused."
     assert tab.get_attribute("body", "data-look") == "no"
 
 

@@ -10,16 +10,8 @@ const MOVE_MS = 230;
 const NEARLY_ROUND = 2.6;
 // The server sends at least every two seconds: after this silence the connection counts as lost.
 const SILENCE_MS = 5000, REOPEN_MS = 1500;
-const VERDICTS = {
-  good: "The calibration is good.",
-  usable: "The calibration is usable.",
-  refused: "The calibration was refused.",
-  "still good": "The calibration is still good.",
-  drifted: "The sensor has drifted.",
-  remounted: "The sensor was remounted.",
-  "another sensor": "This is a different sensor.",
-  "cannot be told": "Not enough data to tell.",
-};
+// Verdicts on a calibration; the others are those of a check.
+const CALIBRATED = ["good", "usable", "refused"];
 const FINE = ["good", "usable", "still good"];
 const REPORT = "report.html";
 // The axes in brackets are for the eye.
@@ -131,7 +123,7 @@ function task() {
   document.body.dataset.verdict = done;
   const { look, share, number } = done ? { look: FINE.includes(done) ? "yes" : "no", share: 1 } : dial();
   document.body.dataset.look = look;
-  put("headline", VERDICTS[done] ?? (done ? "Stopped" : state.headline ?? "Connecting"));
+  put("headline", state.verdict ? verdict() : done ? "Stopped" : state.headline ?? "Connecting");
   put("prompt", done ? state.stopped ?? state.estimated_error ?? "" : promptWords());
   put("step", done ? "" : state.confirming || (state.count ?? ""));
   put("number", number ?? "");
@@ -311,6 +303,7 @@ function result() {
 
 const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const sentence = (words) => `${capital(words)}.`;
+const verdict = () => (CALIBRATED.includes(state.verdict) ? `The calibration is ${state.verdict}.` : sentence(state.verdict));
 const reportFirst = (files) => [...files].sort((a, b) => (b.name === REPORT) - (a.name === REPORT));
 const size = (bytes) => (bytes > 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`);
 
@@ -355,7 +348,7 @@ function announce(words, tone = null) {
 }
 
 function tellChanges(old, begins) {
-  if (state.verdict !== old.verdict && state.verdict) return announce(VERDICTS[state.verdict], FINE.includes(state.verdict) ? "done" : "wrong");
+  if (state.verdict !== old.verdict && state.verdict) return announce(verdict(), FINE.includes(state.verdict) ? "done" : "wrong");
   if (state.stopped !== old.stopped && state.stopped) return announce(state.stopped, "wrong");
   if (state.verdict || state.stopped || state.live || begins) return;
   if (state.said && state.said.number !== old.said?.number) announce(state.said.words, state.said.tone);
