@@ -10,7 +10,7 @@ import mpucal
 from mpucal.__main__ import run
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.tlog import RawPacket
-from mpucal.mavlink.transport import SteadyClock
+from mpucal.mavlink.transports import SteadyClock
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport

@@ -17,7 +17,7 @@ from ..disk.output_folder import OutputFolder
 from ..errors import UsageError
 from ..files import load
 from ..page.address import Address
-from ..page.result import Result
+from ..page.feed import Result
 from ..recheck import check
 from ..recheck.outcome import CheckResult
 from ..recheck.update import update_biases

@@ -44,7 +44,7 @@ def command(calibration: Path, name: str, file: Path | None, noise: Path | None,
     if name == TLOG:
         if file is None or noise is not None or as_json:
             raise UsageError("--to tlog writes packets", "name the file with -o, and leave out --noise and --json")
-        from ..files.tlog import tlog_of  # noqa: PLC0415 - no other form reads a capture
+        from ..files.vehicle_logs import tlog_of  # noqa: PLC0415 - no other form reads a capture
 
         write_atomically(file, tlog_of(calibration.parent if calibration.name == DOCUMENT.name else calibration))
         click.echo(f"Written to {file}.")

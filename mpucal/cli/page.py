@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..page.address import LOOPBACK, Address, parse_address
-from ..page.result import Result
+from ..page.feed import Result
 from ..report.units import accelerometer, estimated_error
 from ..result.calibration import Calibration
 from ..session.boards import BOARD, BOARDS, usual_board

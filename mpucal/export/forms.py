@@ -8,7 +8,7 @@ from functools import partial
 
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..result.calibration import Calibration
-from . import c_code, esphome, offset_words, python_modules, ros, vehicles
+from . import code, esphome, offset_words, ros, vehicles
 from .losses import (
     LossNotes,
     check_usable,
@@ -63,7 +63,7 @@ FORMS = (
         ".h",
         "C99, C++11",
         "`mpucal_correct_at(y, temperature_c, a)`, `mpucal_correct_gyro(y, w)`; of counts, with a check of the range",
-        c_code.text,
+        code.header,
         (float_rounding, scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(
@@ -71,15 +71,15 @@ FORMS = (
         ".ino",
         "the Arduino IDE",
         "a sketch that reads the chip over Wire and prints accelerations and rates",
-        c_code.sketch,
-        (float_rounding, c_code.sketch_losses, hardware_offsets),
+        code.sketch,
+        (float_rounding, code.sketch_losses, hardware_offsets),
     ),
     Form(
         "python",
         ".py",
         "NumPy",
         "`apply(y, temperature_c)`, `apply_gyro(y)`",
-        python_modules.numpy_text,
+        code.numpy_text,
         (scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(
@@ -146,7 +146,7 @@ FORMS = (
         ".py",
         "MicroPython, CircuitPython",
         "`apply(y, temperature_c)`, `apply_gyro(y)` of one sample, without NumPy; of counts, with a check of the range",
-        python_modules.micropython_text,
+        code.micropython_text,
         (float_rounding, scale_of_rates, optional_temperature, hardware_offsets),
     ),
     Form(

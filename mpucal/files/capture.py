@@ -17,10 +17,10 @@ from weakref import finalize
 
 import numpy as np
 
+from ..chip.access import BEGUN, FORGET, OPENED, RESUMED, SAMPLED_NS, UTC, SessionEvent
 from ..chip.accesses import Accesses
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
-from ..chip.records import BEGUN, FORGET, OPENED, RESUMED, SAMPLED_NS, UTC, SessionEvent
 from ..data import RUN, Recording, without
 from ..errors import CaptureError, RecordingError
 from ..mavlink.log import read_log

@@ -17,9 +17,8 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import CompressionType, IndexType, Writer
 from zstandard import ZstdError
 
-from ..chip.access import Transaction
+from ..chip.access import SessionEvent, Transaction
 from ..chip.accesses import Accesses
-from ..chip.records import SessionEvent
 from ..disk.atomic import atomic_file
 from ..disk.growing_file import GrowingFile
 from ..errors import CaptureError, OutputError

@@ -101,10 +101,10 @@ _ANY: dict[str, Any] = {"hinted": True, "fallback": True}
 FORMATS = (
     Format(".mcap", "a bag of ROS 2", recognises=".mcap:is_mcap_of_ros", **_BAG),
     Format(".mcap", "a capture", ".capture:load_capture", rows=".capture:capture_rows", session=CAPTURE),
-    Format(".tlog", "a MAVLink log", ".tlog:load_tlog", session=CAPTURE_OF_VEHICLE),
-    Format(".bin", "a dataflash log of ArduPilot", ".dataflash:load_dataflash", ".dataflash:is_dataflash"),
+    Format(".tlog", "a MAVLink log", ".vehicle_logs:load_tlog", session=CAPTURE_OF_VEHICLE),
+    Format(".bin", "a dataflash log of ArduPilot", ".vehicle_logs:load_dataflash", ".vehicle_logs:is_dataflash"),
     # no other .bin is recognised as a recording, but each that is given is read as such
-    Format(".bin", "records of numbers", ".records:load_records", ".dataflash:is_dataflash", **_ANY),
+    Format(".bin", "records of numbers", ".records:load_records", ".vehicle_logs:is_dataflash", **_ANY),
     Format(".ulg", "a log of PX4", ".ulog:load_ulog", hinted=True),
     Format(".db3", "a bag of ROS 2", **_BAG),
     Format(".bag", "a bag of ROS 1", **_BAG),

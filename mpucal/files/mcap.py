@@ -18,9 +18,8 @@ from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from zstandard import ZstdError, frame_content_size
 
 from ..arguments import check_regular, reading
-from ..chip.access import Transaction
+from ..chip.access import SessionEvent, Transaction
 from ..chip.accesses import Accesses
-from ..chip.records import SessionEvent
 from ..errors import CaptureError
 from ..mavlink.tlog import RawPacket
 from ..strict_json import parse_own_json

@@ -27,9 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from ..chip.access import Failure
+from ..chip.access import Failure, SessionEvent
 from ..chip.accesses import Accesses
-from ..chip.records import SessionEvent
 from ..mavlink.dialect import is_packet
 from ..mavlink.tlog import RawPacket
 from ..strict_json import parse_own_json

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ..arguments import reading
 from ..data import Recording
 from ..errors import RecordingError, UsageError
-from .dataflash import is_dataflash
 from .hints import NO_HINTS, ROLES, Hints
 from .reading import MEMORY_PER_TEXT, MOST_ODD, SNIFFED, check_size
 from .tables.columns import measured
@@ -24,6 +23,7 @@ from .tables.guess import is_clock, is_even_clock, side_by_side
 from .tables.load import recording_from_table
 from .tables.shown_units import typical_size
 from .tables.table import Table
+from .vehicle_logs import is_dataflash
 
 # bytes of a record: of six numbers of 16 bits, and of an array of sensors; and numbers that it may hold
 SIZES = range(12, 513)

@@ -15,7 +15,7 @@ from ..clocks import S
 from ..errors import BusError, LinkError, NoAnswer
 from .dialect import LONGEST, MAGIC, SIGNED, Message, Packet, Parser, dialect
 from .firmwares import Vehicle, vehicle_of
-from .transport import PAUSE_NS, ReceivedBytes, Transport
+from .transports import PAUSE_NS, ReceivedBytes, Transport
 
 # Our ids: a system other than the usual ground station's 255, and the component that autopilots expect of one.
 OWN_SYSTEM, OWN_COMPONENT = 254, 190

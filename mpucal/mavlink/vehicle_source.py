@@ -18,7 +18,7 @@ from .parameters.slots import find_slot
 from .px4_preparation import AUTOCAL, Preparation
 from .stream import Streams
 from .stream_buffers import Row, samples_of, sensor_of
-from .transport import PAUSE_NS
+from .transports import PAUSE_NS
 
 POLL_NS = S // 20
 SILENT_NS = 4 * S

@@ -20,8 +20,7 @@ from ..session.meter import MotionWatch
 from ..terminal.console import Console
 from ..terminal.keys import Keys
 from .address import Address, qr_code
-from .feed import Feed
-from .result import Result
+from .feed import Feed, Result
 from .server import ASK_EVERY_S
 
 # Function that shows a result, and its files, on the page.

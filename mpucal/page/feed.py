@@ -9,6 +9,7 @@ import secrets
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -156,3 +157,20 @@ class Feed:
             if last:
                 return
             self._closed.wait(LEAST_INTERVAL_S)
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result of a session or a check, as the page shows it.
+
+    Attributes
+    ----------
+    verdict : one word or two. estimated_error : a sentence. reasons : as calibration.json has them.
+    values : name of each row of the table, and its cells for x, y and z. summary : further text.
+    """
+
+    verdict: str
+    estimated_error: str = ""
+    reasons: Sequence[Mapping[str, object]] = ()
+    values: Sequence[tuple[str, Sequence[str]]] = ()
+    summary: str = ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from ..chip.records import FORGET, KEY, LATE
+from ..chip.access import FORGET, KEY, LATE
 from ..data import Recording, Samples
 from ..errors import Abandoned
 from .events import Abort, Command, Decision, Enough, Event, Forget, Key, Measured, Prompt, Redo, Tick

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
-from ..chip.records import KEY, SessionEvent
+from ..chip.access import KEY, SessionEvent
 from ..data import Recording, Samples, Sensor
 from .events import Key, Output
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ..chip.records import KEY, RESUMED, SAMPLED_NS
+from ..chip.access import KEY, RESUMED, SAMPLED_NS
 from ..data import Recording, Sensor
 from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture, SourceError
 from ..result.calibration import Calibration

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from .. import __version__
-from ..chip.access import Transaction
-from ..chip.records import LATE, UTC
+from ..chip.access import LATE, UTC, Transaction
 from ..errors import CaptureError
 from ..files.recorders import CHIP, DRIVER
 from ..origin import Origin

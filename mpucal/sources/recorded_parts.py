@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ..chip.records import ABORT, KEY, RESUMED, SessionEvent
+from ..chip.access import ABORT, KEY, RESUMED, SessionEvent
 from ..clocks import S
 
 if TYPE_CHECKING:

@@ -6,13 +6,12 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from typing import Any, Literal, TypeVar
 
-from ..chip.access import Bus, Failure, Reply, Transaction
-from ..chip.records import SessionEvent
+from ..chip.access import Bus, Failure, Reply, SessionEvent, Transaction
 from ..errors import BusError, BusHeld, CaptureError, EndOfCapture, LateRead, LinkError, NoAnswer
 from ..files.mcap import Record
 from ..mavlink.texts import is_own
 from ..mavlink.tlog import RawPacket
-from ..mavlink.transport import PAUSE_NS, ReceivedBytes
+from ..mavlink.transports import PAUSE_NS, ReceivedBytes
 from .recorded_parts import RecordedParts
 
 _RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld, LateRead, LinkError)}

@@ -81,7 +81,7 @@ def _read(place: Path) -> list[Capture]:
 def _read_file(file: Path) -> Capture:
     if file.suffix.lower() != TLOG:
         return read_capture(file)
-    from ..files.tlog import read_tlog  # noqa: PLC0415 - it decodes MAVLink, which a chip's capture does without
+    from ..files.vehicle_logs import read_tlog  # noqa: PLC0415 - it decodes MAVLink, which a chip's capture does without
 
     return read_tlog(file)
 

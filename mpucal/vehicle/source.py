@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
-from ..chip.records import BEGUN, END, OPENED, PAUSED, SAMPLED_NS
+from ..chip.access import BEGUN, END, OPENED, PAUSED, SAMPLED_NS
 from ..clocks import S
 from ..data import Recording, Samples, Sensor
 from ..errors import EndOfCapture, LinkError

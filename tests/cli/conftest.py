@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from mpucal.__main__ import run
-from mpucal.chip.records import SessionEvent
+from mpucal.chip.access import SessionEvent
 from mpucal.files.capture_writer import CaptureWriter
 from mpucal.files.messages import BUS, PACKETS
 from mpucal.mavlink import MAVLINK_VERSION

@@ -22,11 +22,10 @@ from mcap.records import ChunkIndex
 from mcap_protobuf.decoder import DecoderFactory
 
 import mpucal
-from mpucal.chip.access import Failure, Transaction
+from mpucal.chip.access import FORGET, Failure, SessionEvent, Transaction
 from mpucal.chip.accesses import Accesses
 from mpucal.chip.decode import decode
 from mpucal.chip.fifo import Run
-from mpucal.chip.records import FORGET, SessionEvent
 from mpucal.data import Samples
 from mpucal.errors import CaptureError, OutputError, RecordingError
 from mpucal.files import capture as capture_module

@@ -9,7 +9,7 @@ import pytest
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.tlog import RawPacket
-from mpucal.mavlink.transport import ReceivedBytes
+from mpucal.mavlink.transports import ReceivedBytes
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 import mpucal
 from mpucal.cli import commands
-from mpucal.files.tlog import tlog_of
+from mpucal.files.vehicle_logs import tlog_of
 from mpucal.mavlink.parameters.slots import find_slot
 from mpucal.result.calibration import REFUSED
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 import mpucal
 from mpucal.__main__ import run
-from mpucal.chip.records import END, SessionEvent
+from mpucal.chip.access import END, SessionEvent
 from mpucal.errors import CaptureError, EndOfCapture, RecordingError
 from mpucal.files.capture_writer import CaptureWriter
 from mpucal.files.messages import PACKETS
-from mpucal.files.tlog import read_tlog
+from mpucal.files.vehicle_logs import read_tlog
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM
 from mpucal.mavlink.log import read_log

@@ -3,7 +3,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from mpucal.chip.records import SessionEvent
+from mpucal.chip.access import SessionEvent
 from mpucal.data import Recording, Samples, Sensor
 from mpucal.errors import Abandoned, CaptureError, ChipError, EndOfCapture, NoAnswer, SourceError
 from mpucal.result.calibration import Calibration

@@ -2,8 +2,7 @@
 
 import pytest
 
-from mpucal.chip.access import Reply, Transaction
-from mpucal.chip.records import RESUMED, SessionEvent
+from mpucal.chip.access import RESUMED, Reply, SessionEvent, Transaction
 from mpucal.sources.recorded_parts import split_at_resumes
 from mpucal.sources.replay import ReplayBus
 

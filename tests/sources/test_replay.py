@@ -1,7 +1,6 @@
 import pytest
 
-from mpucal.chip.access import Failure, Transaction
-from mpucal.chip.records import SessionEvent
+from mpucal.chip.access import Failure, SessionEvent, Transaction
 from mpucal.errors import BusError, CaptureError, NoAnswer
 from mpucal.sources.replay import ReplayBus
 

@@ -25,7 +25,7 @@ from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.requests import interval_command, send_command
 from mpucal.mavlink.rest import Horizon
 from mpucal.mavlink.texts import ReceivedPrompt, encode_prompt
-from mpucal.mavlink.transport import ReceivedBytes
+from mpucal.mavlink.transports import ReceivedBytes
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions

@@ -24,7 +24,7 @@ from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.client import read_agreed, stream_parameter_names
 from mpucal.mavlink.requests import is_armed
-from mpucal.mavlink.transport import ReceivedBytes
+from mpucal.mavlink.transports import ReceivedBytes
 from mpucal.page.requests import RequestFilter
 from mpucal.page.server import Handler
 

@@ -14,7 +14,7 @@ from unittest.mock import patch
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.parameters.client import stream_parameter_names
 from mpucal.mavlink.parameters.encoding import from_wire
-from mpucal.mavlink.transport import ReceivedBytes
+from mpucal.mavlink.transports import ReceivedBytes
 from mpucal.session import results
 from mpucal.simulated.vehicle import SimulatedVehicle
 from mpucal.simulated.vehicle.transport import ADDRESS, SimulatedTransport

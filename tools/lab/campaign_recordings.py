@@ -16,7 +16,7 @@ import numpy as np
 from mpucal.__main__ import run
 from mpucal.files import load, open_writer
 from mpucal.files.rows import Rows
-from mpucal.files.tlog import tlog_of
+from mpucal.files.vehicle_logs import tlog_of
 from tools.processes import Child, lasting_folder
 
 from .campaign_judge import FOLDER, judge_files

@@ -41,8 +41,7 @@ from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.client import read_parameters, read_stream_parameters
 from mpucal.mavlink.parameters.mounting import mounting
 from mpucal.mavlink.parameters.slots import Correction, find_slot
-from mpucal.mavlink.transport import Transport
-from mpucal.mavlink.transports import open_transport
+from mpucal.mavlink.transports import Transport, open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.simulated.disturbance import ARMS
 from mpucal.simulated.hands import HANDS

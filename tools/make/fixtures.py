@@ -18,10 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from mpucal.calibration import calibrate
-from mpucal.chip.access import Bus
+from mpucal.chip.access import Bus, SessionEvent
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.chip.records import SessionEvent
 from mpucal.cli.running import open_runner
 from mpucal.data import Recording
 from mpucal.errors import EndOfCapture, SourceError

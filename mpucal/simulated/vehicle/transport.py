@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from random import Random
 
 from ...clocks import US
-from ...mavlink.transport import ReceivedBytes
+from ...mavlink.transports import ReceivedBytes
 from ..faults import FAULTS, Fault, Where
 from .vehicle import SimulatedVehicle
 

@@ -1,4 +1,4 @@
-"""ArduPilot's dataflash logs (.bin) as recordings, by pymavlink's reader."""
+"""Logs of vehicles as recordings: .tlog, also as a capture, and ArduPilot's dataflash logs (.bin), by pymavlink."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -16,13 +17,59 @@ from ..errors import RecordingError
 from ..mavlink.dialect import import_pymavlink
 from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.imu import DATAFLASH, Reading, Stream
-from ..mavlink.log import Log
-from .reading import first_bytes
+from ..mavlink.log import Log, read_log
+from ..mavlink.tlog import RawPacket, TlogFile, encode_tlog
+from ..result.session_files import CAPTURE
+from .mcap import Capture, CaptureReader
+from .reading import check_size, first_bytes
 
 MAGIC = b"\xa3\x95"
 PARAMETER = "PARM"
 # before ArduPilot 4.0 each IMU had its own message; since then `I` numbers them from 0
 IMUS = ("IMU", "IMU2", "IMU3")
+
+
+def load_tlog(path: Path) -> Recording:
+    """Return the recording of the vehicle's first IMU in a .tlog, with the other IMUs in its `others`.
+
+    Raises
+    ------
+    CaptureError : it cannot be read. RecordingError : it holds no vehicle, several, or no usable IMU.
+    """
+    # the file is mapped, and its pages count as memory
+    check_size(path, path.stat().st_size)
+    file = TlogFile(path)
+    recording = read_log(file, file.name)
+    return replace(recording, recovered=file.recovered)
+
+
+def read_tlog(path: Path) -> Capture:
+    """Return the packets of a .tlog as a capture without a head.
+
+    Raises
+    ------
+    CaptureError : it cannot be read, or holds no packet.
+    """
+    file = TlogFile(path)
+    return Capture({}, tuple(file), file.recovered, file.name)
+
+
+def tlog_of(place: Path) -> bytes:
+    """Return the packets in a vehicle's capture, or in the captures of its session's folder, as a .tlog.
+
+    Raises
+    ------
+    CaptureError : not a capture. RecordingError : it holds no packets.
+    """
+    packets = [
+        record
+        for path in CAPTURE.all_in(place) or [place]
+        for record in CaptureReader(path)
+        if isinstance(record, RawPacket)
+    ]
+    if not packets:
+        raise RecordingError(f"{place} holds no packets of a vehicle", "give the capture of a session with --mavlink")
+    return encode_tlog(packets)
 
 
 def is_dataflash(path: Path) -> bool:

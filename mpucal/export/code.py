@@ -1,6 +1,7 @@
-"""C functions that apply a calibration, to m/s^2 and rad/s, with b_a(T): as a header, and in an Arduino sketch.
+"""Code that applies a calibration, to m/s^2 and rad/s, with b_a(T): C functions, and modules of Python.
 
-The header has functions for the chip's counts, too. The sketch reads the chip over Wire, and prints what it calibrates.
+The C functions stand in a header, with those for the chip's counts, and in an Arduino sketch, which reads the chip over
+Wire. One module needs only NumPy; the other is for MicroPython or CircuitPython, and corrects one sample at a time.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .templates import fill, row, rows
 FLOAT = "{:.8e}f"
 
 
-def text(calibration: Calibration, notes: Sequence[str]) -> str:
+def header(calibration: Calibration, notes: Sequence[str]) -> str:
     """Return the header's text (C99 or C++11), with `notes` in its heading."""
     return fill(
         "header.h",
@@ -114,3 +115,38 @@ def sketch_losses(calibration: Calibration) -> tuple[str, ...]:
     if family_of(sensor.chip) is None and calibration.follows_temperature:
         notes.append("It assumes the thermometer of an MPU-6050; `mpucal doctor` shows which chip it is.")
     return tuple(notes)
+
+
+def numpy_text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """Return the text of the module for NumPy, with `notes` in its docstring."""
+    head = "\n\n".join(heading(calibration, notes, "", "m/s^2, rad/s"))
+    return _module("module.py", calibration, head, "{:.12g}", "[]", "{:.6g}")
+
+
+def micropython_text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """Return the text of the module for MicroPython, with `notes` in its heading."""
+    return _module(
+        "micropython.py",
+        calibration,
+        "\n".join(heading(calibration, notes, "# ", "m/s^2, rad/s")),
+        "{:.9g}",
+        "()",
+        "{:.9g}",
+        ranges=f"{calibration.sensor.accel_range_g}, {calibration.sensor.gyro_range_dps}",
+        mps2_per_g_count=f"{mps2_per_count(1.0):.9g}",
+        rad_s_per_dps_count=f"{rad_s_per_count(1.0):.9g}",
+    )
+
+
+def _module(name: str, c: Calibration, head: str, form: str, brackets: str, of_t: str, **more: str) -> str:
+    return fill(
+        name,
+        heading=head,
+        inv_D=rows(c.inverse, form, brackets),
+        b_a=row(c.b_a_to_subtract, form),
+        slope=row(c.b_a_slope, form),
+        temperatures=row(temperature_range(c), of_t),
+        K=rows(c.K, form, brackets),
+        b_omega=row(np.nan_to_num(c.b_omega), form),
+        **more,
+    )
