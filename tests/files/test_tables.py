@@ -1147,12 +1147,7 @@ def test_our_own_times_that_came_late_lie_between_their_neighbours(walk, walk_ns
 
 
 def test_rates_called_after_the_turns_of_a_gyroscope(read, walk, assert_same):
-    """Read them as x, y and z, and AltOS's about the axes of its accelerometer: it rolls about the one along it."""
     assert_same(read("time,acc_x,acc_y,acc_z,gyro_roll,gyro_pitch,gyro_yaw\n", "t a dps"), walk, 0, 1e-12)
-    rocket = "time,accel_along,accel_across,accel_through,gyro_roll,gyro_pitch,gyro_yaw\n"
-    order = [1, 0, 2]
-    found = read(rocket, "t a dps", of=replace(walk, acc=walk.acc[:, order], gyr=walk.gyr[:, order]))
-    assert_same(found, walk, 0, 1e-12)
 
 
 @pytest.mark.parametrize(

@@ -100,9 +100,6 @@ _CLOCK = re.compile(
     r"(?![a-z])"
 )
 _TURN = re.compile("(roll|pitch|yaw)(?:rate|speed|vel|velocity)|gyro?(roll|pitch|yaw)").fullmatch
-# a rocket's axes as AltOS calls them, which rolls about the one along it -> x, y, z
-_OF_ALTOS = {"across": "x", "along": "y", "through": "z", "pitch": "x", "roll": "y", "yaw": "z"}
-_OF_A_ROCKET = re.compile(rf"((?:accel|gyro)_)({'|'.join(_OF_ALTOS)})").fullmatch
 _OF_DAY = re.compile(r"[hmsydf:/ .-]{5,}").fullmatch
 _LETTER = re.compile("[A-Za-z]").search
 # the ends of names that are units
@@ -237,10 +234,6 @@ def parse_header(header: Sequence[str]) -> list[Column]:
     # most lines that may be a header hold numbers
     if not any(map(_LETTER, header)):
         return []
-    of_rocket = [_OF_A_ROCKET(name.strip().lower()) for name in header]
-    if any(found and found[2] == "along" for found in of_rocket):
-        plain = [found and found[1] + _OF_ALTOS[found[2]] for found in of_rocket]
-        header = [of or name for of, name in zip(plain, header, strict=True)]
     named = ((place, name) for place, name in enumerate(header) if _LETTER(name))
     return [column for place, name in named if (column := parse_column_name(name, place)) is not None]
 
