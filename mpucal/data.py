@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STANDARD_GRAVITY_MPS2 = 9.80665
+AXES = "xyz"
 
 # Counts at full scale, with which mpucal, its exports and its firmware convert to SI units. PS-MPU-6000A r3.4, 6.1 and
 # 6.2, and PS-MPU-9250A r1.0, 3.1 and 3.2, "Sensitivity Scale Factor": 16384 LSB/g at +-2 g and 131 LSB/(deg/s) at +-250

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..chip.families import PARTS, Family
-from ..data import Vector
+from ..data import AXES, Vector
 from ..rests.limits import OF_NORMAL
 from ..result.calibration import REFUSED
-from ..result.error_model import AXES, bias_mg, misalignment, scale_factor_error
+from ..result.error_model import bias_mg, misalignment, scale_factor_error
 
 # robust standard deviations from the fleet's median, beyond which a value is an outlier
 OUTLIER_STD = 5.0

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..data import Recording
+from ..data import AXES, Recording
 from ..disk.atomic import write_atomically
 from ..errors import MpucalError
 from ..files import load
@@ -23,7 +23,6 @@ from ..files.hints import NO_HINTS, Hints
 from ..mavlink.parameters.document import calibrate_vehicle
 from ..report import render
 from ..result.calibration import Calibration
-from ..result.error_model import AXES
 from .locations import compute_digest, fetch
 
 TEXTS = (

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
+from ..data import AXES
 from ..disk.output_folder import free_name
 from ..mavlink.parameters.document import AUTOPILOT, NEW
 from ..origin import Origin
 from ..report.elements import as_float
-from ..report.units import AXES, accelerometer, estimated_error
+from ..report.units import accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.error_model import mg_text
 from ..result.keys import ACCELEROMETER_FORMULA

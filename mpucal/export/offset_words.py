@@ -22,11 +22,10 @@ import numpy as np
 from ..chip.families import MPU6050, PARTS, part_named
 from ..chip.offsets import Words, shift_words
 from ..chip.registers import ACCEL_RANGES_G, GYRO_OFFSET_LSB_PER_DPS
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import AXES, STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError, WriteBackError
 from ..iio.attributes import ACCEL, MPU_SCALES, PRINTED_SCALES
 from ..result.calibration import Calibration
-from ..result.error_model import AXES
 from .losses import format_xyz, heading
 
 LSB_PER_G = MPU6050.accel_offset_lsb_per_g

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..chip.families import MPU6050, part_named
 from ..chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS, mps2_per_lsb, rad_s_per_lsb
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import AXES, STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
 
 TYPE = re.compile(r"(be|le):([su])(\d+)/(8|16|32|64)(?:X(\d+))?>>(\d+)")
@@ -128,7 +128,6 @@ class FrameLayout:
         return frames.tobytes()
 
 
-AXES = "xyz"
 ACCEL, GYRO, TEMP, TIMESTAMP = "in_accel", "in_anglvel", "in_temp", "in_timestamp"
 KINDS = {ACCEL: "accelerometer", GYRO: "gyroscope"}
 # Bits of an MPU's count, if there is no buffer to describe them.

@@ -9,11 +9,10 @@ import numpy as np
 from ..chip.access import Transaction
 from ..chip.families import part_named
 from ..clocks.sample_clock import NS
-from ..data import Recording, Samples, Sensor
+from ..data import AXES, Recording, Samples, Sensor
 from ..errors import ChipError, RecordingError
 from .attributes import (
     ACCEL,
-    AXES,
     GYRO,
     TEMP,
     TIMESTAMP,

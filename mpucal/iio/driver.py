@@ -17,9 +17,9 @@ from ..chip.driver import DEAD_NS
 from ..chip.losses import Loss
 from ..chip.port import Port
 from ..clocks import S
-from ..data import Recording, Samples, Sensor
+from ..data import AXES, Recording, Samples, Sensor
 from ..errors import BusError, ChipError, EndOfCapture, NoAnswer, UsageError
-from .attributes import ACCEL, AXES, GYRO, TEMP
+from .attributes import ACCEL, GYRO, TEMP
 from .decode import IioDecoder
 from .setup import DeviceSetup
 

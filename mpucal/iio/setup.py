@@ -7,8 +7,9 @@ from contextlib import nullcontext, suppress
 
 from ..chip.config import Config
 from ..chip.port import Port
+from ..data import AXES
 from ..errors import BusError, ChipError, NoAnswer
-from .attributes import ACCEL, AXES, GYRO, KINDS, SCALE_TOLERANCE, TEMP, TIMESTAMP, bits_of, full_scale, parse_available
+from .attributes import ACCEL, GYRO, KINDS, SCALE_TOLERANCE, TEMP, TIMESTAMP, bits_of, full_scale, parse_available
 from .decode import ENABLE, FREQUENCY, IioDecoder
 
 # Most bytes of one attribute; and of a list of names, or of one read from a buffer.

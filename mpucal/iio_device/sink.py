@@ -21,11 +21,11 @@ from ..chip.config import Config
 from ..chip.offsets import Words
 from ..chip.port import Port
 from ..chip.quick_measure import PATIENCE
-from ..data import Vector
+from ..data import AXES, Vector
 from ..disk.atomic import write_atomically
 from ..errors import ChipError, OutputError
 from ..export.offset_words import LSB_PER_G, matrix_text, offset_words
-from ..iio.attributes import ACCEL, AXES, mount_matrix, read_scale
+from ..iio.attributes import ACCEL, mount_matrix, read_scale
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, DeviceSetup

@@ -8,11 +8,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..data import Vector
+from ..data import AXES, Vector
 from ..errors import Abandoned, RefusedError
 from ..result.calibration import Calibration
 from ..result.correlation import UPPER
-from ..result.error_model import AXES, MG_PER_MPS2, with_std
+from ..result.error_model import MG_PER_MPS2, with_std
 from .observed import BETA, DELTA, E, G
 
 Verdict = Literal["still good", "drifted", "remounted", "another sensor", "cannot be told"]

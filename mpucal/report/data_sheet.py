@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from ..chip.families import Family, family_of
-from ..data import Vector
+from ..data import AXES, Vector
 from ..origin import name_thing
 from ..result.calibration import REFUSED, Calibration
 from .elements import paragraph, table
-from .units import AXES, ParameterRow, accelerometer, unbroken
+from .units import ParameterRow, accelerometer, unbroken
 
 USUAL, UNUSUAL, OUTSIDE = "usual", "unusual", "outside"
 # share of the tolerance: two of the three standard deviations that it covers

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..chip.families import Family, family_of
-from ..data import Recording, Vector
+from ..data import AXES, Recording, Vector
 from ..result.calibration import Calibration
 from ..result.error_model import MG_PER_MPS2
 from .data_sheet import tolerance
 from .elements import paragraph, table
 from .pictures import envelope
 from .track import Track
-from .units import AXES, ParameterRow, accelerometer, estimated_error
+from .units import ParameterRow, accelerometer, estimated_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

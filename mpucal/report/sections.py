@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..chip.families import family_of
+from ..data import AXES
 from ..origin import Origin
 from ..result.calibration import REFUSED, USABLE, Calibration
 from ..result.error_model import with_std
@@ -16,7 +17,7 @@ from ..result.keys import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
 from .data_sheet import CAPTION, about, accelerometer_table, unusual_parameters
 from .elements import as_float, code, escape, heading, number, pair, paragraph, quantity, section, table
-from .units import AXES, gyroscope, unbroken
+from .units import gyroscope, unbroken
 
 # docs/method.md, "Precision and repeatability"
 REPEATABILITY = (

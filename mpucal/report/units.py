@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data import Vector
+from ..data import AXES, Vector
 from ..result import error_model
 from ..result.calibration import REFUSED, Calibration, unknown
 from ..result.error_model import with_std
 
-AXES = error_model.AXES
 # a standard uncertainty from here on, in the unit that is shown, means not observable
 UNKNOWN = 100.0
 

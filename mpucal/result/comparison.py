@@ -8,11 +8,10 @@ from itertools import permutations
 
 import numpy as np
 
-from ..data import Vector
+from ..data import AXES, Vector
 from . import error_model
 from .calibration import GOOD, Calibration
 from .correction import same_trim
-from .error_model import AXES
 
 # Of pairs of calibrations of an unchanged linear sensor, and of checks of an unchanged sensor, 1 in 100 find a change.
 CONFIDENCE = 0.99

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Vector
+from ..data import AXES, Vector
 
-_AXES, _PAIRS = ("x", "y", "z"), ("xx", "xy", "xz", "yy", "yz", "zz")
+_PAIRS = ("xx", "xy", "xz", "yy", "yz", "zz")
 NAMES = (
-    *(f"D_{i}{j}" for i in _AXES for j in _AXES),
-    *(f"b_a_{i}" for i in _AXES),
+    *(f"D_{i}{j}" for i in AXES for j in AXES),
+    *(f"b_a_{i}" for i in AXES),
     *(f"K_{pair}" for pair in _PAIRS),
-    *(f"b_omega_{i}" for i in _AXES),
+    *(f"b_omega_{i}" for i in AXES),
 )
 KEY = "correlation"
 LOWER = np.tril_indices(len(NAMES), -1)

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 
-AXES = "xyz"
 MG_PER_MPS2 = 1000.0 / STANDARD_GRAVITY_MPS2
 
 

@@ -12,12 +12,11 @@ from ..calibration.checks.estimate import USABLE_RMS_MPS2
 from ..calibration.evidence import Evidence
 from ..calibration.hypothesis_tests import MOST_STD
 from ..calibration.verification import NewOrientation
-from ..data import Recording, Vector
+from ..data import AXES, Recording, Vector
 from ..origin import Origin
 from ..reasons import KINDS, Reason, ReasonFound, is_explained, reason
 from ..rests.intervals import RestFinder
 from ..result.calibration import REFUSED, USABLE, Calibration
-from ..result.error_model import AXES
 from ..result.keys import Quality
 from .events import Checked, Verification, triple
 from .rotate import REST_S

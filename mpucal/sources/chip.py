@@ -11,7 +11,15 @@ from contextlib import closing, contextmanager
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..chip import registers as reg
+from ..chip.access import Bus
 from ..chip.driver import Driver
+from ..chip.families import PARTS
+from ..chip.offsets import PLACES, OffsetRegisters
+from ..chip.port import Port
+from ..data import STANDARD_GRAVITY_MPS2
 from ..files.messages import BUS
 from ..origin import Origin
 from .opened_source import ActiveSource, CaptureRecorder, OpenedSource, Say
@@ -19,14 +27,6 @@ from .replay import Tap
 
 if TYPE_CHECKING:
     from .reading_process import BusDriver
-import numpy as np
-
-from ..chip import registers as reg
-from ..chip.access import Bus
-from ..chip.families import PARTS
-from ..chip.offsets import PLACES, OffsetRegisters
-from ..chip.port import Port
-from ..data import STANDARD_GRAVITY_MPS2
 
 CAN_FORK = sys.platform == "linux"
 

@@ -20,8 +20,8 @@ from ...chip.offsets import OffsetRegisters, Words
 from ...chip.port import Port
 from ...chip.registers import ACCEL_RANGES_G, GYRO_RANGES_DPS
 from ...chip.setup import read_identity
-from ...data import Samples
-from ...iio.attributes import ACCEL, AXES, GYRO, MPU_SCALES, PRINTED_SCALES, TEMP, TIMESTAMP, FrameLayout, ScanElement
+from ...data import AXES, Samples
+from ...iio.attributes import ACCEL, GYRO, MPU_SCALES, PRINTED_SCALES, TEMP, TIMESTAMP, FrameLayout, ScanElement
 from ...iio.setup import TRIGGERS
 from ...iio_device.source import file_error
 from ..chip import SimulatedBus, with_long_polls
