@@ -31,6 +31,7 @@ UNSORTED = "sort the samples by time and drop repeated ones; if another recordin
 
 Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Whole = NDArray[np.int64]
 
 
 def check_numbers(values: ArrayLike, key: str, name: str, as_given: bool = False) -> Any:

@@ -28,6 +28,7 @@ from .arguments import (
 )
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
+from .arguments import Whole as Whole  # noqa: PLC0414
 from .clocks.sample_clock import GAP_INTERVALS as GAP_INTERVALS  # noqa: PLC0414
 from .clocks.stamps import FEWEST, Clock, fit_clock
 from .errors import WrongType, escape_line

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..clocks.sample_clock import Whole
+from ..arguments import Mask, Whole
 from .access import Failure, Transaction
 from .registers import FIFO_R_W, FRAME_BYTES, FRAME_WORDS
 
@@ -32,9 +32,9 @@ class Accesses:
     files : names of files; `register` is FIRST_FILE_NUMBER + the index of the name.
     """
 
-    write: NDArray[np.bool_]
-    has_host_ns: NDArray[np.bool_]
-    framed: NDArray[np.bool_]
+    write: Mask
+    has_host_ns: Mask
+    framed: Mask
     register: Whole
     count: Whole
     moved: Whole
@@ -145,5 +145,5 @@ class Accesses:
 _columns = attrgetter(*(f.name for f in fields(Accesses) if f.name not in ("failures", "files")))
 
 
-def _joined(transactions: Sequence[Transaction], chosen: NDArray[np.bool_]) -> bytes:
+def _joined(transactions: Sequence[Transaction], chosen: Mask) -> bytes:
     return b"".join(each.data for each, is_chosen in zip(transactions, chosen, strict=True) if is_chosen)

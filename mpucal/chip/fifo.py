@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..clocks.host_clock import HostClock
-from ..clocks.sample_clock import NS, PolledClock, SampleClock, Times, Whole, make_increasing
-from ..data import Mask, Recording, Samples, Sensor, Vector
+from ..clocks.sample_clock import NS, PolledClock, SampleClock, Times, make_increasing
+from ..data import Mask, Recording, Samples, Sensor, Vector, Whole
 from . import registers as reg
 from .bit_flips import BitFlipFilter, Counts
 from .config import Settings

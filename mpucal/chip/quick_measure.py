@@ -13,9 +13,8 @@ from contextlib import contextmanager, suppress
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import STANDARD_GRAVITY_MPS2, Vector, Whole
 from ..errors import BoardMoved, BusError, ChipReset
 from ..rests.stillness import is_untouched
 from . import registers as reg
@@ -25,8 +24,6 @@ from .identity import accel_sensitivity
 from .losses import Loss
 from .port import Port
 from .setup import STARTUP_NS
-
-Codes = NDArray[np.int64]
 
 READS = 100
 
@@ -183,7 +180,7 @@ def _mean_counts(port: Port, test: int, afs_sel: int) -> Vector:
     return np.asarray(read_counts(port, reg.FRAME_WORDS).mean(0))
 
 
-def _factory_codes(port: Port, packed: bool) -> tuple[Codes, Codes]:
+def _factory_codes(port: Port, packed: bool) -> tuple[Whole, Whole]:
     """Read the factory's codes (3,) of the accelerometer and of the gyroscope; 0: there is none."""
     if not packed:
         gyro, accel = (port.read(start, 3) for start in (reg.SELF_TEST_GYRO, reg.SELF_TEST_ACCEL))
@@ -193,7 +190,7 @@ def _factory_codes(port: Port, packed: bool) -> tuple[Codes, Codes]:
     return np.array(accel_codes), np.array([axis & 0x1F for axis in axes])
 
 
-def factory_response(packed: bool, accel: Codes, gyro: Codes) -> tuple[Vector, Vector]:
+def factory_response(packed: bool, accel: Whole, gyro: Whole) -> tuple[Vector, Vector]:
     """Return the factory's responses (3,) [g] and (3,) [deg/s] by its codes; those of 0 mean nothing."""
     a, w = (codes.astype(np.float64) - 1.0 for codes in (accel, gyro))
     if packed:

@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import Vector
-from .sample_clock import NS, RATE_TOLERANCE, Whole
+from ..arguments import Vector, Whole
+from .sample_clock import NS, RATE_TOLERANCE
 
 # Warming moves a ceramic resonator, and an RC oscillator, by some 50 ppm a minute.
 DRIFT_STD_PER_S = 100e-6 / 60

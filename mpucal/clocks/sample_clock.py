@@ -20,9 +20,8 @@ from dataclasses import dataclass, field
 from operator import mul
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arguments import Vector
+from ..arguments import Vector, Whole
 from . import UNIFORM
 from .piecewise_rate import fit_lines, merge_equal_slopes
 
@@ -31,7 +30,6 @@ NS = 1e-9
 GAP_INTERVALS = 2.5
 # in a longer time a sample is missing, or its time is late
 MISSING_INTERVALS = 1.5
-Whole = NDArray[np.int64]
 
 # PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %. So is an RC oscillator; a ceramic resonator is
 # within 0.5 %.

@@ -18,9 +18,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-from ..arguments import Mask, Vector
+from ..arguments import Mask, Vector, Whole
 from .sample_clock import GAP_INTERVALS, NS, SampleClock, make_increasing
 
 FEWEST = 100
@@ -45,8 +44,6 @@ CATCH_UP_STRETCHES = 8
 EARLIEST = 0.75
 # a jump of the envelope is a gap beyond these multiples of the period, of its usual move and of the stamps' resolution
 GAP_PERIODS, GAP_MOVES, GAP_RESOLUTIONS = 0.6, 6.0, 1.5
-
-Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -102,13 +99,13 @@ def are_new(at_once: Mask | None, values: Vector) -> Mask:
     return np.append(True, ~again)[: len(values)]
 
 
-def are_gaps(t: Vector | Numbers) -> Mask:
+def are_gaps(t: Vector | Whole) -> Mask:
     """Return (n,) True where more than one sample is missing before a sample, by increasing times or numbers (n,)."""
     steps = np.diff(t, prepend=t[:1])
     return steps > GAP_INTERVALS * np.median(steps[1:]) if len(t) > 1 else np.zeros(len(t), bool)
 
 
-def sample_period(stamps: Vector, number: Numbers | None = None) -> float:
+def sample_period(stamps: Vector, number: Whole | None = None) -> float:
     """Return the sample period of (n,) stamps that may come in bursts, repeat or be late, in their unit."""
     # of samples at one stamp, the first: a rounded stamp has just changed
     new = np.flatnonzero(np.diff(stamps, prepend=np.nan) != 0.0)
@@ -119,7 +116,7 @@ def sample_period(stamps: Vector, number: Numbers | None = None) -> float:
     return float(np.median((at[lag:] - at[:-lag]) / (count[lag:] - count[:-lag])))
 
 
-def fit_clock(stamps: Vector, number: Numbers | None = None) -> Clock:
+def fit_clock(stamps: Vector, number: Whole | None = None) -> Clock:
     """Return the clock behind (n,) stamps [s] that do not decrease.
 
     Parameters
@@ -165,7 +162,7 @@ def _trimmed_square(values: Vector, left_out: float) -> float:
     return float(squares[: len(squares) - max(round(left_out * len(squares)), 1)].mean())
 
 
-def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> tuple[Mask, Vector]:
+def _gaps(stamps: Vector, number: Whole, period: float, least_width: int) -> tuple[Mask, Vector]:
     """Return (n,) where samples are missing, by jumps of the lower envelope, and the delay (n,) of each stamp.
 
     Parameters
@@ -203,7 +200,7 @@ def _gaps(stamps: Vector, number: Numbers, period: float, least_width: int) -> t
     return gap, late
 
 
-def _edges(n: int, period: float, least_width: int) -> Numbers:
+def _edges(n: int, period: float, least_width: int) -> Whole:
     """Return where the stretches of n samples begin; all have a width but the last, which may be half of it longer."""
     width = min(max(round(STRETCH_S / period), STRETCH_SAMPLES, least_width), n // 2)
     return np.arange(0, n - width // 2, width)

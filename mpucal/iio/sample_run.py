@@ -7,17 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..chip.bit_flips import BitFlipFilter
 from ..clocks.sample_clock import MISSING_INTERVALS, NS
-from ..data import Samples, Vector
+from ..data import Samples, Vector, Whole
 from .attributes import USUAL_BITS, SensorScale
 
 # Columns of a row of both sensors: of each, three counts, and 1 if one of them is clipped.
 ROW = 8
-
-Times = NDArray[np.int64]
 
 
 class StreamAligner:
@@ -35,7 +32,7 @@ class StreamAligner:
         self._values = [np.zeros((0, width)) for width in widths]
         self._last = [np.iinfo(np.int64).min] * len(widths)
 
-    def add(self, stream: int, t_ns: Times, values: Vector) -> None:
+    def add(self, stream: int, t_ns: Whole, values: Vector) -> None:
         """Add samples (n, width) of a stream at `t_ns` (n,); one that is not later than the earlier ones is dropped."""
         latest = np.maximum.accumulate(np.concatenate(([self._last[stream]], t_ns)))
         later = t_ns > latest[:-1]
@@ -43,7 +40,7 @@ class StreamAligner:
         self._t[stream] = np.concatenate((self._t[stream], t_ns[later]))
         self._values[stream] = np.concatenate((self._values[stream], values[later]))
 
-    def take(self) -> tuple[Times, Vector]:
+    def take(self) -> tuple[Whole, Vector]:
         """Return the new complete rows: times (n,) of the first stream, and all streams' columns at these times."""
         t_ns, values = self._t[0], self._values[0]
         if not all(map(len, self._t)):
@@ -62,7 +59,7 @@ class StreamAligner:
         return asked, np.concatenate(parts, axis=1)
 
 
-def _interpolate(asked: Times, t: Times, values: Vector) -> Vector:
+def _interpolate(asked: Whole, t: Whole, values: Vector) -> Vector:
     """Interpolate `values` (m, width) at the times `t` (m,) to the times `asked` (n,) between them."""
     if len(asked) == 0:
         return np.zeros((0, values.shape[1]))
@@ -97,7 +94,7 @@ class SampleRun:
         self._waiting = np.zeros(0, np.int64), np.zeros((0, ROW))
         self._last_ns: int | None = None
 
-    def add(self, stream: str, t_ns: Times, values: Vector) -> None:
+    def add(self, stream: str, t_ns: Whole, values: Vector) -> None:
         """Add values (n, columns) of a stream at `t_ns` (n,)."""
         self._aligned.add(list(self.widths).index(stream), t_ns, values)
 
@@ -124,7 +121,7 @@ class SampleRun:
             counts[:, 7] > 0,
         )
 
-    def _repaired(self, t_ns: Times, rows: Vector) -> tuple[Times, Vector]:
+    def _repaired(self, t_ns: Whole, rows: Vector) -> tuple[Whole, Vector]:
         """Return times (n,) and rows (n, ROW) without flipped bits; the last row waits while it may hold one."""
         if max(self.accel.bits or 0, self.gyro.bits or 0) > USUAL_BITS:
             return t_ns, rows
@@ -135,7 +132,7 @@ class SampleRun:
         self._waiting = t_ns[ready:], rows[ready:]
         return t_ns[:ready], rows[:ready]
 
-    def _gaps(self, t_ns: Times) -> np.ndarray:
+    def _gaps(self, t_ns: Whole) -> np.ndarray:
         """Return (n,) True where the buffer dropped samples; polling has no fixed interval."""
         steps = np.diff(t_ns, prepend=t_ns[0] if self._last_ns is None else self._last_ns)
         longest_ns = (

@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from ...clocks import S
-from ...clocks.stamps import FEWEST, SLOWEST_HZ, Clock, Numbers, are_gaps, fit_clock, sample_period
-from ...data import Mask, Vector
+from ...clocks.stamps import FEWEST, SLOWEST_HZ, Clock, are_gaps, fit_clock, sample_period
+from ...data import Mask, Vector, Whole
 from ...errors import RecordingError
 from ..hints import Hints
 from . import shown_units as units
@@ -52,7 +52,7 @@ class Stream:
     time_unit: str = ""
     unit: str = ""
     zero_ns: int | None = None
-    places: Numbers | None = None
+    places: Whole | None = None
     temperature_c: Vector | None = None
     lost: int = 0
     rate_hz: float | None = None
@@ -61,7 +61,7 @@ class Stream:
     summed: bool = False
 
     @cached_property
-    def number(self) -> Numbers:
+    def number(self) -> Whole:
         """Return `places`, or else numbers without holes."""
         return np.arange(len(self.values)) if self.places is None else self.places
 
@@ -148,7 +148,7 @@ def go_on(t: Vector, last: float = -math.inf) -> tuple[Vector, Mask]:
     return t + np.cumsum(np.where(begins, GAP_S - steps, 0.0)), begins
 
 
-def in_order(t: Vector, number: Numbers, last: float = -math.inf) -> Vector:
+def in_order(t: Vector, number: Whole, last: float = -math.inf) -> Vector:
     """Return times (n,) of samples with these numbers, of which those that came late lie between their neighbours'.
 
     The same holds where a clock was set back a little. `last` is the time before the first of them.
