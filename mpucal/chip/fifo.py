@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import accumulate
 from typing import Any, NamedTuple
 
@@ -211,8 +211,7 @@ class FifoDecoder:
     def recording(self, name: str) -> Recording:
         """Return all samples with final times, and the sensor with its measured rate."""
         samples = self._samples(self._runs, self._final_times())
-        arrays = {f.name: getattr(samples, f.name) for f in fields(Samples)}
-        return Recording(**arrays, sensor=self.sensor, name=name)
+        return Recording(**vars(samples), sensor=self.sensor, name=name)
 
     @property
     def sensor(self) -> Sensor:
