@@ -54,12 +54,12 @@ def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[
     towards = direction(rng)
     match event.split():
         case ["bias", mg, "mg"]:
-            return replace(truth, b_a=truth.b_a + float(mg) / MG_PER_MPS2 * towards), TEMPERATURE_C
+            return truth._replace(b_a=truth.b_a + float(mg) / MG_PER_MPS2 * towards), TEMPERATURE_C
         case ["scale", percent, "%"]:
             axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
-            return replace(truth, D=truth.D @ np.diag(1.0 + 0.01 * float(percent) * axis)), TEMPERATURE_C
+            return truth._replace(D=truth.D @ np.diag(1.0 + 0.01 * float(percent) * axis)), TEMPERATURE_C
         case ["mount", deg, "deg"]:
-            return replace(truth, D=truth.D @ rotation(np.radians(float(deg)) * towards)), TEMPERATURE_C
+            return truth._replace(D=truth.D @ rotation(np.radians(float(deg)) * towards)), TEMPERATURE_C
         case [by_c, "degC"]:
             spread = drift.BY_TEMPERATURE["MPU-6050"].covariance() * float(by_c) ** 2
             theta = rng.multivariate_normal(np.zeros(len(spread)), spread)
@@ -73,8 +73,7 @@ def aged_by(truth: SensorTruth, theta: Vector) -> SensorTruth:
     """Return the sensor after a change theta (23,), see mpucal.recheck.observed."""
     after = apply_errors(mpucal.Calibration(truth.D, truth.b_a, K=truth.K, b_omega=truth.b_omega), theta)
     noise = np.exp(theta[NOISE]) * [truth.accel_noise_density, truth.gyro_noise_density]
-    return replace(
-        truth,
+    return truth._replace(
         D=after.D,
         b_a=after.b_a,
         K=after.K,

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import Annotated, Any, NamedTuple
@@ -54,7 +53,7 @@ class Scene(NamedTuple):
 def gyro_off(seed: int) -> Simulated:
     """Simulate the paper's scenario with a gyroscope that has scale factor errors and misalignments."""
     of_sensor, of_gyro = np.random.default_rng(seed).spawn(2)
-    return paper_scenario(seed, sensor=replace(paper_sensor(of_sensor), K=hand_sensor(of_gyro).K))
+    return paper_scenario(seed, sensor=paper_sensor(of_sensor)._replace(K=hand_sensor(of_gyro).K))
 
 
 SCENES = {

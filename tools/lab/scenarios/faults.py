@@ -65,7 +65,7 @@ def nonlinear(readings: Readings, rng: Rng, share: float = 0.005) -> Readings:
     bend, truth = share * rng.uniform(-1.0, 1.0, 3) / readings.ranges[0], readings.truth
     D = truth.D * (1.0 + 2.0 * bend * truth.b_a)[:, None]
     b_a = truth.b_a + bend * (truth.b_a**2 + truth.gravity**2 / 3.0 * np.sum(truth.D**2, axis=1))
-    return replace(readings, acc=readings.acc + bend * readings.acc**2, truth=replace(truth, D=D, b_a=b_a))
+    return replace(readings, acc=readings.acc + bend * readings.acc**2, truth=truth._replace(D=D, b_a=b_a))
 
 
 def gyro_nonlinear(readings: Readings, rng: Rng, share: float = 0.002) -> Readings:
@@ -112,7 +112,7 @@ def flicker(readings: Readings, rng: Rng, accel_hz: float = 3.0, gyro_hz: float 
 def swapped(readings: Readings, rng: Rng, sign: float = 1.0) -> Readings:
     """Swap the accelerometer's x and y; with `sign` -1 turned by 90 deg, which leaves it right-handed."""
     P, truth = np.array([[0.0, sign, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), readings.truth
-    return replace(readings, acc=readings.acc @ P.T, truth=replace(truth, D=P @ truth.D, b_a=P @ truth.b_a))
+    return replace(readings, acc=readings.acc @ P.T, truth=truth._replace(D=P @ truth.D, b_a=P @ truth.b_a))
 
 
 def cross_clipped(readings: Readings, rng: Rng, mps2: float = 1.0) -> Readings:
@@ -191,7 +191,7 @@ def slip(readings: Readings, rng: Rng, deg: float = 3.0) -> Readings:
     turn = np.cross(np.eye(3), np.radians(deg) * direction(rng))
     D, share = readings.truth.D, after[readings.t >= FLAT_S].mean()
     acc = readings.acc + after[:, None] * (readings.force @ (D @ turn).T)
-    before, mean, end = (replace(readings.truth, D=D + of_turn * D @ turn) for of_turn in (0.0, share, 1.0))
+    before, mean, end = (readings.truth._replace(D=D + of_turn * D @ turn) for of_turn in (0.0, share, 1.0))
     return replace(readings, acc=acc, truth=mean, slipped=(before, end))
 
 
