@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ..data import Vector
+from ..rests.limits import VIBRATING_MPS2
 from ..rests.tremor import low_pass
 from ..rests.windows import WINDOW_S
 from .levenberg_marquardt import Minimum
@@ -21,6 +22,7 @@ from .theta import Theta
 from .transitions import REWEIGHTED
 from .uncertainty import MOST_NIS
 
+FEW_PEAKS_NIS = 1.5  # mean squared innovation of a vibration whose peaks are no outliers; that of white noise is 3
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 FIRST_MPS2 = WHITE_MPS2[4]  # sigma at which a search begins: a board that goes from rest to rest is in a hand
 HAND_MPS2 = tuple(sigma for sigma in WHITE_MPS2 if sigma >= FIRST_MPS2)
@@ -69,11 +71,11 @@ def most_likely_sigma(
 
 
 def vibration_sigma(prepared: Preprocessed, noise: Noise, minimum: Minimum) -> float:
-    """Return the least sigma [m/s^2] of a vibration that explains the innovations at a minimum; 0 if there is none.
+    """Return the least sigma [m/s^2] of a vibration that explains the innovations at a minimum; 0 if none does.
 
-    Jerks make some innovations large, and a change of the sensor all of half a second. A vibration makes most of them
-    large, with either sign. It has no tails: with a smaller sigma, a likelihood that allows for tails takes its peaks
-    for outliers, and the estimate follows those of one side.
+    It shows in the noise around each sample; or, if it is slow, in the innovations: jerks make some of them large, a
+    change of the sensor all of half a second, and a vibration most, with either sign. A vibration is skewed, and has no
+    tails: with its true size, the loss would take peaks for outliers, and the estimate follow those of one side.
     """
     n = max(round(WINDOW_S * prepared.recording.rate_hz), 2)
 
@@ -82,9 +84,11 @@ def vibration_sigma(prepared: Preprocessed, noise: Noise, minimum: Minimum) -> f
         windows = innovation[: len(innovation) // n * n].reshape(-1, n, 3)
         return np.asarray(np.sum((windows - np.median(windows, axis=1, keepdims=True)) ** 2, axis=2))
 
-    if not (minimum.nis > MOST_NIS and np.median(squares(0.0)) > MOST_NIS):
+    scale, variance = prepared.problem.series.r_scale, prepared.flat.Sigma_a.mean()
+    is_loud = scale is not None and np.median(scale) * variance > VIBRATING_MPS2**2
+    if prepared.rests_often or not (is_loud or (minimum.nis > MOST_NIS and np.median(squares(0.0)) > MOST_NIS)):
         return 0.0
-    return next((sigma for sigma in WHITE_MPS2 if squares(sigma).mean() < 3.0), WHITE_MPS2[-1])  # as of white noise
+    return next((sigma for sigma in WHITE_MPS2 if squares(sigma).mean() < FEW_PEAKS_NIS), 0.0)
 
 
 def remove_tremor(prepared: Preprocessed) -> Preprocessed:

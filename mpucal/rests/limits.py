@@ -16,6 +16,7 @@ from ..data import Vector
 # A noisy sensor may exceed the limits of spread, up to this multiple of its own noise and up to these values.
 TIMES_NOISE = 2.5
 NOISIEST_GYRO_RAD_S, NOISIEST_ACC_MPS2 = 0.15, 0.5
+VIBRATING_MPS2 = 0.2  # the noise of no sensor
 # The MPU-6050's bias may be 20 deg/s; where the bias is not known, a larger mean rate than this is a turn.
 MOST_BIAS_RAD_S = math.radians(30.0)
 # A window in which gravity turns faster is neither a rest nor a measurement of the gyroscope's bias.

@@ -8,20 +8,18 @@ from ...arguments import LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2
 from ...data import Mask
 from ...origin import Origin
 from ...reasons import Reason, reason
-from ...rests.limits import NOISIEST_ACC_MPS2, TIMES_NOISE
+from ...rests.limits import NOISIEST_ACC_MPS2, TIMES_NOISE, VIBRATING_MPS2
 from ...rests.windows import noise_variance
 from ..evidence import Evidence, once
 from ..masks import Stuck, stuck_readings
 
-WARMER_C = 5.0
+MOST_RANGE_C = 5.0
 MOST_SPOILT = 0.2
 # A longer gap is an interruption of the session, which says nothing about the link.
 INTERRUPTED_S = 10.0
-# The accelerometer's noise is vibration where it exceeds this and TIMES_NOISE that of the flat segment for MOST_SPOILT
-# of the time, or where it is at rest more than that of any sensor.
-VIBRATING_MPS2 = 0.2
-# Below this rate, fourth differences do not separate a tremor of up to 12 Hz from noise: only what is larger than the
-# noise of any sensor is vibration.
+# The accelerometer's noise is vibration where it exceeds VIBRATING_MPS2 and TIMES_NOISE that of the flat segment for
+# MOST_SPOILT of the time, or where it is at rest more than that of any sensor. Below this rate, fourth differences do
+# not separate a tremor of up to 12 Hz from noise: only what is larger than the noise of any sensor is vibration.
 SEPARABLE_HZ = 48.0
 
 
@@ -124,7 +122,7 @@ def temperature_moved(e: Evidence) -> Reason | None:
     if len(known) < 10:
         return None
     low, high = np.quantile(known, [0.02, 0.98])
-    if high - low <= WARMER_C:
+    if high - low <= MOST_RANGE_C:
         return None
     of_vehicle = e.recording.sensor.origin is Origin.VEHICLE
     return reason("temperature_moved", "of_vehicle" if of_vehicle else "range", low=low, high=high)
