@@ -45,8 +45,8 @@ class Accesses:
     failures: Mapping[int, Failure] = field(default_factory=dict)
     files: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        """Raise ValueError if the columns do not fit each other."""
+    def check(self) -> None:
+        """Raise ValueError if the columns, which were read from a file, do not fit each other."""
         columns = (self.has_host_ns, self.framed, self.register, self.count, self.moved, self.t_ns, self.host_ns)
         if any(len(column) != len(self.write) for column in columns):
             raise ValueError("columns of different lengths")

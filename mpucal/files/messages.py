@@ -123,7 +123,7 @@ def decode_accesses(message: bytes) -> Accesses:
         raise ValueError("numbers of times and accesses differ")
     host_ns = np.zeros(len(t_ns), np.int64)
     host_ns[is_heard] = t_ns[is_heard] + np.cumsum(protobuf.unzigzag(heard))
-    return Accesses(
+    accesses = Accesses(
         (kind & np.uint64(WRITE)) > 0,
         is_heard,
         (kind & np.uint64(FRAMED)) > 0,
@@ -137,6 +137,8 @@ def decode_accesses(message: bytes) -> Accesses:
         failures,
         tuple(files),
     )
+    accesses.check()
+    return accesses
 
 
 def _failure(message: bytes | int) -> tuple[int, Failure]:
