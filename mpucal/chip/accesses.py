@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import compress
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -118,32 +119,29 @@ class Accesses:
     @classmethod
     def from_transactions(cls, transactions: Sequence[Transaction]) -> Accesses:
         """Convert single accesses; reads of the FIFO are framed if all of them are whole frames."""
-        moved = np.array([len(each.data) for each in transactions], np.int64)
-        write = np.array([each.op == "write" for each in transactions], bool)
-        fifo = np.array([each.register == FIFO_R_W for each in transactions], bool)
+        ops, registers, counts, data, t_ns, errors, host_ns = zip(*map(_values, transactions), strict=True)
+        moved = np.array([*map(len, data)], np.int64)
+        write = np.array([op == "write" for op in ops], bool)
+        fifo = np.array([register == FIFO_R_W for register in registers], bool)
         framed = fifo & ~write & (moved > 0)
         framed &= not (moved[framed] % FRAME_BYTES).any()
-        files = tuple(dict.fromkeys(each.register for each in transactions if isinstance(each.register, str)))
+        files = tuple(dict.fromkeys(register for register in registers if isinstance(register, str)))
         numbers = {name: FIRST_FILE_NUMBER + i for i, name in enumerate(files)}
-        shown = [each.host_ns for each in transactions]
         return cls(
             write,
-            np.array([ns is not None for ns in shown], bool),
+            np.array([ns is not None for ns in host_ns], bool),
             framed,
-            np.array([numbers.get(each.register, each.register) for each in transactions], np.int64),
-            np.array([each.count for each in transactions], np.int64),
+            np.array([numbers.get(register, register) for register in registers], np.int64),
+            np.array(counts, np.int64),
             moved,
-            np.array([each.t_ns for each in transactions], np.int64),
-            np.array([ns or 0 for ns in shown], np.int64),
-            np.frombuffer(_joined(transactions, ~framed), np.uint8),
-            np.frombuffer(_joined(transactions, framed), ">i2").astype(np.int16).reshape(-1, FRAME_WORDS),
-            {i: each.error for i, each in enumerate(transactions) if each.error is not None},
+            np.array(t_ns, np.int64),
+            np.array([ns or 0 for ns in host_ns], np.int64),
+            np.frombuffer(b"".join(compress(data, ~framed)), np.uint8),
+            np.frombuffer(b"".join(compress(data, framed)), ">i2").astype(np.int16).reshape(-1, FRAME_WORDS),
+            {i: error for i, error in enumerate(errors) if error is not None},
             files,
         )
 
 
 _columns = attrgetter(*(f.name for f in fields(Accesses) if f.name not in ("failures", "files")))
-
-
-def _joined(transactions: Sequence[Transaction], chosen: Mask) -> bytes:
-    return b"".join(each.data for each, is_chosen in zip(transactions, chosen, strict=True) if is_chosen)
+_values = attrgetter(*(f.name for f in fields(Transaction)))

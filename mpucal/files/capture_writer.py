@@ -148,8 +148,10 @@ class _Stream:
         self._writer.flush()
 
     def add(self, record: Record | Accesses) -> None:
-        ends = (record.t_ns[0], record.t_ns[-1]) if isinstance(record, Accesses) else (record.t_ns, record.t_ns)
-        begin_ns, t_ns = map(int, ends)
+        if isinstance(record, Accesses):
+            begin_ns, t_ns = int(record.t_ns[0]), int(record.t_ns[-1])
+        else:
+            begin_ns = t_ns = record.t_ns
         if isinstance(record, SessionEvent):
             self._put_waiting()
             self._put(SESSION, t_ns, encode_event(record.name, record.data))
