@@ -32,7 +32,6 @@ def state(view: View, said: Announcement | None = None) -> dict[str, Any]:
         "said": said,
         "confirming": view.confirming,
         "flat": KINDS[view.board].picture,
-        "eye": view.eye._asdict(),
         "countdown": view.waiting,
         "count": None if view.progress is None else count(view.progress),
         "line": view.line,
