@@ -47,7 +47,7 @@ class Readings:
     def zero_moved(self, by: Vector) -> Readings:
         """Move the accelerometer's zero by (m, 3) m/s^2, and the true b_a by its mean after the flat segment."""
         mean = by[self.t >= FLAT_S].mean(axis=0)
-        return replace(self, acc=self.acc + by, truth=replace(self.truth, b_a=self.truth.b_a + mean))
+        return replace(self, acc=self.acc + by, truth=self.truth._replace(b_a=self.truth.b_a + mean))
 
     def turning_share(self, share: float) -> float:
         """Return the time [s] at that share of what follows the flat segment."""
