@@ -72,7 +72,7 @@ docs: $(TESTED)
 BUILT_OF := tools/set_up pyproject.toml CMakeLists.txt mpucal/calibration/parameters.py $(shell find mpucal -name '*.[ch]pp')
 
 $(READY): $(BUILT_OF)
-	@tools/set_up $(VENV) mavlink,plot
+	@tools/set_up $(VENV) mavlink
 	@touch $@
 
 $(TESTED): $(BUILT_OF)
