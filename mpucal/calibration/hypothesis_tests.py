@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat
@@ -56,26 +57,27 @@ class HandEffects(NamedTuple):
 
     Attributes
     ----------
-    r : (3,) m, the lever arm that the data likely show; None where the sensor turns in place.
+    likely : what of them the data likely show, for a message; None where no other model is needed.
     shift : (p,) of the estimate, by the likeliest delay tau. covariance : (p, p) that an unknown tau adds to it.
     """
 
-    r: Vector | None
+    likely: str | None
     shift: Vector
     covariance: Vector
 
 
 def find_hand_effects(
-    problem: Problem, recording: Recording, flat: Flat, minimum: Minimum, prior: Prior
+    problem: Problem, recording: Recording, flat: Flat, minimum: Minimum, prior: Prior, step_s: float
 ) -> HandEffects:
-    """Return the lever arm r that the data likely show, and what the delay tau changes.
+    """Return whether the data likely show a lever arm r, or a delay tau against its prior, and what tau changes.
 
     The statistic of r is g' S^-1 g: g is the gradient by r at r = 0 and S its information, both less what the
-    parameters of the estimate take of them. S^-1 g is the first step to r, and to tau likewise.
+    parameters of the estimate take of them. S^-1 g is the step to r, and to tau likewise.
 
     Parameters
     ----------
     problem : of the recording, whose flat segment is `flat`. minimum : of a model without a lever arm.
+    step_s : s, from sample to sample, of the recording before its downsampling.
     """
     n = len(problem.series)
     rate, alpha = smoothed_rates(recording, flat)
@@ -87,17 +89,22 @@ def find_hand_effects(
     H = at.fisher[np.ix_(others, others)] + np.diag(prior.precision[others])
 
     def beside(name: str) -> tuple[Vector, Vector, Vector]:
-        """Return S, g and what the parameters take of them."""
+        """Return the step, S, and what the parameters take of them."""
         places = np.arange(HAND)[PLACES[name]]
         taken = np.linalg.solve(H, at.fisher[np.ix_(others, places)])
         S = at.fisher[np.ix_(places, places)] - at.fisher[np.ix_(places, others)] @ taken
-        return S, at.gradient[places] - taken.T @ at.gradient[others], np.asarray(taken)
+        step = -np.linalg.lstsq(S, at.gradient[places] - taken.T @ at.gradient[others], rcond=None)[0]
+        return np.asarray(step), S, np.asarray(taken)
 
-    S, g, _ = beside("r")
-    step = np.linalg.lstsq(S, g, rcond=None)[0]
-    is_likely = g @ step > most_chi2(len(step), RARE_STD) and np.linalg.norm(step) > LEAST_LEVER_M
-    S, g, taken = beside("tau")
-    tau, precision = prior.mean[PLACES["tau"]], prior.precision[PLACES["tau"]]
+    likely, (r, S, _) = None, beside("r")
+    if r @ S @ r > most_chi2(len(r), RARE_STD) and norm(r) > LEAST_LEVER_M:
+        likely = f"a lever arm of {1e3 * norm(r):.0f} mm"
+    tau, S, taken = beside("tau")
+    expected, precision = prior.mean[PLACES["tau"]], prior.precision[PLACES["tau"]]
+    # A rate may be that of the step before its sample, or of the step after.
+    std = math.sqrt(np.sum(1.0 / S + 1.0 / precision) + (0.5 * step_s) ** 2)
+    if abs(tau - expected).item() > MOST_STD * std:
+        likely = f"a delay of {1e3 * tau.item():.0f} ms"
     variance = 1.0 / (S + precision)
-    shift = -taken @ (variance @ (precision * tau - g))
-    return HandEffects(np.asarray(-step) if is_likely else None, shift, taken @ variance @ taken.T)
+    shift = -taken @ (variance @ (precision * expected + S @ tau))
+    return HandEffects(likely, shift, taken @ variance @ taken.T)

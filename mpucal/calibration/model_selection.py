@@ -130,9 +130,10 @@ class InPlaceFits:
             if minimum.nis < self._most_nis:
                 if parameters == ACCEL:
                     minimum = self._fit_matrix(minimum, errors) or minimum
-                hand = find_hand_effects(_with_errors(self._thin, errors), *self._means, minimum, self._prior)
-                if hand.r is not None:
-                    return f"the data show a lever arm of {1e3 * np.linalg.norm(hand.r):.0f} mm"
+                of_means, step_s = _with_errors(self._thin, errors), 1.0 / self._recording.rate_hz
+                hand = find_hand_effects(of_means, *self._means, minimum, self._prior, step_s)
+                if hand.likely is not None:
+                    return f"the data show {hand.likely}"
                 return self._chosen(minimum, errors, hand)
         return f"white noise does not explain the data (innovations {least:.0f}, expected 3)"
 
