@@ -278,6 +278,9 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
 
 
 def _is_motion(column: Vector, value: float) -> bool:
-    """Return True if a value is so far from the median of its column that only motion can explain it."""
+    """Return True if a value is so far from the median of its column that only motion can explain it.
+
+    The first value is that of a rest, however steadily the board is turned after it.
+    """
     median = np.median(column)
-    return bool(abs(value - median) > 20.0 * np.median(np.abs(column - median)) + 1e-9)
+    return bool(value != column[0] and abs(value - median) > 20.0 * np.median(np.abs(column - median)) + 1e-9)

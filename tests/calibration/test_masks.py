@@ -92,6 +92,13 @@ def test_values_that_repeat_without_a_rail_are_not_clipped(change):
     assert not with_masks(replace(recording, acc=change(recording.acc))).acc_clipped.any()
 
 
+def test_a_rest_before_a_steady_turn_is_not_clipped():
+    """Turn the board at one rate, with a gyroscope of so little noise that coarse steps repeat."""
+    recording = noise()
+    counts = np.rint(328.4 * (recording.t > 4.0)[:, None] + 0.1 * recording.gyr)
+    assert not with_masks(replace(recording, gyr=np.deg2rad(counts / 16.4))).gyr_clipped.any()
+
+
 def drawn(recording, first, last, at=slice(None)):
     """Return the recording with a line through samples first..last-1 of its gyroscope."""
     gyr = recording.gyr.copy()
