@@ -12,13 +12,13 @@ import numpy as np
 from ..data import GYRO_RANGES_DPS, Mask, Recording, Vector
 from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
-from ..rests.intervals import Intervals, RestFinder, statistics
+from ..rests.intervals import Intervals, RestFinder, block_means, statistics
 from ..rests.limits import ENOUGH_ORIENTATIONS, LEAST_TURN_RAD, MOVING_RAD_S
 from ..rests.windows import WINDOW_S
 from .fit import Fit
 from .hypotheses import Explanation
 from .parameters import ACCELEROMETER
-from .rotation import fibonacci_sphere, lengths, sides_down, signed_permutations, turned
+from .rotation import fibonacci_sphere, lengths, sides_down, signed_permutations, turned, units
 from .tilt import tilted_directions
 from .transitions import FEWEST_TRANSITIONS, MOST_MISS_RAD
 from .uncertainty import Uncertainty, UncertaintyClaim, is_usable, propagate
@@ -133,8 +133,8 @@ class Evidence:
         if a is None or self.flat is None:
             return 0.0, np.inf
         n = max(round(BLOCK_S * r.rate_hz), 1)
-        turns = lengths(_means(r.gyr - self.flat.b_omega, n))[1:-1] > MOVING_RAD_S
-        size = lengths(_means(a, n)) - self.gravity
+        turns = lengths(block_means(r.gyr - self.flat.b_omega, n))[1:-1] > MOVING_RAD_S
+        size = lengths(block_means(a, n)) - self.gravity
         away, bent = np.abs(size[1:-1])[turns], np.abs(np.diff(size, n=2))[turns]
         return (float(np.median(away)), float(np.median(bent))) if len(away) else (0.0, np.inf)
 
@@ -148,7 +148,7 @@ class Evidence:
         """Largest angle [rad] between the flat mean and where the rates carry it, from half second to half second."""
         if self.flat is None or not np.isfinite(self.recording.gyr).all():
             return 0.0
-        u = start = _units(self.flat.y[None])
+        u = start = units(self.flat.y[None])
         first = np.arange(self.flat.last, len(self.recording) - self._half_second, self._half_second)
         steps, runs = self._steps(self.flat), np.stack([first, first + self._half_second], axis=1)
         moving = lengths(statistics(steps, runs)[0]) * self._half_second > MOVING_RAD_S * WINDOW_S  # less may be drift
@@ -164,7 +164,7 @@ class Evidence:
         return 0.0 if self.flat is None else self._angle_from(self.flat, self.recording.acc[: self.flat.first])
 
     def _angle_from(self, flat: Flat, acc: Vector) -> float:
-        return float(_angles(_units(_means(acc, self._half_second)), _units(flat.y[None])).max(initial=0.0))
+        return float(_angles(units(block_means(acc, self._half_second)), units(flat.y[None])).max(initial=0.0))
 
     @property
     def _half_second(self) -> int:
@@ -191,7 +191,7 @@ class Evidence:
     def _turns_of_half_seconds(self, flat: Flat) -> _Turns:
         """Return turns of gravity between the middles of neighbouring half seconds."""
         n = self._half_second
-        u = _units(_means(self.recording.acc[flat.last :], n))
+        u = units(block_means(self.recording.acc[flat.last :], n))
         at = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_STEP_RAD)
         first = flat.last + n // 2 + at * n
         return self._turns(flat, u[at], u[at + 1], np.stack([first, first + n], axis=1))
@@ -199,7 +199,7 @@ class Evidence:
     @cached_property
     def _turns_of_rests(self) -> _Turns:
         """Turns from rest to rest that move gravity far, without interruption."""
-        u = _units(statistics(self.recording.acc, self.rests)[0])
+        u = units(statistics(self.recording.acc, self.rests)[0])
         between = np.stack([self.rests[:-1, 1], self.rests[1:, 0]], axis=1)
         whole = np.array([k for k in self._far_turns if not self._is_interrupted(*between[k] - (1, 0))], np.intp)
         return self._turns(self.rest, u[whole], u[whole + 1], between[whole])
@@ -207,7 +207,7 @@ class Evidence:
     @cached_property
     def _far_turns(self) -> list[int]:
         """Places of the turns, from rest to rest, that move gravity far."""
-        u = _units(statistics(self.recording.acc, self.rests)[0])
+        u = units(statistics(self.recording.acc, self.rests)[0])
         found: list[int] = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_TURN_RAD).tolist()
         return found
 
@@ -361,16 +361,6 @@ def _misses(turns: _Turns, by: Vector) -> Vector:
     return _angles(np.einsum("kij,kj->ki", turned(-turns.steps @ by.T, turns.runs), turns.before), turns.after)
 
 
-def _means(values: Vector, n: int) -> Vector:
-    """Return (m, 3) means of consecutive windows of n samples, without an incomplete last one."""
-    first = n * np.arange(len(values) // n)
-    return statistics(values, np.stack([first, first + n], axis=1))[0]
-
-
 def _angles(u: Vector, v: Vector) -> Vector:
     """Return (m,) angles [rad] between unit vectors (m, 3)."""
     return np.asarray(np.arccos(np.clip(np.sum(u * v, axis=1), -1.0, 1.0)))
-
-
-def _units(v: Vector) -> Vector:
-    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9))

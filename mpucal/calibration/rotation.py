@@ -22,6 +22,11 @@ def lengths(v: Vector) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(squares, out=squares))
 
 
+def units(v: Vector) -> NDArray[np.float64]:
+    """Return vectors (n, 3) as unit vectors; one of no length stays 0."""
+    return np.asarray(v / np.maximum(lengths(v), 1e-9)[:, None])
+
+
 def cross_rows(u: Vector, v: Vector) -> NDArray[np.float64]:
     """Return u x v of (n, 3) and (n, 3) or (3,), by columns, which takes a third of np.cross's time."""
     (a, b, c), (x, y, z) = u.T, v.T

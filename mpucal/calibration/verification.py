@@ -16,7 +16,7 @@ from ..data import Recording, Vector
 from ..origin import Origin
 from ..rests.flat import Flat
 from ..rests.gyro_drift import remove_drift
-from ..rests.intervals import RestFinder
+from ..rests.intervals import RestFinder, block_means
 from ..result.calibration import Calibration
 from .fit import Fit
 from .hypothesis_tests import MOST_STD
@@ -136,5 +136,5 @@ def carried(recording: Recording, flat: Flat, known: Fit | Calibration, rest: sl
 def _mean(part: Vector, rate_hz: float) -> tuple[Vector, Vector]:
     """Return the mean (3,) of a rest, and its variance by the spread of shorter means, as a tremor is not white."""
     n = max(round(BLOCK_S * rate_hz), 1)
-    blocks = part[: len(part) // n * n].reshape(-1, n, 3).mean(1)
+    blocks = block_means(part, n)
     return part.mean(0), blocks.var(0, ddof=1) / len(blocks)

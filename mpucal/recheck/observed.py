@@ -29,7 +29,7 @@ from ..calibration.words import decode
 from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from ..rests.gyro_drift import remove_drift
-from ..rests.intervals import Intervals, RestFinder
+from ..rests.intervals import Intervals, RestFinder, block_means
 from ..rests.limits import LEAST_TURN_RAD
 from ..result.calibration import Calibration
 from ..result.correlation import UPPER
@@ -155,7 +155,7 @@ class _Rests:
         self.unit = self.a / self.norm[:, None]
         shortest = max(round(BLOCK_S * recording.rate_hz), 1)
         sizes = np.maximum((runs[:, 1] - runs[:, 0]) // BLOCKS_A_REST, shortest).tolist()
-        own = [acc[: len(acc) // n * n].reshape(-1, n, 3).mean(1) for acc, n in zip(readings, sizes, strict=True)]
+        own = [block_means(acc, n) for acc, n in zip(readings, sizes, strict=True)]
         counts = np.array([len(block) for block in own])
         variances = np.array([block.var(0, ddof=1).mean() for block in own])
         others = variances[1:].mean() if len(runs) > 1 else variances[0]
@@ -232,7 +232,7 @@ def _noise_ratios(recording: Recording, flat: Flat, calibration: Calibration) ->
 def _is_shaken(values: Vector, rate_hz: float) -> bool:
     """Return True if means over 0.1 s of values (n, 3) vary by more than noise does."""
     n = max(round(SHAKEN_S * rate_hz), 1)
-    blocks = values[: len(values) // n * n].reshape(-1, n, 3).mean(1)
+    blocks = block_means(values, n)
     return bool((n * blocks.var(0) > MOST_SHAKEN_RATIO * values.var(0)).any())
 
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..calibration.rotation import units
 from ..data import Vector
 from ..origin import name_thing
 from ..result.error_model import MG_PER_MPS2
@@ -208,8 +209,8 @@ def sphere(track: Track) -> str:
 
 def coverage(track: Track) -> str:
     """Draw the directions that pointed down in the board's axes, on both halves of the sphere, in equal areas."""
-    moving = -_units(track.calibrated[:: max(len(track.calibrated) // POINTS, 1)])
-    rests = -_units(track.at_rest(track.calibrated))
+    moving = -units(track.calibrated[:: max(len(track.calibrated) // POINTS, 1)])
+    rests = -units(track.at_rest(track.calibrated))
     marks = []
     for centre, sign, name in ((0.25, -1.0, "+Z up"), (0.75, 1.0, "−Z up")):
         disc = _Disc(centre * WIDTH, HEIGHT / 2.0 + 8.0, 84.0)
@@ -218,8 +219,8 @@ def coverage(track: Track) -> str:
         for at_x, at_y, letter in ((1.13, -0.04, "+X"), (-1.13, -0.04, "−X"), (0.0, 1.05, "+Y"), (0.0, -1.14, "−Y")):
             (x,), (y,) = disc.place(np.array([[at_x, at_y]]))
             marks.append(text(float(x), float(y), letter, colour=FAINT))
-        for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
-            marks.append(dots(*disc.place(_project(units[sign * units[:, 2] >= 0.0])), radius, colour))
+        for shown, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
+            marks.append(dots(*disc.place(_project(shown[sign * shown[:, 2] >= 0.0])), radius, colour))
     label = "Direction that pointed down, in the axes of x, y and z: large dots held still, small dots moving"
     return svg("coverage", label, HEIGHT, *marks)
 
@@ -241,7 +242,3 @@ def _view() -> Vector:
 def _project(units: Vector) -> Vector:
     """Project unit vectors (k, 3) of a hemisphere to (k, 2) by Lambert's azimuthal projection, rim at 1."""
     return np.asarray(units[:, :2] / np.sqrt(1.0 + np.abs(units[:, 2:])))
-
-
-def _units(acc: Vector) -> Vector:
-    return np.asarray(acc / np.maximum(np.linalg.norm(acc, axis=1, keepdims=True), 1e-9))

@@ -160,6 +160,12 @@ def statistics(values: Vector, runs: Intervals) -> tuple[Vector, Vector]:
     return _kernel.statistics(np.ascontiguousarray(values), np.ascontiguousarray(runs, np.int64))
 
 
+def block_means(values: Vector, n: int) -> Vector:
+    """Return means (m, 3) of consecutive blocks of n samples of values, without an incomplete last one."""
+    first = n * np.arange(len(values) // n)
+    return statistics(values, np.stack([first, first + n], axis=1))[0]
+
+
 def _windows(recording: Recording, n: int) -> Spreads | None:
     if len(recording) < n:
         return None

@@ -11,11 +11,12 @@ import numpy as np
 from ..calibration.checks.estimate import USABLE_RMS_MPS2
 from ..calibration.evidence import Evidence
 from ..calibration.hypothesis_tests import MOST_STD
+from ..calibration.rotation import units
 from ..calibration.verification import NewOrientation
 from ..data import AXES, Recording, Vector
 from ..origin import Origin
 from ..reasons import KINDS, Reason, ReasonFound, is_explained, reason
-from ..rests.intervals import RestFinder
+from ..rests.intervals import statistics
 from ..result.calibration import REFUSED, USABLE, Calibration
 from ..result.keys import Quality
 from .events import Checked, Verification, triple
@@ -44,13 +45,12 @@ def select_unseen(rests: Sequence[NewOrientation], evidence: Evidence, apart_rad
 
 def _fitted_directions(evidence: Evidence) -> Vector:
     """Return (k, 3) unit vectors, calibrated: the direction that pointed down in each rest of the fitted recording."""
-    r, fit, flat = evidence.recording, evidence.fit, evidence.flat
-    if fit is None or flat is None:
+    r, fit = evidence.recording, evidence.fit
+    if fit is None or evidence.flat is None:
         return np.zeros((0, 3))
-    shortest = REST_S * r.rate_hz
-    means = [r.acc[a:b].mean(0) for a, b in RestFinder(r, flat).typical() if b - a >= shortest]
-    up = np.linalg.solve(fit.D, (np.reshape(means, (-1, 3)) - fit.b_a).T).T
-    return np.asarray(-up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9))
+    rests = evidence.rests
+    means = statistics(r.acc, rests[rests[:, 1] - rests[:, 0] >= REST_S * r.rate_hz])[0]
+    return -units(np.asarray(np.linalg.solve(fit.D, (means - fit.b_a).T).T, np.float64))
 
 
 def judge_verification(
