@@ -86,10 +86,8 @@ def _verify(
     # An arm sways as it rests: its readings are carried to the sample where the turn begins, or ends.
     z, z_var = _mean(carried(r, flat, fit, slice(a, b), -1), r.rate_hz)
     y, y_var = _mean(carried(r, flat, fit, slice(c, d), 0), r.rate_hz)
-    dt = np.diff(r.t[between])
-    rates = 0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega
+    dt, rates, noise = turn_between(r, flat, b - 1, c)
     steps = dt[:, None] * rates
-    noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
     # The mean of two rates is not the rate between them: the trapezoidal rule errs by their second difference.
     bends = np.diff(r.gyr[between], n=2, axis=0) * dt[1:, None] / 12.0
     gyro_var = 2.0 * noise + float(np.sum(bends * bends))
@@ -119,6 +117,16 @@ def _verify(
         miss=miss,
         clipped=clipped or 0.0 < direction - MOST_STD * direction_std <= unsure_rad,
     )
+
+
+def turn_between(recording: Recording, flat: Flat, first: int, last: int) -> tuple[Vector, Vector, float]:
+    """Return the steps of a turn from one sample to another: durations (n,) [s] and mean rates (n, 3) [rad/s].
+
+    The third value is the turn's variance [rad^2 an axis], by the gyroscope's noise and a bias that wanders.
+    """
+    dt, gyr = np.diff(recording.t[first : last + 1]), recording.gyr
+    rates = 0.5 * (gyr[first:last] + gyr[first + 1 : last + 1]) - flat.b_omega
+    return dt, rates, float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
 
 
 def carried(recording: Recording, flat: Flat, known: Fit | Calibration, rest: slice, to: int) -> Vector:

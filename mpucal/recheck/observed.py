@@ -24,7 +24,15 @@ import numpy as np
 
 from ..calibration.masks import with_masks
 from ..calibration.rotation import cross, turn_by_matrix
-from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S, carried
+from ..calibration.verification import (
+    BIAS_RAD_S,
+    BLOCK_S,
+    FLOOR_MPS2,
+    FLOOR_RAD,
+    LEAST_REST_S,
+    carried,
+    turn_between,
+)
 from ..calibration.words import decode
 from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
@@ -190,8 +198,7 @@ def _direction(rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _
     between = slice(first, last + 1)
     if recording.gyr_clipped[between].any() or recording.gap[first + 1 : last + 1].any():
         return None
-    dt = np.diff(recording.t[between])
-    rates = 0.5 * (recording.gyr[first:last] + recording.gyr[first + 1 : last + 1]) - flat.b_omega
+    dt, rates, noise = turn_between(recording, flat, first, last)
     steps = dt[:, None] * (rates @ calibration.K.T)
     (T,), (of_turn,) = turn_by_matrix(steps, np.eye(3), np.array([[0, len(steps)]]))
     here, there = rests.unit[k], T @ rests.unit[k - 1]
@@ -203,7 +210,6 @@ def _direction(rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _
         J_rests[:, 3 * at : 3 * at + 3] = across @ matrix @ of_unit
     J_theta = np.zeros((2, PARAMETERS))
     J_theta[:, G] = -across @ cross(here) @ cross(here) @ of_turn
-    noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
     noise += FLOOR_RAD**2 + (TURN_NONLINEARITY * float(np.linalg.norm(steps, axis=1).sum())) ** 2
     return _Residuals(across @ np.cross(there, here), J_rests, J_theta, np.full(2, noise))
 
