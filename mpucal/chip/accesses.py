@@ -119,7 +119,9 @@ class Accesses:
     @classmethod
     def from_transactions(cls, transactions: Sequence[Transaction]) -> Accesses:
         """Convert single accesses; reads of the FIFO are framed if all of them are whole frames."""
-        ops, registers, counts, data, t_ns, errors, host_ns = zip(*map(_values, transactions), strict=True)
+        ops, registers, counts, data, t_ns, errors, host_ns = zip(
+            *(vars(each).values() for each in transactions), strict=True
+        )
         moved = np.array([*map(len, data)], np.int64)
         write = np.array([op == "write" for op in ops], bool)
         fifo = np.array([register == FIFO_R_W for register in registers], bool)
@@ -144,4 +146,3 @@ class Accesses:
 
 
 _columns = attrgetter(*(f.name for f in fields(Accesses) if f.name not in ("failures", "files")))
-_values = attrgetter(*(f.name for f in fields(Transaction)))
