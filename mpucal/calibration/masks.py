@@ -15,7 +15,7 @@ from ..rests.intervals import true_runs
 from ..rests.limits import LEAST_TURN_RAD, MOVING_RAD_S
 from ..rests.windows import WINDOW_S
 from .problem import Series
-from .rotation import cross_rows, lengths
+from .rotation import cross_rows, lengths, shortest_turn, units
 from .words import ODDS
 
 ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
@@ -149,11 +149,14 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     rate2 = np.sum((series.omega - flat.b_omega) ** 2, axis=1)
     rates, variance = _bridged(recording)
     q_extra = variance[last:].copy()
-    for i in np.flatnonzero(q_extra > LOST_RAD**2):
-        q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
-    q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
     # The measured rates on both sides of a long gap do not tell the rate within it.
     omega = np.where(gap[:, None], np.where(np.isnan(rates[last:]), flat.b_omega, rates[last:]), series.omega)
+    up = units(recording.acc[last - 1 :])
+    for i in np.flatnonzero(q_extra > LOST_RAD**2):
+        q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
+        if up[i].any() and up[i + 1].any():  # a linear correction of a turn to the other side leads astray
+            omega[i] = flat.b_omega - shortest_turn(up[i], up[i + 1]) / series.dt[i]
+    q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
 
 

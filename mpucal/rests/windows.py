@@ -163,10 +163,12 @@ def _noise(rows: Vector) -> Vector:
 def noise_variance(recording: Recording) -> Vector:
     """Return the accelerometer's noise around each sample, (n, 3) (m/s^2)^2, as if white, by fourth differences.
 
-    A motor that starts makes it louder than it was at rest.
+    A motor that starts makes it louder than it was at rest. What changed across a gap is no noise.
     """
-    half = max(round(WINDOW_S * recording.rate_hz) // 2, 2)
-    return _kernel.noise_variance(np.ascontiguousarray(recording.acc), half)
+    half, acc = max(round(WINDOW_S * recording.rate_hz) // 2, 2), recording.acc
+    if recording.gap.any():
+        acc = acc - np.cumsum(np.where(recording.gap[:, None], np.diff(acc, axis=0, prepend=acc[:1]), 0.0), axis=0)
+    return _kernel.noise_variance(np.ascontiguousarray(acc), half)
 
 
 def noise_ratio(recording: Recording, Sigma_a: Vector) -> Vector:

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.masks import ACC_RANGES, GYRO_RANGES, with_masks
+from mpucal.calibration.masks import ACC_RANGES, GYRO_RANGES, mask, with_masks
+from mpucal.calibration.problem import Series
+from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
+from mpucal.rests.flat import flat_statistics
+from mpucal.rests.windows import noise_variance
 from tools.lab.judge import judged, sph_rms
 
 
@@ -181,6 +185,19 @@ def test_masks_reduce_the_error_by_a_clipped_gyroscope(hand, monkeypatch):
     monkeypatch.setattr("mpucal.calibration.estimation.with_masks", lambda recording: recording)
     blind = calibrate(clipped, "hand", truth.gravity)
     assert sph_rms(truth, saved.D, saved.b_a) < 0.5 * sph_rms(truth, blind.D, blind.b_a)
+
+
+def test_a_board_may_lie_on_the_other_side_after_a_gap():
+    """Lose four seconds in which a board was turned over: gravity tells how, and its change is no noise."""
+    rng, n, up = np.random.default_rng(0), 1000, np.array([0.1, 0.0, 9.8])
+    acc = np.where(np.arange(n)[:, None] < 500, up, [0.3, -0.2, -9.8]) + 0.05 * rng.standard_normal((n, 3))
+    t = 0.01 * np.arange(n) + 4.0 * (np.arange(n) >= 500)
+    recording = with_masks(Recording.from_arrays(t, acc, 0.01 + 0.001 * rng.standard_normal((n, 3))))
+    flat = flat_statistics(recording, (0, 400))
+    series = mask(Series.after(recording, flat), recording, flat)
+    turn = rotation(-(series.omega[100] - flat.b_omega) * series.dt[100])
+    assert np.abs(turn @ acc[499] / 9.8 - acc[500] / 9.8).max() < 0.02
+    assert noise_variance(recording).max() < 3.0 * 0.05**2
 
 
 def test_short_gaps_cost_little(hand, pick):
