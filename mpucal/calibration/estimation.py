@@ -13,7 +13,7 @@ from ..errors import WrongValue
 from ..reasons import OF_A_PART, OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, is_long_enough
 from .bias_changes import without_changes
-from .checks import NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
+from .checks import CONTRADICTED, NO_GYROSCOPE, OTHER_RANGE, find_gyroscope_fault, find_reasons, is_unusable
 from .checks.sensor import is_trustworthy
 from .evidence import Evidence
 from .hand import HandFit
@@ -23,6 +23,7 @@ from .model_selection import METHODS, ModelChoice, fit_model
 from .parameters import ACCELEROMETER, B_A_NAMES, D_NAMES
 from .sensitivity import Sensitivity, find_sensitivity
 from .static import fit_static
+from .transitions import FEWEST_TRANSITIONS
 from .uncertainty import claim_uncertainty, inflate
 from .words import decode
 
@@ -64,9 +65,17 @@ def estimate(
             return replace(whole[0], against_rests=refusing), whole[1]
         # other faults of the gyroscope can be mended, and then the rests need not be enough
         return _of_a_part(whole[0]) or whole
+    if _is_doubtful(whole[0], at_fault, of_rests):
+        return _of_a_part(whole[0]) or whole
     if at_fault != OTHER_RANGE.reason(whole[0]) and _is_known_better(whole[0], of_rests):
         return _of_a_part(whole[0]) or whole
     return of_rests, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
+
+
+def _is_doubtful(whole: Evidence, at_fault: Reason, of_rests: Evidence) -> bool:
+    """Return True if a slip may contradict the gyroscope, as no gap does, and the rests are too few to show it."""
+    is_few = of_rests.estimate.freedom < FEWEST_TRANSITIONS
+    return is_few and not whole.recording.gap.any() and at_fault == CONTRADICTED.reason(whole)
 
 
 def _is_known_better(evidence: Evidence, other: Evidence) -> bool:

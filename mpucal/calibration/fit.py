@@ -27,7 +27,8 @@ class Fit:
     at_prior : names of parameters that the data hardly determine: they keep what was known beforehand.
     parts : scores of the parts of the recording at the estimate; None where they are not known.
     delay_s : delay of the accelerometer behind the gyroscope; 0 where the model does not estimate it.
-    spread_mps2 : error of a rest's |a| beside noise and tremor, of an estimate from the rests alone.
+    spread_mps2, freedom : of an estimate from the rests alone, the error of a rest's |a| beside noise and tremor, and the
+        degrees of freedom that are left.
     slip : slip of the mount that the rests show, or None.
     slipped : (12,) variances of D and b_a by slips that may have happened near the ends.
     """
@@ -46,6 +47,7 @@ class Fit:
     parts: Parts | None = None
     delay_s: float = 0.0
     spread_mps2: float = 0.0
+    freedom: float = 0.0
     slip: Slip | None = None
     slipped: Vector | None = None
 

@@ -72,6 +72,7 @@ def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
         nis=3.0 * float(weight @ (e * e)) / max(left, 1.0),
         V=0.5 * float(weight @ (e * e)),
         spread_mps2=float(extra),
+        freedom=left,
         at_prior=tuple(compress(D_NAMES + B_A_NAMES, ALL_OF_NINE @ unknown > 0.0)),
     )
 

@@ -7,6 +7,7 @@ import pytest
 import scipy
 
 from mpucal import Recording, calibrate, check
+from mpucal.calibration.rotation import rotation
 from mpucal.errors import UsageError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder, statistics
@@ -43,6 +44,20 @@ def test_the_static_model_is_an_ellipsoid_through_the_rests(hand):
     away = np.append(calibration.D[np.triu_indices(3)] - x[:6], calibration.b_a - x[6:])
     std = np.append(calibration.D_std[np.triu_indices(3)], calibration.b_a_std)
     assert np.abs(away / std).max() < 1.0
+
+
+@pytest.mark.parametrize("seed", [1, 7, 8])
+def test_rests_too_few_to_contradict_each_other_do_not_blame_the_gyroscope(hand, seed):
+    """Slip by 12 deg, with a step of the bias, in the middle of nine rests, of which nine numbers fit all."""
+    recording = hand(seed, "pose12").recording
+    runs = RestFinder(recording, flat_statistics(recording, recording.flat)).typical()
+    after = np.arange(len(recording))[:, None] > runs[4, 1] + 0.3 * recording.rate_hz
+    slip = rotation(np.radians(12.0) * np.array([0.6, -0.6, 0.53]))
+    acc = np.where(after, recording.acc @ slip.T + [0.15, 0.0, -0.04], recording.acc)
+    calibration = calibrate(replace(recording, acc=acc).part(0, runs[8, 1]), "auto", G)
+    assert calibration.fit["model"] == "hand"
+    assert "gyro_off" not in {reason["code"] for reason in calibration.quality["reasons"]}
+    assert calibration.quality["error_std"]["rms"] > 0.3
 
 
 def test_six_faces_that_were_joined_give_biases_and_scale_factors():
