@@ -27,8 +27,8 @@ class Fit:
     at_prior : names of parameters that the data hardly determine: they keep what was known beforehand.
     parts : scores of the parts of the recording at the estimate; None where they are not known.
     delay_s : delay of the accelerometer behind the gyroscope; 0 where the model does not estimate it.
-    spread_mps2, freedom : of an estimate from the rests alone, the error of a rest's |a| beside noise and tremor, and the
-        degrees of freedom that are left.
+    spread_mps2 : error of a rest's |a| beside noise and tremor, of an estimate from the rests alone.
+    freedom : degrees of freedom that this estimate leaves.
     slip : slip of the mount that the rests show, or None.
     slipped : (12,) variances of D and b_a by slips that may have happened near the ends.
     """
