@@ -24,6 +24,7 @@ from .uncertainty import MOST_NIS
 
 FEW_PEAKS_NIS = 1.5  # mean squared innovation of a vibration whose peaks are no outliers; that of white noise is 3
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+VIBRATION_MPS2 = (*WHITE_MPS2, 4.0, 8.0, 16.0)
 FIRST_MPS2 = WHITE_MPS2[4]  # sigma at which a search begins: a board that goes from rest to rest is in a hand
 HAND_MPS2 = tuple(sigma for sigma in WHITE_MPS2 if sigma >= FIRST_MPS2)
 CALM_MPS2 = WHITE_MPS2[3:]  # the same over all samples: less noise than a calm hand's is taken for jerks
@@ -88,7 +89,7 @@ def vibration_sigma(prepared: Preprocessed, noise: Noise, minimum: Minimum) -> f
     is_loud = scale is not None and np.median(scale) * variance > VIBRATING_MPS2**2
     if prepared.rests_often or not (is_loud or (minimum.nis > MOST_NIS and np.median(squares(0.0)) > MOST_NIS)):
         return 0.0
-    return next((sigma for sigma in WHITE_MPS2 if squares(sigma).mean() < FEW_PEAKS_NIS), 0.0)
+    return next((sigma for sigma in VIBRATION_MPS2 if squares(sigma).mean() < FEW_PEAKS_NIS), 0.0)
 
 
 def remove_tremor(prepared: Preprocessed) -> Preprocessed:
