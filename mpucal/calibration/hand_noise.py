@@ -85,9 +85,11 @@ def vibration_sigma(prepared: Preprocessed, noise: Noise, minimum: Minimum) -> f
         windows = innovation[: len(innovation) // n * n].reshape(-1, n, 3)
         return np.asarray(np.sum((windows - np.median(windows, axis=1, keepdims=True)) ** 2, axis=2))
 
-    scale, variance = prepared.problem.series.r_scale, prepared.flat.Sigma_a.mean()
-    is_loud = scale is not None and np.median(scale) * variance > VIBRATING_MPS2**2
-    if prepared.rests_often or not (is_loud or (minimum.nis > MOST_NIS and np.median(squares(0.0)) > MOST_NIS)):
+    scale = prepared.problem.series.r_scale
+    if prepared.rests_often or scale is None:
+        return 0.0
+    is_loud = np.mean(scale * prepared.flat.Sigma_a.mean() > VIBRATING_MPS2**2) > 0.5
+    if not (is_loud or (minimum.nis > MOST_NIS and np.median(squares(0.0)) > MOST_NIS)):
         return 0.0
     return next((sigma for sigma in VIBRATION_MPS2 if squares(sigma).mean() < FEW_PEAKS_NIS), 0.0)
 

@@ -100,11 +100,12 @@ def find_hand_effects(
     if r @ S @ r > most_chi2(len(r), RARE_STD) and norm(r) > LEAST_LEVER_M:
         likely = f"a lever arm of {1e3 * norm(r):.0f} mm"
     tau, S, taken = beside("tau")
+    information = max(S.item(), np.finfo(np.float64).tiny)  # of rates that never change it is 0, or rounded below that
     expected, precision = prior.mean[PLACES["tau"]], prior.precision[PLACES["tau"]]
     # A rate may be that of the step before its sample, or of the step after.
-    std = math.sqrt(np.sum(1.0 / S + 1.0 / precision) + (0.5 * step_s) ** 2)
+    std = math.sqrt(1.0 / information + 1.0 / precision.item() + (0.5 * step_s) ** 2)
     if abs(tau - expected).item() > MOST_STD * std:
         likely = f"a delay of {1e3 * tau.item():.0f} ms"
-    variance = 1.0 / (S + precision)
-    shift = -taken @ (variance @ (precision * expected + S @ tau))
-    return HandEffects(likely, shift, taken @ variance @ taken.T)
+    variance = 1.0 / (information + precision)
+    shift = -taken @ (variance * (precision * expected + information * tau))
+    return HandEffects(likely, shift, variance * taken @ taken.T)
