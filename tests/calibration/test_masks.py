@@ -96,6 +96,13 @@ def test_values_that_repeat_without_a_rail_are_not_clipped(change):
     assert not with_masks(replace(recording, acc=change(recording.acc))).acc_clipped.any()
 
 
+def test_an_acceleration_that_is_cut_off_at_any_value_is_clipped():
+    recording = noise()
+    acc = recording.acc.copy()
+    acc[:, 1] = np.minimum(acc[:, 1], 0.5)  # where noise would spread it, and no steady motion
+    np.testing.assert_array_equal(with_masks(replace(recording, acc=acc)).acc_clipped, acc[:, 1] == 0.5)
+
+
 def test_a_rest_before_a_steady_turn_is_not_clipped():
     """Turn the board at one rate, with a gyroscope of so little noise that coarse steps repeat."""
     recording = noise()
