@@ -166,7 +166,7 @@ def rank(parts: Parts | None, D: Vector, hypotheses: Sequence[Hypothesis] = HYPO
 
     Nothing where the fit failed, or has no parts.
     """
-    if parts is None or not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
+    if parts is None or not (parts.is_finite and np.isfinite(D).all()):
         return []
     return _weigh(hypotheses, parts, D)
 
@@ -336,6 +336,8 @@ def _explain(alike: Sequence[Hypothesis], groups: _Groups, parts: Parts, D: Vect
 
 def nonlinearity(parts: Parts, D: Vector) -> Vector:
     """Return (p,) variances of the estimate by a nonlinearity of NONLINEARITY_MPS2 that the parts do not show."""
+    if not parts.is_finite:
+        return np.full(len(parts.H), np.nan)
     groups = _Groups.of(parts, GROUPS["reading"])
     B = _directions("linearity", D, len(parts.H))[None]
     likelihood = _Likelihood.of(B, _shapes("reading", groups), groups, parts)

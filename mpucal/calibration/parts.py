@@ -42,6 +42,11 @@ class Parts:
         return len(self.start)
 
     @cached_property
+    def is_finite(self) -> bool:
+        """True if the Fisher matrix is finite, as it is not of an accelerometer that reads zeros."""
+        return bool(np.isfinite(self.H).all())
+
+    @cached_property
     def side(self) -> NDArray[np.intp]:
         """Side (k,) that was down, 0 to 5: the accelerometer's axis nearest to gravity, with its sign."""
         return sides_down(self.reading[1:])

@@ -228,6 +228,17 @@ def test_a_session_knows_what_its_calibration_will_say_that_it_knows(hand, seed)
     assert ratios.max() < 1.3
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_an_accelerometer_that_reads_zeros_at_rest_gives_no_deviations_meanwhile(in_hand):
+    """A supply that fails as the board lies flat; the session goes on, and refuses the recording at its end."""
+    recording = in_hand.recording
+    acc = np.where(np.arange(len(recording))[:, None] < recording.flat[1], 0.0, recording.acc)
+    dead = replace(recording, acc=acc)
+    known = interim_estimate(dead, flat_statistics(dead, recording.flat), G)
+    assert np.isnan(known.D_std).all()
+    assert not known.converged
+
+
 # ---- recordings of others
 
 
