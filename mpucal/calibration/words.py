@@ -101,9 +101,21 @@ def _counts(values: Vector, lsb: float) -> Counts | None:
     return counts.astype(np.int32)
 
 
+def _coarse_step(words: Words | None) -> float:
+    """Return the step of readings of which most are the same as the one before, or a step from it; 0 of finer ones."""
+    if words is None:
+        return 0.0
+    apart = np.abs(np.diff(words.counts, axis=0))
+    step = int(np.min(apart, where=apart > 0, initial=ACCEL_COUNTS))
+    return step * words.lsb if 2 * np.count_nonzero(apart <= step) > apart.size else 0.0
+
+
 def decode(recording: Recording) -> Decoded:
     """Recover the words of a recording, and correct those whose low byte was taken for signed."""
     words = _words_of(recording)
+    (acc_step, gyr_step), (of_acc, of_gyr) = recording.sensor.steps, words
+    steps = acc_step or _coarse_step(of_acc), gyr_step or _coarse_step(of_gyr)
+    recording = replace(recording, sensor=replace(recording.sensor, steps=steps))
     odds = np.array([np.zeros(3) if each is None else _log_odds(each.counts, recording.gap) for each in words])
     sure = math.log(ODDS)
     # One program reads all words: an axis that shows nothing is taken to be as the others.

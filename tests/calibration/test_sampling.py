@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from mpucal.calibration import calibrate
+from mpucal.calibration.words import decode
 from mpucal.data import Recording
 from tools.lab.judge import judged
 from tools.lab.scenarios.body import attitudes, specific_force
@@ -43,6 +45,17 @@ def on_a_turntable(seed, slam=False):
 def test_parameters_are_as_uncertain_as_rounding_leaves_them():
     z = np.array([judged(calibrate(on_a_turntable(seed), gravity=G), (D, B_A)).z for seed in range(6)])
     assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.3
+
+
+def test_coarse_steps_are_found_in_readings_that_hardly_leave_them():
+    """A file states no steps: a sketch prints two decimals, and a machine turns the board at constant rates."""
+    steps, known = (0.01, 0.01), on_a_turntable(0)
+    sensor = replace(known.sensor, steps=(0.0, 0.0))
+    coarse = replace(known, sensor=sensor, acc=known.acc.round(2), gyr=known.gyr.round(2))
+    assert decode(coarse).recording.sensor.steps == pytest.approx(steps)
+    noise = np.random.default_rng(0).normal(0.0, 0.2, known.acc.shape)
+    fine = replace(coarse, acc=(known.acc + noise).round(2))
+    assert decode(fine).recording.sensor.steps == pytest.approx((0.0, steps[1]))
 
 
 def test_a_turn_between_few_samples_is_no_change_of_the_sensor():
