@@ -77,9 +77,9 @@ class UncertaintyClaim:
 
     Attributes
     ----------
-    covariance : (p, p) of the model. model : m/s^2, the error by it, rms over all directions.
-    floored : m/s^2, `model` enlarged by changes of the gyroscope's bias that were removed, and where few sides
-        were down.
+    covariance : (p, p) of the model, without the changes of the gyroscope's bias that were removed. model : m/s^2, the
+        error by it, rms over all directions.
+    floored : m/s^2, `model` enlarged where changes were removed, and where few sides were down.
     explanations : what may have happened besides, the likeliest first. errors : (n,) m/s^2, what each adds.
     slipped : (12,) variances of D and b_a by slips of the mount near the ends, which no explanation holds.
     """
@@ -140,10 +140,13 @@ def claim_uncertainty(
     # over the sphere, the square of each element of s is gravity^2 / 3 in the mean, and their products are 0
     rms = partial(_rms, np.repeat([gravity / 3.0**0.5, 1.0], [9, 3])[:, None] * _errors_of(fit.D))
     covariance = fit.covariance + np.diag(nonlinearity(fit.parts, fit.D))  # no sensor is perfectly linear
+    if freed.any():
+        grown = np.ones(len(covariance))
+        grown[ACCELEROMETER] = np.sqrt(1.0 + freed)
+        covariance = covariance * np.outer(grown, grown)
     model = floored = rms(covariance)
     if freed.any():
-        known = np.diag(fit.parts.covariance)[ACCELEROMETER]
-        floored = float(np.hypot(model * rms(np.diag((1.0 + freed) * known)) / rms(np.diag(known)), FLOOR_MPS2))
+        floored = float(np.hypot(model, FLOOR_MPS2))
     if len(np.unique(fit.parts.side)) < FEWEST_SIDES:
         floored *= UNCOMPARED
     errors = [each.weight**0.5 * rms(np.diag(each.away**2)) for each in explanations]

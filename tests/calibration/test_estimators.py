@@ -16,6 +16,7 @@ from mpucal.calibration.paper import expand
 from mpucal.calibration.parameters import ACCEL, B_A_NAMES, D_NAMES, K_NAMES
 from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.theta import Prior
+from mpucal.calibration.uncertainty import claim_uncertainty
 from mpucal.data import Recording
 from mpucal.kernel import _kernel
 from mpucal.rests.flat import flat_statistics
@@ -216,3 +217,12 @@ def test_a_delay_between_the_sensors_is_no_turn_of_the_mount(delay_ms, model):
         z.append(judged(calibration, (D, b_a)).z)
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
     assert np.abs(z).max() < 4.0
+
+
+def test_a_change_that_was_removed_widens_the_elements_that_it_moves(ideal):
+    fit, freed = by(METHODS["accel"], ideal(0).recording), np.zeros(12)
+    usual = claim_uncertainty(fit, G, [], freed).widen()
+    freed[1] = 8.0
+    wide = claim_uncertainty(fit, G, [], freed).widen()
+    grown = np.sqrt(np.diag(wide) / np.diag(usual))
+    np.testing.assert_allclose(grown, np.where(np.arange(len(grown)) == 1, 3.0, 1.0), rtol=1e-3)
