@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -80,6 +81,7 @@ def vibration_sigma(prepared: Preprocessed, noise: Noise, minimum: Minimum) -> f
     """
     n = max(round(WINDOW_S * prepared.recording.rate_hz), 2)
 
+    @cache
     def squares(sigma: float) -> Vector:
         innovation = trace(noise.problem(prepared.vibrating(sigma)), minimum.theta).innovation
         windows = innovation[: len(innovation) // n * n].reshape(-1, n, 3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
@@ -72,8 +71,8 @@ def with_masks(recording: Recording) -> Recording:
     marked = replace(
         recording,
         gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t),
-        acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges, _is_cut_off)),
-        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges, _is_motion)),
+        acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
+        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges, may_stay=True)),
     )
     for run in stuck_readings(marked, "gyr"):
         marked.gap[run.first : run.last] = True
@@ -261,24 +260,25 @@ def _longest_by_chance(same: Mask) -> float:
     return max(-float(np.log(ODDS * len(same)) / np.log(share)), SHORTEST_RUN)
 
 
-def _at_the_rail(values: Vector, ranges: Vector, is_clear: Callable[[Vector, float], bool]) -> Mask:
+def _at_the_rail(values: Vector, ranges: Vector, may_stay: bool = False) -> Mask:
     """Return (n,) True where an axis repeats its largest magnitude: few times at a chip's range, often elsewhere.
 
     Readings that are cut off are more often at the range than within its tolerance below; those of a slow peak, which
     coarse steps repeat, are not.
 
-    is_clear : tells of a column, and the value that it repeats, whether that is the end of a range that is not known.
+    may_stay : a machine holds a rate, and then the end of a range that is not known must be far from the others.
     """
     clipped = np.zeros(len(values), bool)
     for column in np.ascontiguousarray(values.T):
         for rail in (column.max(), column.min()):
-            at = column == rail
+            at, tolerance = column == rail, RANGE_TOLERANCE * abs(rail)
             if np.count_nonzero(at) == 1:
                 continue
-            known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
-            known &= 2 * np.count_nonzero(at) > np.count_nonzero(np.abs(column - rail) <= RANGE_TOLERANCE * abs(rail))
-            runs = int(np.count_nonzero(at[1:] & at[:-1]))
-            if known or (runs >= _longest_by_chance(np.diff(column) == 0.0) and is_clear(column, rail)):
+            is_cut_off = 2 * np.count_nonzero(at) > np.count_nonzero(np.abs(column - rail) <= tolerance)
+            known = is_cut_off and bool((np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE).any())
+            if not known and np.count_nonzero(at[1:] & at[:-1]) >= _longest_by_chance(np.diff(column) == 0.0):
+                known = _is_motion(column, rail) if may_stay else is_cut_off and _is_noisy(column, tolerance)
+            if known:
                 clipped |= at
     return clipped
 
@@ -292,11 +292,7 @@ def _is_motion(column: Vector, value: float) -> bool:
     return bool(value != column[0] and abs(value - median) > 20.0 * np.median(np.abs(column - median)) + 1e-9)
 
 
-def _is_cut_off(column: Vector, value: float) -> bool:
-    """Return True if an acceleration is more often at a value than just below it, where noise would spread it."""
-    steps, tolerance = np.abs(np.diff(column)), RANGE_TOLERANCE * abs(value)
-    is_fine = steps[steps > 0.0].min(initial=np.inf) < 0.5 * tolerance
-    near = column[np.abs(column - value) <= tolerance]
-    return bool(
-        is_fine and 2 * np.count_nonzero(near == value) > len(near) and 2 * np.count_nonzero(steps) > len(steps)
-    )
+def _is_noisy(column: Vector, tolerance: float) -> bool:
+    """Return True if most readings differ from the one before, by steps of which two fit into the tolerance."""
+    steps = np.abs(np.diff(column))
+    return bool(2 * np.count_nonzero(steps) > len(steps) and 2.0 * steps[steps > 0.0].min() < tolerance)

@@ -46,6 +46,17 @@ class Words(NamedTuple):
     counts: Counts
     lsb: float
 
+    @property
+    def steps(self) -> Counts:
+        """Steps (n - 1, 3) from one sample to the next, in counts."""
+        return np.abs(np.diff(self.counts, axis=0))
+
+    @property
+    def finest(self) -> int:
+        """Smallest step that is not 0, in counts; the largest reading of words that never change."""
+        steps = self.steps
+        return int(steps[steps > 0].min(initial=np.abs(self.counts).max()))
+
 
 class Decoded(NamedTuple):
     """Recording of true words.
@@ -105,9 +116,8 @@ def _coarse_step(words: Words | None) -> float:
     """Return the step of readings of which most are the same as the one before, or a step from it; 0 of finer ones."""
     if words is None:
         return 0.0
-    apart = np.abs(np.diff(words.counts, axis=0))
-    step = int(np.min(apart, where=apart > 0, initial=ACCEL_COUNTS))
-    return step * words.lsb if 2 * np.count_nonzero(apart <= step) > apart.size else 0.0
+    finest = words.finest
+    return finest * words.lsb if 2 * np.count_nonzero(words.steps <= finest) > words.steps.size else 0.0
 
 
 def decode(recording: Recording) -> Decoded:

@@ -69,8 +69,10 @@ def plot_recording(recording: Recording) -> Figure:
 
 def _figure(height_in: float) -> Figure:
     """Return an empty figure, which a notebook shows as a picture."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - only for a plot
-
+    try:
+        from matplotlib.figure import Figure  # noqa: PLC0415 - only for a plot
+    except ModuleNotFoundError as error:
+        raise ImportError("figures need matplotlib: pip install 'mpucal[plot]'") from error
     figure = Figure(figsize=(8.0, height_in), layout="constrained")
     # IPython knows figures only if pyplot is imported
     vars(figure)["_repr_png_"] = partial(_png, figure)

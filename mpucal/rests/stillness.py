@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data import Vector
+from ..data import AXES, Vector
 from .limits import (
     ANY_HAND,
     MOST_BIAS_RAD_S,
@@ -36,8 +36,6 @@ FEWEST_WINDOWS, NEWEST_WINDOWS = 2, 12
 
 # Two means of noise differ by at most this many standard deviations.
 CHANCE = 4.5
-
-AXES = "xyz"
 
 
 @dataclass(frozen=True)

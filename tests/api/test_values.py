@@ -3,6 +3,7 @@
 import html
 import json
 import pickle
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from copy import copy, deepcopy
 from dataclasses import replace
@@ -79,6 +80,13 @@ def test_the_figure_of_a_calibration_holds_its_parameters(calibration):
     drawn = [value for axes in panels for value in axes.containers[-1].lines[0].get_ydata()]
     rows = accelerometer(calibration)
     assert drawn == [value for row in rows for value, cell in zip(row.value, row.cells, strict=True) if cell]
+
+
+def test_figures_without_matplotlib_say_what_to_install(recording, calibration, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    for plot in (recording.plot, calibration.plot):
+        with pytest.raises(ImportError, match=r"figures need matplotlib: pip install 'mpucal\[plot\]'"):
+            plot()
 
 
 def test_copies_and_pickles_are_equal_and_a_changed_value_is_not(recording, calibration):

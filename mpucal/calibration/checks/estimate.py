@@ -155,8 +155,7 @@ def _coarse(e: Evidence, rms: float) -> Reason | None:
     words = None if e.decoded is None else e.decoded.words[0]
     if words is None:
         return None
-    steps = np.abs(np.diff(words.counts, axis=0))
-    step = words.lsb * int(steps[steps > 0].min(initial=np.abs(words.counts).max()))
+    step = words.lsb * words.finest
     return reason("inconsistent", "coarse", _is_useless(e), rms=rms, step=step) if rms < 2.0 * step else None
 
 
