@@ -86,7 +86,7 @@ class Child:
             try:
                 resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
                 os.chdir(folder)
-                for number, path in enumerate((os.devnull, os.devnull, said)):
+                for number, path in enumerate((os.devnull, os.devnull, str(said))):
                     os.dup2(os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC * (number == 2), 0o644), number)
                 _keep_streams()
                 code = call()

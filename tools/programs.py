@@ -44,7 +44,7 @@ def run(folder: str) -> None:
                 print(f"{name:18} {(ast.get_docstring(ast.parse(path.read_text())) or '').splitlines()[0]}")
 
 
-def call(module: Any, words: Sequence[str]) -> int | None:
+def call(module: Any, words: Sequence[str]) -> Any:
     """Call `main` of a program with what the command line gives; return the exit code."""
     if not inspect.isfunction(module.main):
         return module.main(words)
@@ -72,10 +72,10 @@ def _add(parser: argparse.ArgumentParser, parameter: inspect.Parameter, hint: An
     hint, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     if get_origin(hint) is UnionType:
         hint = next(each for each in get_args(hint) if each is not NoneType)
-    kind = get_args(hint)[0] if get_origin(hint) is list else hint
+    kind = get_args(hint)[0] if get_origin(hint) is Sequence else hint
     needed = parameter.default is parameter.empty
     how: dict[str, Any] = {"type": kind, "default": None if needed else parameter.default}
-    if get_origin(hint) is list:
+    if get_origin(hint) is Sequence:
         how["nargs"] = "+" if needed or parameter.kind is parameter.KEYWORD_ONLY else "*"
     for note in notes:
         if isinstance(note, str):
@@ -90,7 +90,7 @@ def _add(parser: argparse.ArgumentParser, parameter: inspect.Parameter, hint: An
     if parameter.kind is parameter.KEYWORD_ONLY:
         parser.add_argument(f"--{parameter.name.replace('_', '-')}", required=needed, **how)
     else:
-        parser.add_argument(parameter.name, **how, **({"nargs": "?"} if not needed and "nargs" not in how else {}))
+        parser.add_argument(parameter.name, **how if needed else {"nargs": "?", **how})
 
 
 def _one_of(known: Iterable[str], text: str) -> str:

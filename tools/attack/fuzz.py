@@ -51,9 +51,9 @@ def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
     from ..lab.campaign_recordings import OF_BYTES  # noqa: PLC0415 - not before the package is instrumented
 
     rng = np.random.default_rng(seed)
-    data = bytearray(corpus[rng.integers(len(corpus))])
+    data = bytearray(corpus[int(rng.integers(len(corpus)))])
     if rng.random() < 0.2:
-        data += corpus[rng.integers(len(corpus))]
+        data += corpus[int(rng.integers(len(corpus)))]
     for _ in range(rng.integers(1, 4)):
         if data:
             OF_BYTES[rng.integers(len(OF_BYTES))](data, rng)
@@ -153,7 +153,7 @@ def too_long(_signal: int, _frame: FrameType | None) -> None:
 
 
 def main(
-    targets: Annotated[list[str], "default: all"] = (),
+    targets: Annotated[Sequence[str], "default: all"] = (),
     *,
     seconds: Annotated[float, "of each target"] = 60.0,
     budget: Annotated[float | None, "of all of them, in place of --seconds"] = None,

@@ -67,7 +67,8 @@ def frames(data: bytes) -> None:
 class HostileBridge:
     """Port that receives one piece at each read, and then nothing."""
 
-    name, bauds = "a port", (115200,)
+    name = "a port"
+    bauds: tuple[int, ...] = (115200,)
 
     def __init__(self, data: bytes) -> None:
         self._pieces, self._t_ns = pieces(data, PIECE_OF_BRIDGE), 0
@@ -199,9 +200,9 @@ def vehicle_says() -> list[bytes]:
     values = (0.5, 0.0, -9.8, 0.1, 0.2, 0.3, *[0.0] * 7)
     more = [m.MAVLink_highres_imu_message(20_000 * n, *values, 63) for n in range(40)]
     names = stream_parameter_names("ArduPilot")[:2]
-    values = [m.MAVLink_param_value_message(name.encode(), 0.5, 9, 9, 1) for name in names * 3]
+    held = [m.MAVLink_param_value_message(name.encode(), 0.5, 9, 9, 1) for name in names * 3]
     text = m.MAVLink_statustext_message(6, b'mpucal {"name":"key","data":{"key":"enough"}}', 1, 0)
-    asked = joined(PIECE_OF_VEHICLE, [piece(one) for one in (*[beat] * 3, *values, text, beat)])
+    asked = joined(PIECE_OF_VEHICLE, [piece(one) for one in (*[beat] * 3, *held, text, beat)])
     return [asked, *(joined(PIECE_OF_VEHICLE, [piece(one) for one in (beat, text, *kind)]) for kind in (imus, more))]
 
 

@@ -56,7 +56,7 @@ Run = Callable[[bytes], object]
 PIECE_OF_CAPTURE = struct.Struct("<BqH")
 TOPICS = ("/bus", "/session")
 MEMBER = b"\x93NUMPY"
-TEXTS = (
+TEXTS: tuple[Callable[[str], object], ...] = (
     ChipOptions.parse,
     VehicleOptions.parse,
     parse_url,

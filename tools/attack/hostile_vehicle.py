@@ -21,7 +21,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache, partial
 from itertools import product
 from pathlib import Path
@@ -158,7 +158,7 @@ def of_attack(case: Case) -> Row:
         return run_attack(case, Path(place).resolve())
 
 
-def scenarios(*, seeds: range, kinds: Annotated[list[str], KINDS] = tuple(KINDS)) -> Iterator[Case]:
+def scenarios(*, seeds: range, kinds: Annotated[Sequence[str], KINDS] = tuple(KINDS)) -> Iterator[Case]:
     """Yield the attacks of each kind, attacker, seed and firmware."""
     for kind, attacker, seed, firmware in product(kinds, ATTACKERS, seeds, FIRMWARES):
         clean, heard = undisturbed(SIGNED if attacker == SIGNED else STRANGER, firmware)

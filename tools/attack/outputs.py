@@ -149,7 +149,7 @@ def tried(words: Sequence[str], here: Path) -> Iterator[tuple[str, str]]:
 
 
 def scenarios(
-    commands: Annotated[list[str], COMMANDS_WITH_OUTPUT, "default: all"] = tuple(COMMANDS_WITH_OUTPUT),
+    commands: Annotated[Sequence[str], COMMANDS_WITH_OUTPUT, "default: all"] = tuple(COMMANDS_WITH_OUTPUT),
 ) -> list[tuple[str, Path]]:
     """Return the commands, if there is a row for each of the command line's, with a folder of their inputs."""
     if lacks := check_rows():

@@ -46,6 +46,7 @@ if "libasan" in os.environ.get("LD_PRELOAD", ""):
     for name in MODULES:
         path = next(BUILT.glob(f"{name.partition('.')[2]}.*.so"))
         spec = spec_from_file_location(f"mpucal.{name}", path)
+        assert spec is not None and spec.loader is not None
         module = module_from_spec(spec)
         sys.modules[f"mpucal.{name}"] = module
         spec.loader.exec_module(module)

@@ -244,7 +244,7 @@ def of_command(
 
 
 def scenarios(
-    commands: Annotated[list[str], WORDS, "default: all"] = tuple(WORDS), *, seed: int = TODAY
+    commands: Annotated[Sequence[str], WORDS, "default: all"] = tuple(WORDS), *, seed: int = TODAY
 ) -> list[tuple[str, Path, int]]:
     """Return the commands, with a folder of their inputs; start this program again, if need be, with syscalls.c."""
     if "LD_PRELOAD" not in os.environ:

@@ -8,8 +8,9 @@ python -m tools.bench apply_speed hour.npz hour.csv            # those that appl
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from .timing import command, used
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
 B_A = np.array([0.31, -0.22, 1.08])
 IN_MEMORY = 5_000_000
+GOOD: Any = {"verdict": "good", "reasons": []}
 
 
 def in_memory() -> float:
@@ -33,11 +35,13 @@ def in_memory() -> float:
 
 
 def main(
-    files: Annotated[list[Path], "recordings"], *, to: Annotated[list[str], (".npz", ".csv", ".mcap")] = (".npz",)
+    files: Annotated[Sequence[Path], "recordings"],
+    *,
+    to: Annotated[Sequence[str], (".npz", ".csv", ".mcap")] = (".npz",),
 ) -> None:
     """Print a line for each conversion."""
     with tempfile.TemporaryDirectory() as name:
-        Calibration(D, B_A, quality={"verdict": "good", "reasons": []}).save(Path(name) / "c.json")
+        Calibration(D, B_A, quality=GOOD).save(Path(name) / "c.json")
         for file in files:
             count, size = sum(map(len, open_rows(file).runs)), file.stat().st_size
             for ending in to:

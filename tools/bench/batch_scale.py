@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import resource
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -42,9 +43,9 @@ def cost(paths: list[str], workers: int, journal: RowJournal) -> str:
 
 
 def main(
-    captures: Annotated[list[Path], "recordings"] = (),
+    captures: Annotated[Sequence[Path], "recordings"] = (),
     *,
-    workers: list[int] = (1, 2),
+    workers: Sequence[int] = (1, 2),
     engine_only: Annotated[int, "so many recordings that are not there"] = 0,
 ) -> None:
     """Measure the batches of the options."""

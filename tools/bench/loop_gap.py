@@ -89,7 +89,7 @@ def main(
             emulator = [sys.executable, "-m", "tools.lab", "sim_bridge", f"{text},hand=random,seed=1"]
             bridge = stack.enter_context(subprocess.Popen(emulator, stdout=subprocess.PIPE, text=True))
             stack.callback(bridge.kill)
-            words = ["--serial", bridge.stdout.readline().strip()]
+            words = ["--serial", next(iter(bridge.stdout or ())).strip()]
         else:
             words = [f"--{SOURCES[source]}", f"sim:pace=real,{text}", "--seed", "1"]
         words += ["--rate", f"{rate:g}"]

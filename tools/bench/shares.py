@@ -64,7 +64,7 @@ class Shares:
 
 def run(into: str, *words: str) -> None:
     """Run a command of mpucal in this process, and write the shares into a file."""
-    shares, bootstrap = Shares(), importlib._bootstrap
+    shares, bootstrap = Shares(), vars(importlib)["_bootstrap"]
     bootstrap._find_and_load = shares.counted(IMPORTS, bootstrap._find_and_load)
     for part, (place, *names) in PARTS.items():
         owner = shares.counted(IMPORTS, resolve_name)(place)

@@ -7,12 +7,14 @@ every machine. Times are the processor's, so that what else runs counts little. 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
 
-import mpucal
 from mpucal.allan import noise_of
+from mpucal.calibration import calibrate
+from mpucal.calibration.fit import Fit
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.likelihood import evaluate, value
 from mpucal.calibration.model_selection import fit_model
@@ -21,9 +23,9 @@ from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.theta import Theta
 from mpucal.data import Recording
 from mpucal.kernel import _kernel
-from mpucal.rests.flat import flat_statistics
+from mpucal.rests.flat import Flat
 from tools.lab.reference import evaluate_hand_reference, evaluate_reference
-from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import hand_scenario, known_flat, paper_scenario
 from tools.lab.scenarios.sensors import GRAVITY_MPS2
 from tools.lab.table import plain_table, show
 
@@ -43,6 +45,11 @@ def turned(seconds: float, rate_hz: float, turns: int = TURNS) -> Recording:
     return paper_scenario(0, rate_hz=rate_hz, turn_s=(seconds - FLAT_S) / turns, turns=turns).recording
 
 
+def estimated(recording: Recording, flat: Flat, model: str) -> Fit:
+    """Return the fit of the model that is chosen, with honest uncertainties."""
+    return fit_model(recording, flat, GRAVITY_MPS2, model).honest()
+
+
 def calibrations(runs: int) -> list[dict[str, Any]]:
     """Time whole calibrations with their verdicts, and the estimation alone."""
     by_hand = hand_scenario(0, "pose12").recording
@@ -55,10 +62,9 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
         ("12 poses by hand", by_hand, "auto"),
         ("59 turns", turned(600.0, 1000.0, 59), "accel"),
     ):
-        found = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
-        flat = flat_statistics(recording, recording.flat)
-        estimation_s = median_s(lambda m=model, r=recording, f=flat: fit_model(r, f, GRAVITY_MPS2, m).honest(), runs)
-        whole_s = median_s(lambda r=recording, m=model: mpucal.calibrate(r, model=m, gravity=GRAVITY_MPS2), runs)
+        found = calibrate(recording, model, GRAVITY_MPS2)
+        estimation_s = median_s(partial(estimated, recording, known_flat(recording), model), runs)
+        whole_s = median_s(partial(calibrate, recording, model, GRAVITY_MPS2), runs)
         length_s = float(recording.t[-1] - recording.t[0])
         rows.append(
             {
@@ -76,7 +82,7 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
 
 def problem_of(recording: Recording) -> tuple[Problem, Theta]:
     """Return the problem of the filters, and the initial estimate."""
-    flat = flat_statistics(recording, recording.flat)
+    flat = known_flat(recording)
     problem = Problem(Series.after(recording, flat), flat, GRAVITY_MPS2)
     return problem, initialise(problem, flat.b_omega)
 
@@ -92,7 +98,7 @@ def as_hand(problem: Problem) -> Problem:
 
 def cut(problem: Problem, steps: int) -> Problem:
     """Return the problem of the first steps."""
-    arrays = {name: None if x is None else x[:steps] for name, x in vars(problem.series).items()}
+    arrays: dict[str, Any] = {name: None if x is None else x[:steps] for name, x in vars(problem.series).items()}
     return replace(problem, series=replace(problem.series, **arrays))
 
 
@@ -104,11 +110,11 @@ def kernel(runs: int) -> list[dict[str, Any]]:
     for parameters, of in ((ACCEL, problem), (IMU, problem), (HAND, as_hand(problem))):
         long, short = cut(of, KERNEL_STEPS), cut(of, TWIN_STEPS)
         hand = parameters == HAND
-        alone = value if hand else lambda p, t: evaluate(p, t, 0)
-        twin = evaluate_hand_reference if hand else lambda p, t, n=parameters: evaluate_reference(p, t, n)
-        ns_value = 1e9 * median_s(lambda c=alone, p=long: c(p, theta), runs) / KERNEL_STEPS
-        ns_all = 1e9 * median_s(lambda p=long, n=parameters: evaluate(p, theta, n), runs) / KERNEL_STEPS
-        ns_twin = 1e9 * median_s(lambda c=twin, p=short: c(p, theta), 1) / TWIN_STEPS
+        alone = partial(value, long, theta) if hand else partial(evaluate, long, theta, 0)
+        reference, more = (evaluate_hand_reference, ()) if hand else (evaluate_reference, (parameters,))
+        ns_value = 1e9 * median_s(alone, runs) / KERNEL_STEPS
+        ns_all = 1e9 * median_s(partial(evaluate, long, theta, parameters), runs) / KERNEL_STEPS
+        ns_twin = 1e9 * median_s(partial(reference, short, theta, *more), 1) / TWIN_STEPS
         rows.append(
             {
                 "parameters": parameters,
@@ -127,9 +133,8 @@ def growth(runs: int) -> list[dict[str, Any]]:
     rows = []
     for n in GROWTH:
         recording = turned(60.0, n / 60.0)
-        flat = flat_statistics(recording, recording.flat)
-        s = median_s(lambda r=recording, f=flat: fit_model(r, f, GRAVITY_MPS2, "accel"), runs)
-        whole = peak_bytes(lambda r=recording: mpucal.calibrate(r, model="accel", gravity=GRAVITY_MPS2))
+        s = median_s(partial(fit_model, recording, known_flat(recording), GRAVITY_MPS2, "accel"), runs)
+        whole = peak_bytes(partial(calibrate, recording, "accel", GRAVITY_MPS2))
         rows.append(
             {
                 "samples": len(recording),

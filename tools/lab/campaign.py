@@ -24,6 +24,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from mpucal.__main__ import run
+from mpucal.report import render
 from mpucal.session import results
 from tools.processes import Child, quick, ready
 
@@ -94,8 +95,7 @@ def run_with_faults(case: Case, world: World) -> int:
 
     os.environ["XDG_STATE_HOME"] = str(Path("state").resolve())
     if case.k % PICTURES:
-        render = results.render
-        results.render = lambda calibration, _: render(calibration)
+        setattr(results, "render", lambda calibration, _: render(calibration))  # noqa: B010 - it is imported there
     world.at(case.faults[0].at_s, begin)
     with world.opened(), quick():
         return run(words(case.number))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout
 from functools import cache, partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def lost(rows: Table, rng: Rng) -> Table:
 def twice(rows: Table, rng: Rng) -> Table:
     """Repeat a run of rows."""
     at = rng.integers(len(rows))
-    return rows[:at] + rows[max(0, at - rng.integers(1, 100)) :]
+    return rows[:at] + rows[max(0, int(at - rng.integers(1, 100))) :]
 
 
 def swapped(rows: Table, rng: Rng) -> Table:
@@ -158,7 +158,7 @@ def originals(numbers: Iterable[int]) -> list[Damaged]:
 def damaged(path: Path, number: int) -> tuple[list[str], bytes]:
     """Return the kinds of damage that the number draws, and the damaged file."""
     rng = np.random.default_rng(number)
-    kinds: list[Callable] = []
+    kinds: list[Callable[..., Any]] = []
     data = bytearray(path.read_bytes())
     if path.suffix in (".npz", ".csv") and rng.random() < 0.7:
         rows = [row.copy() for row in _table(path)]

@@ -103,14 +103,14 @@ class World:
 
     def begin_faults(self, faults: Sequence[TimedFault]) -> None:
         """Begin these faults, each at its time."""
-        if self.bus is not None:
+        if self.bus is not None and self.bus._motion is not None:
             self.bus.begin_faults(_faults(faults), faults[0].number)
             self.bus._motion.mishaps = (*self.bus._motion.mishaps, *_sensor_faults(faults))
-        else:
+        if self.transport is not None:
             self.transport.begin_faults(_faults(faults))
         for fault in faults:
             if fault.name in (*PROCESS, *CLOCK, *SERIAL):
-                self.at(fault.at_s, lambda fault=fault: self._begin(fault))
+                self.at(fault.at_s, partial(self._begin, fault))
 
     def truths(self, faults: Sequence[TimedFault], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the values of (D, b_a) that count as true: before and after each fault, and amid slow ones."""
@@ -147,7 +147,7 @@ class World:
             if rng.random() < 0.5:
                 self.line.to_host = LineFaults(spoilt)
             else:
-                self.line.to_device = LineFaults([(at // 16, *rest) for at, *rest in spoilt])
+                self.line.to_device = LineFaults([(at // 16, name, value) for at, name, value in spoilt])
 
 
 class HookedBus(SimulatedBus):

@@ -145,7 +145,7 @@ def events(seeds: range, only: Sequence[str]) -> list[tuple[str, int]]:
 
 
 def scenarios(
-    *, seeds: range, only: Annotated[list[str], names_of(EVENTS), "events, with ; between"] = EVENTS
+    *, seeds: range, only: Annotated[Sequence[str], names_of(EVENTS), "events, with ; between"] = EVENTS
 ) -> list[tuple[str, int]]:
     """Return pairs of an event and a seed."""
     return events(seeds, only)

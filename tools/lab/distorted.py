@@ -10,6 +10,7 @@ A good accelerometer is taken as perfect, and spoilt: gains by 10 %, skew by 5 d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -23,6 +24,7 @@ from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
+from mpucal.result.keys import Model
 from mpucal.simulated.rotation import up_in_board
 from mpucal.simulated.sensor import SensorTruth
 
@@ -67,7 +69,7 @@ def distortion(seed: int) -> tuple[Vector, Vector]:
 def of_seed(
     item: tuple[Path, int],
     *,
-    model: Annotated[str, MODELS] = "auto",
+    model: Annotated[Model, MODELS] = "auto",
     gravity: Annotated[float, "m/s^2"] = 9.81,
 ) -> list[Row]:
     """Distort, calibrate, and judge each of SETS by the distortion [m/s^2] and by motion capture [deg].
@@ -94,7 +96,7 @@ def of_seed(
     errors = [sph_rms(truth, *sets) for sets in zip(D, b_a, strict=True)]
     tilts = (*tilts_deg(s_true, s), *tilts_deg(s_true[:turned_until], s[:turned_until]))
     same = {"name": path.stem, "seed": seed, "told": f"{result.fit['model']}, {result.verdict}"}
-    same["claim"] = float(result.quality["error_std"]["rms"])
+    same["claim"] = float(result.quality["error_std"]["rms"] or np.nan)
     return [Row(**same, **dict(zip(FIGURES, each, strict=True))) for each in zip(SETS, errors, *tilts, strict=True)]
 
 
@@ -126,7 +128,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def scenarios(
-    recordings: Annotated[list[Path], ".npz with t, acc, gyr and quat"], *, seeds: range
+    recordings: Annotated[Sequence[Path], ".npz with t, acc, gyr and quat"], *, seeds: range
 ) -> list[tuple[Path, int]]:
     """Return each recording with each seed."""
     return each_seed(recordings, seeds)

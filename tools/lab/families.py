@@ -22,6 +22,7 @@ import mpucal
 from mpucal.errors import MpucalError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
 from mpucal.result.comparison import degrees_of_freedom, limit_of
+from mpucal.result.keys import Model
 
 from .judge import judged, judgement, rms
 from .runner import Trial
@@ -40,7 +41,7 @@ FALSE_SHARE, GOOD_SHARE, SHARP_MPS2 = 0.003, 0.98, 1e-3
 RMS_CLAIMS = (0.5, 1.5)
 
 
-def of_seed(item: tuple[str, int], *, model: str = "auto") -> Row:
+def of_seed(item: tuple[str, int], *, model: Model = "auto") -> Row:
     """Simulate a family's name and a seed, calibrate and compare."""
     name, seed = item
     family = FAMILIES[name]

@@ -30,12 +30,13 @@ from mpucal.result.calibration import GOOD
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind, Use
 from mpucal.session.meter import TURN_WORDS
 from mpucal.session.plan import Plan
+from mpucal.session.step import SAY_AGAIN_S
 from mpucal.simulated import rotation as quaternions
 from mpucal.simulated.hand import IN_THE_HAND, MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import HANDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
-from mpucal.terminal.voice import HOLD, SAY_AGAIN_S, SETTLED_S, Announcement, Tone, Voice
+from mpucal.terminal.voice import HOLD, SETTLED_S, Announcement, Tone, Voice
 
 from .runner import Trial, each_seed
 from .sessions import session
@@ -229,7 +230,7 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def scenarios(*, seeds: range, hand: Annotated[list[str], HANDS] = tuple(HANDS)) -> list[tuple[str, int]]:
+def scenarios(*, seeds: range, hand: Annotated[Sequence[str], HANDS] = tuple(HANDS)) -> list[tuple[str, int]]:
     """Return each hand with each seed."""
     return each_seed(hand, seeds)
 

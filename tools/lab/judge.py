@@ -20,7 +20,7 @@ from .table import Row
 
 # a verdict is false if the error exceeds the claim by this factor, or that of an element exceeds its standard
 # uncertainty by MOST_Z
-MOST_CLAIMS = {GOOD: 3.0, USABLE: 5.0}
+MOST_CLAIMS: Mapping[str, float] = {GOOD: 3.0, USABLE: 5.0}
 MOST_Z = 5.0
 
 
@@ -67,7 +67,8 @@ def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: fl
     std = np.append(calibration.D_std, calibration.b_a_std)
     # a refused one may claim no uncertainty
     z = (found - np.clip(found, true.min(axis=0), true.max(axis=0))) / np.where(std > 0.0, std, np.nan)
-    claim = (calibration.quality.get("error_std") or {}).get("rms")
+    stated: Mapping[str, Any] = calibration.quality.get("error_std") or {}
+    claim = stated.get("rms")
     return judgement(
         calibration.verdict,
         tuple(reason["code"] for reason in calibration.quality["reasons"]),

@@ -27,7 +27,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Annotated, Any
@@ -102,7 +102,7 @@ def _opened(url: str) -> Transport:
 
 
 def main(
-    words: Annotated[list[str], "for mpucal session"] = (),
+    words: Annotated[Sequence[str], "for mpucal session"] = (),
     *,
     mavlink: Annotated[str, "URL of the session"],
     parameters: Annotated[str, "another URL of the same simulator"],

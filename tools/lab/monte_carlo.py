@@ -20,23 +20,27 @@ from rich.table import Table
 
 import mpucal
 from mpucal.calibration import MODELS
-from mpucal.calibration.model_selection import METHODS
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.model_selection import fit_in_place
 from mpucal.calibration.paper import fit_paper
-from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
+from mpucal.calibration.parameters import ACCEL, B_A_NAMES, D_NAMES
+from mpucal.data import Recording
 from mpucal.errors import MpucalError
-from mpucal.rests.flat import flat_statistics
+from mpucal.rests.flat import Flat
 from mpucal.result.calibration import REFUSED
+from mpucal.result.keys import Model
 
 from .judge import followed, judged, judgement, sph_rms, tilts_deg
 from .rivals import Estimate, Rests, Unfit, aligned_ellipsoid, ellipsoid, six_positions
 from .runner import Trial, names_of
-from .scenarios.recordings import Simulated, hand_scenario, paper_scenario
+from .scenarios.family import Simulated
+from .scenarios.recordings import hand_scenario, known_flat, paper_scenario
 from .scenarios.sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
 from .table import Column, Row, cell, frequencies, grouped, known, over, plain_table, show, table
 
 # NIS is 3 for data that conform to the model, and tens if the fit ended in a wrong optimum
 NIS_WRONG = 10.0
-FITS = {"accel": METHODS["accel"], "paper": fit_paper}
+FITS: dict[str, Callable[[Recording, Flat, float], Fit]] = {"accel": partial(fit_in_place, ACCEL), "paper": fit_paper}
 PRINTED = "the paper's algorithm"
 TILTS = ("uncalibrated", "true D, b_a", "calibrated")
 # required mean errors, and means (standard deviations) of the paper before and after calibration [deg]
@@ -82,7 +86,7 @@ METHODS: dict[str, Callable[[Rests, float], Estimate] | None] = {
 }
 
 
-def of_seed(item: tuple[str, int, str], model: str) -> Row:
+def of_seed(item: tuple[str, int, str], model: Model) -> Row:
     """Simulate a scene and a seed, calibrate by a method, and judge the result.
 
     In the row, `before` is the error without a calibration [m/s^2], `failure` why it does not count, `known_K` the
@@ -91,7 +95,12 @@ def of_seed(item: tuple[str, int, str], model: str) -> Row:
     scene, seed, method = item
     simulated = SCENES[scene].simulate(seed)
     recording, truth, of_rests = simulated.recording, simulated.truth, METHODS[method]
-    same = {"scene": scene, "seed": seed, "method": method, "before": sph_rms(truth, np.eye(3), np.zeros(3))}
+    same: dict[str, Any] = {
+        "scene": scene,
+        "seed": seed,
+        "method": method,
+        "before": sph_rms(truth, np.eye(3), np.zeros(3)),
+    }
     began = time.perf_counter()
     try:
         if of_rests:
@@ -122,7 +131,7 @@ def tilts(simulated: Simulated, result: mpucal.Calibration) -> tuple[tuple[float
     """Return roll and pitch errors [deg] of the orientations that the paper's filter finds with each of TILTS."""
     recording, truth = simulated.recording, simulated.truth
     D, b_a = np.array([np.eye(3), truth.D, result.D]), np.array([np.zeros(3), truth.b_a, result.b_a])
-    flat = flat_statistics(recording, recording.flat)
+    flat = known_flat(recording)
     return tilts_deg(simulated.specific_force[flat.last :], followed(recording, flat, D, b_a, GRAVITY_MPS2))
 
 
@@ -180,7 +189,7 @@ def fit_fixed(seed: int, model: str) -> Row | None:
     """Fit one sensor with a seed's noise, as in section 4.4; None if it failed."""
     simulated = paper_scenario(seed, sensor=paper_sensor(np.random.default_rng(0)))
     recording = simulated.recording
-    fit = FITS[model](recording, flat_statistics(recording, recording.flat), GRAVITY_MPS2)
+    fit = FITS[model](recording, known_flat(recording), GRAVITY_MPS2)
     if not (fit.converged and fit.nis < NIS_WRONG):
         return None
     errors = np.concatenate([(fit.D - simulated.truth.D).ravel(), fit.b_a - simulated.truth.b_a])
@@ -197,7 +206,7 @@ def efficiency(fits: Sequence[Row]) -> list[dict[str, Any]]:
     return [dict(zip(("", "RMSE", "√CRLB", "RMSE / √CRLB"), row, strict=True)) for row in rows]
 
 
-def tried(item: int | tuple[str, int, str], *, model: Annotated[str, MODELS] = "auto") -> Row | None:
+def tried(item: int | tuple[str, int, str], *, model: Annotated[Model, MODELS] = "auto") -> Row | None:
     """Fit one sensor with a seed's noise, or calibrate a scene and a seed."""
     return fit_fixed(item, model) if isinstance(item, int) else of_seed(item, model)
 
@@ -205,8 +214,8 @@ def tried(item: int | tuple[str, int, str], *, model: Annotated[str, MODELS] = "
 def scenarios(
     *,
     seeds: range,
-    scenes: Annotated[list[str], names_of(SCENES), "patterns, with ; between"] = tuple(SCENES),
-    methods: Annotated[list[str], names_of(METHODS), "patterns, with ; between"] = ("mpucal",),
+    scenes: Annotated[Sequence[str], names_of(SCENES), "patterns, with ; between"] = tuple(SCENES),
+    methods: Annotated[Sequence[str], names_of(METHODS), "patterns, with ; between"] = ("mpucal",),
     crlb: Annotated[bool, f"section 4.4: one sensor, many noises; --model {' or '.join(FITS)}"] = False,
 ) -> Sequence[int | tuple[str, int, str]]:
     """Return the seeds of one sensor's noises, or the seeds of each scene."""

@@ -10,7 +10,7 @@ kernel/hand.hpp.
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,17 +43,17 @@ def with_steps(theta: Theta, p: int) -> SimpleNamespace:
     return SimpleNamespace(**found)
 
 
-def times(M: Vector, v: Vector) -> Complex:
+def times(M: Complex | Vector, v: Complex | Vector) -> Complex:
     """Return the product of each matrix (..., 3, 3) with its vector (..., 3)."""
     return np.asarray((M @ v[..., None])[..., 0])
 
 
-def cross(v: Vector) -> Vector:
+def cross(v: Any) -> Any:
     """Return [v]x: (..., 3) -> (..., 3, 3)."""
     return np.cross(np.eye(3), v[..., None, :])
 
 
-def rotation(phi: Vector) -> Vector:
+def rotation(phi: Any) -> Any:
     """Return exp([phi]x): (..., 3) -> (..., 3, 3), by Rodrigues' formula."""
     X, angle = cross(phi), np.sqrt((phi * phi).sum(-1))[..., None, None] / np.pi
     return np.asarray(np.eye(3) + np.sinc(angle) * X + 0.5 * np.sinc(0.5 * angle) ** 2 * (X @ X))

@@ -57,7 +57,12 @@ class Trial:
             json: Annotated[Path | None, "file for the rows"] = None,
         ) -> None: ...
 
-        functions = (options, self.scenarios, self.judge, *([self.report] if self.report else []))
+        functions: tuple[Callable[..., Any], ...] = (
+            options,
+            self.scenarios,
+            self.judge,
+            *([self.report] if self.report else []),
+        )
         # what these are about is no option, and not every trial draws by seeds
         without = {next(iter(inspect.signature(each).parameters)) for each in functions[2:]}
         without |= set() if any("seeds" in inspect.signature(each).parameters for each in functions[1:]) else {"seeds"}

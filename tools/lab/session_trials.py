@@ -49,7 +49,7 @@ def of_hand(item: tuple[str, int]) -> Row:
     )
 
 
-def scenarios(*, seeds: range, of: Annotated[list[str], HELD] = ("guided",)) -> list[tuple[str, int]]:
+def scenarios(*, seeds: range, of: Annotated[Sequence[str], HELD] = ("guided",)) -> list[tuple[str, int]]:
     """Return each hand with each seed."""
     return each_seed(of, seeds)
 
@@ -59,6 +59,11 @@ def typical(name: str, middle: Callable[[Sequence[float]], Any] = np.median) -> 
     return lambda group: f"{middle(values):.3g} ({max(values):.3g})" if (values := known(group, name)) else ""
 
 
+def number_of(verdict: str) -> Column:
+    """Return a column: the number of sessions with this verdict, empty for none."""
+    return lambda group: count("verdict", verdict)(group) or ""
+
+
 def most_claims(verdict: str) -> Column:
     """Return a column: the largest error with this verdict, in units of the claim."""
     return lambda group: over("claims", max)([ended for ended in group if ended.verdict == verdict])
@@ -66,7 +71,7 @@ def most_claims(verdict: str) -> Column:
 
 COLUMNS: dict[str, Column] = {
     "all": len,
-    **{v: lambda g, v=v: count("verdict", v)(g) or "" for v in (GOOD, USABLE, REFUSED, ABANDONED, NOTHING)},
+    **{verdict: number_of(verdict) for verdict in (GOOD, USABLE, REFUSED, ABANDONED, NOTHING)},
     "rotated s": typical("rotated_s"),
     "finished s": typical("finished_s"),
     "error m/s²": typical("error", np.mean),

@@ -20,6 +20,7 @@ import pty
 import sys
 import time
 import tty
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -97,7 +98,7 @@ def run(vehicle: SimulatedVehicle, port: Any, datagrams: bool, speed: float) -> 
 
 def main(
     port: Annotated[str, "udp:HOST:PORT, tcp:HOST:PORT or pty"],
-    words: Annotated[list[str], "KEY=VALUE"] = (),
+    words: Annotated[Sequence[str], "KEY=VALUE"] = (),
     *,
     signing_key: Annotated[Path | None, "file of 32 bytes: it signs, and hears nobody who does not"] = None,
     speed: Annotated[float, "how much faster than real its time runs"] = 1.0,

@@ -10,6 +10,7 @@ the differences of D and b_a in units of what both claim, which are 1 if the sta
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -39,7 +40,7 @@ def read(path: Path) -> tuple[Recording | None, int, str]:
         except MpucalError as error:
             why = str(error)
             words = shlex.split(error.options) if isinstance(error, RecordingError) else []
-        said = {
+        said: dict[str, Any] = {
             word.removeprefix("--").replace("-", "_"): value
             for word, value in zip(words[::2], words[1::2], strict=True)
         }
@@ -88,7 +89,7 @@ def left_out(rests: Rests, gravity: float) -> float:
             of_others = ellipsoid(replace(rests, runs=np.delete(rests.runs, k, axis=0)), gravity)
         except Unfit:
             return float("nan")
-        errors.append(np.linalg.norm(np.linalg.solve(of_others.D, rests.y[k] - of_others.b_a)) - gravity)
+        errors.append(float(np.linalg.norm(np.linalg.solve(of_others.D, rests.y[k] - of_others.b_a))) - gravity)
     return 1e3 * rms(errors)
 
 
@@ -108,7 +109,7 @@ COLUMNS: dict[str, Column] = {
 }
 
 
-def scenarios(recordings: Annotated[list[Path], "files and folders that mpucal reads"]) -> list[Path]:
+def scenarios(recordings: Annotated[Sequence[Path], "files and folders that mpucal reads"]) -> Sequence[Path]:
     """Return the recordings."""
     return recordings
 

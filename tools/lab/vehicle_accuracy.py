@@ -114,7 +114,7 @@ def attitude_deg(link: Link) -> Vector:
     """Return the mean roll and pitch (2,) of a few seconds."""
     send_command(link, *interval_command(ATTITUDE))
     heard = [m for m in link.messages(link.now_ns() + HEARD_NS) if m.get_type() == ATTITUDE]
-    return np.degrees(np.mean([(m.roll, m.pitch) for m in heard], axis=0))
+    return np.asarray(np.degrees(np.mean([(m.roll, m.pitch) for m in heard], axis=0)))
 
 
 COLUMNS = {

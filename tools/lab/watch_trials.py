@@ -86,7 +86,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def scenarios(
-    *, seeds: range, only: Annotated[list[str], names_of(WATCHED), "events, with ; between"] = WATCHED
+    *, seeds: range, only: Annotated[Sequence[str], names_of(WATCHED), "events, with ; between"] = WATCHED
 ) -> list[tuple[str, int]]:
     """Return pairs of an event and a seed."""
     return events(seeds, only)

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from mpucal.calibration import calibrate
-from mpucal.chip.access import Bus, SessionEvent
+from mpucal.chip.access import Bus, SessionEvent, Transaction
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.cli.running import open_runner
@@ -118,7 +118,7 @@ def without_date(dated: Path, capture: Path) -> None:
         for record in read.records:
             if isinstance(record, SessionEvent):
                 writer.event(record.name, record.t_ns, record.data)
-            else:
+            elif isinstance(record, Transaction):
                 writer.transaction(record)
 
 

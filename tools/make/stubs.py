@@ -33,7 +33,7 @@ def stubs() -> Iterator[tuple[Path, str]]:
         made.put(made.module)
         text = HEAD + DETAILS.sub(r"\1", made.get()).replace("from typing import Annotated\n", "")
         path = ROOT / f"{name.replace('.', '/')}.pyi"
-        ruff = [sys.executable, "-m", "ruff", "format", "--stdin-filename", path, "-"]
+        ruff = [sys.executable, "-m", "ruff", "format", "--stdin-filename", str(path), "-"]
         yield path, subprocess.run(ruff, input=text, capture_output=True, text=True, check=True).stdout
 
 

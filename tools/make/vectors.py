@@ -65,9 +65,9 @@ COUNTS = (3000, -20000, 32767)
 
 def sealed(body: bytes, length: int | None = None) -> bytes:
     """Return `body` with the right length and CRC-32; `length` : write this length instead."""
-    body = bytearray(body)
-    struct.pack_into("<H", body, 6, len(body) + 4 if length is None else length)
-    return bytes(body) + struct.pack("<I", zlib.crc32(body))
+    whole = bytearray(body)
+    struct.pack_into("<H", whole, 6, len(whole) + 4 if length is None else length)
+    return bytes(whole) + struct.pack("<I", zlib.crc32(whole))
 
 
 def accepted(blob: Blob, data: bytes | None = None) -> tuple[bytes, dict[str, Any]]:
@@ -203,7 +203,7 @@ def one_message(seq: int, message: wire.Message, kind: int | None = None) -> tup
     frame = Frame(message.TYPE if kind is None else kind, seq, message.payload())
     values = {
         key: value.rstrip(b"\0").decode() if key in ("magic", "name") else value.hex() if key in BYTES else value
-        for key, value in asdict(message).items()
+        for key, value in vars(message).items()
     }
     return frame.encode(), {"frames": [plain_frame(frame)], "message": type(message).__name__, "values": values}
 

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from mpucal.bridge import board
 from mpucal.bridge.messages import Feature, Status
 from mpucal.chip.access import Bus
+from mpucal.chip.registers import ADDRESSES
 from mpucal.clocks import US
 from mpucal.clocks.device_clocks import WRAP
 from mpucal.errors import BusError, NoAnswer
@@ -76,7 +77,7 @@ class EmulatedBridge(board.Bridge):
         now_ns: Callable[[], int],
         memory: Memory | None = None,
         *,
-        address: int = board.ADDRESSES[0],
+        address: int = ADDRESSES[0],
         features: Feature = Feature.STREAM | Feature.BLOB,
         window: int = 4,
     ) -> None:

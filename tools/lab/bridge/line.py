@@ -44,7 +44,8 @@ class EmulatedLine:
         burst_ns: int = 0,
         step_ns: int = STEP_NS,
     ) -> None:
-        self.name, self.bauds = "the emulated line", BAUDS[:1]
+        self.name = "the emulated line"
+        self.bauds: tuple[int, ...] = BAUDS[:1]
         self.device = device
         self.to_host: Damage = _unchanged
         self.to_device: Damage = _unchanged

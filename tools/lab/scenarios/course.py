@@ -73,7 +73,7 @@ def along(legs: Sequence[Leg], step_s: float, rate: Callable[[Vector], Vector] =
     start = FLAT_S
     for leg in legs:
         inside = slice(round(start / step_s), min(round((start + leg.seconds) / step_s), n))
-        share = (np.arange(inside.start, inside.stop) + 0.5 - start / step_s) * step_s / leg.seconds
+        share = (np.arange(inside.start, inside.stop, dtype=np.float64) + 0.5 - start / step_s) * step_s / leg.seconds
         omega[inside] = rate(share)[:, None] * (leg.turn_rad / leg.seconds)
         moving[inside] = np.clip(8.0 * share * (1.0 - share), 0.0, 1.0)
         start += leg.seconds + leg.hold_s
@@ -99,7 +99,7 @@ def poses(
 
     back : it is put down at last as it lay at first.
     """
-    attitude, shown, legs = rotation.exp(np.zeros(3)), [np.array([0.0, 0.0, 1.0])], []
+    attitude, shown, legs = rotation.exp(np.zeros(3)), [np.array([0.0, 0.0, 1.0])], list[Leg]()
     for _ in range(count - 1):
         turns = [direction(rng) * np.radians(rng.uniform(*turn_deg)) for _ in range(CANDIDATES)]
         after = rotation.product(attitude, rotation.exp(np.array(turns)))
@@ -171,7 +171,8 @@ def arcs(
 
     ramp : the share of an arc that it takes to start, and to stop.
     """
-    legs, last = [], np.zeros(3)
+    legs: list[Leg] = []
+    last = np.zeros(3)
     while len(legs) < count:
         axis = rng.integers(-1, 2, 3).astype(float)
         if not np.any(np.cross(axis, last) if legs else axis):

@@ -14,6 +14,7 @@ import numpy as np
 
 from mpucal.calibration.rotation import shortest_turn
 from mpucal.data import Recording, Sensor, Vector
+from mpucal.rests.flat import Flat, flat_statistics
 from mpucal.simulated import rotation
 from mpucal.simulated.disturbance import JERK_S
 from mpucal.simulated.sensor import SensorTruth
@@ -108,6 +109,12 @@ SCENES = {
 }
 
 
+def known_flat(recording: Recording) -> Flat:
+    """Return the statistics of the segment that a simulated recording is known to lie flat in."""
+    assert recording.flat is not None
+    return flat_statistics(recording, recording.flat)
+
+
 def hand_scenario(
     seed: int,
     motion: str,
@@ -128,11 +135,11 @@ def hand_scenario(
     sensor : drawn from the seed unless given. truth_hz : how finely the hand is simulated, at least.
     """
     scene, sampling = SCENES[motion], Sampling(rate_hz, delay_ms=1e3 * delay_s, fine_hz=truth_hz)
-    shaking = {"tremor_mps2": TREMOR_MPS2, "tremor_rad_s": TREMOR_RAD_S} if tremble else {}
-    scene = replace(scene, sampling=sampling, hand=replace(scene.hand, **shaking))
+    hand = replace(scene.hand, tremor_mps2=TREMOR_MPS2, tremor_rad_s=TREMOR_RAD_S) if tremble else scene.hand
+    scene = replace(scene, sampling=sampling, hand=hand)
     made = simulate(scene, np.random.default_rng(seed), sensor)
-    told = {"sensor": Sensor(rate_hz=rate_hz), "name": f"simulated {motion} {seed}"}
-    return replace(made, recording=replace(made.recording, **told))
+    told = Sensor(rate_hz=rate_hz)
+    return replace(made, recording=replace(made.recording, sensor=told, name=f"simulated {motion} {seed}"))
 
 
 def paper_scenario(

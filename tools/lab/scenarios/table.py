@@ -9,6 +9,7 @@ words and times are those that owners of such chips have reported; sources stand
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
@@ -191,7 +192,9 @@ FAMILIES: dict[str, Family] = {
 
 
 def of_families(
-    *, seeds: range, families: Annotated[list[str], names_of(FAMILIES), "patterns, with ; between"] = tuple(FAMILIES)
+    *,
+    seeds: range,
+    families: Annotated[Sequence[str], names_of(FAMILIES), "patterns, with ; between"] = tuple(FAMILIES),
 ) -> list[tuple[str, int]]:
     """Return each family with each seed."""
     return each_seed(families, seeds)
