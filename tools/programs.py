@@ -4,8 +4,6 @@ The parameters of `main` are what a command line may give: its arguments, and af
 hold the type, the words to choose from or a function that converts the text, and the help.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import inspect

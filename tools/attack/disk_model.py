@@ -4,8 +4,6 @@ The calls come from the log of syscalls.c. Data written to a file is safe once t
 created or removed is safe once its folder is synced.
 """
 
-from __future__ import annotations
-
 import os
 import random
 from collections.abc import Iterator, Mapping, Sequence

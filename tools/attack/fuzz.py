@@ -13,8 +13,6 @@ says how many branches were reached. Half of the mutants are those of above. Wha
 build/fuzz/TARGET.wrong until it is mended.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

@@ -5,8 +5,6 @@
 It needs clang with its runtime library. build/fuzz/core keeps the corpus for the next run.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -8,8 +8,6 @@ process, and its seed is printed. Lengths are 0 to 70, around the filters' lanes
 shapes, types, strides and values than they should, one in three of them. Then the modules' own tests run once.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -4,8 +4,6 @@ Mutated bytes would nearly always fail checksums and sequence numbers, so these 
 are pieces, each a header that ends with a length, and that many bytes.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 from collections.abc import Iterator, Sequence

@@ -4,8 +4,6 @@ Mutated bytes would nearly always fail checksums, so the mutated bytes are the c
 of archives and captures here, of frames and packets in fuzz_peers.py.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """The simulated vehicle's link with an attacker on it, and its hostile packets; see tools/attack/hostile_vehicle.py."""
 
-from __future__ import annotations
-
 import math
 import random
 import struct

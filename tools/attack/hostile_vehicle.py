@@ -15,8 +15,6 @@ that is set to neither the vehicle's own value nor that of calibration.json, and
 calibration with larger errors than it claims. Exit code 1: a run was wrong.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

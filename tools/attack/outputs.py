@@ -9,8 +9,6 @@ whole, or follow a link to a folder. Otherwise it has to end with a sentence, le
 temporary file. Exit code 1: one did not. Full and read-only disks are those of syscalls.py.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat

@@ -3,8 +3,6 @@
 As a plugin of pytest: `-p tools.attack.sanitized`, in the environment of `environment`.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -8,8 +8,6 @@ beside it its own, and all other processes must end with a sentence. Ending send
 to a session at any time, and none of its processes may be left after ten seconds. Exit code 1: a rule was broken.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -17,8 +17,6 @@ kind: each file must be old or new, what was synced be there, and a note of a wr
 Seeds are the day's number. Exit code 1 where something was wrong.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os

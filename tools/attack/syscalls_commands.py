@@ -1,7 +1,5 @@
 """The commands of syscalls.py, run in child processes with syscalls.c preloaded, and their simulated devices."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

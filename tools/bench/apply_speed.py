@@ -5,8 +5,6 @@ python -m tools.bench apply_speed hour.mcap --to .npz .csv .mcap
 python -m tools.bench apply_speed hour.npz hour.csv            # those that apply made of it
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ python -m tools.bench batch_scale --engine-only 2000
 With --engine-only there are no recordings to read: what is left is the engine and the journal.
 """
 
-from __future__ import annotations
-
 import resource
 import tempfile
 from collections.abc import Sequence

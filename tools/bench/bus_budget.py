@@ -8,8 +8,6 @@ byte of address and 8 bits a byte, registers at 1 MHz and what is measured at 20
 lost one is seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated

@@ -7,8 +7,6 @@ Only this process counts; it receives, decodes, records and hands out samples as
 tools/lab/sim_vehicle.py.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

@@ -11,8 +11,6 @@ one session as one program. The capture shows the times of the reads, and the sa
 FIFO holds 0.36 s at 200 Hz and 73 ms at 1 kHz. Behind a serial bridge, a read's time is that of its bytes' arrival.
 """
 
-from __future__ import annotations
-
 import signal
 import socket
 import subprocess

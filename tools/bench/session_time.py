@@ -4,8 +4,6 @@ Each runs in a process of its own, as `mpucal session` does, in the simulated wo
 part is that of its functions without what they call of another part. The median of several runs counts.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Processor time of a command of mpucal in this process, by part."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import time

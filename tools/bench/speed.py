@@ -4,8 +4,6 @@ The kernel is compared with its NumPy twins on the same data in the same run, so
 every machine. Times are the processor's, so that what else runs counts little. Nothing here passes or fails.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any

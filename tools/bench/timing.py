@@ -1,7 +1,5 @@
 """Time and memory: of a part of a program, of a call, and of a command in a process of its own."""
 
-from __future__ import annotations
-
 import statistics
 import subprocess
 import sys

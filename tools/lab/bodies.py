@@ -1,7 +1,5 @@
 """Body of a vehicle in the simulated hand, for an autopilot's own simulator, which reads its sensors."""
 
-from __future__ import annotations
-
 import json
 import select
 import socket

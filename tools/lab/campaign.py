@@ -11,8 +11,6 @@ that does not fit, a failure without a sentence, or an incomplete file. A table 
 wrong case comes with the command that repeats it. Seeds begin with the day's number. Exit code 1: a case was wrong.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from datetime import date

@@ -1,7 +1,5 @@
 """Judgement of a command with faults: its files, its exit code, and its calibration against the truth."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recordings whose bytes, bits, rows and values are damaged, calibrated: tools/lab/campaign.py --recordings."""
 
-from __future__ import annotations
-
 import io
 import json
 import resource

@@ -4,8 +4,6 @@ A world is `--bus sim`, the same chip behind the emulated bridge, or `--mavlink 
 `World.reach` hears of it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -9,8 +9,6 @@ as `mpucal.recheck.drift` says of an unchanged one. Its rests and turns have the
 assumes of every mounting and every gyroscope.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace

@@ -3,8 +3,6 @@
 python -m tools.lab clock_trials --seeds 5000:5200     # -1 to +1 %, drifts of 50 ppm a minute, bursts of 1 to 16 ms
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

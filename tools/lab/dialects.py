@@ -4,8 +4,6 @@ python -m tools.lab dialects                      a row for each, as docs/record
 python -m tools.lab dialects --only '*ROS*'
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from functools import cache

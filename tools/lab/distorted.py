@@ -8,8 +8,6 @@ A good accelerometer is taken as perfect, and spoilt: gains by 10 %, skew by 5 d
 1 m/s^2, all uniform.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -10,8 +10,6 @@ A family is a row of scenarios/table.py. An error is the rms over the whole sphe
 limit is broken.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import cache

@@ -1,7 +1,5 @@
 """Feeds of a simulated chip: numbered samples, and the counts of a recording."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -13,8 +13,6 @@ wanted orientation is compared with that of one that turns the board as the page
 looks again.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

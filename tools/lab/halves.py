@@ -1,7 +1,5 @@
 """The two halves of a recording, cut in the middle of a rest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of a calibration, or of a vehicle's parameters, against the truth: in m/s^2, and in units of the claim."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

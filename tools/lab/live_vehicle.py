@@ -18,8 +18,6 @@ how far they are now (offset [m/s^2], scale) and the rms over D and b_a of (esti
 the time that was measured [s], and how far the attitude is off that level once the vehicle has been rebooted [deg].
 """
 
-from __future__ import annotations
-
 import json
 import math
 import signal

@@ -7,8 +7,6 @@ python -m tools.lab monte_carlo --methods '*' --seeds 5                 beside o
 python -m tools.lab monte_carlo --crlb --model accel --seeds 1000       one sensor, many noises
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from functools import partial

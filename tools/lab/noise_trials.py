@@ -4,8 +4,6 @@ python -m tools.lab noise_trials                        four kinds of axes, an h
 python -m tools.lab noise_trials --hours 3 --seeds 100
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

@@ -7,8 +7,6 @@ The exact filter first; then the hand's in the body frame, whose x = (s, p, v, a
 kernel/hand.hpp.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 

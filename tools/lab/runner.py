@@ -1,7 +1,5 @@
 """Runner of trials: options, a pool of processes for the scenarios, the table, and a JSON file of the rows."""
 
-from __future__ import annotations
-
 import argparse
 import fnmatch
 import inspect

@@ -7,8 +7,6 @@ are simulated seconds since the start. Exit code 1 where one ended as it should 
 `python -m tools.lab campaign`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Sessions on simulated sensors for the trials, in this process with their outputs, or as the command."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -7,8 +7,6 @@ no prompt reaches the hand. It takes a real-time priority if it may, as a microc
 the terminal has no room are lost.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from contextlib import suppress

@@ -13,8 +13,6 @@ vehicle's keys (an unknown one lists them) and its parameters' first values. Fur
     refuse=INS_ACCSCAL_Y                               # a parameter that it will not set
 """
 
-from __future__ import annotations
-
 import os
 import pty
 import sys

@@ -7,8 +7,6 @@ fitted to all rests but one, and judged by that one. Halves are cut in the middl
 the differences of D and b_a in units of what both claim, which are 1 if the standard deviations are true.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tables of trials: a line for each group of rows, a column for each figure of a group."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence

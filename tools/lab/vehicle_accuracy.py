@@ -12,8 +12,6 @@ was written and the vehicle rebooted, which a refused one does not have; `z` is 
 LEVEL_DEG off, or the z of all of them is not within Z.
 """
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

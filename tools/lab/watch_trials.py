@@ -8,8 +8,6 @@ turns it while it walks, and puts it down again; it trembles all the while. The 
 days before, as in tools/lab/check_trials.py, and the mounting bends in each rest by as much as there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial

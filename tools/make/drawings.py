@@ -1,7 +1,5 @@
 """Drawings in Mermaid for docs/: the rooms of mpucal with their imports, and the states of a session."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import defaultdict

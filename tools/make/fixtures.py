@@ -6,8 +6,6 @@ a simulated chip, ten seconds at 50 Hz, that suffered the fault NAME at the fift
 it. vectors/ are those of vectors.py.
 """
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections.abc import Sequence

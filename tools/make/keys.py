@@ -1,7 +1,5 @@
 """The schema of calibration.json and the table of its keys in docs/, from the types in mpucal/result/keys.py."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import is_dataclass

@@ -3,8 +3,6 @@
 python -m tools.make pages [--check]
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator

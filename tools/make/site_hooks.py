@@ -3,8 +3,6 @@
 The docstrings' `name : what it is` is made into the name and text that numpydoc has.
 """
 
-from __future__ import annotations
-
 import base64
 import re
 import subprocess

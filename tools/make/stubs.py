@@ -3,8 +3,6 @@
 python -m tools.make stubs
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

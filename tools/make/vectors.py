@@ -6,8 +6,6 @@ holds requests of a host and the replies of the bridge; clock_*.json the values 
 bits that the bridge must make of them.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import struct

@@ -3,8 +3,6 @@
 It stands for a microcontroller in tests and trials. See firmware_protocol.md.
 """
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable
 from typing import Any, TypeVar

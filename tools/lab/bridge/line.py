@@ -1,7 +1,5 @@
 """Serial line to an emulated bridge, as a port, in a time that passes only while the host waits; and its faults."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any

@@ -4,8 +4,6 @@ Each of the latter is a function of the course and a generator: (n, 3) m/s^2 of 
 rad/s in the body; 0.0 for none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

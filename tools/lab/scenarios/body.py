@@ -1,7 +1,5 @@
 """The board as a rigid body: its attitude, and the acceleration of a point on it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mpucal.calibration.rotation import cross

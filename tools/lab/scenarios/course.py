@@ -3,8 +3,6 @@
 Each motion is a function of the clock's step and a generator, and draws a course; a span is the least and the most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A family of hands and sensors, and the recording with known truth that a seed draws of it."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

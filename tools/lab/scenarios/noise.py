@@ -1,7 +1,5 @@
 """Noise of a sensor at rest, with known coefficients."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mpucal.data import Vector

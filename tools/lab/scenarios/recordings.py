@@ -3,8 +3,6 @@
 A motion gives the board's turns on a clock of steps, as in course.py.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial

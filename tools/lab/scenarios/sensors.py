@@ -1,7 +1,5 @@
 """Sensors drawn: those of the paper's section 4.3, an MPU-6050 as it is sold, any chip; and how they are sampled."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ linear one nearest to it; where a calibration names an unlikely gravity, D in un
 words and times are those that owners of such chips have reported; sources stand beside those rows.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
