@@ -14,7 +14,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Container, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -26,7 +26,8 @@ from mpucal.__main__ import _keep_streams
 from mpucal.chip.config import Config
 from mpucal.disk.growing_file import SyncThread
 from mpucal.mavlink.dialect import dialect
-from mpucal.session import rotate
+from mpucal.report import render
+from mpucal.session import results, rotate
 
 # documented exit codes, except that of a wrong use (2)
 CODES = (0, 3, 4, 5, 6)
@@ -140,6 +141,11 @@ def ready() -> None:
     import_module("numpy.ma")  # as NumPy's median does
     dialect()
     gc.freeze()
+
+
+def without_pictures() -> AbstractContextManager[object]:
+    """Leave the pictures out of the reports of sessions while the block runs."""
+    return patch.object(results, "render", lambda calibration, _: render(calibration))
 
 
 @contextmanager

@@ -13,10 +13,9 @@ from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.parameters.client import stream_parameter_names
 from mpucal.mavlink.parameters.encoding import from_wire
 from mpucal.mavlink.transports import ReceivedBytes
-from mpucal.session import results
 from mpucal.simulated.vehicle import SimulatedVehicle
 from mpucal.simulated.vehicle.transport import ADDRESS, SimulatedTransport
-from tools.processes import quick
+from tools.processes import quick, without_pictures
 
 OTHER_KEY = bytes(32)
 ODD = (float("nan"), float("inf"), -float("inf"), 3.4e38, -3.4e38, 1e-45, 0.0, 1.0, -9.8)
@@ -251,7 +250,7 @@ def hostile(attack: Attack) -> Iterator[None]:
     HostileTransport.attack = attack
     with (
         patch("mpucal.simulated.vehicle.SimulatedTransport", HostileTransport),
-        patch.object(results, "report", lambda _: None),
+        without_pictures(),
         quick(),
     ):
         yield

@@ -13,6 +13,7 @@ wrong case comes with the command that repeats it. Seeds begin with the day's nu
 
 import os
 from collections.abc import Sequence
+from contextlib import nullcontext
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -22,9 +23,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from mpucal.__main__ import run
-from mpucal.report import render
-from mpucal.session import results
-from tools.processes import Child, quick, ready
+from tools.processes import Child, quick, ready, without_pictures
 
 from .campaign_judge import FOLDER, judge_files
 from .campaign_recordings import Damaged, of_recording, originals
@@ -92,10 +91,8 @@ def run_with_faults(case: Case, world: World) -> int:
         world.begin_faults(case.faults)
 
     os.environ["XDG_STATE_HOME"] = str(Path("state").resolve())
-    if case.k % PICTURES:
-        setattr(results, "render", lambda calibration, _: render(calibration))  # noqa: B010 - it is imported there
     world.at(case.faults[0].at_s, begin)
-    with world.opened(), quick():
+    with world.opened(), quick(), without_pictures() if case.k % PICTURES else nullcontext():
         return run(words(case.number))
 
 

@@ -81,8 +81,12 @@ def test_an_output_that_cannot_be_written_is_left_as_it_is(holds):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc")
-def test_sessions_under_attack_end_in_an_allowed_way(holds):
-    holds("lab", "campaign", "--sessions", "16", "--recordings", "40", "--first", "1")
+@pytest.mark.parametrize(
+    "words",
+    ["lab campaign --sessions 16 --recordings 40 --first 1", "attack hostile_vehicle --seeds 1 --kinds junk"],
+)
+def test_sessions_under_attack_end_in_an_allowed_way(words, holds):
+    holds(*words.split())
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs named pipes and ulimit")
