@@ -14,7 +14,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from mpucal.session.beside import ONE_THREAD
 
@@ -70,6 +70,8 @@ def _add(parser: argparse.ArgumentParser, parameter: inspect.Parameter, hint: An
     hint, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     if get_origin(hint) is UnionType:
         hint = next(each for each in get_args(hint) if each is not NoneType)
+    if get_origin(hint) is Literal:
+        notes.append(get_args(hint))
     kind = get_args(hint)[0] if get_origin(hint) is Sequence else hint
     needed = parameter.default is parameter.empty
     how: dict[str, Any] = {"type": kind, "default": None if needed else parameter.default}

@@ -16,7 +16,6 @@ from typing import Annotated
 import numpy as np
 
 import mpucal
-from mpucal.calibration import MODELS
 from mpucal.calibration.masks import with_masks
 from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
@@ -67,7 +66,7 @@ def distortion(seed: int) -> tuple[Vector, Vector]:
 def of_seed(
     item: tuple[Path, int],
     *,
-    model: Annotated[Model, MODELS] = "auto",
+    model: Model = "auto",
     gravity: Annotated[float, "m/s^2"] = 9.81,
 ) -> list[Row]:
     """Distort, calibrate, and judge each of SETS by the distortion [m/s^2] and by motion capture [deg].

@@ -17,7 +17,6 @@ import numpy as np
 from rich.table import Table
 
 import mpucal
-from mpucal.calibration import MODELS
 from mpucal.calibration.fit import Fit
 from mpucal.calibration.model_selection import fit_in_place
 from mpucal.calibration.paper import fit_paper
@@ -204,7 +203,7 @@ def efficiency(fits: Sequence[Row]) -> list[dict[str, Any]]:
     return [dict(zip(("", "RMSE", "√CRLB", "RMSE / √CRLB"), row, strict=True)) for row in rows]
 
 
-def tried(item: int | tuple[str, int, str], *, model: Annotated[Model, MODELS] = "auto") -> Row | None:
+def tried(item: int | tuple[str, int, str], *, model: Model = "auto") -> Row | None:
     """Fit one sensor with a seed's noise, or calibrate a scene and a seed."""
     return fit_fixed(item, model) if isinstance(item, int) else of_seed(item, model)
 
