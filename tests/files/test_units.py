@@ -28,20 +28,6 @@ def same(found, walk, rtol=1e-6, gyr_atol=1e-6):
 
 
 @pytest.mark.parametrize(
-    ("acc", "mps2", "gyr", "rad_s"),
-    [
-        ("ug", G / 1e6, "udps", math.radians(1e-6)),
-        ("ft_s2", 0.3048, "rpm", math.tau / 60),
-        ("cm_s2", 0.01, "dps", math.radians(1)),
-        ("mm_s2", 0.001, "rad_s", 1.0),
-    ],
-)
-def test_units_in_names_are_applied(acc, mps2, gyr, rad_s, walk, ms, table):
-    names = [f"a{axis}_{acc}" for axis in "xyz"] + [f"g{axis}_{gyr}" for axis in "xyz"]
-    same(mpucal.load(table(f"ms,{','.join(names)}", ms, walk.acc / mps2, walk.gyr / rad_s)), walk)
-
-
-@pytest.mark.parametrize(
     ("mps2", "rad_s", "says"),
     [
         (0.001, 0.001, r"accelerations in mm/s\^2 .* and rates in mrad/s"),
@@ -91,12 +77,6 @@ def test_whole_mg_beside_mdeg(per_g, walk, ms, table):
     assert "accelerations in mg and rates in mdeg/s" in mpucal.load(path).taken
 
 
-def test_counts_stay_counts(walk, ms, table):
-    found = mpucal.load(table(HEADER, ms, np.rint(walk.acc * 8192 / G), np.rint(np.rad2deg(walk.gyr) * 65.536)))
-    assert "counts of ±4 g" in found.taken
-    same(found, walk, 1e-3, 1e-3)
-
-
 @pytest.mark.parametrize("orient", ["columns", "index"])
 def test_pandas_json_with_times_as_its_index(orient, walk, tmp_path):
     made = pd.DataFrame(np.column_stack([walk.acc, walk.gyr]), columns=NAMES, index=walk.t - walk.t[0])
@@ -125,15 +105,6 @@ def test_columns_of_different_times_are_refused(walk, tmp_path):
         mpucal.load(tmp_path / "a.json")
 
 
-def test_rows_of_cells_with_units_are_not_taken_for_heads(walk, tmp_path):
-    rows = [
-        ",".join([f"{t:.6f} s", *(f"{x:.9g} m/s^2" for x in acc), *(f"{x:.9g} rad/s" for x in gyr)])
-        for t, acc, gyr in zip(walk.t - walk.t[0], walk.acc, walk.gyr, strict=True)
-    ]
-    (tmp_path / "a.csv").write_text("\n".join([f"t,{','.join(NAMES)}", *rows, ""]))
-    assert len(mpucal.load(tmp_path / "a.csv")) == len(walk)
-
-
 def test_packets_of_samples_in_json(walk, tmp_path):
     """Read one time and lists of samples for each packet, as of Movesense."""
     size = 8
@@ -158,13 +129,6 @@ def test_two_lines_of_names_and_that_of_the_index(walk, tmp_path):
     same(mpucal.load(tmp_path / "a.csv"), walk)
 
 
-def test_lines_below_the_names_that_hold_no_numbers(walk, ms, table):
-    """Read what Shimmer's program says of each column, and then its unit."""
-    heads = [["Timestamp", *NAMES], ["CAL"] * 7, ["ms", *["m/(s^2)"] * 3, *["deg/s"] * 3]]
-    head = "\n".join(",".join(row) for row in heads)
-    same(mpucal.load(table(head, ms, walk.acc, np.rad2deg(walk.gyr))), walk)
-
-
 def test_lines_of_a_value_called_by_its_path(walk, tmp_path):
     """Read Foxglove's export, in which linear_acceleration is ROS's and contains gravity."""
     paths = [f"/imu.{of}.{axis}" for of in ("linear_acceleration", "angular_velocity") for axis in "xyz"]
@@ -172,12 +136,3 @@ def test_lines_of_a_value_called_by_its_path(walk, tmp_path):
     lines = [f"{t},{1e9 + t},{path},{of}" for t, row in samples for path, of in zip(paths, row, strict=True)]
     (tmp_path / "a.csv").write_text("\n".join(["elapsed,receive_time,topic,value", *lines]) + "\n")
     same(mpucal.load(tmp_path / "a.csv"), walk)
-
-
-def test_rates_called_after_turns_and_exponents_of_fortran(walk, tmp_path):
-    """Read rates in the order yaw, pitch, roll; a velocity along x is none."""
-    rows = np.column_stack([walk.t, walk.acc, walk.gyr[:, ::-1], walk.gyr[:, :1]])
-    text = "\n".join(" ".join(f"{value:.12E}" for value in row) for row in rows).replace("E", "D")
-    names = "time acc_x acc_y acc_z yaw_rate pitch_rate roll_rate x_vel"
-    (tmp_path / "a.txt").write_text(f"{names}\n{text}\n")
-    same(mpucal.load(tmp_path / "a.txt"), walk)

@@ -15,7 +15,7 @@ import numpy as np
 
 import mpucal
 from mpucal.files import load, open_writer
-from mpucal.files.hints import NO_HINTS, Hints, parse_columns
+from mpucal.files.hints import NO_HINTS, Hints, parse_columns, parse_units
 from mpucal.files.rows import Rows
 
 from .runner import Trial, names_of
@@ -85,7 +85,8 @@ WRITERS = {".npy": "NumPy", ".npz": "NumPy", ".mat": "SciPy", "quet": "pandas, p
 def hints_of(words: dict[str, Any]) -> Hints:
     """Return the hints of words of mpucal.load."""
     scales = (words.get(key) for key in ("accel_range", "gyro_range", "rate"))
-    return Hints(None, None, parse_columns(words["columns"]) if "columns" in words else {}, {}, *scales)
+    columns, units = words.get("columns"), words.get("units")
+    return Hints(None, None, parse_columns(columns) if columns else {}, parse_units(units) if units else {}, *scales)
 
 
 def written(name: str, folder: Path, w: Walk) -> Path:

@@ -52,13 +52,19 @@ def is_table(path: Path) -> bool:
 def is_own_table(path: Path) -> bool:
     """Return True if a file begins as a table in mpucal's own format and units."""
     first = next(iter(first_bytes(path).decode("utf-8-sig", "replace").splitlines()), "")
-    named = {name.strip(' "').lower() for name in first.split(",")}
-    table = _begun(path) if set(ROLES) <= named else None
-    if table is None or any(map(NAMES_SENSORS, table.header)) or of_one_sensor(table) is not table:
+    table = _begun(path) if _names_roles(first.split(",")) else None
+    # units in the cells stand in its header
+    if table is None or not _names_roles(table.header) or any(map(NAMES_SENSORS, table.header)):
+        return False
+    if of_one_sensor(table) is not table:
         return False
     if turns(_accelerations(table)) > 1:
         return False
     return _may_be_si(table, path) and not _may_be_no_seconds(table, path)
+
+
+def _names_roles(header: Sequence[str]) -> bool:
+    return set(ROLES) <= {name.strip(' "').lower() for name in header}
 
 
 def _begun(path: Path, count: int = SNIFFED) -> Table | None:
