@@ -177,7 +177,7 @@ class Bridged(BridgeBus):
     real_time = False
 
     def __init__(self, chip: SimulatedBus, world: World) -> None:
-        world.line = EmulatedLine(EmulatedBridge(chip, chip._clock.now), chip._clock)
+        world.line = EmulatedLine(EmulatedBridge(chip, chip._clock.now), chip._clock, step_ns=5_000_000)
         self.hear, self.truth_document = chip.hear, chip.truth_document
         super().__init__(world.line)
 
